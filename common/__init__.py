@@ -1,0 +1,1 @@
+"""What the master and the slave share; it imports neither."""

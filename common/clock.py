@@ -1,0 +1,29 @@
+"""The one place that reads a clock: integer nanoseconds of this host's monotonic clock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+NS_PER_S = 1_000_000_000
+NS_PER_MS = 1_000_000
+
+Clock = Callable[[], int]
+"""Returns now, in ns of one monotonic clock. Tests pass a virtual one."""
+
+monotonic_ns: Clock = time.monotonic_ns
+
+
+def to_ns(seconds: float) -> int:
+    """Seconds as integer nanoseconds."""
+    return round(seconds * NS_PER_S)
+
+
+def to_s(nanoseconds: int) -> float:
+    """Nanoseconds as seconds."""
+    return nanoseconds / NS_PER_S
+
+
+def to_ms(nanoseconds: float) -> float:
+    """Nanoseconds as milliseconds."""
+    return nanoseconds / NS_PER_MS

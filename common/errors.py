@@ -1,0 +1,48 @@
+"""Every error a person or a peer can cause; the command line prints them as one line each, no traceback."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class TandemError(Exception):
+    """Base of all errors that tandem raises on purpose; the text says what was wrong and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigMistake:
+    """One wrong entry of a configuration file."""
+
+    key: str
+    value: object
+    expected: str
+
+
+class ConfigError(TandemError):
+    """A configuration file that cannot be used: one line a mistake, each with file, key, value, expectation."""
+
+    def __init__(self, path: Path | str, mistakes: list[ConfigMistake]) -> None:
+        self.path = Path(path)
+        self.mistakes = mistakes
+        super().__init__("\n".join(f"{path}: {m.key} = {m.value!r}: expected {m.expected}" for m in mistakes))
+
+
+class CodecError(TandemError):
+    """A message from the wire that is not what its topic carries; count it and drop it."""
+
+
+class BusError(TandemError):
+    """A CAN bus that cannot be opened or has failed."""
+
+
+class LinkError(TandemError):
+    """A Zenoh session that cannot be opened, or a peer that does not answer."""
+
+
+class LinkTimeoutError(LinkError, TimeoutError):
+    """A peer that did not answer in time."""
+
+
+class RobotError(TandemError):
+    """A robot, servo or encoder that cannot be used."""

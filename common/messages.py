@@ -1,0 +1,168 @@
+"""What travels between the two sides. Times are ns of the sender's own monotonic clock unless named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.quaternion import Array
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class CommandStamps:
+    """When a command passed each station on the master, ns of the master's clock."""
+
+    sampled_ns: int
+    """SYNC sent: the nodes sample on it."""
+    frames_in_ns: int
+    """Last frame of the deciding tick arrived, or its window closed."""
+    solved_ns: int
+    """Joint angles known."""
+    put_ns: int
+    """Handed to the link."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """The operator's posture, master → slave, 12.5 Hz."""
+
+    robot: str
+    lease: int
+    """Token of the lease that the slave granted this master; 0 where it has none."""
+    sequence: int
+    """Counts up by one within a lease."""
+    tick: int
+    """Capture tick that decided it; the suit's truth carries the same number."""
+    stamps: CommandStamps
+    deadman_held: bool
+    valid: Mask
+    """(J,) False where a joint's nodes are lost: the slave holds just those."""
+    position_rad: Array
+    velocity_rad_s: Array
+
+
+@dataclass(frozen=True, slots=True)
+class CommandEcho:
+    """The stamps of the newest accepted command, sent back so that round trips close on one clock."""
+
+    sequence: int
+    put_ns: int
+    """Master's clock."""
+    received_ns: int
+    """Slave's clock, as all that follow."""
+    accepted_ns: int
+    written_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """What the robot does, slave → master, 50 Hz."""
+
+    robot: str
+    sequence: int
+    sent_ns: int
+    encoder_ns: int
+    """When the encoders were read."""
+    guard: str
+    """Name of the guard's state."""
+    reason: str
+    """Why the guard is there, in words."""
+    operator: str
+    """Who holds the lease, empty where nobody does."""
+    encoder_valid: Mask
+    position_rad: Array
+    """(J,) measured by the encoders."""
+    setpoint_rad: Array
+    """(J,) last written to the servos."""
+    echo: CommandEcho | None
+    master_offset_ns: int
+    """Master's clock minus the slave's, as the slave measured it."""
+    offset_bound_ns: int
+    """Half-width of its bound; negative where the offset is not trusted."""
+
+
+class Action(StrEnum):
+    """What a person or a master can ask of a robot."""
+
+    CLAIM = "claim"
+    RELEASE = "release"
+    ENGAGE = "engage"
+    DISENGAGE = "disengage"
+    ESTOP = "estop"
+    RESET = "reset"
+    STATUS = "status"
+
+
+@dataclass(frozen=True, slots=True)
+class ControlRequest:
+    """A question to the slave that must be answered."""
+
+    robot: str
+    action: Action
+    operator: str
+    """Who asks; `engage` and `disengage` are for the lease holder's name only."""
+    key: str = ""
+    """The reset key, for `reset`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlReply:
+    """What happened, and why not."""
+
+    done: bool
+    guard: str
+    text: str
+    lease: int = 0
+    """The token granted, for `claim`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockQuery:
+    """Master → slave. Carries the end of the last exchange, so that the slave can measure too."""
+
+    asked_ns: int
+    """t1, master's clock."""
+    last_asked_ns: int = 0
+    """t1 of the exchange before, 0 where there was none."""
+    last_heard_ns: int = 0
+    """t4 of the exchange before."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockReply:
+    """Slave → master."""
+
+    asked_ns: int
+    """t1, returned."""
+    received_ns: int
+    """t2, slave's clock."""
+    replied_ns: int
+    """t3, slave's clock."""
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Counters and figures of one process, 1 Hz, for tables and reports; a tree of plain values."""
+
+    role: str
+    sent_ns: int
+    figures: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The simulated operator's true joint angles: for judging, never read by either pipeline."""
+
+    tick: int
+    sampled_ns: int
+    """Suit's clock."""
+    position_rad: Array
+    velocity_rad_s: Array
+
+
+Message = Command | RobotState | ControlRequest | ControlReply | ClockQuery | ClockReply | Statistics | Truth

@@ -1,0 +1,101 @@
+"""Read a skeleton's TOML and refuse one that contradicts itself."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from common.errors import ConfigError, ConfigMistake
+from common.skeleton.table import WORLD, Joint, Segment, Skeleton
+
+_UNIT = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
+
+
+@cache
+def load_skeleton(name: str) -> Skeleton:
+    """The named profile that ships with tandem, such as `nursing`.
+
+    Raises ConfigError naming the profiles there are, or the entry that is wrong.
+    """
+    folder = resources.files(__package__)
+    names = sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml"))
+    if name not in names:
+        raise ConfigError("skeleton", [ConfigMistake("profile", name, f"one of {', '.join(names)}")])
+    return parse_skeleton(folder.joinpath(f"{name}.toml").read_text("utf-8"), source=f"{name}.toml")
+
+
+def parse_skeleton(text: str, source: str) -> Skeleton:
+    """A skeleton from TOML text (its form is described at the head of nursing.toml)."""
+    table = tomllib.loads(text)
+    skeleton = Skeleton(
+        name=table["name"],
+        segments=tuple(_segment(entry) for entry in table["segment"]),
+        joints=tuple(_joint(entry) for entry in table["joint"]),
+    )
+    mistakes = _mistakes(skeleton)
+    if mistakes:
+        raise ConfigError(source, mistakes)
+    return skeleton
+
+
+def _segment(entry: dict[str, Any]) -> Segment:
+    first, second, third = (_axis(a) for a in entry["axes"].split())
+    one, two, three = (None if a == "_" else a for a in entry["angles"].split())
+    return Segment(
+        name=entry["name"],
+        parent=entry["parent"],
+        axes=(first, second, third),
+        angles=(one, two, three),
+        origin_m=tuple(entry["origin_m"]),
+        node_m=tuple(entry["node_m"]),
+    )
+
+
+def _axis(text: str) -> tuple[int, int, int]:
+    sign = -1 if text.startswith("-") else 1
+    x, y, z = _UNIT[text.lstrip("-")]
+    return (sign * x, sign * y, sign * z)
+
+
+def _joint(entry: dict[str, Any]) -> Joint:
+    return Joint(
+        name=entry["name"],
+        lower_rad=math.radians(entry["lower_deg"]),
+        upper_rad=math.radians(entry["upper_deg"]),
+        max_velocity_rad_s=math.radians(entry["max_velocity_deg_s"]),
+        max_acceleration_rad_s2=math.radians(entry["max_acceleration_deg_s2"]),
+        drives=entry.get("drives", {entry["name"]: 1.0}),
+    )
+
+
+def _mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
+    mistakes = []
+    seen = {WORLD}
+    for segment in skeleton.segments:
+        if segment.parent not in seen:
+            mistakes.append(
+                ConfigMistake(f"{segment.name}.parent", segment.parent, "a segment listed before it")
+            )
+        if segment.name in seen:
+            mistakes.append(ConfigMistake("segment.name", segment.name, "a name used once"))
+        if sorted(tuple(map(abs, axis)) for axis in segment.axes) != [(0, 0, 1), (0, 1, 0), (1, 0, 0)]:
+            mistakes.append(ConfigMistake(f"{segment.name}.axes", segment.axes, "x, y and z in some order"))
+        seen.add(segment.name)
+    driven: set[str] = set()
+    for joint in skeleton.joints:
+        if not joint.lower_rad < joint.upper_rad:
+            mistakes.append(
+                ConfigMistake(f"{joint.name}.lower_deg", joint.lower_rad, "a limit below upper_deg")
+            )
+        for angle in joint.drives:
+            if angle not in skeleton.angle_slots or angle in driven:
+                mistakes.append(
+                    ConfigMistake(
+                        f"{joint.name}.drives", angle, "a segment's angle that no other joint drives"
+                    )
+                )
+            driven.add(angle)
+    return mistakes

@@ -1,0 +1,121 @@
+"""What a skeleton is: a tree of segments, the angles between neighbours, and the joints that drive them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.quaternion import Array
+
+WORLD = "world"
+"""The parent of a root segment: the ground, of which only the vertical is known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A body segment, which carries one node, and its joint with the neighbour it hangs on.
+
+    `axes` are the three signed unit axes (rows, parent frame in zero pose) of the intrinsic rotation
+    parent → segment; `angles` names the angle about each, None for a residual no robot joint follows.
+    """
+
+    name: str
+    parent: str
+    axes: tuple[tuple[int, int, int], tuple[int, int, int], tuple[int, int, int]]
+    angles: tuple[str | None, str | None, str | None]
+    origin_m: tuple[float, float, float]
+    node_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A robot joint, its limits, and the segment angles that follow it, each with its ratio."""
+
+    name: str
+    lower_rad: float
+    upper_rad: float
+    max_velocity_rad_s: float
+    max_acceleration_rad_s2: float
+    drives: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """One robot's table. Node arrays are in the order of `segments`, joint arrays in that of `joints`."""
+
+    name: str
+    segments: tuple[Segment, ...]
+    joints: tuple[Joint, ...]
+
+    @cached_property
+    def segment_names(self) -> tuple[str, ...]:
+        """Names of the segments (and of their nodes), in order."""
+        return tuple(s.name for s in self.segments)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in order."""
+        return tuple(j.name for j in self.joints)
+
+    @cached_property
+    def parents(self) -> NDArray[np.intp]:
+        """Index of each segment's parent, (N,); -1 for the world. A parent stands before its children."""
+        index = {name: i for i, name in enumerate(self.segment_names)}
+        return np.array([index.get(s.parent, -1) for s in self.segments], dtype=np.intp)
+
+    @cached_property
+    def angle_slots(self) -> dict[str, tuple[int, int]]:
+        """Where each named angle lives: (segment index, place 0..2 in its rotation order)."""
+        return {a: (i, k) for i, s in enumerate(self.segments) for k, a in enumerate(s.angles) if a}
+
+    @cached_property
+    def lower_rad(self) -> Array:
+        """Lower position limits, (J,)."""
+        return np.array([j.lower_rad for j in self.joints])
+
+    @cached_property
+    def upper_rad(self) -> Array:
+        """Upper position limits, (J,)."""
+        return np.array([j.upper_rad for j in self.joints])
+
+    @cached_property
+    def max_velocity_rad_s(self) -> Array:
+        """Velocity limits, (J,)."""
+        return np.array([j.max_velocity_rad_s for j in self.joints])
+
+    @cached_property
+    def max_acceleration_rad_s2(self) -> Array:
+        """Acceleration limits, (J,)."""
+        return np.array([j.max_acceleration_rad_s2 for j in self.joints])
+
+    @cached_property
+    def angles_from_joints(self) -> Array:
+        """Ratios (3 N, J): angle `3 * segment + place` of every segment for given joint positions."""
+        ratios = np.zeros((3 * len(self.segments), len(self.joints)))
+        for j, joint in enumerate(self.joints):
+            for angle, ratio in joint.drives.items():
+                segment, place = self.angle_slots[angle]
+                ratios[3 * segment + place, j] = ratio
+        return ratios
+
+    @cached_property
+    def joints_from_angles(self) -> Array:
+        """Weights (J, 3 N), the least-squares inverse of `angles_from_joints`: θ = Σ c α / Σ c²."""
+        ratios = self.angles_from_joints
+        out: Array = (ratios / np.sum(ratios**2, axis=0)).T
+        return out
+
+    @cached_property
+    def joint_needs_node(self) -> NDArray[np.bool_]:
+        """(J, N): True where a joint's angle cannot be known without that node (the segment or its parent)."""
+        needs = np.zeros((len(self.joints), len(self.segments)), dtype=np.bool_)
+        for j, joint in enumerate(self.joints):
+            for angle in joint.drives:
+                segment, _ = self.angle_slots[angle]
+                needs[j, segment] = True
+                if self.parents[segment] >= 0:
+                    needs[j, self.parents[segment]] = True
+        return needs

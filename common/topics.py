@@ -1,0 +1,48 @@
+"""One table of all topics: key, rate, time-out and quality of service; liveness follows from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Priority(StrEnum):
+    """Names as Zenoh has them."""
+
+    REAL_TIME = "real_time"
+    INTERACTIVE_HIGH = "interactive_high"
+    DATA = "data"
+    DATA_LOW = "data_low"
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A key expression with `{robot}` to fill in, and how it travels."""
+
+    name: str
+    key: str
+    rate_hz: float
+    """Nominal rate; 0 where it is sent on demand."""
+    timeout_s: float
+    """Silence after which it counts as dead; 0 where silence means nothing."""
+    priority: Priority
+    reliable: bool
+    drop: bool
+    """Under congestion drop rather than block: a `put` must never stall the loop."""
+    express: bool
+    """Never batched."""
+
+    def key_for(self, robot: str) -> str:
+        """The key of one robot."""
+        return self.key.format(robot=robot)
+
+
+COMMAND = Topic("command", "tandem/{robot}/command", 12.5, 0.2, Priority.REAL_TIME, False, True, True)
+STATE = Topic("state", "tandem/{robot}/state", 50.0, 0.2, Priority.INTERACTIVE_HIGH, False, True, True)
+CONTROL = Topic("control", "tandem/{robot}/control", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
+CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 0.5, Priority.REAL_TIME, True, True, True)
+STATISTICS = Topic("statistics", "tandem/{robot}/statistics", 1.0, 5.0, Priority.DATA_LOW, False, True, False)
+ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
+TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
+
+TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, CLOCK, STATISTICS, ALIVE, TRUTH)}

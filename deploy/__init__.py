@@ -1,0 +1,1 @@
+"""Everything that launches, demonstrates and judges the two sides."""

@@ -1,0 +1,1 @@
+"""The operator's side: nodes on CAN in, joint commands out."""
