@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo
 
 from common.errors import ConfigError, ConfigMistake
 
@@ -16,6 +17,10 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
+    def mistakes(self) -> list[ConfigMistake]:
+        """What no single key can tell: contradictions between keys. Asked once all keys are well formed."""
+        return []
+
 
 class LinkConfig(Section):
     """`[link]`: Zenoh endpoints, such as `tcp/192.168.7.2:7447`, `udp/…`, `ws/…`, `unixsock-stream/…`."""
@@ -24,35 +29,71 @@ class LinkConfig(Section):
     connect: list[str] = []
 
 
+def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
+    return (info.context or {}).get("folder", Path()) / path
+
+
+RelativePath = Annotated[Path, Field(strict=False), AfterValidator(_beside_the_file)]
+"""A path that is relative to the configuration file that names it."""
+
 Model = TypeVar("Model", bound=Section)
 
 
-def load_config(path: Path, model: type[Model]) -> Model:
-    """Read and check a TOML file before anything is opened. Raises ConfigError, one line a mistake."""
+def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -> Model:
+    """Read and check a TOML file before anything is opened.
+
+    `overrides` are `section.key=value` with the value in TOML, and win over the file.
+    Raises ConfigError, one line a mistake.
+    """
     try:
-        text = path.read_text("utf-8")
+        table = tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
-        raise ConfigError(
-            path, [ConfigMistake("file", str(path), f"a readable file ({error.strerror})")]
-        ) from None
-    try:
-        table = tomllib.loads(text)
+        raise _mistake(path, "file", str(path), f"a readable file ({error.strerror})") from None
+    except UnicodeDecodeError as error:
+        raise _mistake(path, "file", path.name, f"UTF-8 text ({error.reason})") from None
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(path, [ConfigMistake("file", path.name, f"valid TOML ({error})")]) from None
+        raise _mistake(path, "file", path.name, f"valid TOML ({error})") from None
+    for override in overrides:
+        _override(table, override)
     return check_config(path, table, model)
 
 
 def check_config(path: Path, table: dict[str, Any], model: type[Model]) -> Model:
     """The checked model of a table that was read from `path`."""
     try:
-        # TOML has no tuples and its integers serve as floats: lax there, strict in the rest
-        return model.model_validate(table)
+        checked = model.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
         mistakes = [
             ConfigMistake(".".join(map(str, e["loc"])) or "file", e["input"], _expected(e["type"], e["msg"]))
             for e in error.errors()
         ]
         raise ConfigError(path, mistakes) from None
+    contradictions = checked.mistakes()
+    if contradictions:
+        raise ConfigError(path, contradictions)
+    return checked
+
+
+def _override(table: dict[str, Any], text: str) -> None:
+    key, equals, value = text.partition("=")
+    if not equals:
+        raise _mistake("--set", "--set", text, "section.key=value")
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        raise _mistake(
+            "--set", key, value, "a TOML value; texts need quotes, as in 'robot=\"robot-2\"'"
+        ) from None
+    *sections, last = key.strip().split(".")
+    for section in sections:
+        table = table.setdefault(section, {})
+        if not isinstance(table, dict):
+            raise _mistake("--set", key, text, f"{section} to be a table")
+    table[last] = parsed
+
+
+def _mistake(path: Path | str, key: str, value: object, expected: str) -> ConfigError:
+    return ConfigError(path, [ConfigMistake(key, value, expected)])
 
 
 def _expected(kind: str, message: str) -> str:
