@@ -30,7 +30,8 @@ class LinkConfig(Section):
 
 
 def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
-    return (info.context or {}).get("folder", Path()) / path
+    folder: Path = (info.context or {}).get("folder", Path())
+    return folder / path
 
 
 RelativePath = Annotated[Path, Field(strict=False), AfterValidator(_beside_the_file)]
