@@ -20,7 +20,7 @@ class ConfigMistake:
 
 
 class ConfigError(TandemError):
-    """A configuration file that cannot be used: one line a mistake, each with file, key, value, expectation."""
+    """A configuration file that cannot be used: one line a mistake, with file, key, value, expectation."""
 
     def __init__(self, path: Path | str, mistakes: list[ConfigMistake]) -> None:
         self.path = Path(path)

@@ -8,31 +8,59 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 IDENTITY: Array = np.array([1.0, 0.0, 0.0, 0.0])
+_CONJUGATE: Array = np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def _hamilton() -> Array:
+    """The product's structure: (p outer q) flattened to 16, times this (16, 4), is p ⊗ q."""
+    i, j, k = (0, 1), (0, 2), (0, 3)
+    table = [
+        [(0, 0), i, j, k],
+        [i, (1, 0), k, (1, 2)],
+        [j, (1, 3), (1, 0), i],
+        [k, j, (1, 1), (1, 0)],
+    ]
+    structure = np.zeros((4, 4, 4))
+    for p, row in enumerate(table):
+        for q, (minus, unit) in enumerate(row):
+            structure[p, q, unit] = -1.0 if minus else 1.0
+    return structure.reshape(16, 4)
+
+
+def _cross() -> Array:
+    """The same for a × b: (a outer b) flattened to 9, times this (9, 3)."""
+    return _hamilton().reshape(4, 4, 4)[1:, 1:, 1:].reshape(9, 3).copy()
+
+
+_HAMILTON = _hamilton()
+_CROSS = _cross()
 
 
 def multiply(p: Array, q: Array) -> Array:
     """Hamilton product p ⊗ q. Shapes (..., 4), broadcast."""
-    pw, px, py, pz = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
-    qw, qx, qy, qz = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    out = np.empty(np.broadcast_shapes(p.shape, q.shape))
-    out[..., 0] = pw * qw - px * qx - py * qy - pz * qz
-    out[..., 1] = pw * qx + px * qw + py * qz - pz * qy
-    out[..., 2] = pw * qy - px * qz + py * qw + pz * qx
-    out[..., 3] = pw * qz + px * qy - py * qx + pz * qw
+    # one outer product and one matrix product: on a few dozen rows numpy's cost is its calls
+    outer = p[..., :, None] * q[..., None, :]
+    out: Array = outer.reshape(*outer.shape[:-2], 16) @ _HAMILTON
+    return out
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Vector product a × b. Shapes (..., 3), broadcast."""
+    outer = a[..., :, None] * b[..., None, :]
+    out: Array = outer.reshape(*outer.shape[:-2], 9) @ _CROSS
     return out
 
 
 def conjugate(q: Array) -> Array:
     """The inverse rotation of unit quaternions. Shape (..., 4)."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    return q * _CONJUGATE
 
 
 def rotate(q_a_from_b: Array, v_b: Array) -> Array:
     """Vectors (..., 3) of b in the coordinates of a."""
     w, r = q_a_from_b[..., :1], q_a_from_b[..., 1:]
-    t = 2.0 * np.cross(r, v_b)
-    out: Array = v_b + w * t + np.cross(r, t)
-    return out
+    t = 2.0 * cross(r, v_b)
+    return v_b + w * t + cross(r, t)
 
 
 def normalise(q: Array) -> Array:

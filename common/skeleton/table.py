@@ -42,9 +42,12 @@ class Joint:
     drives: dict[str, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Skeleton:
-    """One robot's table. Node arrays are in the order of `segments`, joint arrays in that of `joints`."""
+    """One robot's table, compared by identity.
+
+    Node arrays are in the order of `segments`, joint arrays in that of `joints`.
+    """
 
     name: str
     segments: tuple[Segment, ...]
@@ -65,6 +68,23 @@ class Skeleton:
         """Index of each segment's parent, (N,); -1 for the world. A parent stands before its children."""
         index = {name: i for i, name in enumerate(self.segment_names)}
         return np.array([index.get(s.parent, -1) for s in self.segments], dtype=np.intp)
+
+    @cached_property
+    def axis_frames(self) -> Array:
+        """(N, 3, 3) proper rotations whose columns are a1, a2, a1 × a2 of each segment's `axes`.
+
+        In these frames every segment's rotation is the plain intrinsic x-y-z one, the third angle
+        times `axis_handedness`.
+        """
+        a = np.array([s.axes for s in self.segments], dtype=np.float64)
+        return np.stack([a[:, 0], a[:, 1], np.cross(a[:, 0], a[:, 1])], axis=-1)
+
+    @cached_property
+    def axis_handedness(self) -> Array:
+        """(N,): +1 where a3 = a1 × a2, -1 where a3 is its opposite."""
+        a = np.array([s.axes for s in self.segments], dtype=np.float64)
+        out: Array = np.sum(np.cross(a[:, 0], a[:, 1]) * a[:, 2], axis=-1)
+        return out
 
     @cached_property
     def angle_slots(self) -> dict[str, tuple[int, int]]:
@@ -110,7 +130,7 @@ class Skeleton:
 
     @cached_property
     def joint_needs_node(self) -> NDArray[np.bool_]:
-        """(J, N): True where a joint's angle cannot be known without that node (the segment or its parent)."""
+        """(J, N): True where a joint's angle needs that node (the segment's own or its parent's)."""
         needs = np.zeros((len(self.joints), len(self.segments)), dtype=np.bool_)
         for j, joint in enumerate(self.joints):
             for angle in joint.drives:
