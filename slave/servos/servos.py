@@ -1,0 +1,44 @@
+"""What every robot's servos can do: take setpoints, give encoder counts, hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.messages import Mask
+from common.quaternion import Array
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderReading:
+    """One reading of all encoders at the output shafts."""
+
+    read_ns: int
+    """When the counts were taken, ns of the slave's clock."""
+    counts: NDArray[np.int64]
+    """(J,) 0..4095, raw: neither zero nor direction applied."""
+    valid: Mask
+    """(J,) False where the encoder does not answer or says it cannot be trusted."""
+
+
+class Servos(Protocol):
+    """The robot as the slave sees it. No method blocks for longer than `start` and `stop` must."""
+
+    def start(self) -> None:
+        """Open the drives; they hold where they stand. Raises RobotError where that fails."""
+        ...
+
+    def write(self, position_rad: Array) -> None:
+        """Hand over setpoints (J,); the newest wins. Never blocks."""
+        ...
+
+    def read(self) -> EncoderReading:
+        """The newest reading there is. Never blocks; its `read_ns` tells how old it is."""
+        ...
+
+    def stop(self) -> None:
+        """Let go of the drives, which hold by themselves. Safe to call twice."""
+        ...

@@ -1,0 +1,5 @@
+"""From commands at 12.5 Hz to setpoints at the servo rate."""
+
+from slave.track.tracker import Target, Tracker
+
+__all__ = ["Target", "Tracker"]

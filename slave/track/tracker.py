@@ -1,0 +1,39 @@
+"""What every strategy does: take samples of the operator as they come, say where to be now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from common.quaternion import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where the joints should be told to go now."""
+
+    position_rad: Array
+    """(J,)"""
+    velocity_rad_s: Array
+    """(J,) rate of change of `position_rad`; for feed-forward and for judging, not for integration."""
+
+
+class Tracker(Protocol):
+    """One strategy. All times are ns of the slave's clock."""
+
+    def reset(self) -> None:
+        """Forget every sample: the next one starts afresh."""
+        ...
+
+    def accept(self, sampled_ns: int, now_ns: int, position_rad: Array, velocity_rad_s: Array) -> None:
+        """Take a sample (J,) that was captured at `sampled_ns` and arrived at `now_ns`.
+
+        A sample captured no later than the newest one is ignored. All values must be finite; a
+        velocity of zero on every joint is taken as "not known" only by its effect: nothing is
+        extrapolated.
+        """
+        ...
+
+    def target(self, now_ns: int) -> Target | None:
+        """Where to be now, or None before the first sample. `now_ns` never goes back."""
+        ...
