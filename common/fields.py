@@ -1,0 +1,143 @@
+"""Single fields of a wire message: packed on sending, checked on arrival. Any doubt raises CodecError."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import CodecError
+from common.messages import Mask
+from common.quaternion import Array
+
+MAX_NAME = 64
+MAX_TEXT = 512
+MAX_ITEMS = 4096
+"""Entries of one array or map."""
+MAX_DEPTH = 16
+"""Levels of a tree of figures."""
+_U63 = (1 << 63) - 1
+_F4 = np.dtype("<f4")
+
+
+def pack_floats(first: Array, second: Array) -> bytes:
+    """Two arrays of one length as one float32 block: 1e-7 of a turn, half the size."""
+    return first.astype(_F4).tobytes() + second.astype(_F4).tobytes()
+
+
+def floats(value: object, count: int, limits: tuple[float, float]) -> tuple[Array, Array]:
+    """Two float64 arrays of `count`, none of whose values lies beyond ± its limit or is not finite."""
+    if type(value) is not bytes or len(value) != 8 * count:
+        raise CodecError(f"not two times {count} float32 values")
+    block = np.frombuffer(value, _F4)
+    bounds, all_true = _bounds(count, limits)
+    # one comparison refuses NaN and infinity too; before the cast, which would warn of a signalling NaN
+    if (np.abs(block) <= bounds).tobytes() != all_true:
+        raise CodecError(f"a value is not finite, or beyond ±{limits[0]:g} or ±{limits[1]:g}")
+    wide = block.astype(np.float64)
+    return wide[:count], wide[count:]
+
+
+@lru_cache(maxsize=32)
+def _bounds(count: int, limits: tuple[float, float]) -> tuple[NDArray[np.float32], bytes]:
+    """The limits as float32, as the values are, so that a value at its limit passes; and all-True bytes."""
+    return np.repeat(np.array(limits, _F4), count), b"\x01" * (2 * count)
+
+
+def pack_mask(mask: Mask) -> bytes:
+    """One byte an entry: ten times faster here than bits, for twenty bytes more."""
+    return mask.tobytes()
+
+
+def mask(value: object, count: int) -> Mask:
+    """A read-only mask of `count` entries."""
+    if type(value) is not bytes or len(value) != count or value.strip(b"\x00\x01"):
+        raise CodecError(f"not a mask of {count} flags")
+    return np.frombuffer(value, np.bool_)
+
+
+def counts(values: tuple[Any, ...]) -> tuple[int, ...]:
+    """Integers of 0 to 2**63 - 1: counters, ticks and stamps in ns."""
+    for value in values:
+        if type(value) is not int or not 0 <= value <= _U63:
+            raise CodecError(f"{short(value)} is not a 63-bit count")
+    return values
+
+
+def count(value: Any) -> int:
+    """One integer of 0 to 2**63 - 1."""
+    if type(value) is not int or not 0 <= value <= _U63:
+        raise CodecError(f"{short(value)} is not a 63-bit count")
+    return value
+
+
+def signed(value: Any) -> int:
+    """An integer of ±(2**63 - 1)."""
+    if type(value) is not int or not -_U63 <= value <= _U63:
+        raise CodecError(f"{short(value)} is not a 64-bit integer")
+    return value
+
+
+def flag(value: Any) -> bool:
+    """True or false, not 0 or 1."""
+    if type(value) is not bool:
+        raise CodecError(f"{short(value)} is not a flag")
+    return value
+
+
+def text(value: Any, most: int) -> str:
+    """A text of at most `most` characters."""
+    if type(value) is not str or len(value) > most:
+        raise CodecError(f"{short(value)} is not a text of at most {most} characters")
+    return value
+
+
+def length(fields: tuple[Any, ...], expected: int) -> None:
+    """Refuse an array of any other length."""
+    if len(fields) != expected:
+        raise CodecError(f"{len(fields)} fields, expected {expected}")
+
+
+def pack_figures(value: object) -> object:
+    """A tree that msgpack carries: numpy numbers made plain, a value that is not finite made None."""
+    if isinstance(value, dict):
+        return {str(key): pack_figures(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [pack_figures(item) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return pack_figures(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def figures(value: Any) -> dict[str, object]:
+    """A tree of maps with text keys, arrays, texts, finite numbers, flags and None."""
+    if type(value) is not dict:
+        raise CodecError("figures are not a map")
+    _check_figures(value, MAX_DEPTH)
+    return value
+
+
+def _check_figures(value: object, depth: int) -> None:
+    if depth == 0:
+        raise CodecError(f"figures are nested more than {MAX_DEPTH} deep")
+    kind = type(value)
+    if kind is dict:
+        for key, item in value.items():  # type: ignore[attr-defined]
+            if type(key) is not str:
+                raise CodecError(f"{short(key)} is not a key")
+            _check_figures(item, depth - 1)
+    elif kind is tuple:
+        for item in value:  # type: ignore[attr-defined]
+            _check_figures(item, depth - 1)
+    elif not (value is None or kind in (int, str, bool) or (kind is float and math.isfinite(value))):  # type: ignore[arg-type]
+        raise CodecError(f"{short(value)} is not a figure")
+
+
+def short(value: object) -> str:
+    """A value as an error may quote it."""
+    return repr(value)[:40]
