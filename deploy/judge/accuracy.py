@@ -1,0 +1,190 @@
+"""Solved against truth at the same instants: every joint, the paper's Table 1, and its η (Eq. 25).
+
+The paper first shifts its solved angles by one 80 ms step, to take out the lag against its reference. Nothing
+is shifted here: rows are matched by capture tick, so a lag of the estimate counts as an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.messages import Mask
+from common.quaternion import Array
+from deploy.judge.paper import STEP_TICKS, TABLE_1
+from deploy.judge.trace import SolvedSeries, Ticks, TruthSeries
+
+SIDES = ("left", "right")
+MIN_SAMPLES = 10
+"""Fewer matched samples of a joint than these give no figure."""
+FAST_SHARE = 0.5
+FAST_QUANTILE = 0.95
+FAST_FLOOR_DEG = 0.5
+"""A step is fast where the truth changes by at least FAST_SHARE of the joint's FAST_QUANTILE step, and by
+FAST_FLOOR_DEG (6°/s): the middle half of a reach, and nothing of a joint that only trembles."""
+MIN_FAST_STEPS = 2
+"""Shorter runs of fast steps are not a period."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointAccuracy:
+    """One joint (or all) over the whole run, degrees, solved minus truth."""
+
+    samples: int
+    mae_deg: float
+    rmse_deg: float
+    bias_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class FastAccuracy:
+    """One joint over its fast-moving periods: a row of the paper's Table 1, with the terms of Eq. 25."""
+
+    samples: int
+    change_deg: float
+    """Mean change of the truth per step."""
+    error_deg: float
+    """Mean absolute error."""
+    rmse_deg: float
+    signed_deg: float
+    """Eq. 25, numerator: |mean(truth) - mean(solved)| of a period, averaged over periods by their samples."""
+    travel_deg: float
+    """Eq. 25, denominator: mean of |truth - its first of the period|."""
+
+    @property
+    def ratio(self) -> float:
+        """Error as a share of the change per step."""
+        return self.error_deg / self.change_deg
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """How well the angles were solved. What there was not enough data for is None."""
+
+    joints: Mapping[str, JointAccuracy | None]
+    overall: JointAccuracy | None
+    fast: Mapping[str, FastAccuracy | None]
+    """By full joint name, such as `left_elbow_pitch`: Table 1's five joints on each side the robot has."""
+    eta_percent_by_side: Mapping[str, float | None]
+    eta_joints: Mapping[str, int]
+    """How many of the five joints had a fast period, and so stand in that side's η."""
+
+    @property
+    def eta_percent(self) -> float | None:
+        """The worse side's η."""
+        return max((eta for eta in self.eta_percent_by_side.values() if eta is not None), default=None)
+
+    @property
+    def fast_mae_deg(self) -> float | None:
+        """Mean absolute error over all fast periods, beside η because η averages signed errors."""
+        rows = [row for row in self.fast.values() if row is not None]
+        return _mean([row.error_deg for row in rows], [row.samples for row in rows])
+
+    @property
+    def fast_rmse_deg(self) -> float | None:
+        """Root mean square error over all fast periods."""
+        rows = [row for row in self.fast.values() if row is not None]
+        square = _mean([row.rmse_deg**2 for row in rows], [row.samples for row in rows])
+        return None if square is None else square**0.5
+
+    def worse(self, joint: str) -> FastAccuracy | None:
+        """The side with the larger mean error of one of Table 1's joints."""
+        rows = [row for side in SIDES if (row := self.fast.get(f"{side}_{joint}")) is not None]
+        return max(rows, key=lambda row: row.error_deg, default=None)
+
+    def mean_error_deg(self, joint: str) -> float | None:
+        """Mean error of one of Table 1's joints over both sides, by samples."""
+        rows = [row for side in SIDES if (row := self.fast.get(f"{side}_{joint}")) is not None]
+        return _mean([row.error_deg for row in rows], [row.samples for row in rows])
+
+
+def accuracy(truth: TruthSeries, solved: SolvedSeries, joint_names: Sequence[str]) -> Accuracy:
+    """Judge the solved angles, row by row of equal tick. Invalid and non-finite entries count nowhere.
+
+    `joint_names` (J,) are in the order of the columns. Poor data raises nothing: what it cannot tell is None.
+    """
+    ticks, t_row, s_row = np.intersect1d(truth.tick, solved.tick, return_indices=True)
+    true_deg = _degrees(truth.position_rad[t_row], np.ones_like(solved.valid[s_row]))
+    error_deg = _degrees(solved.position_rad[s_row], solved.valid[s_row]) - true_deg
+    column = {name: i for i, name in enumerate(joint_names)}
+    table_1 = [name for side in SIDES for joint in TABLE_1 if (name := f"{side}_{joint}") in column]
+    fast = {name: _fast(ticks, true_deg[:, column[name]], error_deg[:, column[name]]) for name in table_1}
+    by_side = {
+        side: [row for joint in TABLE_1 if (row := fast.get(f"{side}_{joint}")) is not None] for side in SIDES
+    }
+    return Accuracy(
+        joints={name: _whole(error_deg[:, i]) for name, i in column.items()},
+        overall=_whole(error_deg.ravel()),
+        fast=fast,
+        eta_percent_by_side={side: _eta_percent(rows) for side, rows in by_side.items()},
+        eta_joints={side: len(rows) for side, rows in by_side.items()},
+    )
+
+
+def fast_periods(ticks: Ticks, true_deg: Array, usable: Mask) -> list[slice]:
+    """Runs of rows over which a joint moves fast (see FAST_SHARE), each at least MIN_FAST_STEPS steps long.
+
+    `ticks`, `true_deg` and `usable` are (T,). A lost command or an unusable row ends a period, because the
+    change per step is then not known.
+    """
+    whole_step = (np.diff(ticks) == STEP_TICKS) & usable[:-1] & usable[1:]
+    change_deg = np.where(whole_step, np.abs(np.diff(true_deg)), 0.0)
+    if not whole_step.any():
+        return []
+    quantile_deg = float(np.quantile(change_deg[whole_step], FAST_QUANTILE))
+    fast = change_deg >= max(FAST_FLOOR_DEG, FAST_SHARE * quantile_deg)
+    edges = np.flatnonzero(np.diff(fast.astype(np.int8), prepend=0, append=0))
+    starts, stops = edges[::2], edges[1::2]
+    # steps start..stop-1 join rows start..stop
+    return [slice(a, b + 1) for a, b in zip(starts, stops, strict=True) if b - a >= MIN_FAST_STEPS]
+
+
+def _degrees(angle_rad: Array, valid: Mask) -> Array:
+    return np.degrees(np.where(valid & np.isfinite(angle_rad), angle_rad, np.nan))
+
+
+def _whole(error_deg: Array) -> JointAccuracy | None:
+    error_deg = error_deg[np.isfinite(error_deg)]
+    if len(error_deg) < MIN_SAMPLES:
+        return None
+    return JointAccuracy(
+        samples=len(error_deg),
+        mae_deg=float(np.mean(np.abs(error_deg))),
+        rmse_deg=float(np.sqrt(np.mean(error_deg**2))),
+        bias_deg=float(np.mean(error_deg)),
+    )
+
+
+def _fast(ticks: Ticks, true_deg: Array, error_deg: Array) -> FastAccuracy | None:
+    usable = np.isfinite(error_deg)
+    if np.count_nonzero(usable) < MIN_SAMPLES:
+        return None
+    periods = fast_periods(ticks, true_deg, usable)
+    if not periods:
+        return None
+    errors = np.concatenate([error_deg[p] for p in periods])
+    lengths = [len(error_deg[p]) for p in periods]
+    # each period by itself: pooled, the error of reaching out would cancel that of drawing back
+    signed = [abs(float(np.mean(error_deg[p]))) for p in periods]
+    travel = [float(np.mean(np.abs(true_deg[p] - true_deg[p][0]))) for p in periods]
+    return FastAccuracy(
+        samples=len(errors),
+        change_deg=float(np.mean(np.concatenate([np.abs(np.diff(true_deg[p])) for p in periods]))),
+        error_deg=float(np.mean(np.abs(errors))),
+        rmse_deg=float(np.sqrt(np.mean(errors**2))),
+        signed_deg=float(np.average(signed, weights=lengths)),
+        travel_deg=float(np.average(travel, weights=lengths)),
+    )
+
+
+def _eta_percent(rows: Sequence[FastAccuracy]) -> float | None:
+    """Eq. 25 over the joints of one arm; with one period a joint it is the paper's formula to the letter."""
+    if not rows:
+        return None
+    return 100.0 * sum(row.signed_deg for row in rows) / sum(row.travel_deg for row in rows)
+
+
+def _mean(values: Sequence[float], weights: Sequence[int]) -> float | None:
+    return float(np.average(values, weights=weights)) if values else None

@@ -1,0 +1,174 @@
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.quaternion import Array
+from deploy.judge import motion
+from deploy.judge.motion import MIN_SAMPLES, MOVING_DEG, SETTLE_S
+
+COUNT_RAD = 2 * np.pi / 4096
+
+
+def quantised(position: Array) -> Array:
+    return np.round(position / COUNT_RAD) * COUNT_RAD
+
+
+def test_a_perfect_copy_has_no_lag_no_error_and_roughness_one(run: Any) -> None:
+    judged = motion(run.truth(), run.moved(), run.names)
+    assert judged is not None
+    assert judged.lag_ms == pytest.approx(0.0, abs=1.0)
+    assert judged.rmse_deg < 0.01
+    assert judged.roughness == pytest.approx(1.0, abs=0.001)
+
+
+@pytest.mark.parametrize("late_ms", [-60.0, 12.0, 87.3, 240.0, 430.0])
+def test_a_known_lag_is_found_to_a_millisecond(run: Any, late_ms: float) -> None:
+    judged = motion(run.truth(), run.moved(late_s=late_ms / 1000, change=quantised), run.names)
+    assert judged is not None
+    assert judged.lag_ms == pytest.approx(late_ms, abs=1.0)
+    assert judged.aligned_rmse_deg is not None
+    assert judged.aligned_rmse_deg < 0.05 < judged.rmse_deg
+
+
+@pytest.mark.parametrize("late_ms", [-250.0, 700.0])
+def test_a_lag_outside_the_search_is_not_made_up(run: Any, late_ms: float) -> None:
+    judged = motion(run.truth(), run.moved(late_s=late_ms / 1000), run.names)
+    assert judged is not None
+    assert judged.lag_ms is None
+    assert judged.aligned_rmse_deg is None
+    assert judged.rmse_deg > 5.0
+
+
+def test_a_bias_survives_alignment(run: Any) -> None:
+    judged = motion(run.truth(), run.moved(late_s=0.05, change=lambda p: p + np.radians(2.0)), run.names)
+    assert judged is not None
+    assert judged.lag_ms == pytest.approx(50.0, abs=1.0)
+    assert judged.aligned_rmse_deg == pytest.approx(2.0, abs=0.01)
+
+
+def test_only_joints_that_move_are_judged(run: Any) -> None:
+    moved = run.moved()
+    moved.position_rad[:, 3] += 1.0  # the neck stays; its encoder is a radian off
+    judged = motion(run.truth(), moved, run.names)
+    assert judged is not None
+    assert set(judged.joints) == set(run.names[:3])
+    assert judged.rmse_deg < 0.01
+
+
+@pytest.mark.parametrize(("range_deg", "judged"), [(MOVING_DEG + 0.1, True), (MOVING_DEG - 0.1, False)])
+def test_moving_means_a_range_of_a_few_degrees(run: Any, range_deg: float, judged: bool) -> None:
+    whole = run.at
+    run.at = lambda time_s: whole(time_s) * range_deg / 60.0
+    found = motion(run.truth(), run.moved(), run.names)
+    assert (found is not None) == judged
+    if found is not None:
+        assert set(found.joints) == {run.names[0]}
+
+
+def test_only_tracking_counts_and_its_first_second_does_not(run: Any) -> None:
+    moved = run.moved()
+    begins = 250  # 5 s
+    settled = begins + round(SETTLE_S * 50)
+    moved.tracking[:begins] = False
+    moved.position_rad[:settled] += 1.0
+    judged = motion(run.truth(), moved, run.names)
+    assert judged is not None
+    assert judged.rmse_deg < 0.01
+    moved.position_rad[settled] += 1.0
+    judged = motion(run.truth(), moved, run.names)
+    assert judged is not None
+    assert judged.rmse_deg > 0.1
+
+
+def test_each_hand_over_settles_anew(run: Any) -> None:
+    moved = run.moved()
+    moved.tracking[400:420] = False
+    moved.position_rad[400:470] += 1.0
+    judged = motion(run.truth(), moved, run.names)
+    assert judged is not None
+    assert judged.rmse_deg < 0.01
+
+
+def test_a_bad_encoder_is_left_out_and_the_others_judged(run: Any) -> None:
+    moved = run.moved()
+    moved.position_rad[300:400, 1] = 9.0
+    moved.valid[300:400, 1] = False
+    moved.position_rad[200, 0] = np.nan
+    judged = motion(run.truth(), moved, run.names)
+    assert judged is not None
+    assert judged.rmse_deg < 0.01
+    assert judged.roughness == pytest.approx(1.0, abs=0.001)
+
+
+def test_gaps_of_truth_and_encoders_are_not_filled_in(run: Any) -> None:
+    truth, moved = run.truth(), run.moved(late_s=0.03)
+    kept = np.r_[0:1000, 1300:2000, 2100:4000]
+    truth = replace(
+        truth, tick=truth.tick[kept], sampled_ns=truth.sampled_ns[kept], position_rad=truth.position_rad[kept]
+    )
+    truth.position_rad[500:560] = np.nan
+    rows = np.r_[0:600, 640:900]
+    moved = replace(
+        moved,
+        encoder_ns=moved.encoder_ns[rows],
+        position_rad=moved.position_rad[rows],
+        valid=moved.valid[rows],
+        tracking=moved.tracking[rows],
+    )
+    judged = motion(truth, moved, run.names)
+    assert judged is not None
+    assert judged.lag_ms == pytest.approx(30.0, abs=1.0)
+    assert judged.aligned_rmse_deg is not None
+    assert judged.aligned_rmse_deg < 0.02
+    # the robot is 30 ms late, so its stretches differ a little from the operator's
+    assert judged.roughness == pytest.approx(1.0, abs=0.1)
+
+
+def test_rows_out_of_order_or_twice_change_nothing(run: Any) -> None:
+    moved = run.moved(late_s=0.04)
+    rows = np.random.default_rng(0).permutation(np.r_[np.arange(len(moved.encoder_ns)), 5, 6, 7])
+    shuffled = replace(
+        moved,
+        encoder_ns=moved.encoder_ns[rows],
+        position_rad=moved.position_rad[rows],
+        valid=moved.valid[rows],
+        tracking=moved.tracking[rows],
+    )
+    assert motion(run.truth(), shuffled, run.names) == motion(run.truth(), moved, run.names)
+
+
+@pytest.mark.parametrize("spoil", ["nothing", "still", "never tracked", "nan", "no truth", "other time"])
+def test_useless_input_gives_none(run: Any, spoil: str) -> None:
+    truth, moved = run.truth(), run.moved()
+    if spoil == "nothing":
+        moved = replace(
+            moved,
+            encoder_ns=moved.encoder_ns[:0],
+            position_rad=moved.position_rad[:0],
+            valid=moved.valid[:0],
+            tracking=moved.tracking[:0],
+        )
+    elif spoil == "still":
+        truth.position_rad[:] = 0.3
+    elif spoil == "never tracked":
+        moved.tracking[:] = False
+    elif spoil == "nan":
+        moved.position_rad[:] = np.nan
+    elif spoil == "no truth":
+        truth = replace(
+            truth, tick=truth.tick[:0], sampled_ns=truth.sampled_ns[:0], position_rad=truth.position_rad[:0]
+        )
+    else:
+        truth = replace(truth, sampled_ns=truth.sampled_ns + 10**12)
+    assert motion(truth, moved, run.names) is None
+
+
+@pytest.mark.parametrize(("spare", "known"), [(0, True), (-1, False)])
+def test_too_few_readings_give_none(run: Any, spare: int, known: bool) -> None:
+    moved = run.moved()
+    settled = round(SETTLE_S * 50)
+    moved.tracking[300 + settled + MIN_SAMPLES + spare :] = False
+    moved.tracking[:300] = False
+    assert (motion(run.truth(), moved, run.names) is not None) == known
