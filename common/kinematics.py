@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from common.quaternion import Array, multiply, rotate
+from common.quaternion import IDENTITY, Array, multiply, rotate
 from common.skeleton.table import Skeleton
 
 
@@ -23,8 +23,8 @@ class _Chain:
     sign: Array
     """(3 N,): and its sign there."""
     roots: NDArray[np.intp]
-    jumps: tuple[tuple[NDArray[np.intp], NDArray[np.intp]], ...]
-    """(rows, their ancestors 1, 2, 4, … generations up): composing along these covers the tree."""
+    jumps: tuple[NDArray[np.intp], ...]
+    """(N + 1,) each: everyone's ancestor 1, 2, 4, … generations up; row N is the world, its own ancestor."""
     above: Array
     """(N, N): 1 where the column is the row's segment or an ancestor of it."""
     parents: NDArray[np.intp]
@@ -40,11 +40,10 @@ def _chain(skeleton: Skeleton) -> _Chain:
     order = np.argmax(np.abs(skeleton.axis_frames), axis=-1)
     sign = np.take_along_axis(skeleton.axis_frames, order[..., None], axis=-1)[..., 0]
     jumps = []
-    ancestors = parents.copy()
-    while np.any(ancestors >= 0):
-        rows = np.flatnonzero(ancestors >= 0)
-        jumps.append((rows, ancestors[rows]))
-        ancestors = np.where(ancestors >= 0, ancestors[ancestors], -1)
+    ancestors = np.append(np.where(parents < 0, count, parents), count)
+    while np.any(ancestors < count):
+        jumps.append(ancestors)
+        ancestors = ancestors[ancestors]
     above = np.eye(count)
     for i, parent in enumerate(parents):
         if parent >= 0:
@@ -69,20 +68,17 @@ def orientations(skeleton: Skeleton, position_rad: Array, heading_rad: ArrayLike
     """
     chain = _chain(skeleton)
     q = _local(chain, position_rad)
-    heading = 0.5 * np.asarray(heading_rad, dtype=np.float64)
-    if np.any(heading):
-        turn = np.zeros((*np.broadcast_shapes(heading.shape, q.shape[:-2]), 1, 4))
-        turn[..., 0, 0], turn[..., 0, 3] = np.cos(heading), np.sin(heading)
-        q = np.broadcast_to(q, (*turn.shape[:-2], *q.shape[-2:])).copy()
-        q[..., chain.roots, :] = multiply(turn, q[..., chain.roots, :])
+    heading = np.asarray(heading_rad, dtype=np.float64)
+    if heading.any():
+        q = _turned(chain, q, heading)
     # pointer doubling: after each round a row holds the rotation from twice as many generations up
-    for rows, ancestors in chain.jumps:
-        q[..., rows, :] = multiply(q[..., ancestors, :], q[..., rows, :])
-    return q
+    for ancestors in chain.jumps:
+        q = multiply(q.take(ancestors, axis=-2), q)
+    return q[..., :-1, :]
 
 
 def _local(chain: _Chain, position_rad: Array) -> Array:
-    """Each segment's rotation from its parent, (..., N, 4)."""
+    """Each segment's rotation from its parent, and the world's identity, (..., N + 1, 4)."""
     half = position_rad @ chain.half_angles
     half = half.reshape(*half.shape[:-1], -1, 3)
     c, s = np.cos(half), np.sin(half)
@@ -94,10 +90,22 @@ def _local(chain: _Chain, position_rad: Array) -> Array:
     vector[..., 0] = sc * c3 + cs * s3
     vector[..., 1] = cs * c3 - sc * s3
     vector[..., 2] = cc * s3 + ss * c3
-    q = np.empty((*half.shape[:-1], 4))
-    q[..., 0] = cc * c3 - ss * s3
+    q = np.empty((*half.shape[:-2], half.shape[-2] + 1, 4))
+    q[..., :-1, 0] = cc * c3 - ss * s3
     flat = vector.reshape(*vector.shape[:-2], -1)
-    q[..., 1:] = (flat[..., chain.order] * chain.sign).reshape(vector.shape)
+    q[..., :-1, 1:] = (flat.take(chain.order, axis=-1) * chain.sign).reshape(vector.shape)
+    q[..., -1, :] = IDENTITY
+    return q
+
+
+def _turned(chain: _Chain, q: Array, heading_rad: Array) -> Array:
+    """The same with the roots turned about the vertical; headings (...) and q (..., N + 1, 4) broadcast."""
+    shape = np.broadcast_shapes(heading_rad.shape, q.shape[:-2])
+    q = np.broadcast_to(q, (*shape, *q.shape[-2:])).copy()
+    turn = np.zeros((*shape, 1, 4))
+    turn[..., 0, 0] = np.cos(0.5 * heading_rad)
+    turn[..., 0, 3] = np.sin(0.5 * heading_rad)
+    q[..., chain.roots, :] = multiply(turn, q[..., chain.roots, :])
     return q
 
 
@@ -107,7 +115,7 @@ def origins(skeleton: Skeleton, q_world_from_segment: Array) -> Array:
     A root segment's joint stands at its `origin_m`.
     """
     chain = _chain(skeleton)
-    offset_m = rotate(q_world_from_segment[..., chain.parents, :], chain.origin_m)
+    offset_m = rotate(q_world_from_segment.take(chain.parents, axis=-2), chain.origin_m)
     offset_m[..., chain.roots, :] = chain.origin_m[chain.roots]
     out: Array = chain.above @ offset_m
     return out
