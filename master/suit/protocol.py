@@ -1,0 +1,145 @@
+"""What travels between master and suit, as the DBC describes it: SYNC out, answers in.
+
+On CAN FD a node answers in one frame (NODE_SAMPLE), on classic CAN in three (NODE_ACC, NODE_GYR, NODE_MAG).
+An `AnswerFormat` is one of the two, so that the rest of the code need not care which.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from common.errors import ConfigError, ConfigMistake
+from common.quaternion import Array
+from master.suit.frame import Frame
+from master.suit.layout import AnswerLayout, LayoutError, Raw
+
+READINGS = tuple(f"{sensor}_{axis}" for sensor in ("ACC", "GYR", "MAG") for axis in "XYZ")
+"""Order of a node's nine readings everywhere: accelerometer, gyro, magnetometer; x, y, z."""
+FD_MESSAGES = ("NODE_SAMPLE",)
+CLASSIC_MESSAGES = ("NODE_ACC", "NODE_GYR", "NODE_MAG")
+NO_VALUE = -32768
+"""Magnetometer counts of a sample without a magnetic reading."""
+HIGHEST_NODE = 127
+TICK_MASK = 0xFFFF_FFFF
+SHIPPED_DBC = Path(__file__).parents[2] / "deploy" / "suit.dbc"
+"""The description that comes with tandem."""
+
+
+class Status(IntFlag):
+    """Status bits of an answer."""
+
+    FAULT = 1
+    """The node's own check failed: its readings are not to be used."""
+    SATURATED = 2
+    """A reading is at the end of its range."""
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerFormat:
+    """How a node answers: the layouts of its frames, in the order of the readings they carry."""
+
+    fd: bool
+    parts: tuple[AnswerLayout, ...]
+    """All of one shape; they differ by identifier and scale only."""
+    scale: Array
+    """SI per count of the nine readings, (9,)."""
+
+    @property
+    def length(self) -> int:
+        """Data bytes of each frame."""
+        return self.parts[0].length
+
+    @property
+    def readings_a_part(self) -> int:
+        """Readings in each frame."""
+        return len(READINGS) // len(self.parts)
+
+
+class SuitProtocol:
+    """Frames of the suit, laid out by a DBC."""
+
+    def __init__(self, sync_id: int, fd: AnswerFormat, classic: AnswerFormat) -> None:
+        self.sync_id = sync_id
+        self.fd = fd
+        self.classic = classic
+        self.acc_scale = float(fd.scale[0])
+        """m/s² per count."""
+        self.gyr_scale = float(fd.scale[3])
+        """rad/s per count."""
+        self.mag_scale = float(fd.scale[6])
+        """µT per count."""
+
+    @classmethod
+    def load(cls, dbc_path: Path | str = SHIPPED_DBC) -> SuitProtocol:
+        """Read the DBC. Raises ConfigError naming the message and signal that are not as expected."""
+        import cantools  # only here: it is slow to import, and nothing but the layout needs it
+
+        try:
+            database = cantools.database.can.Database()
+            database.add_dbc_file(dbc_path)
+            messages = {message.name: message for message in database.messages}
+            sync = messages["SYNC"]
+            if (sync.length, [(s.name, s.start, s.length) for s in sync.signals]) != (4, [("TICK", 0, 32)]):
+                raise LayoutError("SYNC: expected 4 bytes, all of them TICK")
+            fd = _format(messages, FD_MESSAGES, fd=True)
+            classic = _format(messages, CLASSIC_MESSAGES, fd=False)
+            if (fd.scale != classic.scale).any():
+                raise LayoutError("NODE_SAMPLE: expected the factors of NODE_ACC, NODE_GYR and NODE_MAG")
+        except OSError as error:
+            raise _mistake(dbc_path, f"a readable DBC ({error.strerror})") from None
+        except KeyError as error:
+            raise _mistake(dbc_path, f"a message {error}") from None
+        except LayoutError as error:
+            raise _mistake(dbc_path, str(error)) from None
+        except (cantools.Error, ValueError) as error:
+            raise _mistake(dbc_path, f"a DBC that cantools can read ({error})") from None
+        return cls(sync.frame_id, fd, classic)
+
+    def answer_format(self, fd: bool) -> AnswerFormat:
+        """How nodes answer on a bus of that kind."""
+        return self.fd if fd else self.classic
+
+    def sync(self, tick: int) -> Frame:
+        """The master's question: sample now, and answer with this tick. Classic on either kind of bus."""
+        return Frame(self.sync_id, (tick & TICK_MASK).to_bytes(4, "little"), fd=False)
+
+    def parse_sync(self, data: bytes) -> int:
+        """The tick of a SYNC. Raises ValueError where the length is wrong."""
+        if len(data) != 4:
+            raise ValueError(f"a SYNC has 4 bytes, not {len(data)}")
+        return int.from_bytes(data, "little")
+
+    def encode_sample(self, node_id: int, raw: Raw, tick: int, status: int, fd: bool) -> list[Frame]:
+        """The answer of a node: raw (9,) counts (ACC, GYR, MAG), in one frame on CAN FD, else in three."""
+        form = self.answer_format(fd)
+        step = form.readings_a_part
+        frames = []
+        for place, part in enumerate(form.parts):
+            frame_id = part.base_id + node_id
+            readings = raw[step * place : step * (place + 1)]
+            frames.append(Frame(frame_id, part.encode(frame_id, readings, tick, status), fd))
+        return frames
+
+
+def _format(messages: dict[str, Any], names: tuple[str, ...], fd: bool) -> AnswerFormat:
+    step = len(READINGS) // len(names)
+    parts = []
+    for place, name in enumerate(names):
+        message = messages[name]
+        if message.is_fd != fd:
+            raise LayoutError(f"{name}: expected VFrameFormat StandardCAN{'_FD' if fd else ''}")
+        parts.append(AnswerLayout(message, READINGS[step * place : step * (place + 1)]))
+    first = parts[0]
+    for part in parts[1:]:
+        if not part.same_shape(first):
+            raise LayoutError(f"{part.name}: expected TICK, STATUS and CRC where {first.name} has them")
+    return AnswerFormat(fd, tuple(parts), np.concatenate([part.scale for part in parts]))
+
+
+def _mistake(path: Path | str, expected: str) -> ConfigError:
+    return ConfigError(path, [ConfigMistake("dbc", Path(path).name, expected)])
