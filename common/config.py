@@ -86,11 +86,17 @@ def _override(table: dict[str, Any], text: str) -> None:
             "--set", key, value, "a TOML value; texts need quotes, as in 'robot=\"robot-2\"'"
         ) from None
     *sections, last = key.strip().split(".")
+    place: Any = table
     for section in sections:
-        table = table.setdefault(section, {})
-        if not isinstance(table, dict):
-            raise _mistake("--set", key, text, f"{section} to be a table")
-    table[last] = parsed
+        if isinstance(place, list) and section.isdigit() and int(section) < len(place):
+            place = place[int(section)]
+        elif isinstance(place, dict):
+            place = place.setdefault(section, {})
+        else:
+            raise _mistake("--set", key, value, f"{section} to be in the file")
+    if not isinstance(place, dict):
+        raise _mistake("--set", key, value, "a key of a table")
+    place[last] = parsed
 
 
 def _mistake(path: Path | str, key: str, value: object, expected: str) -> ConfigError:
