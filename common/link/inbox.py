@@ -1,0 +1,70 @@
+"""From Zenoh's thread to the loop: a latest-value slot and at most one wake-up under way."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+import zenoh
+
+from common.clock import monotonic_ns
+from common.link.counters import TopicCounters
+from common.mailbox import Mailbox
+from common.throttle import Throttle
+
+log = logging.getLogger(__name__)
+
+
+class Inbox:
+    """Hands a topic's payloads to `on_payload(payload, arrived_ns)` on the loop, newest only."""
+
+    def __init__(
+        self,
+        key: str,
+        on_payload: Callable[[bytes, int], None],
+        loop: asyncio.AbstractEventLoop,
+        counters: TopicCounters,
+    ) -> None:
+        self._key = key
+        self._on_payload = on_payload
+        self._loop = loop
+        self._counters = counters
+        self._mailbox: Mailbox[tuple[bytes, int]] = Mailbox()
+        self._throttle = Throttle()
+        self._closed = False
+
+    def on_sample(self, sample: zenoh.Sample) -> None:
+        """Called in Zenoh's thread: stamp, copy, hand over, nothing else."""
+        arrived_ns = monotonic_ns()
+        if self._closed:
+            return
+        if self._mailbox.put((sample.payload.to_bytes(), arrived_ns)):
+            wake(self._loop, self._deliver)
+        self._counters.received += 1
+
+    def close(self) -> None:
+        """Deliver nothing from now on."""
+        self._closed = True
+
+    def _deliver(self) -> None:
+        item = self._mailbox.take()
+        self._counters.overwritten = self._mailbox.overwritten
+        if item is None or self._closed:
+            return
+        try:
+            self._on_payload(*item)
+        except Exception:
+            # one bad message must not end the session, nor flood the log
+            self._counters.handler_errors += 1
+            if self._throttle.passes(monotonic_ns()):
+                log.exception("handler of %s failed", self._key)
+
+
+def wake(loop: asyncio.AbstractEventLoop, callback: Callable[..., None], *args: object) -> None:
+    """Run a callback on the loop, from any thread; a loop that is already closed needs nothing."""
+    try:
+        loop.call_soon_threadsafe(callback, *args)
+    except RuntimeError:
+        if not loop.is_closed():
+            raise
