@@ -1,0 +1,98 @@
+"""What a TOML says of the simulated suit."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from common.config import LinkConfig, RelativePath, Section
+from common.errors import ConfigError, ConfigMistake
+from common.skeleton import load_skeleton
+from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.protocol import SHIPPED_DBC
+from master.suit.simulated.faults import FaultsConfig
+from master.suit.simulated.imperfections import GradeName
+from master.suit.simulated.motion import MOTIONS
+
+QuaternionList = Annotated[list[float], Field(min_length=4, max_length=4)]
+
+
+class FieldConfig(Section):
+    """`[field]`: the earth's magnetic field where the operator stands."""
+
+    strength_ut: float = Field(default=50.0, gt=0.0, le=100.0)
+    """µT; the earth's is 25 to 65."""
+    dip_deg: float = Field(default=60.0, ge=-90.0, le=90.0)
+    """Angle below the horizon, degrees; negative south of the magnetic equator."""
+
+
+class SuitConfig(Section):
+    """The whole file of `tandem suit`. Buses and nodes are as in the master's file."""
+
+    robot: str = Field(default="robot-1", pattern=r"^[A-Za-z0-9_.-]{1,64}$")
+    """Under whose name the truth is published."""
+    profile: str = "nursing"
+    """The skeleton that wears it."""
+    dbc: RelativePath = SHIPPED_DBC
+    """Description of the frames."""
+    buses: list[BusConfig] = Field(min_length=1)
+    nodes: dict[str, NodeConfig]
+    """By segment; segments without a node stay silent."""
+    motion: str = "bottle"
+    """What the operator does: `bottle`, `calibration_pose` or `sweep`. Not used with `replay`."""
+    seed: int = Field(default=0, ge=0)
+    """Decides the units' errors, their noise and the faults."""
+    grade: GradeName = "calibrated"
+    """How good the sensors are: `ideal` (quantised only), `calibrated`, `raw` (as delivered)."""
+    field: FieldConfig = FieldConfig()
+    mounting: dict[str, QuaternionList] = Field(default={})
+    """q_segment_from_sensor (wxyz) of nodes that sit askew, by segment; others are aligned with it."""
+    faults: FaultsConfig = FaultsConfig()
+    replay: RelativePath | None = None
+    """A recording (npz) to play instead of the motion: no magnetometers then, and no truth."""
+    link: LinkConfig = LinkConfig()
+    """Where the truth is published; not at all where it names no endpoint."""
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """Names that nothing has, ids used twice, quaternions that are no rotation."""
+        mistakes = [*_bus_mistakes(self.buses), *_node_mistakes(self.nodes, self.buses)]
+        if self.motion not in MOTIONS:
+            mistakes.append(ConfigMistake("motion", self.motion, f"one of {', '.join(MOTIONS)}"))
+        for name, q in self.mounting.items():
+            if not abs(math.hypot(*q) - 1.0) < 1e-3:
+                mistakes.append(ConfigMistake(f"mounting.{name}", q, "a quaternion (wxyz) of length 1"))
+        mistakes += self.faults.unknown_nodes(list(self.nodes))
+        try:
+            segments = load_skeleton(self.profile).segment_names
+        except ConfigError as error:
+            return mistakes + error.mistakes
+        for key, names in (("nodes", self.nodes), ("mounting", self.mounting)):
+            mistakes += [
+                ConfigMistake(f"{key}.{name}", name, f"a segment of the profile {self.profile}")
+                for name in names
+                if name not in segments
+            ]
+        return mistakes
+
+
+def _bus_mistakes(buses: list[BusConfig]) -> list[ConfigMistake]:
+    names = [bus.name for bus in buses]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    return [ConfigMistake("buses", name, "a bus name used once") for name in twice]
+
+
+def _node_mistakes(nodes: dict[str, NodeConfig], buses: list[BusConfig]) -> list[ConfigMistake]:
+    """Unlike the master, a suit may have nodes on some segments only."""
+    names = [bus.name for bus in buses]
+    taken: dict[tuple[str, int], str] = {}
+    mistakes = []
+    for segment, node in nodes.items():
+        if node.bus not in names:
+            mistakes.append(ConfigMistake(f"nodes.{segment}.bus", node.bus, f"one of {', '.join(names)}"))
+        other = taken.setdefault((node.bus, node.id), segment)
+        if other != segment:
+            expected = f"an id that nodes.{other} does not have"
+            mistakes.append(ConfigMistake(f"nodes.{segment}.id", node.id, expected))
+    return mistakes

@@ -1,0 +1,157 @@
+"""The simulated suit without I/O: a SYNC in, the nodes' answers and the truth out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from common.clock import to_s
+from common.messages import Truth
+from common.quaternion import IDENTITY, Array
+from common.skeleton import Skeleton, load_skeleton
+from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.protocol import NO_VALUE, Status, SuitProtocol
+from master.suit.simulated.config import SuitConfig
+from master.suit.simulated.faults import Faults, NodeAnswer, Outgoing
+from master.suit.simulated.imperfections import Counts, Imperfections, quantise
+from master.suit.simulated.motion import Motion, load_motion
+from master.suit.simulated.replay import Replay, load_replay
+from master.suit.simulated.sensors import IdealSensors, earth_field_ut
+
+
+@dataclass(frozen=True, slots=True)
+class SuitAnswer:
+    """What one SYNC brings about."""
+
+    frames: list[Outgoing]
+    truth: Truth | None
+    """None where a recording is played: nobody knows it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wearing:
+    """One instant of whoever wears the suit."""
+
+    readings: Array
+    """(N, 9) what the sensors read, before quantisation."""
+    joints: tuple[Array, Array] | None
+    """True positions and velocities, (J,) each."""
+
+
+class Wearer(Protocol):
+    """Whoever wears the suit: a simulated operator, or a recording of a real one."""
+
+    @property
+    def magnetic(self) -> bool:
+        """Whether the readings include a magnetometer's."""
+
+    def at(self, t_s: float) -> Wearing:
+        """The instant `t_s` after the first SYNC."""
+
+
+class SimulatedOperator:
+    """Makes a motion in the earth's field, wearing sensors of some grade."""
+
+    magnetic = True
+
+    def __init__(self, motion: Motion, sensors: IdealSensors, imperfections: Imperfections) -> None:
+        self._motion = motion
+        self._sensors = sensors
+        self._imperfections = imperfections
+
+    def at(self, t_s: float) -> Wearing:
+        """The motion at that time; draws new noise at each call."""
+        position, velocity, acceleration = self._motion.state(t_s)
+        readings = self._sensors.read(position, velocity, acceleration)
+        return Wearing(self._imperfections.apply(readings), (position, velocity))
+
+
+class RecordedOperator:
+    """A real person's recording; real sensors made it, so nothing is added."""
+
+    magnetic = False
+
+    def __init__(self, replay: Replay) -> None:
+        self._replay = replay
+
+    def at(self, t_s: float) -> Wearing:
+        """The recording at that time."""
+        return Wearing(self._replay.readings(t_s), None)
+
+
+class SimulatedSuit:
+    """Answers each SYNC for all its nodes; deterministic for the same seed and the same SYNCs.
+
+    Time runs from the first SYNC: the wearer begins when the master begins to ask.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        nodes: dict[str, NodeConfig],
+        buses: Sequence[BusConfig],
+        protocol: SuitProtocol,
+        wearer: Wearer,
+        faults: Faults,
+    ) -> None:
+        self.faults = faults
+        self._wearer = wearer
+        self._protocol = protocol
+        fd = {bus.name: bus.fd for bus in buses}
+        self._nodes = [
+            (row, name, nodes[name], fd[nodes[name].bus])
+            for row, name in enumerate(skeleton.segment_names)
+            if name in nodes
+        ]
+        with_field = {row for row, _, node, _ in self._nodes if node.magnetometer and wearer.magnetic}
+        self._without_field = np.array([r not in with_field for r in range(len(skeleton.segments))])
+        self._scale = protocol.fd.scale
+        self._first_sync_ns: int | None = None
+
+    def on_sync(self, tick: int, now_ns: int) -> SuitAnswer:
+        """The answers of all nodes on all buses to the SYNC of that tick, which they receive `now_ns`."""
+        if self._first_sync_ns is None:
+            self._first_sync_ns = now_ns
+        t_ns = now_ns - self._first_sync_ns
+        instant = self._wearer.at(to_s(t_ns))
+        answers = self._answers(tick, *self._counts(instant.readings))
+        truth = None if instant.joints is None else Truth(tick, now_ns, *instant.joints)
+        return SuitAnswer(self.faults.apply(answers, t_ns), truth)
+
+    def _counts(self, readings: Array) -> tuple[Counts, Array]:
+        """Counts (N, 9) and status bits (N,)."""
+        readings[self._without_field, 6:] = 0.0
+        counts, saturated = quantise(readings, self._scale)
+        counts[self._without_field, 6:] = NO_VALUE
+        return counts, np.where(saturated, int(Status.SATURATED), 0)
+
+    def _answers(self, tick: int, counts: Counts, status: Array) -> list[NodeAnswer]:
+        encode = self._protocol.encode_sample
+        bits = status.tolist()
+        return [
+            NodeAnswer(name, node.bus, encode(node.id, counts[row], tick, bits[row], fd))
+            for row, name, node, fd in self._nodes
+        ]
+
+
+def build_suit(config: SuitConfig) -> SimulatedSuit:
+    """The suit that a configuration describes. Raises ConfigError; opens nothing but files."""
+    skeleton = load_skeleton(config.profile)
+    protocol = SuitProtocol.load(config.dbc)
+    faults = Faults(config.faults, config.seed)
+    return SimulatedSuit(skeleton, config.nodes, config.buses, protocol, _wearer(config, skeleton), faults)
+
+
+def _wearer(config: SuitConfig, skeleton: Skeleton) -> Wearer:
+    if config.replay is not None:
+        return RecordedOperator(load_replay(config.replay, skeleton, config.nodes))
+    mounting = np.array([config.mounting.get(name, IDENTITY) for name in skeleton.segment_names])
+    field_ut = earth_field_ut(config.field.strength_ut, config.field.dip_deg)
+    return SimulatedOperator(
+        load_motion(config.motion, skeleton),
+        IdealSensors(skeleton, field_ut, mounting),
+        Imperfections(config.grade, len(skeleton.segments), config.seed),
+    )
