@@ -1,0 +1,190 @@
+"""Tables for people: rich renderables from plain data, all of them at home in 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from deploy.judge.accuracy import SIDES, Accuracy
+from deploy.judge.motion import Motion
+from deploy.judge.paper import ETA_PERCENT, TABLE_1
+from deploy.targets import Verdict
+
+Stage = Mapping[str, float]
+"""`mean`, `p50`, `p99`, `max` in ms, and `count`."""
+UNKNOWN = "–"
+
+
+def latency_table(
+    stages: Mapping[str, Stage],
+    total: Stage | None = None,
+    one_way: Mapping[str, float | bool | None] | None = None,
+) -> RenderableType:
+    """The latency budget: one row a stage in the order they happen, means that add up, and a total row.
+
+    `total` is the measured whole, for its percentiles (those of stages do not add up). `one_way` may hold
+    `bound` (ms) and `trusted`: how far the offset between the two clocks is known.
+    """
+    table = _table("latency budget, ms", "stage", "mean", "p50", "p99", "max", "count")
+    for name, stage in stages.items():
+        table.add_row(name, *_stage_cells(stage))
+    table.add_section()
+    mean = sum(stage.get("mean", 0.0) for stage in stages.values())
+    count = min((stage.get("count", 0) for stage in stages.values()), default=0)
+    sums = {"mean": mean, "count": count} if count else {}
+    table.add_row("total", *_stage_cells({**(total or {}), **sums}), style="bold")
+    if one_way is None:
+        return table
+    bound = one_way.get("bound")
+    if not one_way.get("trusted", bound is not None):
+        return Group(table, Text("one-way figures are not trusted: the clocks' offset is stale", "yellow"))
+    return Group(table, Text(f"one-way figures are known to ± {_number(bound, 3)} ms", "dim"))
+
+
+def accuracy_table(judged: Accuracy) -> RenderableType:
+    """Solved against truth: the paper's Table 1 beside ours, η beside what it hides, then every joint."""
+    table = _table("solved against truth, fast periods", "joint")
+    for head in ("°/step", "left °", "right °", "paper °", "ratio", "paper"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for joint, paper in TABLE_1.items():
+        rows = [judged.fast.get(f"{side}_{joint}") for side in SIDES]
+        errors = [_marked(None if row is None else row.error_deg, paper.error_deg, digits=3) for row in rows]
+        worse = judged.worse(joint)
+        table.add_row(
+            joint.replace("_", " "),
+            _number(None if worse is None else worse.change_deg, 2),
+            *errors,
+            _number(paper.error_deg, 3),
+            _marked(None if worse is None else worse.ratio, paper.ratio, digits=3),
+            _number(paper.ratio, 3),
+        )
+    eta = Text.assemble(
+        "η ", _marked(judged.eta_percent, ETA_PERCENT, digits=2), f" % (paper {ETA_PERCENT} %)"
+        f"; beside it, mean absolute error {_number(judged.fast_mae_deg, 3)}°"
+        f", RMSE {_number(judged.fast_rmse_deg, 3)}°",
+    )  # fmt: skip
+    return Group(table, eta, _joints_table(judged))
+
+
+def motion_table(judged: Motion | None) -> RenderableType:
+    """Moved against truth: each joint that moved, the worst first, then over all."""
+    if judged is None:
+        return Text(
+            "moved against truth: not enough data (was the robot in track, and did it move?)", "yellow"
+        )
+    table = _table("moved against truth", "joint", "RMSE °", "aligned °", "roughness")
+    for name, joint in sorted(judged.joints.items(), key=lambda item: -item[1].rmse_deg):
+        table.add_row(
+            name,
+            _number(joint.rmse_deg, 2),
+            _number(joint.aligned_rmse_deg, 2),
+            _number(joint.roughness, 2),
+        )
+    table.add_section()
+    figures = (judged.rmse_deg, judged.aligned_rmse_deg, judged.roughness)
+    table.add_row("all moving joints", *(_number(f, 2) for f in figures), style="bold")
+    if judged.lag_ms is None:
+        return Group(table, Text("motion lag: no shift within the search fits", "yellow"))
+    return Group(table, Text(f"motion lag {judged.lag_ms:.0f} ms", "bold"))
+
+
+def verdict_table(title: str, verdicts: Iterable[Verdict]) -> RenderableType:
+    """Each figure beside its target, and whether it was met."""
+    table = _table(title, "figure", "measured", "at most", "")
+    for verdict in verdicts:
+        target = verdict.target
+        said = {
+            True: Text("met", "green"),
+            False: Text("missed", "bold red"),
+            None: Text("not known", "yellow"),
+        }
+        table.add_row(
+            target.name,
+            UNKNOWN if verdict.value is None else f"{verdict.value:.4g} {target.unit}".rstrip(),
+            f"{target.limit:g} {target.unit}".rstrip(),
+            said[verdict.met],
+        )
+    return table
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """What the live view shows of a running pair."""
+
+    elapsed_s: float
+    guard: str
+    reason: str
+    rates_hz: Mapping[str, float] = field(default_factory=dict)
+    """Such as capture, commands, states."""
+    stages: Mapping[str, Stage] = field(default_factory=dict)
+    joint_error_deg: Mapping[str, float] = field(default_factory=dict)
+    """Encoder minus truth now, by joint; the worst few are shown."""
+    drops: Mapping[str, int] = field(default_factory=dict)
+    """What was lost or refused, by reason; zeros are not shown."""
+
+
+_GUARD_STYLE = {"track": "bold green", "align": "bold cyan", "hold": "yellow", "estop": "bold red"}
+
+
+def live_view(live: Live, worst: int = 5) -> RenderableType:
+    """One screen, redrawn a few times a second."""
+    head = Text.assemble(
+        f"{live.elapsed_s:6.1f} s   robot ", (live.guard or UNKNOWN, _GUARD_STYLE.get(live.guard, "")),
+        f"   {live.reason}", overflow="ellipsis", no_wrap=True,
+    )  # fmt: skip
+    rates = "   ".join(f"{name} {rate:.1f} Hz" for name, rate in live.rates_hz.items()) or UNKNOWN
+    errors = sorted(live.joint_error_deg.items(), key=lambda item: -abs(item[1]))[:worst]
+    dropped = "   ".join(f"{name} {count}" for name, count in live.drops.items() if count)
+    joints = Text("   ".join(f"{name} {error:+.1f}°" for name, error in errors) or UNKNOWN)
+    lines = Table.grid(padding=(0, 2))
+    lines.add_row(Text("rates", "dim"), Text(rates))
+    lines.add_row(Text("worst joints", "dim"), joints)
+    lines.add_row(Text("dropped", "dim"), Text(dropped, "yellow") if dropped else Text("nothing", "green"))
+    table = _table("", "stage, ms", "mean", "p50", "p99", "max", "count")
+    for name, stage in live.stages.items():
+        table.add_row(name, *_stage_cells(stage))
+    return Group(head, lines, table)
+
+
+def _joints_table(judged: Accuracy) -> Table:
+    table = _table("solved against truth, whole run", "joint", "mean abs °", "RMSE °", "bias °")
+    for name, joint in judged.joints.items():
+        if joint is None:
+            table.add_row(name, *[UNKNOWN] * 3)
+        else:
+            table.add_row(name, *(_number(x, 3) for x in (joint.mae_deg, joint.rmse_deg, joint.bias_deg)))
+    if judged.overall is not None:
+        overall = judged.overall
+        table.add_section()
+        figures = (overall.mae_deg, overall.rmse_deg, overall.bias_deg)
+        table.add_row("all joints", *(_number(f, 3) for f in figures), style="bold")
+    return table
+
+
+def _table(title: str, first: str, *others: str) -> Table:
+    table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column(first, overflow="fold")
+    for head in others:
+        table.add_column(head, justify="right", no_wrap=True)
+    return table
+
+
+def _stage_cells(stage: Stage) -> list[str]:
+    count = stage.get("count")
+    cells = [_number(stage.get(key), 2) for key in ("mean", "p50", "p99", "max")]
+    return [*cells, UNKNOWN if count is None else f"{count:.0f}"]
+
+
+def _marked(value: float | None, limit: float, digits: int) -> Text:
+    if value is None:
+        return Text(UNKNOWN)
+    return Text(_number(value, digits), "green" if value <= limit else "bold red")
+
+
+def _number(value: float | None, digits: int) -> str:
+    return UNKNOWN if value is None else f"{value:.{digits}f}"

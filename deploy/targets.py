@@ -1,0 +1,81 @@
+"""The figures to reach, as data: where each stands in a report, and how far it may go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from deploy.judge.accuracy import SIDES
+from deploy.judge.paper import ETA_PERCENT, TABLE_1
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One figure and the most it may be."""
+
+    name: str
+    path: tuple[str, ...]
+    """Keys from the top of the report to the value; `*` in a key stands for each side, the worse counts."""
+    limit: float
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A target beside what was measured; `value` is None where the report does not hold it."""
+
+    target: Target
+    value: float | None
+
+    @property
+    def met(self) -> bool | None:
+        """None where there is nothing to judge."""
+        return None if self.value is None else self.value <= self.target.limit
+
+
+DEMO = (
+    Target("capture ticks missed", ("ticks", "missed"), 0),
+    Target("master, of one core", ("cpu_percent", "master"), 35.0, "%"),
+    Target("master, memory", ("rss_mb", "master"), 150.0, "MB"),
+    Target("last frame in → put, p99", ("frames_in_to_put_ms", "p99"), 3.0, "ms"),
+    Target("motion lag", ("motion_lag_ms",), 25.0, "ms"),
+    Target("roughness", ("motion", "roughness"), 2.5),
+    Target("η (Eq. 25)", ("eta_percent",), ETA_PERCENT, "%"),
+    *(
+        Target(
+            f"{joint.replace('_', ' ')}, mean error",
+            ("table_1", f"*_{joint}", "error_deg"),
+            row.error_deg,
+            "°",
+        )
+        for joint, row in TABLE_1.items()
+    ),
+)
+"""What a report of `tandem demo` is held against."""
+
+BENCH = (
+    Target("fuse + filter, 36 nodes", ("pipeline", "nodes_36", "fuse_us", "median"), 200.0, "µs"),
+    Target("solve 25 joints", ("pipeline", "solve_us", "median"), 150.0, "µs"),
+    Target("encode + decode a command", ("pipeline", "codec_us", "median"), 15.0, "µs"),
+    Target("put → received / bare Zenoh", ("link", "over_bare_zenoh"), 1.5),
+    Target("master, of one core", ("core_percent", "master_36_nodes"), 35.0, "%"),
+)
+"""What a report of `tandem bench` is held against."""
+
+
+def verdicts(report: Mapping[str, object], targets: Iterable[Target]) -> list[Verdict]:
+    """Each target beside the report's value."""
+    return [Verdict(target, _worst(report, target.path)) for target in targets]
+
+
+def _worst(report: object, path: tuple[str, ...]) -> float | None:
+    found = [_value(report, tuple(key.replace("*", side) for key in path)) for side in SIDES]
+    return max((value for value in found if value is not None), default=None)
+
+
+def _value(report: object, path: tuple[str, ...]) -> float | None:
+    for key in path:
+        if not isinstance(report, Mapping):
+            return None
+        report = report.get(key)
+    return float(report) if isinstance(report, int | float) and not isinstance(report, bool) else None
