@@ -81,6 +81,10 @@ class AnswerLayout:
         if (crc.start, crc.length) != (8 * (self.length - 1), 8):
             raise LayoutError(f"{self.name}.CRC: expected the last byte")
         self.crc = BatchCrc(self.length)
+        after_readings = self._readings_byte + 2 * len(readings)
+        if min(self.tick.byte, self.status.byte) < after_readings:
+            raise LayoutError(f"{self.name}: expected TICK and STATUS after the readings")
+        self._tail = (after_readings, self.length - 1)
         self._dtype = np.dtype(
             {
                 "names": ["raw", "tick", "status"],
@@ -122,12 +126,28 @@ class AnswerLayout:
             folded=self.crc.folded(as_bytes),
         )
 
+    def raw(self, frames: bytes) -> Raw:
+        """Readings (F, k) of F frames that lie one after the other."""
+        readings: Raw = np.frombuffer(frames, dtype=self._dtype)["raw"]
+        return readings
+
+    def is_all(self, frames: bytes, tick: int, status: int, folded: Bytes) -> bool:
+        """Whether all F frames have that tick and status and a sound CRC (`folded` (F,) as it should be)."""
+        table = np.frombuffer(frames, dtype=np.uint8).reshape(-1, self.length)
+        begin, end = self._tail
+        tail = self._bits_of(tick, status).to_bytes(self.length, "little")[begin:end]
+        if table[:, begin:end].tobytes() != tail * len(table):
+            return False
+        return self.crc.folded(table).tobytes() == folded.tobytes()
+
+    def _bits_of(self, tick: int, status: int) -> int:
+        bits = (tick & self.tick.mask) << self.tick.start
+        return bits | (status & self.status.mask) << self.status.start
+
     def encode(self, frame_id: int, raw: Raw, tick: int, status: int) -> bytes:
         """The data of one answer: raw (k,) counts, tick and status cut to their fields, CRC."""
         readings = int.from_bytes(raw.astype("<i2").tobytes(), "little")
-        bits = readings << (8 * self._readings_byte)
-        bits |= (tick & self.tick.mask) << self.tick.start
-        bits |= (status & self.status.mask) << self.status.start
+        bits = readings << (8 * self._readings_byte) | self._bits_of(tick, status)
         covered = bits.to_bytes(self.length - 1, "little")
         return covered + bytes((frame_crc(frame_id, covered),))
 

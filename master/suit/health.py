@@ -1,0 +1,85 @@
+"""What is counted of each node and each bus, and how seldom it is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.clock import NS_PER_S
+
+Counts: TypeAlias = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeHealth:
+    """One node since the start. Every window is fresh, late or lost; the others count frames."""
+
+    fresh: int
+    """Windows it answered soundly."""
+    late: int
+    """Windows it missed while not (yet) lost."""
+    lost: int
+    """Windows in which it was lost."""
+    times_lost: int
+    bad_checksum: int
+    bad_tick: int
+    """Sound frames that answered another tick: too late, or from a node that counts wrongly."""
+    bad_length: int
+    duplicates: int
+    """Sound frames beyond the first of a window; the first stands."""
+    faults: int
+    """Windows in which it said that its sensor is faulty: it counts as missed."""
+    saturated: int
+    """Windows in which it said that a reading is at the end of its range; the readings are used."""
+
+
+@dataclass(slots=True)
+class BusHealth:
+    """What arrived on one bus and belongs to no node."""
+
+    unknown_id: int = 0
+    overflow: int = 0
+    """Frames dropped because more arrived in one window than any sound bus can carry."""
+
+
+class NodeCounters:
+    """The counters of `NodeHealth` for N nodes at once, each (N,)."""
+
+    def __init__(self, count: int) -> None:
+        self.fresh: Counts = np.zeros(count, dtype=np.int64)
+        self.late: Counts = np.zeros(count, dtype=np.int64)
+        self.lost: Counts = np.zeros(count, dtype=np.int64)
+        self.times_lost: Counts = np.zeros(count, dtype=np.int64)
+        self.bad_checksum: Counts = np.zeros(count, dtype=np.int64)
+        self.bad_tick: Counts = np.zeros(count, dtype=np.int64)
+        self.bad_length: Counts = np.zeros(count, dtype=np.int64)
+        self.duplicates: Counts = np.zeros(count, dtype=np.int64)
+        self.faults: Counts = np.zeros(count, dtype=np.int64)
+        self.saturated: Counts = np.zeros(count, dtype=np.int64)
+
+    def node(self, index: int) -> NodeHealth:
+        """The counters of one node."""
+        return NodeHealth(**{f.name: int(getattr(self, f.name)[index]) for f in fields(NodeHealth)})
+
+
+class OncePerSecond:
+    """Lets each key speak once a second; says how many times it was asked since it last spoke."""
+
+    def __init__(self, period_ns: int = NS_PER_S) -> None:
+        self._period_ns = period_ns
+        self._spoke_ns: dict[str, int] = {}
+        self._held: dict[str, int] = {}
+
+    def ask(self, key: str, now_ns: int) -> int:
+        """0: keep quiet. n ≥ 1: speak now, for n occurrences, this one included."""
+        held = self._held.get(key, 0) + 1
+        spoke_ns = self._spoke_ns.get(key)
+        if spoke_ns is not None and now_ns - spoke_ns < self._period_ns:
+            self._held[key] = held
+            return 0
+        self._spoke_ns[key] = now_ns
+        self._held[key] = 0
+        return held

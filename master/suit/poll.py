@@ -1,0 +1,230 @@
+"""One tick of the suit: ask by SYNC, gather the answers, judge them. Open this file first.
+
+    open_window ─▶ SYNC on every bus … on_frame, on_frame, … ─▶ close_window ─▶ Sweep
+
+A frame with a wrong checksum, tick or length, or of an unknown identifier, never changes a value; it is
+counted. Frames are only put aside as they arrive, and decoded together when the window closes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.messages import Mask
+from common.quaternion import Array
+from master.suit.frame import Frame
+from master.suit.health import BusHealth, NodeCounters, NodeHealth
+from master.suit.intake import Intake, Place
+from master.suit.layout import Raw
+from master.suit.nodes import NodeConfig
+from master.suit.presence import Presence
+from master.suit.protocol import NO_VALUE, READINGS, SuitProtocol
+
+_IDS = 0x800
+"""Identifiers of 11 bits."""
+_FRAMES_PER_PART = 16
+"""Room in a window for each frame that is expected; a bus with more than that babbles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """One tick's answers, in node order. Where a node is not fresh its last good readings stand."""
+
+    tick: int
+    sampled_ns: int
+    """SYNC sent."""
+    frames_in_ns: int
+    """The last awaited node answered, or the window closed without it."""
+    acc_m_s2: Array
+    """(N, 3) specific force, sensor frame; zero before the first answer."""
+    gyr_rad_s: Array
+    """(N, 3) rotation rate, sensor frame; zero before the first answer."""
+    mag_ut: Array
+    """(N, 3) magnetic field, sensor frame; a row of NaN where there is no reading."""
+    fresh: Mask
+    """(N,) answered this tick soundly."""
+    lost: Mask
+    """(N,) missing for `lost_after` ticks or more, or never heard yet."""
+
+
+class Poll:
+    """The suit's nodes as the master knows them. Pure: frames and times come in, sweeps go out."""
+
+    def __init__(
+        self, nodes: Sequence[NodeConfig], protocol: SuitProtocol, lost_after: int, fd: Mapping[str, bool]
+    ) -> None:
+        """`nodes` in skeleton order; `lost_after` in ticks; `fd` says of each bus whether it is CAN FD."""
+        count = len(nodes)
+        self._protocol = protocol
+        self._counters = NodeCounters(count)
+        self._presence = Presence(count, lost_after)
+        self._counters.times_lost = self._presence.times_lost
+        self._bus_of_node = [node.bus for node in nodes]
+        self.bus_health: dict[str, BusHealth] = {bus: BusHealth() for bus in fd}
+        self._bus_names = list(fd)
+        self._all: Mask = np.ones(count, dtype=np.bool_)
+        self._without_mag: Mask = np.array([not node.magnetometer for node in nodes])
+        self._some_without_mag = bool(self._without_mag.any())
+        self._scale = protocol.fd.scale
+        self._values = np.zeros((count, len(READINGS)))
+        """Last good readings in SI units. Replaced, never written to: sweeps hold views of it."""
+        self._values[:, 6:] = np.nan
+
+        self._first_key = {bus: place * _IDS for place, bus in enumerate(fd)}
+        places = [Place(i, node.id, self._first_key[node.bus]) for i, node in enumerate(nodes)]
+        self._intakes: list[Intake] = []
+        self._intake_of_bus: dict[str, Intake] = {}
+        for kind in sorted(set(fd.values())):
+            buses = [bus for bus in fd if fd[bus] == kind]
+            here = [place for place, node in zip(places, nodes, strict=True) if node.bus in buses]
+            intake = Intake(protocol.answer_format(kind), here)
+            self._intake_of_bus.update(dict.fromkeys(buses, intake))
+            if here:
+                self._intakes.append(intake)
+        self._slots = {
+            key: (intake, slot) for intake in self._intakes for slot, key in enumerate(intake.keys)
+        }
+        self._capacity = _FRAMES_PER_PART * max(1, len(self._slots))
+
+        self._tick = 0
+        self._sampled_ns = 0
+        self._complete_ns: int | None = None
+        self._frames: list[tuple[int, bytes]] = []
+        self._waiting: set[int] = set()
+        self._awaited: Mask | None = None
+        self._awaited_keys: set[int] = set()
+        self._set_tests()
+
+    def open_window(self, tick: int, now_ns: int) -> Frame:
+        """Begin a tick, at the time at which SYNC is sent; returns the SYNC for every bus."""
+        self._tick = tick
+        self._sampled_ns = now_ns
+        self._complete_ns = None
+        awaited = self._presence.awaited
+        if awaited is not self._awaited:
+            self._awaited = awaited
+            self._awaited_keys = {
+                key
+                for intake in self._intakes
+                for slot, key in enumerate(intake.keys)
+                if awaited[intake.rows[slot // intake.parts]]
+            }
+        self._waiting = self._awaited_keys.copy()
+        self._set_tests()
+        return self._protocol.sync(tick)
+
+    def _set_tests(self) -> None:
+        self._tests = {
+            bus: (self._first_key[bus], *intake.tick_test(self._tick))
+            for bus, intake in self._intake_of_bus.items()
+        }
+
+    def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
+        """Put one frame aside. True once every awaited node has answered this tick.
+
+        Looks at one byte of the tick, so that a late answer to the last tick does not end the wait; all else
+        is checked when the window closes. With every node lost it is never True: the window stays open for
+        them all to come back.
+        """
+        first_key, byte, mask, value = self._tests[bus]
+        key = first_key + frame_id if frame_id < _IDS else first_key
+        if len(self._frames) >= self._capacity:
+            self.bus_health[bus].overflow += 1
+            return self._complete_ns is not None
+        self._frames.append((key, data))
+        waiting = self._waiting
+        if key in waiting and len(data) > byte and data[byte] & mask == value:
+            waiting.remove(key)
+            if not waiting:
+                self._complete_ns = now_ns
+        return self._complete_ns is not None
+
+    def close_window(self, now_ns: int) -> Sweep:
+        """End the tick: decode what came, update values and health. Right when nothing came, too."""
+        frames, self._frames = self._frames, []
+        fresh = heard = self._all
+        if not self._take_whole(frames):
+            self._sort(frames)
+            fresh, heard = self._take()
+        presence, counters = self._presence, self._counters
+        presence.close(fresh, heard)
+        counters.fresh += fresh
+        if fresh is not self._all:
+            counters.lost += presence.lost
+            counters.late += ~(fresh | presence.lost)
+        values = self._values
+        return Sweep(
+            tick=self._tick,
+            sampled_ns=self._sampled_ns,
+            frames_in_ns=now_ns if self._complete_ns is None else self._complete_ns,
+            acc_m_s2=values[:, 0:3],
+            gyr_rad_s=values[:, 3:6],
+            mag_ut=values[:, 6:9],
+            fresh=fresh,
+            lost=presence.lost,
+        )
+
+    def bus_down(self, bus: str) -> None:
+        """Take the nodes of a failed bus as lost at once; they come back by answering."""
+        first_key = self._first_key[bus]
+        self._frames = [frame for frame in self._frames if not first_key <= frame[0] < first_key + _IDS]
+        self._presence.lose(np.array([name == bus for name in self._bus_of_node]))
+
+    @property
+    def health(self) -> list[NodeHealth]:
+        """The counters of each node, in node order."""
+        return [self._counters.node(index) for index in range(len(self._values))]
+
+    def _take_whole(self, frames: list[tuple[int, bytes]]) -> bool:
+        """The usual window: each expected frame came once and is sound. False, and no effect, if not so."""
+        if len(frames) != len(self._slots):
+            return False
+        by_key = dict(frames)
+        if by_key.keys() != self._slots.keys():
+            return False
+        wholes = [intake.take_whole(by_key, self._tick) for intake in self._intakes]
+        values = np.empty_like(self._values)
+        for intake, raw in zip(self._intakes, wholes, strict=True):
+            if raw is None:
+                return False
+            values[intake.rows] = self._si(raw, intake)
+        self._values = values
+        return True
+
+    def _sort(self, frames: list[tuple[int, bytes]]) -> None:
+        """Hand each frame to the intake of its format; count those of no node and those of wrong length."""
+        for key, data in frames:
+            place = self._slots.get(key)
+            if place is None:
+                self.bus_health[self._bus_names[key // _IDS]].unknown_id += 1
+                continue
+            intake, slot = place
+            if len(data) == intake.length:
+                intake.add(slot, data)
+            else:
+                self._counters.bad_length[intake.rows[slot // intake.parts]] += 1
+
+    def _take(self) -> tuple[Mask, Mask]:
+        """Judge what was sorted, node by node; returns who is fresh and who was heard at all."""
+        fresh = np.zeros(len(self._values), dtype=np.bool_)
+        heard = np.zeros(len(self._values), dtype=np.bool_)
+        values = self._values.copy()
+        for intake in self._intakes:
+            answers = intake.take(self._tick, self._counters)
+            fresh[intake.rows] = answers.usable
+            heard[intake.rows] = answers.heard
+            values[intake.rows[answers.usable]] = self._si(answers.raw, intake)[answers.usable]
+        self._values = values
+        return fresh, heard
+
+    def _si(self, raw: Raw, intake: Intake) -> Array:
+        """Counts (n, 9) of an intake's nodes in SI units; NaN where there is no magnetic reading."""
+        values: Array = raw * self._scale
+        blank = raw[:, 6:] == NO_VALUE
+        if self._some_without_mag or blank.any():
+            # two thirds of a field are no direction: one blank axis blanks all three
+            values[blank.any(axis=1) | self._without_mag[intake.rows], 6:] = np.nan
+        return values
