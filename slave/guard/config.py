@@ -1,0 +1,136 @@
+"""`[guard]`: how old, how long, how far, how fast."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from common.config import Section
+from common.errors import ConfigMistake
+from common.skeleton import Joint, Skeleton
+from slave.guard.limit import Limits
+
+_Limit = Annotated[float | None, Field(allow_inf_nan=False)]
+
+
+class JointLimits(Section):
+    """`[guard.joints.NAME]`: limits of one joint, tighter than the skeleton's; what is not set stays."""
+
+    lower_deg: _Limit = None
+    """Lower position limit, °; not below the skeleton's."""
+    upper_deg: _Limit = None
+    """Upper position limit, °; not above the skeleton's."""
+    max_velocity_deg_s: _Limit = None
+    """Velocity limit, °/s; above 0, not above the skeleton's."""
+    max_acceleration_deg_s2: _Limit = None
+    """Acceleration limit, °/s²; above 0, not above the skeleton's."""
+
+
+class GuardConfig(Section):
+    """What the guard asks for before it lets a robot move, and how it lets it move."""
+
+    max_age_s: float = Field(0.3, gt=0.0, le=2.0)
+    """A command older than this, the offset's bound added, is refused."""
+    future_tolerance_s: float = Field(0.02, ge=0.0, le=0.5)
+    """A command from further ahead than this plus the offset's bound is refused."""
+    command_timeout_s: float = Field(0.2, gt=0.0, le=2.0)
+    """Without an accepted command for longer than this, by arrival, the robot holds."""
+    lease_timeout_s: float = Field(1.0, gt=0.0, le=60.0)
+    """Without an accepted command for longer than this, by arrival, the operator's lease lapses."""
+    encoder_timeout_s: float = Field(0.05, gt=0.0, le=1.0)
+    """Without a valid reading of every joint for longer than this the robot holds."""
+
+    align_velocity_rad_s: float = Field(0.5, gt=0.0, le=2.0)
+    """Speed towards the operator's posture, of all joints in `align` and of a joint that comes back."""
+    align_acceleration_rad_s2: float = Field(2.0, gt=0.0, le=20.0)
+    """Acceleration on that way."""
+    align_window_rad: float = Field(0.05, gt=0.0, le=0.5)
+    """Distance between setpoint and operator within which a joint counts as aligned."""
+    align_dwell_s: float = Field(0.2, ge=0.0, le=5.0)
+    """How long every valid joint must have been aligned before `track` begins."""
+    align_timeout_s: float = Field(15.0, gt=0.0, le=120.0)
+    """`align` that takes longer ends in `hold`."""
+    engage_window_rad: float = Field(0.2, gt=0.0, le=1.0)
+    """`engage` is refused where an encoder is further than this from the held setpoint."""
+
+    velocity_scale: float = Field(1.0, gt=0.0, le=1.0)
+    """Share of the velocity limits that is used."""
+    acceleration_scale: float = Field(1.0, gt=0.0, le=1.0)
+    """Share of the acceleration limits that is used."""
+    joints: dict[str, JointLimits] = Field(default_factory=dict)
+    """Tighter limits of single joints, by name."""
+    max_step_s: float = Field(0.025, gt=0.0, le=0.1)
+    """A step that comes later than this after the last one moves the setpoint as if it came then."""
+
+    reset_key: str = Field("", repr=False, max_length=512)
+    """Who sends it with `reset` may reset an e-stop; empty: nobody can, but by restarting the slave."""
+    events_kept: int = Field(256, ge=1, le=100_000)
+    """Newest events that are remembered."""
+
+    def mistakes_for(self, skeleton: Skeleton, section: str = "guard") -> list[ConfigMistake]:
+        """Contradictions between keys, joints that do not exist, and limits looser than the skeleton's."""
+        return [
+            ConfigMistake(f"{section}.{key}", value, expected)
+            for key, value, expected in (*self._contradictions(), *self._loosened(skeleton))
+        ]
+
+    def limits(self, skeleton: Skeleton) -> Limits:
+        """The skeleton's limits, tightened."""
+        joints = skeleton.joints
+        tighter = [self.joints.get(joint.name, JointLimits()) for joint in joints]
+
+        def pick(key: str, own: str) -> list[float]:
+            values = [getattr(t, key) for t in tighter]
+            return [
+                getattr(joint, own) if v is None else math.radians(v)
+                for joint, v in zip(joints, values, strict=True)
+            ]
+
+        return Limits(
+            lower_rad=np.array(pick("lower_deg", "lower_rad")),
+            upper_rad=np.array(pick("upper_deg", "upper_rad")),
+            max_velocity_rad_s=self.velocity_scale
+            * np.array(pick("max_velocity_deg_s", "max_velocity_rad_s")),
+            max_acceleration_rad_s2=self.acceleration_scale
+            * np.array(pick("max_acceleration_deg_s2", "max_acceleration_rad_s2")),
+        )
+
+    def _contradictions(self) -> Iterator[tuple[str, object, str]]:
+        if self.lease_timeout_s < self.command_timeout_s:
+            yield (
+                "lease_timeout_s",
+                self.lease_timeout_s,
+                f"at least command_timeout_s, {self.command_timeout_s}",
+            )
+        if self.align_timeout_s <= self.align_dwell_s:
+            yield "align_timeout_s", self.align_timeout_s, f"more than align_dwell_s, {self.align_dwell_s}"
+
+    def _loosened(self, skeleton: Skeleton) -> Iterator[tuple[str, object, str]]:
+        known = {joint.name: joint for joint in skeleton.joints}
+        for name, tighter in self.joints.items():
+            if name not in known:
+                yield f"joints.{name}", tighter.model_dump(exclude_none=True), f"a joint of {skeleton.name}"
+                continue
+            for key, value, expected in _looser(known[name], tighter):
+                yield f"joints.{name}.{key}", value, expected
+
+
+def _looser(joint: Joint, tighter: JointLimits) -> Iterator[tuple[str, float, str]]:
+    lower_deg, upper_deg = math.degrees(joint.lower_rad), math.degrees(joint.upper_rad)
+    for key, angle in (("lower_deg", tighter.lower_deg), ("upper_deg", tighter.upper_deg)):
+        if angle is not None and not joint.lower_rad <= math.radians(angle) <= joint.upper_rad:
+            yield key, angle, f"within the skeleton's {lower_deg:g} to {upper_deg:g}"
+    for key, rate, most in (
+        ("max_velocity_deg_s", tighter.max_velocity_deg_s, joint.max_velocity_rad_s),
+        ("max_acceleration_deg_s2", tighter.max_acceleration_deg_s2, joint.max_acceleration_rad_s2),
+    ):
+        if rate is not None and not 0.0 < math.radians(rate) <= most:
+            yield key, rate, f"above 0, at most the skeleton's {math.degrees(most):g}"
+    lower = lower_deg if tighter.lower_deg is None else tighter.lower_deg
+    upper = upper_deg if tighter.upper_deg is None else tighter.upper_deg
+    if lower >= upper:
+        yield "lower_deg", lower, f"below upper_deg, {upper:g}"

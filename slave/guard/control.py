@@ -1,0 +1,107 @@
+"""What people and masters may ask of a robot, who may ask it, and how they are answered."""
+
+from __future__ import annotations
+
+import hmac
+from typing import Protocol
+
+from common.messages import Action, ControlReply, ControlRequest
+from slave.guard.engage import holder_only
+from slave.guard.lease import Lease
+from slave.guard.states import State
+
+
+class Controlled(Protocol):
+    """The part of the guard that requests act on."""
+
+    robot: str
+    state: State
+    reason: str
+    lease: Lease
+
+    def claim(self, operator: str, now_ns: int) -> int:
+        """See Guard."""
+        ...
+
+    def release(self, now_ns: int, reason: str) -> None:
+        """See Guard."""
+        ...
+
+    def engage(self, operator: str, now_ns: int) -> str | None:
+        """See Guard."""
+        ...
+
+    def disengage(self, now_ns: int, reason: str) -> None:
+        """See Guard."""
+        ...
+
+    def reset(self, now_ns: int, reason: str) -> str | None:
+        """See Guard."""
+        ...
+
+    def estop(self, now_ns: int, reason: str) -> None:
+        """See Guard."""
+        ...
+
+
+class Control:
+    """Answers requests. Anybody may stop; only the lease's holder may move; only the key resets."""
+
+    def __init__(self, guard: Controlled, reset_key: str) -> None:
+        self._guard = guard
+        self._reset_key = reset_key.encode()
+
+    def answer(self, request: ControlRequest, now_ns: int) -> ControlReply:
+        """Do what is asked, or say why not."""
+        guard = self._guard
+        if request.action is Action.ESTOP:
+            # before any check: who it is from and whom it names does not matter to a person in danger
+            guard.estop(now_ns, f"e-stop by {request.operator or 'somebody'}")
+            return self._reply(True, "stopped; only a reset with the key leaves the e-stop")
+        if request.robot != guard.robot:
+            return self._reply(False, f"this robot is {guard.robot}, not {request.robot}")
+        match request.action:
+            case Action.CLAIM:
+                return self._claim(request.operator, now_ns)
+            case Action.RELEASE:
+                return self._release(request.operator, now_ns)
+            case Action.ENGAGE:
+                why = guard.engage(request.operator, now_ns)
+                return self._reply(why is None, why or "moves slowly to the operator's posture")
+            case Action.DISENGAGE:
+                return self._disengage(request.operator, now_ns)
+            case Action.RESET:
+                return self._reset(request, now_ns)
+            case Action.STATUS:
+                return self._reply(True, guard.reason)
+
+    def _claim(self, operator: str, now_ns: int) -> ControlReply:
+        if not operator:
+            return self._reply(False, "an operator needs a name")
+        token = self._guard.claim(operator, now_ns)
+        if not token:
+            return self._reply(False, f"{self._guard.lease.operator} holds the lease")
+        return self._reply(True, f"{operator} holds the lease now; engage to move", token)
+
+    def _release(self, operator: str, now_ns: int) -> ControlReply:
+        why = holder_only(operator, self._guard.lease.operator)
+        if why is None:
+            self._guard.release(now_ns, f"{operator} released the lease")
+        return self._reply(why is None, why or "the lease is free")
+
+    def _disengage(self, operator: str, now_ns: int) -> ControlReply:
+        why = holder_only(operator, self._guard.lease.operator)
+        if why is None:
+            self._guard.disengage(now_ns, f"disengaged by {operator}")
+        return self._reply(why is None, why or self._guard.reason)
+
+    def _reset(self, request: ControlRequest, now_ns: int) -> ControlReply:
+        if not self._reset_key:
+            return self._reply(False, "no reset key is configured: restart the slave at the robot")
+        if not hmac.compare_digest(request.key.encode("utf-8", "replace"), self._reset_key):
+            return self._reply(False, "wrong reset key")
+        why = self._guard.reset(now_ns, f"reset by {request.operator or 'somebody'}; engage to move")
+        return self._reply(why is None, why or "holds; engage to move")
+
+    def _reply(self, done: bool, text: str, lease: int = 0) -> ControlReply:
+        return ControlReply(done, self._guard.state, text, lease)

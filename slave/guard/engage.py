@@ -1,0 +1,83 @@
+"""What must be so before anything moves. Each condition answers with what is missing, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from slave.guard.states import MOVING, State
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """What the guard knows when somebody wants to engage."""
+
+    state: State
+    reason: str
+    operator: str
+    """Who asks."""
+    holder: str
+    """Who holds the live lease, empty where nobody does."""
+    command_loss: str | None
+    """What is amiss with the commands."""
+    encoder_loss: str | None
+    """What is amiss with the encoders."""
+    any_valid: bool
+    """Whether the last command has a valid joint."""
+    at_rest: bool
+    strayed: str | None
+    """The joint that is not where it is held."""
+
+
+Condition = Callable[[Readiness], str | None]
+
+
+def _state(at: Readiness) -> str | None:
+    if at.state is State.BOOT:
+        return at.reason
+    if at.state is State.ESTOP:
+        return "the e-stop is latched: reset it first"
+    return f"already in {at.state}" if at.state in MOVING else None
+
+
+def holder_only(operator: str, holder: str) -> str | None:
+    """Why somebody may not ask for what is the lease holder's alone, or None where they may."""
+    if not holder:
+        return "nobody holds the lease: claim it first"
+    return None if operator == holder else f"{holder} holds the lease"
+
+
+def _holder(at: Readiness) -> str | None:
+    return holder_only(at.operator, at.holder)
+
+
+def _command(at: Readiness) -> str | None:
+    return at.command_loss
+
+
+def _valid(at: Readiness) -> str | None:
+    return None if at.any_valid else "no joint of the last command is valid"
+
+
+def _encoder(at: Readiness) -> str | None:
+    return at.encoder_loss
+
+
+def _rest(at: Readiness) -> str | None:
+    return None if at.at_rest else "still braking"
+
+
+def _strayed(at: Readiness) -> str | None:
+    return at.strayed
+
+
+CONDITIONS: tuple[Condition, ...] = (_state, _holder, _command, _valid, _encoder, _rest, _strayed)
+
+
+def refusal(at: Readiness) -> str | None:
+    """Why the robot does not engage, or None where it may."""
+    for condition in CONDITIONS:
+        reason = condition(at)
+        if reason is not None:
+            return reason
+    return None

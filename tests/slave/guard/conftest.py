@@ -1,0 +1,179 @@
+"""A robot on a virtual clock: perfect servos, a tracker that goes where the newest command points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.messages import Action, Command, CommandStamps, ControlReply, ControlRequest
+from common.quaternion import Array
+from common.skeleton import load_skeleton
+from slave.guard import Guard, GuardConfig, Setpoint, State, Verdict
+from slave.track import Target
+
+ROBOT = "robot-1"
+KEY = "a key kept at the robot"
+PERIOD_NS = 5_000_000
+COMMAND_EVERY = 16
+MASTER_AHEAD_NS = 3_600_000_000_000
+"""The master's clock was started an hour before the slave's."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    offset_ns: int = MASTER_AHEAD_NS
+    bound_ns: int = 2_000_000
+    trusted: bool = True
+
+
+class NewestTracker:
+    """Target: the newest accepted position, at rest or at the velocity that came with it."""
+
+    def __init__(self) -> None:
+        self.resets = 0
+        self.accepted: list[tuple[int, int, Array, Array]] = []
+        self.newest: Target | None = None
+        self.override: Target | None = None
+
+    def reset(self) -> None:
+        self.resets += 1
+        self.newest = None
+
+    def accept(self, sampled_ns: int, now_ns: int, position_rad: Array, velocity_rad_s: Array) -> None:
+        self.accepted.append((sampled_ns, now_ns, position_rad, velocity_rad_s))
+        self.newest = Target(position_rad, velocity_rad_s)
+
+    def target(self, now_ns: int) -> Target | None:
+        return self.override if self.newest is not None and self.override is not None else self.newest
+
+
+class Rig:
+    def __init__(self, config: GuardConfig | None = None, **guard_options: Any) -> None:
+        self.skeleton = load_skeleton("nursing")
+        self.joints = len(self.skeleton.joints)
+        self.config = config or GuardConfig(reset_key=KEY)
+        self.tracker = NewestTracker()
+        self.tokens = iter(range(1001, 1_000_000))
+        guard_options.setdefault("draw_token", lambda: next(self.tokens))
+        self.guard = Guard(ROBOT, self.skeleton, self.config, self.tracker, **guard_options)
+        self.now_ns = 10_000_000_000
+        self.measured = 0.5 * (self.skeleton.lower_rad + self.skeleton.upper_rad)
+        self.encoder_valid = np.ones(self.joints, np.bool_)
+        self.encoder_delay_ns = 0
+        self.coupled = True
+        self.target = self.measured.copy()
+        self.offset = Offset()
+        self.sequence = 0
+        self.lease = 0
+        self.setpoints: list[Setpoint] = []
+        self._since_command = 0
+
+    # one act each
+
+    def command(self, **changes: Any) -> Command:
+        """A good command, 10 ms old, or one with something changed."""
+        sampled_ns = changes.pop("sampled_ns", self.now_ns - 10_000_000) + MASTER_AHEAD_NS
+        good = Command(
+            ROBOT, self.lease, self.sequence, 0, CommandStamps(sampled_ns, sampled_ns, sampled_ns, sampled_ns),
+            True, np.ones(self.joints, np.bool_), self.target.copy(), np.zeros(self.joints),
+        )  # fmt: skip
+        return replace(good, **changes)
+
+    def give(self, command: Command, received_ns: int | None = None) -> Verdict:
+        received_ns = self.now_ns if received_ns is None else received_ns
+        return self.guard.on_command(command, received_ns, self.now_ns, self.offset)
+
+    def send(self, **changes: Any) -> Verdict:
+        """The master's next command."""
+        self.sequence += 1
+        return self.give(self.command(**changes))
+
+    def ask(
+        self, action: Action, operator: str = "anna", key: str = "", robot: str = ROBOT
+    ) -> ControlReply:
+        return self.guard.on_control(ControlRequest(robot, action, operator, key), self.now_ns)
+
+    def claim(self, operator: str = "anna") -> ControlReply:
+        reply = self.ask(Action.CLAIM, operator)
+        if reply.done:
+            self.lease, self.sequence = reply.lease, 0
+        return reply
+
+    def step(self, dt_ns: int = PERIOD_NS) -> Setpoint:
+        self.now_ns += dt_ns
+        setpoint = self.guard.step(
+            self.now_ns, self.measured, self.encoder_valid, self.now_ns - self.encoder_delay_ns
+        )
+        if self.coupled and setpoint.ready:
+            self.measured = setpoint.position_rad.copy()
+        self.setpoints.append(setpoint)
+        return setpoint
+
+    # whole scenes
+
+    def run(self, seconds: float, commands: bool = True, **changes: Any) -> list[Setpoint]:
+        """Steps of 5 ms with a command before every 16th; the setpoints."""
+        first = len(self.setpoints)
+        for _ in range(round(seconds * 1e9 / PERIOD_NS)):
+            if commands and self._since_command % COMMAND_EVERY == 0:
+                self.send(**changes)
+            self._since_command += 1
+            self.step()
+        return self.setpoints[first:]
+
+    def to_hold(self) -> Rig:
+        self.step()
+        assert self.guard.state is State.HOLD
+        return self
+
+    def to_leased(self) -> Rig:
+        self.to_hold()
+        assert self.claim().done
+        self.run(0.1)
+        return self
+
+    def to_align(self) -> Rig:
+        self.to_leased()
+        self.engage()
+        return self
+
+    def engage(self) -> None:
+        reply = self.ask(Action.ENGAGE)
+        assert reply.done, reply.text
+        assert self.guard.state is State.ALIGN
+
+    def to_track(self) -> Rig:
+        self.to_align()
+        self.run(0.4)
+        assert self.guard.state is State.TRACK
+        return self
+
+    def to(self, state: State) -> Rig:
+        match state:
+            case State.HOLD:
+                self.to_leased()
+            case State.ALIGN:
+                self.to_align()
+            case State.TRACK:
+                self.to_track()
+            case State.ESTOP:
+                self.to_leased()
+                self.guard.estop(self.now_ns)
+            case State.BOOT:
+                pass
+        assert self.guard.state is state
+        return self
+
+
+@pytest.fixture
+def make_rig() -> Callable[..., Rig]:
+    return Rig
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return Rig()
