@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from common.quaternion import IDENTITY, Array, multiply, rotate
+from common.quaternion import IDENTITY, Array, heading_turn, multiply, rotate
 from common.skeleton.table import Skeleton
 
 
@@ -102,10 +102,7 @@ def _turned(chain: _Chain, q: Array, heading_rad: Array) -> Array:
     """The same with the roots turned about the vertical; headings (...) and q (..., N + 1, 4) broadcast."""
     shape = np.broadcast_shapes(heading_rad.shape, q.shape[:-2])
     q = np.broadcast_to(q, (*shape, *q.shape[-2:])).copy()
-    turn = np.zeros((*shape, 1, 4))
-    turn[..., 0, 0] = np.cos(0.5 * heading_rad)
-    turn[..., 0, 3] = np.sin(0.5 * heading_rad)
-    q[..., chain.roots, :] = multiply(turn, q[..., chain.roots, :])
+    q[..., chain.roots, :] = multiply(heading_turn(heading_rad)[..., None, :], q[..., chain.roots, :])
     return q
 
 

@@ -90,6 +90,24 @@ def from_axis_angle(axis: ArrayLike, angle_rad: ArrayLike) -> Array:
     return from_rotation_vector(np.asarray(axis, float) * np.asarray(angle_rad, float)[..., None])
 
 
+def heading_turn(heading_rad: ArrayLike) -> Array:
+    """Rotation about the vertical z; headings (...) in, (..., 4) out."""
+    half = 0.5 * np.asarray(heading_rad, dtype=np.float64)
+    out = np.zeros((*half.shape, 4))
+    out[..., 0], out[..., 3] = np.cos(half), np.sin(half)
+    return out
+
+
+def heading_rad(q: Array) -> Array:
+    """The heading whose `heading_turn` is nearest to q (its twist about z). Shape (..., 4) in, (...) out.
+
+    0 where q turns the vertical upside down, so that no heading is nearest.
+    """
+    flip = np.where(q[..., 0] < 0.0, -1.0, 1.0)
+    out: Array = 2.0 * np.arctan2(flip * q[..., 3], flip * q[..., 0])
+    return out
+
+
 def to_matrix(q: Array) -> Array:
     """Rotation matrices (..., 3, 3), a from b."""
     w, x, y, z = np.moveaxis(q, -1, 0)

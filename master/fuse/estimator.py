@@ -1,0 +1,213 @@
+"""From raw readings to the segments' orientations: calibrate ▸ low-pass ▸ filter ▸ posture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from pydantic import Field
+
+from common.config import Section
+from common.errors import ConfigError, ConfigMistake
+from common.messages import Mask
+from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate
+from master.calibrate.affine import ACC, GYR, MAG, Calibration, apply, load_calibration
+from master.fuse.filter import FilterBank
+from master.fuse.heading import HeadingMemory
+from master.fuse.liveness import Liveness
+from master.fuse.lowpass import LowPass
+from master.fuse.mahony import MahonyConfig, MahonyFilter
+from master.fuse.stance import Stance
+from master.fuse.vqf import VqfConfig, VqfFilter
+
+_GRAVITY_M_S2 = 9.81
+
+
+class EstimationConfig(Section):
+    """`[estimation]`: how readings become orientations."""
+
+    filter: Literal["vqf", "mahony"] = "vqf"
+    """Orientation filter of every node that does not name its own."""
+    order: Literal[2, 4, 6, 8] = 2
+    """Order of the Butterworth low-passes."""
+    accelerometer_cutoff_hz: float = Field(30.0, ge=0.0, allow_inf_nan=False)
+    """-3 dB; 0 leaves the accelerometer as it is."""
+    gyroscope_cutoff_hz: float = Field(50.0, ge=0.0, allow_inf_nan=False)
+    """-3 dB; 0 leaves the gyroscope as it is. Its delay is made good in the posture."""
+    magnetometer_cutoff_hz: float = Field(20.0, ge=0.0, allow_inf_nan=False)
+    """-3 dB; 0 leaves the magnetometer as it is."""
+    settle_s: float = Field(1.0, ge=0.0, le=60.0)
+    """From a node's first answer, or its return, until its orientation counts as valid."""
+    stance_s: float = Field(0.0, ge=0.0, le=60.0)
+    """Standing still in the zero pose for so long then gives the mounting of the sensors; 0: as calibrated."""
+    stance_heading_deg: float = Field(0.0, ge=-360.0, le=360.0)
+    """Where the operator faces meanwhile, from east towards north."""
+    vqf: VqfConfig = VqfConfig()
+    mahony: MahonyConfig = MahonyConfig()
+
+    @property
+    def cutoffs_hz(self) -> tuple[float, float, float]:
+        """In the sensors' order: accelerometer, gyroscope, magnetometer."""
+        return self.accelerometer_cutoff_hz, self.gyroscope_cutoff_hz, self.magnetometer_cutoff_hz
+
+    def mistakes_at(self, rate_hz: float) -> list[ConfigMistake]:
+        """What cannot be done at that rate: a cut-off must lie below half of it."""
+        names = ("accelerometer", "gyroscope", "magnetometer")
+        return [
+            ConfigMistake(
+                f"estimation.{name}_cutoff_hz", cutoff, f"less than half the rate of {rate_hz:g} Hz, or 0"
+            )
+            for name, cutoff in zip(names, self.cutoffs_hz, strict=True)
+            if cutoff >= 0.5 * rate_hz
+        ]
+
+
+class Node(Protocol):
+    """What a node's configuration says to the estimator."""
+
+    @property
+    def filter(self) -> str | None:
+        """Its own filter's name, or None."""
+
+    @property
+    def calibration(self) -> str | None:
+        """Path of its calibration file, or None."""
+
+
+class Readings(Protocol):
+    """One tick of all N nodes, raw but in SI units, sensor frame; what is not fresh is the last known."""
+
+    @property
+    def acc_m_s2(self) -> Array:
+        """(N, 3)."""
+
+    @property
+    def gyr_rad_s(self) -> Array:
+        """(N, 3)."""
+
+    @property
+    def mag_ut(self) -> Array:
+        """(N, 3), a row of NaN where there is no magnetometer."""
+
+    @property
+    def fresh(self) -> Mask:
+        """(N,)."""
+
+    @property
+    def lost(self) -> Mask:
+        """(N,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Posture:
+    """The operator at the newest tick."""
+
+    q_world_from_segment: Array
+    """(N, 4)."""
+    rate_rad_s: Array
+    """(N, 3), each segment's in its own frame."""
+    valid: Mask
+    """(N,) False while a node is lost or its filter settles."""
+
+
+class Estimator:
+    """State of all nodes between ticks."""
+
+    def __init__(
+        self,
+        config: EstimationConfig,
+        nodes: Sequence[Node],
+        rate_hz: float,
+        calibration: Calibration | None = None,
+    ) -> None:
+        """Without a `calibration` the files that the nodes name are read. Raises ConfigError."""
+        mistakes = config.mistakes_at(rate_hz)
+        if mistakes:
+            raise ConfigError("configuration", mistakes)
+        count = len(nodes)
+        if calibration is None:
+            calibration = load_calibration([node.calibration for node in nodes])
+        self._affine = calibration.affine
+        self._samples = np.empty((3, count, 3))
+        self._lowpass = LowPass(config.cutoffs_hz, config.order, rate_hz, count)
+        self._bank = FilterBank(
+            [node.filter or config.filter for node in nodes],
+            {
+                "vqf": lambda n: VqfFilter(config.vqf, rate_hz, n),
+                "mahony": lambda n: MahonyFilter(config.mahony, rate_hz, n),
+            },
+        )
+        self._liveness = Liveness(count, math.ceil(config.settle_s * rate_hz))
+        self._heading = HeadingMemory(count)
+        self._stance = Stance(
+            calibration.q_sensor_from_segment,
+            math.ceil(config.stance_s * rate_hz),
+            math.radians(config.stance_heading_deg),
+        )
+        self._parts = (self._lowpass, self._bank, self._liveness, self._heading, self._stance)
+        self._gyr_rad_s = np.zeros((count, 3))
+        # the filters hold each reading for the period before it, which leads by half of it on average
+        self._advance_s = self._lowpass.delays_s[GYR] - 0.5 / rate_hz
+
+    def update(self, readings: Readings) -> None:
+        """Take one tick."""
+        samples = self._samples
+        samples[ACC], samples[GYR], samples[MAG] = readings.acc_m_s2, readings.gyr_rad_s, readings.mag_ut
+        was_valid = self._liveness.settled
+        changes = self._liveness.update(readings.fresh, readings.lost)
+        if changes.went.any():
+            self._heading.lose(changes.went & was_valid, self._bank.q_world_from_sensor())
+        if not self._liveness.alive.all():
+            self._idle(~self._liveness.alive)
+        if changes.came.any():
+            self._lowpass.restart(changes.came)
+            self._bank.restart(changes.came)
+        filtered = self._lowpass.update(apply(self._affine, samples))
+        self._gyr_rad_s = filtered[GYR]
+        self._bank.update(filtered[GYR], filtered[ACC], filtered[MAG])
+        if changes.settled.any():
+            self._heading.find(
+                changes.settled & np.isnan(samples[MAG, :, 0]), self._bank.q_world_from_sensor()
+            )
+        if not self._stance.known.all():
+            self._stance.add(self._oriented(self._rate_of_sensors()), self._liveness.settled)
+
+    def posture(self) -> Posture:
+        """The segments at the instant the newest tick sampled."""
+        rate = self._rate_of_sensors()
+        mounting = self._stance.q_sensor_from_segment
+        return Posture(
+            q_world_from_segment=multiply(self._oriented(rate), mounting),
+            rate_rad_s=rotate(conjugate(mounting), rate),
+            valid=self._liveness.settled & self._stance.known,
+        )
+
+    def _idle(self, nodes: Mask) -> None:
+        """Nodes that say nothing rest, so that no filter runs away on a rate heard long ago."""
+        self._samples[ACC, nodes] = (0.0, 0.0, _GRAVITY_M_S2)
+        self._samples[GYR, nodes] = 0.0
+        self._samples[MAG, nodes] = np.nan
+
+    def _rate_of_sensors(self) -> Array:
+        return self._gyr_rad_s - self._bank.bias_rad_s()
+
+    def _oriented(self, rate_rad_s: Array) -> Array:
+        """The filters' orientations brought forward over the delay of the gyro's low-pass, (N, 4)."""
+        q = multiply(self._heading.turn, self._bank.q_world_from_sensor())
+        return multiply(q, from_rotation_vector(self._advance_s * rate_rad_s))
+
+    def snapshot(self) -> object:
+        """The whole state, to be given to `restore`; later updates do not change it."""
+        return (*(part.snapshot() for part in self._parts), self._gyr_rad_s.copy())
+
+    def restore(self, snapshot: object) -> None:
+        """Go on from a snapshot that an estimator of the same configuration took."""
+        if not isinstance(snapshot, tuple) or len(snapshot) != len(self._parts) + 1:
+            raise TypeError("not a snapshot of this estimator")
+        *states, gyr_rad_s = snapshot
+        for part, state in zip(self._parts, states, strict=True):
+            part.restore(state)
+        self._gyr_rad_s = gyr_rad_s.copy()

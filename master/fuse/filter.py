@@ -1,0 +1,88 @@
+"""The one interface of the orientation filters, and a bank in which each node has the filter it asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.messages import Mask
+from common.quaternion import Array
+
+
+class OrientationFilter(Protocol):
+    """Estimates the orientations of n nodes at once from their calibrated readings, one tick at a time."""
+
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
+        """Take one tick's readings, (n, 3) each, sensor frame. A NaN row of `mag_ut` has no magnetometer.
+
+        A node's first readings after its start set its orientation at once.
+        """
+
+    def q_world_from_sensor(self) -> Array:
+        """Orientations (n, 4), world east-north-up; heading arbitrary without a magnetometer."""
+
+    def bias_rad_s(self) -> Array:
+        """What the filter takes for the gyros' bias, (n, 3): the true rate is the reading minus this."""
+
+    def restart(self, nodes: Mask) -> None:
+        """Forget the past of some nodes, mask (n,)."""
+
+    def snapshot(self) -> object:
+        """The whole state, to be given to `restore`; later updates do not change it."""
+
+    def restore(self, snapshot: object) -> None:
+        """Go on from a snapshot that a filter of the same kind and size took."""
+
+
+MakeFilter = Callable[[int], OrientationFilter]
+"""Makes a filter for that many nodes."""
+
+
+class FilterBank:
+    """N nodes, each filtered by the filter it names; itself an `OrientationFilter`."""
+
+    def __init__(self, names: Sequence[str], make: dict[str, MakeFilter]) -> None:
+        self._count = len(names)
+        self._parts: list[tuple[NDArray[np.intp] | slice, OrientationFilter]] = []
+        for name in dict.fromkeys(names):
+            rows = np.flatnonzero([n == name for n in names])
+            # a slice where all share one filter: nothing is then copied
+            self._parts.append((slice(None) if len(rows) == self._count else rows, make[name](len(rows))))
+
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
+        """One tick's readings, (N, 3) each."""
+        for rows, part in self._parts:
+            part.update(gyr_rad_s[rows], acc_m_s2[rows], mag_ut[rows])
+
+    def q_world_from_sensor(self) -> Array:
+        """Orientations (N, 4)."""
+        out = np.empty((self._count, 4))
+        for rows, part in self._parts:
+            out[rows] = part.q_world_from_sensor()
+        return out
+
+    def bias_rad_s(self) -> Array:
+        """Gyro biases (N, 3)."""
+        out = np.empty((self._count, 3))
+        for rows, part in self._parts:
+            out[rows] = part.bias_rad_s()
+        return out
+
+    def restart(self, nodes: Mask) -> None:
+        """Forget the past of some nodes, mask (N,)."""
+        for rows, part in self._parts:
+            part.restart(nodes[rows])
+
+    def snapshot(self) -> object:
+        """The state of every part."""
+        return [part.snapshot() for _, part in self._parts]
+
+    def restore(self, snapshot: object) -> None:
+        """Go on from a snapshot of this bank."""
+        if not isinstance(snapshot, list) or len(snapshot) != len(self._parts):
+            raise TypeError("not a snapshot of this bank")
+        for (_, part), state in zip(self._parts, snapshot, strict=True):
+            part.restore(state)

@@ -1,0 +1,39 @@
+"""A node without a magnetometer that was lost comes back with the heading it had, not with its filter's zero."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from common.messages import Mask
+from common.quaternion import IDENTITY, Array, conjugate, heading_rad, heading_turn, multiply
+
+
+class HeadingMemory:
+    """Turns about the vertical, (N, 4), that carry each six-axis node's heading over a loss.
+
+    What the segment turned meanwhile stays unknown; with a magnetometer the filter finds the heading itself.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.turn: Array = np.tile(IDENTITY, (count, 1))
+        self._held = np.full((count, 4), np.nan)
+
+    def lose(self, nodes: Mask, q_world_from_sensor: Array) -> None:
+        """Keep the orientations (N, 4), as the filters give them, of nodes that were trusted until now."""
+        self._held[nodes] = multiply(self.turn[nodes], q_world_from_sensor[nodes])
+
+    def find(self, nodes: Mask, q_world_from_sensor: Array) -> None:
+        """Turn the restarted nodes (six-axis only) so that their heading goes on from the one held."""
+        back = nodes & np.isfinite(self._held[:, 0])
+        between = multiply(self._held[back], conjugate(q_world_from_sensor[back]))
+        self.turn[back] = heading_turn(heading_rad(between))
+
+    def snapshot(self) -> object:
+        """The state, to be given to `restore`."""
+        return self.turn.copy(), self._held.copy()
+
+    def restore(self, snapshot: object) -> None:
+        """Go on from a snapshot."""
+        if not isinstance(snapshot, tuple):
+            raise TypeError("not a snapshot of this memory")
+        self.turn, self._held = snapshot[0].copy(), snapshot[1].copy()

@@ -1,0 +1,141 @@
+"""The complementary filter of Zuo, Yu and Gong (Acta Automatica Sinica 42(12), 2016), over all nodes at once.
+
+Equations 1 to 12, in this project's frames (world east-north-up, accelerometer at rest reads upward) and
+with two errors in print put right: Eq. 8 rotates into the sensor, not out of it; the magnetic error of
+Eq. 9 is m̂ × û, not m̂ × v̂.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from common.config import Section
+from common.messages import Mask
+from common.quaternion import Array, cross, heading_turn, multiply, to_matrix
+
+
+class MahonyConfig(Section):
+    """`[estimation.mahony]`."""
+
+    kp: float = Field(1.0, ge=0.0, allow_inf_nan=False)
+    """K_p, 1/s: how fast accelerometer and magnetometer pull; time constant 1 / K_p."""
+    ki: float = Field(0.0, ge=0.0, allow_inf_nan=False)
+    """K_i, 1/s²: how fast the gyro's bias is learnt; 0 learns none."""
+    bias_limit_rad_s: float = Field(0.1, ge=0.0, allow_inf_nan=False)
+    """Bound on each axis of the learnt bias; 0 for none."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Snapshot:
+    q: Array
+    integral: Array
+    started: Mask
+
+
+class MahonyFilter:
+    """An `OrientationFilter` of n nodes with proportional-integral feedback."""
+
+    def __init__(self, config: MahonyConfig, rate_hz: float, count: int) -> None:
+        self._config = config
+        self._period_s = 1.0 / rate_hz
+        self._q = np.zeros((count, 4))
+        self._q[:, 0] = 1.0
+        # K_i ∫ e dt, rad/s
+        self._integral = np.zeros((count, 3))
+        self._started = np.zeros(count, dtype=np.bool_)
+
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
+        """One tick's readings, (n, 3) each."""
+        if not self._started.all():
+            new = ~self._started
+            self._q[new] = initial_orientation(acc_m_s2[new], mag_ut[new])
+            self._started[new] = True
+        error = attitude_error(self._q, acc_m_s2, mag_ut)
+        config = self._config
+        if config.ki > 0.0:
+            self._integral += config.ki * self._period_s * error
+            if config.bias_limit_rad_s > 0.0:
+                limit = config.bias_limit_rad_s
+                np.clip(self._integral, -limit, limit, out=self._integral)
+        rate = gyr_rad_s + config.kp * error + self._integral  # Eqs 10, 11
+        self._q = integrate(self._q, rate, self._period_s)  # Eq. 12
+
+    def q_world_from_sensor(self) -> Array:
+        """Orientations (n, 4)."""
+        return self._q.copy()
+
+    def bias_rad_s(self) -> Array:
+        """Gyro biases (n, 3): the integral with its sign turned."""
+        return -self._integral
+
+    def restart(self, nodes: Mask) -> None:
+        """Forget the past of some nodes, mask (n,)."""
+        self._started[nodes] = False
+        self._integral[nodes] = 0.0
+
+    def snapshot(self) -> object:
+        """Orientation and bias."""
+        return _Snapshot(self._q.copy(), self._integral.copy(), self._started.copy())
+
+    def restore(self, snapshot: object) -> None:
+        """Go on from a snapshot."""
+        if not isinstance(snapshot, _Snapshot) or snapshot.q.shape != self._q.shape:
+            raise TypeError("not a snapshot of this filter")
+        self._q = snapshot.q.copy()
+        self._integral = snapshot.integral.copy()
+        self._started = snapshot.started.copy()
+
+
+def attitude_error(q_world_from_sensor: Array, acc: Array, mag: Array) -> Array:
+    """Eqs 4 to 9: the rotation, rad about sensor axes (n, 3), that small errors of q (n, 4) ask for.
+
+    Only the directions of `acc` and `mag` (n, 3) count. A NaN or zero row pulls at nothing.
+    """
+    matrix = to_matrix(q_world_from_sensor)  # Eq. 4, C_b^n
+    a_hat, m_hat = _directions(acc), _directions(mag)
+    v_hat = matrix[:, 2]  # Eq. 5: up, seen from the sensor
+    field = np.einsum("nij,nj->ni", matrix, m_hat)  # Eq. 6
+    reference = np.zeros_like(field)  # Eq. 7: no field to the east; north is our y
+    reference[:, 1] = np.hypot(field[:, 0], field[:, 1])
+    reference[:, 2] = field[:, 2]
+    u_hat = np.einsum("nji,nj->ni", matrix, reference)  # Eq. 8, put right: the inverse rotation
+    return cross(a_hat, v_hat) + cross(m_hat, u_hat)  # Eq. 9, put right
+
+
+def integrate(q: Array, rate_rad_s: Array, period_s: float) -> Array:
+    """Eq. 3: one first-order step of q̇ = ½ q ⊗ (0, ω), then unit length again. (n, 4), (n, 3) → (n, 4)."""
+    step = np.empty_like(q)
+    step[:, 0] = 1.0
+    step[:, 1:] = (0.5 * period_s) * rate_rad_s
+    q = multiply(q, step)
+    q /= np.sqrt(np.einsum("ni,ni->n", q, q))[:, None]
+    return q
+
+
+def initial_orientation(acc: Array, mag: Array) -> Array:
+    """In place of Eq. 1: orientations (n, 4) with `acc` up and `mag` northward.
+
+    Without `mag` the heading is that of the shortest turn from the sensor's frame.
+    """
+    up = _directions(acc)
+    # the shortest turn that brings `up` to the vertical: (1 + cos, sin · axis), up × z
+    q = np.stack([1.0 + up[:, 2], up[:, 1], -up[:, 0], np.zeros(len(up))], axis=-1)
+    q[q[:, 0] < 1e-9] = [0.0, 1.0, 0.0, 0.0]
+    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    field = np.einsum("nij,nj->ni", to_matrix(q), _directions(mag))
+    return multiply(heading_turn(np.arctan2(field[:, 0], field[:, 1])), q)
+
+
+def _directions(v: Array) -> Array:
+    """Rows of unit length; zero where a row is NaN or zero."""
+    length = np.sqrt(np.einsum("ni,ni->n", v, v))
+    known = length > 0.0
+    if known.all():
+        directions: Array = v / length[:, None]
+        return directions
+    out = np.zeros_like(v)
+    np.divide(v, length[:, None], out=out, where=known[:, None])
+    return out

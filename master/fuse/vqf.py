@@ -1,0 +1,81 @@
+"""VQF (Laidig and Seel, Information Fusion 91, 2023) behind the filters' interface: one object a node."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+from vqf import VQF
+
+from common.config import Section
+from common.messages import Mask
+from common.quaternion import Array
+
+
+class VqfConfig(Section):
+    """`[estimation.vqf]`."""
+
+    tau_acc_s: float = Field(3.0, gt=0.0, allow_inf_nan=False)
+    """Time constant with which the accelerometer corrects the inclination."""
+    tau_mag_s: float = Field(9.0, gt=0.0, allow_inf_nan=False)
+    """Time constant with which the magnetometer corrects the heading."""
+    motion_bias: bool = True
+    """Estimate the gyro's bias in motion too."""
+    rest_bias: bool = True
+    """Estimate the gyro's bias at rest."""
+    reject_disturbed_field: bool = True
+    """Leave out a magnetic field whose strength or dip is not the usual one."""
+
+
+class VqfFilter:
+    """An `OrientationFilter` of n `vqf.VQF` objects (C++, about 1 µs an update)."""
+
+    def __init__(self, config: VqfConfig, rate_hz: float, count: int) -> None:
+        self._filters = [
+            VQF(
+                1.0 / rate_hz,
+                tauAcc=config.tau_acc_s,
+                tauMag=config.tau_mag_s,
+                motionBiasEstEnabled=config.motion_bias,
+                restBiasEstEnabled=config.rest_bias,
+                magDistRejectionEnabled=config.reject_disturbed_field,
+            )
+            for _ in range(count)
+        ]
+
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
+        """One tick's readings, (n, 3) each; rows must be contiguous float64."""
+        has_mag = np.isfinite(mag_ut[:, 0])
+        if has_mag.all():
+            for vqf, gyr, acc, mag in zip(self._filters, gyr_rad_s, acc_m_s2, mag_ut, strict=True):
+                vqf.update(gyr, acc, mag)
+            return
+        rows = zip(self._filters, gyr_rad_s, acc_m_s2, mag_ut, has_mag.tolist(), strict=True)
+        for vqf, gyr, acc, mag, nine_axis in rows:
+            if nine_axis:
+                vqf.update(gyr, acc, mag)
+            else:
+                vqf.update(gyr, acc)
+
+    def q_world_from_sensor(self) -> Array:
+        """Orientations (n, 4); VQF's nine-axis answer is its six-axis one until a magnetometer speaks."""
+        return np.array([vqf.getQuat9D() for vqf in self._filters])
+
+    def bias_rad_s(self) -> Array:
+        """Gyro biases (n, 3)."""
+        return np.array([vqf.getBiasEstimate()[0] for vqf in self._filters])
+
+    def restart(self, nodes: Mask) -> None:
+        """Forget the past of some nodes, mask (n,)."""
+        for i in np.flatnonzero(nodes):
+            self._filters[i].resetState()
+
+    def snapshot(self) -> object:
+        """Each object's state."""
+        return [vqf.state for vqf in self._filters]
+
+    def restore(self, snapshot: object) -> None:
+        """Go on from a snapshot."""
+        if not isinstance(snapshot, list) or len(snapshot) != len(self._filters):
+            raise TypeError("not a snapshot of this filter")
+        for vqf, state in zip(self._filters, snapshot, strict=True):
+            vqf.state = state
