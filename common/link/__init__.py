@@ -1,6 +1,6 @@
 """The link between the two sides: one Zenoh session a process, live data first, nothing kept.
 
-Read configuration (what Zenoh is told), inbox (foreign thread → loop), queries, then session.
+Read configuration (what Zenoh is told), inbox (foreign thread → loop), queries, waiting, then session.
 """
 
 from common.link.session import Link, open_link

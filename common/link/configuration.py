@@ -13,6 +13,7 @@ def zenoh_configuration(config: LinkConfig) -> dict[str, Any]:
         "mode": "peer",
         # nothing is found by chance: endpoints are explicit
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        # told explicitly even where empty: by default a peer listens on every interface
         "listen": {"endpoints": config.listen},
         "connect": {
             "endpoints": config.connect,

@@ -21,10 +21,12 @@ from common.link.configuration import zenoh_configuration
 from common.link.counters import TopicCounters
 from common.link.inbox import Inbox, wake
 from common.link.queries import Answerer, ask
+from common.link.waiting import wait_for_peer
 from common.throttle import Throttle
 from common.topics import ALIVE, Topic
 
 CLOSE_TIMEOUT_S = 1.0
+CONNECT_TIMEOUT_S = 3.0
 _ROBOT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _RUST_PLACE = re.compile(r" at \S+\.rs:\d+\.?")
 
@@ -126,6 +128,14 @@ class Link:
             )
         )
 
+    async def connected(self, topic: Topic | None = None, timeout_s: float = CONNECT_TIMEOUT_S) -> None:
+        """Wait for another session, and where a topic is given, for one that answers its questions.
+
+        Raises LinkTimeoutError when none comes.
+        """
+        key = None if topic is None else topic.key_for(self.robot)
+        await wait_for_peer(self._session, key, timeout_s)
+
     async def ask(self, topic: Topic, payload: bytes) -> bytes:
         """The answer. LinkTimeoutError after the topic's time-out; LinkError where nobody can answer."""
         return (await self.ask_stamped(topic, payload))[0]
@@ -165,7 +175,6 @@ class Link:
             )
         )
 
-    @property
     def counters(self) -> dict[str, dict[str, int]]:
         """Counters per topic name."""
         return {name: asdict(counters) for name, counters in self._counters.items()}

@@ -1,0 +1,52 @@
+"""Wait until the other side is there."""
+
+from __future__ import annotations
+
+import asyncio
+
+import zenoh
+from zenoh.handlers import Callback
+
+from common.errors import LinkTimeoutError
+from common.link.inbox import wake
+
+
+async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: float) -> None:
+    """Until another session is connected and, where a key is given, one that answers it.
+
+    A session is connected a millisecond before it has told what it answers, so a question put in between
+    would find nobody. Raises LinkTimeoutError.
+    """
+    loop = asyncio.get_running_loop()
+    there = asyncio.Event()
+
+    def on_change(_: object) -> None:
+        wake(loop, there.set)
+
+    handler: Callback[object] = Callback(on_change, indirect=False)
+    try:
+        async with asyncio.timeout(timeout_s):
+            if key is None:
+                events = session.info.declare_transport_events_listener(handler, history=True)
+                try:
+                    await there.wait()
+                finally:
+                    events.undeclare()  # type: ignore[no-untyped-call]
+                return
+            querier = session.declare_querier(key, allowed_destination=zenoh.Locality.REMOTE)
+            try:
+                querier.declare_matching_listener(handler)
+                while not _matching(querier):
+                    there.clear()
+                    await there.wait()
+            finally:
+                querier.undeclare()  # type: ignore[no-untyped-call]
+    except TimeoutError:
+        what = "another session" if key is None else f"anyone who answers {key}"
+        raise LinkTimeoutError(f"no link to {what} within {timeout_s:g} s") from None
+
+
+def _matching(querier: zenoh.Querier) -> bool:
+    # declared as a flag, but an object that holds one comes
+    status = querier.matching_status
+    return bool(getattr(status, "matching", status))
