@@ -108,20 +108,23 @@ def heading_rad(q: Array) -> Array:
     return out
 
 
+def _squares() -> Array:
+    """(q outer q) flattened to 16, times this (16, 9), is the rotation matrix flattened."""
+    # R v is the vector part of q ⊗ v ⊗ q*: put the basis vectors through the product's structure
+    left = _HAMILTON.reshape(4, 4, 4)
+    turned = np.einsum("ajb,bcd,c->acdj", left[:, 1:], left, _CONJUGATE)[:, :, 1:]
+    out: Array = turned.reshape(16, 9)
+    return out
+
+
+_SQUARES = _squares()
+
+
 def to_matrix(q: Array) -> Array:
-    """Rotation matrices (..., 3, 3), a from b."""
-    w, x, y, z = np.moveaxis(q, -1, 0)
-    m = np.empty((*q.shape[:-1], 3, 3))
-    m[..., 0, 0] = 1 - 2 * (y * y + z * z)
-    m[..., 0, 1] = 2 * (x * y - w * z)
-    m[..., 0, 2] = 2 * (x * z + w * y)
-    m[..., 1, 0] = 2 * (x * y + w * z)
-    m[..., 1, 1] = 1 - 2 * (x * x + z * z)
-    m[..., 1, 2] = 2 * (y * z - w * x)
-    m[..., 2, 0] = 2 * (x * z - w * y)
-    m[..., 2, 1] = 2 * (y * z + w * x)
-    m[..., 2, 2] = 1 - 2 * (x * x + y * y)
-    return m
+    """Rotation matrices (..., 3, 3), a from b, of unit quaternions (..., 4)."""
+    outer = q[..., :, None] * q[..., None, :]
+    out: Array = outer.reshape(*outer.shape[:-2], 16) @ _SQUARES
+    return out.reshape(*outer.shape[:-2], 3, 3)
 
 
 def angle_between(p: Array, q: Array) -> Array:

@@ -33,17 +33,17 @@ class EstimationConfig(Section):
     """Orientation filter of every node that does not name its own."""
     order: Literal[2, 4, 6, 8] = 2
     """Order of the Butterworth low-passes."""
-    accelerometer_cutoff_hz: float = Field(30.0, ge=0.0, allow_inf_nan=False)
+    accelerometer_cutoff_hz: float = Field(default=30.0, ge=0.0, allow_inf_nan=False)
     """-3 dB; 0 leaves the accelerometer as it is."""
-    gyroscope_cutoff_hz: float = Field(50.0, ge=0.0, allow_inf_nan=False)
+    gyroscope_cutoff_hz: float = Field(default=50.0, ge=0.0, allow_inf_nan=False)
     """-3 dB; 0 leaves the gyroscope as it is. Its delay is made good in the posture."""
-    magnetometer_cutoff_hz: float = Field(20.0, ge=0.0, allow_inf_nan=False)
+    magnetometer_cutoff_hz: float = Field(default=20.0, ge=0.0, allow_inf_nan=False)
     """-3 dB; 0 leaves the magnetometer as it is."""
-    settle_s: float = Field(1.0, ge=0.0, le=60.0)
+    settle_s: float = Field(default=1.0, ge=0.0, le=60.0)
     """From a node's first answer, or its return, until its orientation counts as valid."""
-    stance_s: float = Field(0.0, ge=0.0, le=60.0)
-    """Standing still in the zero pose for so long then gives the mounting of the sensors; 0: as calibrated."""
-    stance_heading_deg: float = Field(0.0, ge=-360.0, le=360.0)
+    stance_s: float = Field(default=0.0, ge=0.0, le=60.0)
+    """So long standing still in the zero pose then gives the sensors' mounting; 0: as calibrated."""
+    stance_heading_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
     """Where the operator faces meanwhile, from east towards north."""
     vqf: VqfConfig = VqfConfig()
     mahony: MahonyConfig = MahonyConfig()
@@ -101,6 +101,12 @@ class Readings(Protocol):
         """(N,)."""
 
 
+class _Stateful(Protocol):
+    def snapshot(self) -> object: ...
+
+    def restore(self, snapshot: object) -> None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Posture:
     """The operator at the newest tick."""
@@ -147,7 +153,13 @@ class Estimator:
             math.ceil(config.stance_s * rate_hz),
             math.radians(config.stance_heading_deg),
         )
-        self._parts = (self._lowpass, self._bank, self._liveness, self._heading, self._stance)
+        self._parts: tuple[_Stateful, ...] = (
+            self._lowpass,
+            self._bank,
+            self._liveness,
+            self._heading,
+            self._stance,
+        )
         self._gyr_rad_s = np.zeros((count, 3))
         # the filters hold each reading for the period before it, which leads by half of it on average
         self._advance_s = self._lowpass.delays_s[GYR] - 0.5 / rate_hz

@@ -1,4 +1,4 @@
-"""A node without a magnetometer that was lost comes back with the heading it had, not with its filter's zero."""
+"""A lost node without a magnetometer comes back with the heading it had, not its filter's zero."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from common.messages import Mask
 from common.quaternion import Array
 
 
@@ -102,12 +103,12 @@ class LowPass:
         self._state, self._next = self._next, state
         return self._state[:, 0].reshape(self._shape)
 
-    def _start(self, channels: Array) -> None:
+    def _start(self, channels: Mask) -> None:
         """Give channels (sensors, 3 nodes) the steady state of the sample they now hold."""
         first = self._steady * self._state[:, :1]
         np.copyto(self._state[:, 1:], first, where=channels[:, None])
 
-    def restart(self, nodes: Array) -> None:
+    def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (nodes,)."""
         self._state[:, 1:, np.repeat(nodes, 3)] = np.nan
 

@@ -20,11 +20,11 @@ from common.quaternion import Array, cross, heading_turn, multiply, to_matrix
 class MahonyConfig(Section):
     """`[estimation.mahony]`."""
 
-    kp: float = Field(1.0, ge=0.0, allow_inf_nan=False)
+    kp: float = Field(default=1.0, ge=0.0, allow_inf_nan=False)
     """K_p, 1/s: how fast accelerometer and magnetometer pull; time constant 1 / K_p."""
-    ki: float = Field(0.0, ge=0.0, allow_inf_nan=False)
+    ki: float = Field(default=0.0, ge=0.0, allow_inf_nan=False)
     """K_i, 1/s²: how fast the gyro's bias is learnt; 0 learns none."""
-    bias_limit_rad_s: float = Field(0.1, ge=0.0, allow_inf_nan=False)
+    bias_limit_rad_s: float = Field(default=0.1, ge=0.0, allow_inf_nan=False)
     """Bound on each axis of the learnt bias; 0 for none."""
 
 
@@ -95,14 +95,17 @@ def attitude_error(q_world_from_sensor: Array, acc: Array, mag: Array) -> Array:
     Only the directions of `acc` and `mag` (n, 3) count. A NaN or zero row pulls at nothing.
     """
     matrix = to_matrix(q_world_from_sensor)  # Eq. 4, C_b^n
-    a_hat, m_hat = _directions(acc), _directions(mag)
-    v_hat = matrix[:, 2]  # Eq. 5: up, seen from the sensor
-    field = np.einsum("nij,nj->ni", matrix, m_hat)  # Eq. 6
+    measured = _directions(np.stack([acc, mag]))  # â, m̂
+    field = np.einsum("nij,nj->ni", matrix, measured[1])  # Eq. 6
     reference = np.zeros_like(field)  # Eq. 7: no field to the east; north is our y
-    reference[:, 1] = np.hypot(field[:, 0], field[:, 1])
+    np.hypot(field[:, 0], field[:, 1], out=reference[:, 1])
     reference[:, 2] = field[:, 2]
-    u_hat = np.einsum("nji,nj->ni", matrix, reference)  # Eq. 8, put right: the inverse rotation
-    return cross(a_hat, v_hat) + cross(m_hat, u_hat)  # Eq. 9, put right
+    expected = np.empty_like(measured)
+    expected[0] = matrix[:, 2]  # Eq. 5, v̂: up, seen from the sensor
+    np.einsum("nji,nj->ni", matrix, reference, out=expected[1])  # Eq. 8, û: the inverse rotation
+    errors = cross(measured, expected)  # Eq. 9: â × v̂ and m̂ × û
+    out: Array = errors[0] + errors[1]
+    return out
 
 
 def integrate(q: Array, rate_rad_s: Array, period_s: float) -> Array:
@@ -130,12 +133,8 @@ def initial_orientation(acc: Array, mag: Array) -> Array:
 
 
 def _directions(v: Array) -> Array:
-    """Rows of unit length; zero where a row is NaN or zero."""
-    length = np.sqrt(np.einsum("ni,ni->n", v, v))
+    """Vectors (..., 3) at unit length; zero where one is NaN or zero."""
+    length = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
     known = length > 0.0
-    if known.all():
-        directions: Array = v / length[:, None]
-        return directions
-    out = np.zeros_like(v)
-    np.divide(v, length[:, None], out=out, where=known[:, None])
+    out: Array = v / length if known.all() else np.divide(v, length, out=np.zeros_like(v), where=known)
     return out

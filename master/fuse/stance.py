@@ -17,7 +17,7 @@ class Stance:
     """Takes each node's mean orientation over its first `ticks` settled ticks as that of the zero pose."""
 
     def __init__(self, q_sensor_from_segment: Array, ticks: int, heading_rad: float) -> None:
-        """`q_sensor_from_segment` (N, 4) stands until the stance is complete, and for good if `ticks` is 0."""
+        """`q_sensor_from_segment` (N, 4) stands until the stance is complete, for good if `ticks` is 0."""
         count = len(q_sensor_from_segment)
         self._ticks = ticks
         self._facing = heading_turn(heading_rad)

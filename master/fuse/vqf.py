@@ -14,9 +14,9 @@ from common.quaternion import Array
 class VqfConfig(Section):
     """`[estimation.vqf]`."""
 
-    tau_acc_s: float = Field(3.0, gt=0.0, allow_inf_nan=False)
+    tau_acc_s: float = Field(default=3.0, gt=0.0, allow_inf_nan=False)
     """Time constant with which the accelerometer corrects the inclination."""
-    tau_mag_s: float = Field(9.0, gt=0.0, allow_inf_nan=False)
+    tau_mag_s: float = Field(default=9.0, gt=0.0, allow_inf_nan=False)
     """Time constant with which the magnetometer corrects the heading."""
     motion_bias: bool = True
     """Estimate the gyro's bias in motion too."""

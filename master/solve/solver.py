@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.quaternion import IDENTITY, Array, conjugate, multiply, rotate
+from common.quaternion import IDENTITY, Array, conjugate, multiply, to_matrix
 from common.skeleton import Skeleton
-from master.solve.angles import elements, intrinsic_angles
+from master.solve.angles import intrinsic_angles
 from master.solve.rates import angle_rates
 
 
@@ -26,6 +26,8 @@ class JointSolver:
         self._parents = np.where(skeleton.parents < 0, count, skeleton.parents)
         self._frames = skeleton.axis_frames
         self._q_axes = np.empty((count, 4))
+        self._vectors = np.empty((count, 3, 3))
+        self._both = np.empty((2, 3 * count))
         weights = skeleton.joints_from_angles.reshape(joints, count, 3).copy()
         weights[:, :, 2] *= skeleton.axis_handedness
         # (3 N, J), the angles place by place, as angles.py gives them
@@ -37,17 +39,20 @@ class JointSolver:
         Takes orientations (N, 4) and the segments' rates (N, 3), each in its own frame. Turning the whole
         world about the vertical changes nothing. NaN stays within the joints that need its node.
         """
-        q, rate = self._q, self._rate
+        q, rate, vectors, q_axes = self._q, self._rate, self._vectors, self._q_axes
         q[:-1], rate[:-1] = q_world_from_segment, rate_rad_s
-        q_segment_from_parent = multiply(conjugate(q_world_from_segment), q.take(self._parents, axis=0))
-        relative = rate_rad_s - rotate(q_segment_from_parent, rate.take(self._parents, axis=0))
-        # both vectors into each segment's axis frame
-        vectors = np.stack([-q_segment_from_parent[:, 1:], relative], axis=1) @ self._frames
-        q_axes = self._q_axes
-        q_axes[:, 0] = q_segment_from_parent[:, 0]
-        q_axes[:, 1:] = vectors[:, 0]
-        r = elements(q_axes)
-        angles = intrinsic_angles(r)
-        rates = angle_rates(r, vectors[:, 1].T)
-        both = np.stack([angles.reshape(-1), rates.reshape(-1)]) @ self._weights
-        return both[0], both[1]
+        q_parent_from_segment = multiply(conjugate(q.take(self._parents, axis=0)), q_world_from_segment)
+        vectors[:, 0] = q_parent_from_segment[:, 1:]
+        vectors[:, 1] = rate_rad_s
+        vectors[:, 2] = rate.take(self._parents, axis=0)
+        # rotation axis, own rate and parent's rate, all into each segment's axis frame
+        in_axes = vectors @ self._frames
+        q_axes[:, 0] = q_parent_from_segment[:, 0]
+        q_axes[:, 1:] = in_axes[:, 0]
+        matrix = to_matrix(q_axes)
+        relative_rate = in_axes[:, 1] - np.einsum("nji,nj->ni", matrix, in_axes[:, 2])
+        both = self._both
+        both[0] = intrinsic_angles(matrix).reshape(-1)
+        both[1] = angle_rates(matrix, relative_rate).reshape(-1)
+        solved: Array = both @ self._weights
+        return solved[0], solved[1]
