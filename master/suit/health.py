@@ -64,6 +64,10 @@ class NodeCounters:
         """The counters of one node."""
         return NodeHealth(**{f.name: int(getattr(self, f.name)[index]) for f in fields(NodeHealth)})
 
+    def totals(self) -> dict[str, int]:
+        """The sum of each counter over all nodes."""
+        return {f.name: int(getattr(self, f.name).sum()) for f in fields(NodeHealth)}
+
 
 class OncePerSecond:
     """Lets each key speak once a second; says how many times it was asked since it last spoke."""

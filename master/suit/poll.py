@@ -65,6 +65,7 @@ class Poll:
         self._bus_of_node = [node.bus for node in nodes]
         self.bus_health: dict[str, BusHealth] = {bus: BusHealth() for bus in fd}
         self._bus_names = list(fd)
+        self._names = [f"{node.bus} {node.id}" for node in nodes]
         self._all: Mask = np.ones(count, dtype=np.bool_)
         self._without_mag: Mask = np.array([not node.magnetometer for node in nodes])
         self._some_without_mag = bool(self._without_mag.any())
@@ -177,6 +178,16 @@ class Poll:
     def health(self) -> list[NodeHealth]:
         """The counters of each node, in node order."""
         return [self._counters.node(index) for index in range(len(self._values))]
+
+    def summary(self) -> dict[str, object]:
+        """Totals over nodes and buses, and the nodes that are lost now, as plain values."""
+        lost = [self._names[index] for index in np.flatnonzero(self._presence.lost)]
+        return {
+            **self._counters.totals(),
+            "unknown_id": sum(bus.unknown_id for bus in self.bus_health.values()),
+            "overflow": sum(bus.overflow for bus in self.bus_health.values()),
+            "lost_now": lost,
+        }
 
     def _take_whole(self, frames: list[tuple[int, bytes]]) -> bool:
         """The usual window: each expected frame came once and is sound. False, and no effect, if not so."""

@@ -1,0 +1,143 @@
+"""Open a python-can interface, set its socket up, and say in plain words why it could not be opened."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import socket
+from typing import Any
+
+import can
+
+from common.errors import BusError
+from master.suit.nodes import BusConfig
+
+RECEIVE_BUFFER_BYTES = 1 << 20
+"""Some 4000 waiting udp_multicast frames: half a second of 36 nodes."""
+_LOOPBACK = "127.0.0.1"
+_SO_BINDTODEVICE = getattr(socket, "SO_BINDTODEVICE", 25)
+
+log = logging.getLogger("tandem.bus")
+
+
+def open_bus(config: BusConfig) -> can.BusABC:
+    """An open python-can bus. Raises BusError: which bus, why not, and what to do."""
+    options: dict[str, Any] = {"fd": config.fd, **config.options}
+    try:
+        # ignore_config: only tandem's TOML says what is opened, no ~/.canrc or CAN_CONFIG
+        bus = can.Bus(
+            channel=config.channel,
+            interface=config.interface,
+            ignore_config=True,
+            **options,
+        )
+    except Exception as error:  # a driver may raise what it likes, of any library it is made with
+        raise BusError(explain(config, error)) from error
+    try:
+        _set_up_socket(config, bus)
+    except OSError as error:
+        bus.shutdown()
+        raise BusError(explain(config, error)) from error
+    return bus
+
+
+def descriptor(bus: can.BusABC) -> int | None:
+    """What an event loop can watch, or None where the interface has no such thing."""
+    try:
+        number = bus.fileno()
+    except NotImplementedError:
+        return None
+    return number if number >= 0 else None
+
+
+def _set_up_socket(config: BusConfig, bus: can.BusABC) -> None:
+    number = descriptor(bus)
+    if number is None:
+        return
+    try:
+        # python-can keeps its socket to itself: a second handle reaches the same one
+        wire = socket.socket(fileno=os.dup(number))
+    except OSError as error:
+        if error.errno == errno.ENOTSOCK:  # a serial adapter
+            return
+        raise
+    with wire:
+        wire.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        if stays_on_host(config):
+            _keep_on_host(wire, config.channel)
+        # a CAN socket can be bound to an interface that is down: only its pending error says so
+        pending = wire.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+    if pending:
+        raise OSError(pending, os.strerror(pending))
+
+
+def stays_on_host(config: BusConfig) -> bool:
+    """Whether the bus is a multicast group that nothing leaves: `hop_limit = 0`, IPv4."""
+    return (
+        config.interface == "udp_multicast"
+        and config.options.get("hop_limit") == 0
+        and ":" not in config.channel
+    )
+
+
+def _keep_on_host(wire: socket.socket, group: str) -> None:
+    membership = socket.inet_aton(group) + socket.inet_aton(_LOOPBACK)
+    wire.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+    wire.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(_LOOPBACK))
+    try:
+        # the port is bound on every interface: without this, another host could send frames to it
+        wire.setsockopt(socket.SOL_SOCKET, _SO_BINDTODEVICE, b"lo\0")
+    except OSError as error:
+        log.warning("multicast group %s also hears other hosts: %s", group, error.strerror)
+
+
+def explain(config: BusConfig, error: BaseException) -> str:
+    """One line: the bus, what failed, what to do about it, and the way without hardware."""
+    reason = _reason(error)
+    what = f"bus {config.name}: cannot open {config.interface} {config.channel}: {reason}"
+    advice = _advice(config, error)
+    simulated = "without hardware, put this bus on udp_multicast and start the simulated suit (tandem suit)"
+    return f"{what}; " + "; ".join(filter(None, [advice, simulated]))
+
+
+def error_number(error: BaseException) -> int | None:
+    """The operating system's number behind a python-can error, where there is one."""
+    code = getattr(error, "error_code", None)
+    if code is None and isinstance(error, OSError):
+        code = error.errno
+    if code is None and error.__cause__ is not None:
+        return error_number(error.__cause__)
+    return code
+
+
+def _reason(error: BaseException) -> str:
+    number = error_number(error)
+    if number is not None and number in errno.errorcode:
+        return os.strerror(number)
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _advice(config: BusConfig, error: BaseException) -> str:
+    number = error_number(error) or 0
+    channel = config.channel
+    if isinstance(error, NotImplementedError):
+        return "use an interface that python-can has, such as socketcan or udp_multicast"
+    if config.interface == "socketcan":
+        bitrate = f"ip link set {channel} type can bitrate 1000000"
+        if config.fd:
+            bitrate += " dbitrate 5000000 fd on"
+        by_number = {
+            errno.ENODEV: "plug the adapter in and check its name with `ip link`",
+            errno.ENETDOWN: f"bring it up: `{bitrate}`, then `ip link set {channel} up`",
+            errno.EAFNOSUPPORT: "this kernel has no SocketCAN",
+        }
+        return by_number.get(number, "")
+    if config.interface == "udp_multicast":
+        by_number = {
+            errno.ENODEV: "give multicast a route: `ip route add 239.0.0.0/8 dev lo`",
+            errno.ENETUNREACH: "give multicast a route: `ip route add 239.0.0.0/8 dev lo`",
+            errno.EINVAL: "its channel must be a multicast group, such as 239.74.163.2",
+        }
+        return by_number.get(number, "")
+    return ""
