@@ -85,7 +85,7 @@ class AnswerLayout:
         if min(self.tick.byte, self.status.byte) < after_readings:
             raise LayoutError(f"{self.name}: expected TICK and STATUS after the readings")
         self._tail = (after_readings, self.length - 1)
-        self._dtype = np.dtype(
+        self.dtype = np.dtype(
             {
                 "names": ["raw", "tick", "status"],
                 "formats": [("<i2", len(readings)), self.tick.dtype, self.status.dtype],
@@ -93,6 +93,7 @@ class AnswerLayout:
                 "itemsize": self.length,
             }
         )
+        """A frame as one structured value: `raw` (k,), and the words that hold `tick` and `status`."""
 
     def _first_byte(self, readings: list[Signal]) -> int:
         first = readings[0].start
@@ -112,11 +113,11 @@ class AnswerLayout:
 
     def same_shape(self, other: AnswerLayout) -> bool:
         """True where frames of both can be decoded in one batch."""
-        return self._dtype == other._dtype and (self.tick, self.status) == (other.tick, other.status)
+        return self.dtype == other.dtype and (self.tick, self.status) == (other.tick, other.status)
 
     def decode(self, frames: bytes) -> Decoded:
         """Read F frames that lie one after the other, F × length bytes. Checks nothing."""
-        table = np.frombuffer(frames, dtype=self._dtype)
+        table = np.frombuffer(frames, dtype=self.dtype)
         as_bytes = np.frombuffer(frames, dtype=np.uint8).reshape(-1, self.length)
         tick, status = self.tick, self.status
         return Decoded(
@@ -128,7 +129,7 @@ class AnswerLayout:
 
     def raw(self, frames: bytes) -> Raw:
         """Readings (F, k) of F frames that lie one after the other."""
-        readings: Raw = np.frombuffer(frames, dtype=self._dtype)["raw"]
+        readings: Raw = np.frombuffer(frames, dtype=self.dtype)["raw"]
         return readings
 
     def is_all(self, frames: bytes, tick: int, status: int, folded: Bytes) -> bool:
