@@ -1,0 +1,5 @@
+"""`python -m deploy` is `tandem`."""
+
+from deploy.cli import main
+
+main()

@@ -1,0 +1,216 @@
+"""`tandem`: every command, its options and its help. The work is done elsewhere."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from common.config import load_config
+from common.errors import TandemError
+from common.messages import Action
+from common.runtime import run as run_until_stopped
+
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    help="A nurse moves; a humanoid upper body far away moves the same way, safely, "
+    "and everyone knows how late it was.\n\nStart with `tandem demo`.",
+)
+_debug = False
+
+ConfigFile = Annotated[Path, typer.Argument(help="TOML file; deploy/examples has one to start from.")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Set one key over the file: `--set 'robot=\"robot-2\"'`."
+    ),
+]
+Figures = Annotated[
+    Path | None, typer.Option(help="Write what was counted, as JSON, when stopped.", dir_okay=False)
+]
+Connect = Annotated[list[str], typer.Option(help="The robot's endpoint.")]
+Robot = Annotated[str, typer.Option(help="The robot's name.")]
+Operator = Annotated[str, typer.Option(help="Your name, as in the master's file.")]
+
+
+@app.callback()
+def _options(
+    debug: Annotated[bool, typer.Option(help="Show tracebacks and every log line.")] = False,
+) -> None:
+    global _debug
+    _debug = debug
+    logging.basicConfig(
+        level=logging.DEBUG if debug else logging.INFO,
+        format="%(asctime)s %(name)s: %(message)s",
+        stream=sys.stderr,
+    )
+
+
+@app.command()
+def master(config: ConfigFile, set_: Overrides = None, figures: Figures = None) -> None:
+    """Run the operator's side: read the suit, solve the joints, command the robot.
+
+    Example: `tandem master deploy/examples/master.toml`
+    """
+    from master.app import run
+    from master.config import MasterConfig
+
+    checked = load_config(config, MasterConfig, set_ or ())
+    run_until_stopped(lambda stop: run(checked, stop, _write_figures(figures)))
+
+
+@app.command()
+def slave(config: ConfigFile, set_: Overrides = None, figures: Figures = None) -> None:
+    """Run the robot's side: guard, drive and measure.
+
+    Example: `tandem slave deploy/examples/slave.toml`
+    """
+    from slave.app import run
+    from slave.config import SlaveConfig
+
+    checked = load_config(config, SlaveConfig, set_ or ())
+    run_until_stopped(lambda stop: run(checked, stop, _write_figures(figures)))
+
+
+@app.command()
+def suit(config: ConfigFile, set_: Overrides = None, figures: Figures = None) -> None:
+    """Run the simulated suit: a real CAN peer that answers every SYNC as worn nodes would.
+
+    Example: `tandem suit deploy/examples/suit.toml --set 'motion="sweep"'`
+    """
+    from deploy.suit import run
+    from master.suit.simulated.config import SuitConfig
+
+    checked = load_config(config, SuitConfig, set_ or ())
+    run_until_stopped(lambda stop: run(checked, stop, _write_figures(figures)))
+
+
+@app.command()
+def demo(
+    seconds: Annotated[float, typer.Option(help="How long to follow the operator.", min=3.0)] = 20.0,
+    report: Annotated[Path | None, typer.Option(help="Write the report as JSON.", dir_okay=False)] = None,
+    transport: Annotated[str, typer.Option(help="tcp, udp, ws or unixsock-stream.")] = "tcp",
+    replay: Annotated[
+        Path | None, typer.Option(help="A person's recording (.npz) instead of a simulated one.", exists=True)
+    ] = None,
+    motion: Annotated[str, typer.Option(help="bottle, sweep or calibration_pose.")] = "bottle",
+    strategy: Annotated[str, typer.Option(help="predict, interpolate or hold.")] = "predict",
+    filter_: Annotated[str, typer.Option("--filter", help="vqf or mahony.")] = "vqf",
+    seed: Annotated[int, typer.Option(help="Of the simulated sensors' errors.")] = 1,
+) -> None:
+    """Run the whole way here: simulated suit, master and robot as three processes, and judge it.
+
+    Example: `tandem demo --seconds 60 --report report.json --transport udp`
+    """
+    from deploy.demo.run import DemoOptions, run_demo
+    from deploy.demo.view import print_report
+
+    console = Console()
+    options = DemoOptions(seconds, transport, replay, motion, strategy, filter_, seed)
+
+    async def tell(stop: asyncio.Event) -> None:
+        result = await run_demo(options, stop, console)
+        if report is not None:
+            report.write_text(json.dumps(result.tree, indent=2, ensure_ascii=False) + "\n", "utf-8")
+        print_report(result, console)
+        if result.problems:
+            raise TandemError("the demo failed: " + "; ".join(result.problems))
+
+    run_until_stopped(tell)
+
+
+@app.command()
+def bench(
+    report: Annotated[Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False)] = None,
+    quick: Annotated[bool, typer.Option(help="A few seconds, rougher figures.")] = False,
+) -> None:
+    """Measure whether this machine is good enough.
+
+    Example: `tandem bench --report bench.json`
+    """
+    from deploy.bench.run import bench as measure
+
+    figures = measure(quick=quick, console=Console())
+    if report is not None:
+        report.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", "utf-8")
+
+
+@app.command()
+def engage(connect: Connect, robot: Robot, operator: Operator) -> None:
+    """Let the robot follow: it moves slowly to the operator's posture, then tracks.
+
+    Example: `tandem engage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
+    """
+    _ask(robot, Action.ENGAGE, connect, operator)
+
+
+@app.command()
+def disengage(connect: Connect, robot: Robot, operator: Operator) -> None:
+    """Let the robot hold where it is."""
+    _ask(robot, Action.DISENGAGE, connect, operator)
+
+
+@app.command()
+def estop(connect: Connect, robot: Robot) -> None:
+    """Stop the robot now. Anyone may; it stays stopped until it is reset."""
+    _ask(robot, Action.ESTOP, connect)
+
+
+@app.command()
+def reset(
+    connect: Connect,
+    robot: Robot,
+    key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
+) -> None:
+    """Leave an emergency stop: the robot then holds, it does not move."""
+    _ask(robot, Action.RESET, connect, key=key)
+
+
+@app.command()
+def status(connect: Connect, robot: Robot) -> None:
+    """Ask a robot what it does."""
+    _ask(robot, Action.STATUS, connect)
+
+
+def _ask(robot: str, action: Action, connect: list[str], operator: str = "", key: str = "") -> None:
+    from deploy.control import ask_robot
+
+    async def tell(_: asyncio.Event) -> None:
+        reply = await ask_robot(robot, action, connect, operator, key)
+        Console().print(f"{robot}: {reply.guard}: {reply.text}", highlight=False)
+        if not reply.done:
+            raise TandemError(f"{action} was refused: {reply.text}")
+
+    run_until_stopped(tell)
+
+
+def _write_figures(path: Path | None) -> Any:
+    def write(figures: dict[str, object]) -> None:
+        if path is not None:
+            path.write_text(json.dumps(figures, ensure_ascii=False), "utf-8")
+
+    return write
+
+
+def main() -> None:
+    """Entry point: errors a person can cause are one clear line each, and status 1."""
+    try:
+        app()
+    except TandemError as error:
+        if _debug:
+            raise
+        for line in str(error).splitlines():
+            print(f"tandem: {line}", file=sys.stderr)  # noqa: T201
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

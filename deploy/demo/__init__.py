@@ -1,0 +1,1 @@
+"""The main job on one machine: suit, master and slave as separate processes, watched and judged."""

@@ -1,0 +1,109 @@
+"""A process of the demo: started, measured, stopped by SIGTERM, its last words kept."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from common.errors import TandemError
+
+STOP_S = 5.0
+"""Grace between SIGTERM and SIGKILL: above the processes' own shutdown deadline."""
+
+
+class Child:
+    """One `tandem ROLE FILE` process. Its log and its figures lie in the run's folder."""
+
+    def __init__(self, role: str, folder: Path) -> None:
+        self.role = role
+        self.log = folder / f"{role}.log"
+        self.figures_file = folder / f"{role}.figures.json"
+        self._process: asyncio.subprocess.Process | None = None
+        self._usage: psutil.Process | None = None
+        self._cpu_from = (0.0, 0.0)
+        self._cpu_to = (0.0, 0.0)
+        self.rss_mb = 0.0
+
+    async def start(self, config: Path, overrides: Sequence[str]) -> None:
+        """Start it; its output goes to the log."""
+        arguments = [
+            sys.executable,
+            "-m",
+            "deploy",
+            self.role,
+            str(config),
+            "--figures",
+            str(self.figures_file),
+        ]
+        for override in overrides:
+            arguments += ["--set", override]
+        with self.log.open("ab") as log:
+            self._process = await asyncio.create_subprocess_exec(
+                *arguments, stdin=asyncio.subprocess.DEVNULL, stdout=log, stderr=log
+            )
+        self._usage = psutil.Process(self._process.pid)
+
+    def check(self) -> None:
+        """Raise TandemError with the process's last words if it has ended."""
+        process = self._process
+        if process is not None and process.returncode is not None:
+            raise TandemError(f"the {self.role} ended with status {process.returncode}: {self.last_words()}")
+
+    def measure(self, first: bool = False) -> None:
+        """Take a sample of CPU time and memory; `first` begins the period that `cpu_percent` covers."""
+        if self._usage is None or self._process is None or self._process.returncode is not None:
+            return
+        with self._usage.oneshot():
+            times, self.rss_mb = self._usage.cpu_times(), self._usage.memory_info().rss / 1e6
+        self._cpu_to = (asyncio.get_running_loop().time(), times.user + times.system)
+        if first:
+            self._cpu_from = self._cpu_to
+
+    @property
+    def cpu_percent(self) -> float:
+        """Percent of one core over the measured period."""
+        wall = self._cpu_to[0] - self._cpu_from[0]
+        return 100.0 * (self._cpu_to[1] - self._cpu_from[1]) / wall if wall > 0 else 0.0
+
+    async def kill(self) -> None:
+        """End it without a warning, as a crash would."""
+        if self._process is not None and self._process.returncode is None:
+            self._process.kill()
+            await self._process.wait()
+
+    async def stop(self, by: signal.Signals = signal.SIGTERM) -> int | None:
+        """Ask it to stop, kill it if it does not, and return its exit status."""
+        process = self._process
+        if process is None:
+            return None
+        if process.returncode is None:
+            process.send_signal(by)
+            try:
+                await asyncio.wait_for(process.wait(), STOP_S)
+            except TimeoutError:
+                await self.kill()
+        return process.returncode
+
+    def figures(self) -> dict[str, Any]:
+        """What the process counted, written when it stopped; empty if it could not."""
+        try:
+            figures: dict[str, Any] = json.loads(self.figures_file.read_text("utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return figures
+
+    def said(self) -> str:
+        """Everything it has logged so far."""
+        return self.log.read_text("utf-8", errors="replace")
+
+    def last_words(self) -> str:
+        """The end of its log."""
+        lines = self.said().strip().splitlines()
+        return " | ".join(lines[-3:]) or "it said nothing"

@@ -1,0 +1,119 @@
+"""Watches a run from outside: hears commands, states, truth and statistics, and changes nothing."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from typing import Any
+
+from common.clock import monotonic_ns
+from common.codec import decode
+from common.errors import CodecError
+from common.link import Link
+from common.messages import Command, RobotState, Statistics, Truth
+from common.skeleton import Skeleton
+from common.topics import COMMAND, STATE, STATISTICS, TRUTH
+from deploy.judge import Trace
+
+RATES: dict[type, str] = {Truth: "capture", Command: "commands", RobotState: "states"}
+
+
+class Observer:
+    """Keeps the newest of each message and, while recording, all that judging needs."""
+
+    def __init__(self, link: Link, skeleton: Skeleton) -> None:
+        self._joints = len(skeleton.joints)
+        self.trace = Trace(skeleton.joint_names)
+        self.recording = False
+        self.command: Command | None = None
+        self.state: RobotState | None = None
+        self.truth: Truth | None = None
+        self.statistics: dict[str, dict[str, Any]] = {}
+        self.guards_seen: list[str] = []
+        self.states: list[RobotState] = []
+        """While recording."""
+        self._news = asyncio.Event()
+        self._counts: Counter[str] = Counter()
+        self._counted_ns = monotonic_ns()
+        self._rates_hz: dict[str, float] = {}
+        link.subscribe(COMMAND, lambda payload, _: self._take(payload, Command))
+        link.subscribe(STATE, lambda payload, _: self._take(payload, RobotState))
+        link.subscribe(TRUTH, lambda payload, _: self._take(payload, Truth))
+        link.subscribe(STATISTICS, lambda payload, _: self._take(payload, Statistics))
+
+    def _take(self, payload: bytes, kind: type[Command | RobotState | Statistics | Truth]) -> None:
+        try:
+            message = decode(payload, kind, self._joints)
+        except CodecError:
+            return
+        if isinstance(message, Statistics):
+            self.statistics[message.role] = message.figures
+            return
+        self._counts[RATES[kind]] += 1
+        if isinstance(message, Command):
+            self.command = message
+        elif isinstance(message, RobotState):
+            self.state = message
+            if self.guards_seen[-1:] != [message.guard]:
+                self.guards_seen.append(message.guard)
+        else:
+            self.truth = message
+        if self.recording:
+            self.trace.add(message)
+            if isinstance(message, RobotState):
+                self.states.append(message)
+        self._news.set()
+
+    def rates_hz(self) -> dict[str, float]:
+        """Messages a second of each kind over the last second or so."""
+        now_ns = monotonic_ns()
+        elapsed_s = (now_ns - self._counted_ns) / 1e9
+        if elapsed_s >= 1.0:
+            self._rates_hz = {name: self._counts[name] / elapsed_s for name in RATES.values()}
+            self._counts.clear()
+            self._counted_ns = now_ns
+        return self._rates_hz
+
+    async def news(self) -> None:
+        """Wait for the next message."""
+        self._news.clear()
+        await self._news.wait()
+
+    @property
+    def guard(self) -> str:
+        """The guard's state as last told."""
+        return self.state.guard if self.state else "not heard"
+
+    @property
+    def sent_ns(self) -> int:
+        """When the newest state was sent, robot's clock; 0 before any."""
+        return self.state.sent_ns if self.state else 0
+
+    @property
+    def ready(self) -> bool:
+        """Whether engaging makes sense: clock trusted, lease held, every joint known."""
+        command, state = self.command, self.state
+        return (
+            command is not None
+            and state is not None
+            and state.guard == "hold"
+            and state.offset_bound_ns >= 0
+            and command.lease != 0
+            and bool(command.valid.all())
+        )
+
+    def waiting_for(self) -> str:
+        """What is missing until `ready`, in words."""
+        command, state = self.command, self.state
+        if state is None:
+            return "the robot is not heard"
+        if command is None:
+            return "the master sends no commands"
+        if not command.valid.all():
+            names = [n for n, ok in zip(self.trace.joint_names, command.valid, strict=True) if not ok]
+            return f"{len(names)} joints are not known yet ({', '.join(names[:3])} …)"
+        if command.lease == 0:
+            return "the master does not hold the robot's lease"
+        if state.offset_bound_ns < 0:
+            return "the clock offset is not trusted yet"
+        return f"the guard is in {state.guard}: {state.reason}"

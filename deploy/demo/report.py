@@ -1,0 +1,119 @@
+"""What a demo found, as one plain tree for machines and tables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from deploy.demo.rig import Rig
+from deploy.judge import Accuracy, Motion, accuracy, motion
+from deploy.judge.paper import TABLE_1
+
+if TYPE_CHECKING:
+    from deploy.demo.run import DemoOptions
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Judged figures, and the JSON tree made of them."""
+
+    accuracy: Accuracy
+    motion: Motion | None
+    tree: dict[str, Any]
+    problems: list[str] = field(default_factory=list)
+    """Why the run counts as failed, empty where it does not."""
+
+
+def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None]) -> Report:
+    """Judge a finished run from what was observed and what the processes counted."""
+    observer, children = rig.observer, rig.children.values()
+    names = observer.trace.joint_names
+    truth, solved, moved = observer.trace.truth(), observer.trace.solved(), observer.trace.moved()
+    solved_right = accuracy(truth, solved, names)
+    moved_right = motion(truth, moved, names)
+    figures = {child.role: child.figures() for child in children}
+    master, slave = figures.get("master", {}), figures.get("slave", {})
+    problems = [f"{role} ended with status {status}" for role, status in statuses.items() if status != 0]
+    problems += [f"{role} left no figures" for role in ("master", "slave") if not figures.get(role)]
+    if "track" not in observer.guards_seen:
+        problems.append("the robot never reached track")
+    tree = {
+        "options": {
+            "seconds": options.seconds,
+            "transport": options.transport,
+            "motion": str(options.replay.name) if options.replay else options.motion,
+            "strategy": options.strategy,
+            "filter": options.filter,
+            "seed": options.seed,
+        },
+        "ticks": master.get("ticks", {}),
+        "commands": _commands(master, slave),
+        "stages_ms": slave.get("stages_ms", {}),
+        "end_to_end_ms": slave.get("end_to_end_ms", {}),
+        "one_way_ms": _one_way(slave),
+        "round_trip_ms": master.get("round_trip_ms", {}),
+        "motion_lag_ms": moved_right.lag_ms if moved_right else None,
+        "motion": _motion(moved_right),
+        "accuracy": _accuracy(solved_right),
+        "eta_percent": solved_right.eta_percent,
+        "table_1": _table_1(solved_right),
+        "cpu_percent": {child.role: round(child.cpu_percent, 1) for child in children},
+        "rss_mb": {child.role: round(child.rss_mb, 1) for child in children},
+        "guard": slave.get("guard", {}),
+        "guards_seen": observer.guards_seen,
+        "nodes": master.get("nodes", {}),
+        "buses": master.get("buses", {}),
+        "slave_ticks": slave.get("ticks", {}),
+        "exit_status": statuses,
+        "problems": problems,
+    }
+    return Report(solved_right, moved_right, tree, problems)
+
+
+def _commands(master: dict[str, Any], slave: dict[str, Any]) -> dict[str, Any]:
+    guard = slave.get("guard", {})
+    return {
+        "sent": master.get("commands_sent", 0),
+        "received": guard.get("received", 0),
+        "accepted": guard.get("accepted", 0),
+        "dropped": guard.get("dropped", {}),
+    }
+
+
+def _one_way(slave: dict[str, Any]) -> dict[str, Any]:
+    stage = slave.get("stages_ms", {}).get("put→received", {})
+    offset = slave.get("offset", {})
+    return {
+        "p50": stage.get("p50"),
+        "p99": stage.get("p99"),
+        "bound": offset.get("bound_ms"),
+        "trusted": offset.get("trusted", False),
+    }
+
+
+def _motion(judged: Motion | None) -> dict[str, float | None]:
+    return {
+        "rmse_deg": judged.rmse_deg if judged else None,
+        "aligned_rmse_deg": judged.aligned_rmse_deg if judged else None,
+        "roughness": judged.roughness if judged else None,
+    }
+
+
+def _accuracy(judged: Accuracy) -> dict[str, dict[str, float] | None]:
+    return {
+        name: None if row is None else {"mae_deg": row.mae_deg, "rmse_deg": row.rmse_deg}
+        for name, row in judged.joints.items()
+    }
+
+
+def _table_1(judged: Accuracy) -> dict[str, dict[str, float | None]]:
+    table: dict[str, dict[str, float | None]] = {}
+    for joint in TABLE_1:
+        worse = judged.worse(joint)
+        table[joint] = {
+            "mean_error_deg": judged.mean_error_deg(joint),
+            "worse_error_deg": worse.error_deg if worse else None,
+            "worse_rmse_deg": worse.rmse_deg if worse else None,
+            "change_deg": worse.change_deg if worse else None,
+        }
+    return table

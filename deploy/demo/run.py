@@ -1,0 +1,105 @@
+"""The story of one demo: start, wait, engage, watch, disengage, stop, judge."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.live import Live
+
+from common.clock import monotonic_ns, to_ns
+from common.errors import TandemError
+from common.messages import Action
+from deploy.demo.report import Report, make_report
+from deploy.demo.rig import ROLES, Rig, at_most, open_rig
+from deploy.demo.view import draw
+
+START_S = 30.0
+"""Processes up, filters settled, clock trusted, lease held."""
+ALIGN_S = 20.0
+HOLD_S = 5.0
+LOST_S = 1.0
+"""Out of `track` for longer, the demo has failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class DemoOptions:
+    """What the command line chose."""
+
+    seconds: float = 20.0
+    transport: str = "tcp"
+    replay: Path | None = None
+    motion: str = "bottle"
+    strategy: str = "predict"
+    filter: str = "vqf"
+    seed: int = 1
+
+    def overrides(self) -> dict[str, list[str]]:
+        """What it changes in the processes' files."""
+        suit = [f'motion="{self.motion}"', f"seed={self.seed}"]
+        master = [f'estimation.filter="{self.filter}"']
+        if self.replay is not None:
+            suit.append(f'replay="{self.replay.resolve()}"')
+            master.append("estimation.stance_s=1.0")
+        return {"slave": [f'track.strategy="{self.strategy}"'], "suit": suit, "master": master}
+
+
+async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
+    """Run it and judge it. Raises TandemError when a process fails or the robot never reaches `track`."""
+    async with open_rig(options.transport, options.overrides()) as rig:
+        for role in ROLES:
+            await rig.start(role)
+        observer = rig.observer
+        with Live(console=console, refresh_per_second=4, transient=True) as live:
+            show = _Show(rig, stop, live)
+            await rig.until(lambda: observer.ready, START_S, "readiness", show.look)
+            await _must(rig, Action.ENGAGE)
+            observer.recording = True
+            await rig.until(lambda: observer.guard == "track", ALIGN_S, "track", show.look)
+            await show.watch(options.seconds)
+            observer.recording = False
+            await _must(rig, Action.DISENGAGE)
+            await rig.until(lambda: observer.guard == "hold", HOLD_S, "hold after disengaging", show.look)
+        return make_report(options, rig, await rig.stop())
+
+
+class _Show:
+    """Keeps an eye on the processes, the operator's Ctrl-C and the screen."""
+
+    def __init__(self, rig: Rig, stop: asyncio.Event, live: Live) -> None:
+        self._rig = rig
+        self._stop = stop
+        self._live = live
+        self._began_ns = 0
+
+    def look(self) -> None:
+        """Fail early, measure, and draw."""
+        if self._stop.is_set():
+            raise TandemError("interrupted")
+        for child in self._rig.children.values():
+            child.check()
+            child.measure()
+        elapsed_s = (monotonic_ns() - self._began_ns) / 1e9 if self._began_ns else 0.0
+        self._live.update(draw(self._rig, elapsed_s))
+
+    async def watch(self, seconds: float) -> None:
+        """Let it run while it tracks. Raises TandemError when the robot leaves `track` for good."""
+        for child in self._rig.children.values():
+            child.measure(first=True)
+        self._began_ns = tracked_ns = monotonic_ns()
+        while monotonic_ns() - self._began_ns < to_ns(seconds):
+            self.look()
+            if self._rig.observer.guard == "track":
+                tracked_ns = monotonic_ns()
+            elif monotonic_ns() - tracked_ns > to_ns(LOST_S):
+                state = self._rig.observer.state
+                raise TandemError(f"the robot left track: {state.reason if state else 'not heard'}")
+            await at_most(self._stop.wait(), 0.25)
+
+
+async def _must(rig: Rig, action: Action) -> None:
+    reply = await rig.control(action)
+    if not reply.done:
+        raise TandemError(f"{action} was refused: {reply.text}")

@@ -1,0 +1,58 @@
+"""What a person sees of a demo: the live view while it runs, the tables when it is over."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.text import Text
+
+from deploy.demo.report import Report
+from deploy.demo.rig import Rig
+from deploy.tables import Live, accuracy_table, latency_table, live_view, motion_table, verdict_table
+from deploy.targets import DEMO, verdicts
+
+
+def draw(rig: Rig, elapsed_s: float) -> RenderableType:
+    """The live view of a running rig."""
+    observer = rig.observer
+    master = observer.statistics.get("master", {})
+    slave = observer.statistics.get("slave", {})
+    state = observer.state
+    reason = state.reason if state else "not heard"
+    if not observer.ready and observer.guard == "hold":
+        reason = observer.waiting_for()
+    usage = {f"{role} CPU %": child.cpu_percent for role, child in rig.children.items()}
+    view = live_view(
+        Live(
+            elapsed_s=elapsed_s,
+            guard=observer.guard,
+            reason=reason,
+            rates_hz=observer.rates_hz(),
+            stages=slave.get("stages_ms", {}),
+            joint_error_deg=_errors_deg(rig),
+            drops={
+                "ticks missed": master.get("ticks", {}).get("missed", 0),
+                **slave.get("guard", {}).get("dropped", {}),
+            },
+        )
+    )
+    return Group(view, Text("   ".join(f"{name} {value:.0f}" for name, value in usage.items()), "dim"))
+
+
+def print_report(report: Report, console: Console) -> None:
+    """Latency budget, accuracy beside the paper's, motion, and the targets met or missed."""
+    tree = report.tree
+    console.print(latency_table(tree["stages_ms"], tree["end_to_end_ms"], tree["one_way_ms"]))
+    if report.accuracy.overall is None:
+        console.print(Text("no truth to judge by: a recording has none", "yellow"))
+    else:
+        console.print(accuracy_table(report.accuracy), motion_table(report.motion))
+    console.print(verdict_table("targets", verdicts(tree, DEMO)))
+
+
+def _errors_deg(rig: Rig) -> dict[str, float]:
+    truth, state = rig.observer.truth, rig.observer.state
+    if truth is None or state is None:
+        return {}
+    errors = np.degrees(state.position_rad - truth.position_rad)
+    return dict(zip(rig.observer.trace.joint_names, errors.tolist(), strict=True))

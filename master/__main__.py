@@ -1,0 +1,9 @@
+"""`python -m master FILE`."""
+
+import sys
+
+from common.launch import launch
+from master.app import run
+from master.config import MasterConfig
+
+sys.exit(launch("master", MasterConfig, run))

@@ -1,0 +1,95 @@
+"""The master's TOML file: which robot, which nodes on which buses, how to estimate, where to send."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from common.config import LinkConfig, RelativePath, Section
+from common.errors import ConfigError, ConfigMistake
+from common.skeleton import Skeleton, load_skeleton
+from master.fuse.estimator import EstimationConfig
+from master.suit.nodes import BusConfig, NodeConfig
+
+
+class CaptureConfig(Section):
+    """`[capture]`: how the nodes are polled."""
+
+    rate_hz: int = Field(200, ge=10, le=1000)
+    """SYNC frames a second."""
+    decimation: int = Field(16, ge=1, le=1000)
+    """Every so many ticks one is solved and sent: 200 / 16 = 12.5 Hz."""
+    lost_after: int = Field(20, ge=1, le=10_000)
+    """Missed ticks in a row after which a node counts as lost."""
+    dbc: RelativePath
+    """The frames' description."""
+    buses: list[BusConfig] = Field(min_length=1)
+
+
+class OperatorConfig(Section):
+    """`[operator]`: who commands."""
+
+    name: str = Field(min_length=1, max_length=64)
+    deadman: Literal["always_held"]
+    """`always_held`: the operator has no pedal. There is no default, so that somebody decided it."""
+
+
+class MasterConfig(Section):
+    """The whole file."""
+
+    robot: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")
+    profile: str = "nursing"
+    operator: OperatorConfig
+    capture: CaptureConfig
+    estimation: EstimationConfig = EstimationConfig()
+    nodes: dict[str, NodeConfig]
+    link: LinkConfig
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The robot's table."""
+        return load_skeleton(self.profile)
+
+    @property
+    def command_rate_hz(self) -> float:
+        """Commands a second."""
+        return self.capture.rate_hz / self.capture.decimation
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """Nodes and buses must agree with the profile and with each other."""
+        try:
+            skeleton = self.skeleton
+        except ConfigError as error:
+            return error.mistakes
+        return [
+            *node_mistakes(self.nodes, self.capture.buses, skeleton),
+            *self.estimation.mistakes_at(self.capture.rate_hz),
+        ]
+
+
+def node_mistakes(
+    nodes: dict[str, NodeConfig], buses: list[BusConfig], skeleton: Skeleton
+) -> list[ConfigMistake]:
+    """Contradictions between a table of nodes, the buses and the profile's segments."""
+    mistakes: list[ConfigMistake] = []
+    names = [bus.name for bus in buses]
+    for name in sorted({n for n in names if names.count(n) > 1}):
+        mistakes.append(ConfigMistake("capture.buses", name, "a bus name used once"))
+    for segment in skeleton.segment_names:
+        if segment not in nodes:
+            mistakes.append(
+                ConfigMistake(f"nodes.{segment}", None, f"a node, as {skeleton.name} has one there")
+            )
+    taken: dict[tuple[str, int], str] = {}
+    for name, node in nodes.items():
+        if name not in skeleton.segment_names:
+            mistakes.append(ConfigMistake(f"nodes.{name}", name, f"a segment of the profile {skeleton.name}"))
+        if node.bus not in names:
+            mistakes.append(ConfigMistake(f"nodes.{name}.bus", node.bus, f"one of {', '.join(names)}"))
+        other = taken.setdefault((node.bus, node.id), name)
+        if other != name:
+            mistakes.append(
+                ConfigMistake(f"nodes.{name}.id", node.id, f"an id that nodes.{other} does not have")
+            )
+    return mistakes

@@ -1,0 +1,44 @@
+"""How a master comes to hold a robot's lease, and notices that it does not any more. Pure."""
+
+from __future__ import annotations
+
+from common.clock import to_ns
+from common.messages import Action, ControlReply, ControlRequest, RobotState
+
+RETRY_S = 0.25
+"""Between two claims: a restarted master waits out the lease of its predecessor (1 s)."""
+GRACE_S = 0.5
+"""State messages under way when the claim was granted still tell the old holder."""
+
+
+class LeaseKeeper:
+    """Claims once the robot is heard, keeps the token, drops it when the robot names another holder."""
+
+    def __init__(self, robot: str, operator: str) -> None:
+        self._robot = robot
+        self._operator = operator
+        self._next_claim_ns = 0
+        self._granted_ns = 0
+        self.token = 0
+        self.answer = "the robot has not been asked yet"
+
+    def request(self, now_ns: int) -> ControlRequest | None:
+        """Build the claim to send now, if one is due."""
+        if self.token or now_ns < self._next_claim_ns:
+            return None
+        self._next_claim_ns = now_ns + to_ns(RETRY_S)
+        return ControlRequest(self._robot, Action.CLAIM, self._operator)
+
+    def on_reply(self, reply: ControlReply, now_ns: int) -> None:
+        """Take the robot's answer to a claim."""
+        self.answer = reply.text
+        if reply.done:
+            self.token = reply.lease
+            self._granted_ns = now_ns
+
+    def on_state(self, state: RobotState, now_ns: int) -> None:
+        """Notice a lease that was lost: it is claimed anew, but only a person engages again."""
+        settled = now_ns - self._granted_ns > to_ns(GRACE_S)
+        if self.token and settled and state.operator != self._operator:
+            self.token = 0
+            self.answer = f"the lease was lost to {state.operator or 'nobody'}"

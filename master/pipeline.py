@@ -1,0 +1,110 @@
+"""The master's whole way for one sample, without a clock, a bus or a link: frames in, commands out.
+
+poll ▸ calibrate ▸ low-pass ▸ fuse ▸ (every 16th tick) solve ▸ command
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.messages import Command, CommandStamps, Mask
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from master.config import MasterConfig
+from master.fuse.estimator import Estimator
+from master.solve.solver import JointSolver
+from master.suit.frame import Frame
+from master.suit.nodes import NodeConfig
+from master.suit.poll import Poll, Sweep
+from master.suit.protocol import SuitProtocol
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """The operator's joint angles at one deciding tick."""
+
+    tick: int
+    sampled_ns: int
+    frames_in_ns: int
+    position_rad: Array
+    velocity_rad_s: Array
+    valid: Mask
+
+
+class MasterPipeline:
+    """State of the nodes and filters between ticks."""
+
+    def __init__(self, config: MasterConfig, protocol: SuitProtocol) -> None:
+        self.skeleton: Skeleton = config.skeleton
+        nodes: Sequence[NodeConfig] = [config.nodes[name] for name in self.skeleton.segment_names]
+        self.poll = Poll(
+            nodes,
+            protocol,
+            lost_after=config.capture.lost_after,
+            fd={bus.name: bus.fd for bus in config.capture.buses},
+        )
+        self.estimator = Estimator(config.estimation, nodes, config.capture.rate_hz)
+        self.solver = JointSolver(self.skeleton)
+        self._decimation = config.capture.decimation
+        self._window_open = False
+
+    def tick(self, tick: int, now_ns: int) -> tuple[Frame, Solved | None]:
+        """Open a tick: the SYNC frame for every bus, and what the last window gave if it was still open."""
+        late = self.close(now_ns) if self._window_open else None
+        self._window_open = True
+        return self.poll.open_window(tick, now_ns), late
+
+    def frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
+        """Take one frame; True when every node that is not lost has answered this tick."""
+        return self.poll.on_frame(bus, frame_id, data, now_ns) and self._window_open
+
+    def close(self, now_ns: int) -> Solved | None:
+        """Take the tick's answers through the filters; the joint angles if this tick decides."""
+        self._window_open = False
+        sweep = self.poll.close_window(now_ns)
+        self.estimator.update(sweep)
+        return self._solve(sweep) if sweep.tick % self._decimation == 0 else None
+
+    def _solve(self, sweep: Sweep) -> Solved:
+        posture = self.estimator.posture()
+        position, velocity = self.solver.solve(posture.q_world_from_segment, posture.rate_rad_s)
+        # a joint is known only if the nodes on both its segments are
+        missing = self.skeleton.joint_needs_node @ ~posture.valid
+        known = np.isfinite(position) & np.isfinite(velocity) & ~missing
+        return Solved(
+            tick=sweep.tick,
+            sampled_ns=sweep.sampled_ns,
+            frames_in_ns=sweep.frames_in_ns,
+            position_rad=np.where(known, position, 0.0),
+            velocity_rad_s=np.where(known, velocity, 0.0),
+            valid=known,
+        )
+
+
+class CommandWriter:
+    """Turns solved postures into the numbered commands of one lease."""
+
+    def __init__(self, robot: str) -> None:
+        self._robot = robot
+        self._sequence = 0
+        self.sent = 0
+
+    def write(self, solved: Solved, lease: int, deadman_held: bool, solved_ns: int, put_ns: int) -> Command:
+        """The command to put now. The sequence never restarts within a process, so no lease sees it fall."""
+        self._sequence += 1
+        self.sent += 1
+        stamps = CommandStamps(solved.sampled_ns, solved.frames_in_ns, solved_ns, put_ns)
+        return Command(
+            robot=self._robot,
+            lease=lease,
+            sequence=self._sequence,
+            tick=solved.tick,
+            stamps=stamps,
+            deadman_held=deadman_held,
+            valid=solved.valid,
+            position_rad=solved.position_rad,
+            velocity_rad_s=solved.velocity_rad_s,
+        )

@@ -1,0 +1,46 @@
+"""What the master knows of the robot from its state messages: silence, latency on one clock. Pure."""
+
+from __future__ import annotations
+
+from common.clock import to_ns
+from common.latency import RoundTrip
+from common.messages import RobotState
+from common.topics import STATE
+
+
+class RobotWatch:
+    """The newest state, whether the robot has fallen silent, and round-trip times."""
+
+    def __init__(self) -> None:
+        self.state: RobotState | None = None
+        self.round_trip = RoundTrip()
+        self._heard_ns = 0
+        self._echoed = 0
+        self._was_silent = True
+        self.times_lost = 0
+
+    def on_state(self, state: RobotState, arrived_ns: int) -> None:
+        """Take a state message; each command's echo closes one round trip."""
+        self.state = state
+        self._heard_ns = arrived_ns
+        echo = state.echo
+        if echo is not None and echo.sequence != self._echoed:
+            self._echoed = echo.sequence
+            # the time on the slave is measured on the slave's clock alone, so no offset enters
+            on_slave_ns = state.sent_ns - echo.received_ns
+            self.round_trip.record(arrived_ns - echo.put_ns - on_slave_ns)
+
+    def silent(self, now_ns: int) -> bool:
+        """Whether the robot has not been heard within the state topic's time-out."""
+        return self.state is None or now_ns - self._heard_ns > to_ns(STATE.timeout_s)
+
+    def change(self, now_ns: int) -> str | None:
+        """What to tell people when the robot falls silent or is heard again, once a change."""
+        silent = self.silent(now_ns)
+        if silent == self._was_silent:
+            return None
+        self._was_silent = silent
+        if silent:
+            self.times_lost += 1
+            return f"the robot is silent for more than {STATE.timeout_s:g} s: it holds by itself"
+        return "the robot is heard"

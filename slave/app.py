@@ -1,0 +1,116 @@
+"""The slave's process: real servos, the real link and a real clock around the pure pipeline."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+from common.clock import monotonic_ns, to_ms
+from common.codec import encode
+from common.launch import WriteFigures
+from common.link import Link, open_link
+from common.messages import Statistics
+from common.pacing import TickGrid
+from common.runtime import until_stopped
+from common.ticker import ticks
+from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS
+from slave.config import SlaveConfig
+from slave.pipeline import SlavePipeline
+from slave.servos import Servos, open_servos
+
+log = logging.getLogger("tandem.slave")
+
+
+class Slave:
+    """One robot's servo loop and its conversation with the master."""
+
+    def __init__(self, config: SlaveConfig, link: Link, servos: Servos) -> None:
+        self._config = config
+        self._link = link
+        self._servos = servos
+        self._pipeline = SlavePipeline(config)
+        self._ticks_expected = 0
+        self._ticks_missed = 0
+        self._put_state: Callable[[bytes], None] = link.publish(STATE)
+        self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
+        link.subscribe(COMMAND, self._on_command)
+        link.answer(CONTROL, self._on_control)
+        link.answer(CLOCK, self._on_clock)
+
+    async def run(self) -> None:
+        """Guard, drive and tell until cancelled."""
+        self._link.declare_alive("slave")
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._drive())
+            tasks.create_task(self._tell())
+
+    async def _drive(self) -> None:
+        loop = self._config.loop
+        period_ns = round(1e9 / loop.rate_hz)
+        said = ""
+        async for due in ticks(TickGrid(monotonic_ns() + period_ns, period_ns)):
+            self._ticks_expected += 1 + due.missed
+            self._ticks_missed += due.missed
+            setpoint = self._pipeline.tick(monotonic_ns(), self._servos.read())
+            if setpoint.ready:
+                self._servos.write(setpoint.position_rad)
+                self._pipeline.written(monotonic_ns())
+            if due.tick % loop.state_every == 0:
+                self._put_state(self._pipeline.state(monotonic_ns()))
+            guard = self._pipeline.guard
+            if guard.state != said:
+                said = guard.state
+                log.info("%s: %s: %s", self._config.robot, guard.state, guard.reason)
+
+    def _on_command(self, payload: bytes, received_ns: int) -> None:
+        self._pipeline.on_command(payload, received_ns, monotonic_ns())
+
+    def _on_control(self, payload: bytes, _: int) -> bytes:
+        return self._pipeline.on_control(payload, monotonic_ns())
+
+    def _on_clock(self, payload: bytes, received_ns: int) -> bytes:
+        return self._pipeline.on_clock(payload, received_ns, monotonic_ns())
+
+    async def _tell(self) -> None:
+        async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
+            self._put_statistics(encode(Statistics("slave", due.scheduled_ns, self.figures())))
+
+    def figures(self) -> dict[str, object]:
+        """Counters and percentiles for tables and reports."""
+        pipeline = self._pipeline
+        offset = pipeline.clock.estimator.estimate(monotonic_ns())
+        return {
+            "ticks": {"expected": self._ticks_expected, "missed": self._ticks_missed},
+            "guard": {
+                "state": str(pipeline.guard.state),
+                "reason": pipeline.guard.reason,
+                **pipeline.guard.counters.summary(),
+            },
+            "stages_ms": pipeline.journeys.budget.summary(),
+            "end_to_end_ms": pipeline.journeys.budget.total(),
+            "unmoved": pipeline.journeys.unmoved,
+            "offset": {
+                "offset_ms": to_ms(offset.offset_ns),
+                "bound_ms": to_ms(offset.bound_ns),
+                "trusted": offset.trusted,
+            },
+            "undecodable": pipeline.undecodable,
+            "link": self._link.counters,
+        }
+
+
+async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+    """Run a slave until `stop` is set; the servos are left holding. Raises LinkError or RobotError."""
+    servos = open_servos(config.servos, config.skeleton, config.encoders)
+    servos.start()
+    try:
+        async with open_link(config.link, config.robot) as link:
+            slave = Slave(config, link, servos)
+            try:
+                await until_stopped(stop, slave.run())
+            finally:
+                write_figures(slave.figures())
+    finally:
+        servos.stop()
+    log.info("stopped; the servos hold")

@@ -1,0 +1,48 @@
+"""The slave's TOML file: which robot it is, how it guards, tracks and drives."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from common.config import LinkConfig, Section
+from common.errors import ConfigError, ConfigMistake
+from common.skeleton import Skeleton, load_skeleton
+from slave.encoders import EncoderConfig
+from slave.guard.config import GuardConfig
+from slave.servos.config import ServosConfig
+from slave.track.config import TrackConfig
+
+
+class LoopConfig(Section):
+    """`[loop]`: rates of the slave's own ticks."""
+
+    rate_hz: int = Field(200, ge=20, le=1000)
+    """Encoders read, guard stepped, servos written."""
+    state_every: int = Field(4, ge=1, le=100)
+    """Every so many ticks the state is published: 200 / 4 = 50 Hz."""
+
+
+class SlaveConfig(Section):
+    """The whole file."""
+
+    robot: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")
+    profile: str = "nursing"
+    loop: LoopConfig = LoopConfig()
+    guard: GuardConfig = GuardConfig()
+    track: TrackConfig = TrackConfig()
+    servos: ServosConfig = ServosConfig()
+    encoders: EncoderConfig = EncoderConfig()
+    link: LinkConfig
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The robot's table."""
+        return load_skeleton(self.profile)
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """Joints named anywhere must be joints of the profile, and limits may only be tightened."""
+        try:
+            skeleton = self.skeleton
+        except ConfigError as error:
+            return error.mistakes
+        return [*self.guard.mistakes_for(skeleton), *self.encoders.mistakes_for(skeleton)]

@@ -1,0 +1,77 @@
+"""Follows each accepted command from the master's sample to the encoder that moved. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.latency import LatencyBudget, Passage
+from common.messages import Command, CommandEcho
+from common.offset import Offset
+from slave.servos.servos import EncoderReading
+
+MOVED_COUNTS = 2
+"""An encoder has moved when it differs by this much: one count may be flicker (0.088° each)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Underway:
+    command: Command
+    received_ns: int
+    accepted_ns: int
+    offset: Offset
+    written_ns: int = 0
+    counts: NDArray[np.int64] | None = None
+    """Encoder counts when it was written."""
+
+
+class Journeys:
+    """One command under way at a time: the newest. An older one that moved nothing is counted."""
+
+    def __init__(self) -> None:
+        self.budget = LatencyBudget()
+        self.echo: CommandEcho | None = None
+        self.unmoved = 0
+        self._underway: _Underway | None = None
+
+    def accepted(self, command: Command, received_ns: int, now_ns: int, offset: Offset) -> None:
+        """Begin to follow a command that has passed the gates."""
+        if self._underway is not None and self._underway.written_ns:
+            self.unmoved += 1
+        self._underway = _Underway(command, received_ns, now_ns, offset)
+        self.echo = CommandEcho(command.sequence, command.stamps.put_ns, received_ns, now_ns, 0)
+
+    def written(self, now_ns: int, counts: NDArray[np.int64]) -> None:
+        """Note the first write after acceptance."""
+        underway = self._underway
+        if underway is None or underway.written_ns or self.echo is None:
+            return
+        self._underway = replace(underway, written_ns=now_ns, counts=counts.copy())
+        self.echo = replace(self.echo, written_ns=now_ns)
+
+    def read(self, reading: EncoderReading) -> None:
+        """Close the journey at the first reading, later than the write, in which a joint has moved."""
+        underway = self._underway
+        if underway is None or underway.counts is None or reading.read_ns <= underway.written_ns:
+            return
+        turned = np.abs(reading.counts - underway.counts)
+        turned = np.minimum(turned, 4096 - turned)
+        if not (turned[reading.valid] >= MOVED_COUNTS).any():
+            return
+        self._underway = None
+        stamps = underway.command.stamps
+        self.budget.record(
+            Passage(
+                sampled_ns=stamps.sampled_ns,
+                frames_in_ns=stamps.frames_in_ns,
+                solved_ns=stamps.solved_ns,
+                put_ns=stamps.put_ns,
+                received_ns=underway.received_ns,
+                accepted_ns=underway.accepted_ns,
+                written_ns=underway.written_ns,
+                moved_ns=reading.read_ns,
+            ),
+            underway.offset,
+        )

@@ -1,0 +1,107 @@
+"""The slave's whole way for one command, without a clock, a link or a servo: bytes in, setpoints out.
+
+decode ▸ guard (gates) ▸ track ▸ limit ▸ servos ▸ encoders ▸ state
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from common.codec import decode, encode
+from common.errors import CodecError
+from common.messages import (
+    ClockQuery,
+    Command,
+    ControlReply,
+    ControlRequest,
+    RobotState,
+)
+from common.offset import SlaveExchange
+from slave.config import SlaveConfig
+from slave.encoders import Encoders
+from slave.guard import Guard, Setpoint, State
+from slave.journey import Journeys
+from slave.servos.servos import EncoderReading
+from slave.track.config import make_tracker
+
+
+class SlavePipeline:
+    """Guard, tracker and counters between ticks."""
+
+    def __init__(self, config: SlaveConfig) -> None:
+        self.robot = config.robot
+        self.skeleton = config.skeleton
+        self.encoders = Encoders(self.skeleton, config.encoders)
+        self.guard = Guard(
+            config.robot, self.skeleton, config.guard, make_tracker(config.track, self.skeleton)
+        )
+        self.clock = SlaveExchange()
+        self.journeys = Journeys()
+        self.undecodable: dict[str, int] = {}
+        self._states_sent = 0
+        self._reading: EncoderReading | None = None
+        self._position_rad = np.zeros(len(self.skeleton.joints))
+        self._setpoint = Setpoint(self._position_rad, np.zeros_like(self._position_rad), ready=False)
+
+    def on_command(self, payload: bytes, received_ns: int, now_ns: int) -> None:
+        """Take a command from the link; whatever is wrong with it is counted and changes nothing."""
+        try:
+            command = decode(payload, Command, len(self.skeleton.joints))
+        except CodecError:
+            self._count("command")
+            return
+        offset = self.clock.estimator.estimate(now_ns)
+        if self.guard.on_command(command, received_ns, now_ns, offset).accepted:
+            self.journeys.accepted(command, received_ns, now_ns, offset)
+
+    def on_control(self, payload: bytes, now_ns: int) -> bytes:
+        """Answer a request of a person or a master; never with silence."""
+        try:
+            request = decode(payload, ControlRequest)
+        except CodecError as error:
+            self._count("control")
+            return encode(ControlReply(False, self.guard.state, f"not understood: {error}"))
+        return encode(self.guard.on_control(request, now_ns))
+
+    def on_clock(self, payload: bytes, received_ns: int, now_ns: int) -> bytes:
+        """Answer the master's clock query. Raises CodecError, which the link counts."""
+        return encode(self.clock.on_query(decode(payload, ClockQuery), received_ns, now_ns))
+
+    def tick(self, now_ns: int, reading: EncoderReading) -> Setpoint:
+        """One turn of the 200 Hz loop: what to write to the servos now."""
+        self._reading = reading
+        self._position_rad = self.encoders.position_rad(reading.counts)
+        self.journeys.read(reading)
+        self._setpoint = self.guard.step(now_ns, self._position_rad, reading.valid, reading.read_ns)
+        return self._setpoint
+
+    def written(self, now_ns: int) -> None:
+        """Note that the setpoint of this turn has reached the servos."""
+        if self._reading is not None and self.guard.state in (State.ALIGN, State.TRACK):
+            self.journeys.written(now_ns, self._reading.counts)
+
+    def state(self, now_ns: int) -> bytes:
+        """Encode what the robot does now."""
+        self._states_sent += 1
+        offset = self.clock.estimator.estimate(now_ns)
+        reading = self._reading
+        return encode(
+            RobotState(
+                robot=self.robot,
+                sequence=self._states_sent,
+                sent_ns=now_ns,
+                encoder_ns=reading.read_ns if reading else 0,
+                guard=self.guard.state,
+                reason=self.guard.reason,
+                operator=self.guard.operator,
+                encoder_valid=reading.valid if reading else np.zeros(len(self.skeleton.joints), np.bool_),
+                position_rad=self._position_rad,
+                setpoint_rad=self._setpoint.position_rad,
+                echo=self.journeys.echo,
+                master_offset_ns=offset.offset_ns,
+                offset_bound_ns=offset.bound_ns if offset.trusted else -1,
+            )
+        )
+
+    def _count(self, topic: str) -> None:
+        self.undecodable[topic] = self.undecodable.get(topic, 0) + 1

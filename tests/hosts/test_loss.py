@@ -1,0 +1,106 @@
+"""Real processes killed while the robot tracks: it holds in time, and moves again only when engaged."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+
+import numpy as np
+import pytest
+
+from common.clock import to_ns
+from common.messages import Action, RobotState
+from deploy.demo.rig import ROLES, Rig, open_rig
+
+pytestmark = pytest.mark.hosts
+
+COMMAND_TIMEOUT_S = 0.2
+STATE_PERIOD_S = 0.02
+BRAKE_S = 0.35
+"""From the fastest joint speed to standstill, and the servo's own settling."""
+
+
+async def engaged(rig: Rig) -> None:
+    reply = await rig.control(Action.ENGAGE)
+    assert reply.done, reply.text
+    await rig.until(lambda: rig.observer.guard == "track", 20.0, "track")
+
+
+async def tracking(rig: Rig) -> None:
+    for role in ROLES:
+        await rig.start(role)
+    await rig.until(lambda: rig.observer.ready, 30.0, "readiness")
+    await engaged(rig)
+
+
+def test_killed_master_leaves_the_robot_holding_until_engaged_anew() -> None:
+    async def story() -> None:
+        async with open_rig() as rig:
+            observer = rig.observer
+            await tracking(rig)
+            observer.recording = True
+            await rig.children["master"].kill()
+            await rig.until(lambda: observer.guard == "hold", 5.0, "hold")
+            held = observer.state
+            assert held is not None
+            # both stamps are the robot's own clock: no other clock decides how long it took
+            assert held.echo is not None
+            waited_s = (held.sent_ns - held.echo.received_ns) / 1e9
+            assert waited_s < COMMAND_TIMEOUT_S + 2 * STATE_PERIOD_S
+            assert "no command" in held.reason
+
+            still_from_ns = held.sent_ns + to_ns(BRAKE_S)
+            await rig.until(lambda: observer.sent_ns > still_from_ns + to_ns(0.5), 5.0, "more states")
+            assert spread_rad([s for s in observer.states if s.sent_ns > still_from_ns]) < np.radians(0.3)
+
+            await rig.start("master")
+            await rig.until(lambda: observer.ready, 30.0, "readiness of the new master")
+            resumed_ns = observer.sent_ns
+            await rig.until(lambda: observer.sent_ns > resumed_ns + to_ns(1.0), 5.0, "a second of states")
+            after = [s for s in observer.states if s.sent_ns > resumed_ns]
+            assert {s.guard for s in after} == {"hold"}
+            assert spread_rad(after) < np.radians(0.3)
+            await engaged(rig)
+
+    asyncio.run(story())
+
+
+def test_killed_slave_is_told_by_the_master_and_resumes_only_when_engaged() -> None:
+    async def story() -> None:
+        async with open_rig() as rig:
+            observer = rig.observer
+            await tracking(rig)
+            await rig.children["slave"].kill()
+            await rig.until(lambda: "is silent" in rig.children["master"].said(), 5.0, "word from the master")
+
+            await rig.start("slave")
+            await rig.until(lambda: observer.ready, 30.0, "readiness with the new slave")
+            assert observer.guard == "hold"
+            assert "is heard" in rig.children["master"].said()
+            resumed_ns = observer.sent_ns
+            observer.recording = True
+            await rig.until(lambda: observer.sent_ns > resumed_ns + to_ns(1.0), 5.0, "a second of states")
+            assert {s.guard for s in observer.states} == {"hold"}
+            await engaged(rig)
+
+    asyncio.run(story())
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_each_process_stops_cleanly(stop: signal.Signals) -> None:
+    async def story() -> None:
+        async with open_rig() as rig:
+            await tracking(rig)
+            statuses = {role: await rig.children[role].stop(stop) for role in ("master", "suit", "slave")}
+            assert statuses == {"master": 0, "suit": 0, "slave": 0}, {
+                role: child.last_words() for role, child in rig.children.items()
+            }
+            assert rig.children["slave"].figures()["guard"]["accepted"] > 0
+
+    asyncio.run(story())
+
+
+def spread_rad(states: list[RobotState]) -> float:
+    """The largest excursion of any joint's encoder, rad."""
+    assert len(states) > 10
+    return float(np.ptp([s.position_rad for s in states], axis=0).max())
