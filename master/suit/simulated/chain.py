@@ -43,70 +43,76 @@ class Chain:
     def __init__(self, skeleton: Skeleton) -> None:
         count = len(skeleton.segments)
         self._angles_from_joints = skeleton.angles_from_joints
-        self._axes = np.array([s.axes for s in skeleton.segments], dtype=np.float64)
-        self._cross = _cross_matrices(self._axes)
+        self._axes = np.array([s.axes for s in skeleton.segments], dtype=np.float64)[..., None]
+        self._cross = _cross_matrices(self._axes[..., 0])
         self._cross_squared = self._cross @ self._cross
-        self._parents = skeleton.parents
-        self._generations = _generations(skeleton)
-        self._origin_m = np.array([s.origin_m for s in skeleton.segments])[:, :, None]
-        self._node_m = np.array([s.node_m for s in skeleton.segments])[:, :, None]
+        self._along = np.eye(3) + self._cross_squared
 
-        self._links = np.eye(count)
-        for i, parent in enumerate(skeleton.parents):
-            if parent >= 0:
-                self._links[i] += self._links[parent]
+        # row N of the arrays below is the world, which never moves
+        parents = np.append(np.where(skeleton.parents < 0, count, skeleton.parents), count)
+        self._parents = parents[:-1]
+        self._jumps = _jumps(parents)
+        self._links = np.zeros((count + 1, count))
+        for i, parent in enumerate(self._parents):
+            self._links[i] = self._links[parent]
+            self._links[i, i] = 1.0
         self._turns = np.repeat(self._links, 3, axis=1)
-        within = np.kron(np.eye(count), np.tri(3, k=-1))
-        above = np.repeat(np.repeat(self._links - np.eye(count), 3, axis=0), 3, axis=1)
-        self._turns_before = above + within
+
+        # two levers a segment: the link from the parent's joint to its own, and from that to the node
+        self._foot = np.append(self._parents, np.arange(count))
+        levers = [s.origin_m for s in skeleton.segments] + [s.node_m for s in skeleton.segments]
+        self._lever_m = np.array(levers)[..., None]
 
     def motion(self, position_rad: Array, velocity_rad_s: Array, acceleration_rad_s2: Array) -> ChainMotion:
         """Every segment's motion for joint positions, velocities and accelerations, (J,) each."""
-        angles = self._angles_from_joints @ np.stack(
-            [position_rad, velocity_rad_s, acceleration_rad_s2], axis=-1
-        )
-        world, axes = self._rotations(angles[:, 0].reshape(-1, 3))
-        spin = axes * angles[:, 1, None]
-        rate = _with_world(self._turns @ spin)
-        swirl = axes * angles[:, 2, None] + _cross(self._turns_before @ spin, spin)
-        rate_change = _with_world(self._turns @ swirl)
+        count = len(self._parents)
+        joints = np.array([position_rad, velocity_rad_s, acceleration_rad_s2])
+        angles, speeds, pushes = (self._angles_from_joints @ joints.T).T.reshape(3, count, 3, 1)
+        world, axes = self._rotations(angles)
 
-        parents = self._parents
-        link = (world[parents] @ self._origin_m)[..., 0]
-        place = (world[:-1] @ self._node_m)[..., 0]
-        joint_acceleration = self._links @ _carried(rate[parents], rate_change[parents], link)
-        node_acceleration = joint_acceleration + _carried(rate[:-1], rate_change[:-1], place)
+        spin = axes * speeds
+        rate = self._turns @ spin.reshape(-1, 3)
+        before = np.cumsum(spin, axis=1) - spin + rate.take(self._parents, axis=0)[:, None]
+        swirl = axes * pushes + _cross(before, spin)
+        rate_change = self._turns @ swirl.reshape(-1, 3)
+
+        lever = (world.take(self._foot, axis=0) @ self._lever_m)[..., 0]
+        carried = _carried(rate.take(self._foot, axis=0), rate_change.take(self._foot, axis=0), lever)
+        node_acceleration = self._links[:-1] @ carried[:count] + carried[count:]
         return ChainMotion(world[:-1], rate[:-1], node_acceleration)
 
     def _rotations(self, angles_rad: Array) -> tuple[Array, Array]:
-        """World rotations (N + 1, 3, 3), the world's own last; axes of the turns (3 N, 3) in the world."""
-        sine = np.sin(angles_rad)[..., None, None]
-        versine = (1.0 - np.cos(angles_rad))[..., None, None]
-        turns = sine * self._cross + versine * self._cross_squared
-        turns[..., [0, 1, 2], [0, 1, 2]] += 1.0
-        first, second, third = turns[:, 0], turns[:, 1], turns[:, 2]
-        two = first @ second
-        segment = two @ third
+        """World rotations (N + 1, 3, 3) and the turns' axes in the world (N, 3, 3), for angles (N, 3, 1)."""
+        angles = angles_rad[..., None]
+        # Rodrigues: I + sin K + (1 - cos) K²
+        turns = np.sin(angles) * self._cross - np.cos(angles) * self._cross_squared + self._along
+        first, third = turns[:, 0], turns[:, 2]
+        two = first @ turns[:, 1]
+        axes = np.empty((len(turns), 3, 3))
+        axes[:, 0] = self._axes[:, 0, :, 0]
+        axes[:, 1] = (first @ self._axes[:, 1])[..., 0]
+        axes[:, 2] = (two @ self._axes[:, 2])[..., 0]
 
-        axes = self._axes[..., None].copy()
-        axes[:, 1] = first @ axes[:, 1]
-        axes[:, 2] = two @ axes[:, 2]
-
-        # row -1 is the world, so the parent index -1 of a root finds it without a special case
-        world = np.empty((len(segment) + 1, 3, 3))
+        world = np.empty((len(turns) + 1, 3, 3))
+        world[:-1] = two @ third
         world[-1] = np.eye(3)
-        for rows, parents in self._generations:
-            world[rows] = world[parents] @ segment[rows]
-        return world, (world[self._parents][:, None] @ axes).reshape(-1, 3)
+        for ancestors in self._jumps:
+            world = world.take(ancestors, axis=0) @ world
+        # axes stand in rows: times the transposed rotation
+        return world, axes @ world.take(self._parents, axis=0).swapaxes(-1, -2)
 
 
-def _generations(skeleton: Skeleton) -> list[tuple[Indices, Indices]]:
-    """Segments that are equally far from the world, with their parents, nearest first."""
-    depth = np.zeros(len(skeleton.segments), dtype=int)
-    for i, parent in enumerate(skeleton.parents):
-        depth[i] = 0 if parent < 0 else depth[parent] + 1
-    rows = [np.flatnonzero(depth == d) for d in range(depth.max() + 1)]
-    return [(r, skeleton.parents[r]) for r in rows]
+def _jumps(parents: Indices) -> list[Indices]:
+    """Everyone's ancestor 1, 2, 4, … generations up, until all are the world.
+
+    Composed in this order, each round doubles the generations that a rotation spans (pointer doubling).
+    """
+    jumps = []
+    ancestors = parents
+    while (ancestors < len(parents) - 1).any():
+        jumps.append(ancestors)
+        ancestors = ancestors[ancestors]
+    return jumps
 
 
 def _cross_matrices(v: Array) -> Array:
@@ -129,14 +135,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 def _carried(rate: Array, rate_change: Array, lever_m: Array) -> Array:
     """Acceleration of a lever's tip against its foot: tangential ω̇ × r and centripetal ω × (ω × r)."""
-    along = np.sum(rate * lever_m, axis=-1, keepdims=True)
-    squared = np.sum(rate * rate, axis=-1, keepdims=True)
+    along = np.einsum("ij,ij->i", rate, lever_m)[:, None]
+    squared = np.einsum("ij,ij->i", rate, rate)[:, None]
     out: Array = _cross(rate_change, lever_m) + rate * along - lever_m * squared
-    return out
-
-
-def _with_world(values: Array) -> Array:
-    """One more row of zeros at the end: the world stands still."""
-    out = np.zeros((len(values) + 1, 3))
-    out[:-1] = values
     return out

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.clock import to_s
 from common.messages import Truth
@@ -15,11 +16,14 @@ from common.skeleton import Skeleton, load_skeleton
 from master.suit.nodes import BusConfig, NodeConfig
 from master.suit.protocol import NO_VALUE, Status, SuitProtocol
 from master.suit.simulated.config import SuitConfig
+from master.suit.simulated.encode import BatchEncoder
 from master.suit.simulated.faults import Faults, NodeAnswer, Outgoing
 from master.suit.simulated.imperfections import Counts, Imperfections, quantise
 from master.suit.simulated.motion import Motion, load_motion
 from master.suit.simulated.replay import Replay, load_replay
 from master.suit.simulated.sensors import IdealSensors, earth_field_ut
+
+Bits = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,15 +103,13 @@ class SimulatedSuit:
     ) -> None:
         self.faults = faults
         self._wearer = wearer
-        self._protocol = protocol
-        fd = {bus.name: bus.fd for bus in buses}
-        self._nodes = [
-            (row, name, nodes[name], fd[nodes[name].bus])
-            for row, name in enumerate(skeleton.segment_names)
-            if name in nodes
-        ]
-        with_field = {row for row, _, node, _ in self._nodes if node.magnetometer and wearer.magnetic}
-        self._without_field = np.array([r not in with_field for r in range(len(skeleton.segments))])
+        self._groups = [_group(skeleton, nodes, bus, protocol) for bus in buses]
+        self._without_field = np.array(
+            [
+                not (wearer.magnetic and name in nodes and nodes[name].magnetometer)
+                for name in skeleton.segment_names
+            ]
+        )
         self._scale = protocol.fd.scale
         self._first_sync_ns: int | None = None
 
@@ -121,20 +123,45 @@ class SimulatedSuit:
         truth = None if instant.joints is None else Truth(tick, now_ns, *instant.joints)
         return SuitAnswer(self.faults.apply(answers, t_ns), truth)
 
-    def _counts(self, readings: Array) -> tuple[Counts, Array]:
+    def _counts(self, readings: Array) -> tuple[Counts, Bits]:
         """Counts (N, 9) and status bits (N,)."""
         readings[self._without_field, 6:] = 0.0
         counts, saturated = quantise(readings, self._scale)
         counts[self._without_field, 6:] = NO_VALUE
         return counts, np.where(saturated, int(Status.SATURATED), 0)
 
-    def _answers(self, tick: int, counts: Counts, status: Array) -> list[NodeAnswer]:
-        encode = self._protocol.encode_sample
-        bits = status.tolist()
+    def _answers(self, tick: int, counts: Counts, status: Bits) -> list[NodeAnswer]:
         return [
-            NodeAnswer(name, node.bus, encode(node.id, counts[row], tick, bits[row], fd))
-            for row, name, node, fd in self._nodes
+            NodeAnswer(name, group.bus, frames)
+            for group in self._groups
+            for name, frames in zip(
+                group.names,
+                group.encoder.encode(counts[group.rows], tick, status[group.rows]),
+                strict=True,
+            )
         ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """The nodes of one bus."""
+
+    bus: str
+    names: list[str]
+    rows: list[int]
+    encoder: BatchEncoder
+
+
+def _group(
+    skeleton: Skeleton, nodes: dict[str, NodeConfig], bus: BusConfig, protocol: SuitProtocol
+) -> _Group:
+    names = [name for name in skeleton.segment_names if name in nodes and nodes[name].bus == bus.name]
+    return _Group(
+        bus=bus.name,
+        names=names,
+        rows=[skeleton.segment_names.index(name) for name in names],
+        encoder=BatchEncoder(protocol.answer_format(bus.fd), [nodes[name].id for name in names]),
+    )
 
 
 def build_suit(config: SuitConfig) -> SimulatedSuit:
