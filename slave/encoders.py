@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+from pydantic import Field
 
+from common.config import Section
 from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
 from common.skeleton import Skeleton
@@ -14,67 +16,67 @@ from common.skeleton import Skeleton
 COUNTS_PER_TURN = 4096
 RAD_PER_COUNT = 2.0 * np.pi / COUNTS_PER_TURN
 """Resolution: 0.088°."""
+_TURN_MASK = COUNTS_PER_TURN - 1
+"""Modulo a turn, also of negative counts."""
 
 Counts = NDArray[np.int64]
 
 
+class EncoderConfig(Section):
+    """`[encoders]`: how they are mounted; a joint that is not named has zero count 0 and is not reversed."""
+
+    zero_counts: dict[str, Annotated[int, Field(ge=0, lt=COUNTS_PER_TURN)]] = Field(default_factory=dict)
+    """The raw count, 0..4095, that a joint's encoder shows at joint angle 0."""
+    reversed: list[str] = Field(default_factory=list)
+    """Joints whose counts fall as the angle rises."""
+
+    def mistakes_for(self, skeleton: Skeleton) -> list[ConfigMistake]:
+        """Joints that the robot has not got, and joints that turn too far for one encoder."""
+        named = [(f"encoders.zero_counts.{name}", name) for name in self.zero_counts]
+        named += [("encoders.reversed", name) for name in self.reversed]
+        mistakes = [
+            ConfigMistake(key, name, f"a joint of the {skeleton.name} profile")
+            for key, name in named
+            if name not in skeleton.joint_names
+        ]
+        return mistakes + [
+            ConfigMistake(f"{joint.name}.range", f"{np.rad2deg(span):.1f}°", "less than a turn")
+            for joint in skeleton.joints
+            if (span := joint.upper_rad - joint.lower_rad) >= 2.0 * np.pi - 2.0 * RAD_PER_COUNT
+        ]
+
+
 class Encoders:
-    """How each joint's encoder is mounted: the count it shows at joint angle 0, and which way it turns.
+    """Counts to joint angles and back, for all joints of a robot at once.
 
     An encoder knows its angle within a turn only. Every joint's range is less than a turn, so the
-    angle is the one nearest the middle of the range: right within the limits and half the spare
-    turn beyond them on either side.
+    angle is the one nearest the middle of the range: right within the limits, and beyond them by
+    half of what is left of the turn on either side.
     """
 
-    def __init__(self, skeleton: Skeleton, zero_counts: ArrayLike, directions: ArrayLike) -> None:
-        """`zero_counts` (J,) in 0..4095; `directions` (J,) +1, or -1 where counts fall as the angle rises.
-
-        Raises ConfigError naming the joint that cannot be.
-        """
-        self.zero_counts: Counts = np.array(zero_counts, dtype=np.int64)
-        self.directions: Counts = np.array(directions, dtype=np.int64)
-        _check(skeleton, self.zero_counts, self.directions)
+    def __init__(self, skeleton: Skeleton, config: EncoderConfig | None = None) -> None:
+        """Raises ConfigError naming the joint that cannot be."""
+        config = config or EncoderConfig()
+        mistakes = config.mistakes_for(skeleton)
+        if mistakes:
+            raise ConfigError("encoders", mistakes)
+        names = skeleton.joint_names
+        self._zero = np.array([config.zero_counts.get(name, 0) for name in names], dtype=np.int64)
+        self._direction = np.array([-1 if n in config.reversed else 1 for n in names], dtype=np.int64)
+        self._counts_per_rad = self._direction / RAD_PER_COUNT
         middle = 0.5 * (skeleton.lower_rad + skeleton.upper_rad)
-        # unwrap in whole counts: exact, so that a count always comes back as itself
-        self._first = np.round(middle / RAD_PER_COUNT).astype(np.int64) - COUNTS_PER_TURN // 2
+        # unwrapped in whole counts, which is exact: a count always comes back as itself
+        self._lowest = np.rint(middle / RAD_PER_COUNT).astype(np.int64) - COUNTS_PER_TURN // 2
+        self._lowest_shown = self._direction * self._zero + self._lowest
 
     def position_rad(self, counts: Counts) -> Array:
         """Joint angles (J,) from raw counts (J,), unwrapped into each joint's range."""
-        turned = self.directions * (counts - self.zero_counts)
-        unwrapped = self._first + (turned - self._first) % COUNTS_PER_TURN
+        unwrapped = self._lowest + (self._direction * counts - self._lowest_shown & _TURN_MASK)
         out: Array = unwrapped.astype(np.float64) * RAD_PER_COUNT
         return out
 
     def counts(self, position_rad: Array) -> Counts:
         """What the encoders show at joint angles (J,): the nearest count, so within ±0.044°."""
-        turned = np.rint(position_rad / RAD_PER_COUNT).astype(np.int64)
-        out: Counts = (self.zero_counts + self.directions * turned) % COUNTS_PER_TURN
+        turned = np.rint(position_rad * self._counts_per_rad).astype(np.int64)
+        out: Counts = self._zero + turned & _TURN_MASK
         return out
-
-
-def _check(skeleton: Skeleton, zero_counts: Counts, directions: Counts) -> None:
-    joints = len(skeleton.joints)
-    mistakes = [
-        ConfigMistake(key, values.tolist(), f"{joints} values, one a joint")
-        for key, values in (("zero_counts", zero_counts), ("directions", directions))
-        if values.shape != (joints,)
-    ]
-    if not mistakes:
-        mistakes = list(_joint_mistakes(skeleton, zero_counts.tolist(), directions.tolist()))
-    if mistakes:
-        raise ConfigError("encoders", mistakes)
-
-
-def _joint_mistakes(
-    skeleton: Skeleton, zero_counts: Sequence[int], directions: Sequence[int]
-) -> list[ConfigMistake]:
-    mistakes = []
-    for joint, zero, direction in zip(skeleton.joints, zero_counts, directions, strict=True):
-        if not 0 <= zero < COUNTS_PER_TURN:
-            mistakes.append(ConfigMistake(f"{joint.name}.zero_counts", zero, "0 to 4095"))
-        if direction not in (1, -1):
-            mistakes.append(ConfigMistake(f"{joint.name}.directions", direction, "1 or -1"))
-        if joint.upper_rad - joint.lower_rad >= 2.0 * np.pi - 2.0 * RAD_PER_COUNT:
-            span = f"{np.rad2deg(joint.upper_rad - joint.lower_rad):.1f}°"
-            mistakes.append(ConfigMistake(f"{joint.name} range", span, "less than a turn"))
-    return mistakes

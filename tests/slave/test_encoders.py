@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from common.errors import ConfigError
 from common.skeleton import load_skeleton
-from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT, Encoders
+from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT, EncoderConfig, Encoders
 
 SKELETON = load_skeleton("nursing")
 J = len(SKELETON.joints)
@@ -19,7 +20,9 @@ fractions = st.floats(0.0, 1.0)
 
 
 def mounted(zero: int, direction: int) -> Encoders:
-    return Encoders(SKELETON, np.full(J, zero), np.full(J, direction))
+    names = SKELETON.joint_names
+    reversed_joints = list(names) if direction < 0 else []
+    return Encoders(SKELETON, EncoderConfig(zero_counts=dict.fromkeys(names, zero), reversed=reversed_joints))
 
 
 @given(zeros, directions, fractions)
@@ -64,22 +67,26 @@ def test_a_reversed_encoder_counts_down() -> None:
     np.testing.assert_allclose(encoders.position_rad(np.full(J, 4095)), RAD_PER_COUNT)
 
 
+@pytest.mark.parametrize("zero", [-1, 4096])
+def test_a_zero_count_that_no_encoder_shows_is_refused(zero: int) -> None:
+    with pytest.raises(ValidationError, match="neck_yaw"):
+        EncoderConfig(zero_counts={"neck_yaw": zero})
+
+
 @pytest.mark.parametrize(
-    ("zero", "direction", "says"),
-    [(-1, 1, "0 to 4095"), (4096, 1, "0 to 4095"), (0, 0, "1 or -1"), (0, 2, "1 or -1")],
+    ("config", "key"),
+    [
+        (EncoderConfig(zero_counts={"knee": 1}), "encoders.zero_counts.knee"),
+        (EncoderConfig(reversed=["knee"]), "encoders.reversed"),
+    ],
 )
-def test_a_mounting_that_cannot_be_is_refused_by_joint(zero: int, direction: int, says: str) -> None:
-    with pytest.raises(ConfigError, match=f"neck_yaw.*{says}"):
-        mounted(zero, direction)
-
-
-def test_a_table_of_the_wrong_length_is_refused() -> None:
-    with pytest.raises(ConfigError, match="25 values"):
-        Encoders(SKELETON, [0], np.ones(J))
+def test_a_joint_that_does_not_exist_is_refused(config: EncoderConfig, key: str) -> None:
+    with pytest.raises(ConfigError, match=f"{key} = 'knee': expected a joint of the nursing profile"):
+        Encoders(SKELETON, config)
 
 
 def test_a_range_of_a_turn_is_refused() -> None:
     wide = replace(SKELETON.joints[0], lower_rad=-np.pi, upper_rad=np.pi)
     skeleton = replace(SKELETON, joints=(wide, *SKELETON.joints[1:]))
-    with pytest.raises(ConfigError, match=r"neck_yaw range = '360.0°'"):
-        Encoders(skeleton, np.zeros(J), np.ones(J))
+    with pytest.raises(ConfigError, match=r"neck_yaw.range = '360.0°'"):
+        Encoders(skeleton)

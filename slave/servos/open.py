@@ -1,0 +1,18 @@
+"""The servos that the configuration names."""
+
+from __future__ import annotations
+
+from common.skeleton import Skeleton
+from slave.encoders import EncoderConfig
+from slave.servos.config import ServosConfig
+from slave.servos.servos import Servos
+
+
+def open_servos(config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfig) -> Servos:
+    """Servos that have not been started yet. Raises RobotError where they cannot be had."""
+    match config.backend:
+        case "mujoco":
+            # imported here: a robot of metal needs no simulator
+            from slave.servos.mujoco import MujocoServos
+
+            return MujocoServos(skeleton, encoders)

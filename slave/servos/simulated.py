@@ -1,0 +1,93 @@
+"""The simulated robot as drives and encoders see it, on any clock: no thread, no sleep, deterministic."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from common.clock import to_ns
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from slave.encoders import EncoderConfig, Encoders
+from slave.servos.model import STEP_S, build_model, leader, unit_rates
+from slave.servos.servos import EncoderReading
+
+STEPS_PER_CYCLE = 2
+CYCLE_NS = STEPS_PER_CYCLE * to_ns(STEP_S)
+"""The drives' cycle, 4 ms: setpoints are taken in and encoders latched at its boundaries."""
+MOST_CYCLES = 5
+"""Late by more than these 20 ms, the robot skips rather than catches up in a burst."""
+
+
+class SimulatedRobot:
+    """Physics of one robot up to some time of its own, which `advance` moves on.
+
+    A setpoint written during a cycle takes effect at the cycle's end, as on a field bus that is
+    synchronised. The drives hold the last setpoint for as long as no other comes.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        encoders: EncoderConfig | None = None,
+        origin_ns: int = 0,
+        position_rad: Array | None = None,
+    ) -> None:
+        """At rest at `origin_ns` in `position_rad` (J,), or with all joints as near 0 as limits let them."""
+        self._skeleton = skeleton
+        self._encoders = Encoders(skeleton, encoders)
+        self._model = build_model(skeleton)
+        self._data = mujoco.MjData(self._model)
+        if position_rad is None:
+            position_rad = np.zeros(len(skeleton.joints))
+        self._setpoint = np.clip(position_rad, skeleton.lower_rad, skeleton.upper_rad)
+        # views of the simulation's own state: fetched once, as every access builds a new one
+        self._hinge_rad, self._taken_in = self._data.qpos, self._data.ctrl
+        self._hinge_rad[:] = self._setpoint @ unit_rates(skeleton, self._model)
+        self._taken_in[:] = self._setpoint
+        leaders = [leader(joint) for joint in skeleton.joints]
+        self._leaders = np.array([self._model.joint(angle).qposadr[0] for angle, _ in leaders])
+        self._joint_per_hinge = np.array([1.0 / ratio for _, ratio in leaders])
+        self._all_valid = np.ones(len(leaders), dtype=np.bool_)
+        self.now_ns = origin_ns
+        """Time that the physics has reached."""
+        self.skipped_cycles = 0
+        """Cycles that were left out because `advance` came too late for them."""
+
+    def write(self, position_rad: Array) -> None:
+        """New setpoints (J,), kept within the drives' limits. Raises ValueError if not finite or not J."""
+        if position_rad.shape != self._setpoint.shape or not np.isfinite(position_rad).all():
+            raise ValueError(f"setpoints must be {len(self._setpoint)} finite angles, not {position_rad}")
+        self._setpoint = np.clip(position_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
+
+    def resume(self, now_ns: int) -> None:
+        """Go on from `now_ns` after a pause in which time stood still for the robot."""
+        self.now_ns = now_ns
+
+    def advance(self, until_ns: int) -> None:
+        """Run every cycle that ends by `until_ns`; skip what lies more than MOST_CYCLES back."""
+        due = (until_ns - self.now_ns) // CYCLE_NS
+        if due > MOST_CYCLES:
+            self.skipped_cycles += due - MOST_CYCLES
+            self.now_ns += (due - MOST_CYCLES) * CYCLE_NS
+            due = MOST_CYCLES
+        for _ in range(due):
+            mujoco.mj_step(self._model, self._data, nstep=STEPS_PER_CYCLE)
+            self._taken_in[:] = self._setpoint
+            self.now_ns += CYCLE_NS
+
+    def read(self) -> EncoderReading:
+        """The counts latched at the end of the last cycle; none valid where the physics has diverged."""
+        position = self.position_rad
+        # one sum finds any NaN or infinity
+        if not math.isfinite(position.sum()):
+            return EncoderReading(self.now_ns, np.zeros(len(position), np.int64), ~self._all_valid)
+        return EncoderReading(self.now_ns, self._encoders.counts(position), self._all_valid)
+
+    @property
+    def position_rad(self) -> Array:
+        """True joint angles (J,), which no encoder shows as finely."""
+        out: Array = self._hinge_rad[self._leaders] * self._joint_per_hinge
+        return out
