@@ -148,7 +148,7 @@ class _Group:
 
     bus: str
     names: list[str]
-    rows: list[int]
+    rows: NDArray[np.intp]
     encoder: BatchEncoder
 
 
@@ -159,15 +159,14 @@ def _group(
     return _Group(
         bus=bus.name,
         names=names,
-        rows=[skeleton.segment_names.index(name) for name in names],
+        rows=np.array([skeleton.segment_names.index(name) for name in names], dtype=np.intp),
         encoder=BatchEncoder(protocol.answer_format(bus.fd), [nodes[name].id for name in names]),
     )
 
 
-def build_suit(config: SuitConfig) -> SimulatedSuit:
+def build_suit(config: SuitConfig, protocol: SuitProtocol) -> SimulatedSuit:
     """The suit that a configuration describes. Raises ConfigError; opens nothing but files."""
     skeleton = load_skeleton(config.profile)
-    protocol = SuitProtocol.load(config.dbc)
     faults = Faults(config.faults, config.seed)
     return SimulatedSuit(skeleton, config.nodes, config.buses, protocol, _wearer(config, skeleton), faults)
 

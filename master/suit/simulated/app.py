@@ -1,0 +1,44 @@
+"""The simulated suit on real buses: the only file here that knows of the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import asdict
+
+from common.clock import to_s
+from master.suit.bus import SuitBus
+from master.suit.protocol import SuitProtocol
+from master.suit.simulated.config import SuitConfig
+from master.suit.simulated.faults import Outgoing
+from master.suit.simulated.peer import PublishTruth, SuitPeer
+from master.suit.simulated.suit import build_suit
+
+
+async def run(
+    config: SuitConfig, stop: asyncio.Event, publish_truth: PublishTruth | None = None
+) -> dict[str, object]:
+    """Answer every SYNC until `stop` is set; returns what was counted.
+
+    `publish_truth` is called once a tick, after the answers have gone out. Raises ConfigError before
+    anything is opened, and BusError where a bus cannot be opened.
+    """
+    protocol = SuitProtocol.load(config.dbc)
+    suit = build_suit(config, protocol)
+    loop = asyncio.get_running_loop()
+
+    def send(outgoing: Outgoing) -> None:
+        bus = buses[outgoing.bus]
+        if outgoing.delay_ns:
+            loop.call_later(to_s(outgoing.delay_ns), bus.send, outgoing.frame)
+        else:
+            bus.send(outgoing.frame)
+
+    peer = SuitPeer(suit, protocol, send, publish_truth)
+    buses = {bus.name: SuitBus(bus, peer.on_frame) for bus in config.buses}
+    try:
+        for bus in buses.values():
+            bus.open()
+        await stop.wait()
+    finally:
+        await asyncio.gather(*(bus.close() for bus in buses.values()))
+    return {**asdict(peer.counters), "buses": {name: bus.summary() for name, bus in buses.items()}}
