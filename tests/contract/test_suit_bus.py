@@ -1,0 +1,238 @@
+"""What every bus must keep, whatever carries it: virtual, udp_multicast, SocketCAN (vcan and Kvaser cards)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Any
+
+import can
+import numpy as np
+import uvloop
+
+from master.suit.bus import SuitBus
+from master.suit.frame import Frame
+from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.poll import Poll
+from master.suit.protocol import SuitProtocol
+
+if TYPE_CHECKING:
+    from tests.contract.conftest import Wire
+
+DEADLINE_S = 60.0
+"""Only a broken bus needs it: the suite also runs on an emulated machine."""
+PROTOCOL = SuitProtocol.load()
+
+
+def run(test: Coroutine[Any, Any, None]) -> None:
+    """On the loop that the product uses."""
+
+    async def bounded() -> None:
+        async with asyncio.timeout(DEADLINE_S):
+            await test
+
+    uvloop.run(bounded())
+
+
+class End:
+    """One end of a wire: a SuitBus and all it tells."""
+
+    def __init__(self, wire: Wire, config: BusConfig) -> None:
+        self.frames: list[tuple[int, bytes]] = []
+        self.changes: list[bool] = []
+        self._stirred = asyncio.Event()
+        self.bus = SuitBus(config, self._on_frame, self._on_change, wire.open)
+
+    def _on_frame(self, name: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        assert name == self.bus.name
+        assert now_ns > 0
+        self.frames.append((frame_id, data))
+        self._stirred.set()
+
+    def _on_change(self, name: str, up: bool) -> None:
+        assert name == self.bus.name
+        self.changes.append(up)
+        self._stirred.set()
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        """Wait for something that comes with a frame or a change of this end."""
+        while not condition():
+            self._stirred.clear()
+            await self._stirred.wait()
+
+    async def have(self, count: int) -> None:
+        await self.until(lambda: len(self.frames) >= count)
+
+
+@asynccontextmanager
+async def both_ends(wire: Wire) -> AsyncIterator[tuple[End, End]]:
+    near, far = End(wire, wire.near), End(wire, wire.far)
+    near.bus.open()
+    far.bus.open()
+    try:
+        yield near, far
+    finally:
+        await near.bus.close()
+        await far.bus.close()
+
+
+@asynccontextmanager
+async def stranger(wire: Wire) -> AsyncIterator[can.BusABC]:
+    """A third party at the far end, with plain python-can."""
+    bus = wire.open(wire.far)
+    try:
+        yield bus
+    finally:
+        bus.shutdown()
+
+
+def frames_of_all_lengths(fd: bool) -> list[Frame]:
+    lengths = [*range(9), *((12, 16, 20, 24, 32, 48, 64) if fd else ())]
+    return [Frame(0x101 + n, bytes((7 * n + k) % 256 for k in range(n)), fd) for n in lengths]
+
+
+def test_frames_arrive_in_order_and_unchanged_both_ways(wire: Wire) -> None:
+    async def test() -> None:
+        async with both_ends(wire) as (near, far):
+            for sender, receiver in ((far, near), (near, far)):
+                # ids of its own for each direction: an end does not hear the ids that it sends
+                sent = [
+                    Frame(frame.id + (0x200 if sender is near else 0), frame.data, frame.fd)
+                    for frame in frames_of_all_lengths(wire.fd) * 4
+                ]
+                for first in range(0, len(sent), 8):  # a CAN card's own queue holds 10
+                    for frame in sent[first : first + 8]:
+                        sender.bus.send(frame)
+                    await receiver.have(min(first + 8, len(sent)))
+                assert receiver.frames == [(frame.id, frame.data) for frame in sent]
+                assert sender.bus.counters.sent == len(sent)
+                assert sender.bus.counters.send_errors == 0
+
+    run(test())
+
+
+def test_a_classic_sync_is_answered_by_every_node(wire: Wire) -> None:
+    async def test() -> None:
+        nodes = [NodeConfig(id=number, bus="near") for number in (1, 2, 127)]
+        poll = Poll(nodes, PROTOCOL, lost_after=3, fd={"near": wire.fd})
+        raw = np.arange(9, dtype=np.int16)
+        async with both_ends(wire) as (near, far):
+            for tick in range(5):
+                near.bus.send(poll.open_window(tick, 0))
+                await far.have(tick + 1)
+                asked = PROTOCOL.parse_sync(far.frames[-1][1])
+                answers = [f for n in nodes for f in PROTOCOL.encode_sample(n.id, raw, asked, 0, wire.fd)]
+                for answer in answers:
+                    far.bus.send(answer)
+                await near.have(len(answers))
+                done = [poll.on_frame("near", frame_id, data, 1) for frame_id, data in near.frames]
+                near.frames.clear()
+                assert done[-1]
+                assert not any(done[:-1])
+                assert poll.close_window(2).fresh.all()
+
+    run(test())
+
+
+def test_an_end_does_not_hear_itself(wire: Wire) -> None:
+    async def test() -> None:
+        async with both_ends(wire) as (near, far):
+            for number in range(5):
+                near.bus.send(Frame(0x080, bytes([number]), fd=False))
+            await far.have(5)
+            far.bus.send(Frame(0x101, b"answer", wire.fd))
+            await near.have(1)
+            # the answer came after its own frames on the same wire, so these have been passed over
+            assert near.frames == [(0x101, b"answer")]
+
+    run(test())
+
+
+def test_frames_of_no_suit_are_counted_and_not_handed_on(wire: Wire) -> None:
+    async def test() -> None:
+        async with both_ends(wire) as (near, _), stranger(wire) as other:
+            other.send(can.Message(arbitration_id=0x123456, is_extended_id=True, data=b"29 bits"))
+            other.send(can.Message(arbitration_id=0x101, is_extended_id=False, is_remote_frame=True))
+            other.send(can.Message(arbitration_id=0x102, is_extended_id=False, data=b"good"))
+            await near.have(1)
+            assert near.frames == [(0x102, b"good")]
+            assert near.bus.counters.foreign == 2
+            assert near.bus.up
+
+    run(test())
+
+
+def test_a_bus_that_disappears_is_reopened_and_nothing_is_raised(wire: Wire) -> None:
+    async def test() -> None:
+        async with both_ends(wire) as (near, far):
+            wire.disappear()
+            near.bus.send(Frame(0x080, b"lost", fd=False))
+            await near.until(lambda: not near.bus.up)
+            near.bus.send(Frame(0x080, b"lost", fd=False))
+            assert near.bus.counters.send_errors >= 1
+            assert near.bus.counters.times_down == 1
+            assert near.bus.last_error
+
+            wire.come_back()
+            await near.until(lambda: near.bus.up)
+            await far.until(lambda: far.bus.up)
+            assert near.changes[:3] == [True, False, True]
+            before = len(near.frames)
+            # the far end may not have noticed yet that its bus was away: it repeats itself until heard
+            while len(near.frames) == before:
+                far.bus.send(Frame(0x101, b"back", wire.fd))
+                await asyncio.wait({asyncio.create_task(near.have(before + 1))}, timeout=0.2)
+            assert near.frames[-1] == (0x101, b"back")
+
+    run(test())
+
+
+def test_a_bus_that_stays_away_does_not_hold_up_close(wire: Wire) -> None:
+    async def test() -> None:
+        async with both_ends(wire) as (near, _):
+            wire.disappear()
+            near.bus.send(Frame(0x080, b"lost", fd=False))
+            await near.until(lambda: not near.bus.up)
+            await near.bus.close()
+            assert not near.bus.up
+            wire.come_back()
+
+    run(test())
+    assert True
+
+
+def test_close_may_be_called_again_and_before_open(wire: Wire) -> None:
+    async def test() -> None:
+        end = End(wire, wire.near)
+        end.bus.open()
+        await end.bus.close()
+        await end.bus.close()
+        end.bus.send(Frame(0x080, b"late", fd=False))
+        assert end.bus.counters.send_errors == 1
+        await End(wire, wire.near).bus.close()
+
+    run(test())
+
+
+def test_an_error_frame_is_counted_and_not_handed_on(wire: Wire) -> None:
+    async def test() -> None:
+        async with both_ends(wire) as (near, _), stranger(wire) as other:
+            if "can1" in (wire.far.channel, wire.near.channel):
+                return  # error frames do not cross a real wire
+            protocol_violation = 0x008
+            other.send(
+                can.Message(
+                    arbitration_id=protocol_violation,
+                    is_extended_id=False,
+                    is_error_frame=True,
+                    data=bytes(8),
+                )
+            )
+            other.send(can.Message(arbitration_id=0x102, is_extended_id=False, data=b"good"))
+            await near.have(1)
+            assert near.frames == [(0x102, b"good")]
+            assert near.bus.counters.error_frames == 1
+            assert near.bus.up
+
+    run(test())
