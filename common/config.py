@@ -9,24 +9,30 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo
 
-from common.errors import ConfigError, ConfigMistake
+from common.endpoint import check_endpoint
+from common.errors import NOT_SET, ConfigError, ConfigMistake
 
 
 class Section(BaseModel):
     """Base of every part of a configuration: frozen, strict, unknown keys are mistakes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     def mistakes(self) -> list[ConfigMistake]:
         """What no single key can tell: contradictions between keys. Asked once all keys are well formed."""
         return []
 
 
+Endpoint = Annotated[str, AfterValidator(check_endpoint)]
+
+
 class LinkConfig(Section):
     """`[link]`: Zenoh endpoints, such as `tcp/192.168.7.2:7447`, `udp/…`, `ws/…`, `unixsock-stream/…`."""
 
-    listen: list[str] = []
-    connect: list[str] = []
+    listen: list[Endpoint] = []
+    """Where other sessions may connect to this one."""
+    connect: list[Endpoint] = []
+    """Which sessions to connect to; they may start later, or again."""
 
 
 def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
@@ -65,7 +71,11 @@ def check_config(path: Path, table: dict[str, Any], model: type[Model]) -> Model
         checked = model.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
         mistakes = [
-            ConfigMistake(".".join(map(str, e["loc"])) or "file", e["input"], _expected(e["type"], e["msg"]))
+            ConfigMistake(
+                ".".join(map(str, e["loc"])) or "file",
+                NOT_SET if e["type"] == "missing" else e["input"],
+                _expected(e["type"], e["msg"]),
+            )
             for e in error.errors()
         ]
         raise ConfigError(path, mistakes) from None

@@ -19,13 +19,25 @@ class ConfigMistake:
     expected: str
 
 
+class _NotSet:
+    def __repr__(self) -> str:
+        return "(not set)"
+
+
+NOT_SET = _NotSet()
+"""The value of a key that is missing."""
+_LONGEST_VALUE = 100
+
+
 class ConfigError(TandemError):
     """A configuration file that cannot be used: one line a mistake, with file, key, value, expectation."""
 
     def __init__(self, path: Path | str, mistakes: list[ConfigMistake]) -> None:
         self.path = Path(path)
         self.mistakes = mistakes
-        super().__init__("\n".join(f"{path}: {m.key} = {m.value!r}: expected {m.expected}" for m in mistakes))
+        super().__init__(
+            "\n".join(f"{path}: {m.key} = {_short(m.value)}: expected {m.expected}" for m in mistakes)
+        )
 
 
 class CodecError(TandemError):
@@ -46,3 +58,8 @@ class LinkTimeoutError(LinkError, TimeoutError):
 
 class RobotError(TandemError):
     """A robot, servo or encoder that cannot be used."""
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + "…"

@@ -8,7 +8,6 @@ import os
 import signal
 import sys
 import threading
-import traceback
 from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import suppress
 from types import FrameType
@@ -119,9 +118,8 @@ class _Shutdown:
         os._exit(status)
 
     def _hanging(self) -> list[str]:
-        lines = []
-        for task in asyncio.all_tasks(self.loop) if self.loop is not None else ():
-            lines.append(f"task {task.get_name()} in {_innermost(task.get_coro())}")
+        tasks = asyncio.all_tasks(self.loop) if self.loop is not None else set()
+        lines = [f"task {task.get_name()} in {_chain(task.get_coro())}" for task in tasks]
         frames_now = sys._current_frames()
         for thread in threading.enumerate():
             frame = frames_now.get(thread.ident or 0)
@@ -130,15 +128,15 @@ class _Shutdown:
         return lines
 
 
-def _innermost(awaited: object) -> str:
-    """Where a coroutine waits: the end of the chain of what awaits what."""
-    place = "not started"
+def _chain(awaited: object) -> str:
+    """Where a coroutine waits: the chain of what awaits what, and the place of the last."""
+    names, place = [], ""
     while (frame := getattr(awaited, "cr_frame", None)) is not None:
-        place = _place(frame)
+        names.append(frame.f_code.co_name)
+        place = f" ({frame.f_code.co_filename}:{frame.f_lineno})"
         awaited = getattr(awaited, "cr_await", None)
-    return place
+    return " → ".join(names) + place
 
 
 def _place(frame: FrameType) -> str:
-    summary = traceback.extract_stack(frame, limit=1)[-1]
-    return f"{summary.name} ({summary.filename}:{summary.lineno})"
+    return f"{frame.f_code.co_name} ({frame.f_code.co_filename}:{frame.f_lineno})"
