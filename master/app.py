@@ -43,7 +43,7 @@ class Master:
         self._ticks_expected = 0
         self._ticks_missed = 0
         self._undecodable = 0
-        self._buses = [SuitBus(bus, self._on_frame) for bus in config.capture.buses]
+        self._buses = [SuitBus(bus, self._on_frame, self._on_bus) for bus in config.capture.buses]
         self._put_command: Callable[[bytes], None] = link.publish(COMMAND)
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
         link.subscribe(STATE, self._on_state)
@@ -79,6 +79,10 @@ class Master:
             solved = self._pipeline.close(now_ns)
             if solved is not None:
                 self._send(solved)
+
+    def _on_bus(self, bus: str, up: bool) -> None:
+        if not up:
+            self._pipeline.bus_down(bus)
 
     def _send(self, solved: Solved) -> None:
         solved_ns = monotonic_ns()
@@ -142,7 +146,7 @@ class Master:
                 "undecodable": self._undecodable,
             },
             "lease": {"held": bool(self._lease.token), "answer": self._lease.answer},
-            "nodes": self._pipeline.poll.summary(),
+            "nodes": self._pipeline.node_counts(),
             "buses": {bus.name: bus.summary() for bus in self._buses},
             "link": self._link.counters,
         }

@@ -6,7 +6,7 @@ poll ▸ calibrate ▸ low-pass ▸ fuse ▸ (every 16th tick) solve ▸ command
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -60,6 +60,17 @@ class MasterPipeline:
     def frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Take one frame; True when every node that is not lost has answered this tick."""
         return self.poll.on_frame(bus, frame_id, data, now_ns) and self._window_open
+
+    def bus_down(self, bus: str) -> None:
+        """Take a failed bus's nodes as lost at once: their joints are not valid until they answer again."""
+        self.poll.bus_down(bus)
+
+    def node_counts(self) -> dict[str, dict[str, int]]:
+        """The counters of each node that are not zero, by segment."""
+        return {
+            name: {counter: count for counter, count in asdict(health).items() if count}
+            for name, health in zip(self.skeleton.segment_names, self.poll.health, strict=True)
+        }
 
     def close(self, now_ns: int) -> Solved | None:
         """Take the tick's answers through the filters; the joint angles if this tick decides."""

@@ -1,0 +1,131 @@
+"""Both pipelines, suit and robot for a simulated minute: the same every time, in seconds, and right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from common.codec import encode
+from common.messages import Action
+from deploy.judge import Motion, accuracy, motion
+from deploy.judge.paper import ETA_PERCENT, TABLE_1
+from deploy.virtual import VirtualRun, World
+
+
+def engaged(world: World) -> VirtualRun:
+    run = VirtualRun(world)
+    run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
+    run.run(1.0)
+    reply = run.ask(Action.ENGAGE)
+    assert reply.done, reply.text
+    run.run(15.0, until=lambda: run.slave.guard.state == "track")
+    assert run.slave.guard.state == "track", run.slave.guard.reason
+    return run
+
+
+def moved(strategy: str, seconds: float) -> Motion:
+    run = engaged(World(overrides={"slave": [f'track.strategy="{strategy}"']}))
+    run.run(seconds)
+    judged = motion(run.trace.truth(), on_masters_clock(run), run.trace.joint_names)
+    assert judged is not None
+    return judged
+
+
+def on_masters_clock(run: VirtualRun):
+    """The encoders' stamps on the suit's clock, which is the master's."""
+    for state in run.states:
+        run.trace.add(state)
+    series = run.trace.moved()
+    offset_ns = run.slave_ns - run.now_ns
+    return type(series)(series.encoder_ns - offset_ns, series.position_rad, series.valid, series.tracking)
+
+
+@pytest.fixture(scope="module")
+def minute() -> VirtualRun:
+    run = engaged(World())
+    run.run(60.0)
+    return run
+
+
+def test_a_minute_passes_without_loss(minute: VirtualRun) -> None:
+    counters = minute.slave.guard.counters
+    assert minute.slave.guard.state == "track"
+    assert not counters.losses
+    assert not counters.dropped.keys() - {"lease", "clock"}, "only before the lease and the clock stood"
+    sent_with_lease = sum(1 for c in minute.commands if c.lease)
+    assert counters.accepted >= sent_with_lease - 15
+    assert len(minute.commands) / ((minute.now_ns - 1e9) / 1e9) == pytest.approx(12.5, rel=0.01)
+
+
+def test_angles_are_solved_better_than_the_papers(minute: VirtualRun) -> None:
+    judged = accuracy(minute.trace.truth(), minute.trace.solved(), minute.trace.joint_names)
+    assert judged.eta_percent is not None
+    assert judged.eta_percent <= ETA_PERCENT
+    for joint, paper in TABLE_1.items():
+        worse = judged.worse(joint)
+        assert worse is not None
+        assert worse.error_deg < paper.error_deg, joint
+
+
+def test_the_slave_knows_the_masters_clock_within_its_bound(minute: VirtualRun) -> None:
+    offset = minute.slave.clock.estimator.estimate(minute.slave_ns)
+    assert offset.trusted
+    true_ns = minute.now_ns - minute.slave_ns
+    assert abs(offset.offset_ns - true_ns) <= offset.bound_ns
+
+
+def test_the_latency_budget_adds_up(minute: VirtualRun) -> None:
+    budget = minute.slave.journeys.budget
+    stages = budget.summary()
+    assert sum(stage["mean"] for stage in stages.values()) == pytest.approx(budget.total()["mean"])
+    assert stages["put→received"]["mean"] == pytest.approx(2.0, abs=0.1)
+    assert stages["sampled→frames in"]["mean"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_setpoint_never_breaks_a_limit(minute: VirtualRun) -> None:
+    skeleton = minute.slave_config.skeleton
+    setpoints = np.array([s.setpoint_rad for s in minute.states])
+    assert (setpoints >= skeleton.lower_rad - 1e-6).all()
+    assert (setpoints <= skeleton.upper_rad + 1e-6).all()
+    seconds = np.diff([s.encoder_ns for s in minute.states]) / 1e9
+    rates = np.abs(np.diff(setpoints, axis=0)) / 0.02
+    assert seconds.min() > 0
+    assert (rates <= skeleton.max_velocity_rad_s * 1.02 + 1e-3).all()
+
+
+def test_prediction_shows_the_patient_a_third_of_holds_error() -> None:
+    hold, predict = moved("hold", 20.0), moved("predict", 20.0)
+    assert predict.rmse_deg <= hold.rmse_deg / 3
+    assert predict.lag_ms is not None
+    assert abs(predict.lag_ms) <= 25
+    assert predict.roughness is not None
+    assert predict.roughness <= 2.5
+
+
+def test_the_same_world_gives_the_same_bytes() -> None:
+    def story() -> list[bytes]:
+        run = VirtualRun(World())
+        run.run(4.0)
+        run.ask(Action.ENGAGE)
+        run.run(3.0)
+        return [encode(c) for c in run.commands] + [encode(s) for s in run.states]
+
+    assert story() == story()
+
+
+def test_a_cut_link_makes_the_robot_hold_and_only_engaging_moves_it_again() -> None:
+    run = engaged(World())
+    run.run(4.0)
+    run.deliver = lambda _: False
+    cut_ns = run.slave_ns
+    run.run(2.0, until=lambda: run.slave.guard.state == "hold")
+    held_s = (run.slave_ns - cut_ns) / 1e9
+    timeout_s = run.slave_config.guard.command_timeout_s
+    assert timeout_s - 0.08 <= held_s <= timeout_s + 0.01
+    run.run(1.0)
+    run.deliver = lambda _: True
+    still = run.states[-1].setpoint_rad
+    run.run(3.0)
+    assert run.slave.guard.state == "hold"
+    np.testing.assert_array_equal(run.states[-1].setpoint_rad, still)
+    assert run.ask(Action.ENGAGE).done
