@@ -18,9 +18,9 @@ import can
 from common.clock import monotonic_ns
 from common.errors import BusError
 from master.suit.frame import Frame
-from master.suit.health import OncePerSecond
 from master.suit.interface import descriptor, error_number, open_bus
 from master.suit.nodes import BusConfig
+from master.suit.quiet import OncePerSecond
 from master.suit.reader import DescriptorReader, Reader, ThreadReader
 
 FIRST_WAIT_S = 0.1

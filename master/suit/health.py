@@ -1,4 +1,4 @@
-"""What is counted of each node and each bus, and how seldom it is told."""
+"""What is counted of each node and each bus."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-
-from common.clock import NS_PER_S
 
 Counts: TypeAlias = NDArray[np.int64]
 
@@ -67,23 +65,3 @@ class NodeCounters:
     def totals(self) -> dict[str, int]:
         """The sum of each counter over all nodes."""
         return {f.name: int(getattr(self, f.name).sum()) for f in fields(NodeHealth)}
-
-
-class OncePerSecond:
-    """Lets each key speak once a second; says how many times it was asked since it last spoke."""
-
-    def __init__(self, period_ns: int = NS_PER_S) -> None:
-        self._period_ns = period_ns
-        self._spoke_ns: dict[str, int] = {}
-        self._held: dict[str, int] = {}
-
-    def ask(self, key: str, now_ns: int) -> int:
-        """0: keep quiet. n ≥ 1: speak now, for n occurrences, this one included."""
-        held = self._held.get(key, 0) + 1
-        spoke_ns = self._spoke_ns.get(key)
-        if spoke_ns is not None and now_ns - spoke_ns < self._period_ns:
-            self._held[key] = held
-            return 0
-        self._spoke_ns[key] = now_ns
-        self._held[key] = 0
-        return held
