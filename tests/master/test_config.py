@@ -1,0 +1,67 @@
+"""Each mistake in the master's file gives one clear line: file, key, value and what was expected."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from common.config import load_config
+from common.errors import ConfigError
+from master.config import MasterConfig
+
+EXAMPLE = Path(__file__).parents[2] / "deploy" / "examples" / "master.toml"
+
+
+def mistakes(*overrides: str) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        load_config(EXAMPLE, MasterConfig, overrides)
+    return str(caught.value).splitlines()
+
+
+def test_the_example_is_right() -> None:
+    config = load_config(EXAMPLE, MasterConfig)
+    assert config.command_rate_hz == 12.5
+    assert len(config.nodes) == 36
+    assert config.capture.dbc.is_file()
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("capture.rate_hs=200", ["capture.rate_hs = 200", "no such key"]),
+        ('capture.rate_hz="fast"', ["capture.rate_hz = 'fast'", "integer"]),
+        ("capture.rate_hz=0", ["capture.rate_hz = 0", "greater than or equal to 10"]),
+        ("capture.rate_hz=100000", ["capture.rate_hz = 100000", "less than or equal to 1000"]),
+        ("capture.decimation=0", ["capture.decimation = 0", "greater than or equal to 1"]),
+        ("nodes.tail={id=99, bus='suit'}", ["nodes.tail", "a segment of the profile nursing"]),
+        ("nodes.head.id=1", ["nodes.head.id = 1", "nodes.chest"]),
+        ("nodes.head.id=0", ["nodes.head.id = 0", "greater than or equal to 1"]),
+        ("nodes.head.bus='left'", ["nodes.head.bus = 'left'", "one of suit"]),
+        ("profile='octopus'", ["profile = 'octopus'", "nursing"]),
+        ("estimation.gyroscope_cutoff_hz=100.0", ["gyroscope_cutoff_hz = 100.0", "less than half the rate"]),
+        ("estimation.filter='magic'", ["estimation.filter = 'magic'", "'vqf' or 'mahony'"]),
+        ("robot='robot 1'", ["robot = 'robot 1'", "pattern"]),
+    ],
+)
+def test_one_line_a_mistake(override: str, expected: list[str]) -> None:
+    lines = mistakes(override)
+    assert len(lines) == 1
+    for part in (str(EXAMPLE), *expected):
+        assert part in lines[0]
+
+
+def test_a_missing_node_and_a_missing_deadman_are_named() -> None:
+    text = EXAMPLE.read_text("utf-8").replace('head = { id = 2, bus = "suit" }\n', "")
+    with pytest.raises(ConfigError, match=r"nodes\.head"):
+        load_text(text)
+    with pytest.raises(ConfigError, match=r"operator\.deadman"):
+        load_text(EXAMPLE.read_text("utf-8").replace("deadman =", "# deadman ="))
+
+
+def load_text(text: str) -> MasterConfig:
+    import tomllib
+
+    from common.config import check_config
+
+    return check_config(EXAMPLE, tomllib.loads(text), MasterConfig)

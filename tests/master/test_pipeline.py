@@ -1,0 +1,101 @@
+"""Frames in, commands out: decimation, lost nodes, a bus that fails; against the simulated suit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.clock import NS_PER_MS, NS_PER_S
+from common.config import load_config
+from master.config import MasterConfig
+from master.pipeline import CommandWriter, MasterPipeline, Solved
+from master.suit.protocol import SuitProtocol
+from master.suit.simulated.config import SuitConfig
+from master.suit.simulated.suit import SimulatedSuit, build_suit
+
+EXAMPLES = Path(__file__).parents[2] / "deploy" / "examples"
+PERIOD_NS = 5 * NS_PER_MS
+
+
+class Bench:
+    """A master's pipeline and a suit, wired together without time between them."""
+
+    def __init__(self, *suit: str) -> None:
+        config = load_config(EXAMPLES / "master.toml", MasterConfig)
+        protocol = SuitProtocol.load(config.capture.dbc)
+        self.pipeline = MasterPipeline(config, protocol)
+        calm = ('motion="calibration_pose"', *suit)
+        self.suit: SimulatedSuit = build_suit(load_config(EXAMPLES / "suit.toml", SuitConfig, calm), protocol)
+        self.tick = 0
+        self.silent = False
+
+    @property
+    def now_ns(self) -> int:
+        return NS_PER_S + self.tick * PERIOD_NS
+
+    def run(self, ticks: int) -> list[Solved]:
+        """What was solved in so many ticks."""
+        found = []
+        for _ in range(ticks):
+            self.tick += 1
+            _, late = self.pipeline.tick(self.tick, self.now_ns)
+            found.append(late)
+            frames = [] if self.silent else self.suit.on_sync(self.tick, self.now_ns).frames
+            complete = [
+                self.pipeline.frame(bus, frame.id, frame.data, self.now_ns + NS_PER_MS)
+                for bus, frame, _ in frames
+            ]
+            if any(complete):
+                assert complete.index(True) == len(complete) - 1, "only the last frame completes the tick"
+                found.append(self.pipeline.close(self.now_ns + NS_PER_MS))
+        return [solved for solved in found if solved is not None]
+
+
+@pytest.fixture
+def settled() -> Bench:
+    bench = Bench()
+    bench.run(320)
+    return bench
+
+
+def test_one_of_sixteen_ticks_is_solved(settled: Bench) -> None:
+    solved = settled.run(160)
+    assert [s.tick % 16 for s in solved] == [0] * 10
+    assert all(s.valid.all() for s in solved)
+    assert all(s.frames_in_ns - s.sampled_ns == NS_PER_MS for s in solved)
+
+
+def test_nothing_is_valid_before_the_filters_have_settled() -> None:
+    assert not any(s.valid.any() for s in Bench().run(160))
+
+
+def test_a_lost_node_takes_just_the_joints_that_need_it() -> None:
+    bench = Bench('faults.lose=[{node="left_forearm", from_s=2.0}]')
+    bench.run(400)
+    after = bench.run(40)[-1]
+    names = bench.pipeline.skeleton.joint_names
+    gone = {name for name, ok in zip(names, after.valid, strict=True) if not ok}
+    assert gone == {"left_elbow_pitch", "left_elbow_roll", "left_wrist_yaw"}
+    np.testing.assert_array_equal(after.position_rad[~after.valid], 0.0)
+
+
+def test_a_failed_bus_means_no_valid_joint_but_commands_go_on(settled: Bench) -> None:
+    settled.silent = True
+    settled.pipeline.bus_down("suit")
+    solved = settled.run(161)  # an open window closes at the next tick
+    assert len(solved) == 10
+    assert not any(s.valid.any() for s in solved)
+    settled.silent = False
+    assert settled.run(320)[-1].valid.all(), "it comes back"
+
+
+def test_the_sequence_counts_up_and_the_lease_is_carried(settled: Bench) -> None:
+    writer = CommandWriter("r")
+    solved = settled.run(16)[0]
+    first = writer.write(solved, 5, True, 10, 11)
+    second = writer.write(solved, 6, False, 20, 21)
+    assert (first.sequence, second.sequence) == (1, 2)
+    assert (first.lease, second.lease, second.deadman_held) == (5, 6, False)
+    assert (second.stamps.solved_ns, second.stamps.put_ns) == (20, 21)

@@ -1,0 +1,51 @@
+"""Silence of the robot on the master's own clock, and round trips closed by echoes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from common.clock import NS_PER_MS, to_ns
+from common.messages import CommandEcho, RobotState
+from common.topics import STATE
+from master.robot_watch import RobotWatch
+
+TIMEOUT_NS = to_ns(STATE.timeout_s)
+SLAVE_AHEAD_NS = 10**15
+
+
+def state(sent_ns: int = 0, echo: CommandEcho | None = None) -> RobotState:
+    zeros = np.zeros(25)
+    return RobotState("r", 1, sent_ns, 1, "hold", "", "", np.ones(25, np.bool_), zeros, zeros, echo, 0, 1)
+
+
+def test_silence_begins_just_after_the_time_out_whatever_the_sender_stamps() -> None:
+    watch = RobotWatch()
+    watch.on_state(state(sent_ns=SLAVE_AHEAD_NS), 1000)
+    assert not watch.silent(1000 + TIMEOUT_NS)
+    assert watch.silent(1001 + TIMEOUT_NS)
+
+
+def test_people_are_told_once_a_change() -> None:
+    watch = RobotWatch()
+    assert watch.change(0) is None
+    watch.on_state(state(), 0)
+    assert watch.change(1) == "the robot is heard"
+    assert watch.change(2) is None
+    told = watch.change(TIMEOUT_NS + 1)
+    assert told is not None
+    assert "silent" in told
+    assert watch.change(TIMEOUT_NS + 2) is None
+    assert watch.times_lost == 1
+
+
+def test_a_round_trip_takes_off_the_time_on_the_slave_and_needs_no_common_clock() -> None:
+    watch = RobotWatch()
+    received_ns = SLAVE_AHEAD_NS + 3 * NS_PER_MS
+    echo = CommandEcho(5, 1 * NS_PER_MS, received_ns, received_ns, received_ns)
+    held_ns = 11 * NS_PER_MS
+    watch.on_state(state(received_ns + held_ns, echo), 1 * NS_PER_MS + held_ns + 4 * NS_PER_MS)
+    assert watch.round_trip.summary()["mean"] == pytest.approx(4.0)
+    # the same echo again, later, is the same command
+    watch.on_state(state(received_ns + 2 * held_ns, echo), 10**12)
+    assert watch.round_trip.summary()["count"] == 1

@@ -1,0 +1,41 @@
+"""Each mistake in the slave's file gives one clear line: file, key, value and what was expected."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from common.config import load_config
+from common.errors import ConfigError
+from slave.config import SlaveConfig
+
+EXAMPLE = Path(__file__).parents[2] / "deploy" / "examples" / "slave.toml"
+
+
+def test_the_example_is_right() -> None:
+    assert load_config(EXAMPLE, SlaveConfig).track.strategy == "predict"
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("guard.command_timeout=0.1", ["guard.command_timeout = 0.1", "no such key"]),
+        ('guard.command_timeout_s="soon"', ["guard.command_timeout_s = 'soon'", "number"]),
+        ("guard.command_timeout_s=0.0", ["guard.command_timeout_s = 0.0", "greater than 0"]),
+        ("guard.joints.left_tail.upper_deg=3.0", ["guard.joints.left_tail", "a joint of nursing"]),
+        ("guard.joints.neck_yaw.upper_deg=75.0", ["guard.joints.neck_yaw.upper_deg = 75.0", "skeleton's"]),
+        ("guard.velocity_scale=1.5", ["guard.velocity_scale = 1.5", "less than or equal to 1"]),
+        ("encoders.zero_counts.tail=1", ["encoders.zero_counts", "joint"]),
+        ("track.strategy='guess'", ["track.strategy = 'guess'", "'hold'"]),
+        ("loop.rate_hz=5", ["loop.rate_hz = 5", "greater than or equal to 20"]),
+        ("servos.backend='steam'", ["servos.backend = 'steam'", "'mujoco'"]),
+    ],
+)
+def test_one_line_a_mistake(override: str, expected: list[str]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_config(EXAMPLE, SlaveConfig, [override])
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 1
+    for part in (str(EXAMPLE), *expected):
+        assert part in lines[0]
