@@ -81,7 +81,7 @@ def _timeline(
         if move.duration_s <= 0.0:
             raise MotionError(f"{which} lasts {move.duration_s:g} s, expected more than 0")
         if move.start_s < free_s:
-            raise MotionError(f"{which} begins before the one ahead of it ends, at {free_s:g} s")
+            raise MotionError(f"{which} begins before the one ahead ends, at {free_s:g} s")
         rows.append((move.start_s, move.duration_s, at_rad, move.to_rad - at_rad))
         at_rad, free_s = move.to_rad, move.start_s + move.duration_s
     if free_s > period_s:
