@@ -63,7 +63,8 @@ class SlaveExchange:
 
     def on_query(self, query: ClockQuery, received_ns: int, now_ns: int) -> ClockReply:
         """The reply to a query that arrived at `received_ns` and is answered at `now_ns`."""
-        replied_ns = self._replied.get(query.last_asked_ns)
+        # 0 means that there was none before
+        replied_ns = self._replied.get(query.last_asked_ns) if query.last_asked_ns else None
         if replied_ns is not None:
             self.estimator.add(replied_ns, query.last_heard_ns, query.asked_ns, received_ns)
         elif self._followed_ns is None or received_ns - self._followed_ns > QUIET_NS:
