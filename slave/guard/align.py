@@ -1,4 +1,4 @@
-"""The slow way to the operator's posture: of the whole robot after `engage`, of single joints after a loss."""
+"""The slow way to the operator's posture: the whole robot after `engage`, single joints after a loss."""
 
 from __future__ import annotations
 

@@ -80,6 +80,6 @@ class GuardCounters:
             "accepted": self.accepted,
             "dropped": dict(self.dropped),
             "losses": dict(self.losses),
-            "clamps": dict(self.clamps),
+            "clamps": {str(rule): count for rule, count in self.clamps.items()},
             "late_steps": self.late_steps,
         }

@@ -71,10 +71,11 @@ def approach(error_rad: Array, acceleration_rad_s2: Array, dt_s: float) -> Array
 
 def _position(motion: Motion) -> tuple[Array, Array]:
     limits = motion.limits
+    room = np.empty((2, len(limits.lower_rad)))
+    np.subtract(motion.position_rad, limits.lower_rad, out=room[0])
+    np.subtract(limits.upper_rad, motion.position_rad, out=room[1])
     # a joint that stands beyond its limit has no room on that side: it may only move back
-    room = np.maximum(
-        np.stack((motion.position_rad - limits.lower_rad, limits.upper_rad - motion.position_rad)), 0.0
-    )
+    np.maximum(room, 0.0, out=room)
     speed = safe_speed(room, limits.max_acceleration_rad_s2, motion.dt_s)
     return -speed[0], speed[1]
 
@@ -88,6 +89,8 @@ def _acceleration(motion: Motion) -> tuple[Array, Array]:
     # or a gentle limit that comes while the joint is fast would carry it beyond its position limit
     v = motion.velocity_rad_s
     gain = motion.max_acceleration_rad_s2 * motion.dt_s
+    if motion.max_acceleration_rad_s2 is motion.limits.max_acceleration_rad_s2:
+        return v - gain, v + gain
     brake = motion.limits.max_acceleration_rad_s2 * motion.dt_s
     low = np.where(v > 0.0, np.maximum(v - brake, -gain), v - gain)
     high = np.where(v < 0.0, np.minimum(v + brake, gain), v + gain)
@@ -105,25 +108,26 @@ RULES: tuple[tuple[Rule, Envelope], ...] = (
 class SetpointLimiter:
     """The setpoint of all J joints.
 
-    Whatever is asked, for every joint and step: |v| ≤ its velocity limit, |Δv| ≤ its acceleration limit · dt,
-    and the position stays within its limits, the way to brake included. A joint seated beyond a limit moves back only.
+    Whatever is asked, for every joint and step: |v| ≤ its velocity limit, |Δv| ≤ its acceleration limit
+    times dt, and the position stays within its limits, the way to brake included. A joint that was seated
+    beyond a limit only ever moves back.
     """
 
     def __init__(self, joint_names: Sequence[str], limits: Limits) -> None:
         self._names = tuple(joint_names)
+        self._none: Mask = np.zeros(len(self._names), np.bool_)
         self.limits = limits
-        self.position_rad: Array = np.zeros(len(self._names))
-        """(J,) read-only."""
-        self.velocity_rad_s: Array = np.zeros(len(self._names))
-        """(J,) read-only."""
-        self._clamped: dict[Rule, Mask] = {}
-        self._release()
+        self.seat(np.zeros(len(self._names)))
 
     def seat(self, position_rad: Array) -> None:
         """Put the setpoint where the joints stand (J,), at rest."""
-        self.position_rad = position_rad.copy()
-        self.velocity_rad_s = np.zeros_like(position_rad)
-        self._release()
+        self.position_rad: Array = position_rad.copy()
+        """(J,) read-only."""
+        self.velocity_rad_s: Array = np.zeros_like(position_rad)
+        """(J,) read-only."""
+        self.position_rad.flags.writeable = self.velocity_rad_s.flags.writeable = False
+        self._clamped = dict.fromkeys(Rule, self._none)
+        self._clamping = False
 
     @property
     def at_rest(self) -> bool:
@@ -135,7 +139,7 @@ class SetpointLimiter:
         if dt_s <= 0.0 or self.at_rest:
             return
         brake = self.limits.max_acceleration_rad_s2 * dt_s
-        self._release()
+        self._clamped, self._clamping = dict.fromkeys(Rule, self._none), False
         self._move(self.velocity_rad_s - np.clip(self.velocity_rad_s, -brake, brake), dt_s)
 
     def step(
@@ -164,62 +168,61 @@ class SetpointLimiter:
             self.position_rad, self.velocity_rad_s, dt_s, self.limits,
             max_velocity_rad_s, max_acceleration_rad_s2,
         )  # fmt: skip
-        free = ~held
-        clamps: list[Clamp] = []
-        for rule, envelope in RULES:
+        given = [wish]
+        for _, envelope in RULES:
             low, high = envelope(motion)
-            given = np.minimum(np.maximum(wish, low), high)
-            clamped = given != wish
-            if rule is Rule.POSITION:
-                clamped |= beyond
-            clamped &= free
-            began = clamped & ~self._clamped[rule]
-            if began.any():
-                clamps += self._describe(now_ns, rule, began, wish, given, target_rad, motion)
-            self._clamped[rule] = clamped
-            wish = given
-        self._move(wish, dt_s)
-        return clamps
+            given.append(np.minimum(np.maximum(given[-1], low), high))
+        self._move(given[-1], dt_s)
+        if not (self._clamping or beyond.any() or (given[-1] != wish).any()):
+            return []
+        return self._clamps(now_ns, target_rad, beyond, ~held, given, motion)
 
     def _move(self, velocity_rad_s: Array, dt_s: float) -> None:
-        before = self.position_rad
+        before, limits = self.position_rad, self.limits
         after = before + velocity_rad_s * dt_s
         # takes off what rounding may have added; never pulls in a joint that stands beyond its limit
-        after = np.maximum(after, np.minimum(before, self.limits.lower_rad))
-        after = np.minimum(after, np.maximum(before, self.limits.upper_rad))
+        np.maximum(after, np.minimum(before, limits.lower_rad), out=after)
+        np.minimum(after, np.maximum(before, limits.upper_rad), out=after)
         after.flags.writeable = velocity_rad_s.flags.writeable = False
         self.position_rad, self.velocity_rad_s = after, velocity_rad_s
 
-    def _release(self) -> None:
-        self.position_rad.flags.writeable = self.velocity_rad_s.flags.writeable = False
-        none = np.zeros(len(self._names), np.bool_)
-        self._clamped = dict.fromkeys(Rule, none)
+    def _clamps(
+        self, now_ns: int, target_rad: Array, beyond: Mask, free: Mask, given: list[Array], motion: Motion
+    ) -> list[Clamp]:
+        """Those that began in this step. A held joint brakes by order, and is not clamped by a rule."""
+        clamps: list[Clamp] = []
+        self._clamping = False
+        for (rule, _), before, after in zip(RULES, given, given[1:], strict=False):
+            clamped = (before != after) & free
+            if rule is Rule.POSITION:
+                clamped |= beyond & free
+            for j in np.flatnonzero(clamped & ~self._clamped[rule]).tolist():
+                asked, got = self._describe(rule, j, float(before[j]), float(after[j]), target_rad, motion)
+                clamps.append(Clamp(now_ns, self._names[j], rule, asked, got))
+            self._clamped[rule] = clamped
+            self._clamping = self._clamping or bool(clamped.any())
+        return clamps
 
     def _describe(
         self,
-        now_ns: int,
         rule: Rule,
-        began: Mask,
-        asked_rad_s: Array,
-        given_rad_s: Array,
+        joint: int,
+        asked_rad_s: float,
+        given_rad_s: float,
         target_rad: Array,
         motion: Motion,
-    ) -> list[Clamp]:
-        clamps = []
-        for j in np.flatnonzero(began).tolist():
-            asked, given = float(asked_rad_s[j]), float(given_rad_s[j])
-            if rule is Rule.POSITION:
-                asked = self._aim(j, asked, float(target_rad[j]), motion)
-                given = min(max(asked, float(self.limits.lower_rad[j])), float(self.limits.upper_rad[j]))
-            elif rule is Rule.ACCELERATION:
-                speed = float(motion.velocity_rad_s[j])
-                asked, given = (asked - speed) / motion.dt_s, (given - speed) / motion.dt_s
-            clamps.append(Clamp(now_ns, self._names[j], rule, asked, given))
-        return clamps
-
-    def _aim(self, joint: int, asked_rad_s: float, target_rad: float, motion: Motion) -> float:
-        """Where a joint was asked to be, or else would have come to rest."""
-        if not self.limits.lower_rad[joint] <= target_rad <= self.limits.upper_rad[joint]:
-            return target_rad
-        braking = asked_rad_s * abs(asked_rad_s) / (2.0 * float(self.limits.max_acceleration_rad_s2[joint]))
-        return float(motion.position_rad[joint]) + asked_rad_s * motion.dt_s + braking
+    ) -> tuple[float, float]:
+        """What was asked and what was given, in the rule's unit."""
+        if rule is Rule.VELOCITY:
+            return asked_rad_s, given_rad_s
+        if rule is Rule.ACCELERATION:
+            speed = float(motion.velocity_rad_s[joint])
+            return (asked_rad_s - speed) / motion.dt_s, (given_rad_s - speed) / motion.dt_s
+        lower, upper = float(self.limits.lower_rad[joint]), float(self.limits.upper_rad[joint])
+        asked = float(target_rad[joint])
+        if lower <= asked <= upper:
+            # the target itself is allowed, but the joint would have come to rest beyond the limit
+            braking = asked_rad_s**2 / (2.0 * float(self.limits.max_acceleration_rad_s2[joint]))
+            asked = float(motion.position_rad[joint]) + asked_rad_s * motion.dt_s
+            asked += braking if asked_rad_s > 0.0 else -braking
+        return asked, min(max(asked, lower), upper)

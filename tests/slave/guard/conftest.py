@@ -77,9 +77,10 @@ class Rig:
     def command(self, **changes: Any) -> Command:
         """A good command, 10 ms old, or one with something changed."""
         sampled_ns = changes.pop("sampled_ns", self.now_ns - 10_000_000) + MASTER_AHEAD_NS
+        stamps = CommandStamps(sampled_ns, sampled_ns, sampled_ns, sampled_ns)
         good = Command(
-            ROBOT, self.lease, self.sequence, 0, CommandStamps(sampled_ns, sampled_ns, sampled_ns, sampled_ns),
-            True, np.ones(self.joints, np.bool_), self.target.copy(), np.zeros(self.joints),
+            ROBOT, self.lease, self.sequence, 0, stamps, True, np.ones(self.joints, np.bool_),
+            self.target.copy(), np.zeros(self.joints),
         )  # fmt: skip
         return replace(good, **changes)
 
@@ -92,9 +93,7 @@ class Rig:
         self.sequence += 1
         return self.give(self.command(**changes))
 
-    def ask(
-        self, action: Action, operator: str = "anna", key: str = "", robot: str = ROBOT
-    ) -> ControlReply:
+    def ask(self, action: Action, operator: str = "anna", key: str = "", robot: str = ROBOT) -> ControlReply:
         return self.guard.on_control(ControlRequest(robot, action, operator, key), self.now_ns)
 
     def claim(self, operator: str = "anna") -> ControlReply:

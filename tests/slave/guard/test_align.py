@@ -1,0 +1,190 @@
+"""The start gate and the way back of single joints, at their boundaries."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from slave.guard import State, align
+from slave.guard.align import Alignment, Rejoin
+from slave.guard.config import GuardConfig
+
+MakeRig = Callable[..., Any]
+MS = 1_000_000
+ALL = np.ones(3, np.bool_)
+CONFIG = GuardConfig(align_window_rad=0.05, align_dwell_s=0.2, align_timeout_s=15.0)
+
+
+@pytest.fixture
+def alignment() -> Alignment:
+    out = Alignment(["a", "b", "c"], CONFIG)
+    out.begin(0)
+    return out
+
+
+def test_it_is_done_after_the_dwell_time_and_not_before(alignment: Alignment) -> None:
+    near = np.array([0.05, -0.05, 0.0])
+    assert not alignment.done(10 * MS, near, ALL)
+    assert not alignment.done(210 * MS - 1, near, ALL)
+    assert alignment.done(210 * MS, near, ALL)
+
+
+@pytest.mark.parametrize("error", [0.0500001, -0.0500001, 3.0, -3.0])
+def test_a_joint_outside_on_either_side_is_waited_for(alignment: Alignment, error: float) -> None:
+    """A start gate without abs() would let a robot start that is far off on one side."""
+    for ms in range(0, 1000, 5):
+        assert not alignment.done(ms * MS, np.array([0.0, error, 0.0]), ALL)
+
+
+def test_leaving_the_window_begins_the_dwell_time_anew(alignment: Alignment) -> None:
+    assert not alignment.done(0, np.zeros(3), ALL)
+    assert not alignment.done(150 * MS, np.array([0.0, 0.1, 0.0]), ALL)
+    assert not alignment.done(155 * MS, np.zeros(3), ALL)
+    assert not alignment.done(350 * MS, np.zeros(3), ALL)
+    assert alignment.done(355 * MS, np.zeros(3), ALL)
+
+
+def test_joints_that_are_not_valid_are_not_waited_for(alignment: Alignment) -> None:
+    error, valid = np.array([0.0, 9.0, 0.0]), np.array([True, False, True])
+    alignment.done(0, error, valid)
+    assert alignment.done(200 * MS, error, valid)
+
+
+def test_with_no_valid_joint_at_all_it_never_is(alignment: Alignment) -> None:
+    for ms in range(0, 1000, 5):
+        assert not alignment.done(ms * MS, np.zeros(3), ~ALL)
+
+
+def test_it_gives_up_after_its_time_out_and_names_the_farthest_joint(alignment: Alignment) -> None:
+    alignment.done(0, np.array([0.1, -0.3, 0.2]), ALL)
+    assert alignment.overdue(15_000 * MS) is None
+    assert alignment.overdue(15_000 * MS + 1) == "not aligned within 15 s: b is 0.30 rad away"
+
+
+def test_without_the_window_a_robot_that_is_far_off_would_track(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(align, "within", lambda error, window: np.ones(len(error), np.bool_))
+    rig.to_align()
+    rig.target = rig.skeleton.lower_rad.copy()
+    rig.run(0.4)
+    assert rig.guard.state is State.TRACK
+
+
+def test_without_abs_a_robot_that_is_far_off_on_one_side_would_track(
+    rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(align, "within", lambda error, window: error <= window)
+    rig.to_align()
+    rig.target = rig.skeleton.lower_rad.copy()
+    rig.run(0.4)
+    assert rig.guard.state is State.TRACK
+
+
+@pytest.mark.parametrize("end", ["lower_rad", "upper_rad"])
+def test_it_comes_slowly_from_either_side_and_tracks_when_near(rig: Any, end: str) -> None:
+    rig.to_align()
+    rig.target = getattr(rig.skeleton, end).copy()
+    slow = rig.config.align_velocity_rad_s
+    gain = rig.config.align_acceleration_rad_s2 * 0.005
+    rig.run(0.3)
+    assert rig.guard.state is State.ALIGN
+    last = rig.setpoints[-1]
+    while rig.guard.state is State.ALIGN:
+        (setpoint,) = rig.run(0.005)
+        speed = np.abs(setpoint.velocity_rad_s)
+        assert (speed <= slow + 1e-12).all()
+        assert (speed - np.abs(last.velocity_rad_s) <= gain + 1e-12).all()
+        last = setpoint
+    assert rig.guard.state is State.TRACK
+    assert (np.abs(rig.target - last.position_rad) <= rig.config.align_window_rad).all()
+
+
+def test_an_operator_beyond_the_robots_limits_is_aligned_with_at_the_limit(rig: Any) -> None:
+    rig.to_align()
+    rig.target[6] = rig.skeleton.lower_rad[6] - 0.2
+    rig.run(4.0)
+    assert rig.guard.state is State.TRACK
+    assert rig.measured[6] == pytest.approx(rig.skeleton.lower_rad[6])
+
+
+def test_an_operator_who_does_not_hold_still_is_not_followed(rig: Any) -> None:
+    rig.to_align()
+    home = rig.target
+    for i in range(200):
+        rig.target = home + (0.6 if i % 2 else -0.6) * (rig.skeleton.upper_rad - home)
+        rig.run(0.08)
+    assert rig.guard.state is State.HOLD
+    assert "not aligned within 15 s" in rig.guard.reason
+    assert rig.guard.counters.losses == {"align": 1}
+
+
+# single joints
+
+
+def lost(rig: Any, *joints: int) -> Any:
+    valid = np.ones(rig.joints, np.bool_)
+    valid[list(joints)] = False
+    return valid
+
+
+def test_a_joint_that_is_lost_is_held_alone_and_comes_back_slowly(rig: Any) -> None:
+    rig.to_track()
+    valid = lost(rig, 6)
+    start = rig.measured[6]
+    rig.target = rig.target + 0.3
+    rig.run(1.0, valid=valid)
+    assert rig.guard.state is State.TRACK
+    assert rig.measured[6] == start
+    assert rig.measured[5] == pytest.approx(rig.target[5])
+
+    rig.target = rig.target + 0.4
+    back = rig.run(0.5)
+    speed = max(abs(s.velocity_rad_s[6]) for s in back)
+    assert speed == pytest.approx(rig.config.align_velocity_rad_s)
+    assert max(abs(s.velocity_rad_s[5]) for s in back) > 2.0
+    rig.run(1.5)
+    assert rig.measured[6] == pytest.approx(rig.target[6])
+
+    rig.target = rig.target - 0.7
+    again = rig.run(0.5)
+    assert max(abs(s.velocity_rad_s[6]) for s in again) > 2.0
+
+
+def test_a_joint_that_was_lost_while_aligning_comes_back_slowly_too(rig: Any) -> None:
+    rig.to_align()
+    rig.run(0.1, valid=lost(rig, 6))
+    rig.target[6] += 0.8
+    rig.run(0.4, valid=lost(rig, 6))
+    assert rig.guard.state is State.TRACK
+    assert max(abs(s.velocity_rad_s[6]) for s in rig.run(1.0)) <= rig.config.align_velocity_rad_s + 1e-12
+
+
+def test_flickering_validity_never_makes_a_joint_lurch(rig: Any) -> None:
+    rig.to_track()
+    rig.target = rig.target + 0.4
+    for i in range(30):
+        steps = rig.run(0.08, valid=lost(rig, 6) if i % 2 == 0 else np.ones(rig.joints, np.bool_))
+        assert max(abs(s.velocity_rad_s[6]) for s in steps) <= rig.config.align_velocity_rad_s + 1e-12
+    rig.run(2.0)
+    assert rig.measured[6] == pytest.approx(rig.target[6])
+
+
+def test_all_nodes_lost_holds_every_joint_but_the_stream_keeps_the_state(rig: Any) -> None:
+    rig.to_track()
+    rig.target = rig.target + 0.3
+    rig.run(1.0, valid=np.zeros(rig.joints, np.bool_))
+    assert rig.guard.state is State.TRACK
+    assert rig.guard._limiter.at_rest
+
+
+def test_without_rejoin_it_would_come_back_at_full_speed(rig: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: Rejoin, error_rad: Any, valid: Any) -> Any:
+        return self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2
+
+    monkeypatch.setattr(Rejoin, "maxima", full)
+    rig.to_track()
+    rig.target = rig.target + 0.7
+    rig.run(1.0, valid=lost(rig, 6))
+    assert max(abs(s.velocity_rad_s[6]) for s in rig.run(0.5)) > 2.0
