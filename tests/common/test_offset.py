@@ -220,7 +220,7 @@ def test_both_ends_measure_from_the_same_messages() -> None:
     master, slave = MasterExchange(), SlaveExchange()
     now_ns = 0
     for i in range(40):
-        now_ns = converse(master, slave, slave_clock, i * NS_PER_S // 4, reply_lost=i % 5 == 4)
+        now_ns = converse(master, slave, slave_clock, NS_PER_S + i * NS_PER_S // 4, reply_lost=i % 5 == 4)
     true_ns = slave_clock.offset_at(now_ns)
     on_master = master.estimator.estimate(now_ns)
     on_slave = slave.estimator.estimate(slave_clock.at(now_ns))
@@ -254,7 +254,7 @@ def test_another_asker_is_answered_but_not_measured() -> None:
     master, stranger, slave = MasterExchange(), MasterExchange(), SlaveExchange()
     now_ns = 0
     for i in range(20):
-        now_ns = converse(master, slave, slave_clock, i * NS_PER_S // 4)
+        now_ns = converse(master, slave, slave_clock, NS_PER_S + i * NS_PER_S // 4)
         # the stranger's clock is an hour ahead of the master's
         reply = slave.on_query(stranger.query(now_ns + HOUR), now_ns, now_ns)
         assert stranger.on_reply(reply, now_ns + HOUR + MS)
@@ -269,7 +269,7 @@ def test_after_a_second_of_silence_the_next_asker_is_followed() -> None:
     first, slave = MasterExchange(), SlaveExchange()
     now_ns = 0
     for i in range(20):
-        now_ns = converse(first, slave, RemoteClock(0, 0.0, 0), i * NS_PER_S // 4)
+        now_ns = converse(first, slave, RemoteClock(0, 0.0, 0), NS_PER_S + i * NS_PER_S // 4)
     second, ahead_ns = MasterExchange(), HOUR
     second_sees_slave = RemoteClock(-ahead_ns, 0.0, 0)
     start_ns = now_ns + NS_PER_S + 1
@@ -288,9 +288,9 @@ def test_foreign_stamps_do_not_move_the_estimate(first: int, second: int, third:
     master, slave = MasterExchange(), SlaveExchange()
     now_ns = 0
     for i in range(1, 9):
-        now_ns = converse(master, slave, slave_clock, i * NS_PER_S // 4)
+        now_ns = converse(master, slave, slave_clock, NS_PER_S + i * NS_PER_S // 4)
     before = master.estimator.estimate(now_ns), slave.estimator.estimate(now_ns)
-    asked = {i * NS_PER_S // 4 for i in range(1, 9)}
+    asked = {NS_PER_S + i * NS_PER_S // 4 for i in range(1, 9)}
     if first not in asked:
         master.on_reply(ClockReply(first, second, third), now_ns)
     if second not in asked:
