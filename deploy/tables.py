@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from rich import box
 from rich.console import Group, RenderableType
@@ -110,6 +111,38 @@ def verdict_table(title: str, verdicts: Iterable[Verdict]) -> RenderableType:
             said[verdict.met],
         )
     return table
+
+
+_BENCH_ROWS = (
+    ("loop lateness, idle, µs", ("loop", "idle", "late_us")),
+    ("loop lateness, busy core, µs", ("loop", "busy", "late_us")),
+    ("receive + decode, 36 nodes, CPU µs", ("capture", "nodes_36", "cpu_us")),
+    ("receive + decode, 8 classic, CPU µs", ("capture", "nodes_8_classic", "cpu_us")),
+    ("answers in, 36 nodes, µs", ("capture", "nodes_36", "answers_us")),
+    ("decode, 8 nodes, µs", ("pipeline", "nodes_8", "decode_us")),
+    ("decode, 36 nodes, µs", ("pipeline", "nodes_36", "decode_us")),
+    ("filter + fuse, 8 nodes, µs", ("pipeline", "nodes_8", "fuse_us")),
+    ("filter + fuse, 36 nodes, µs", ("pipeline", "nodes_36", "fuse_us")),
+    ("the same with mahony, µs", ("pipeline", "nodes_36_mahony", "fuse_us")),
+    ("solve 25 joints, µs", ("pipeline", "solve_us")),
+    ("encode + decode, µs", ("pipeline", "codec_us")),
+    ("one way, tandem, µs", ("link", "one_way_us", "tandem")),
+    ("one way, bare Zenoh, µs", ("link", "one_way_us", "zenoh")),
+    ("one way, bare UDP, µs", ("link", "one_way_us", "udp")),
+    ("MuJoCo step, µs", ("robot", "step_us")),
+)
+
+
+def bench_table(report: Mapping[str, Any]) -> RenderableType:
+    """The figures of `tandem bench`, then percent of a core."""
+    table = _table("bench", "", "min", "median", "p99", "max")
+    for name, path in _BENCH_ROWS:
+        figures: Any = report
+        for key in path:
+            figures = figures.get(key, {})
+        table.add_row(name, *(_number(figures.get(key), 1) for key in ("min", "median", "p99", "max")))
+    shares = (f"{name.replace('_', ' ')} {_number(v, 1)}" for name, v in report["core_percent"].items())
+    return Group(table, Text("percent of one core: " + ", ".join(shares), "bold"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,47 @@
+"""How late the 200 Hz loop ticks, alone and beside a core that is kept busy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import uvloop
+
+from common.clock import monotonic_ns, to_ns
+from common.pacing import TickGrid
+from common.runtime import freeze_heap
+from common.ticker import ticks
+from deploy.bench.measure import spread_us
+from deploy.bench.worker import beside, in_worker
+
+RATE_HZ = 200
+
+
+def loop(seconds: float) -> dict[str, Any]:
+    """Lateness in µs and ticks missed, `idle` and `busy`; half of the time goes to each."""
+    idle = in_worker("loop:lateness", seconds / 2)
+    with beside("loop:burn"):
+        return {"idle": idle, "busy": in_worker("loop:lateness", seconds / 2)}
+
+
+def lateness(seconds: float) -> dict[str, Any]:
+    """Tick for a while and do nothing else."""
+    return uvloop.run(_lateness(seconds))
+
+
+async def _lateness(seconds: float) -> dict[str, Any]:
+    freeze_heap()
+    period_ns = to_ns(1 / RATE_HZ)
+    begin_ns = monotonic_ns() + period_ns
+    late_ns, missed = [], 0
+    async for due in ticks(TickGrid(begin_ns, period_ns)):
+        late_ns.append(monotonic_ns() - due.scheduled_ns)
+        missed += due.missed
+        if due.scheduled_ns - begin_ns >= to_ns(seconds):
+            break
+    return {"late_us": spread_us(late_ns), "missed": missed}
+
+
+def burn() -> None:
+    """Keep one core busy until killed."""
+    while True:
+        pass
