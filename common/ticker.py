@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import ctypes
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 
 from common.clock import NS_PER_S, Clock, monotonic_ns
 from common.pacing import Due, TickGrid
@@ -23,7 +23,7 @@ class _Itimerspec(ctypes.Structure):
     _fields_ = (("it_interval", _Timespec), ("it_value", _Timespec))
 
 
-async def ticks(grid: TickGrid, clock: Clock = monotonic_ns) -> AsyncIterator[Due]:
+async def ticks(grid: TickGrid, clock: Clock = monotonic_ns) -> AsyncGenerator[Due, None]:
     """Each tick of the grid when it falls due; a late caller gets the newest, with the count of the missed.
 
     The loop runs between any two ticks, however late the caller is. `clock` must be this host's monotonic
