@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntFlag
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
 from master.suit.frame import Frame
 from master.suit.layout import AnswerLayout, LayoutError, Raw
+
+if TYPE_CHECKING:
+    from cantools.database.can import Message
 
 READINGS = tuple(f"{sensor}_{axis}" for sensor in ("ACC", "GYR", "MAG") for axis in "XYZ")
 """Order of a node's nine readings everywhere: accelerometer, gyro, magnetometer; x, y, z."""
@@ -77,12 +80,8 @@ class SuitProtocol:
     @classmethod
     def load(cls, dbc_path: Path | str = SHIPPED_DBC) -> SuitProtocol:
         """Read the DBC. Raises ConfigError naming the message and signal that are not as expected."""
-        import cantools  # only here: it is slow to import, and nothing but the layout needs it
-
+        messages = _read(dbc_path)
         try:
-            database = cantools.database.can.Database()
-            database.add_dbc_file(dbc_path)
-            messages = {message.name: message for message in database.messages}
             sync = messages["SYNC"]
             if (sync.length, [(s.name, s.start, s.length) for s in sync.signals]) != (4, [("TICK", 0, 32)]):
                 raise LayoutError("SYNC: expected 4 bytes, all of them TICK")
@@ -90,14 +89,10 @@ class SuitProtocol:
             classic = _format(messages, CLASSIC_MESSAGES, fd=False)
             if (fd.scale != classic.scale).any():
                 raise LayoutError("NODE_SAMPLE: expected the factors of NODE_ACC, NODE_GYR and NODE_MAG")
-        except OSError as error:
-            raise _mistake(dbc_path, f"a readable DBC ({error.strerror})") from None
         except KeyError as error:
             raise _mistake(dbc_path, f"a message {error}") from None
         except LayoutError as error:
             raise _mistake(dbc_path, str(error)) from None
-        except (cantools.Error, ValueError) as error:
-            raise _mistake(dbc_path, f"a DBC that cantools can read ({error})") from None
         return cls(sync.frame_id, fd, classic)
 
     def answer_format(self, fd: bool) -> AnswerFormat:
@@ -126,7 +121,20 @@ class SuitProtocol:
         return frames
 
 
-def _format(messages: dict[str, Any], names: tuple[str, ...], fd: bool) -> AnswerFormat:
+def _read(path: Path | str) -> dict[str, Message]:
+    import cantools  # only here: it is slow to import, and nothing but the layout needs it
+
+    database = cantools.database.can.Database()
+    try:
+        database.add_dbc_file(path)
+    except OSError as error:
+        raise _mistake(path, f"a readable DBC ({error.strerror})") from None
+    except Exception as error:  # its parser raises errors of several libraries
+        raise _mistake(path, f"a DBC that cantools can read ({error})") from None
+    return {message.name: message for message in database.messages}
+
+
+def _format(messages: dict[str, Message], names: tuple[str, ...], fd: bool) -> AnswerFormat:
     step = len(READINGS) // len(names)
     parts = []
     for place, name in enumerate(names):
