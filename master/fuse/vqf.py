@@ -58,11 +58,11 @@ class VqfFilter:
 
     def q_world_from_sensor(self) -> Array:
         """Orientations (n, 4); VQF's nine-axis answer is its six-axis one until a magnetometer speaks."""
-        return np.array([vqf.getQuat9D() for vqf in self._filters])
+        return np.concatenate([vqf.getQuat9D() for vqf in self._filters]).reshape(-1, 4)
 
     def bias_rad_s(self) -> Array:
         """Gyro biases (n, 3)."""
-        return np.array([vqf.getBiasEstimate()[0] for vqf in self._filters])
+        return np.concatenate([vqf.getBiasEstimate()[0] for vqf in self._filters]).reshape(-1, 3)
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
