@@ -95,7 +95,8 @@ def _recorded_name(skeleton: Skeleton, segment: int) -> str | None:
 
 def _arrays(path: Path) -> Mapping[str, NDArray[np.generic]]:
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as stream:
+            file = np.load(stream, allow_pickle=False)
             if isinstance(file, np.lib.npyio.NpzFile):
                 return {name: file[name] for name in file.files}
     except OSError as error:
