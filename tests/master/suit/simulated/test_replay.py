@@ -99,7 +99,10 @@ def put(name: str, value: Any) -> Callable[[dict[str, Any]], object]:
     [
         (drop("hand_left_gyr"), "hand_left_gyr = None: expected an array of that name"),
         (drop("t_s"), "t_s = None: expected an array"),
-        (put("head_acc", np.zeros((SAMPLES - 1, 3))), r"head_acc = 'float64 \(49, 3\)': expected .*\(50, 3\)"),
+        (
+            put("head_acc", np.zeros((SAMPLES - 1, 3))),
+            r"head_acc = 'float64 \(49, 3\)': expected .*\(50, 3\)",
+        ),
         (put("head_acc", np.zeros((SAMPLES, 4))), r"head_acc = 'float64 \(50, 4\)'"),
         (put("head_acc", np.full((SAMPLES, 3), "x")), r"head_acc = '<U1 \(50, 3\)': expected numbers"),
         (put("head_gyr", np.full((SAMPLES, 3), np.nan)), "head_gyr = 'NaN or infinity'"),
