@@ -29,8 +29,7 @@ class Tracker(Protocol):
         """Take a sample (J,) that was captured at `sampled_ns` and arrived at `now_ns`.
 
         A sample captured no later than the newest one is ignored. All values must be finite; a
-        velocity of zero on every joint is taken as "not known" only by its effect: nothing is
-        extrapolated.
+        velocity of exactly zero on every joint means that velocities are not known.
         """
         ...
 

@@ -1,0 +1,43 @@
+"""`[track]`: which strategy turns 12.5 commands a second into a setpoint for every servo tick."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from common.config import Section
+from slave.track.hold import Hold
+from slave.track.interpolate import Interpolate
+from slave.track.predict import Predict
+from slave.track.tracker import Tracker
+
+SERVO_LAG_S = 0.033
+"""Of the MuJoCo robot written at 200 Hz: 28 ms its servos, 2 ms their cycle, 2.5 ms until the next write."""
+
+
+class TrackConfig(Section):
+    """`[track]` of the slave's TOML."""
+
+    strategy: Literal["hold", "interpolate", "predict"] = "predict"
+    """`hold`: the newest sample. `interpolate`: smooth, one period late. `predict`: extrapolated to now."""
+    blend_s: float = Field(default=0.08, gt=0.0, le=1.0)
+    """Time over which a difference between the old course and a new sample's is worked off."""
+    servo_lag_s: float = Field(default=SERVO_LAG_S, ge=0.0, le=0.5)
+    """`predict`: how far the servos lag behind a ramp; aimed ahead by as much."""
+    max_horizon_s: float = Field(default=0.3, gt=0.0, le=2.0)
+    """`predict`: age of a sample, servo lag included, at which it moves nothing any more; it coasts to rest
+    from half of it. Wants to be twice the age at which samples are usually replaced."""
+    jitter_margin_s: float = Field(default=0.01, ge=0.0, le=0.5)
+    """`interpolate`: how much later than usual a sample may arrive and still find the robot moving."""
+
+
+def make_tracker(config: TrackConfig) -> Tracker:
+    """The strategy that the configuration names."""
+    match config.strategy:
+        case "hold":
+            return Hold()
+        case "interpolate":
+            return Interpolate(config.blend_s, config.jitter_margin_s)
+        case "predict":
+            return Predict(config.blend_s, config.servo_lag_s, config.max_horizon_s)
