@@ -1,0 +1,39 @@
+import pytest
+
+from common.endpoint import MAX_SOCKET_PATH, check_endpoint
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    [
+        "tcp/192.168.7.2:7447", "udp/[::1]:7447", "ws/robot.local:1", "tls/0.0.0.0:65535#dscp=0x2e",
+        "quic/10.0.0.1:7447?rel=0", "unixsock-stream/run/tandem/link",
+        "unixsock-stream/" + "x" * MAX_SOCKET_PATH,
+    ],
+)  # fmt: skip
+def test_a_good_endpoint_is_returned(endpoint: str) -> None:
+    assert check_endpoint(endpoint) == endpoint
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "why"),
+    [
+        ("", "a protocol out of tcp, udp"),
+        ("tcp", "a protocol out of"),
+        ("192.168.7.2:7447", "a protocol out of"),
+        ("TCP/1.2.3.4:7447", "a protocol out of"),
+        ("serial//dev/ttyS0", "a protocol out of"),
+        ("tcp/1.2.3.4", "tcp/host:port"),
+        ("tcp/:7447", "tcp/host:port"),
+        ("tcp/1.2.3.4:", "a port of 1 to 65535"),
+        ("tcp/1.2.3.4:0", "a port of 1 to 65535"),
+        ("udp/1.2.3.4:65536", "a port of 1 to 65535"),
+        ("ws/1.2.3.4:٧", "a port of 1 to 65535"),
+        ("tcp/1.2.3.4:-1", "a port of 1 to 65535"),
+        ("unixsock-stream/", "a path of 1 to 107 bytes"),
+        ("unixsock-stream/" + "x" * (MAX_SOCKET_PATH + 1), "a path of 1 to 107 bytes"),
+    ],
+)
+def test_a_bad_endpoint_is_refused_with_what_was_expected(endpoint: str, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        check_endpoint(endpoint)
