@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from deploy.judge import motion
-from deploy.judge.motion import MIN_SAMPLES, MOVING_DEG, SETTLE_S
+from deploy.judge import MovedSeries, motion
+from deploy.judge.motion import MIN_SAMPLES, MOVING_DEG, SETTLE_S, at_shift
 
 COUNT_RAD = 2 * np.pi / 4096
 
@@ -172,3 +172,54 @@ def test_too_few_readings_give_none(run: Any, spare: int, known: bool) -> None:
     moved.tracking[300 + settled + MIN_SAMPLES + spare :] = False
     moved.tracking[:300] = False
     assert (motion(run.truth(), moved, run.names) is not None) == known
+
+
+def test_a_silence_of_the_encoders_settles_anew(run: Any) -> None:
+    # what the guard did meanwhile is not known
+    moved = run.moved()
+    moved.position_rad[450:500] += 1.0
+    rows = np.r_[0:440, 450:900]
+    assert motion(run.truth(), rows_of(moved, rows), run.names).rmse_deg < 0.01  # type: ignore[union-attr]
+    rows = np.r_[0:446, 450:900]  # 80 ms, no gap yet
+    assert motion(run.truth(), rows_of(moved, rows), run.names).rmse_deg > 1.0  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(("spare", "judged"), [(0, True), (-1, False)])
+def test_a_joint_with_too_few_readings_is_left_out(run: Any, spare: int, judged: bool) -> None:
+    moved = run.moved()
+    moved.valid[:, 1] = False
+    moved.valid[300 : 300 + MIN_SAMPLES + spare, 1] = True
+    found = motion(run.truth(), moved, run.names)
+    assert found is not None
+    assert (run.names[1] in found.joints) == judged
+
+
+def test_no_shift_may_land_in_a_gap_of_the_truth(run: Any) -> None:
+    truth, moved = run.truth(), run.moved()
+    whole = motion(truth, moved, run.names)
+    kept = np.r_[0:2000, 2030:4000]  # 150 ms
+    holed = replace(
+        truth, tick=truth.tick[kept], sampled_ns=truth.sampled_ns[kept], position_rad=truth.position_rad[kept]
+    )
+    judged = motion(holed, moved, run.names)
+    assert whole is not None
+    assert judged is not None
+    # the hole, 500 ms after it and 100 ms before: every row there could meet it at some shift
+    assert whole.samples - judged.samples == pytest.approx((0.155 + 0.6) * 50, abs=1)
+
+
+def test_the_truth_is_not_interpolated_over_a_gap_nor_beyond_its_ends(run: Any) -> None:
+    truth = run.truth()
+    kept = np.r_[0:2000, 2021:4000]  # 110 ms
+    holed = replace(
+        truth, tick=truth.tick[kept], sampled_ns=truth.sampled_ns[kept], position_rad=truth.position_rad[kept]
+    )
+    at_ns = np.array([-1, 0, 9_995_000_000, 10_050_000_000, 10_105_000_000, 19_995_000_000, 19_995_000_001])
+    known = np.isfinite(at_shift(holed, at_ns, 0)).all(axis=1)
+    assert known.tolist() == [False, True, False, False, True, True, False]
+
+
+def rows_of(moved: MovedSeries, rows: Any) -> MovedSeries:
+    return MovedSeries(
+        moved.encoder_ns[rows], moved.position_rad[rows], moved.valid[rows], moved.tracking[rows]
+    )
