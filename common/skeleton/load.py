@@ -90,6 +90,10 @@ def _mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
             mistakes.append(
                 ConfigMistake(f"{joint.name}.lower_deg", joint.lower_rad, "a limit below upper_deg")
             )
+        if not joint.drives or not all(joint.drives.values()):
+            mistakes.append(
+                ConfigMistake(f"{joint.name}.drives", joint.drives, "at least one angle, no ratio of 0")
+            )
         for angle in joint.drives:
             if angle not in skeleton.angle_slots or angle in driven:
                 mistakes.append(

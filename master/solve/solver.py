@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.quaternion import IDENTITY, Array, conjugate, multiply, to_matrix
 from common.skeleton import Skeleton
@@ -19,7 +20,7 @@ class JointSolver:
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
-        count, joints = len(skeleton.segments), len(skeleton.joints)
+        count = len(skeleton.segments)
         # row `count` of the buffers is the world: no rotation, no rate
         self._q = np.tile(IDENTITY, (count + 1, 1))
         self._rate = np.zeros((count + 1, 3))
@@ -28,10 +29,7 @@ class JointSolver:
         self._q_axes = np.empty((count, 4))
         self._vectors = np.empty((count, 3, 3))
         self._both = np.empty((2, 3 * count))
-        weights = skeleton.joints_from_angles.reshape(joints, count, 3).copy()
-        weights[:, :, 2] *= skeleton.axis_handedness
-        # (3 N, J), the angles place by place, as angles.py gives them
-        self._weights = weights.transpose(2, 1, 0).reshape(3 * count, joints).copy()
+        self._driven, self._weights = _driven_angles(skeleton)
 
     def solve(self, q_world_from_segment: Array, rate_rad_s: Array) -> tuple[Array, Array]:
         """Joint positions (J,) rad and velocities (J,) rad/s.
@@ -54,5 +52,24 @@ class JointSolver:
         both = self._both
         both[0] = intrinsic_angles(matrix).reshape(-1)
         both[1] = angle_rates(matrix, relative_rate).reshape(-1)
-        solved: Array = both @ self._weights
+        solved: Array = np.einsum("tjk,jk->tj", both.take(self._driven, axis=1), self._weights)
         return solved[0], solved[1]
+
+
+def _driven_angles(skeleton: Skeleton) -> tuple[NDArray[np.intp], Array]:
+    """Each joint's angles: places among the flattened (3, N) of angles.py, and weights; (J, K) each.
+
+    A joint with fewer than K repeats its first with weight 0: a matrix product would spread NaN to all.
+    """
+    joints, count = len(skeleton.joints), len(skeleton.segments)
+    weights = skeleton.joints_from_angles.reshape(joints, count, 3).copy()
+    weights[:, :, 2] *= skeleton.axis_handedness
+    flat = weights.transpose(0, 2, 1).reshape(joints, 3 * count)
+    most = max(len(joint.drives) for joint in skeleton.joints)
+    driven = np.empty((joints, most), dtype=np.intp)
+    for row, ratios in enumerate(flat):
+        places = np.flatnonzero(ratios)
+        driven[row] = places[0]
+        driven[row, : len(places)] = places
+    used = np.arange(most) < [[len(joint.drives)] for joint in skeleton.joints]
+    return driven, np.where(used, np.take_along_axis(flat, driven, axis=1), 0.0)

@@ -86,6 +86,11 @@ def test_an_unknown_profile_names_those_there_are() -> None:
             "left_index_mpj = 1.2",
             r"left_index\.drives = 'left_index_mpj': expected a",
         ),
+        (
+            "left_thumb_ipj = 1.2",
+            "left_thumb_ipj = 0",
+            r"left_thumb\.drives = .*: expected at least one angle",
+        ),
         ("left_thumb_ipj = 1.2", "tail = 1.2", r"left_thumb\.drives = 'tail': expected a segment's angle"),
     ],
 )
