@@ -33,7 +33,7 @@ class SlavePipeline:
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
         self.guard = Guard(
-            config.robot, self.skeleton, config.guard, make_tracker(config.track, self.skeleton)
+            config.robot, self.skeleton, config.guard, make_tracker(config.track)
         )
         self.clock = SlaveExchange()
         self.journeys = Journeys()
