@@ -14,6 +14,6 @@ async def ask_robot(
 ) -> ControlReply:
     """Ask the robot at one of the endpoints. Raises LinkError when it does not answer."""
     async with open_link(LinkConfig(connect=connect), robot) as link:
-        await link.connected()
+        await link.connected(CONTROL)
         reply = await link.ask(CONTROL, encode(ControlRequest(robot, action, operator, key)))
         return decode(reply, ControlReply)
