@@ -24,5 +24,4 @@ async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigur
             link = await stack.enter_async_context(open_link(config.link, config.robot))
             put = link.publish(TRUTH)
             tell = lambda truth: put(encode(truth))  # noqa: E731
-        await answer(config, stop, tell)
-        write_figures({})
+        write_figures(await answer(config, stop, tell))

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from common.clock import monotonic_ns, to_ns
 from common.codec import decode, encode
 from common.errors import CodecError, LinkError
-from common.latency import StageTimes
+from common.latency import Durations, StageTimes
 from common.launch import WriteFigures
 from common.link import Link, open_link
 from common.messages import ClockReply, ControlReply, RobotState, Statistics
@@ -40,6 +40,7 @@ class Master:
         self._clock = MasterExchange()
         self._robot = RobotWatch()
         self._stages = StageTimes("sampled→frames in", "frames in→solved", "solved→put")
+        self._frames_in_to_put = Durations()
         self._ticks_expected = 0
         self._ticks_missed = 0
         self._undecodable = 0
@@ -89,11 +90,11 @@ class Master:
         held = self._config.operator.deadman == "always_held"
         put_ns = monotonic_ns()
         self._put_command(encode(self._writer.write(solved, self._lease.token, held, solved_ns, put_ns)))
+        done_ns = monotonic_ns()
         self._stages.record(
-            solved.frames_in_ns - solved.sampled_ns,
-            solved_ns - solved.frames_in_ns,
-            monotonic_ns() - solved_ns,
+            solved.frames_in_ns - solved.sampled_ns, solved_ns - solved.frames_in_ns, done_ns - solved_ns
         )
+        self._frames_in_to_put.record(done_ns - solved.frames_in_ns)
 
     def _on_state(self, payload: bytes, arrived_ns: int) -> None:
         try:
@@ -139,6 +140,7 @@ class Master:
             "ticks": {"expected": self._ticks_expected, "missed": self._ticks_missed},
             "commands_sent": self._writer.sent,
             "stages_ms": self._stages.summary(),
+            "frames_in_to_put_ms": self._frames_in_to_put.summary(),
             "round_trip_ms": self._robot.round_trip.summary(),
             "robot": {
                 "silent": self._robot.silent(monotonic_ns()),
@@ -148,7 +150,7 @@ class Master:
             "lease": {"held": bool(self._lease.token), "answer": self._lease.answer},
             "nodes": self._pipeline.node_counts(),
             "buses": {bus.name: bus.summary() for bus in self._buses},
-            "link": self._link.counters,
+            "link": self._link.counters(),
         }
 
 

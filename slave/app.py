@@ -96,7 +96,7 @@ class Slave:
                 "trusted": offset.trusted,
             },
             "undecodable": pipeline.undecodable,
-            "link": self._link.counters,
+            "link": self._link.counters(),
         }
 
 

@@ -49,6 +49,7 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
         "ticks": master.get("ticks", {}),
         "commands": _commands(master, slave),
         "stages_ms": slave.get("stages_ms", {}),
+        "frames_in_to_put_ms": master.get("frames_in_to_put_ms", {}),
         "end_to_end_ms": slave.get("end_to_end_ms", {}),
         "one_way_ms": _one_way(slave),
         "round_trip_ms": master.get("round_trip_ms", {}),
