@@ -161,6 +161,16 @@ def test_a_joint_that_was_lost_while_aligning_comes_back_slowly_too(rig: Any) ->
     assert max(abs(s.velocity_rad_s[6]) for s in rig.run(1.0)) <= rig.config.align_velocity_rad_s + 1e-12
 
 
+def test_a_joint_that_returns_at_the_very_start_of_track_comes_back_slowly(rig: Any) -> None:
+    rig.to_align()
+    rig.target[6] += 0.8
+    while rig.guard.state is State.ALIGN:
+        rig.run(0.005, valid=lost(rig, 6))
+    rig.send()
+    fastest = max(abs(rig.step().velocity_rad_s[6]) for _ in range(30))
+    assert 0.0 < fastest <= rig.config.align_velocity_rad_s + 1e-12
+
+
 def test_flickering_validity_never_makes_a_joint_lurch(rig: Any) -> None:
     rig.to_track()
     rig.target = rig.target + 0.4

@@ -112,6 +112,16 @@ def test_a_late_step_moves_the_setpoint_no_further_than_its_cap(rig: Any) -> Non
     assert (np.abs(after.position_rad - before.position_rad) <= most + 1e-12).all()
 
 
+@pytest.mark.parametrize("dt_ns", [0, -1, -5_000_000])
+def test_a_step_in_no_time_or_less_moves_nothing(rig: Any, dt_ns: int) -> None:
+    rig.to_track()
+    rig.target = rig.skeleton.lower_rad.copy()
+    rig.run(0.1)
+    before = rig.setpoints[-1]
+    assert np.array_equal(rig.step(dt_ns).position_rad, before.position_rad)
+    assert rig.guard.state is State.TRACK
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 @pytest.mark.parametrize("field", ["position_rad", "velocity_rad_s"])
 def test_a_tracker_that_fails_holds(rig: Any, bad: float, field: str) -> None:

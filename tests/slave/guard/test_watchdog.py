@@ -198,3 +198,35 @@ def test_a_lost_lease_is_not_regained_by_sending_on(rig: Any) -> None:
     assert rig.guard.state is State.HOLD
     rig.run(0.1)
     assert rig.guard.state is State.HOLD
+
+
+def test_a_lease_counts_from_arrival_too(rig: Any) -> None:
+    rig.to_leased()
+    rig.now_ns += 90_000_000
+    rig.sequence += 1
+    assert rig.give(rig.command(), rig.now_ns - 80_000_000).accepted
+    rig.now_ns += 920_000_000
+    assert not rig.claim("ben").done
+    rig.now_ns += 1
+    assert rig.claim("ben").done
+
+
+def test_an_arrival_stamp_from_the_future_counts_as_now(rig: Any) -> None:
+    rig.to_track()
+    rig.sequence += 1
+    assert rig.give(rig.command(), rig.now_ns + 150_000_000).accepted
+    for _ in range(40):
+        rig.step()
+    rig.step(1)
+    assert rig.guard.state is State.HOLD
+
+
+def test_a_command_read_after_the_lease_has_lapsed_does_not_revive_it(rig: Any) -> None:
+    """It arrived in time, but the loop stood still until the lease was over."""
+    rig.to_leased()
+    rig.send()
+    arrived_ns = rig.now_ns + 900_000_000
+    rig.now_ns += 1_000_000_001
+    rig.sequence += 1
+    assert rig.give(rig.command(), arrived_ns).gate == "lease"
+    assert rig.guard.operator == ""
