@@ -72,8 +72,9 @@ class Chain:
 
         spin = axes * speeds
         rate = self._turns @ spin.reshape(-1, 3)
-        before = np.cumsum(spin, axis=1) - spin + rate.take(self._parents, axis=0)[:, None]
-        swirl = axes * pushes + _cross(before, spin)
+        # up to and with the turn itself, which adds nothing: a × a = 0
+        carrying = np.cumsum(spin, axis=1) + rate.take(self._parents, axis=0)[:, None]
+        swirl = axes * pushes + _cross(carrying, spin)
         rate_change = self._turns @ swirl.reshape(-1, 3)
 
         lever = (world.take(self._foot, axis=0) @ self._lever_m)[..., 0]

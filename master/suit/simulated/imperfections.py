@@ -77,7 +77,7 @@ LARGEST_COUNT = np.repeat([32767.0, 32767.0, 2047.0], 3)
 class Imperfections:
     """N units of a grade. Each has errors of its own, drawn once; the noise is drawn at each sample.
 
-    A sensor with truth s reads (I + E) s + b + n. The same seed gives the same units and the same noise.
+    A sensor with truth s, a row, reads s (I + E) + b + n. The same seed gives the same units and the same noise.
     """
 
     def __init__(self, grade: GradeName, count: int, seed: int) -> None:
@@ -86,9 +86,7 @@ class Imperfections:
         units, self._noise = (np.random.default_rng([seed, stream]) for stream in (0, 1))
         self._bias = units.standard_normal((count, CHANNELS)) * np.repeat([s.bias for s in sensors], 3)
         spread = np.array([np.where(np.eye(3), s.scale, s.cross_axis) for s in sensors])
-        gain = np.eye(3) + units.standard_normal((count, 3, 3, 3)) * spread
-        # readings stand in rows, so the gains are kept transposed
-        self._gain = np.ascontiguousarray(gain.swapaxes(-1, -2))
+        self._gain = np.eye(3) + units.standard_normal((count, 3, 3, 3)) * spread
         self._noise_sd = np.repeat([s.noise for s in sensors], 3)
 
     def apply(self, readings: Array) -> Array:

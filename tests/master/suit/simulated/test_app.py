@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from typing import Any
 
 import pytest
@@ -68,3 +69,4 @@ def test_a_bus_that_cannot_be_opened_is_an_error_and_leaves_none_open(config: Su
     broken = BusConfig(name="broken", interface="nothing of the kind", channel="x")
     with pytest.raises(BusError, match="bus broken: cannot open"):
         asyncio.run(run(config.model_copy(update={"buses": [*config.buses, broken]}), asyncio.Event()))
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("can ")]
