@@ -11,8 +11,8 @@ from common.quaternion import Array
 from slave.track.blend import Blend, Course, coast
 from slave.track.tracker import Target
 
-_KEPT = 4
-"""Samples remembered: the play time lies between the last two, or one earlier where several came at once."""
+_KEPT = 3
+"""Segments remembered: the newest is played, or one before it where several samples came at once."""
 _DELAY_GAIN = 0.1
 """Share of a new measurement of the delay that is believed: ten periods or so to follow a change."""
 _MOST_GROWTH = 1.5
@@ -22,9 +22,13 @@ _RUN_OUT_S = 0.08
 
 
 @dataclass(frozen=True, slots=True)
-class _Sample:
-    sampled_ns: int
-    course: Course
+class _Segment:
+    """From one sample to the next."""
+
+    start_ns: int
+    end_ns: int
+    ends: Array
+    """(4, J): position and velocity at the start, then at the end."""
 
 
 class Interpolate:
@@ -38,7 +42,9 @@ class Interpolate:
     def __init__(self, blend_s: float, jitter_margin_s: float) -> None:
         self._blend = Blend(blend_s)
         self._margin_s = jitter_margin_s
-        self._samples: list[_Sample] = []
+        self._newest_ns = 0
+        self._newest: Course | None = None
+        self._segments: list[_Segment] = []
         self._wait_s: float | None = None
 
     @property
@@ -48,29 +54,31 @@ class Interpolate:
 
     def reset(self) -> None:
         """Forget every sample, and how long they took."""
-        self._samples = []
+        self._newest = None
+        self._segments = []
         self._wait_s = None
         self._blend.reset()
 
     def accept(self, sampled_ns: int, now_ns: int, position_rad: Array, velocity_rad_s: Array) -> None:
         """Append a sample (J,) if it is newer than the last."""
-        sample = _Sample(sampled_ns, np.stack([position_rad, velocity_rad_s]))
-        if not self._samples:
-            self._samples = [sample]
+        before, before_ns = self._newest, self._newest_ns
+        if before is not None and sampled_ns <= before_ns:
             return
-        newest = self._samples[-1]
-        if sampled_ns <= newest.sampled_ns:
-            return
-        old = self._blend.applied(now_ns, self._course(now_ns))
-        self._measure(to_s(now_ns - newest.sampled_ns))
-        self._samples = [*self._samples[1 - _KEPT :], sample]
-        self._blend.begin(now_ns, old, self._course(now_ns))
+        sample = np.stack([position_rad, velocity_rad_s])
+        if before is not None:
+            old = self._blend.applied(now_ns, self._course(before, now_ns))
+            self._measure(to_s(now_ns - before_ns))
+            segment = _Segment(before_ns, sampled_ns, np.concatenate([before, sample]))
+            self._segments = [*self._segments[1 - _KEPT :], segment]
+        self._newest, self._newest_ns = sample, sampled_ns
+        if before is not None:
+            self._blend.begin(now_ns, old, self._course(sample, now_ns))
 
     def target(self, now_ns: int) -> Target | None:
         """The course as it was `delay_s` ago."""
-        if not self._samples:
+        if self._newest is None:
             return None
-        course = self._blend.applied(now_ns, self._course(now_ns))
+        course = self._blend.applied(now_ns, self._course(self._newest, now_ns))
         return Target(course[0], course[1])
 
     def _measure(self, wait_s: float) -> None:
@@ -79,27 +87,35 @@ class Interpolate:
         else:
             self._wait_s += _DELAY_GAIN * (min(wait_s, _MOST_GROWTH * self._wait_s) - self._wait_s)
 
-    def _course(self, now_ns: int) -> Course:
+    def _course(self, newest: Course, now_ns: int) -> Course:
         play_ns = now_ns - to_ns(self.delay_s)
-        newest, oldest = self._samples[-1], self._samples[0]
-        if self._wait_s is None or play_ns <= oldest.sampled_ns:
-            # the first sample, or one not yet due: stand there
-            return np.stack([oldest.course[0], np.zeros_like(oldest.course[0])])
-        if play_ns >= newest.sampled_ns:
-            ahead_s, rate = coast(to_s(play_ns - newest.sampled_ns), 0.0, _RUN_OUT_S)
-            course: Course = np.array([[1.0, ahead_s], [0.0, rate]]) @ newest.course
-            return course
-        end = next(i for i, s in enumerate(self._samples) if s.sampled_ns > play_ns)
-        return _between(self._samples[end - 1], self._samples[end], play_ns)
+        if not self._segments:
+            return _standing(newest[0])
+        for segment in reversed(self._segments):
+            if play_ns >= segment.end_ns:
+                # only in the newest segment: no sample ahead
+                ahead_s, rate = coast(to_s(play_ns - segment.end_ns), 0.0, _RUN_OUT_S)
+                course: Course = np.array([[1.0, ahead_s], [0.0, rate]]) @ newest
+                return course
+            if play_ns >= segment.start_ns:
+                return _between(segment, play_ns)
+        return _standing(self._segments[0].ends[0])
 
 
-def _between(start: _Sample, end: _Sample, at_ns: int) -> Course:
+def _standing(position_rad: Array) -> Course:
+    return np.stack([position_rad, np.zeros_like(position_rad)])
+
+
+def _between(segment: _Segment, at_ns: int) -> Course:
     """Hermite's cubic through two samples' positions and velocities, at a time between them."""
-    span_s = to_s(end.sampled_ns - start.sampled_ns)
-    x = to_s(at_ns - start.sampled_ns) / span_s
-    rise = x * x * (3.0 - 2.0 * x)
-    slope = 6.0 * x * (1.0 - x) / span_s
-    from_start = np.array([[1.0 - rise, span_s * x * (1.0 - x) ** 2], [-slope, 1.0 + x * (3.0 * x - 4.0)]])
-    from_end = np.array([[rise, span_s * x * x * (x - 1.0)], [slope, x * (3.0 * x - 2.0)]])
-    course: Course = from_start @ start.course + from_end @ end.course
+    span_s = to_s(segment.end_ns - segment.start_ns)
+    x = to_s(at_ns - segment.start_ns) / span_s
+    rise, slope = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / span_s
+    weights = np.array(
+        [
+            [1.0 - rise, span_s * x * (1.0 - x) ** 2, rise, span_s * x * x * (x - 1.0)],
+            [-slope, 1.0 + x * (3.0 * x - 4.0), slope, x * (3.0 * x - 2.0)],
+        ]
+    )
+    course: Course = weights @ segment.ends
     return course

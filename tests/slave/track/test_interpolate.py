@@ -1,0 +1,113 @@
+import numpy as np
+import pytest
+
+from common.quaternion import Array
+from slave.track.interpolate import Interpolate
+
+MS = 1_000_000
+PERIOD, TRANSIT, MARGIN = 80, 12, 10
+DELAY_S = (PERIOD + TRANSIT + MARGIN) / 1e3
+
+
+def fresh() -> Interpolate:
+    return Interpolate(0.08, MARGIN / 1e3)
+
+
+def course(tracker: Interpolate, at_ms: float) -> tuple[Array, Array]:
+    target = tracker.target(round(at_ms * MS))
+    assert target is not None
+    return target.position_rad, target.velocity_rad_s
+
+
+def feed(tracker: Interpolate, k: int, position: float, velocity: float, transit: int = TRANSIT) -> None:
+    tracker.accept(PERIOD * k * MS, (PERIOD * k + transit) * MS, np.array([position]), np.array([velocity]))
+
+
+def test_there_is_no_target_before_a_sample_nor_after_a_reset() -> None:
+    tracker = fresh()
+    assert tracker.target(0) is None
+    feed(tracker, 0, 1.0, 0.0)
+    tracker.reset()
+    assert tracker.target(MS) is None
+
+
+def test_the_first_sample_is_where_it_stands() -> None:
+    tracker = fresh()
+    feed(tracker, 0, 1.0, 3.0)
+    for ms in (12.0, 50.0, 91.0):
+        position, velocity = course(tracker, ms)
+        assert position == 1.0
+        assert velocity == 0.0
+
+
+def test_a_cubic_comes_out_exactly_one_period_transit_and_margin_late() -> None:
+    cubic = np.polynomial.Polynomial([0.1, -1.0, 4.0, 2.5])
+    tracker = fresh()
+    for k in range(12):
+        feed(tracker, k, cubic(PERIOD * k / 1e3), cubic.deriv()(PERIOD * k / 1e3))
+        if k < 4:
+            continue  # the first blend, from standing, is still being worked off
+        for ms in np.arange(PERIOD * k + TRANSIT, PERIOD * (k + 1) + TRANSIT, 3.0).tolist():
+            position, velocity = course(tracker, ms)
+            assert position == pytest.approx(cubic(ms / 1e3 - DELAY_S), abs=1e-9)
+            assert velocity == pytest.approx(cubic.deriv()(ms / 1e3 - DELAY_S), abs=1e-8)
+    assert tracker.delay_s == pytest.approx(DELAY_S)
+
+
+def test_no_sample_makes_position_or_velocity_jump_whenever_it_comes() -> None:
+    rng = np.random.default_rng(3)
+    tracker = fresh()
+    for k in range(60):
+        transit = int(rng.integers(1, 75))
+        at_ms = PERIOD * k + transit
+        before = tracker.target(at_ms * MS)
+        feed(tracker, k, float(rng.normal()), float(rng.normal(0.0, 3.0)), transit)
+        if before is not None:
+            position, velocity = course(tracker, at_ms)
+            np.testing.assert_allclose(position, before.position_rad, atol=1e-9)
+            np.testing.assert_allclose(velocity, before.velocity_rad_s, atol=1e-8)
+
+
+def test_with_no_sample_ahead_it_slows_smoothly_to_rest() -> None:
+    tracker = fresh()
+    for k in range(8):
+        feed(tracker, k, PERIOD * k / 1e3, 1.0)
+    ran_out_ms = 7 * PERIOD + 1e3 * DELAY_S
+    assert course(tracker, ran_out_ms)[1] == pytest.approx(1.0)
+    assert 0.0 < course(tracker, ran_out_ms + 40.0)[1] < 1.0
+    position, velocity = course(tracker, ran_out_ms + 80.0)
+    assert velocity == pytest.approx(0.0, abs=1e-9)
+    assert position == pytest.approx(7 * PERIOD / 1e3 + 0.04)
+    assert course(tracker, 60_000.0)[0] == pytest.approx(position)
+
+
+def test_the_delay_follows_a_slower_link_and_a_lost_sample_moves_it_little() -> None:
+    tracker = fresh()
+    for k in range(6):
+        feed(tracker, k, 0.0, 0.0)
+    feed(tracker, 7, 0.0, 0.0)
+    assert tracker.delay_s < DELAY_S + 0.1 * 0.5 * 0.092 + 1e-9
+    for k in range(8, 80):
+        feed(tracker, k, 0.0, 0.0, transit=60)
+    assert tracker.delay_s == pytest.approx(0.15, abs=1e-3)
+
+
+def test_a_sample_that_is_not_newer_is_ignored() -> None:
+    tracker, other = fresh(), fresh()
+    for t in (tracker, other):
+        feed(t, 0, 0.0, 1.0)
+        feed(t, 1, 0.08, 1.0)
+    feed(tracker, 1, 5.0, 5.0)
+    feed(tracker, 0, 5.0, 5.0)
+    np.testing.assert_array_equal(course(tracker, 130.0), course(other, 130.0))
+
+
+def test_several_samples_at_once_leave_the_played_segment_in_reach() -> None:
+    tracker = fresh()
+    for k in range(6):
+        feed(tracker, k, PERIOD * k / 1e3, 1.0)
+    for k in (6, 7):
+        tracker.accept(PERIOD * k * MS, (7 * PERIOD + 5) * MS, np.array([PERIOD * k / 1e3]), np.ones(1))
+    late_s = tracker.delay_s
+    at_ms = 7 * PERIOD + 5 + 80
+    assert course(tracker, at_ms)[0] == pytest.approx(at_ms / 1e3 - late_s, abs=1e-9)

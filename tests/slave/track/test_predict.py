@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.quaternion import Array
+from slave.track.predict import Predict
+
+MS = 1_000_000
+PERIOD, TRANSIT = 80, 12
+LAG_S, HORIZON_S, BLEND_S = 0.033, 0.3, 0.08
+
+
+def fresh() -> Predict:
+    return Predict(BLEND_S, LAG_S, HORIZON_S)
+
+
+def course(tracker: Predict, at_ms: float) -> tuple[Array, Array]:
+    target = tracker.target(round(at_ms * MS))
+    assert target is not None
+    return target.position_rad, target.velocity_rad_s
+
+
+def feed(tracker: Predict, k: int, position: float, velocity: float, transit: int = TRANSIT) -> None:
+    tracker.accept(PERIOD * k * MS, (PERIOD * k + transit) * MS, np.array([position]), np.array([velocity]))
+
+
+def test_there_is_no_target_before_a_sample_nor_after_a_reset() -> None:
+    tracker = fresh()
+    assert tracker.target(0) is None
+    feed(tracker, 0, 1.0, 0.0)
+    tracker.reset()
+    assert tracker.target(MS) is None
+
+
+def test_a_reset_forgets_the_difference_being_worked_off() -> None:
+    tracker = fresh()
+    feed(tracker, 0, 0.0, 0.0)
+    feed(tracker, 1, 1.0, 0.0)
+    tracker.reset()
+    feed(tracker, 2, 5.0, 0.0)
+    assert course(tracker, 2 * PERIOD + TRANSIT)[0] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("speed", [-2.0, 0.0, 1.5])
+def test_constant_velocity_is_met_exactly_servo_lag_included(speed: float) -> None:
+    tracker = fresh()
+    for k in range(10):
+        feed(tracker, k, speed * PERIOD * k / 1e3, speed)
+        for ms in np.arange(PERIOD * k + TRANSIT, PERIOD * (k + 1) + TRANSIT, 5.0).tolist():
+            position, velocity = course(tracker, ms)
+            assert position == pytest.approx(speed * (ms / 1e3 + LAG_S), abs=1e-12)
+            assert velocity == pytest.approx(speed, abs=1e-12)
+
+
+def test_an_acceleration_that_lasts_is_followed_better_than_by_velocity_alone() -> None:
+    tracker, acceleration = fresh(), 5.0
+    for k in range(12):
+        t = PERIOD * k / 1e3
+        feed(tracker, k, 0.5 * acceleration * t**2, acceleration * t)
+    at_s = (12 * PERIOD + TRANSIT - 1) / 1e3
+    position, _ = course(tracker, at_s * 1e3)
+    ahead_s = at_s + LAG_S
+    error = abs(float(position[0]) - 0.5 * acceleration * ahead_s**2)
+    by_velocity_alone = 0.5 * acceleration * (ahead_s - 11 * PERIOD / 1e3) ** 2
+    assert error < 0.4 * by_velocity_alone
+
+
+jumps = st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(-4.0, 4.0)), min_size=2, max_size=8)
+
+
+@settings(deadline=None)
+@given(jumps, st.lists(st.integers(0, 60), min_size=8, max_size=8))
+def test_no_sample_however_wild_makes_position_or_velocity_jump(
+    samples: list[tuple[float, float]], transits: list[int]
+) -> None:
+    tracker = fresh()
+    for k, (position, velocity) in enumerate(samples):
+        at_ms = PERIOD * k + transits[k]
+        before = tracker.target(at_ms * MS)
+        feed(tracker, k, position, velocity, transits[k])
+        after = tracker.target(at_ms * MS)
+        assert after is not None
+        if before is not None:
+            np.testing.assert_allclose(after.position_rad, before.position_rad, atol=1e-9)
+            np.testing.assert_allclose(after.velocity_rad_s, before.velocity_rad_s, atol=1e-8)
+
+
+def test_the_velocity_is_the_slope_of_the_position() -> None:
+    tracker = fresh()
+    for k, (p, v) in enumerate([(0.0, 1.0), (0.2, -1.0), (0.1, 2.0)]):
+        feed(tracker, k, p, v)
+    for ms in np.arange(175.0, 600.0, 7.0).tolist():
+        (before, _), (_, velocity), (after, _) = (course(tracker, ms + d) for d in (-0.01, 0.0, 0.01))
+        assert (after - before) / 2e-5 == pytest.approx(velocity, abs=5e-3)
+
+
+def test_without_samples_it_is_at_rest_from_the_horizon_on_and_not_before() -> None:
+    tracker = fresh()
+    feed(tracker, 0, 0.0, 2.0)
+    rest_ms = 1e3 * (HORIZON_S - LAG_S)
+    assert course(tracker, rest_ms - 20.0)[1] > 0.0
+    stood, velocity = course(tracker, rest_ms)
+    assert velocity == pytest.approx(0.0, abs=1e-9)
+    # full rate for half of the horizon, then the mean of a smooth descent
+    assert stood == pytest.approx(2.0 * 0.75 * HORIZON_S)
+    assert course(tracker, 60_000.0)[0] == pytest.approx(stood)
+
+
+def test_after_a_silence_past_the_horizon_the_estimate_starts_afresh_but_the_robot_does_not_jump() -> None:
+    tracker = fresh()
+    for k in range(4):
+        feed(tracker, k, 0.1 * k, 0.1 / 0.08)
+    stood, _ = course(tracker, 999.0)
+    feed(tracker, 12, -1.0, 0.0)
+    assert course(tracker, 12 * PERIOD + TRANSIT)[0] == pytest.approx(stood)
+    settled = 12 * PERIOD + TRANSIT + 1e3 * BLEND_S
+    # no memory of the old motion: all of the new position, none of the old acceleration
+    assert course(tracker, settled)[0] == pytest.approx(-1.0)
+
+
+def test_a_sample_that_is_not_newer_is_ignored() -> None:
+    tracker, other = fresh(), fresh()
+    for t in (tracker, other):
+        feed(t, 0, 0.0, 1.0)
+        feed(t, 1, 0.08, 1.0)
+    feed(tracker, 1, 5.0, 5.0)
+    feed(tracker, 0, 5.0, 5.0)
+    np.testing.assert_array_equal(course(tracker, 130.0), course(other, 130.0))
+
+
+def test_without_velocities_it_goes_by_the_positions() -> None:
+    tracker = fresh()
+    for k in range(8):
+        feed(tracker, k, 1.0 * PERIOD * k / 1e3, 0.0)
+    # steady motion is then met once the velocity is known from two samples and has been blended in
+    position, velocity = course(tracker, 8 * PERIOD + TRANSIT - 1)
+    assert velocity == pytest.approx(1.0, rel=0.05)
+    assert position == pytest.approx((8 * PERIOD + TRANSIT - 1) / 1e3 + LAG_S, rel=0.05)
+
+
+def test_what_the_caller_does_to_its_arrays_does_not_move_the_robot() -> None:
+    tracker = fresh()
+    position, velocity = np.ones(1), np.zeros(1)
+    tracker.accept(0, 0, position, velocity)
+    position[:], velocity[:] = 9.0, 9.0
+    assert course(tracker, 1.0)[0] == pytest.approx(1.0)

@@ -1,0 +1,84 @@
+"""The strategies side by side on simulated reaches: the figures of slave/track/README.md, with a margin."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.config import check_config
+from common.errors import ConfigError
+from slave.track import Tracker
+from slave.track.config import TrackConfig, make_tracker
+from slave.track.hold import Hold
+from slave.track.interpolate import Interpolate
+from slave.track.predict import Predict
+from slave.track.simulate import TICK_S, Figures, Run, Strategy, World, figures, run, tracker_for
+
+WORLD = World(seconds=14.0)
+UNLIMITED = replace(WORLD, max_velocity_deg_s=1e5, max_acceleration_deg_s2=1e8)
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[Strategy, Run]:
+    strategies: tuple[Strategy, ...] = ("hold", "interpolate", "predict")
+    return {s: run(tracker_for(s), WORLD) for s in strategies}
+
+
+@pytest.fixture(scope="module")
+def judged(runs: dict[Strategy, Run]) -> dict[Strategy, Figures]:
+    return {strategy: figures(done) for strategy, done in runs.items()}
+
+
+def test_predict_is_early_enough_near_enough_and_smooth_enough(judged: dict[Strategy, Figures]) -> None:
+    predict = judged["predict"]
+    assert abs(predict.lag_ms) <= 10.0
+    assert predict.rmse_deg <= 0.25 * judged["hold"].rmse_deg
+    assert predict.roughness <= 2.2
+
+
+def test_interpolate_is_late_and_the_smoothest(judged: dict[Strategy, Figures]) -> None:
+    interpolate = judged["interpolate"]
+    assert interpolate.lag_ms == pytest.approx(132.0, abs=5.0)
+    assert interpolate.aligned_rmse_deg <= 0.3
+    assert interpolate.roughness <= 1.2
+
+
+def test_predict_needs_no_guard_to_be_smooth() -> None:
+    unlimited = {s: figures(run(tracker_for(s), UNLIMITED)) for s in ("hold", "predict")}
+    assert unlimited["predict"].rmse_deg <= 0.3 * unlimited["hold"].rmse_deg
+    assert unlimited["predict"].roughness <= 2.1
+    assert unlimited["hold"].lag_ms == pytest.approx(83.0, abs=5.0)
+
+
+def test_predict_without_velocities_still_beats_hold(judged: dict[Strategy, Figures]) -> None:
+    blind = figures(run(tracker_for("predict"), replace(WORLD, velocity_known=False)))
+    assert blind.rmse_deg <= 0.6 * judged["hold"].rmse_deg
+
+
+@pytest.mark.parametrize("strategy", ["interpolate", "predict"])
+def test_what_a_smooth_strategy_asks_for_is_the_integral_of_its_velocity(
+    runs: dict[Strategy, Run], strategy: Strategy
+) -> None:
+    done = runs[strategy]
+    moved = np.diff(done.target_rad, axis=0)
+    mean_rad_s = 0.5 * (done.target_rad_s[1:] + done.target_rad_s[:-1])
+    assert np.abs(moved[200:] - TICK_S * mean_rad_s[200:]).max() < np.deg2rad(0.1)
+
+
+def test_a_run_is_the_same_every_time() -> None:
+    short = World(seconds=5.0, joints=3)
+    first, second = (run(tracker_for("predict"), short) for _ in range(2))
+    np.testing.assert_array_equal(first.robot_rad, second.robot_rad)
+
+
+@pytest.mark.parametrize(
+    ("strategy", "kind"), [("hold", Hold), ("interpolate", Interpolate), ("predict", Predict)]
+)
+def test_the_configuration_names_the_strategy(strategy: Strategy, kind: type[Tracker]) -> None:
+    assert isinstance(make_tracker(TrackConfig(strategy=strategy)), kind)
+
+
+def test_a_strategy_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"strategy = 'guess': expected 'hold', 'interpolate' or 'predict'"):
+        check_config(Path("slave.toml"), {"strategy": "guess"}, TrackConfig)
