@@ -11,11 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from common.clock import NS_PER_MS, NS_PER_S
 from common.codec import decode, encode
-from common.config import load_config
+from common.config import Model, load_config
 from common.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState
 from common.offset import MasterExchange
 from deploy.judge import Trace
@@ -56,10 +55,10 @@ class VirtualRun:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self.master_config = _load(MasterConfig, world)
-        self.slave_config = _load(SlaveConfig, world)
+        self.master_config = _load(MasterConfig, "master", world)
+        self.slave_config = _load(SlaveConfig, "slave", world)
         self._protocol = SuitProtocol.load(self.master_config.capture.dbc)
-        self._suit = build_suit(_load(SuitConfig, world), self._protocol)
+        self._suit = build_suit(_load(SuitConfig, "suit", world), self._protocol)
         self._master = MasterPipeline(self.master_config, self._protocol)
         self._writer = CommandWriter(self.master_config.robot)
         self._lease = LeaseKeeper(self.master_config.robot, self.master_config.operator.name)
@@ -173,6 +172,5 @@ class VirtualRun:
         self.clock.on_reply(decode(reply, ClockReply), self.now_ns)
 
 
-def _load(model: type[Any], world: World) -> Any:
-    role = {MasterConfig: "master", SlaveConfig: "slave", SuitConfig: "suit"}[model]
+def _load(model: type[Model], role: str, world: World) -> Model:
     return load_config(EXAMPLES / f"{role}.toml", model, world.overrides.get(role, ()))
