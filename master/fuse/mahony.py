@@ -32,6 +32,7 @@ class MahonyConfig(Section):
 @dataclass(frozen=True, slots=True)
 class _Snapshot:
     q: Array
+    error: Array
     integral: Array
     started: Mask
 
@@ -44,25 +45,30 @@ class MahonyFilter:
         self._period_s = 1.0 / rate_hz
         self._q = np.zeros((count, 4))
         self._q[:, 0] = 1.0
+        self._error = np.zeros((count, 3))
         # K_i ∫ e dt, rad/s
         self._integral = np.zeros((count, 3))
         self._started = np.zeros(count, dtype=np.bool_)
 
     def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
         """One tick's readings, (n, 3) each."""
+        rate = gyr_rad_s + self._config.kp * self._error + self._integral  # Eqs 10, 11
+        self._q = integrate(self._q, rate, self._period_s)  # Eq. 12
         if not self._started.all():
             new = ~self._started
             self._q[new] = initial_orientation(acc_m_s2[new], mag_ut[new])
             self._started[new] = True
-        error = attitude_error(self._q, acc_m_s2, mag_ut)
+        # taken at the orientation that belongs to these readings, and fed back in the next period
+        self._error = attitude_error(self._q, acc_m_s2, mag_ut)
+        self._learn_bias()
+
+    def _learn_bias(self) -> None:
         config = self._config
         if config.ki > 0.0:
-            self._integral += config.ki * self._period_s * error
+            self._integral += config.ki * self._period_s * self._error
             if config.bias_limit_rad_s > 0.0:
                 limit = config.bias_limit_rad_s
                 np.clip(self._integral, -limit, limit, out=self._integral)
-        rate = gyr_rad_s + config.kp * error + self._integral  # Eqs 10, 11
-        self._q = integrate(self._q, rate, self._period_s)  # Eq. 12
 
     def q_world_from_sensor(self) -> Array:
         """Orientations (n, 4)."""
@@ -75,17 +81,19 @@ class MahonyFilter:
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
         self._started[nodes] = False
+        self._error[nodes] = 0.0
         self._integral[nodes] = 0.0
 
     def snapshot(self) -> object:
-        """Orientation and bias."""
-        return _Snapshot(self._q.copy(), self._integral.copy(), self._started.copy())
+        """Orientation, its error and the bias."""
+        return _Snapshot(self._q.copy(), self._error.copy(), self._integral.copy(), self._started.copy())
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
         if not isinstance(snapshot, _Snapshot) or snapshot.q.shape != self._q.shape:
             raise TypeError("not a snapshot of this filter")
         self._q = snapshot.q.copy()
+        self._error = snapshot.error.copy()
         self._integral = snapshot.integral.copy()
         self._started = snapshot.started.copy()
 

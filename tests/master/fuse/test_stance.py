@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from common.quaternion import angle_between, from_rotation_vector, heading_turn, multiply
+from master.fuse.heading import HeadingMemory
+from master.fuse.stance import Stance
+
+SAME = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
+ALL = np.ones(3, dtype=np.bool_)
+MOUNTED = Rotation.random(3, rng=0).as_quat(scalar_first=True)
+
+
+def test_off_it_leaves_the_mounting_as_calibrated() -> None:
+    stance = Stance(MOUNTED, 0, 0.0)
+    assert stance.known.all()
+    stance.add(SAME, ALL)
+    assert np.array_equal(stance.q_sensor_from_segment, MOUNTED)
+
+
+def test_the_mean_over_the_stance_becomes_the_zero_pose() -> None:
+    rng = np.random.default_rng(1)
+    stance = Stance(SAME, 400, 0.0)
+    for tick in range(400):
+        assert not stance.known.any()
+        assert np.array_equal(stance.q_sensor_from_segment, SAME)
+        sway = multiply(MOUNTED, from_rotation_vector(0.01 * rng.normal(size=(3, 3))))
+        # the sign of a quaternion means nothing
+        stance.add(sway if tick % 2 else -sway, ALL)
+    assert stance.known.all()
+    zero = multiply(MOUNTED, stance.q_sensor_from_segment)
+    assert np.max(angle_between(zero, SAME)) < 0.003
+
+
+def test_the_operator_s_facing_is_kept() -> None:
+    stance = Stance(SAME, 1, 0.7)
+    stance.add(MOUNTED, ALL)
+    zero = multiply(MOUNTED, stance.q_sensor_from_segment)
+    assert np.max(angle_between(zero, heading_turn(0.7))) < 1e-7
+
+
+def test_only_settled_nodes_count_and_one_that_drops_out_begins_again() -> None:
+    stance = Stance(SAME, 4, 0.0)
+    first, wrong = np.array([True, True, False]), heading_turn(np.ones(3))
+    for _ in range(3):
+        stance.add(wrong, first)
+    stance.add(MOUNTED, np.array([True, False, False]))
+    assert stance.known.tolist() == [True, False, False]
+    for _ in range(4):
+        assert not stance.known[1:].any()
+        stance.add(MOUNTED, ALL)
+    assert stance.known.all()
+    zero = multiply(MOUNTED, stance.q_sensor_from_segment)
+    assert np.max(angle_between(zero, SAME)[1:]) < 1e-7
+
+
+def test_once_known_it_stays_even_while_the_node_is_lost() -> None:
+    stance = Stance(SAME, 1, 0.0)
+    stance.add(MOUNTED, np.array([True, False, False]))
+    kept = stance.q_sensor_from_segment[0].copy()
+    stance.add(SAME, np.array([False, False, False]))
+    stance.add(SAME, ALL)
+    assert np.array_equal(stance.q_sensor_from_segment[0], kept)
+
+
+def test_stance_goes_on_from_a_snapshot() -> None:
+    stance = Stance(SAME, 2, 0.0)
+    stance.add(MOUNTED, ALL)
+    snapshot = stance.snapshot()
+    stance.add(MOUNTED, ALL)
+    stance.restore(snapshot)
+    assert not stance.known.any()
+    stance.add(MOUNTED, ALL)
+    assert stance.known.all()
+    with pytest.raises(TypeError, match="not a snapshot"):
+        stance.restore(None)
+
+
+def test_a_lost_heading_is_taken_up_again() -> None:
+    memory = HeadingMemory(3)
+    held = multiply(heading_turn(np.array([0.5, -2.0, 3.0])), from_rotation_vector(np.full((3, 3), 0.1)))
+    memory.lose(np.array([True, True, False]), held)
+    # the restarted filters know the inclination, and some heading of their own
+    restarted = multiply(heading_turn(np.array([1.0, 1.0, 1.0])), held)
+    memory.find(ALL, restarted)
+    back = angle_between(multiply(memory.turn, restarted), held)
+    assert np.allclose(back, [0.0, 0.0, 1.0], atol=1e-7)
+    # and once more, from what was held with the turn
+    memory.lose(ALL, restarted)
+    memory.find(ALL, held)
+    assert np.allclose(angle_between(multiply(memory.turn, held), held)[:2], 0.0, atol=1e-7)
+
+
+def test_heading_memory_goes_on_from_a_snapshot() -> None:
+    memory = HeadingMemory(3)
+    snapshot = memory.snapshot()
+    memory.lose(ALL, heading_turn(np.ones(3)))
+    memory.find(ALL, SAME)
+    assert not np.allclose(memory.turn, SAME)
+    memory.restore(snapshot)
+    assert np.array_equal(memory.turn, SAME)
+    with pytest.raises(TypeError, match="not a snapshot"):
+        memory.restore(None)
