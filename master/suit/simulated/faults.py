@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -63,8 +63,7 @@ class FaultsConfig(Section):
         return [ConfigMistake(key, node, expected) for key, node in named if node not in nodes]
 
 
-@dataclass(frozen=True, slots=True)
-class NodeAnswer:
+class NodeAnswer(NamedTuple):
     """What a sound node sends in one tick."""
 
     node: str
@@ -96,7 +95,7 @@ class Faults:
         for answer in answers:
             if answer.node in lost:
                 continue
-            delay_ns = self._delay_ns(answer.node, delays)
+            delay_ns = self._delay_ns(answer.node, delays) if delays else 0
             out += [Outgoing(answer.bus, frame, delay_ns) for frame in answer.frames]
         if self.config.corrupt_rate:
             out = [self._corrupted(o) if self._happens(self.config.corrupt_rate) else o for o in out]

@@ -77,7 +77,7 @@ LARGEST_COUNT = np.repeat([32767.0, 32767.0, 2047.0], 3)
 class Imperfections:
     """N units of a grade. Each has errors of its own, drawn once; the noise is drawn at each sample.
 
-    A sensor with truth s, a row, reads s (I + E) + b + n. The same seed gives the same units and the same noise.
+    A sensor with truth s, a row, reads s (I + E) + b + n. The same seed gives the same units and noise.
     """
 
     def __init__(self, grade: GradeName, count: int, seed: int) -> None:
