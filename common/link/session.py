@@ -105,11 +105,7 @@ class Link:
         key = topic.key_for(self.robot)
         inbox = Inbox(key, on_payload, self._loop, self._count(topic))
         self._receivers.append(inbox)
-        self._held.append(
-            self._session.declare_subscriber(
-                key, Callback(inbox.on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
-            )
-        )
+        self._held.append(self._session.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
 
     def answer(self, topic: Topic, handler: Callable[[bytes, int], bytes]) -> None:
         """Answer other sessions' questions with `handler(payload, arrived_ns)`, run on the loop.
@@ -120,12 +116,7 @@ class Link:
         answerer = Answerer(key, handler, self._loop, self._count(topic))
         self._receivers.append(answerer)
         self._held.append(
-            self._session.declare_queryable(
-                key,
-                Callback(answerer.on_query, indirect=False),
-                complete=True,
-                allowed_origin=zenoh.Locality.REMOTE,
-            )
+            self._session.declare_queryable(key, Callback(answerer.on_query, indirect=False), complete=True)
         )
 
     async def connected(self, topic: Topic | None = None, timeout_s: float = CONNECT_TIMEOUT_S) -> None:

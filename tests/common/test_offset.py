@@ -114,6 +114,15 @@ def test_one_way_only_is_off_by_exactly_the_bound() -> None:
     assert offset.bound_ns - 5 * MS in range(5)
 
 
+def test_the_drift_within_a_long_exchange_is_in_the_bound() -> None:
+    for drift_ppm in (100.0, -100.0):
+        remote = RemoteClock(0, drift_ppm, 0)
+        estimator = OffsetEstimator()
+        # held for 10 s without any delay: by their clock, longer or shorter than we waited
+        now_ns = exchange(estimator, remote, 0, 0, 10 * NS_PER_S, 0)
+        assert holds(estimator.estimate(now_ns), remote, now_ns)
+
+
 def test_the_shortest_round_trip_decides() -> None:
     remote = RemoteClock(0, 0.0, 0)
     estimator = OffsetEstimator()
@@ -187,7 +196,8 @@ def test_impossible_stamps_are_refused_and_change_nothing() -> None:
     assert not estimator.add(now_ns, now_ns + 10, now_ns, now_ns + 5)  # replied before received
     assert not estimator.add(now_ns, now_ns, now_ns + 9000, now_ns + 10)  # held longer than we waited
     assert not estimator.add(0, 0, 1, 2)  # older than what is known
-    assert estimator.refused == 4
+    assert not estimator.add(now_ns + 1, now_ns, now_ns, now_ns)  # heard a nanosecond before asked
+    assert estimator.refused == 5
     assert estimator.estimate(now_ns) == before
 
 
