@@ -11,8 +11,8 @@ from common.quaternion import Array
 from slave.track.blend import Blend, Course, coast
 from slave.track.tracker import Target
 
-_KEPT = 3
-"""Segments remembered: the newest is played, or one before it where several samples came at once."""
+_KEPT = 4
+"""Segments remembered. The newest is played, or an older one where a slow link has suddenly become fast."""
 _DELAY_GAIN = 0.1
 """Share of a new measurement of the delay that is believed: ten periods or so to follow a change."""
 _MOST_GROWTH = 1.5
@@ -69,7 +69,7 @@ class Interpolate:
             old = self._blend.applied(now_ns, self._course(before, now_ns))
             self._measure(to_s(now_ns - before_ns))
             segment = _Segment(before_ns, sampled_ns, np.concatenate([before, sample]))
-            self._segments = [*self._segments[1 - _KEPT :], segment]
+            self._segments = [*self._segments, segment][-_KEPT:]
         self._newest, self._newest_ns = sample, sampled_ns
         if before is not None:
             self._blend.begin(now_ns, old, self._course(sample, now_ns))

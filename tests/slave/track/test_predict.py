@@ -38,8 +38,8 @@ def test_a_reset_forgets_the_difference_being_worked_off() -> None:
     feed(tracker, 0, 0.0, 0.0)
     feed(tracker, 1, 1.0, 0.0)
     tracker.reset()
-    feed(tracker, 2, 5.0, 0.0)
-    assert course(tracker, 2 * PERIOD + TRANSIT)[0] == pytest.approx(5.0)
+    feed(tracker, 1, 5.0, 0.0)
+    assert course(tracker, PERIOD + TRANSIT + 1)[0] == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("speed", [-2.0, 0.0, 1.5])
