@@ -81,7 +81,6 @@ class MahonyFilter:
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
         self._started[nodes] = False
-        self._error[nodes] = 0.0
         self._integral[nodes] = 0.0
 
     def snapshot(self) -> object:

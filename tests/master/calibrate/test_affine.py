@@ -94,6 +94,16 @@ def test_a_mistake_names_file_key_value_and_expectation(tmp_path: Path, text: st
         load_calibration([None, write(tmp_path, text)])
 
 
+@pytest.mark.parametrize(("last", "singular"), [("1e-5", False), ("1e-7", True), ("0", True)])
+def test_a_map_that_all_but_loses_a_direction_is_singular(tmp_path: Path, last: str, singular: bool) -> None:
+    path = write(tmp_path, f"gyroscope = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, {last}, 0]]")
+    if singular:
+        with pytest.raises(ConfigError, match="three independent rows"):
+            load_calibration([path])
+    else:
+        load_calibration([path])
+
+
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"gone\.toml: file = .*: expected a readable file"):
         load_calibration([tmp_path / "gone.toml"])
