@@ -63,7 +63,7 @@ class VirtualRun:
         self._writer = CommandWriter(self.master_config.robot)
         self._lease = LeaseKeeper(self.master_config.robot, self.master_config.operator.name)
         self.clock = MasterExchange()
-        self.slave = SlavePipeline(self.slave_config)
+        self.slave = SlavePipeline(self.slave_config, draw_token=itertools.count(1).__next__)
         self.now_ns = NS_PER_S
         self._robot = SimulatedRobot(
             self.slave_config.skeleton, self.slave_config.encoders, origin_ns=self.slave_ns

@@ -20,20 +20,21 @@ from common.offset import SlaveExchange
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
 from slave.guard import Guard, Setpoint, State
+from slave.guard.lease import DrawToken, random_token
 from slave.journey import Journeys
 from slave.servos.servos import EncoderReading
 from slave.track.config import make_tracker
 
 
 class SlavePipeline:
-    """Guard, tracker and counters between ticks."""
+    """Guard, tracker and counters between ticks. `draw_token` makes the tokens of its leases."""
 
-    def __init__(self, config: SlaveConfig) -> None:
+    def __init__(self, config: SlaveConfig, draw_token: DrawToken = random_token) -> None:
         self.robot = config.robot
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
         self.guard = Guard(
-            config.robot, self.skeleton, config.guard, make_tracker(config.track)
+            config.robot, self.skeleton, config.guard, make_tracker(config.track), draw_token=draw_token
         )
         self.clock = SlaveExchange()
         self.journeys = Journeys()
