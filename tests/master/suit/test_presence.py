@@ -78,6 +78,15 @@ def test_a_lost_bus_takes_its_nodes_at_once() -> None:
     assert presence.times_lost.tolist() == [1, 0]
 
 
+def test_a_bus_that_is_back_at_once_brings_its_nodes_back() -> None:
+    presence, all_there = Presence(2, 5), np.ones(2, bool)
+    presence.close(all_there, all_there)
+    presence.lose(all_there)
+    presence.close(all_there, all_there)
+    assert not presence.lost.any()
+    assert presence.awaited.all()
+
+
 def test_lost_after_must_be_a_count() -> None:
     with pytest.raises(ValueError, match="at least 1"):
         Presence(1, 0)
