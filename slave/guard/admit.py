@@ -4,31 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from common.clock import to_ms
 from common.messages import Command
-
-
-class ClockOffset(Protocol):
-    """What is known of the master's clock; `common.offset.Offset` is one."""
-
-    @property
-    def offset_ns(self) -> int:
-        """The master's clock minus the slave's."""
-        ...
-
-    @property
-    def bound_ns(self) -> int:
-        """Half-width of what the offset is known to."""
-        ...
-
-    @property
-    def trusted(self) -> bool:
-        """Whether it was measured, and lately."""
-        ...
+from common.offset import Offset
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +23,14 @@ class Situation:
     newest_sequence: int
     """Of the last command accepted within this lease, -1 before the first."""
     now_ns: int
-    offset: ClockOffset
+    offset: Offset
+    """The master's clock against the slave's."""
     max_age_ns: int
     future_tolerance_ns: int
 
     def sampled_ns(self, command: Command) -> int:
         """When the operator stood so, on the slave's clock."""
-        return command.stamps.sampled_ns - self.offset.offset_ns
+        return self.offset.local_ns(command.stamps.sampled_ns)
 
     def age_ns(self, command: Command) -> int:
         """How long ago that was. Counted to now, not to arrival: waiting in a mailbox ages it too."""

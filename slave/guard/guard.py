@@ -11,9 +11,10 @@ import numpy as np
 from common.clock import to_ns, to_s
 from common.errors import ConfigError
 from common.messages import Command, ControlReply, ControlRequest, Mask
+from common.offset import Offset
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.guard.admit import DEADMAN, GATES, ClockOffset, Gate, Situation, Verdict, admit
+from slave.guard.admit import DEADMAN, GATES, Gate, Situation, Verdict, admit
 from slave.guard.align import Alignment, Rejoin
 from slave.guard.config import GuardConfig
 from slave.guard.control import Control
@@ -98,9 +99,7 @@ class Guard:
         self._watch(now_ns, self._arrival_watches)
         return self._control.answer(request, now_ns)
 
-    def on_command(
-        self, command: Command, received_ns: int, now_ns: int, master_offset: ClockOffset
-    ) -> Verdict:
+    def on_command(self, command: Command, received_ns: int, now_ns: int, master_offset: Offset) -> Verdict:
         """Judge a command that arrived at `received_ns`.
 
         One that is refused changes nothing but counters, except that a released deadman makes the

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from common.messages import Action, Command, CommandStamps, ControlReply, ControlRequest
+from common.offset import Offset
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from slave.guard import Guard, GuardConfig, Setpoint, State, Verdict
@@ -23,11 +24,7 @@ MASTER_AHEAD_NS = 3_600_000_000_000
 """The master's clock was started an hour before the slave's."""
 
 
-@dataclass(frozen=True)
-class Offset:
-    offset_ns: int = MASTER_AHEAD_NS
-    bound_ns: int = 2_000_000
-    trusted: bool = True
+GOOD_OFFSET = Offset(MASTER_AHEAD_NS, bound_ns=2_000_000, trusted=True)
 
 
 class NewestTracker:
@@ -66,7 +63,7 @@ class Rig:
         self.encoder_delay_ns = 0
         self.coupled = True
         self.target = self.measured.copy()
-        self.offset = Offset()
+        self.offset = GOOD_OFFSET
         self.sequence = 0
         self.lease = 0
         self.setpoints: list[Setpoint] = []
