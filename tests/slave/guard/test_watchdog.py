@@ -230,3 +230,14 @@ def test_a_command_read_after_the_lease_has_lapsed_does_not_revive_it(rig: Any) 
     rig.sequence += 1
     assert rig.give(rig.command(), arrived_ns).gate == "lease"
     assert rig.guard.operator == ""
+
+
+def test_an_own_clock_that_goes_back_by_less_than_the_lease_holds_too(rig: Any) -> None:
+    rig.to_track()
+    rig.send()
+    rig.step(-200_000_000)
+    assert rig.guard.state is State.TRACK
+    rig.send()
+    rig.step(-200_000_001)
+    assert rig.guard.state is State.HOLD
+    assert rig.guard.operator == "anna"
