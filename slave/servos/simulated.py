@@ -14,7 +14,7 @@ from slave.encoders import EncoderConfig, Encoders
 from slave.servos.model import STEP_S, build_model, leader, unit_rates
 from slave.servos.servos import EncoderReading
 
-STEPS_PER_CYCLE = 2
+STEPS_PER_CYCLE = 1
 CYCLE_NS = STEPS_PER_CYCLE * to_ns(STEP_S)
 """The drives' cycle, 4 ms: setpoints are taken in and encoders latched at its boundaries."""
 MOST_CYCLES = 5

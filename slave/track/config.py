@@ -12,8 +12,8 @@ from slave.track.interpolate import Interpolate
 from slave.track.predict import Predict
 from slave.track.tracker import Tracker
 
-SERVO_LAG_S = 0.032
-"""Of the MuJoCo robot behind a ramp that is written at 200 Hz, measured: 27 ms are its servos', 3 ms go by
+SERVO_LAG_S = 0.031
+"""Of the MuJoCo robot behind a ramp that is written at 200 Hz, measured: 26 ms are its servos', 3 ms go by
 until the drives take a setpoint in, and for 4 ms (2 on average) it stands."""
 
 

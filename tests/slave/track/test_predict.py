@@ -8,7 +8,7 @@ from slave.track.predict import Predict
 
 MS = 1_000_000
 PERIOD, TRANSIT = 80, 12
-LAG_S, HORIZON_S, BLEND_S = 0.032, 0.3, 0.08
+LAG_S, HORIZON_S, BLEND_S = 0.031, 0.3, 0.08
 
 
 def fresh() -> Predict:
