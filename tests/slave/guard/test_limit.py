@@ -213,6 +213,25 @@ def test_a_joint_seated_beyond_its_limit_does_not_jump_and_only_moves_back() -> 
     assert watched.limiter.position_rad[5] == pytest.approx(MID[5])
 
 
+def test_a_joint_beyond_its_limit_has_no_room_outwards() -> None:
+    beyond = LIMITS.upper_rad + 0.1
+    motion = limit.Motion(
+        beyond, np.zeros(JOINTS), DT, LIMITS, LIMITS.max_velocity_rad_s, LIMITS.max_acceleration_rad_s2
+    )
+    low, high = dict(limit.RULES)[Rule.POSITION](motion)
+    assert (high == 0.0).all()
+    assert (low < 0.0).all()
+
+
+@pytest.mark.parametrize("rate", [3.0, -3.0])
+def test_a_target_beyond_the_limit_counts_as_standing_at_the_limit(rate: float) -> None:
+    """Its velocity there says nothing of where the joint may go."""
+    watched = Watched()
+    for _ in range(300):
+        watched.step(LIMITS.upper_rad + 1.0, np.full(JOINTS, rate))
+    assert np.allclose(watched.limiter.position_rad, LIMITS.upper_rad, rtol=0, atol=EPS)
+
+
 def test_gentle_maxima_bound_speeding_up_and_cruise() -> None:
     watched = Watched(LIMITS.lower_rad)
     for _ in range(200):
