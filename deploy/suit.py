@@ -6,13 +6,12 @@ import asyncio
 from collections.abc import Callable
 from contextlib import AsyncExitStack
 
-from master.suit.simulated.app import run as answer
-
 from common.codec import encode
 from common.launch import WriteFigures
 from common.link import open_link
 from common.messages import Truth
 from common.topics import TRUTH
+from master.suit.simulated.app import run as answer
 from master.suit.simulated.config import SuitConfig
 
 

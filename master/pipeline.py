@@ -6,7 +6,7 @@ poll ▸ calibrate ▸ low-pass ▸ fuse ▸ (every 16th tick) solve ▸ command
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from master.suit.frame import Frame
 from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol
+
+MOST_BRIDGED = 20
+"""Ticks (0.1 s); what the operator did in a longer stall cannot be told from its ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,8 @@ class MasterPipeline:
         self.solver = JointSolver(self.skeleton)
         self._decimation = config.capture.decimation
         self._window_open = False
+        self._last_sweep: Sweep | None = None
+        self._decided_period = -1
 
     def tick(self, tick: int, now_ns: int) -> tuple[Frame, Solved | None]:
         """Open a tick: the SYNC frame for every bus, and what the last window gave if it was still open."""
@@ -76,8 +81,16 @@ class MasterPipeline:
         """Take the tick's answers through the filters; the joint angles if this tick decides."""
         self._window_open = False
         sweep = self.poll.close_window(now_ns)
+        for bridge in bridged(self._last_sweep, sweep):
+            self.estimator.update(bridge)
+        self._last_sweep = sweep
         self.estimator.update(sweep)
-        return self._solve(sweep) if sweep.tick % self._decimation == 0 else None
+        # a deciding tick that was missed is made up for by the next, or a command would fall out
+        period = sweep.tick // self._decimation
+        if period == self._decided_period:
+            return None
+        self._decided_period = period
+        return self._solve(sweep)
 
     def _solve(self, sweep: Sweep) -> Solved:
         posture = self.estimator.posture()
@@ -93,6 +106,27 @@ class MasterPipeline:
             velocity_rad_s=np.where(known, velocity, 0.0),
             valid=known,
         )
+
+
+def bridged(last: Sweep | None, now: Sweep) -> list[Sweep]:
+    """Readings on a straight line for the ticks that were missed between two sweeps, oldest first.
+
+    The filters count time in ticks: without this a missed tick would lose what the operator turned in it.
+    """
+    if last is None or not 1 < now.tick - last.tick <= MOST_BRIDGED + 1:
+        return []
+    gap = now.tick - last.tick
+    return [_between(last, now, i / gap) for i in range(1, gap)]
+
+
+def _between(last: Sweep, now: Sweep, share: float) -> Sweep:
+    return replace(
+        now,
+        acc_m_s2=last.acc_m_s2 + share * (now.acc_m_s2 - last.acc_m_s2),
+        gyr_rad_s=last.gyr_rad_s + share * (now.gyr_rad_s - last.gyr_rad_s),
+        # not the magnetometer: where one reading is missing there is nothing between
+        fresh=last.fresh & now.fresh,
+    )
 
 
 class CommandWriter:

@@ -6,7 +6,7 @@ import asyncio
 from collections import Counter
 from typing import Any
 
-from common.clock import monotonic_ns
+from common.clock import monotonic_ns, to_ns
 from common.codec import decode
 from common.errors import CodecError
 from common.link import Link
@@ -91,16 +91,12 @@ class Observer:
 
     @property
     def ready(self) -> bool:
-        """Whether engaging makes sense: clock trusted, lease held, every joint known."""
+        """Whether engaging makes sense: every joint known, and the robot takes the master's commands."""
         command, state = self.command, self.state
-        return (
-            command is not None
-            and state is not None
-            and state.guard == "hold"
-            and state.offset_bound_ns >= 0
-            and command.lease != 0
-            and bool(command.valid.all())
-        )
+        if command is None or state is None or state.echo is None or state.guard != "hold":
+            return False
+        taken_ns = state.sent_ns - state.echo.received_ns
+        return bool(command.valid.all()) and taken_ns < to_ns(2.0 / COMMAND.rate_hz)
 
     def waiting_for(self) -> str:
         """What is missing until `ready`, in words."""
@@ -116,4 +112,6 @@ class Observer:
             return "the master does not hold the robot's lease"
         if state.offset_bound_ns < 0:
             return "the clock offset is not trusted yet"
+        if not self.ready and state.guard == "hold":
+            return "the robot takes no command yet"
         return f"the guard is in {state.guard}: {state.reason}"

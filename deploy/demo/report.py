@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from deploy.demo.rig import Rig
 from deploy.judge import Accuracy, Motion, accuracy, motion
-from deploy.judge.paper import TABLE_1
 
 if TYPE_CHECKING:
     from deploy.demo.run import DemoOptions
@@ -107,14 +106,5 @@ def _accuracy(judged: Accuracy) -> dict[str, dict[str, float] | None]:
     }
 
 
-def _table_1(judged: Accuracy) -> dict[str, dict[str, float | None]]:
-    table: dict[str, dict[str, float | None]] = {}
-    for joint in TABLE_1:
-        worse = judged.worse(joint)
-        table[joint] = {
-            "mean_error_deg": judged.mean_error_deg(joint),
-            "worse_error_deg": worse.error_deg if worse else None,
-            "worse_rmse_deg": worse.rmse_deg if worse else None,
-            "change_deg": worse.change_deg if worse else None,
-        }
-    return table
+def _table_1(judged: Accuracy) -> dict[str, dict[str, float] | None]:
+    return {name: None if row is None else asdict(row) for name, row in judged.fast.items()}

@@ -5,12 +5,16 @@ from __future__ import annotations
 import asyncio
 from dataclasses import asdict
 
+import can
+
 from common.clock import to_s
 from master.suit.bus import SuitBus
+from master.suit.nodes import BusConfig
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
+from master.suit.simulated.echo import open_deaf_to_answers
 from master.suit.simulated.faults import Outgoing
-from master.suit.simulated.peer import PublishTruth, SuitPeer
+from master.suit.simulated.peer import NewestSync, PublishTruth, SuitPeer
 from master.suit.simulated.suit import build_suit
 
 
@@ -33,12 +37,20 @@ async def run(
         else:
             bus.send(outgoing.frame)
 
+    def opener(bus: BusConfig) -> can.BusABC:
+        return open_deaf_to_answers(bus, protocol.sync(0))
+
     peer = SuitPeer(suit, protocol, send, publish_truth)
-    buses = {bus.name: SuitBus(bus, peer.on_frame) for bus in config.buses}
+    newest = NewestSync(protocol.sync_id, peer.on_frame, loop.call_soon)
+    buses = {bus.name: SuitBus(bus, newest.on_frame, opener=opener) for bus in config.buses}
     try:
         for bus in buses.values():
             bus.open()
         await stop.wait()
     finally:
         await asyncio.gather(*(bus.close() for bus in buses.values()))
-    return {**asdict(peer.counters), "buses": {name: bus.summary() for name, bus in buses.items()}}
+    return {
+        **asdict(peer.counters),
+        "stale_syncs": newest.stale,
+        "buses": {name: bus.summary() for name, bus in buses.items()},
+    }

@@ -12,6 +12,7 @@ from master.suit.simulated.suit import SimulatedSuit
 
 Send = Callable[[Outgoing], None]
 PublishTruth = Callable[[Truth], None]
+OnFrame = Callable[[str, int, bytes, int], None]
 
 
 @dataclass(slots=True)
@@ -82,3 +83,33 @@ class SuitPeer:
         for outgoing in answer.frames:
             self._waiting.setdefault(outgoing.bus, []).append(outgoing)
         return answer.truth
+
+
+class NewestSync:
+    """Hands on, for each bus, only the newest of the SYNCs that wait: a worn node answers no old ones.
+
+    Without it a suit that was held up for some ticks would answer each of them too late, and stay late.
+    """
+
+    def __init__(self, sync_id: int, on_frame: OnFrame, soon: Callable[[Callable[[], None]], object]) -> None:
+        """`soon` calls a function back once all frames that wait have been heard."""
+        self._sync_id = sync_id
+        self._on_frame = on_frame
+        self._soon = soon
+        self._newest: dict[str, tuple[bytes, int]] = {}
+        self.stale = 0
+        """SYNCs that a newer one replaced before they were answered."""
+
+    def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        """A frame was heard on a bus; only SYNCs matter."""
+        if frame_id != self._sync_id:
+            return
+        if not self._newest:
+            self._soon(self._hand_on)
+        self.stale += bus in self._newest
+        self._newest[bus] = (data, now_ns)
+
+    def _hand_on(self) -> None:
+        newest, self._newest = self._newest, {}
+        for bus, (data, now_ns) in newest.items():
+            self._on_frame(bus, self._sync_id, data, now_ns)
