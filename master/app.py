@@ -52,9 +52,9 @@ class Master:
     async def run(self) -> None:
         """Capture, send, keep the lease and the clock until cancelled."""
         self._link.declare_alive("master")
-        for bus in self._buses:
-            bus.open()
         try:
+            for bus in self._buses:
+                bus.open()
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._capture())
                 tasks.create_task(self._keep_lease())
@@ -69,6 +69,8 @@ class Master:
         async for due in ticks(TickGrid(monotonic_ns() + period_ns, period_ns)):
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
+            for bus in self._buses:
+                bus.read()  # answers that are here already are not late, however late this tick runs
             sync, late = self._pipeline.tick(due.tick, monotonic_ns())
             for bus in self._buses:
                 bus.send(sync)

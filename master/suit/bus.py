@@ -139,6 +139,11 @@ class SuitBus:
         self._send_errors_in_a_row = 0
         self._attempt = 0
 
+    def read(self) -> None:
+        """Hand on the frames that wait, now."""
+        if self._reader is not None:
+            self._reader.read()
+
     def summary(self) -> dict[str, object]:
         """State and counters as plain values."""
         return {"up": self.up, "last_error": self.last_error, **asdict(self.counters)}

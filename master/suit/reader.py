@@ -33,6 +33,9 @@ class Reader(Protocol):
     def join(self) -> None:
         """Wait until the bus is no longer touched; call it off the loop."""
 
+    def read(self) -> None:
+        """Call back now for what waits, without waiting for the loop's turn."""
+
 
 class DescriptorReader:
     """Reads when the loop says that the bus can be read."""
@@ -43,9 +46,12 @@ class DescriptorReader:
         self._bus, self._number, self._loop = bus, number, loop
         self._told, self._failed = told, failed
         self._stopped = False
-        loop.add_reader(number, self._read)
+        loop.add_reader(number, self.read)
 
-    def _read(self) -> None:
+    def read(self) -> None:
+        """Call back for each message that waits, but not for ever."""
+        if self._stopped:
+            return
         for _ in range(_FRAMES_A_WAKE_UP):
             try:
                 message = self._bus.recv(0)
@@ -104,6 +110,9 @@ class ThreadReader:
     def _on_error(self, error: Exception) -> None:
         if not self._stopped.is_set():
             self._failed(error)
+
+    def read(self) -> None:
+        """What the thread has read is on its way already."""
 
     def stop(self) -> None:
         """Ask the thread to end."""
