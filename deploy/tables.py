@@ -94,6 +94,20 @@ def motion_table(judged: Motion | None) -> RenderableType:
     return Group(table, Text(f"motion lag {judged.lag_ms:.0f} ms", "bold"))
 
 
+def strategies_table(as_run: Motion, replayed: Mapping[str, Motion]) -> RenderableType:
+    """The run beside what each strategy makes of the same commands on the virtual robot."""
+    table = _table("same commands, each strategy", "", "RMSE °", "lag ms", "aligned °", "roughness")
+    for name, judged in {"this run": as_run, **{f"{s}, replayed": m for s, m in replayed.items()}}.items():
+        table.add_row(
+            name,
+            _number(judged.rmse_deg, 2),
+            _number(judged.lag_ms, 0),
+            _number(judged.aligned_rmse_deg, 2),
+            _number(judged.roughness, 2),
+        )
+    return table
+
+
 def verdict_table(title: str, verdicts: Iterable[Verdict]) -> RenderableType:
     """Each figure beside its target, and whether it was met."""
     table = _table(title, "figure", "measured", "at most", "")

@@ -39,6 +39,7 @@ DEMO = (
     Target("master, memory", ("rss_mb", "master"), 150.0, "MB"),
     Target("last frame in → put, p99", ("frames_in_to_put_ms", "p99"), 3.0, "ms"),
     Target("motion lag", ("motion_lag_ms",), 25.0, "ms"),
+    Target("same-instant RMSE / hold's", ("rmse_over_hold",), 0.333),
     Target("roughness", ("motion", "roughness"), 2.5),
     Target("η (Eq. 25)", ("eta_percent",), ETA_PERCENT, "%"),
     *(

@@ -32,6 +32,8 @@ class Observer:
         self.guards_seen: list[str] = []
         self.states: list[RobotState] = []
         """While recording."""
+        self.commands: list[Command] = []
+        """While recording."""
         self._news = asyncio.Event()
         self._counts: Counter[str] = Counter()
         self._counted_ns = monotonic_ns()
@@ -62,6 +64,8 @@ class Observer:
             self.trace.add(message)
             if isinstance(message, RobotState):
                 self.states.append(message)
+            elif isinstance(message, Command):
+                self.commands.append(message)
         self._news.set()
 
     def rates_hz(self) -> dict[str, float]:

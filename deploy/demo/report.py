@@ -5,11 +5,20 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from deploy.demo.rig import Rig
+from common.config import load_config
+from deploy.demo.baseline import MOST_S, Comparison, arrivals, compare
+from deploy.demo.rig import EXAMPLES, Rig
 from deploy.judge import Accuracy, Motion, accuracy, motion
+from slave.config import SlaveConfig
 
 if TYPE_CHECKING:
     from deploy.demo.run import DemoOptions
+
+
+REPLAYED = (
+    f"the last {MOST_S:g} s (at most) of the run's accepted commands, replayed on the virtual robot by each "
+    "strategy; rmse_over_hold is the real robot's RMSE over the same instants, over that of hold"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +27,8 @@ class Report:
 
     accuracy: Accuracy
     motion: Motion | None
+    comparison: Comparison | None
+    """With the other strategies, on the same commands; None where there is nothing to judge."""
     tree: dict[str, Any]
     problems: list[str] = field(default_factory=list)
     """Why the run counts as failed, empty where it does not."""
@@ -30,6 +41,9 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
     truth, solved, moved = observer.trace.truth(), observer.trace.solved(), observer.trace.moved()
     solved_right = accuracy(truth, solved, names)
     moved_right = motion(truth, moved, names)
+    slave_config = load_config(EXAMPLES / "slave.toml", SlaveConfig)
+    accepted = arrivals(observer.commands, observer.states)
+    compared = compare(truth, moved, accepted, slave_config) if moved_right else None
     figures = {child.role: child.figures() for child in children}
     master, slave = figures.get("master", {}), figures.get("slave", {})
     problems = [f"{role} ended with status {status}" for role, status in statuses.items() if status != 0]
@@ -54,6 +68,9 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
         "round_trip_ms": master.get("round_trip_ms", {}),
         "motion_lag_ms": moved_right.lag_ms if moved_right else None,
         "motion": _motion(moved_right),
+        "motion_by_strategy": _motion_by_strategy(compared),
+        "motion_by_strategy_is": REPLAYED,
+        "rmse_over_hold": compared.rmse_over_hold if compared else None,
         "accuracy": _accuracy(solved_right),
         "eta_percent": solved_right.eta_percent,
         "table_1": _table_1(solved_right),
@@ -67,7 +84,7 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
         "exit_status": statuses,
         "problems": problems,
     }
-    return Report(solved_right, moved_right, tree, problems)
+    return Report(solved_right, moved_right, compared, tree, problems)
 
 
 def _commands(master: dict[str, Any], slave: dict[str, Any]) -> dict[str, Any]:
@@ -96,6 +113,15 @@ def _motion(judged: Motion | None) -> dict[str, float | None]:
         "rmse_deg": judged.rmse_deg if judged else None,
         "aligned_rmse_deg": judged.aligned_rmse_deg if judged else None,
         "roughness": judged.roughness if judged else None,
+    }
+
+
+def _motion_by_strategy(compared: Comparison | None) -> dict[str, dict[str, float | None]]:
+    if compared is None:
+        return {}
+    return {
+        strategy: {**_motion(judged), "lag_ms": judged.lag_ms}
+        for strategy, judged in compared.replayed.items()
     }
 
 

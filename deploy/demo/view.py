@@ -8,7 +8,15 @@ from rich.text import Text
 
 from deploy.demo.report import Report
 from deploy.demo.rig import Rig
-from deploy.tables import Live, accuracy_table, latency_table, live_view, motion_table, verdict_table
+from deploy.tables import (
+    Live,
+    accuracy_table,
+    latency_table,
+    live_view,
+    motion_table,
+    strategies_table,
+    verdict_table,
+)
 from deploy.targets import DEMO, verdicts
 
 
@@ -47,6 +55,8 @@ def print_report(report: Report, console: Console) -> None:
         console.print(Text("no truth to judge by: a recording has none", "yellow"))
     else:
         console.print(accuracy_table(report.accuracy), motion_table(report.motion))
+    if report.comparison is not None:
+        console.print(strategies_table(report.comparison.as_run, report.comparison.replayed))
     console.print(verdict_table("targets", verdicts(tree, DEMO)))
 
 

@@ -6,7 +6,15 @@ import pytest
 from rich.console import Console
 
 from deploy.judge import MovedSeries, SolvedSeries, TruthSeries, accuracy, motion
-from deploy.tables import Live, accuracy_table, latency_table, live_view, motion_table, verdict_table
+from deploy.tables import (
+    Live,
+    accuracy_table,
+    latency_table,
+    live_view,
+    motion_table,
+    strategies_table,
+    verdict_table,
+)
 from deploy.targets import BENCH, DEMO, verdicts
 
 NAMES = [
@@ -74,6 +82,19 @@ def test_the_motion_table_has_the_lag_and_the_moving_joints() -> None:
     assert "all moving joints" in shown
 
 
+def test_the_run_stands_beside_its_replays() -> None:
+    truth, _, moved = series()
+    judged = motion(truth, moved, NAMES)
+    assert judged is not None
+    shown = text(strategies_table(judged, {"hold": judged, "predict": judged}))
+    rows = [line.split() for line in shown.splitlines()]
+    assert [row[:2] for row in rows if row[-2:-1] == ["0.01"] or row[-3:-2] == ["50"]] == [
+        ["this", "run"],
+        ["hold,", "replayed"],
+        ["predict,", "replayed"],
+    ]
+
+
 def test_no_data_is_said_plainly() -> None:
     truth, solved, moved = series()
     moved.tracking[:] = False
@@ -122,10 +143,13 @@ def test_the_worse_side_is_held_against_the_paper() -> None:
 @pytest.mark.parametrize("width", [60, 80, 200])
 def test_nothing_is_wider_than_the_terminal_or_cut(width: int) -> None:
     truth, solved, moved = series()
+    judged = motion(truth, moved, NAMES)
+    assert judged is not None
     live = Live(1.0, "hold", "the operator's deadman was let go and the robot holds " * 2, stages=STAGES)
     shown = [
         text(accuracy_table(accuracy(truth, solved, NAMES)), width),
-        text(motion_table(motion(truth, moved, NAMES)), width),
+        text(motion_table(judged), width),
+        text(strategies_table(judged, {"interpolate": judged}), width),
         text(latency_table(STAGES, stage(15.0)), width),
         text(verdict_table("bench", verdicts({}, BENCH)), width),
         text(live_view(live), width),
@@ -133,4 +157,4 @@ def test_nothing_is_wider_than_the_terminal_or_cut(width: int) -> None:
     for table in shown:
         assert max(map(len, table.splitlines())) <= width
     if width >= 80:
-        assert all("…" not in table for table in shown[:4])
+        assert all("…" not in table for table in shown[:5])
