@@ -77,13 +77,13 @@ def identity(count: int) -> Calibration:
     return _stack([NodeCalibration()] * count)
 
 
-def load_calibration(paths: Sequence[Path | str | None]) -> Calibration:
+def load_calibration(paths: Sequence[Path | None]) -> Calibration:
     """Read the nodes' files; a node without one gets the identity.
 
     Raises ConfigError naming file, key, value and what was expected.
     """
     same = NodeCalibration()
-    return _stack([same if path is None else load_config(Path(path), NodeCalibration) for path in paths])
+    return _stack([same if path is None else load_config(path, NodeCalibration) for path in paths])
 
 
 def _stack(nodes: list[NodeCalibration]) -> Calibration:

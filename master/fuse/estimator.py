@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, Protocol
 
 import numpy as np
@@ -75,8 +76,8 @@ class Node(Protocol):
         """Its own filter's name, or None."""
 
     @property
-    def calibration(self) -> str | None:
-        """Path of its calibration file, or None."""
+    def calibration(self) -> Path | None:
+        """Its calibration file, or None."""
 
 
 class Readings(Protocol):

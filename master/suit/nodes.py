@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from common.config import Section
+from common.config import RelativePath, Section
 
 
 class BusConfig(Section):
@@ -35,5 +35,5 @@ class NodeConfig(Section):
     """False: it has none, and its filter runs on gyro and accelerometer."""
     filter: Literal["vqf", "mahony"] | None = None
     """Orientation filter of this node; None takes the suit's."""
-    calibration: str | None = None
-    """Path of its calibration TOML; None leaves the readings as they come."""
+    calibration: RelativePath | None = None
+    """Its calibration TOML; None leaves the readings as they come."""

@@ -51,6 +51,15 @@ def test_one_line_a_mistake(override: str, expected: list[str]) -> None:
         assert part in lines[0]
 
 
+def test_a_calibration_lies_beside_the_file_that_names_it(tmp_path: Path) -> None:
+    moved = tmp_path / "master.toml"
+    moved.write_text(EXAMPLE.read_text("utf-8"), "utf-8")
+    config = load_config(moved, MasterConfig, ['nodes.head.calibration="nodes/head.toml"'])
+    assert config.nodes["head"].calibration == tmp_path / "nodes" / "head.toml"
+    assert config.nodes["chest"].calibration is None
+    assert mistakes("nodes.head.calibration=3")[0].startswith(f"{EXAMPLE}: nodes.head.calibration = 3: ")
+
+
 def test_a_missing_node_and_a_missing_deadman_are_named() -> None:
     text = EXAMPLE.read_text("utf-8").replace('head = { id = 2, bus = "suit" }\n', "")
     with pytest.raises(ConfigError, match=r"nodes\.head"):

@@ -32,7 +32,7 @@ SETTLE_TICKS = 20
 @dataclass(frozen=True, slots=True)
 class Node:
     filter: str | None = None
-    calibration: str | None = None
+    calibration: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,7 +309,7 @@ def test_the_gyro_s_bias_that_the_filter_learns_is_no_motion() -> None:
 def test_calibrations_are_read_from_the_files_that_the_nodes_name(tmp_path: Path) -> None:
     path = tmp_path / "node.toml"
     path.write_text("q_sensor_from_segment = [0, 1, 0, 0]")
-    fuse = Estimator(QUICK, [Node(), Node(calibration=str(path))], RATE_HZ)
+    fuse = Estimator(QUICK, [Node(), Node(calibration=path)], RATE_HZ)
     rest(fuse, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), 60)
     turned = angle_between(np.array([1.0, 0.0, 0.0, 0.0]), fuse.posture().q_world_from_segment)
     assert np.allclose(turned, [0.0, np.pi], atol=0.01)
