@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
 import can
+import pytest
 import uvloop
 
 from master.suit.bus import SuitBus
@@ -191,10 +192,11 @@ def test_close_may_be_called_again_and_before_open(wire: Wire) -> None:
 
 
 def test_an_error_frame_is_counted_and_not_handed_on(wire: Wire) -> None:
+    if wire.near.channel != wire.far.channel:
+        pytest.skip("an error frame is one controller's own word: none crosses a wire between two cards")
+
     async def test() -> None:
         async with both_ends(wire) as (near, _), stranger(wire) as other:
-            if "can1" in (wire.far.channel, wire.near.channel):
-                return  # error frames do not cross a real wire
             protocol_violation = 0x008
             other.send(
                 can.Message(
