@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.clock import to_ns
 from common.messages import Mask
@@ -62,11 +63,16 @@ class Alignment:
 
 
 class Rejoin:
-    """Joints that were held in `track` and are valid again: slow until near, then as fast as the rest."""
+    """Joints that were held in `track` and are valid again: slow until near, then as fast as the rest.
+
+    Near for the dwell time, as in `align`: a target that is still on its way from where the tracker had the
+    lost joint (the master says 0) crosses the window, and must not let the joint go as it passes.
+    """
 
     def __init__(self, limits: Limits, config: GuardConfig) -> None:
         self._limits = limits
         self._window_rad = config.align_window_rad
+        self._dwell_ns = to_ns(config.align_dwell_s)
         self.slow_velocity_rad_s: Array = np.minimum(limits.max_velocity_rad_s, config.align_velocity_rad_s)
         """(J,) the speed of `align`."""
         self.slow_acceleration_rad_s2: Array = np.minimum(
@@ -74,16 +80,20 @@ class Rejoin:
         )
         """(J,) and its acceleration."""
         self._away: Mask = np.zeros(len(limits.lower_rad), np.bool_)
+        self._outside_ns: NDArray[np.int64] = np.zeros(len(limits.lower_rad), np.int64)
 
-    def begin(self, valid: Mask) -> None:
+    def begin(self, now_ns: int, valid: Mask) -> None:
         """`track` begins: joints that are not valid did not align with the rest."""
         self._away = ~valid
+        self._outside_ns.fill(now_ns)
 
-    def maxima(self, error_rad: Array, valid: Mask) -> tuple[Array, Array]:
+    def maxima(self, now_ns: int, error_rad: Array, valid: Mask) -> tuple[Array, Array]:
         """Velocity and acceleration (J,) for this step; `error_rad` (J,) is from setpoint to target."""
         if valid.all() and not self._away.any():
             return self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2
-        self._away = ~valid | (self._away & ~within(error_rad, self._window_rad))
+        outside = ~valid | ~within(error_rad, self._window_rad)
+        np.copyto(self._outside_ns, now_ns, where=outside)
+        self._away = ~valid | (self._away & (outside | (now_ns - self._outside_ns < self._dwell_ns)))
         return (
             np.where(self._away, self.slow_velocity_rad_s, self._limits.max_velocity_rad_s),
             np.where(self._away, self.slow_acceleration_rad_s2, self._limits.max_acceleration_rad_s2),

@@ -103,7 +103,7 @@ class Guard:
         """Judge a command that arrived at `received_ns`.
 
         One that is refused changes nothing but counters, except that a released deadman makes the
-        robot hold.
+        robot hold, and refuse to engage until it is held again.
         """
         received_ns = min(received_ns, now_ns)
         self.counters.received += 1
@@ -119,6 +119,8 @@ class Guard:
             self.counters.dropped[verdict.gate] += 1
             self._refusal = verdict.reason
             if verdict.gate == DEADMAN:
+                # the operator's newest word: what was said before it may neither engage nor come after it
+                self._newest_sequence, self._command_ns = command.sequence, None
                 self._lose(now_ns, DEADMAN, verdict.reason)
             return verdict
         self.counters.accepted += 1
@@ -240,7 +242,7 @@ class Guard:
         self.events.add(Change(now_ns, self.state, after, reason))
         self.state, self.reason = after, reason
         if after is State.TRACK:
-            self._rejoin.begin(self._valid)
+            self._rejoin.begin(now_ns, self._valid)
         else:
             # what the operator did before must not move the robot after
             self._tracker.reset()
@@ -271,7 +273,7 @@ class Guard:
         if aligning:
             maxima = self._rejoin.slow_velocity_rad_s, self._rejoin.slow_acceleration_rad_s2
         else:
-            maxima = self._rejoin.maxima(error, self._valid)
+            maxima = self._rejoin.maxima(now_ns, error, self._valid)
         clamps = self._limiter.step(
             now_ns, dt_s, target.position_rad, target.velocity_rad_s, ~self._valid, *maxima
         )

@@ -177,6 +177,25 @@ def test_a_released_deadman_holds_at_once(rig: Any) -> None:
     assert rig.guard.counters.losses == {"deadman": 1}
 
 
+def test_with_the_deadman_released_nothing_engages(rig: Any) -> None:
+    rig.to_leased()
+    assert rig.send().accepted
+    rig.send(deadman_held=False)
+    reply = rig.ask(Action.ENGAGE)
+    assert not reply.done
+    assert "deadman is released" in reply.text
+    assert rig.send().accepted
+    assert rig.ask(Action.ENGAGE).done
+
+
+def test_a_command_overtaken_by_the_release_of_the_deadman_is_refused(rig: Any) -> None:
+    rig.to_leased()
+    overtaken = rig.command(sequence=rig.sequence + 1)
+    rig.give(rig.command(sequence=rig.sequence + 2, deadman_held=False))
+    assert rig.give(overtaken).gate == "sequence"
+    assert not rig.ask(Action.ENGAGE).done
+
+
 @pytest.mark.parametrize("case", [c for c in CASES if c.gate not in ("lease", "robot")], ids=ids)
 def test_refused_commands_do_not_renew_the_lease(rig: Any, case: Case) -> None:
     rig.to_leased()

@@ -9,6 +9,7 @@ import pytest
 from slave.guard import State, align
 from slave.guard.align import Alignment, Rejoin
 from slave.guard.config import GuardConfig
+from slave.track.config import TrackConfig, make_tracker
 
 MakeRig = Callable[..., Any]
 MS = 1_000_000
@@ -189,8 +190,26 @@ def test_all_nodes_lost_holds_every_joint_but_the_stream_keeps_the_state(rig: An
     assert rig.guard._limiter.at_rest
 
 
+@pytest.mark.parametrize("strategy", ["hold", "interpolate", "predict"])
+def test_a_target_that_sweeps_past_a_held_joint_does_not_let_it_go(rig: Any, strategy: str) -> None:
+    # the master says 0 of a lost joint, so on return the target comes from there, past where the joint is held
+    rig.guard._tracker = make_tracker(TrackConfig.model_validate({"strategy": strategy}))
+    rig.target[6] = 0.4
+    rig.measured = rig.measured.copy()
+    rig.measured[6] = 0.4
+    rig.to_align()
+    rig.run(1.0)
+    assert rig.guard.state is State.TRACK
+    unknown = rig.target.copy()
+    unknown[6] = 0.0
+    rig.run(0.5, valid=lost(rig, 6), position_rad=unknown)
+    rig.target[6] = 1.2
+    back = rig.run(1.0)
+    assert max(abs(s.velocity_rad_s[6]) for s in back) <= rig.config.align_velocity_rad_s + 1e-12
+
+
 def test_without_rejoin_it_would_come_back_at_full_speed(rig: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: Rejoin, error_rad: Any, valid: Any) -> Any:
+    def full(self: Rejoin, now_ns: int, error_rad: Any, valid: Any) -> Any:
         return self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2
 
     monkeypatch.setattr(Rejoin, "maxima", full)
