@@ -26,6 +26,14 @@ app = typer.Typer(
 )
 _debug = False
 
+
+def _in_a_folder(path: Path | None) -> Path | None:
+    """Before the work that is to be written there, not after."""
+    if path is not None and not path.absolute().parent.is_dir():
+        raise typer.BadParameter(f"there is no folder {path.parent}")
+    return path
+
+
 ConfigFile = Annotated[Path, typer.Argument(help="TOML file; deploy/examples has one to start from.")]
 Overrides = Annotated[
     list[str] | None,
@@ -34,7 +42,13 @@ Overrides = Annotated[
     ),
 ]
 Figures = Annotated[
-    Path | None, typer.Option(help="Write what was counted, as JSON, when stopped.", dir_okay=False)
+    Path | None,
+    typer.Option(
+        help="Write what was counted, as JSON, when stopped.", dir_okay=False, callback=_in_a_folder
+    ),
+]
+ReportFile = Annotated[
+    Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=_in_a_folder)
 ]
 Connect = Annotated[list[str], typer.Option(help="The robot's endpoint.")]
 Robot = Annotated[str, typer.Option(help="The robot's name.")]
@@ -96,7 +110,7 @@ def suit(config: ConfigFile, set_: Overrides = None, figures: Figures = None) ->
 @app.command()
 def demo(
     seconds: Annotated[float, typer.Option(help="How long to follow the operator.", min=3.0)] = 20.0,
-    report: Annotated[Path | None, typer.Option(help="Write the report as JSON.", dir_okay=False)] = None,
+    report: ReportFile = None,
     transport: Annotated[str, typer.Option(help="tcp, udp, ws or unixsock-stream.")] = "tcp",
     replay: Annotated[
         Path | None, typer.Option(help="A person's recording (.npz) instead of a simulated one.", exists=True)
@@ -129,7 +143,7 @@ def demo(
 
 @app.command()
 def bench(
-    report: Annotated[Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False)] = None,
+    report: ReportFile = None,
     quick: Annotated[bool, typer.Option(help="A few seconds, rougher figures.")] = False,
 ) -> None:
     """Measure whether this machine is good enough.
@@ -154,13 +168,19 @@ def engage(connect: Connect, robot: Robot, operator: Operator) -> None:
 
 @app.command()
 def disengage(connect: Connect, robot: Robot, operator: Operator) -> None:
-    """Let the robot hold where it is."""
+    """Let the robot hold where it is.
+
+    Example: `tandem disengage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
+    """
     _ask(robot, Action.DISENGAGE, connect, operator)
 
 
 @app.command()
 def estop(connect: Connect, robot: Robot) -> None:
-    """Stop the robot now. Anyone may; it stays stopped until it is reset."""
+    """Stop the robot now. Anyone may; it stays stopped until it is reset.
+
+    Example: `tandem estop --connect tcp/192.168.7.2:7447 --robot robot-1`
+    """
     _ask(robot, Action.ESTOP, connect)
 
 
@@ -170,13 +190,19 @@ def reset(
     robot: Robot,
     key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
 ) -> None:
-    """Leave an emergency stop: the robot then holds, it does not move."""
+    """Leave an emergency stop: the robot then holds, it does not move.
+
+    Example: `tandem reset --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
+    """
     _ask(robot, Action.RESET, connect, key=key)
 
 
 @app.command()
 def status(connect: Connect, robot: Robot) -> None:
-    """Ask a robot what it does."""
+    """Ask a robot what it does.
+
+    Example: `tandem status --connect tcp/192.168.7.2:7447 --robot robot-1`
+    """
     _ask(robot, Action.STATUS, connect)
 
 

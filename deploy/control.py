@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from common.codec import decode, encode
-from common.config import LinkConfig
+from common.config import LinkConfig, check_config
 from common.link import open_link
 from common.messages import Action, ControlReply, ControlRequest
 from common.topics import CONTROL
@@ -12,8 +14,12 @@ from common.topics import CONTROL
 async def ask_robot(
     robot: str, action: Action, connect: list[str], operator: str = "", key: str = ""
 ) -> ControlReply:
-    """Ask the robot at one of the endpoints. Raises LinkError when it does not answer."""
-    async with open_link(LinkConfig(connect=connect), robot) as link:
+    """Ask the robot at one of the endpoints.
+
+    Raises ConfigError for an endpoint that is none, LinkError when the robot does not answer.
+    """
+    config = check_config(Path("command line"), {"connect": connect}, LinkConfig)
+    async with open_link(config, robot) as link:
         await link.connected(CONTROL)
         reply = await link.ask(CONTROL, encode(ControlRequest(robot, action, operator, key)))
         return decode(reply, ControlReply)

@@ -21,8 +21,11 @@ STOP_S = 5.0
 class Child:
     """One `tandem ROLE FILE` process. Its log and its figures lie in the run's folder."""
 
-    def __init__(self, role: str, folder: Path) -> None:
+    def __init__(
+        self, role: str, folder: Path, tandem: Sequence[str] = (sys.executable, "-m", "deploy")
+    ) -> None:
         self.role = role
+        self._tandem = tandem
         self.log = folder / f"{role}.log"
         self.figures_file = folder / f"{role}.figures.json"
         self._process: asyncio.subprocess.Process | None = None
@@ -34,9 +37,7 @@ class Child:
     async def start(self, config: Path, overrides: Sequence[str]) -> None:
         """Start it; its output goes to the log."""
         arguments = [
-            sys.executable,
-            "-m",
-            "deploy",
+            *self._tandem,
             self.role,
             str(config),
             "--figures",
@@ -60,8 +61,11 @@ class Child:
         """Take a sample of CPU time and memory; `first` begins the period that `cpu_percent` covers."""
         if self._usage is None or self._process is None or self._process.returncode is not None:
             return
-        with self._usage.oneshot():
-            times, self.rss_mb = self._usage.cpu_times(), self._usage.memory_info().rss / 1e6
+        try:
+            with self._usage.oneshot():
+                times, self.rss_mb = self._usage.cpu_times(), self._usage.memory_info().rss / 1e6
+        except psutil.Error:  # it has just ended: `check` will tell
+            return
         self._cpu_to = (asyncio.get_running_loop().time(), times.user + times.system)
         if first:
             self._cpu_from = self._cpu_to

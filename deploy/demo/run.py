@@ -48,6 +48,16 @@ class DemoOptions:
 
 async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
     """Run it and judge it. Raises TandemError when a process fails or the robot never reaches `track`."""
+    try:
+        return await _story(options, stop, console)
+    except TandemError:
+        # a Ctrl-C reaches the processes too: that they end is then no failure
+        if stop.is_set():
+            raise TandemError("interrupted: nothing was judged") from None
+        raise
+
+
+async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
     async with open_rig(options.transport, options.overrides()) as rig:
         for role in ROLES:
             await rig.start(role)
