@@ -140,18 +140,17 @@ def _unpack_echo(value: object) -> CommandEcho | None:
 
 
 def _pack_control_request(m: ControlRequest) -> tuple[Any, ...]:
-    return (m.robot, m.action.value, m.operator, m.key)
+    return (m.robot, m.action.value, m.operator, m.key, m.clock)
 
 
 def _unpack_control_request(f: tuple[Any, ...], _: int) -> ControlRequest:
-    fields.length(f, 4)
+    fields.length(f, 5)
     try:
         action = Action(fields.text(f[1], MAX_NAME))
     except ValueError:
         raise CodecError(f"action {fields.short(f[1])}, expected one of {', '.join(Action)}") from None
-    return ControlRequest(
-        fields.text(f[0], MAX_NAME), action, fields.text(f[2], MAX_NAME), fields.text(f[3], MAX_TEXT)
-    )
+    operator, key = fields.text(f[2], MAX_NAME), fields.text(f[3], MAX_TEXT)
+    return ControlRequest(fields.text(f[0], MAX_NAME), action, operator, key, fields.count(f[4]))
 
 
 def _pack_control_reply(m: ControlReply) -> tuple[Any, ...]:
@@ -166,11 +165,11 @@ def _unpack_control_reply(f: tuple[Any, ...], _: int) -> ControlReply:
 
 
 def _pack_clock_query(m: ClockQuery) -> tuple[Any, ...]:
-    return (m.asked_ns, m.last_asked_ns, m.last_heard_ns)
+    return (m.asked_ns, m.last_asked_ns, m.last_heard_ns, m.asker)
 
 
 def _unpack_clock_query(f: tuple[Any, ...], _: int) -> ClockQuery:
-    fields.length(f, 3)
+    fields.length(f, 4)
     return ClockQuery(*fields.counts(f))
 
 

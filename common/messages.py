@@ -108,6 +108,8 @@ class ControlRequest:
     """Who asks; `engage` and `disengage` are for the lease holder's name only."""
     key: str = ""
     """The reset key, for `reset`."""
+    clock: int = 0
+    """For `claim`: the asker whose clock queries tell of the clock that stamps this master's commands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +133,8 @@ class ClockQuery:
     """t1 of the exchange before, 0 where there was none."""
     last_heard_ns: int = 0
     """t4 of the exchange before."""
+    asker: int = 0
+    """A number that only this asker uses; 0 where it has none."""
 
 
 @dataclass(frozen=True, slots=True)

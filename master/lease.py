@@ -14,9 +14,11 @@ GRACE_S = 0.5
 class LeaseKeeper:
     """Claims once the robot is heard, keeps the token, drops it when the robot names another holder."""
 
-    def __init__(self, robot: str, operator: str) -> None:
+    def __init__(self, robot: str, operator: str, clock: int = 0) -> None:
+        """`clock`: the number by which this master asks for the slave's clock (`MasterExchange.asker`)."""
         self._robot = robot
         self._operator = operator
+        self._clock = clock
         self._next_claim_ns = 0
         self._granted_ns = 0
         self.token = 0
@@ -27,7 +29,7 @@ class LeaseKeeper:
         if self.token or now_ns < self._next_claim_ns:
             return None
         self._next_claim_ns = now_ns + to_ns(RETRY_S)
-        return ControlRequest(self._robot, Action.CLAIM, self._operator)
+        return ControlRequest(self._robot, Action.CLAIM, self._operator, clock=self._clock)
 
     def on_reply(self, reply: ControlReply, now_ns: int) -> None:
         """Take the robot's answer to a claim."""

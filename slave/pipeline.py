@@ -10,6 +10,7 @@ import numpy as np
 from common.codec import decode, encode
 from common.errors import CodecError
 from common.messages import (
+    Action,
     ClockQuery,
     Command,
     ControlReply,
@@ -62,7 +63,10 @@ class SlavePipeline:
         except CodecError as error:
             self._count("control")
             return encode(ControlReply(False, self.guard.state, f"not understood: {error}"))
-        return encode(self.guard.on_control(request, now_ns))
+        reply = self.guard.on_control(request, now_ns)
+        if request.action is Action.CLAIM and reply.done:
+            self.clock.follow(request.clock)
+        return encode(reply)
 
     def on_clock(self, payload: bytes, received_ns: int, now_ns: int) -> bytes:
         """Answer the master's clock query. Raises CodecError, which the link counts."""

@@ -98,9 +98,9 @@ messages = st.one_of(
     commands(),
     states(),
     truths(),
-    st.builds(ControlRequest, names, st.sampled_from(Action), names, texts),
+    st.builds(ControlRequest, names, st.sampled_from(Action), names, texts, counts),
     st.builds(ControlReply, flags, names, texts, counts),
-    st.builds(ClockQuery, counts, counts, counts),
+    st.builds(ClockQuery, counts, counts, counts, counts),
     st.builds(ClockReply, counts, counts, counts),
     st.builds(Statistics, names, counts, trees),
 )

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from common.clock import NS_PER_S, to_ns
 from common.messages import ClockQuery, ClockReply
 from common.offset import NEVER_MEASURED, UNKNOWN_NS, MasterExchange, Offset, OffsetEstimator, SlaveExchange
+from common.offset.exchange import MOST_ASKERS
 
 MS = 1_000_000
 HOUR = 3600 * NS_PER_S
@@ -290,6 +291,33 @@ def test_after_a_second_of_silence_the_next_asker_is_followed() -> None:
     assert slave.estimator.steps == 1
     assert offset.trusted
     assert abs(offset.offset_ns - ahead_ns) <= offset.bound_ns
+
+
+def test_the_asker_who_is_followed_is_measured_though_another_was_there_first() -> None:
+    waiting, holder, slave = MasterExchange(asker=7), MasterExchange(asker=8), SlaveExchange()
+    holder_ahead_ns = HOUR
+    for i in range(1, 21):
+        now_ns = converse(waiting, slave, RemoteClock(0, 0.0, 0), i * NS_PER_S // 4)
+        converse(holder, slave, RemoteClock(-holder_ahead_ns, 0.0, 0), now_ns + holder_ahead_ns)
+    slave.follow(8)
+    now_ns += 10 * MS
+    offset = slave.estimator.estimate(now_ns)
+    assert offset.trusted
+    assert abs(offset.offset_ns - holder_ahead_ns) <= offset.bound_ns
+    slave.follow(9)
+    assert not slave.estimator.estimate(now_ns).trusted
+
+
+def test_many_askers_never_drive_out_the_one_that_is_followed() -> None:
+    master, slave = MasterExchange(asker=7), SlaveExchange()
+    slave.follow(7)
+    for i in range(1, 9):
+        now_ns = converse(master, slave, RemoteClock(0, 0.0, 0), i * NS_PER_S // 4)
+    for asker in range(100, 100 + 3 * MOST_ASKERS):
+        slave.on_query(ClockQuery(1, asker=asker), now_ns, now_ns)
+    assert slave.estimator.estimate(now_ns).trusted
+    assert len(slave._askers) == MOST_ASKERS
+    assert slave.foreign == 3 * MOST_ASKERS
 
 
 @given(st.integers(0, 2**63 - 1), st.integers(0, 2**63 - 1), st.integers(0, 2**63 - 1))

@@ -14,6 +14,12 @@ def state(operator: str) -> RobotState:
     return RobotState("r", 1, 1, 1, "hold", "", operator, np.ones(25, np.bool_), zeros, zeros, None, 0, 1)
 
 
+def test_the_claim_names_the_clock_that_will_stamp_the_commands() -> None:
+    request = LeaseKeeper("r", "nurse", clock=7).request(0)
+    assert request is not None
+    assert request.clock == 7
+
+
 def granted(now_ns: int = NS_PER_S) -> LeaseKeeper:
     keeper = LeaseKeeper("r", "nurse")
     assert keeper.request(now_ns) is not None

@@ -192,7 +192,7 @@ def test_all_nodes_lost_holds_every_joint_but_the_stream_keeps_the_state(rig: An
 
 @pytest.mark.parametrize("strategy", ["hold", "interpolate", "predict"])
 def test_a_target_that_sweeps_past_a_held_joint_does_not_let_it_go(rig: Any, strategy: str) -> None:
-    # the master says 0 of a lost joint, so on return the target comes from there, past where the joint is held
+    # the master says 0 of a lost joint: on return the target comes from there, past where it is held
     rig.guard._tracker = make_tracker(TrackConfig.model_validate({"strategy": strategy}))
     rig.target[6] = 0.4
     rig.measured = rig.measured.copy()

@@ -1,0 +1,54 @@
+"""What the slave's parts do together, without a clock, a link or a servo."""
+
+from __future__ import annotations
+
+import pytest
+
+from common.clock import NS_PER_MS, NS_PER_S
+from common.codec import decode, encode
+from common.config import LinkConfig
+from common.errors import CodecError
+from common.messages import Action, ClockQuery, ClockReply, ControlReply, ControlRequest
+from common.offset import MasterExchange
+from slave.config import SlaveConfig
+from slave.pipeline import SlavePipeline
+
+HOUR_NS = 3600 * NS_PER_S
+
+
+@pytest.fixture
+def pipeline() -> SlavePipeline:
+    return SlavePipeline(SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"])))
+
+
+def converse(pipeline: SlavePipeline, master: MasterExchange, ahead_ns: int, now_ns: int) -> None:
+    """One exchange, 1 ms each way, with a master whose clock is ahead of the slave's."""
+    query = encode(master.query(now_ns + ahead_ns))
+    reply = decode(pipeline.on_clock(query, now_ns + NS_PER_MS, now_ns + NS_PER_MS), ClockReply)
+    assert master.on_reply(reply, now_ns + 2 * NS_PER_MS + ahead_ns)
+
+
+def claim(pipeline: SlavePipeline, operator: str, clock: int, now_ns: int) -> ControlReply:
+    request = ControlRequest("robot-1", Action.CLAIM, operator, clock=clock)
+    return decode(pipeline.on_control(encode(request), now_ns), ControlReply)
+
+
+def test_commands_are_judged_by_the_clock_of_who_holds_the_lease(pipeline: SlavePipeline) -> None:
+    # another operator's master was there first, waits for the lease, and goes on asking
+    ben, anna = MasterExchange(asker=7), MasterExchange(asker=8)
+    now_ns = NS_PER_S
+    for _ in range(8):
+        now_ns += NS_PER_S // 4
+        converse(pipeline, ben, 0, now_ns)
+        converse(pipeline, anna, HOUR_NS, now_ns + 10 * NS_PER_MS)
+    assert claim(pipeline, "anna", anna.asker, now_ns).done
+    assert not claim(pipeline, "ben", ben.asker, now_ns).done
+    offset = pipeline.clock.estimator.estimate(now_ns)
+    assert offset.trusted
+    assert abs(offset.offset_ns - HOUR_NS) <= offset.bound_ns
+
+
+def test_a_query_that_is_no_query_changes_nothing(pipeline: SlavePipeline) -> None:
+    with pytest.raises(CodecError, match="clock"):
+        pipeline.on_clock(encode(ControlReply(True, "", "")), 1, 1)
+    assert decode(pipeline.on_clock(encode(ClockQuery(5)), 6, 7), ClockReply) == ClockReply(5, 6, 7)
