@@ -12,7 +12,7 @@ from common.launch import WriteFigures
 from common.link import Link, open_link
 from common.messages import Statistics
 from common.pacing import TickGrid
-from common.runtime import until_stopped
+from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS
 from slave.config import SlaveConfig
@@ -48,7 +48,7 @@ class Slave:
     async def _drive(self) -> None:
         loop = self._config.loop
         period_ns = round(1e9 / loop.rate_hz)
-        said = ""
+        said, told = "", -1
         async for due in ticks(TickGrid(monotonic_ns() + period_ns, period_ns)):
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
@@ -56,7 +56,9 @@ class Slave:
             if setpoint.ready:
                 self._servos.write(setpoint.position_rad)
                 self._pipeline.written(monotonic_ns())
-            if due.tick % loop.state_every == 0:
+            # where the very tick was missed the next one tells, or an overloaded robot would seem dead
+            if due.tick // loop.state_every != told:
+                told = due.tick // loop.state_every
                 self._put_state(self._pipeline.state(monotonic_ns()))
             guard = self._pipeline.guard
             if guard.state != said:
@@ -107,6 +109,8 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
     try:
         async with open_link(config.link, config.robot) as link:
             slave = Slave(config, link, servos)
+            # the simulator came after the first freeze: to collect what it built takes longer than a tick
+            freeze_heap()
             try:
                 await until_stopped(stop, slave.run())
             finally:

@@ -1,0 +1,52 @@
+"""The slave's loop with a link and servos that are not there, on ticks that are given."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.config import LinkConfig
+from common.pacing import Due, TickGrid
+from common.topics import Topic
+from slave import app
+from slave.config import SlaveConfig
+from slave.servos import EncoderReading
+
+
+class FakeLink:
+    def __init__(self) -> None:
+        self.put: dict[str, int] = {}
+
+    def publish(self, topic: Topic) -> Callable[[bytes], None]:
+        def put(_: bytes) -> None:
+            self.put[topic.name] = self.put.get(topic.name, 0) + 1
+
+        return put
+
+    def subscribe(self, *_: object) -> None: ...
+
+    def answer(self, *_: object) -> None: ...
+
+
+class StillServos:
+    def read(self) -> EncoderReading:
+        return EncoderReading(0, np.zeros(25, np.int64), np.zeros(25, np.bool_))
+
+
+def test_a_loop_that_always_misses_every_second_tick_still_tells_the_state(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def odd_ticks(grid: TickGrid) -> AsyncIterator[Due]:
+        for tick in range(1, 41, 2):
+            yield Due(tick, grid.origin_ns, 1)
+
+    monkeypatch.setattr(app, "ticks", odd_ticks)
+    link: Any = FakeLink()
+    servos: Any = StillServos()
+    config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]))
+    asyncio.run(app.Slave(config, link, servos)._drive())
+    assert link.put == {"state": 40 // config.loop.state_every}
