@@ -21,6 +21,9 @@ _ACCELERATION_GAIN = 1.2
 """Share of the surprise in velocity, over the time since the last sample, taken as acceleration.
 
 Above 1, since the mean over the past period says what the acceleration was half a period ago."""
+_LEAST_SPAN_S = 0.03
+"""A surprise counts as spread over at least this time: noise, or the step of a newly measured clock offset, over
+the few ms between a sample made up for and the next would be an enormous acceleration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +98,7 @@ def _next(before: _Estimate, sampled_ns: int, position_rad: Array, velocity_rad_
         # unknown, or at rest: either way the positions tell
         velocity_rad_s = (position_rad - before.sample_rad) / elapsed_s
     expected = _carried(elapsed_s, 1.0) @ before.motion
-    surprise = (velocity_rad_s - expected[1]) / elapsed_s
+    surprise = (velocity_rad_s - expected[1]) / max(elapsed_s, _LEAST_SPAN_S)
     motion = np.stack(
         [
             expected[0] + _POSITION_GAIN * (position_rad - expected[0]),

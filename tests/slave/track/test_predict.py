@@ -145,3 +145,16 @@ def test_what_the_caller_does_to_its_arrays_does_not_move_the_robot() -> None:
     tracker.accept(0, 0, position, velocity)
     position[:], velocity[:] = 9.0, 9.0
     assert course(tracker, 1.0)[0] == pytest.approx(1.0)
+
+
+def test_two_samples_at_nearly_one_instant_make_no_enormous_acceleration() -> None:
+    """A late master makes up for a missed tick, or a better offset moves the second stamp next to the first."""
+    tracker = fresh()
+    for k in range(5):
+        feed(tracker, k, 0.0, 0.0)
+    at_ms = PERIOD * 4
+    tracker.accept(at_ms * MS + 1000, (at_ms + PERIOD) * MS, np.array([0.0]), np.array([0.1]))
+    for ms in range(at_ms + PERIOD, at_ms + 3 * PERIOD, 5):
+        position, velocity = course(tracker, ms)
+        assert abs(position) < 0.1
+        assert abs(velocity) < 2.0
