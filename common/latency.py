@@ -114,15 +114,22 @@ class Passage:
     frames_in_ns: int
     solved_ns: int
     put_ns: int
+    """Right before the command is encoded, since it is in the command: `put→received` holds the encoding."""
     received_ns: int
-    """Slave's clock, as the next three."""
+    """Slave's clock, as the next three. In the link's thread, before the loop wakes."""
     accepted_ns: int
+    """The loop took it up, and the gates then let it pass: to judge it is part of `accepted→written`."""
     written_ns: int
+    """The first setpoint after that was handed to the servos."""
     moved_ns: int
+    """The first encoder reading after that which differs; a robot that moves already differs at once."""
 
 
 class LatencyBudget:
-    """The stages of commands that went the whole way, recorded on the slave."""
+    """The stages of commands that went the whole way, recorded on the slave.
+
+    The others, refused, lost or followed by no motion, are in no row.
+    """
 
     def __init__(self) -> None:
         self._stages = StageTimes(*STAGES)

@@ -20,8 +20,9 @@ from common.messages import (
 from common.offset import SlaveExchange
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
-from slave.guard import Guard, Setpoint, State
+from slave.guard import Guard, Setpoint
 from slave.guard.lease import DrawToken, random_token
+from slave.guard.states import MOVING
 from slave.journey import Journeys
 from slave.servos.servos import EncoderReading
 from slave.track.config import make_tracker
@@ -54,7 +55,7 @@ class SlavePipeline:
             return
         offset = self.clock.estimator.estimate(now_ns)
         if self.guard.on_command(command, received_ns, now_ns, offset).accepted:
-            self.journeys.accepted(command, received_ns, now_ns, offset)
+            self.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
 
     def on_control(self, payload: bytes, now_ns: int) -> bytes:
         """Answer a request of a person or a master; never with silence."""
@@ -82,7 +83,7 @@ class SlavePipeline:
 
     def written(self, now_ns: int) -> None:
         """Note that the setpoint of this turn has reached the servos."""
-        if self._reading is not None and self.guard.state in (State.ALIGN, State.TRACK):
+        if self._reading is not None and self.guard.state in MOVING:
             self.journeys.written(now_ns, self._reading.counts)
 
     def state(self, now_ns: int) -> bytes:

@@ -89,6 +89,17 @@ def test_a_command_that_moved_nothing_is_counted_when_the_next_comes() -> None:
     assert journeys.budget.total()["count"] == 0
 
 
+def test_a_command_accepted_while_the_robot_holds_is_echoed_but_not_followed() -> None:
+    journeys = Journeys()
+    journeys.accepted(command(), at(5), at(6), OFFSET, moving=False)
+    # engaged meanwhile: what is written now is not of that command
+    journeys.written(at(70), STILL)
+    journeys.read(reading(75, STILL + 100))
+    assert journeys.budget.total()["count"] == 0
+    assert journeys.echo is not None
+    assert journeys.echo.written_ns == 0
+
+
 def test_the_echo_carries_the_newest_commands_stamps() -> None:
     journeys = Journeys()
     assert journeys.echo is None
