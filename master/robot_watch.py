@@ -11,7 +11,9 @@ from common.topics import STATE
 class RobotWatch:
     """The newest state, whether the robot has fallen silent, and round-trip times."""
 
-    def __init__(self) -> None:
+    def __init__(self, operator: str | None = None) -> None:
+        """`operator`: only while that one holds the lease the echoes are of this master's commands."""
+        self._operator = operator
         self.state: RobotState | None = None
         self.round_trip = RoundTrip()
         self._heard_ns = 0
@@ -24,7 +26,8 @@ class RobotWatch:
         self.state = state
         self._heard_ns = arrived_ns
         echo = state.echo
-        if echo is not None and echo.sequence != self._echoed:
+        ours = self._operator is None or state.operator == self._operator
+        if ours and echo is not None and echo.sequence != self._echoed:
             self._echoed = echo.sequence
             # the time on the slave is measured on the slave's clock alone, so no offset enters
             on_slave_ns = state.sent_ns - echo.received_ns

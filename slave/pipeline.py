@@ -67,6 +67,7 @@ class SlavePipeline:
         reply = self.guard.on_control(request, now_ns)
         if request.action is Action.CLAIM and reply.done:
             self.clock.follow(request.clock)
+            self.journeys.forget()
         return encode(reply)
 
     def on_clock(self, payload: bytes, received_ns: int, now_ns: int) -> bytes:

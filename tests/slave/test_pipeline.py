@@ -8,7 +8,15 @@ from common.clock import NS_PER_MS, NS_PER_S
 from common.codec import decode, encode
 from common.config import LinkConfig
 from common.errors import CodecError
-from common.messages import Action, ClockQuery, ClockReply, ControlReply, ControlRequest
+from common.messages import (
+    Action,
+    ClockQuery,
+    ClockReply,
+    CommandEcho,
+    ControlReply,
+    ControlRequest,
+    RobotState,
+)
 from common.offset import MasterExchange
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline
@@ -52,3 +60,11 @@ def test_a_query_that_is_no_query_changes_nothing(pipeline: SlavePipeline) -> No
     with pytest.raises(CodecError, match="clock"):
         pipeline.on_clock(encode(ControlReply(True, "", "")), 1, 1)
     assert decode(pipeline.on_clock(encode(ClockQuery(5)), 6, 7), ClockReply) == ClockReply(5, 6, 7)
+
+
+def test_a_new_holder_never_sees_the_echo_of_the_last_ones_commands(pipeline: SlavePipeline) -> None:
+    pipeline.journeys.echo = CommandEcho(9, 1, 2, 3, 4)
+    assert claim(pipeline, "anna", 8, NS_PER_S).done
+    state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
+    assert state.operator == "anna"
+    assert state.echo is None
