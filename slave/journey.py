@@ -2,9 +2,9 @@
 
 What the figures can say, and what not:
 
-- `moved` is the first change any encoder shows after the command was first written. While the robot is already
-  moving that is hardly more than the wait for the next reading: it proves that the loop is closed, not how soon
-  the robot answers. That is the motion lag, which is found by comparing whole motions.
+- `moved` is the first change any encoder shows after the command was first written. While the robot is
+  already moving that is hardly more than the wait for the next reading: it proves that the loop is closed,
+  not how soon the robot answers. That is the motion lag, which is found by comparing whole motions.
 - All rows are over the same commands: those that were accepted while the robot followed, and after which
   something moved before the next came. Commands that were lost, refused (the oldest are) or moved nothing are
   in no row, but in the guard's counters and in `unmoved`.
@@ -58,6 +58,10 @@ class Journeys:
             self.unmoved += 1
         self._underway = _Underway(command, received_ns, now_ns, offset) if moving else None
         self.echo = CommandEcho(command.sequence, command.stamps.put_ns, received_ns, now_ns, 0)
+
+    def forget(self) -> None:
+        """Somebody else's commands come from now on: the echo's stamps are of another clock than theirs."""
+        self.echo = self._underway = None
 
     def written(self, now_ns: int, counts: NDArray[np.int64]) -> None:
         """Note the first write after acceptance."""

@@ -22,8 +22,8 @@ _ACCELERATION_GAIN = 1.2
 
 Above 1, since the mean over the past period says what the acceleration was half a period ago."""
 _LEAST_SPAN_S = 0.03
-"""A surprise counts as spread over at least this time: noise, or the step of a newly measured clock offset, over
-the few ms between a sample made up for and the next would be an enormous acceleration."""
+"""A surprise counts as spread over at least this time. Over the few ms between a sample made up for and the
+next, or after a step of the measured clock offset, mere noise would be an enormous acceleration."""
 
 
 @dataclass(frozen=True, slots=True)

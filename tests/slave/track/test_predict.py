@@ -148,7 +148,7 @@ def test_what_the_caller_does_to_its_arrays_does_not_move_the_robot() -> None:
 
 
 def test_two_samples_at_nearly_one_instant_make_no_enormous_acceleration() -> None:
-    """A late master makes up for a missed tick, or a better offset moves the second stamp next to the first."""
+    """A late master makes up for a missed tick, or a better offset moves a stamp next to the one before."""
     tracker = fresh()
     for k in range(5):
         feed(tracker, k, 0.0, 0.0)
