@@ -8,6 +8,7 @@ from pydantic import Field
 
 from common.config import LinkConfig, RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
+from common.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from master.fuse.estimator import EstimationConfig
 from master.suit.nodes import BusConfig, NodeConfig
@@ -45,6 +46,7 @@ class MasterConfig(Section):
     estimation: EstimationConfig = EstimationConfig()
     nodes: dict[str, NodeConfig]
     link: LinkConfig
+    process: ProcessConfig = ProcessConfig()
 
     @property
     def skeleton(self) -> Skeleton:

@@ -12,6 +12,7 @@ from common.launch import WriteFigures
 from common.link import Link, open_link
 from common.messages import Statistics
 from common.pacing import TickGrid
+from common.realtime import take_priority
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS
@@ -91,6 +92,8 @@ class Slave:
             },
             "stages_ms": pipeline.journeys.budget.summary(),
             "end_to_end_ms": pipeline.journeys.budget.total(),
+            "one_way_ms": pipeline.one_way.summary(),
+            "early": pipeline.one_way.clamped,
             "unmoved": pipeline.journeys.unmoved,
             "offset": {
                 "offset_ms": to_ms(offset.offset_ns),
@@ -104,6 +107,7 @@ class Slave:
 
 async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
     """Run a slave until `stop` is set; the servos are left holding. Raises LinkError or RobotError."""
+    take_priority(config.process)  # first, so that every thread has it
     servos = open_servos(config.servos, config.skeleton, config.encoders)
     servos.start()
     try:

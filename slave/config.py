@@ -6,6 +6,7 @@ from pydantic import Field
 
 from common.config import LinkConfig, Section
 from common.errors import ConfigError, ConfigMistake
+from common.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from slave.encoders import EncoderConfig
 from slave.guard.config import GuardConfig
@@ -33,6 +34,7 @@ class SlaveConfig(Section):
     servos: ServosConfig = ServosConfig()
     encoders: EncoderConfig = EncoderConfig()
     link: LinkConfig
+    process: ProcessConfig = ProcessConfig()
 
     @property
     def skeleton(self) -> Skeleton:

@@ -9,6 +9,7 @@ import numpy as np
 
 from common.codec import decode, encode
 from common.errors import CodecError
+from common.latency import Durations
 from common.messages import (
     Action,
     ClockQuery,
@@ -40,6 +41,8 @@ class SlavePipeline:
         )
         self.clock = SlaveExchange()
         self.journeys = Journeys()
+        self.one_way = Durations()
+        """From put to received, of every command of the lease's holder while the offset was trusted."""
         self.undecodable: dict[str, int] = {}
         self._states_sent = 0
         self._reading: EncoderReading | None = None
@@ -54,6 +57,9 @@ class SlavePipeline:
             self._count("command")
             return
         offset = self.clock.estimator.estimate(now_ns)
+        # another operator's stamps are of another clock
+        if offset.trusted and command.lease and command.lease == self.guard.lease.token:
+            self.one_way.record(offset.remote_ns(received_ns) - command.stamps.put_ns)
         if self.guard.on_command(command, received_ns, now_ns, offset).accepted:
             self.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
 

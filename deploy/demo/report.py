@@ -98,11 +98,11 @@ def _commands(master: dict[str, Any], slave: dict[str, Any]) -> dict[str, Any]:
 
 
 def _one_way(slave: dict[str, Any]) -> dict[str, Any]:
-    stage = slave.get("stages_ms", {}).get("put→received", {})
+    measured = slave.get("one_way_ms", {})
     offset = slave.get("offset", {})
     return {
-        "p50": stage.get("p50"),
-        "p99": stage.get("p99"),
+        "p50": measured.get("p50"),
+        "p99": measured.get("p99"),
         "bound": offset.get("bound_ms"),
         "trusted": offset.get("trusted", False),
     }

@@ -13,7 +13,7 @@ from common.clock import monotonic_ns, to_ns
 from common.errors import TandemError
 from common.messages import Action
 from deploy.demo.report import Report, make_report
-from deploy.demo.rig import ROLES, Rig, at_most, open_rig
+from deploy.demo.rig import Rig, at_most, open_rig
 from deploy.demo.view import draw
 
 START_S = 30.0
@@ -39,10 +39,10 @@ class DemoOptions:
     def overrides(self) -> dict[str, list[str]]:
         """What it changes in the processes' files."""
         suit = [f'motion="{self.motion}"', f"seed={self.seed}"]
-        master = [f'estimation.filter="{self.filter}"']
+        # simulated and recorded operators begin in the zero pose: zeroed there, as the paper's reference was
+        master = [f'estimation.filter="{self.filter}"', "estimation.stance_s=1.0"]
         if self.replay is not None:
             suit.append(f'replay="{self.replay.resolve()}"')
-            master.append("estimation.stance_s=1.0")
         return {"slave": [f'track.strategy="{self.strategy}"'], "suit": suit, "master": master}
 
 
@@ -59,11 +59,14 @@ async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) 
 
 async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
     async with open_rig(options.transport, options.overrides()) as rig:
-        for role in ROLES:
-            await rig.start(role)
         observer = rig.observer
         with Live(console=console, refresh_per_second=4, transient=True) as live:
             show = _Show(rig, stop, live)
+            for role in ("slave", "suit"):
+                await rig.start(role)
+            # the master last: processes that still start would take the time of its first ticks
+            await rig.until(lambda: observer.state is not None, START_S, "word from the robot", show.look)
+            await rig.start("master")
             await rig.until(lambda: observer.ready, START_S, "readiness", show.look)
             await _must(rig, Action.ENGAGE)
             observer.recording = True

@@ -8,6 +8,7 @@ from dataclasses import asdict
 import can
 
 from common.clock import to_s
+from common.realtime import take_priority
 from master.suit.bus import SuitBus
 from master.suit.nodes import BusConfig
 from master.suit.protocol import SuitProtocol
@@ -26,6 +27,7 @@ async def run(
     `publish_truth` is called once a tick, after the answers have gone out. Raises ConfigError before
     anything is opened, and BusError where a bus cannot be opened.
     """
+    take_priority(config.process)
     protocol = SuitProtocol.load(config.dbc)
     suit = build_suit(config, protocol)
     loop = asyncio.get_running_loop()

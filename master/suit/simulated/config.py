@@ -9,6 +9,7 @@ from pydantic import Field
 
 from common.config import LinkConfig, RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
+from common.realtime import ProcessConfig
 from common.skeleton import load_skeleton
 from master.suit.nodes import BusConfig, NodeConfig
 from master.suit.protocol import SHIPPED_DBC
@@ -52,6 +53,7 @@ class SuitConfig(Section):
     faults: FaultsConfig = FaultsConfig()
     replay: RelativePath | None = None
     """A recording (npz) to play instead of the motion: no magnetometers then, and no truth."""
+    process: ProcessConfig = ProcessConfig()
     link: LinkConfig = LinkConfig()
     """Where the truth is published; not at all where it names no endpoint."""
 
