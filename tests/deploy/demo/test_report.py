@@ -1,0 +1,113 @@
+"""The report's tree, of a run on the virtual clock in place of three processes."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+from rich.console import Console
+
+from common.messages import Action
+from deploy.demo.report import Report, make_report
+from deploy.demo.rig import Rig
+from deploy.demo.run import DemoOptions
+from deploy.demo.view import print_report
+from deploy.judge import Trace
+from deploy.targets import DEMO, verdicts
+from deploy.virtual import VirtualRun, World
+
+ENDED_WELL: dict[str, int | None] = {"master": 0, "suit": 0, "slave": 0}
+
+
+@dataclass
+class FakeChild:
+    role: str
+    counted: dict[str, Any] = field(default_factory=lambda: {"ticks": {"expected": 5, "missed": 0}})
+    cpu_percent: float = 12.34
+    rss_mb: float = 56.78
+
+    def figures(self) -> dict[str, Any]:
+        return self.counted
+
+
+def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
+    observer = SimpleNamespace(
+        trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen
+    )
+    children = {role: FakeChild(role) for role in ENDED_WELL}
+    return cast(Rig, SimpleNamespace(observer=observer, children=children))
+
+
+@pytest.fixture(scope="module")
+def tracked() -> VirtualRun:
+    """Twelve seconds on one host: one clock, half a millisecond of link."""
+    run = VirtualRun(World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000))
+    run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
+    run.run(1.0)
+    assert run.ask(Action.ENGAGE).done
+    run.run(12.0)
+    for state in run.states:
+        run.trace.add(state)
+    return run
+
+
+@pytest.fixture(scope="module")
+def report(tracked: VirtualRun) -> Report:
+    return make_report(DemoOptions(), rig(tracked, ["hold", "align", "track"]), ENDED_WELL)
+
+
+def text(report: Report) -> str:
+    out = io.StringIO()
+    print_report(report, Console(file=out, width=80, color_system=None))
+    return out.getvalue()
+
+
+def test_a_good_run_has_no_problem_and_is_plain_json(report: Report) -> None:
+    assert report.problems == []
+    assert json.loads(json.dumps(report.tree, allow_nan=False)) == report.tree
+    predict = report.tree["motion_by_strategy"]["predict"]
+    assert report.tree["motion_lag_ms"] == pytest.approx(predict["lag_ms"], abs=3.0)
+
+
+def test_the_replay_of_the_run_s_own_strategy_moves_as_the_run_did(report: Report) -> None:
+    motion, replayed = report.tree["motion"], report.tree["motion_by_strategy"]["predict"]
+    for figure in ("rmse_deg", "aligned_rmse_deg", "roughness"):
+        assert replayed[figure] == pytest.approx(motion[figure], rel=0.1), figure
+
+
+def test_predict_shows_a_third_of_hold_s_error_in_the_same_run(report: Report) -> None:
+    hold = report.tree["motion_by_strategy"]["hold"]
+    over_hold = report.tree["rmse_over_hold"]
+    assert over_hold == pytest.approx(report.tree["motion"]["rmse_deg"] / hold["rmse_deg"])
+    assert over_hold <= 1 / 3
+    found = {v.target.name: v for v in verdicts(report.tree, DEMO)}["same-instant RMSE / hold's"]
+    assert (found.value, found.met) == (over_hold, True)
+    for words in ("same commands, each strategy", "this run", "hold, replayed", "RMSE / hold's"):
+        assert words in text(report)
+
+
+def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualRun) -> None:
+    blind = rig(tracked, ["track"])
+    blind.observer.trace = Trace(tracked.trace.joint_names)
+    report = make_report(DemoOptions(), blind, ENDED_WELL)
+    assert (report.problems, report.comparison, report.motion) == ([], None, None)
+    assert (report.tree["motion_by_strategy"], report.tree["rmse_over_hold"]) == ({}, None)
+    shown = text(report)
+    assert "no truth to judge by" in shown
+    assert "each strategy" not in shown
+
+
+def test_every_problem_is_named(tracked: VirtualRun) -> None:
+    failed = rig(tracked, ["hold"])
+    failed.observer.trace = Trace(tracked.trace.joint_names)
+    cast(FakeChild, failed.children["slave"]).counted = {}
+    problems = make_report(DemoOptions(), failed, {**ENDED_WELL, "slave": -9}).problems
+    assert problems == [
+        "slave ended with status -9",
+        "slave left no figures",
+        "the robot never reached track",
+    ]
