@@ -41,7 +41,7 @@ class GuardConfig(Section):
     """Without an accepted command for longer than this, by arrival, the robot holds."""
     lease_timeout_s: float = Field(1.0, gt=0.0, le=60.0)
     """Without an accepted command for longer than this, by arrival, the operator's lease lapses."""
-    encoder_timeout_s: float = Field(0.05, gt=0.0, le=1.0)
+    encoder_timeout_s: float = Field(0.1, gt=0.0, le=1.0)
     """Without a valid reading of every joint for longer than this the robot holds."""
 
     align_velocity_rad_s: float = Field(0.5, gt=0.0, le=2.0)
