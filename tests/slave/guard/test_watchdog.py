@@ -53,7 +53,7 @@ def test_without_either_watch_it_would_be_followed_for_ever(make_rig: MakeRig) -
 
 
 def test_a_lease_that_lapses_holds_by_itself(make_rig: MakeRig) -> None:
-    config = GuardConfig(command_timeout_s=1.0, lease_timeout_s=1.0)
+    config = GuardConfig(command_timeout_s=1.0, lease_timeout_s=1.0, encoder_timeout_s=0.05)
     rig = make_rig(config, arrival_watches=without("command")).to_track()
     rig.run(1.1, commands=False)
     assert rig.guard.counters.losses == {"lease": 1}
