@@ -6,6 +6,7 @@ from pathlib import Path
 
 from common.codec import decode, encode
 from common.config import LinkConfig, check_config
+from common.errors import LinkTimeoutError
 from common.link import open_link
 from common.messages import Action, ControlReply, ControlRequest
 from common.topics import CONTROL
@@ -20,6 +21,13 @@ async def ask_robot(
     """
     config = check_config(Path("command line"), {"connect": connect}, LinkConfig)
     async with open_link(config, robot) as link:
-        await link.connected(CONTROL)
+        try:
+            await link.connected(CONTROL)
+        except LinkTimeoutError:
+            where = ", ".join(connect)
+            raise LinkTimeoutError(
+                f"{robot} does not answer at {where}: is `tandem slave` running, with that robot name, "
+                "and listening there?"
+            ) from None
         reply = await link.ask(CONTROL, encode(ControlRequest(robot, action, operator, key)))
         return decode(reply, ControlReply)

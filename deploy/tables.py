@@ -151,12 +151,16 @@ def bench_table(report: Mapping[str, Any]) -> RenderableType:
     """The figures of `tandem bench`, then percent of a core."""
     table = _table("bench", "", "min", "median", "p99", "max")
     for name, path in _BENCH_ROWS:
-        figures: Any = report
-        for key in path:
-            figures = figures.get(key, {})
+        figures = _within(report, path)
         table.add_row(name, *(_number(figures.get(key), 1) for key in ("min", "median", "p99", "max")))
     shares = (f"{name.replace('_', ' ')} {_number(v, 1)}" for name, v in report["core_percent"].items())
-    return Group(table, Text("percent of one core: " + ", ".join(shares), "bold"))
+    alone = _within(report, ("loop", "idle"))
+    missed = Text(
+        f"ticks missed by a loop that does nothing else: {alone.get('missed', UNKNOWN)} "
+        f"of {alone.get('late_us', {}).get('count', UNKNOWN)} run; "
+        "a pipeline on this machine can do no better"
+    )
+    return Group(table, Text("percent of one core: " + ", ".join(shares), "bold"), missed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +215,13 @@ def _joints_table(judged: Accuracy) -> Table:
         figures = (overall.mae_deg, overall.rmse_deg, overall.bias_deg)
         table.add_row("all joints", *(_number(f, 3) for f in figures), style="bold")
     return table
+
+
+def _within(report: Mapping[str, Any], path: Iterable[str]) -> Any:
+    found: Any = report
+    for key in path:
+        found = found.get(key, {})
+    return found
 
 
 def _table(title: str, first: str, *others: str) -> Table:

@@ -164,6 +164,8 @@ async def run(config: MasterConfig, stop: asyncio.Event, write_figures: WriteFig
     take_priority(config.process)  # first, so that every thread has it
     async with open_link(config.link, config.robot) as link:
         master = Master(config, link)
+        where = ", ".join(config.link.connect or config.link.listen)
+        log.info("%s: %d nodes polled, commands go to %s", config.robot, len(config.nodes), where)
         freeze_heap()  # now that all is built: a full collection took 80 ms
         try:
             await until_stopped(stop, master.run())

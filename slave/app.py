@@ -113,6 +113,8 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
     try:
         async with open_link(config.link, config.robot) as link:
             slave = Slave(config, link, servos)
+            where = ", ".join(config.link.listen or config.link.connect)
+            log.info("%s: waits for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
             freeze_heap()
             try:
