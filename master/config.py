@@ -11,7 +11,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from master.fuse.estimator import EstimationConfig
-from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.nodes import BusConfig, NodeConfig, wiring_mistakes
 
 
 class CaptureConfig(Section):
@@ -65,33 +65,17 @@ class MasterConfig(Section):
         except ConfigError as error:
             return error.mistakes
         return [
-            *node_mistakes(self.nodes, self.capture.buses, skeleton),
+            *wiring_mistakes(self.nodes, self.capture.buses, "capture.buses"),
+            *node_mistakes(self.nodes, skeleton),
             *self.estimation.mistakes_at(self.capture.rate_hz),
         ]
 
 
-def node_mistakes(
-    nodes: dict[str, NodeConfig], buses: list[BusConfig], skeleton: Skeleton
-) -> list[ConfigMistake]:
-    """Contradictions between a table of nodes, the buses and the profile's segments."""
-    mistakes: list[ConfigMistake] = []
-    names = [bus.name for bus in buses]
-    for name in sorted({n for n in names if names.count(n) > 1}):
-        mistakes.append(ConfigMistake("capture.buses", name, "a bus name used once"))
-    for segment in skeleton.segment_names:
-        if segment not in nodes:
-            mistakes.append(
-                ConfigMistake(f"nodes.{segment}", None, f"a node, as {skeleton.name} has one there")
-            )
-    taken: dict[tuple[str, int], str] = {}
-    for name, node in nodes.items():
-        if name not in skeleton.segment_names:
-            mistakes.append(ConfigMistake(f"nodes.{name}", name, f"a segment of the profile {skeleton.name}"))
-        if node.bus not in names:
-            mistakes.append(ConfigMistake(f"nodes.{name}.bus", node.bus, f"one of {', '.join(names)}"))
-        other = taken.setdefault((node.bus, node.id), name)
-        if other != name:
-            mistakes.append(
-                ConfigMistake(f"nodes.{name}.id", node.id, f"an id that nodes.{other} does not have")
-            )
-    return mistakes
+def node_mistakes(nodes: dict[str, NodeConfig], skeleton: Skeleton) -> list[ConfigMistake]:
+    """Segments without a node, and nodes without a segment."""
+    missing = [name for name in skeleton.segment_names if name not in nodes]
+    foreign = [name for name in nodes if name not in skeleton.segment_names]
+    return [
+        *(ConfigMistake(f"nodes.{n}", None, f"a node, as {skeleton.name} has one there") for n in missing),
+        *(ConfigMistake(f"nodes.{n}", n, f"a segment of the profile {skeleton.name}") for n in foreign),
+    ]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
 
 from common.config import RelativePath, Section
+from common.errors import ConfigMistake
 
 
 class BusConfig(Section):
@@ -37,3 +39,21 @@ class NodeConfig(Section):
     """Orientation filter of this node; None takes the suit's."""
     calibration: RelativePath | None = None
     """Its calibration TOML; None leaves the readings as they come."""
+
+
+def wiring_mistakes(
+    nodes: Mapping[str, NodeConfig], buses: Sequence[BusConfig], buses_key: str
+) -> list[ConfigMistake]:
+    """Bus names used twice, nodes on a bus that there is not, and two nodes with one id on one bus."""
+    names = [bus.name for bus in buses]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    mistakes = [ConfigMistake(buses_key, name, "a bus name used once") for name in twice]
+    taken: dict[tuple[str, int], str] = {}
+    for segment, node in nodes.items():
+        if node.bus not in names:
+            mistakes.append(ConfigMistake(f"nodes.{segment}.bus", node.bus, f"one of {', '.join(names)}"))
+        other = taken.setdefault((node.bus, node.id), segment)
+        if other != segment:
+            expected = f"an id that nodes.{other} does not have"
+            mistakes.append(ConfigMistake(f"nodes.{segment}.id", node.id, expected))
+    return mistakes

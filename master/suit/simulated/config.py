@@ -11,7 +11,7 @@ from common.config import LinkConfig, RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
 from common.realtime import ProcessConfig
 from common.skeleton import load_skeleton
-from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.nodes import BusConfig, NodeConfig, wiring_mistakes
 from master.suit.protocol import SHIPPED_DBC
 from master.suit.simulated.faults import FaultsConfig
 from master.suit.simulated.imperfections import GradeName
@@ -59,7 +59,7 @@ class SuitConfig(Section):
 
     def mistakes(self) -> list[ConfigMistake]:
         """Names that nothing has, ids used twice, quaternions that are no rotation."""
-        mistakes = [*_bus_mistakes(self.buses), *_node_mistakes(self.nodes, self.buses)]
+        mistakes = wiring_mistakes(self.nodes, self.buses, "buses")
         if self.motion not in MOTIONS:
             mistakes.append(ConfigMistake("motion", self.motion, f"one of {', '.join(MOTIONS)}"))
         for name, q in self.mounting.items():
@@ -77,24 +77,3 @@ class SuitConfig(Section):
                 if name not in segments
             ]
         return mistakes
-
-
-def _bus_mistakes(buses: list[BusConfig]) -> list[ConfigMistake]:
-    names = [bus.name for bus in buses]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    return [ConfigMistake("buses", name, "a bus name used once") for name in twice]
-
-
-def _node_mistakes(nodes: dict[str, NodeConfig], buses: list[BusConfig]) -> list[ConfigMistake]:
-    """Unlike the master, a suit may have nodes on some segments only."""
-    names = [bus.name for bus in buses]
-    taken: dict[tuple[str, int], str] = {}
-    mistakes = []
-    for segment, node in nodes.items():
-        if node.bus not in names:
-            mistakes.append(ConfigMistake(f"nodes.{segment}.bus", node.bus, f"one of {', '.join(names)}"))
-        other = taken.setdefault((node.bus, node.id), segment)
-        if other != segment:
-            expected = f"an id that nodes.{other} does not have"
-            mistakes.append(ConfigMistake(f"nodes.{segment}.id", node.id, expected))
-    return mistakes
