@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws", "unixsock-stream")
-"""The protocols of the Zenoh wheel that this project is tested over."""
+"""The protocols of the Zenoh wheel; all but tls and quic are tested with a real session."""
 MAX_SOCKET_PATH = 107
 """Bytes in a Unix socket's path, by the kernel's `sun_path`."""
 

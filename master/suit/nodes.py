@@ -12,7 +12,7 @@ from common.errors import ConfigMistake
 
 
 class BusConfig(Section):
-    """`[[buses]]`: one CAN bus, opened by python-can."""
+    """`[[capture.buses]]` of the master, `[[buses]]` of the suit: one CAN bus, opened by python-can."""
 
     name: str = Field(min_length=1)
     """What nodes, logs and counters call it."""
