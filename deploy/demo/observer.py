@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections import Counter
 from typing import Any
 
-from common.clock import monotonic_ns, to_ns
+from common.clock import to_ns, to_s
 from common.codec import decode
 from common.errors import CodecError
 from common.link import Link
@@ -15,7 +14,8 @@ from common.skeleton import Skeleton
 from common.topics import COMMAND, STATE, STATISTICS, TRUTH
 from deploy.judge import Trace
 
-RATES: dict[type, str] = {Truth: "capture", Command: "commands", RobotState: "states"}
+RATE_OVER_NS = 900_000_000
+"""A rate is taken over at least this long: statistics come once a second, give or take a late tick."""
 
 
 class Observer:
@@ -35,9 +35,9 @@ class Observer:
         self.commands: list[Command] = []
         """While recording."""
         self._news = asyncio.Event()
-        self._counts: Counter[str] = Counter()
-        self._counted_ns = monotonic_ns()
-        self._rates_hz: dict[str, float] = {}
+        self._marks: dict[str, tuple[int, int]] = {}
+        self.rates_hz: dict[str, float] = {}
+        """By the senders' own numbers and clocks: this side hears only the newest of what waits."""
         link.subscribe(COMMAND, lambda payload, _: self._take(payload, Command))
         link.subscribe(STATE, lambda payload, _: self._take(payload, RobotState))
         link.subscribe(TRUTH, lambda payload, _: self._take(payload, Truth))
@@ -50,12 +50,16 @@ class Observer:
             return
         if isinstance(message, Statistics):
             self.statistics[message.role] = message.figures
+            ticks = self.statistics.get("master", {}).get("ticks", {})
+            if message.role == "master" and ticks:
+                self._rate("capture", ticks.get("expected", 0) - ticks.get("missed", 0), message.sent_ns)
             return
-        self._counts[RATES[kind]] += 1
         if isinstance(message, Command):
             self.command = message
+            self._rate("commands", message.sequence, message.stamps.put_ns)
         elif isinstance(message, RobotState):
             self.state = message
+            self._rate("states", message.sequence, message.sent_ns)
             if self.guards_seen[-1:] != [message.guard]:
                 self.guards_seen.append(message.guard)
         else:
@@ -68,15 +72,13 @@ class Observer:
                 self.commands.append(message)
         self._news.set()
 
-    def rates_hz(self) -> dict[str, float]:
-        """Messages a second of each kind over the last second or so."""
-        now_ns = monotonic_ns()
-        elapsed_s = (now_ns - self._counted_ns) / 1e9
-        if elapsed_s >= 1.0:
-            self._rates_hz = {name: self._counts[name] / elapsed_s for name in RATES.values()}
-            self._counts.clear()
-            self._counted_ns = now_ns
-        return self._rates_hz
+    def _rate(self, name: str, count: int, at_ns: int) -> None:
+        before, since_ns = self._marks.get(name, (0, 0))
+        if not since_ns or count < before:  # the first, or the sender has started again
+            self._marks[name] = (count, at_ns)
+        elif at_ns - since_ns >= RATE_OVER_NS:
+            self.rates_hz[name] = (count - before) / to_s(at_ns - since_ns)
+            self._marks[name] = (count, at_ns)
 
     async def news(self) -> None:
         """Wait for the next message."""

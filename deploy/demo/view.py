@@ -35,7 +35,7 @@ def draw(rig: Rig, elapsed_s: float) -> RenderableType:
             elapsed_s=elapsed_s,
             guard=observer.guard,
             reason=reason,
-            rates_hz=observer.rates_hz(),
+            rates_hz=observer.rates_hz,
             stages=slave.get("stages_ms", {}),
             joint_error_deg=_errors_deg(rig),
             drops={

@@ -15,8 +15,7 @@ from common.link import Link
 from common.messages import Command, CommandEcho, CommandStamps, Message, RobotState, Statistics, Truth
 from common.skeleton import load_skeleton
 from common.topics import COMMAND, STATE, STATISTICS, TRUTH, Topic
-from deploy.demo import observer as observer_module
-from deploy.demo.observer import Observer
+from deploy.demo.observer import RATE_OVER_NS, Observer
 
 SKELETON = load_skeleton("nursing")
 JOINTS = len(SKELETON.joints)
@@ -131,17 +130,26 @@ def test_statistics_are_kept_by_role() -> None:
     assert observer.statistics == {"master": {"a": 2}, "slave": {}}
 
 
-def test_rates_are_messages_over_the_time_that_passed(monkeypatch: pytest.MonkeyPatch) -> None:
-    now_ns = [0]
-    monkeypatch.setattr(observer_module, "monotonic_ns", lambda: now_ns[0])
+def test_rates_are_by_the_senders_own_numbers_so_that_unheard_messages_count_too() -> None:
     wire = Wire()
-    wire.hear(*[GOOD_COMMAND] * 25, *[TRUE] * 3)
-    assert wire.observer.rates_hz() == {}
-    now_ns[0] = 2_000_000_000
-    assert wire.observer.rates_hz() == {"capture": 1.5, "commands": 12.5, "states": 0.0}
-    now_ns[0] += 999_999_999
-    wire.hear(TRUE)
-    assert wire.observer.rates_hz()["commands"] == 12.5, "not before a second has passed"
+
+    def command(sequence: int, put_ns: int) -> Command:
+        return replace(GOOD_COMMAND, sequence=sequence, stamps=CommandStamps(1, 2, 3, put_ns))
+
+    wire.hear(command(5, NOW_NS), command(17, NOW_NS + RATE_OVER_NS - 1))
+    assert wire.observer.rates_hz == {}
+    wire.hear(command(30, NOW_NS + 2_000_000_000))
+    assert wire.observer.rates_hz == {"commands": 12.5}
+    wire.hear(command(1, NOW_NS + 9_000_000_000), command(26, NOW_NS + 11_000_000_000))
+    assert wire.observer.rates_hz == {"commands": 12.5}, "a sender that starts again is counted anew"
+
+
+def test_the_capture_rate_is_the_masters_ticks_that_ran() -> None:
+    wire = Wire()
+    for second in range(1, 3):
+        ticks = {"expected": 200 * second, "missed": 4 * second}
+        wire.hear(Statistics("master", second * 1_000_000_000, {"ticks": ticks}))
+    assert wire.observer.rates_hz == {"capture": 196.0}
 
 
 def test_news_comes_with_the_next_message() -> None:
