@@ -125,16 +125,18 @@ def figures(value: Any) -> dict[str, object]:
 def _check_figures(value: object, depth: int) -> None:
     if depth == 0:
         raise CodecError(f"figures are nested more than {MAX_DEPTH} deep")
-    kind = type(value)
-    if kind is dict:
-        for key, item in value.items():  # type: ignore[attr-defined]
+    if isinstance(value, dict):
+        for key, item in value.items():
             if type(key) is not str:
                 raise CodecError(f"{short(key)} is not a key")
             _check_figures(item, depth - 1)
-    elif kind is tuple:
-        for item in value:  # type: ignore[attr-defined]
+    elif isinstance(value, tuple):
+        for item in value:
             _check_figures(item, depth - 1)
-    elif not (value is None or kind in (int, str, bool) or (kind is float and math.isfinite(value))):  # type: ignore[arg-type]
+    elif isinstance(value, float):
+        if not math.isfinite(value):
+            raise CodecError(f"{short(value)} is not a figure")
+    elif not (value is None or isinstance(value, int | str)):
         raise CodecError(f"{short(value)} is not a figure")
 
 

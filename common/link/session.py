@@ -194,7 +194,7 @@ class Link:
 
     def _close_session(self, closed: asyncio.Future[None]) -> None:
         try:
-            self._session.close()  # type: ignore[no-untyped-call]
+            self._session.close()  # type: ignore[no-untyped-call]  # untyped in zenoh
         except Exception as error:  # a link that leads nowhere: nothing to be done about it now
             log.debug("close: %s", error)
         wake(self._loop, _settle, closed)

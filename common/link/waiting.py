@@ -31,7 +31,7 @@ async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: floa
                 try:
                     await there.wait()
                 finally:
-                    events.undeclare()  # type: ignore[no-untyped-call]
+                    events.undeclare()  # type: ignore[no-untyped-call]  # untyped in zenoh
                 return
             querier = session.declare_querier(key, allowed_destination=zenoh.Locality.REMOTE)
             try:
@@ -40,7 +40,7 @@ async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: floa
                     there.clear()
                     await there.wait()
             finally:
-                querier.undeclare()  # type: ignore[no-untyped-call]
+                querier.undeclare()  # type: ignore[no-untyped-call]  # untyped in zenoh
     except TimeoutError:
         what = "another session" if key is None else f"anyone who answers {key}"
         raise LinkTimeoutError(f"no link to {what} within {timeout_s:g} s") from None

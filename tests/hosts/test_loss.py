@@ -46,9 +46,7 @@ def test_killed_master_leaves_the_robot_holding_until_engaged_anew() -> None:
             # both stamps are the robot's own clock: no other clock decides how long it took
             assert held.echo is not None
             waited_s = (held.sent_ns - held.echo.received_ns) / 1e9
-            # what the host itself stood still for shows as a gap between the robot's states
-            gap_s = max(np.diff([s.sent_ns for s in observer.states])) / 1e9
-            assert waited_s < COMMAND_TIMEOUT_S + STATE_PERIOD_S + gap_s
+            assert waited_s < COMMAND_TIMEOUT_S + 2 * STATE_PERIOD_S
             assert "no command" in held.reason
 
             still_from_ns = held.sent_ns + to_ns(BRAKE_S)
