@@ -16,6 +16,8 @@ from common.config import load_config
 from common.errors import TandemError
 from common.messages import Action
 from common.runtime import run as run_until_stopped
+from deploy.accuracy.commands import app as accuracy_app
+from deploy.calibrate.commands import app as calibrate_app
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -24,6 +26,8 @@ app = typer.Typer(
     help="A nurse moves; a humanoid upper body far away moves the same way, safely, "
     "and everyone knows how late it was.\n\nStart with `tandem demo`.",
 )
+app.add_typer(calibrate_app, name="calibrate")
+app.add_typer(accuracy_app, name="accuracy")
 _debug = False
 
 

@@ -44,6 +44,7 @@ def parse_skeleton(text: str, source: str) -> Skeleton:
 def _segment(entry: dict[str, Any]) -> Segment:
     first, second, third = (_axis(a) for a in entry["axes"].split())
     one, two, three = (None if a == "_" else a for a in entry["angles"].split())
+    flexes, tilts, twists = (m != "_" for m in entry.get("human", "1 2 3").split())
     return Segment(
         name=entry["name"],
         parent=entry["parent"],
@@ -51,6 +52,7 @@ def _segment(entry: dict[str, Any]) -> Segment:
         angles=(one, two, three),
         origin_m=tuple(entry["origin_m"]),
         node_m=tuple(entry["node_m"]),
+        human=(flexes, tilts, twists),
     )
 
 
@@ -83,6 +85,11 @@ def _mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
             mistakes.append(ConfigMistake("segment.name", segment.name, "a name used once"))
         if sorted(tuple(map(abs, axis)) for axis in segment.axes) != [(0, 0, 1), (0, 1, 0), (1, 0, 0)]:
             mistakes.append(ConfigMistake(f"{segment.name}.axes", segment.axes, "x, y and z in some order"))
+        unable = [a for a, turns in zip(segment.angles, segment.human, strict=True) if a and not turns]
+        if unable:
+            mistakes.append(
+                ConfigMistake(f"{segment.name}.human", unable, "a movement wherever there is an angle")
+            )
         seen.add(segment.name)
     driven: set[str] = set()
     for joint in skeleton.joints:

@@ -20,6 +20,8 @@ class Segment:
 
     `axes` are the three signed unit axes (rows, parent frame in zero pose) of the intrinsic rotation
     parent → segment; `angles` names the angle about each, None for a residual no robot joint follows.
+    `human` tells about which of them the person's own joint turns: what does not turn constrains the two
+    nodes on either side of the joint.
     """
 
     name: str
@@ -28,6 +30,7 @@ class Segment:
     angles: tuple[str | None, str | None, str | None]
     origin_m: tuple[float, float, float]
     node_m: tuple[float, float, float]
+    human: tuple[bool, bool, bool] = (True, True, True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,1 @@
+"""`tandem accuracy`: one file a command."""

@@ -1,0 +1,1 @@
+"""`tandem calibrate`: one file a command."""

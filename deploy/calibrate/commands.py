@@ -1,0 +1,12 @@
+"""`tandem calibrate`: its commands, one file each."""
+
+from __future__ import annotations
+
+import typer
+
+app = typer.Typer(no_args_is_help=True)
+
+
+@app.callback()
+def _group() -> None:
+    """Find the sensors' errors and how they sit, and write them to TOML."""
