@@ -1,0 +1,195 @@
+"""Recordings as the calibration takes them: the raw readings of one node or of a whole suit, from a file."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from common.errors import TandemError
+from common.quaternion import Array
+
+_LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 5.0, 20_000.0
+_JITTER = 0.25
+"""Stamps further than this share of a period off their place are not a rate."""
+_LARGEST_LOSS = 0.5
+"""A recording of which more than this share is missing is not worth laying out on its grid."""
+
+
+class RecordingError(TandemError):
+    """A recording that cannot be used; the text says what is wrong with it and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeRecording:
+    """One node's readings as they came, evenly spaced; a row of NaN stands where a sample is missing."""
+
+    name: str
+    """The segment, or the file's stem for a single unit."""
+    rate_hz: float
+    acc_m_s2: Array
+    """(T, 3), sensor frame."""
+    gyr_rad_s: Array
+    """(T, 3), sensor frame."""
+    mag_ut: Array | None = None
+    """(T, 3), sensor frame; None without a magnetometer."""
+    counts: bool = False
+    """True: the three arrays hold the converters' raw counts, of which the unit is not known."""
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the recording."""
+        return len(self.gyr_rad_s) / self.rate_hz
+
+
+def load_recordings(path: Path) -> dict[str, NodeRecording]:
+    """The nodes of a file, by name. Raises RecordingError.
+
+    `.npz` of one unit: `gyr` rad/s, `acc` m/s², (T, 3) each, optionally `mag` µT, and `rate_hz`.
+    `.npz` of a suit: `t_s`, (T,), and for each segment `{segment}_acc`, `_gyr`, optionally `_mag`.
+    `.npz` of a unit in raw counts (as imu_tk's): `acc_raw`, `gyr_raw`, and `t` in seconds.
+    """
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        known = ", ".join(sorted(_READERS))
+        raise RecordingError(f"{path}: cannot read a {path.suffix or 'nameless'} file; expected {known}")
+    if not path.is_file():
+        raise RecordingError(f"{path}: there is no such file")
+    return reader(path)
+
+
+def _load_npz(path: Path) -> dict[str, NodeRecording]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {key: file[key] for key in file}
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise RecordingError(f"{path}: not a readable .npz file ({error})") from None
+    if "acc_raw" in arrays:
+        return _raw_unit(path, arrays)
+    if "acc" in arrays or "gyr" in arrays:
+        return _single_unit(path, arrays)
+    return _suit(path, arrays)
+
+
+def _raw_unit(path: Path, arrays: Mapping[str, Array]) -> dict[str, NodeRecording]:
+    acc, gyr = (_vectors(path, arrays, key) for key in ("acc_raw", "gyr_raw"))
+    mag = _vectors(path, arrays, "mag_raw") if "mag_raw" in arrays else None
+    rate_hz, slots = _grid(path, "t", _need(path, arrays, "t"), len(acc))
+    return {path.stem: _node(path, path.stem, rate_hz, (acc, gyr, mag), slots, counts=True)}
+
+
+def _single_unit(path: Path, arrays: Mapping[str, Array]) -> dict[str, NodeRecording]:
+    acc, gyr = (_vectors(path, arrays, key) for key in ("acc", "gyr"))
+    mag = _vectors(path, arrays, "mag") if "mag" in arrays else None
+    slots = None
+    if "rate_hz" in arrays:
+        rate_hz = _plausible(path, arrays["rate_hz"])
+    else:
+        time = next((key for key in ("t_s", "t") if key in arrays), None)
+        if time is None:
+            raise RecordingError(f"{path}: has neither rate_hz nor t_s; add the rate in Hz")
+        rate_hz, slots = _grid(path, time, arrays[time], len(acc))
+    return {path.stem: _node(path, path.stem, rate_hz, (acc, gyr, mag), slots)}
+
+
+def _suit(path: Path, arrays: Mapping[str, Array]) -> dict[str, NodeRecording]:
+    names = [key.removesuffix("_gyr") for key in arrays if key.endswith("_gyr")]
+    if not names:
+        raise RecordingError(
+            f"{path}: has no gyroscope; expected gyr and acc of a unit, acc_raw and gyr_raw of a unit, "
+            "or {segment}_gyr and {segment}_acc of a suit"
+        )
+    time = _need(path, arrays, "t_s")
+    rate_hz, slots = _grid(path, "t_s", time, len(time))
+    nodes = {}
+    for name in names:
+        acc, gyr = (_vectors(path, arrays, f"{name}_{key}") for key in ("acc", "gyr"))
+        mag = _vectors(path, arrays, f"{name}_mag") if f"{name}_mag" in arrays else None
+        nodes[name] = _node(path, name, rate_hz, (acc, gyr, mag), slots)
+    return nodes
+
+
+def _node(
+    path: Path,
+    name: str,
+    rate_hz: float,
+    sensors: tuple[Array, Array, Array | None],
+    slots: Array | None,
+    *,
+    counts: bool = False,
+) -> NodeRecording:
+    acc, gyr, mag = sensors
+    lengths = {len(s) for s in sensors if s is not None} | ({len(slots)} if slots is not None else set())
+    if len(lengths) != 1:
+        raise RecordingError(f"{path}: {name}: its arrays differ in length: {sorted(lengths)}")
+    if slots is not None:
+        acc, gyr = _laid_out(acc, slots), _laid_out(gyr, slots)
+        mag = None if mag is None else _laid_out(mag, slots)
+    if mag is not None and np.isnan(mag).all():
+        mag = None
+    return NodeRecording(name, rate_hz, acc, gyr, mag, counts)
+
+
+def _need(path: Path, arrays: Mapping[str, Array], key: str) -> Array:
+    if key not in arrays:
+        raise RecordingError(f"{path}: has no array {key}")
+    return arrays[key]
+
+
+def _vectors(path: Path, arrays: Mapping[str, Array], key: str) -> Array:
+    values = _need(path, arrays, key)
+    if values.ndim != 2 or values.shape[1] != 3 or values.dtype.kind not in "fiu" or len(values) < 2:
+        raise RecordingError(
+            f"{path}: {key} is {values.dtype} of shape {values.shape}; expected numbers, a row of 3 a sample"
+        )
+    return values.astype(np.float64)
+
+
+def _plausible(path: Path, rate_hz: Array | float) -> float:
+    rate = float(rate_hz) if np.size(rate_hz) == 1 else np.nan
+    if not _LOWEST_RATE_HZ <= rate <= _HIGHEST_RATE_HZ:
+        raise RecordingError(
+            f"{path}: a rate of {rate:g} Hz cannot be a node's; expected {_LOWEST_RATE_HZ:g} to "
+            f"{_HIGHEST_RATE_HZ:g} Hz (are the times in seconds?)"
+        )
+    return rate
+
+
+def _grid(path: Path, key: str, time_s: Array, count: int) -> tuple[float, Array]:
+    """The rate, and each sample's slot on the even grid, (T,) from 0. Refuses what is no even sampling."""
+    time_s = np.asarray(time_s, dtype=np.float64)
+    if time_s.ndim != 1 or len(time_s) < 2 or not np.isfinite(time_s).all():
+        raise RecordingError(f"{path}: {key} must be a row of finite times, one a sample")
+    if len(time_s) != count:
+        raise RecordingError(f"{path}: {key} has {len(time_s)} times for {count} samples")
+    steps_s = np.diff(time_s)
+    period_s = float(np.median(steps_s))
+    if period_s <= 0.0 or np.any(steps_s <= 0.0):
+        raise RecordingError(f"{path}: {key} does not rise from sample to sample; record again")
+    _plausible(path, 1.0 / period_s)
+    steps = np.rint(steps_s / period_s)
+    if np.quantile(np.abs(steps_s / period_s - steps), 0.99) > _JITTER or np.any(steps < 1.0):
+        raise RecordingError(
+            f"{path}: {key} is not evenly spaced: steps of {1e3 * steps_s.min():.3g} to "
+            f"{1e3 * steps_s.max():.3g} ms; record at one rate"
+        )
+    slots = np.concatenate([[0.0], np.cumsum(steps)])
+    if len(slots) < _LARGEST_LOSS * (slots[-1] + 1.0):
+        raise RecordingError(f"{path}: more than half of the samples are missing by {key}; record again")
+    return float(slots[-1] / (time_s[-1] - time_s[0])), slots
+
+
+def _laid_out(values: Array, slots: Array) -> Array:
+    places = slots.astype(np.intp)
+    if places[-1] + 1 == len(places):
+        return values
+    out = np.full((places[-1] + 1, values.shape[1]), np.nan)
+    out[places] = values
+    return out
+
+
+Reader = Callable[[Path], dict[str, NodeRecording]]
+_READERS: dict[str, Reader] = {".npz": _load_npz}
