@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigError
+from common.kinematics import orientations
+from common.quaternion import rotate
 from common.skeleton import load_skeleton
 from common.skeleton.load import parse_skeleton
 
@@ -98,3 +100,39 @@ def test_a_table_that_contradicts_itself(old: str, new: str, message: str) -> No
     assert old in TEXT
     with pytest.raises(ConfigError, match=f"other.toml: {message}"):
         parse_skeleton(TEXT.replace(old, new, 1), "other.toml")
+
+
+LEGS = load_skeleton("lower_limb")
+LEG = ["hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_flexion"]
+
+
+def test_the_legs_have_7_nodes_and_10_joints() -> None:
+    assert len(LEGS.segments) == 7
+    assert list(LEGS.joint_names) == [f"{side}_{joint}" for side in SIDES for joint in LEG]
+    assert np.all(LEGS.lower_rad < 0.0)
+    assert np.all(LEGS.upper_rad > 0.0)
+    knees = [s for s in LEGS.segments if s.name.endswith("shank")]
+    assert [knee.human for knee in knees] == [(True, False, False)] * 2
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(
+    ("joint", "segment", "of", "towards"),
+    [
+        ("hip_flexion", "thigh", [0, 0, -1], [1, 0, 0]),
+        ("hip_abduction", "thigh", [0, 0, -1], [0, 1, 0]),
+        ("hip_rotation", "thigh", [1, 0, 0], [0, -1, 0]),
+        ("knee_flexion", "shank", [0, 0, -1], [-1, 0, 0]),
+        ("ankle_flexion", "foot", [1, 0, 0], [0, 0, 1]),
+    ],
+)
+def test_legs_turn_as_anatomy_counts(
+    side: str, joint: str, segment: str, of: list[int], towards: list[int]
+) -> None:
+    """The thigh swings ahead and outwards, the toes turn in and up, the shank swings back: left as right."""
+    mirror = np.array([1.0, 1.0 if side == "left" else -1.0, 1.0])
+    position = np.zeros(10)
+    position[LEGS.joint_names.index(f"{side}_{joint}")] = 0.1
+    q = orientations(LEGS, position)[LEGS.segment_names.index(f"{side}_{segment}")]
+    moved = mirror * rotate(q, mirror * np.array(of, dtype=float)) - of
+    np.testing.assert_allclose(moved @ towards, np.sin(0.1), atol=1e-12)

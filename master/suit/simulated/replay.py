@@ -23,6 +23,13 @@ RECORDED_AS = {
     "right_upper_arm": "upper_arm_right",
     "right_forearm": "forearm_right",
     "right_hand": "hand_right",
+    "pelvis": "hip",
+    "left_thigh": "upper_leg_left",
+    "left_shank": "lower_leg_left",
+    "left_foot": "foot_left",
+    "right_thigh": "upper_leg_right",
+    "right_shank": "lower_leg_right",
+    "right_foot": "foot_right",
 }
 """Our segments, and what the recording calls them. Others take their nearest recorded ancestor's readings:
 a phalanx reads what its hand reads, as on a flat, stiff hand."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigError
-from common.skeleton import Skeleton
+from common.skeleton import Skeleton, load_skeleton
 from master.suit.simulated.replay import RECORDED_AS, Replay, load_replay
 
 SAMPLES = 50
@@ -139,17 +139,21 @@ def test_a_single_array_and_a_missing_file_are_refused(tmp_path: Path, skeleton:
 
 
 @pytest.mark.recordings
-def test_the_real_recording_is_resampled_exactly_at_its_knots(skeleton: Skeleton) -> None:
+@pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
+def test_the_real_recording_is_resampled_exactly_at_its_knots(profile: str) -> None:
     folder = os.environ.get("TANDEM_DATA")
     if not folder:
         pytest.skip("TANDEM_DATA does not name the folder of recordings")
     path = Path(folder) / "human_full_body.npz"
+    skeleton = load_skeleton(profile)
+    recorded = {i: RECORDED_AS[s] for i, s in enumerate(skeleton.segment_names) if s in RECORDED_AS}
+    assert len(recorded) == {"nursing": 8, "lower_limb": 7}[profile]
     replay = load_replay(path, skeleton, skeleton.segment_names)
     assert replay.length_s == pytest.approx(99.99)
     with np.load(path) as arrays:
         for k in (0, 1, 777, 5000, 9999):
             reading = replay.readings(arrays["t_s"][k] - arrays["t_s"][0])
-            for segment, name in RECORDED_AS.items():
-                row = reading[skeleton.segment_names.index(segment)]
+            for i, name in recorded.items():
+                row = reading[i]
                 np.testing.assert_allclose(row[0:3], arrays[f"{name}_acc"][k], atol=1e-6)
                 np.testing.assert_allclose(row[3:6], arrays[f"{name}_gyr"][k], atol=1e-6)
