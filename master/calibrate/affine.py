@@ -6,12 +6,15 @@ A node's TOML, every key optional (identity where it is left out):
     gyroscope     = [[...], ...]                # rad/s from rad/s
     magnetometer  = [[...], ...]                # µT from µT
     q_sensor_from_segment = [w, x, y, z]        # mounting
+
+    [made.accelerometer]                        # how a part came about; `Made` lists the keys
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Annotated
 
@@ -49,6 +52,36 @@ UnitQuaternion = Annotated[list[float], AfterValidator(_unit_quaternion)]
 _SAME = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]
 
 
+class Made(Section):
+    """How one part of a node's file came about; for people, the master only checks its form.
+
+    The residuals are means over the data of: accelerometer |‖a‖ - g| of still intervals, m/s²; gyroscope
+    the angle between gravity as turned by the gyro and as measured, rad; magnetometer the standard
+    deviation of ‖m‖, µT; mounting: see `unit`.
+    """
+
+    date: date
+    recording: str
+    """Name of the file, without its folder."""
+    unit: str
+    """Of the residuals."""
+    residual_before: float | None = None
+    residual_after: float | None = None
+    hold_out: float | None = None
+    """The residual on data that the parameters were not fitted to."""
+    sigma: list[list[float]] | None = None
+    """1σ of each number of the part, as the fit states it."""
+
+
+class MadeParts(Section):
+    """`[made]`: one table a part."""
+
+    accelerometer: Made | None = None
+    gyroscope: Made | None = None
+    magnetometer: Made | None = None
+    mounting: Made | None = None
+
+
 class NodeCalibration(Section):
     """One node's TOML file."""
 
@@ -60,6 +93,7 @@ class NodeCalibration(Section):
     """3 × 4, offset in µT."""
     q_sensor_from_segment: UnitQuaternion = IDENTITY.tolist()
     """Mounting: turns the segment's coordinates into the sensor's."""
+    made: MadeParts = MadeParts()
 
 
 @dataclass(frozen=True, slots=True)
