@@ -23,6 +23,8 @@ class ChainMotion:
     """(N, 3) angular velocity."""
     node_acceleration_m_s2: Array
     """(N, 3) linear acceleration of the place where the node sits (`node_m`), gravity not included."""
+    node_position_m: Array
+    """(N, 3) that place itself."""
 
 
 class Chain:
@@ -80,7 +82,8 @@ class Chain:
         lever = (world.take(self._foot, axis=0) @ self._lever_m)[..., 0]
         carried = _carried(rate.take(self._foot, axis=0), rate_change.take(self._foot, axis=0), lever)
         node_acceleration = self._links[:-1] @ carried[:count] + carried[count:]
-        return ChainMotion(world[:-1], rate[:-1], node_acceleration)
+        node_position = self._links[:-1] @ lever[:count] + lever[count:]
+        return ChainMotion(world[:-1], rate[:-1], node_acceleration, node_position)
 
     def _rotations(self, angles_rad: Array) -> tuple[Array, Array]:
         """World rotations (N + 1, 3, 3) and the turns' axes in the world (N, 3, 3), for angles (N, 3, 1)."""

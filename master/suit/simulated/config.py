@@ -13,6 +13,7 @@ from common.realtime import ProcessConfig
 from common.skeleton import load_skeleton
 from master.suit.nodes import BusConfig, NodeConfig, wiring_mistakes
 from master.suit.protocol import SHIPPED_DBC
+from master.suit.simulated.disturbance import DisturbanceConfig
 from master.suit.simulated.faults import FaultsConfig
 from master.suit.simulated.imperfections import GradeName
 from master.suit.simulated.motion import MOTIONS
@@ -48,6 +49,7 @@ class SuitConfig(Section):
     grade: GradeName = "calibrated"
     """How good the sensors are: `ideal` (quantised only), `calibrated`, `raw` (as delivered)."""
     field: FieldConfig = FieldConfig()
+    disturbance: DisturbanceConfig = DisturbanceConfig()
     mounting: dict[str, QuaternionList] = Field(default={})
     """q_segment_from_sensor (wxyz) of nodes that sit askew, by segment; others are aligned with it."""
     faults: FaultsConfig = FaultsConfig()
@@ -70,6 +72,10 @@ class SuitConfig(Section):
             segments = load_skeleton(self.profile).segment_names
         except ConfigError as error:
             return mistakes + error.mistakes
+        mistakes += [
+            ConfigMistake("disturbance.local.nodes", name, f"a segment of the profile {self.profile}, or all")
+            for name in self.disturbance.unknown_nodes(list(segments))
+        ]
         for key, names in (("nodes", self.nodes), ("mounting", self.mounting)):
             mistakes += [
                 ConfigMistake(f"{key}.{name}", name, f"a segment of the profile {self.profile}")

@@ -16,6 +16,7 @@ from common.skeleton import Skeleton, load_skeleton
 from master.suit.nodes import BusConfig, NodeConfig
 from master.suit.protocol import NO_VALUE, Status, SuitProtocol
 from master.suit.simulated.config import SuitConfig
+from master.suit.simulated.disturbance import Disturbance, DisturbanceConfig
 from master.suit.simulated.encode import BatchEncoder
 from master.suit.simulated.faults import Faults, NodeAnswer, Outgoing
 from master.suit.simulated.imperfections import Counts, Imperfections, quantise
@@ -69,7 +70,7 @@ class SimulatedOperator:
     def at(self, t_s: float) -> Wearing:
         """The motion at that time; draws new noise at each call."""
         position, velocity, acceleration = self._motion.state(t_s)
-        readings = self._sensors.read(position, velocity, acceleration)
+        readings = self._sensors.read(position, velocity, acceleration, t_s)
         return Wearing(self._imperfections.apply(readings), (position, velocity))
 
 
@@ -176,8 +177,11 @@ def _wearer(config: SuitConfig, skeleton: Skeleton) -> Wearer:
         return RecordedOperator(load_replay(config.replay, skeleton, config.nodes))
     mounting = np.array([config.mounting.get(name, IDENTITY) for name in skeleton.segment_names])
     field_ut = earth_field_ut(config.field.strength_ut, config.field.dip_deg)
+    disturbance = None
+    if config.disturbance != DisturbanceConfig():
+        disturbance = Disturbance(config.disturbance, skeleton.segment_names, field_ut)
     return SimulatedOperator(
         load_motion(config.motion, skeleton),
-        IdealSensors(skeleton, field_ut, mounting),
+        IdealSensors(skeleton, field_ut, mounting, disturbance),
         Imperfections(config.grade, len(skeleton.segments), config.seed),
     )
