@@ -9,7 +9,7 @@ from importlib import resources
 from typing import Any
 
 from common.errors import ConfigError, ConfigMistake
-from common.skeleton.table import WORLD, Joint, Segment, Skeleton
+from common.skeleton.table import WORLD, Joint, Post, Segment, Shape, Skeleton, Synergy
 
 _UNIT = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 
@@ -34,6 +34,8 @@ def parse_skeleton(text: str, source: str) -> Skeleton:
         name=table["name"],
         segments=tuple(_segment(entry) for entry in table["segment"]),
         joints=tuple(_joint(entry) for entry in table["joint"]),
+        synergies=tuple(Synergy(**entry) for entry in table.get("synergy", ())),
+        stand=tuple(_post(entry) for entry in table.get("stand", ())),
     )
     mistakes = _mistakes(skeleton)
     if mistakes:
@@ -53,7 +55,17 @@ def _segment(entry: dict[str, Any]) -> Segment:
         origin_m=tuple(entry["origin_m"]),
         node_m=tuple(entry["node_m"]),
         human=(flexes, tilts, twists),
+        shape=_shape(entry.get("shape", {})),
     )
+
+
+def _shape(entry: dict[str, Any]) -> Shape:
+    tip_m = entry.get("tip_m")
+    return Shape(entry.get("radius_m"), entry.get("fan", False), None if tip_m is None else tuple(tip_m))
+
+
+def _post(entry: dict[str, Any]) -> Post:
+    return Post(tuple(entry["from_m"]), tuple(entry["to_m"]), entry["radius_m"])
 
 
 def _axis(text: str) -> tuple[int, int, int]:
@@ -109,4 +121,19 @@ def _mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
                     )
                 )
             driven.add(angle)
+    return mistakes + _synergy_mistakes(skeleton)
+
+
+def _synergy_mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
+    """A synergy must be of joints that there are, each in one of them: least squares then stays a mean."""
+    mistakes, driven = [], set[str]()
+    for synergy in skeleton.synergies:
+        if not synergy.drives or not all(synergy.drives.values()):
+            expected = "at least one joint, no ratio of 0"
+            mistakes.append(ConfigMistake(f"{synergy.name}.drives", synergy.drives, expected))
+        for joint in synergy.drives:
+            if joint not in skeleton.joint_names or joint in driven:
+                expected = "a joint that no other synergy drives"
+                mistakes.append(ConfigMistake(f"{synergy.name}.drives", joint, expected))
+            driven.add(joint)
     return mistakes

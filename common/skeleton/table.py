@@ -15,6 +15,27 @@ WORLD = "world"
 
 
 @dataclass(frozen=True, slots=True)
+class Shape:
+    """What a segment of the simulated robot is made of: bars with round ends, from its joint outwards."""
+
+    radius_m: float | None = None
+    """None: in proportion to its length."""
+    fan: bool = False
+    """A bar to each of its children's joints; otherwise one, to amid them."""
+    tip_m: tuple[float, float, float] | None = None
+    """Where a segment without children ends, in its own frame; None: twice as far down as its node."""
+
+
+@dataclass(frozen=True, slots=True)
+class Post:
+    """One bar of what holds the simulated robot's root: from and to, world frame, and its radius."""
+
+    from_m: tuple[float, float, float]
+    to_m: tuple[float, float, float]
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Segment:
     """A body segment, which carries one node, and its joint with the neighbour it hangs on.
 
@@ -31,6 +52,7 @@ class Segment:
     origin_m: tuple[float, float, float]
     node_m: tuple[float, float, float]
     human: tuple[bool, bool, bool] = (True, True, True)
+    shape: Shape = Shape()
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +67,14 @@ class Joint:
     drives: dict[str, float]
 
 
+@dataclass(frozen=True, slots=True)
+class Synergy:
+    """A joint of a coarser robot that stands for several joints here, each with its ratio to it."""
+
+    name: str
+    drives: dict[str, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """One robot's table, compared by identity.
@@ -55,6 +85,8 @@ class Skeleton:
     name: str
     segments: tuple[Segment, ...]
     joints: tuple[Joint, ...]
+    synergies: tuple[Synergy, ...] = ()
+    stand: tuple[Post, ...] = ()
 
     @cached_property
     def segment_names(self) -> tuple[str, ...]:

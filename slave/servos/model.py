@@ -26,9 +26,8 @@ DAMPING_RATIO = math.sqrt(0.5)
 """Of all dampings the one whose response is a pure delay to second order (s² term 4ζ² - 1 = 2ζ²)."""
 
 _DENSITY_KG_M3 = 900.0
-_RADIUS_M = {"chest": 0.1, "head": 0.07, "upper_arm": 0.04, "forearm": 0.035, "hand": 0.03}
 _SLENDERNESS = 0.18
-"""Radius over length of segments that the table above does not name."""
+"""Radius over length of segments whose radius the skeleton does not tell."""
 _ROTOR_TO_LOAD = 1.0
 """Rotor inertia seen through the gear, over the heaviest load's: matched, as gears are chosen."""
 _LEAST_ARMATURE_KG_M2 = 2e-4
@@ -70,7 +69,7 @@ def _compile(skeleton: Skeleton, drives: Sequence[Drive], step_s: float) -> mujo
     option = ET.SubElement(root, "option", timestep=f"{step_s!r}", integrator="implicitfast")
     ET.SubElement(option, "flag", contact="disable", autoreset="disable")
     world = ET.SubElement(root, "worldbody")
-    _surroundings(world)
+    _surroundings(world, skeleton)
     hinges = _hinges(skeleton, drives)
     bodies = {WORLD: world}
     for segment in skeleton.segments:
@@ -82,10 +81,12 @@ def _compile(skeleton: Skeleton, drives: Sequence[Drive], step_s: float) -> mujo
     return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
 
 
-def _surroundings(world: ET.Element) -> None:
+def _surroundings(world: ET.Element, skeleton: Skeleton) -> None:
     ET.SubElement(world, "light", pos="1 0 3", dir="-0.3 0 -1", diffuse="0.8 0.8 0.8")
     ET.SubElement(world, "geom", name="floor", type="plane", size="3 3 0.1", rgba="0.5 0.5 0.5 1")
-    ET.SubElement(world, "geom", name="pedestal", type="cylinder", fromto="0 0 0 0 0 0.95", size="0.12")
+    for post in skeleton.stand:
+        fromto = _text((*post.from_m, *post.to_m))
+        ET.SubElement(world, "geom", type="cylinder", fromto=fromto, size=f"{post.radius_m!r}")
 
 
 def _hinges(skeleton: Skeleton, drives: Sequence[Drive]) -> dict[str, dict[str, str]]:
@@ -121,31 +122,32 @@ def _body(
         # MuJoCo turns a body by its hinges in their order: the table's intrinsic sequence
         if angle in hinges:
             ET.SubElement(body, "joint", hinges[angle], type="hinge", axis=_text(axis))
-    end = _end_m(segment, skeleton)
-    kind = segment.name.removeprefix("left_").removeprefix("right_")
-    radius = _RADIUS_M.get(kind, _SLENDERNESS * float(np.linalg.norm(end)))
-    ET.SubElement(
-        body,
-        "geom",
-        type="capsule",
-        fromto=_text((0.0, 0.0, 0.0, *end)),
-        size=f"{radius!r}",
-        density=f"{_DENSITY_KG_M3}",
-        rgba="0.85 0.85 0.9 1",
-    )
-    if kind == "head":
+    for end in _ends_m(segment, skeleton):
+        radius = segment.shape.radius_m or _SLENDERNESS * float(np.linalg.norm(end))
+        ET.SubElement(
+            body,
+            "geom",
+            type="capsule",
+            fromto=_text((0.0, 0.0, 0.0, *end)),
+            size=f"{radius!r}",
+            density=f"{_DENSITY_KG_M3}",
+            rgba="0.85 0.85 0.9 1",
+        )
+    if segment.name == "head":
         ET.SubElement(body, "site", name="head", pos="0.09 0 0.1")
         # at the eyes, looking ahead: image right is -y, image up is z
         ET.SubElement(body, "camera", name="head", pos="0.09 0 0.1", xyaxes="0 -1 0 0 0 1", fovy="70")
     return body
 
 
-def _end_m(segment: Segment, skeleton: Skeleton) -> tuple[float, ...]:
-    """Where a segment ends: amid its children's joints, or for the last one twice as far as its node."""
+def _ends_m(segment: Segment, skeleton: Skeleton) -> list[tuple[float, ...]]:
+    """Where its bars end: at or amid its children's joints, at its tip, or twice as far as its node."""
     children = [s.origin_m for s in skeleton.segments if s.parent == segment.name]
+    if children and segment.shape.fan:
+        return list(children)
     if children:
-        return tuple(float(x) for x in np.mean(children, axis=0))
-    return (0.0, 0.0, 2.0 * segment.node_m[2])
+        return [tuple(float(x) for x in np.mean(children, axis=0))]
+    return [segment.shape.tip_m or (0.0, 0.0, 2.0 * segment.node_m[2])]
 
 
 def _couplings(equality: ET.Element, joint: Joint) -> None:
