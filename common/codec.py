@@ -16,6 +16,7 @@ from common.errors import CodecError
 from common.fields import MAX_ITEMS, MAX_NAME, MAX_TEXT
 from common.messages import (
     Action,
+    BaseAttitude,
     ClockQuery,
     ClockReply,
     Command,
@@ -29,7 +30,7 @@ from common.messages import (
     Truth,
 )
 
-VERSION = 1
+VERSION = 2
 MAX_PAYLOAD = 256 * 1024
 ANGLE_LIMIT_RAD = 4 * math.pi
 """No joint turns twice round; a larger angle is a fault, not a posture."""
@@ -79,11 +80,12 @@ def _pack_command(m: Command) -> tuple[Any, ...]:
     return (
         m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.solved_ns, s.put_ns,
         m.deadman_held, fields.pack_mask(m.valid), fields.pack_floats(m.position_rad, m.velocity_rad_s),
+        m.seen_frame,
     )  # fmt: skip
 
 
 def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
-    fields.length(f, 11)
+    fields.length(f, 12)
     lease, sequence, tick, sampled_ns, frames_in_ns, solved_ns, put_ns = fields.counts(f[1:8])
     position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
     return Command(
@@ -96,6 +98,7 @@ def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
         fields.mask(f[9], joints),
         position_rad,
         velocity_rad_s,
+        fields.count(f[11]),
     )
 
 
@@ -105,12 +108,12 @@ def _pack_state(m: RobotState) -> tuple[Any, ...]:
     return (
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, m.reason[:MAX_TEXT], m.operator,
         fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad), echo,
-        m.master_offset_ns, m.offset_bound_ns,
+        m.master_offset_ns, m.offset_bound_ns, _short_faults(m.faults), _pack_base(m.base),
     )  # fmt: skip
 
 
 def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
-    fields.length(f, 12)
+    fields.length(f, 14)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -127,6 +130,33 @@ def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
         echo=_unpack_echo(f[9]),
         master_offset_ns=fields.signed(f[10]),
         offset_bound_ns=fields.signed(f[11]),
+        faults=fields.texts(f[12], MAX_NAME, MAX_TEXT),
+        base=_unpack_base(f[13]),
+    )
+
+
+def _short_faults(faults: dict[str, str]) -> dict[str, str]:
+    return {name: text[:MAX_TEXT] for name, text in faults.items()}
+
+
+def _pack_base(base: BaseAttitude | None) -> tuple[Any, ...] | None:
+    if base is None:
+        return None
+    return (base.measured_ns, base.inclination_rad, base.azimuth_rad, base.tool_face_rad)
+
+
+def _unpack_base(value: object) -> BaseAttitude | None:
+    if value is None:
+        return None
+    if not isinstance(value, tuple):
+        raise CodecError("base is not an array")
+    fields.length(value, 4)
+    azimuth = value[2]
+    return BaseAttitude(
+        fields.count(value[0]),
+        fields.number(value[1], 0.0, math.pi),
+        None if azimuth is None else fields.number(azimuth, 0.0, math.tau),
+        fields.number(value[3], 0.0, math.tau),
     )
 
 

@@ -95,6 +95,20 @@ def text(value: Any, most: int) -> str:
     return value
 
 
+def number(value: Any, lowest: float, highest: float) -> float:
+    """A finite float between two bounds, both allowed."""
+    if type(value) is not float or not lowest <= value <= highest:
+        raise CodecError(f"{short(value)} is not a number from {lowest:g} to {highest:g}")
+    return value
+
+
+def texts(value: Any, most_key: int, most: int) -> dict[str, str]:
+    """A map from names to texts."""
+    if type(value) is not dict:
+        raise CodecError(f"{short(value)} is not a map")
+    return {text(key, most_key): text(item, most) for key, item in value.items()}
+
+
 def length(fields: tuple[Any, ...], expected: int) -> None:
     """Refuse an array of any other length."""
     if len(fields) != expected:

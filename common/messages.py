@@ -44,6 +44,8 @@ class Command:
     """(J,) False where a joint's nodes are lost: the slave holds just those."""
     position_rad: Array
     velocity_rad_s: Array
+    seen_frame: int = 0
+    """Number of the newest video frame that the operator had seen when he moved so; 0 where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +59,20 @@ class CommandEcho:
     """Slave's clock, as all that follow."""
     accepted_ns: int
     written_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class BaseAttitude:
+    """How the robot's base stands (paper D), from its own accelerometer and magnetometer."""
+
+    measured_ns: int
+    """Slave's clock."""
+    inclination_rad: float
+    """Of the base's axis from the vertical, 0 to π."""
+    azimuth_rad: float | None
+    """True azimuth of the axis's horizontal projection, 0 to 2π; None where it has no direction."""
+    tool_face_rad: float
+    """Rotation about the axis itself, 0 to 2π."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +100,10 @@ class RobotState:
     """Master's clock minus the slave's, as the slave measured it."""
     offset_bound_ns: int
     """Half-width of its bound; negative where the offset is not trusted."""
+    faults: dict[str, str] = field(default_factory=dict)
+    """What is wrong with the robot's body, in words: by joint, or `base`, `camera`."""
+    base: BaseAttitude | None = None
+    """None where the base carries no sensor, or it has never answered."""
 
 
 class Action(StrEnum):

@@ -17,6 +17,8 @@ from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS
 from slave.config import SlaveConfig
+from slave.guard.body import Body
+from slave.guard.states import State
 from slave.pipeline import SlavePipeline
 from slave.servos import Servos, open_servos
 
@@ -31,6 +33,7 @@ class Slave:
         self._link = link
         self._servos = servos
         self._pipeline = SlavePipeline(config)
+        self._stopped = False
         self._ticks_expected = 0
         self._ticks_missed = 0
         self._put_state: Callable[[bytes], None] = link.publish(STATE)
@@ -53,7 +56,9 @@ class Slave:
         async for due in ticks(TickGrid(monotonic_ns() + period_ns, period_ns)):
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
-            setpoint = self._pipeline.tick(monotonic_ns(), self._servos.read())
+            body = Body(drives=self._servos.faults())
+            setpoint = self._pipeline.tick(monotonic_ns(), self._servos.read(), body)
+            self._brake_drives(self._pipeline.guard.state is State.ESTOP)
             if setpoint.ready:
                 self._servos.write(setpoint.position_rad)
                 self._pipeline.written(monotonic_ns())
@@ -65,6 +70,12 @@ class Slave:
             if guard.state != said:
                 said = guard.state
                 log.info("%s: %s: %s", self._config.robot, guard.state, guard.reason)
+
+    def _brake_drives(self, stop: bool) -> None:
+        """On an e-stop the drives brake by themselves too: whatever becomes of this process."""
+        if stop != self._stopped:
+            self._stopped = stop
+            self._servos.quick_stop(stop)
 
     def _on_command(self, payload: bytes, received_ns: int) -> None:
         self._pipeline.on_command(payload, received_ns, monotonic_ns())

@@ -22,6 +22,7 @@ from common.offset import SlaveExchange
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
 from slave.guard import Guard, Setpoint
+from slave.guard.body import WELL, Body
 from slave.guard.lease import DrawToken, random_token
 from slave.guard.states import MOVING
 from slave.journey import Journeys
@@ -46,6 +47,7 @@ class SlavePipeline:
         self.undecodable: dict[str, int] = {}
         self._states_sent = 0
         self._reading: EncoderReading | None = None
+        self._body = WELL
         self._position_rad = np.zeros(len(self.skeleton.joints))
         self._setpoint = Setpoint(self._position_rad, np.zeros_like(self._position_rad), ready=False)
 
@@ -80,12 +82,12 @@ class SlavePipeline:
         """Answer the master's clock query. Raises CodecError, which the link counts."""
         return encode(self.clock.on_query(decode(payload, ClockQuery), received_ns, now_ns))
 
-    def tick(self, now_ns: int, reading: EncoderReading) -> Setpoint:
+    def tick(self, now_ns: int, reading: EncoderReading, body: Body = WELL) -> Setpoint:
         """One turn of the 200 Hz loop: what to write to the servos now."""
-        self._reading = reading
+        self._reading, self._body = reading, body
         self._position_rad = self.encoders.position_rad(reading.counts)
         self.journeys.read(reading)
-        self._setpoint = self.guard.step(now_ns, self._position_rad, reading.valid, reading.read_ns)
+        self._setpoint = self.guard.step(now_ns, self._position_rad, reading.valid, reading.read_ns, body)
         return self._setpoint
 
     def written(self, now_ns: int) -> None:
@@ -113,6 +115,7 @@ class SlavePipeline:
                 echo=self.journeys.echo,
                 master_offset_ns=offset.offset_ns,
                 offset_bound_ns=offset.bound_ns if offset.trusted else -1,
+                faults={**self._body.drives, **({"base": self._body.base} if self._body.base else {})},
             )
         )
 

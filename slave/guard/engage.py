@@ -22,6 +22,8 @@ class Readiness:
     """What is amiss with the commands."""
     encoder_loss: str | None
     """What is amiss with the encoders."""
+    body_fault: str | None
+    """What is amiss with the drives or the base."""
     any_valid: bool
     """Whether the last command has a valid joint."""
     at_rest: bool
@@ -63,6 +65,10 @@ def _encoder(at: Readiness) -> str | None:
     return at.encoder_loss
 
 
+def _body(at: Readiness) -> str | None:
+    return at.body_fault
+
+
 def _rest(at: Readiness) -> str | None:
     return None if at.at_rest else "still braking"
 
@@ -71,7 +77,7 @@ def _strayed(at: Readiness) -> str | None:
     return at.strayed
 
 
-CONDITIONS: tuple[Condition, ...] = (_state, _holder, _command, _valid, _encoder, _rest, _strayed)
+CONDITIONS: tuple[Condition, ...] = (_state, _holder, _command, _valid, _encoder, _body, _rest, _strayed)
 
 
 def refusal(at: Readiness) -> str | None:

@@ -16,6 +16,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.guard.admit import DEADMAN, GATES, Gate, Situation, Verdict, admit
 from slave.guard.align import Alignment, Rejoin
+from slave.guard.body import WELL, Body
 from slave.guard.config import GuardConfig
 from slave.guard.control import Control
 from slave.guard.engage import Readiness, refusal
@@ -77,6 +78,7 @@ class Guard:
         self._command_timeout_ns = to_ns(config.command_timeout_s)
         self._control = Control(self, config.reset_key)
         self._encoders = EncoderLife(names, to_ns(config.encoder_timeout_s))
+        self._body = WELL
         self._limiter = SetpointLimiter(names, limits)
         self._alignment = Alignment(names, config)
         self._rejoin = Rejoin(limits, config)
@@ -134,9 +136,12 @@ class Guard:
         )
         return verdict
 
-    def step(self, now_ns: int, position_rad: Array, encoder_valid: Mask, encoder_ns: int) -> Setpoint:
+    def step(
+        self, now_ns: int, position_rad: Array, encoder_valid: Mask, encoder_ns: int, body: Body = WELL
+    ) -> Setpoint:
         """One turn of the servo loop: the encoders (J,) as read at `encoder_ns` in, the setpoint out."""
         dt_s = self._elapsed_s(now_ns)
+        self._body = body
         self._encoders.update(position_rad, encoder_valid, encoder_ns)
         self._watch(now_ns, self._watches)
         if not self._seated:
@@ -182,6 +187,7 @@ class Guard:
                 holder=self.operator,
                 command_loss=arrival[1] if arrival else None,
                 encoder_loss=body,
+                body_fault=self._body.amiss,
                 any_valid=bool(self._valid.any()),
                 at_rest=self._limiter.at_rest,
                 strayed=self._strayed(),
@@ -219,7 +225,7 @@ class Guard:
     def _signs(self, now_ns: int) -> Signs:
         return Signs(
             now_ns, self.lease.token != 0, self._command_ns, self._command_timeout_ns, self._refusal,
-            self._encoders,
+            self._encoders, self._body,
         )  # fmt: skip
 
     def _watch(self, now_ns: int, watches: Sequence[Watch]) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from common.clock import to_s
 from common.messages import Mask
 from common.quaternion import Array
+from slave.guard.body import Body
 
 _NEVER_NS = -(1 << 62)
 
@@ -60,6 +61,7 @@ class Signs:
     refusal: str
     """Why the last command since then was refused, empty where none was."""
     encoders: EncoderLife
+    body: Body
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +91,17 @@ def _encoder(signs: Signs) -> str | None:
     return signs.encoders.silence(signs.now_ns)
 
 
+def _drive(signs: Signs) -> str | None:
+    return signs.body.drive_fault
+
+
+def _base(signs: Signs) -> str | None:
+    return signs.body.base
+
+
 ARRIVAL_WATCHES: tuple[Watch, ...] = (Watch("command", _command), Watch("lease", _lease))
 """Looked at in every step, and before a command is judged: what comes after a gap must not hide the gap."""
-BODY_WATCHES: tuple[Watch, ...] = (Watch("encoder", _encoder),)
+BODY_WATCHES: tuple[Watch, ...] = (Watch("encoder", _encoder), Watch("drive", _drive), Watch("base", _base))
 """Looked at in every step, right after the encoders were read."""
 
 

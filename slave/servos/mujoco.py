@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Mapping
 
 from common.clock import Clock, monotonic_ns, to_s
 from common.errors import RobotError
@@ -54,6 +55,13 @@ class MujocoServos:
     def read(self) -> EncoderReading:
         """The reading of the newest cycle."""
         return self._reading
+
+    def faults(self) -> Mapping[str, str]:
+        """None: a simulated drive is well, or the physics has diverged, and then no encoder is valid."""
+        return {}
+
+    def quick_stop(self, stop: bool) -> None:
+        """Nothing to be done here: the guard's setpoint brakes, and these drives only follow it."""
 
     def stop(self) -> None:
         """End the thread; the robot stays where it is, and its setpoint with it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -37,6 +38,17 @@ class Servos(Protocol):
 
     def read(self) -> EncoderReading:
         """The newest reading there is. Never blocks; its `read_ns` tells how old it is."""
+        ...
+
+    def faults(self) -> Mapping[str, str]:
+        """What the drives and encoders say is wrong, in words, by joint; empty where all are well."""
+        ...
+
+    def quick_stop(self, stop: bool) -> None:
+        """True, on an e-stop: the drives brake and stay, whatever is written. False, after the reset.
+
+        Never blocks.
+        """
         ...
 
     def stop(self) -> None:

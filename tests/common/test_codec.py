@@ -14,6 +14,7 @@ from common.errors import CodecError
 from common.fields import MAX_DEPTH, MAX_NAME, MAX_TEXT
 from common.messages import (
     Action,
+    BaseAttitude,
     ClockQuery,
     ClockReply,
     Command,
@@ -65,7 +66,12 @@ def commands(draw: st.DrawFn, joints: int = 25) -> Command:
         valid=draw(masks(joints)),
         position_rad=draw(values(joints, ANGLE_LIMIT_RAD)),
         velocity_rad_s=draw(values(joints, RATE_LIMIT_RAD_S)),
+        seen_frame=draw(counts),
     )
+
+
+turns = st.floats(0.0, 2.0 * math.pi)
+bases = st.builds(BaseAttitude, counts, st.floats(0.0, math.pi), st.none() | turns, turns)
 
 
 @st.composite
@@ -85,6 +91,8 @@ def states(draw: st.DrawFn, joints: int = 25) -> RobotState:
         echo=None if echo is None else CommandEcho(*echo),
         master_offset_ns=draw(signed),
         offset_bound_ns=draw(signed),
+        faults=draw(st.dictionaries(names, texts, max_size=5)),
+        base=draw(st.none() | bases),
     )
 
 
@@ -134,7 +142,7 @@ COMMAND = Command(
 )
 STATE = RobotState(
     "robot-1", 1, 2, 3, "hold", "", "", np.ones(3, np.bool_), np.zeros(3), np.zeros(3),
-    CommandEcho(1, 2, 3, 4, 5), -5, 6,
+    CommandEcho(1, 2, 3, 4, 5), -5, 6, {"left_elbow_pitch": "over-current"}, BaseAttitude(7, 0.1, None, 0.2),
 )  # fmt: skip
 
 
@@ -169,6 +177,20 @@ def test_a_rate_that_is_no_rate_is_refused(value: float) -> None:
         decode(encode(bad), Command, 3)
 
 
+@pytest.mark.parametrize(
+    "base", [(1, math.nan, None, 0.0), (1, -0.1, None, 0.0), (1, 0.1, 6.3, 0.0), (1, 0.1, None), "level"]
+)
+def test_a_base_that_cannot_stand_so_is_refused(base: object) -> None:
+    with pytest.raises(CodecError):
+        decode(tampered(STATE, put(15, base)), RobotState, 3)
+
+
+@pytest.mark.parametrize("faults", [[], {1: "x"}, {"x": 1}, {"x" * 65: ""}, {"": "x" * 513}])
+def test_faults_that_are_not_words_are_refused(faults: object) -> None:
+    with pytest.raises(CodecError):
+        decode(tampered(STATE, put(14, faults)), RobotState, 3)
+
+
 def test_a_signalling_nan_is_refused_without_a_warning() -> None:
     payload = tampered(COMMAND, put(12, b"\x01\x00\xa0\x7f" * 6))
     with pytest.raises(CodecError, match="not finite"):
@@ -196,7 +218,7 @@ def test_each_count_of_a_command_is_checked(index: int, value: object) -> None:
     [
         (0, "state", "kind 'state', expected command"),
         (0, 5, "kind 5, expected command"),
-        (1, VERSION + 1, "schema version 2, expected 1"),
+        (1, VERSION + 1, "schema version 3, expected 2"),
         (1, True, "schema version True"),
         (2, "x" * (MAX_NAME + 1), "text of at most 64"),
         (2, b"robot-1", "text of at most 64"),

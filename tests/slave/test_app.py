@@ -33,6 +33,9 @@ class FakeLink:
 
 
 class StillServos:
+    def faults(self) -> dict[str, str]:
+        return {}
+
     def read(self) -> EncoderReading:
         return EncoderReading(0, np.zeros(25, np.int64), np.zeros(25, np.bool_))
 

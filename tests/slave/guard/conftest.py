@@ -14,6 +14,7 @@ from common.offset import Offset
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from slave.guard import Guard, GuardConfig, Setpoint, State, Verdict
+from slave.guard.body import WELL
 from slave.track import Target
 
 ROBOT = "robot-1"
@@ -61,6 +62,7 @@ class Rig:
         self.measured = 0.5 * (self.skeleton.lower_rad + self.skeleton.upper_rad)
         self.encoder_valid = np.ones(self.joints, np.bool_)
         self.encoder_delay_ns = 0
+        self.body = WELL
         self.coupled = True
         self.target = self.measured.copy()
         self.offset = GOOD_OFFSET
@@ -102,7 +104,7 @@ class Rig:
     def step(self, dt_ns: int = PERIOD_NS) -> Setpoint:
         self.now_ns += dt_ns
         setpoint = self.guard.step(
-            self.now_ns, self.measured, self.encoder_valid, self.now_ns - self.encoder_delay_ns
+            self.now_ns, self.measured, self.encoder_valid, self.now_ns - self.encoder_delay_ns, self.body
         )
         if self.coupled and setpoint.ready:
             self.measured = setpoint.position_rad.copy()

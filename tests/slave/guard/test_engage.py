@@ -8,6 +8,7 @@ import pytest
 
 from common.messages import Action
 from slave.guard import State, engage
+from slave.guard.body import Body
 
 MakeRig = Callable[..., Any]
 
@@ -41,6 +42,12 @@ def encoder_lost(rig: Any) -> None:
     rig.run(0.1)
 
 
+def drive_faulty(rig: Any) -> None:
+    rig.to_leased()
+    rig.body = Body(drives={"left_elbow_pitch": "over-current"})
+    rig.run(0.1)
+
+
 def still_moving(rig: Any) -> None:
     rig.to_track()
     rig.target = rig.skeleton.lower_rad.copy()
@@ -63,6 +70,7 @@ CASES: list[tuple[Callable[..., Any], Callable[[Any], None], str]] = [
     (engage._command, silent_master, "no command for"),
     (engage._valid, all_nodes_lost, "no joint of the last command is valid"),
     (engage._encoder, encoder_lost, "left_elbow_pitch"),
+    (engage._body, drive_faulty, "the drive of left_elbow_pitch: over-current"),
     (engage._rest, still_moving, "still braking"),
     (engage._strayed, moved_by_hand, "left_elbow_pitch is 0.20 rad from where it is held"),
 ]

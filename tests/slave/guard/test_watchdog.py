@@ -9,7 +9,8 @@ import pytest
 from common.messages import Action
 from common.skeleton import load_skeleton
 from slave.guard import GuardConfig, State
-from slave.guard.watchdog import ARRIVAL_WATCHES
+from slave.guard.body import WELL, Body
+from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES
 
 MakeRig = Callable[..., Any]
 JOINTS = load_skeleton("nursing").joint_names
@@ -127,6 +128,38 @@ def test_one_lost_encoder_holds_the_whole_robot(rig: Any, joint: int, fault: str
     assert rig.guard.state is State.HOLD
     assert JOINTS[joint] in rig.guard.reason
     assert rig.guard.counters.losses == {"encoder": 1}
+
+
+@pytest.mark.parametrize(
+    ("body", "loss", "words"),
+    [
+        (Body(drives={"neck_yaw": "over-temperature"}), "drive", "the drive of neck_yaw: over-temperature"),
+        (Body(base="tilts by 12.0°, limit 10.0°"), "base", "tilts by 12.0°"),
+    ],
+)
+@pytest.mark.parametrize("state", MOVING)
+def test_a_body_that_is_not_well_holds_the_whole_robot_at_once(
+    rig: Any, state: State, body: Body, loss: str, words: str
+) -> None:
+    rig.to(state)
+    rig.body = body
+    rig.step()
+    assert rig.guard.state is State.HOLD
+    assert words in rig.guard.reason
+    assert rig.guard.counters.losses == {loss: 1}
+    rig.body = WELL
+    rig.run(1.0)
+    assert rig.guard.state is State.HOLD  # mended is not engaged
+    rig.engage()
+
+
+@pytest.mark.parametrize("body", [Body(drives={"neck_yaw": "hot"}), Body(base="tilts")])
+def test_without_its_watch_a_sick_body_would_go_on(make_rig: MakeRig, body: Body) -> None:
+    watches = tuple(w for w in BODY_WATCHES if w.name not in ("drive", "base"))
+    rig = make_rig(body_watches=watches).to_track()
+    rig.body = body
+    rig.run(0.5)
+    assert rig.guard.state is State.TRACK
 
 
 @pytest.mark.parametrize("sign", [1, -1])

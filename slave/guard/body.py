@@ -1,0 +1,31 @@
+"""What the robot's body says of itself besides its encoders: drives that are not well, a base that tilts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Of this moment. Whatever is amiss ends motion, and nothing engages until it is mended."""
+
+    drives: Mapping[str, str] = field(default_factory=dict)
+    """What is wrong with a joint's drive, in words, by joint; empty where all are well."""
+    base: str | None = None
+    """What is wrong with how the base stands, or None."""
+
+    @property
+    def amiss(self) -> str | None:
+        """The first thing that is wrong, in words, or None."""
+        return self.drive_fault or self.base
+
+    @property
+    def drive_fault(self) -> str | None:
+        """The first drive that is not well, named, or None."""
+        for joint, words in self.drives.items():
+            return f"the drive of {joint}: {words}"
+        return None
+
+
+WELL = Body()
