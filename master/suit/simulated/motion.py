@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from master.suit.simulated.gait import Curve, Gait, GaitError, Strides
 from master.suit.simulated.minimum_jerk import MinimumJerkMotion, MotionError, Move
 
-MOTIONS = ("bottle", "calibration_pose", "sweep")
+MOTIONS = ("bottle", "calibration_pose", "sweep", "walk")
 
 STILL_S = 3.5
 """A sweep begins with standing still this long, so that filters settle and the robot can align."""
@@ -53,8 +54,10 @@ def load_motion(name: str, skeleton: Skeleton) -> Motion:
 
 
 def parse_motion(text: str, skeleton: Skeleton, source: str) -> Motion:
-    """A motion from TOML text (its form is described at the head of bottle.toml)."""
+    """A motion from TOML text (its forms are described at the heads of bottle.toml and walk.toml)."""
     table = tomllib.loads(text)
+    if "strides" in table:
+        return _gait(table, skeleton, source)
     mistakes = _mistakes(table, skeleton)
     if mistakes:
         raise ConfigError(source, mistakes)
@@ -69,6 +72,23 @@ def parse_motion(text: str, skeleton: Skeleton, source: str) -> Motion:
         return MinimumJerkMotion(skeleton.joint_names, rest_rad, moves, table["period_s"])
     except MotionError as error:
         raise ConfigError(source, [ConfigMistake("move", "", str(error))]) from None
+
+
+def _gait(table: dict[str, Any], skeleton: Skeleton, source: str) -> Motion:
+    curves = {
+        f"{side}_{joint}": (_curve(curve), ahead)
+        for side, ahead in table["ahead"].items()
+        for joint, curve in table["curve"].items()
+    }
+    try:
+        return Gait(skeleton.joint_names, curves, Strides(period_s=table["period_s"], **table["strides"]))
+    except GaitError as error:
+        raise ConfigError(source, [ConfigMistake("strides", table["strides"], str(error))]) from None
+
+
+def _curve(table: dict[str, Any]) -> Curve:
+    cosines, sines = (tuple(map(math.radians, table[key])) for key in ("cos_deg", "sin_deg"))
+    return Curve(math.radians(table["mean_deg"]), cosines, sines)
 
 
 def stand_still(skeleton: Skeleton) -> Motion:

@@ -5,7 +5,7 @@ import pytest
 
 from common.errors import ConfigError
 from common.quaternion import Array
-from common.skeleton import Skeleton
+from common.skeleton import Skeleton, load_skeleton
 from master.suit.simulated.motion import MOTIONS, STILL_S, Motion, load_motion, parse_motion
 
 STEP_S = 0.002
@@ -15,9 +15,14 @@ def sampled(motion: Motion) -> tuple[Array, Array, Array]:
     return motion.state(np.arange(0.0, motion.period_s, STEP_S))
 
 
+PROFILE = {"walk": "lower_limb"}
+"""Of motions that the nursing robot cannot make."""
+
+
 @pytest.fixture(scope="module", params=MOTIONS)
-def motion(request: pytest.FixtureRequest, skeleton: Skeleton) -> Motion:
-    return load_motion(request.param, skeleton)
+def moved(request: pytest.FixtureRequest) -> tuple[Motion, Skeleton]:
+    skeleton = load_skeleton(PROFILE.get(request.param, "nursing"))
+    return load_motion(request.param, skeleton), skeleton
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +30,8 @@ def bottle(skeleton: Skeleton) -> Motion:
     return load_motion("bottle", skeleton)
 
 
-def test_every_motion_stays_within_all_limits(motion: Motion, skeleton: Skeleton) -> None:
+def test_every_motion_stays_within_all_limits(moved: tuple[Motion, Skeleton]) -> None:
+    motion, skeleton = moved
     position, velocity, acceleration = sampled(motion)
     assert (position >= skeleton.lower_rad).all()
     assert (position <= skeleton.upper_rad).all()
@@ -33,7 +39,8 @@ def test_every_motion_stays_within_all_limits(motion: Motion, skeleton: Skeleton
     assert (np.abs(acceleration) <= 0.5 * skeleton.max_acceleration_rad_s2).all()
 
 
-def test_every_motion_is_smooth_at_its_seam(motion: Motion) -> None:
+def test_every_motion_is_smooth_at_its_seam(moved: tuple[Motion, Skeleton]) -> None:
+    motion, _ = moved
     end, begin = motion.state(motion.period_s - 1e-9), motion.state(motion.period_s + 1e-9)
     for left, right in zip(end, begin, strict=True):
         np.testing.assert_allclose(left, right, atol=1e-5)
