@@ -1,4 +1,4 @@
-"""The one place that reads a clock: integer nanoseconds of this host's monotonic clock."""
+"""The one place that reads a clock: integer nanoseconds, of this host's monotonic clock but for recordings."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ Clock = Callable[[], int]
 """Returns now, in ns of one monotonic clock. Tests pass a virtual one."""
 
 monotonic_ns: Clock = time.monotonic_ns
+wall_ns: Clock = time.time_ns
+"""ns since 1970. It jumps when somebody sets it: for recordings and logs only, never to measure by."""
 
 
 def to_ns(seconds: float) -> int:

@@ -56,6 +56,10 @@ class LinkTimeoutError(LinkError, TimeoutError):
     """A peer that did not answer in time."""
 
 
+class RecordingError(TandemError):
+    """A recording that cannot be written or used; the text says what is wrong with it and what to do."""
+
+
 class RobotError(TandemError):
     """A robot, servo or encoder that cannot be used."""
 
