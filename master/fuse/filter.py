@@ -15,14 +15,21 @@ from common.quaternion import Array
 class OrientationFilter(Protocol):
     """Estimates the orientations of n nodes at once from their calibrated readings, one tick at a time."""
 
-    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array, dt_s: float | None = None) -> None:
         """Take one tick's readings, (n, 3) each, sensor frame. A NaN row of `mag_ut` has no magnetometer.
 
-        A node's first readings after its start set its orientation at once.
+        `dt_s` is the time since the update before, None for the nominal period. A node's first readings
+        after its start set its orientation at once.
         """
 
     def q_world_from_sensor(self) -> Array:
         """Orientations (n, 4), world east-north-up; heading arbitrary without a magnetometer."""
+
+    def q_inertial_from_sensor(self) -> Array:
+        """Orientations (n, 4) without the magnetometer: upright by gravity, heading by the gyro alone.
+
+        They differ from `q_world_from_sensor` by a turn about the vertical, whose angle drifts slowly.
+        """
 
     def bias_rad_s(self) -> Array:
         """What the filter takes for the gyros' bias, (n, 3): the true rate is the reading minus this."""
@@ -52,16 +59,23 @@ class FilterBank:
             # a slice where all share one filter: nothing is then copied
             self._parts.append((slice(None) if len(rows) == self._count else rows, make[name](len(rows))))
 
-    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array, dt_s: float | None = None) -> None:
         """One tick's readings, (N, 3) each."""
         for rows, part in self._parts:
-            part.update(gyr_rad_s[rows], acc_m_s2[rows], mag_ut[rows])
+            part.update(gyr_rad_s[rows], acc_m_s2[rows], mag_ut[rows], dt_s)
 
     def q_world_from_sensor(self) -> Array:
         """Orientations (N, 4)."""
         out = np.empty((self._count, 4))
         for rows, part in self._parts:
             out[rows] = part.q_world_from_sensor()
+        return out
+
+    def q_inertial_from_sensor(self) -> Array:
+        """Orientations (N, 4) without the magnetometers."""
+        out = np.empty((self._count, 4))
+        for rows, part in self._parts:
+            out[rows] = part.q_inertial_from_sensor()
         return out
 
     def bias_rad_s(self) -> Array:

@@ -20,8 +20,8 @@ from common.quaternion import Array, cross, heading_turn, multiply, to_matrix
 class MahonyConfig(Section):
     """`[estimation.mahony]`."""
 
-    # the best of a grid over the BROAD trials at hand: 6.7° total, 3.8° inclination
-    kp: float = Field(default=0.74, ge=0.0, allow_inf_nan=False)
+    # the best of a coarse grid over the BROAD trials at hand: 5.9° total; 0.35 to 0.74 lie within 0.4°
+    kp: float = Field(default=0.5, ge=0.0, allow_inf_nan=False)
     """K_p, 1/s: how fast accelerometer and magnetometer pull; time constant 1 / K_p."""
     ki: float = Field(default=0.0012, ge=0.0, allow_inf_nan=False)
     """K_i, 1/s²: how fast the gyro's bias is learnt; 0 learns none."""
@@ -33,7 +33,9 @@ class MahonyConfig(Section):
 class _Snapshot:
     q: Array
     error: Array
+    turn: Array
     integral: Array
+    pulled_rad: Array
     started: Mask
 
 
@@ -46,26 +48,32 @@ class MahonyFilter:
         self._q = np.zeros((count, 4))
         self._q[:, 0] = 1.0
         self._error = np.zeros((count, 3))
+        # the magnetometer's part of it, about the vertical
+        self._turn = np.zeros(count)
         # K_i ∫ e dt, rad/s
         self._integral = np.zeros((count, 3))
+        # how far the magnetometer has turned the heading since the start
+        self._pulled_rad = np.zeros(count)
         self._started = np.zeros(count, dtype=np.bool_)
 
-    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array, dt_s: float | None = None) -> None:
         """One tick's readings, (n, 3) each."""
+        period_s = self._period_s if dt_s is None else dt_s
         rate = gyr_rad_s + self._config.kp * self._error + self._integral  # Eqs 10, 11
-        self._q = integrate(self._q, rate, self._period_s)  # Eq. 12
+        self._q = integrate(self._q, rate, period_s)  # Eq. 12
         if not self._started.all():
             new = ~self._started
             self._q[new] = initial_orientation(acc_m_s2[new], mag_ut[new])
             self._started[new] = True
+        self._pulled_rad += (self._config.kp * period_s) * self._turn
         # taken at the orientation that belongs to these readings, and fed back in the next period
-        self._error = attitude_error(self._q, acc_m_s2, mag_ut)
-        self._learn_bias()
+        self._error, self._turn = attitude_error(self._q, acc_m_s2, mag_ut)
+        self._learn_bias(period_s)
 
-    def _learn_bias(self) -> None:
+    def _learn_bias(self, period_s: float) -> None:
         config = self._config
         if config.ki > 0.0:
-            self._integral += config.ki * self._period_s * self._error
+            self._integral += config.ki * period_s * self._error
             if config.bias_limit_rad_s > 0.0:
                 limit = config.bias_limit_rad_s
                 np.clip(self._integral, -limit, limit, out=self._integral)
@@ -73,6 +81,10 @@ class MahonyFilter:
     def q_world_from_sensor(self) -> Array:
         """Orientations (n, 4)."""
         return self._q.copy()
+
+    def q_inertial_from_sensor(self) -> Array:
+        """Orientations (n, 4) with the magnetometer's turns about the vertical taken back."""
+        return multiply(heading_turn(-self._pulled_rad), self._q)
 
     def bias_rad_s(self) -> Array:
         """Gyro biases (n, 3): the integral with its sign turned."""
@@ -82,10 +94,19 @@ class MahonyFilter:
         """Forget the past of some nodes, mask (n,)."""
         self._started[nodes] = False
         self._integral[nodes] = 0.0
+        self._error[nodes] = 0.0
+        self._turn[nodes] = 0.0
 
     def snapshot(self) -> object:
         """Orientation, its error and the bias."""
-        return _Snapshot(self._q.copy(), self._error.copy(), self._integral.copy(), self._started.copy())
+        return _Snapshot(
+            self._q.copy(),
+            self._error.copy(),
+            self._turn.copy(),
+            self._integral.copy(),
+            self._pulled_rad.copy(),
+            self._started.copy(),
+        )
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
@@ -93,27 +114,27 @@ class MahonyFilter:
             raise TypeError("not a snapshot of this filter")
         self._q = snapshot.q.copy()
         self._error = snapshot.error.copy()
+        self._turn = snapshot.turn.copy()
         self._integral = snapshot.integral.copy()
+        self._pulled_rad = snapshot.pulled_rad.copy()
         self._started = snapshot.started.copy()
 
 
-def attitude_error(q_world_from_sensor: Array, acc: Array, mag: Array) -> Array:
+def attitude_error(q_world_from_sensor: Array, acc: Array, mag: Array) -> tuple[Array, Array]:
     """Eqs 4 to 9: the rotation, rad about sensor axes (n, 3), that small errors of q (n, 4) ask for.
 
+    Beside it the magnetometer's part alone, rad about the vertical (n,): of Eq. 9's m̂ × û only that
+    component is taken, so that a disturbed field turns the heading and never the inclination.
     Only the directions of `acc` and `mag` (n, 3) count. A NaN or zero row pulls at nothing.
     """
     matrix = to_matrix(q_world_from_sensor)  # Eq. 4, C_b^n
     measured = _directions(np.stack([acc, mag]))  # â, m̂
     field = np.einsum("nij,nj->ni", matrix, measured[1])  # Eq. 6
-    reference = np.zeros_like(field)  # Eq. 7: no field to the east; north is our y
-    np.hypot(field[:, 0], field[:, 1], out=reference[:, 1])
-    reference[:, 2] = field[:, 2]
-    expected = np.empty_like(measured)
-    expected[0] = matrix[:, 2]  # Eq. 5, v̂: up, seen from the sensor
-    np.einsum("nji,nj->ni", matrix, reference, out=expected[1])  # Eq. 8, û: the inverse rotation
-    errors = cross(measured, expected)  # Eq. 9: â × v̂ and m̂ × û
-    out: Array = errors[0] + errors[1]
-    return out
+    up = matrix[:, 2]  # Eq. 5, v̂: up, seen from the sensor
+    # Eqs 7 to 9 about the vertical: the field as found, (x, y, ·), times as it should be, (0, |x, y|, ·)
+    turn = field[:, 0] * np.hypot(field[:, 0], field[:, 1])
+    error: Array = cross(measured[0], up) + turn[:, None] * up
+    return error, turn
 
 
 def integrate(q: Array, rate_rad_s: Array, period_s: float) -> Array:

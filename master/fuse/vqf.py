@@ -27,9 +27,15 @@ class VqfConfig(Section):
 
 
 class VqfFilter:
-    """An `OrientationFilter` of n `vqf.VQF` objects (C++, about 1 µs an update)."""
+    """An `OrientationFilter` of n `vqf.VQF` objects (C++, about 1 µs an update).
+
+    The package knows one period only. An update of another `dt_s` turns by the true angle, the bias
+    included, but counts as one period in every time constant: at half the rate all of them last twice as
+    long, and after one long gap nothing is made good but the turn.
+    """
 
     def __init__(self, config: VqfConfig, rate_hz: float, count: int) -> None:
+        self._period_s = 1.0 / rate_hz
         self._filters = [
             VQF(
                 1.0 / rate_hz,
@@ -42,8 +48,12 @@ class VqfFilter:
             for _ in range(count)
         ]
 
-    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array) -> None:
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array, dt_s: float | None = None) -> None:
         """One tick's readings, (n, 3) each; rows must be contiguous float64."""
+        if dt_s is not None and dt_s != self._period_s:
+            bias = self.bias_rad_s()
+            # the package takes the bias off again: (gyr' - bias) period = (gyr - bias) dt
+            gyr_rad_s = bias + (gyr_rad_s - bias) * (dt_s / self._period_s)
         has_mag = np.isfinite(mag_ut[:, 0])
         if has_mag.all():
             for vqf, gyr, acc, mag in zip(self._filters, gyr_rad_s, acc_m_s2, mag_ut, strict=True):
@@ -59,6 +69,10 @@ class VqfFilter:
     def q_world_from_sensor(self) -> Array:
         """Orientations (n, 4); VQF's nine-axis answer is its six-axis one until a magnetometer speaks."""
         return np.concatenate([vqf.getQuat9D() for vqf in self._filters]).reshape(-1, 4)
+
+    def q_inertial_from_sensor(self) -> Array:
+        """Orientations (n, 4) without the magnetometer, VQF's six-axis answer."""
+        return np.concatenate([vqf.getQuat6D() for vqf in self._filters]).reshape(-1, 4)
 
     def bias_rad_s(self) -> Array:
         """Gyro biases (n, 3)."""
