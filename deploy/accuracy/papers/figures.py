@@ -1,0 +1,93 @@
+"""What an experiment yields: figures, each beside the paper's and ours to reach; and many seeds' together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One figure of one seed. Of all of them less is better."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    """One a side, axis or angle that the figure is of; empty where the run did not tell."""
+    paper: float | None = None
+    """The paper's."""
+    target: float | None = None
+    """The most it may be; None where nothing is asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """One block of the output. `run` takes a seed, needs nothing else, and can be sent to another process."""
+
+    key: str
+    """As `--only` names it."""
+    title: str
+    run: Callable[[int], list[Figure]]
+    notes: tuple[str, ...] = ()
+    """What a reader must know to judge the figures, a sentence each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A figure over all seeds."""
+
+    name: str
+    unit: str
+    paper: float | None
+    target: float | None
+    by_seed: Mapping[int, tuple[float, ...]]
+
+    @property
+    def values(self) -> list[float]:
+        """Every seed's, in one row."""
+        return [value for values in self.by_seed.values() for value in values]
+
+    @property
+    def mean(self) -> float | None:
+        """Over seeds and sides alike."""
+        values = self.values
+        return math.fsum(values) / len(values) if values else None
+
+    @property
+    def worst(self) -> float | None:
+        """The largest; NaN where any is."""
+        values = self.values
+        if any(math.isnan(value) for value in values):
+            return math.nan
+        return max(values, default=None)
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the worst of every seed reaches the target; a seed that told nothing has missed it.
+
+        None where nothing is asked.
+        """
+        if self.target is None:
+            return None
+        worst = self.worst
+        return worst is not None and all(self.by_seed.values()) and worst <= self.target
+
+
+def gather(by_seed: Mapping[int, Sequence[Figure]]) -> list[Row]:
+    """One row a figure, in the order of their first appearance, over the seeds' figures."""
+    found: dict[str, Figure] = {}
+    for figures in by_seed.values():
+        for figure in figures:
+            found.setdefault(figure.name, figure)
+    of_seed = {seed: {figure.name: figure.values for figure in figures} for seed, figures in by_seed.items()}
+    return [
+        Row(
+            name,
+            figure.unit,
+            figure.paper,
+            figure.target,
+            {seed: values.get(name, ()) for seed, values in of_seed.items()},
+        )
+        for name, figure in found.items()
+    ]
