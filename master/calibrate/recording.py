@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from common.errors import TandemError
+from common.errors import RecordingError as RecordingError
 from common.quaternion import Array
 
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 5.0, 20_000.0
@@ -17,10 +17,6 @@ _JITTER = 0.25
 """Stamps further than this share of a period off their place are not a rate."""
 _LARGEST_LOSS = 0.5
 """A recording of which more than this share is missing is not worth laying out on its grid."""
-
-
-class RecordingError(TandemError):
-    """A recording that cannot be used; the text says what is wrong with it and what to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +47,7 @@ def load_recordings(path: Path) -> dict[str, NodeRecording]:
     `.npz` of one unit: `gyr` rad/s, `acc` m/s², (T, 3) each, optionally `mag` µT, and `rate_hz`.
     `.npz` of a suit: `t_s`, (T,), and for each segment `{segment}_acc`, `_gyr`, optionally `_mag`.
     `.npz` of a unit in raw counts (as imu_tk's): `acc_raw`, `gyr_raw`, and `t` in seconds.
+    `.mcap` of a suit, as `tandem calibrate record` and `live` write it.
     """
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
@@ -191,5 +188,11 @@ def _laid_out(values: Array, slots: Array) -> Array:
     return out
 
 
+def _load_mcap(path: Path) -> dict[str, NodeRecording]:
+    from master.calibrate.suit_recording import load_suit
+
+    return load_suit(path)
+
+
 Reader = Callable[[Path], dict[str, NodeRecording]]
-_READERS: dict[str, Reader] = {".npz": _load_npz}
+_READERS: dict[str, Reader] = {".npz": _load_npz, ".mcap": _load_mcap}
