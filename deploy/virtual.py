@@ -10,7 +10,6 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 
 from common.clock import NS_PER_MS, NS_PER_S
 from common.codec import decode, encode
@@ -18,6 +17,7 @@ from common.config import Model, load_config
 from common.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState
 from common.offset import MasterExchange
 from deploy.judge import Trace
+from deploy.profiles import NURSING, example
 from master.config import MasterConfig
 from master.lease import LeaseKeeper
 from master.pipeline import CommandWriter, MasterPipeline, Solved
@@ -29,7 +29,6 @@ from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline
 from slave.servos.simulated import SimulatedRobot
 
-EXAMPLES = Path(__file__).parent / "examples"
 PERIOD_NS = 5 * NS_PER_MS
 NODE_NS = NS_PER_MS
 """From SYNC to a node's answer."""
@@ -46,6 +45,7 @@ class World:
     """The slave's clock minus the master's at the start."""
     slave_drift_ppm: float = 20.0
     one_way_ns: int = 2 * NS_PER_MS
+    profile: str = NURSING
     overrides: dict[str, list[str]] = field(default_factory=dict)
     """Of the example files, by role."""
 
@@ -173,4 +173,4 @@ class VirtualRun:
 
 
 def _load(model: type[Model], role: str, world: World) -> Model:
-    return load_config(EXAMPLES / f"{role}.toml", model, world.overrides.get(role, ()))
+    return load_config(example(role, world.profile), model, world.overrides.get(role, ()))

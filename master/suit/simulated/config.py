@@ -16,7 +16,7 @@ from master.suit.protocol import SHIPPED_DBC
 from master.suit.simulated.disturbance import DisturbanceConfig
 from master.suit.simulated.faults import FaultsConfig
 from master.suit.simulated.imperfections import GradeName
-from master.suit.simulated.motion import MOTIONS
+from master.suit.simulated.motion import motion_mistakes
 
 QuaternionList = Annotated[list[float], Field(min_length=4, max_length=4)]
 
@@ -43,7 +43,8 @@ class SuitConfig(Section):
     nodes: dict[str, NodeConfig]
     """By segment; segments without a node stay silent."""
     motion: str = "bottle"
-    """What the operator does: `bottle`, `calibration_pose` or `sweep`. Not used with `replay`."""
+    """What the operator does: `bottle`, `grasp`, `walk` (each of one profile), `calibration_pose`, `sweep`.
+    Not used with `replay`."""
     seed: int = Field(default=0, ge=0)
     """Decides the units' errors, their noise and the faults."""
     grade: GradeName = "calibrated"
@@ -62,8 +63,6 @@ class SuitConfig(Section):
     def mistakes(self) -> list[ConfigMistake]:
         """Names that nothing has, ids used twice, quaternions that are no rotation."""
         mistakes = wiring_mistakes(self.nodes, self.buses, "buses")
-        if self.motion not in MOTIONS:
-            mistakes.append(ConfigMistake("motion", self.motion, f"one of {', '.join(MOTIONS)}"))
         for name, q in self.mounting.items():
             if not abs(math.hypot(*q) - 1.0) < 1e-3:
                 mistakes.append(ConfigMistake(f"mounting.{name}", q, "a quaternion (wxyz) of length 1"))
@@ -72,6 +71,8 @@ class SuitConfig(Section):
             segments = load_skeleton(self.profile).segment_names
         except ConfigError as error:
             return mistakes + error.mistakes
+        if self.replay is None:
+            mistakes += motion_mistakes(self.motion, self.profile)
         mistakes += [
             ConfigMistake("disturbance.local.nodes", name, f"a segment of the profile {self.profile}, or all")
             for name in self.disturbance.unknown_nodes(list(segments))

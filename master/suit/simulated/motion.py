@@ -16,7 +16,14 @@ from common.skeleton import Skeleton
 from master.suit.simulated.gait import Curve, Gait, GaitError, Strides
 from master.suit.simulated.minimum_jerk import MinimumJerkMotion, MotionError, Move
 
-MOTIONS = ("bottle", "calibration_pose", "sweep", "walk")
+MOTIONS = {
+    "bottle": "nursing",
+    "grasp": "hand",
+    "walk": "lower_limb",
+    "calibration_pose": None,
+    "sweep": None,
+}
+"""Each motion, and the one profile that can make it; None: any can."""
 
 STILL_S = 3.5
 """A sweep begins with standing still this long, so that filters settle and the robot can align."""
@@ -37,14 +44,23 @@ class Motion(Protocol):
         """Position rad, velocity rad/s and acceleration rad/s², (..., J), at times (...)."""
 
 
+def motion_mistakes(name: str, profile: str) -> list[ConfigMistake]:
+    """None for a motion that the profile can make; else which ones it can."""
+    able = [motion for motion, only in MOTIONS.items() if only in (None, profile)]
+    if name in able:
+        return []
+    return [ConfigMistake("motion", name, f"one of {', '.join(able)} for the profile {profile}")]
+
+
 def load_motion(name: str, skeleton: Skeleton) -> Motion:
     """The named one of `MOTIONS` for a skeleton.
 
-    Raises ConfigError for another name, and for a motion whose joints the skeleton does not have or whose
-    angles are beyond their limits.
+    Raises ConfigError for another name, for a motion of another profile, and for one whose joints the
+    skeleton does not have or whose angles are beyond their limits.
     """
-    if name not in MOTIONS:
-        raise ConfigError("motion", [ConfigMistake("motion", name, f"one of {', '.join(MOTIONS)}")])
+    mistakes = motion_mistakes(name, skeleton.name)
+    if mistakes:
+        raise ConfigError("motion", mistakes)
     if name == "sweep":
         return sweep(skeleton)
     if name == "calibration_pose":

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from importlib import resources
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,6 +16,7 @@ NAMES = ("left", "right", "tail")
 CURVE = Curve(0.2, (0.5, -0.1), (0.3, 0.05, -0.02))
 STRIDES = Strides(period_s=12.0, start_s=1.0, stop_s=11.0, ramp_s=1.5, stride_s=1.1)
 LEGS = load_skeleton("lower_limb")
+WALK = (resources.files("master.suit.simulated") / "walk.toml").read_text("utf-8")
 
 
 def gait() -> Gait:
@@ -67,7 +70,7 @@ def test_times_out_of_order_are_refused(change: dict[str, float], said: str) -> 
 
 def test_a_gait_of_another_skeleton_is_refused() -> None:
     with pytest.raises(ConfigError, match="a curve of right_hip_flexion, which is none of the skeleton's"):
-        load_motion("walk", load_skeleton("nursing"))
+        parse_motion(WALK, load_skeleton("nursing"), "walk")
     strides = "[strides]\nstart_s = 1\nstop_s = 2\nramp_s = 1\nstride_s = 1\n[ahead]\n[curve]"
     with pytest.raises(ConfigError, match=r"walk: strides = .*leave time"):
         parse_motion(f"period_s = 3.0\n{strides}", LEGS, "walk")

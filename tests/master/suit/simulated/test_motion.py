@@ -15,14 +15,17 @@ def sampled(motion: Motion) -> tuple[Array, Array, Array]:
     return motion.state(np.arange(0.0, motion.period_s, STEP_S))
 
 
-PROFILE = {"walk": "lower_limb"}
-"""Of motions that the nursing robot cannot make."""
+PROFILES = ("nursing", "hand", "lower_limb")
 
 
-@pytest.fixture(scope="module", params=MOTIONS)
+@pytest.fixture(
+    scope="module",
+    params=[(name, profile) for name, only in MOTIONS.items() for profile in ([only] if only else PROFILES)],
+    ids=" ".join,
+)
 def moved(request: pytest.FixtureRequest) -> tuple[Motion, Skeleton]:
-    skeleton = load_skeleton(PROFILE.get(request.param, "nursing"))
-    return load_motion(request.param, skeleton), skeleton
+    name, profile = request.param
+    return load_motion(name, load_skeleton(profile)), load_skeleton(profile)
 
 
 @pytest.fixture(scope="module")
@@ -113,3 +116,18 @@ def test_a_motion_the_skeleton_cannot_make_is_refused(skeleton: Skeleton, text: 
     motion = f"period_s = 3.0\n[rest_deg]\n[[move]]\nstart_s = 1.0\nduration_s = 1.0\nto_deg = {{ {text} }}"
     with pytest.raises(ConfigError, match=said):
         parse_motion(motion, skeleton, source="wave.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "profile", "able"),
+    [
+        ("bottle", "hand", "grasp, calibration_pose, sweep"),
+        ("grasp", "nursing", "bottle, calibration_pose, sweep"),
+        ("dance", "lower_limb", "walk, calibration_pose, sweep"),
+    ],
+)
+def test_a_motion_of_another_profile_is_one_line(name: str, profile: str, able: str) -> None:
+    with pytest.raises(
+        ConfigError, match=f"^motion: motion = '{name}': expected one of {able} for the profile {profile}$"
+    ):
+        load_motion(name, load_skeleton(profile))
