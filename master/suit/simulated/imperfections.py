@@ -93,16 +93,16 @@ class Imperfections:
         self._noise_sd = np.repeat([s.noise for s in sensors], 3)
 
     def apply(self, readings: Array) -> Array:
-        """What the sensors read, for what they should read, (N, 9) both."""
-        count = len(readings)
-        distorted: Array = (readings.reshape(count, 3, 1, 3) @ self._gain).reshape(count, CHANNELS)
+        """What the sensors read, for what they should read, (..., N, 9) both."""
+        shape = readings.shape
+        distorted: Array = (readings.reshape(*shape[:-1], 3, 1, 3) @ self._gain).reshape(shape)
         distorted += self._bias
-        distorted += self._noise.standard_normal((count, CHANNELS)) * self._noise_sd
+        distorted += self._noise.standard_normal(shape) * self._noise_sd
         return distorted
 
 
 def quantise(readings: Array, scale: Array) -> tuple[Counts, Mask]:
-    """Counts (N, 9) of readings, for the value of one count a channel (9,); and who saturated, (N,)."""
+    """Counts (..., 9) of readings, for the value of one count a channel (9,); and who saturated, (...)."""
     counts = np.rint(readings / scale)
     clipped = np.clip(counts, -LARGEST_COUNT, LARGEST_COUNT)
-    return clipped.astype(np.int16), np.any(clipped != counts, axis=1)
+    return clipped.astype(np.int16), np.any(clipped != counts, axis=-1)
