@@ -148,7 +148,8 @@ def ideal_readings(
 ) -> Array:
     """(T, S, 9): as `IdealSensors` reads them, all times at once.
 
-    By central differences of the kinematics: within 0.0005 m/s² and 0.0001 rad/s at walking, a tenth of a count.
+    By central differences of the kinematics: at walking within 0.0005 m/s² and 0.0001 rad/s, a tenth of a
+    count.
     """
     steps = (-DIFFERENCE_S, 0.0, DIFFERENCE_S)
     before, q, after = (orientations(skeleton, motion.state(t_s + step)[0]) for step in steps)
