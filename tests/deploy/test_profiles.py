@@ -43,7 +43,7 @@ def test_an_unknown_profile_names_those_there_are() -> None:
 @pytest.mark.parametrize(
     ("role", "override", "said"),
     [
-        ("slave", "guard.joints.right_index.upper_deg=3.0", r"guard.joints.right_index = .*: a joint of hand"),
+        ("slave", "guard.joints.right_index.upper_deg=3.0", r"joints.right_index = .*: a joint of hand"),
         (
             "slave",
             "guard.joints.right_index_pipj.upper_deg=120.0",
