@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from deploy.accuracy.papers import telerobot
+from deploy.accuracy.papers import glove, telerobot
 from deploy.accuracy.papers.figures import Experiment
 
 EXPERIMENTS = (
@@ -13,6 +13,15 @@ EXPERIMENTS = (
         (
             "Over the fast periods of both arms. Against the truth at the same instant; the paper shifts its "
             "solved angles by one step of 80 ms before it compares.",
+        ),
+    ),
+    Experiment(
+        "B",
+        "the data glove: two units, held and moved (Yuan et al. 2022, section 4.2)",
+        glove.experiment,
+        (
+            "The reference is the truth. Each run begins with 3 s at the zero position, in which the units "
+            "take their zero.",
         ),
     ),
 )
