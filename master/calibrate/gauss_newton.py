@@ -1,0 +1,89 @@
+"""Gauss-Newton with Levenberg's damping on curved spaces, and steps on the unit sphere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from common.quaternion import Array
+
+State = TypeVar("State")
+
+_FIRST_DAMPING = 1e-3
+_MOST_DAMPING = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Minimum(Generic[State]):
+    """Where the descent ended."""
+
+    state: State
+    cost: float
+    """Half the sum of squared residuals there."""
+    normal: Array
+    """(P, P): JᵀJ there, in the local parameters of the last step."""
+
+
+def gauss_newton(
+    linearise: Callable[[State], tuple[Array, Array]],
+    step: Callable[[State, Array], State],
+    start: State,
+    *,
+    most_steps: int = 50,
+    tolerance: float = 1e-10,
+) -> Minimum[State]:
+    """Descend from `start`: `linearise` gives residuals (M,) and their Jacobian (M, P) in local parameters.
+
+    `step(state, x)` walks the local parameters x (P,) from a state. A step that does not lower the cost is
+    tried again with more damping, so the cost never rises. Ends when a step lowers the cost by less than
+    `tolerance` of it.
+    """
+    state = start
+    residual, jacobian = linearise(state)
+    cost = 0.5 * float(residual @ residual)
+    damping = _FIRST_DAMPING
+    for _ in range(most_steps):
+        normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
+        gained = 0.0
+        while damping < _MOST_DAMPING:
+            damped = normal + damping * (np.diag(np.diag(normal)) + 1e-12 * np.eye(len(normal)))
+            trial = step(state, -np.linalg.lstsq(damped, gradient, rcond=None)[0])
+            residual_there, jacobian_there = linearise(trial)
+            cost_there = 0.5 * float(residual_there @ residual_there)
+            if cost_there < cost:
+                gained = cost - cost_there
+                state, residual, jacobian, cost = trial, residual_there, jacobian_there, cost_there
+                damping = max(0.1 * damping, 1e-12)
+                break
+            damping *= 10.0
+        if gained <= tolerance * cost:
+            break
+    return Minimum(state, cost, jacobian.T @ jacobian)
+
+
+def tangents(axis: Array) -> Array:
+    """Two orthonormal columns (3, 2) that touch the unit sphere at `axis` (3,)."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first)], axis=-1)
+
+
+def along_sphere(axis: Array, x: Array) -> Array:
+    """The unit vector ‖x‖ rad from `axis` along its `tangents` times x (2,), on the great circle."""
+    way = tangents(axis) @ x
+    angle = float(np.linalg.norm(way))
+    out: Array = np.cos(angle) * axis + np.sinc(angle / np.pi) * way
+    return out / np.linalg.norm(out)
+
+
+def half_sphere(count: int) -> Array:
+    """`count` directions (count, 3) spread evenly over the half sphere z ≥ 0 (Fibonacci's lattice)."""
+    k = np.arange(count) + 0.5
+    z = k / count
+    turn = np.pi * (1.0 + np.sqrt(5.0)) * k
+    across = np.sqrt(1.0 - z**2)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=-1)
