@@ -94,7 +94,8 @@ def test_both_nodes_feel_one_force_at_the_joint() -> None:
         for nodes, lever in ((NEAR, walked.hinge.lever1_m), (FAR, walked.hinge.lever2_m))
     ]
     seen = angle_of_forces(walked.hinge, *forces)
-    np.testing.assert_allclose(seen.angle_rad, walked.knees, atol=np.radians(0.3))
+    # the last rate's change is one-sided, the walk being cut off there
+    np.testing.assert_allclose(seen.angle_rad[:-1], walked.knees[:-1], atol=np.radians(0.3))
     assert seen.disagreement_m_s2.max() < 0.05
     # and without the levers it does not
     bare = angle_of_forces(walked.hinge, walked.acc[:, NEAR], walked.acc[:, FAR])
