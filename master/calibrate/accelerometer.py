@@ -16,6 +16,7 @@ from master.calibrate.uncertainty import covariance, folds, propagate
 UNKNOWNS = 9
 _UPPER = np.triu_indices(3)
 START: Array = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+_MIDDLE_OF_UNSIGNED = 32768.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,54 +90,84 @@ def sphere(readings: Array) -> tuple[Array, float]:
 
 
 def nominal(readings: Array, gravity_m_s2: float, *, counts: bool) -> Array:
-    """θ to start from: the paper's, or for raw counts of unknown unit that of the sphere through them."""
+    """θ of a sensor without errors: the paper's start, or for raw counts the middle of their range as zero.
+
+    The scale of counts is that which makes the mean reading (K, 3) gravity.
+    """
+    if not counts:
+        return START
+    middle = _MIDDLE_OF_UNSIGNED if readings.min() >= 0.0 else 0.0
+    scale = gravity_m_s2 / float(np.mean(np.linalg.norm(readings - middle, axis=1)))
+    return np.concatenate([scale * START[:6], np.full(3, -middle)])
+
+
+def start(readings: Array, gravity_m_s2: float, *, counts: bool) -> Array:
+    """θ to fit from: the paper's, or for raw counts that of the sphere through them."""
     if not counts:
         return START
     centre, radius = sphere(readings)
-    return np.concatenate([np.eye(3)[_UPPER] * gravity_m_s2 / max(radius, 1e-12), -centre])
+    return np.concatenate([gravity_m_s2 / max(radius, 1e-12) * START[:6], -centre])
 
 
-def fit_accelerometer(readings: Array, gravity_m_s2: float, start: Array) -> AccelerometerFit:
-    """Fit to the mean readings (K ≥ 10, 3) of K still intervals, from θ `start`."""
-    theta = _solve(readings, gravity_m_s2, start)
+def determined(theta: Array, readings: Array, gravity_m_s2: float, error_m_s2: float) -> tuple[float, float]:
+    """How far an error in every interval's mean would carry: 1σ of the worst gain and of the worst bias.
+
+    The gain's is a fraction, the bias's in m/s². Infinite where the readings (K, 3) cannot tell.
+    """
+    slope = jacobian(theta, readings)
+    freedom = len(readings) - UNKNOWNS
+    variance = (2.0 * gravity_m_s2 * error_m_s2) ** 2
+    sigma = np.sqrt(np.diag(covariance(slope, np.zeros(len(slope)), freedom, least_variance=variance)))
+    scale = float(np.cbrt(np.abs(np.prod(theta[[0, 3, 5]]))))
+    return float(sigma[:6].max() / scale), float(sigma[6:].max() * scale)
+
+
+def fit_accelerometer(readings: Array, gravity_m_s2: float, first: Array) -> AccelerometerFit:
+    """Fit to the mean readings (K ≥ 10, 3) of K still intervals, from θ `first`."""
+    theta = solve(readings, gravity_m_s2, first)
     left = residuals(theta, readings, gravity_m_s2)
     gain, bias = _unpacked(theta)
     hold_out = np.full(len(readings), np.nan)
     for out in folds(len(readings)):
         if np.sum(~out) > UNKNOWNS:
-            held = _solve(readings[~out], gravity_m_s2, theta)
-            hold_out[out] = _norm_errors(held, readings[out], gravity_m_s2)
+            held = solve(readings[~out], gravity_m_s2, theta)
+            hold_out[out] = norm_errors(held, readings[out], gravity_m_s2)
     return AccelerometerFit(
         gain=gain,
         bias=bias,
         cov=covariance(jacobian(theta, readings), left, len(readings) - UNKNOWNS),
-        residuals_m_s2=_norm_errors(theta, readings, gravity_m_s2),
+        residuals_m_s2=norm_errors(theta, readings, gravity_m_s2),
         hold_out_m_s2=hold_out,
         cost=float(left @ left),
     )
 
 
-def _solve(readings: Array, gravity_m_s2: float, start: Array) -> Array:
+def solve(readings: Array, gravity_m_s2: float, first: Array) -> Array:
+    """θ that fits the mean readings (K ≥ 9, 3) best, from θ `first`."""
     from scipy.optimize import least_squares
 
-    # counts and m/s² differ by orders of magnitude: solve for what is to be applied after the start
-    scale = start[0]
-    first = np.concatenate([start[:6] / scale, np.zeros(3)])
-    shifted = (readings + start[6:]) * scale
+    # counts and m/s² differ by orders of magnitude: solve for what is left to do after the start
+    scale = first[0]
+    shifted = (readings + first[6:]) * scale
+
+    def slope_at(t: Array, readings: Array, gravity_m_s2: float) -> Array:
+        return jacobian(t, readings)
 
     solved = least_squares(
-        lambda t: residuals(t, shifted, gravity_m_s2),
-        first,
-        lambda t: jacobian(t, shifted),
+        residuals,
+        np.concatenate([first[:6] / scale, np.zeros(3)]),
+        slope_at,
+        args=(shifted, gravity_m_s2),
         method="lm",
         xtol=1e-12,
         ftol=1e-12,
         gtol=1e-12,
     ).x
-    return np.concatenate([solved[:6] * scale, start[6:] + solved[6:] / scale])
+    return np.concatenate([solved[:6] * scale, first[6:] + solved[6:] / scale])
 
 
-def _norm_errors(theta: Array, readings: Array, gravity_m_s2: float) -> Array:
+def norm_errors(theta: Array, readings: Array, gravity_m_s2: float) -> Array:
+    """‖G (a_s + b)‖ - g, m/s², (K,), of readings (K, 3)."""
     gain, bias = _unpacked(theta)
     out: Array = np.linalg.norm((readings + bias) @ gain.T, axis=1) - gravity_m_s2
     return out

@@ -73,8 +73,8 @@ class GyroscopeFit:
     @property
     def affine_sigma(self) -> Array:
         """1σ of `affine`, (3, 4)."""
-        slope = np.kron(np.eye(3), self.bias)
-        offset = np.hypot(propagate(self.gain_cov, slope), np.sqrt(self.gain**2 @ self.bias_sigma**2))
+        slope: Array = np.kron(np.eye(3), self.bias).astype(np.float64)
+        offset = np.sqrt(propagate(self.gain_cov, slope) ** 2 + self.gain**2 @ self.bias_sigma**2)
         return np.column_stack([self.sigma, offset])
 
 
@@ -102,10 +102,14 @@ def nominal_scale(moves: Moves) -> float:
     """The unit of the readings, rad/s each, by trying all that converters have on the shorter moves."""
     # the fastest reading of a session made by hand, 0.5 to 100 rad/s; 5 % apart, near enough to start from
     fastest = float(np.max(np.linalg.norm(moves.pairs, axis=-1)))
-    tried = np.exp(np.arange(np.log(0.5), np.log(100.0), 0.05)) / fastest
     short = moves.of(moves.counts <= np.median(moves.counts))
-    costs = [float(np.mean(gravity_errors(scale * np.eye(3), short))) for scale in tried]
-    return float(tried[int(np.argmin(costs))])
+    coarse = _best(np.exp(np.arange(np.log(0.5), np.log(100.0), 0.05)) / fastest, short)
+    return _best(coarse * np.linspace(0.95, 1.05, 21), moves)
+
+
+def _best(scales: Array, moves: Moves) -> float:
+    costs = [float(np.mean(gravity_errors(scale * np.eye(3), moves))) for scale in scales]
+    return float(scales[int(np.argmin(costs))])
 
 
 def fit_gyroscope(
@@ -157,10 +161,16 @@ def _solve(moves: Moves, start: Array) -> tuple[Array, Array, Array]:
             last[:] = [(key, (arrived - moves.after).ravel(), scale * slope.reshape(-1, UNKNOWNS))]
         return last[0][1], last[0][2]
 
+    def left_at(g: Array) -> Array:
+        return at(g)[0]
+
+    def slope_at(g: Array) -> Array:
+        return at(g)[1]
+
     solved = least_squares(
-        lambda g: at(g)[0],
+        left_at,
         start.ravel() / scale,
-        lambda g: at(g)[1],
+        slope_at,
         method="lm",
         xtol=1e-8,
         ftol=1e-8,

@@ -24,7 +24,7 @@ def motion_level(gyr: Array, rate_hz: float) -> Array:
     Infinite where a sample (T, 3) within the window is missing.
     """
     width = max(3, round(WINDOW_S * rate_hz) | 1)
-    missing = np.isnan(gyr).any(axis=1)
+    missing = np.any(np.isnan(gyr), axis=1)
     known = np.where(missing[:, None], 0.0, gyr)
     mean, square = _sliding(known, width), _sliding(known**2, width)
     spread = np.sum(np.maximum(square - mean**2, 0.0), axis=1)
@@ -53,7 +53,8 @@ def still_intervals(level: Array, limit: float, rate_hz: float, shortest_s: floa
     long_enough = found[:, 1] - found[:, 0] >= shortest_s * rate_hz
     half = round(0.5 * WINDOW_S * rate_hz)
     cut = found[long_enough] + np.array([half, -half])
-    return cut[cut[:, 1] - cut[:, 0] >= 2]
+    out: Intervals = cut[cut[:, 1] - cut[:, 0] >= 2]
+    return out
 
 
 def interval_means(samples: Array, intervals: Intervals) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from common.messages import Mask
 from common.quaternion import Array
 
 
@@ -32,6 +33,6 @@ def propagate(parameters_cov: Array, jacobian: Array) -> Array:
     return out
 
 
-def folds(count: int, parts: int = 5) -> list[Array]:
+def folds(count: int, parts: int = 5) -> list[Mask]:
     """Masks (count,) of what each of the parts holds out: every parts-th, in turn."""
     return [np.arange(count) % parts == part for part in range(parts)]

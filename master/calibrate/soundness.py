@@ -1,0 +1,84 @@
+"""Whether a recording can be calibrated from at all: each refusal says what is wrong and what to do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from common.messages import Mask
+from common.quaternion import Array
+from master.calibrate.recording import NodeRecording, RecordingError
+
+_MOST_MISSING = 0.1
+_CLIPPED_RUN = 3
+"""So many equal readings in a row at the end of the range are no coincidence while the node turns."""
+_AXES = "xyz"
+
+
+def check_samples(sensor: str, samples: Array) -> None:
+    """Refuse readings (T, 3) of which too many are missing, or an axis of which never changes."""
+    missing = float(np.mean(~np.isfinite(samples).all(axis=1)))
+    if missing > _MOST_MISSING:
+        raise RecordingError(
+            f"{100 * missing:.0f} % of the {sensor}'s readings are missing (NaN); look at the cable or the "
+            "bus, and record again"
+        )
+    constant = np.nanmax(samples, axis=0) == np.nanmin(samples, axis=0)
+    if constant.any():
+        axes = ", ".join(a for a, c in zip(_AXES, constant, strict=True) if c)
+        raise RecordingError(
+            f"the {sensor} reads the same all along on {axes}; it is broken or not connected"
+        )
+
+
+def check_clipped(sensor: str, samples: Array, watched: Mask, shortest: int, remedy: str) -> None:
+    """Refuse readings (T, 3) that stay at an end of their range for `shortest` samples while `watched`."""
+    for name, values in zip(_AXES, samples.T, strict=True):
+        for end in (np.nanmax(values), np.nanmin(values)):
+            at_end = (values == end) & watched
+            if len(at_end) >= shortest and _longest_run(at_end) >= shortest:
+                raise RecordingError(
+                    f"the {sensor} is clipped on {name}: {int(at_end.sum())} readings are at its limit "
+                    f"of {end:g}; {remedy}"
+                )
+
+
+def check_inertial(recording: NodeRecording, level: Array, fast: float) -> None:
+    """Refuse a clipped sensor, for the gyro's `level` (T,), above `fast` while the node surely turns."""
+    turning = level > fast
+    check_clipped(
+        "gyroscope",
+        recording.gyr_rad_s,
+        turning,
+        _CLIPPED_RUN,
+        "turn the node more slowly, and record again",
+    )
+    # noise moves a sound accelerometer all the time; a perfect one, as in a simulation, has none to tell by
+    noise = np.nanmedian(np.abs(np.diff(recording.acc_m_s2[~turning], axis=0)), axis=0)
+    if np.median(noise) > 0.0:
+        check_clipped(
+            "accelerometer",
+            recording.acc_m_s2,
+            ~turning,
+            max(_CLIPPED_RUN, round(0.5 * recording.rate_hz)),
+            "set a larger range, or replace the node",
+        )
+
+
+def _longest_run(flags: Mask) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))).reshape(-1, 2)
+    return int(np.max(edges[:, 1] - edges[:, 0], initial=0))
+
+
+def filled(samples: Array, longest: int) -> Array:
+    """Gaps of at most `longest` samples bridged by straight lines, (T, 3); longer ones stay NaN."""
+    missing = np.any(~np.isfinite(samples), axis=1)
+    if not missing.any():
+        return samples
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], missing.astype(np.int8), [0]]))).reshape(-1, 2)
+    known = np.flatnonzero(~missing)
+    out = np.where(missing[:, None], np.nan, samples)
+    for a, b in edges:
+        if b - a <= longest and a > 0 and b < len(samples):
+            for axis in range(3):
+                out[a:b, axis] = np.interp(np.arange(a, b), known, samples[known, axis])
+    return out
