@@ -51,7 +51,7 @@ def experiment(seed: int) -> list[Figure]:
 
 def hinged_pair() -> Skeleton:
     """The second of two units is hinged to the first about the X axes of both; the first turns every way."""
-    first, *turns = *turntable().segments, *turntable().joints
+    table = turntable()
     second = Segment(
         "second",
         "body",
@@ -60,7 +60,7 @@ def hinged_pair() -> Skeleton:
         (0.03, 0.0, 0.0),
         (0.02, 0.0, 0.0),
     )
-    return Skeleton("hinged pair", (first, second), (*turns, free_joint("hinge")))
+    return Skeleton("hinged pair", (*table.segments, second), (*table.joints, free_joint("hinge")))
 
 
 def orient(take: Take, filter_name: str, calibration: Calibration | None = None) -> tuple[Array, Array]:
