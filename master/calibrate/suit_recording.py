@@ -15,7 +15,7 @@ log = logging.getLogger("tandem.calibrate")
 
 
 def load_suit(path: Path) -> dict[str, NodeRecording]:
-    """Every node that answered at all, by segment. Raises RecordingError; says it of a file that was cut off."""
+    """Every node that answered at all, by segment; a file that was cut off is said. Raises RecordingError."""
     sweeps = read_sweeps(path)
     if sweeps.cut:
         log.warning("%s: %s; its first %.1f s are whole", path, sweeps.cut, sweeps.duration_s)

@@ -17,6 +17,7 @@ from master.suit.simulated.disturbance import DisturbanceConfig
 from master.suit.simulated.faults import FaultsConfig
 from master.suit.simulated.imperfections import GradeName
 from master.suit.simulated.motion import motion_mistakes
+from master.suit.simulated.tray import TrayConfig
 
 QuaternionList = Annotated[list[float], Field(min_length=4, max_length=4)]
 
@@ -43,8 +44,10 @@ class SuitConfig(Section):
     nodes: dict[str, NodeConfig]
     """By segment; segments without a node stay silent."""
     motion: str = "bottle"
-    """What the operator does: `bottle`, `grasp`, `walk` (each of one profile), `calibration_pose`, `sweep`.
-    Not used with `replay`."""
+    """What the operator does: `bottle`, `grasp`, `walk` (each of one profile), `calibration_pose`, `sweep`;
+    to calibrate: `tray` (all units in it are turned about), `limber` (the zero pose, then every joint moves),
+    `calibration` (the tray once, then limber). Not used with `replay`."""
+    tray: TrayConfig = TrayConfig()
     seed: int = Field(default=0, ge=0)
     """Decides the units' errors, their noise and the faults."""
     grade: GradeName = "calibrated"

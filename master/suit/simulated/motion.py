@@ -14,6 +14,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from master.suit.simulated.gait import Curve, Gait, GaitError, Strides
+from master.suit.simulated.limber import Limber
 from master.suit.simulated.minimum_jerk import MinimumJerkMotion, MotionError, Move
 
 MOTIONS = {
@@ -22,6 +23,9 @@ MOTIONS = {
     "walk": "lower_limb",
     "calibration_pose": None,
     "sweep": None,
+    "limber": None,
+    "tray": None,
+    "calibration": None,
 }
 """Each motion, and the one profile that can make it; None: any can."""
 
@@ -63,6 +67,8 @@ def load_motion(name: str, skeleton: Skeleton) -> Motion:
         raise ConfigError("motion", mistakes)
     if name == "sweep":
         return sweep(skeleton)
+    if name in ("limber", "tray", "calibration"):  # off the tray the operator always does this
+        return Limber(skeleton)
     if name == "calibration_pose":
         return stand_still(skeleton)
     text = resources.files(__package__).joinpath(f"{name}.toml").read_text("utf-8")

@@ -23,6 +23,7 @@ from master.suit.simulated.imperfections import Counts, Imperfections, quantise
 from master.suit.simulated.motion import Motion, load_motion
 from master.suit.simulated.replay import Replay, load_replay
 from master.suit.simulated.sensors import IdealSensors, earth_field_ut
+from master.suit.simulated.tray import Tray
 
 Bits = NDArray[np.int64]
 
@@ -72,6 +73,27 @@ class SimulatedOperator:
         position, velocity, acceleration = self._motion.state(t_s)
         readings = self._sensors.read(position, velocity, acceleration, t_s)
         return Wearing(self._imperfections.apply(readings), (position, velocity))
+
+
+class CalibratingOperator:
+    """Turns all units about in their tray, and may put them on afterwards."""
+
+    magnetic = True
+
+    def __init__(
+        self, tray: Tray, field_ut: Array, imperfections: Imperfections, then: Wearer | None = None
+    ) -> None:
+        """Without `then` the tray is turned for ever."""
+        self._tray = tray
+        self._field_ut = field_ut
+        self._imperfections = imperfections
+        self._then = then
+
+    def at(self, t_s: float) -> Wearing:
+        """The tray at that time, or whoever wears the units by then; no joints are true of a tray."""
+        if self._then is not None and t_s >= self._tray.period_s:
+            return self._then.at(t_s - self._tray.period_s)
+        return Wearing(self._imperfections.apply(self._tray.readings(t_s, self._field_ut)), None)
 
 
 class RecordedOperator:
@@ -180,8 +202,14 @@ def _wearer(config: SuitConfig, skeleton: Skeleton) -> Wearer:
     disturbance = None
     if config.disturbance != DisturbanceConfig():
         disturbance = Disturbance(config.disturbance, skeleton.segment_names, field_ut)
-    return SimulatedOperator(
+    imperfections = Imperfections(config.grade, len(skeleton.segments), config.seed)
+    worn = SimulatedOperator(
         load_motion(config.motion, skeleton),
         IdealSensors(skeleton, field_ut, mounting, disturbance),
-        Imperfections(config.grade, len(skeleton.segments), config.seed),
+        imperfections,
     )
+    if config.motion not in ("tray", "calibration"):
+        return worn
+    tray = Tray(config.tray, len(skeleton.segments), config.seed)
+    then = worn if config.motion == "calibration" else None
+    return CalibratingOperator(tray, field_ut, imperfections, then)
