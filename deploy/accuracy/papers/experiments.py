@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from deploy.accuracy.papers import glove, telerobot
+from deploy.accuracy.papers import glove, lower_limb, telerobot
 from deploy.accuracy.papers.figures import Experiment
 
 EXPERIMENTS = (
@@ -22,6 +22,16 @@ EXPERIMENTS = (
         (
             "The reference is the truth. Each run begins with 3 s at the zero position, in which the units "
             "take their zero.",
+        ),
+    ),
+    Experiment(
+        "C",
+        "the knees, sensors 40° askew, 20 s of walking (lower-limb paper, section 4.1)",
+        lower_limb.experiment,
+        (
+            "The page prints no figures. Mounting, axes and levers are found from the same recording; no "
+            "magnetometer is read. Sensors are fixed to the segments: skin that moves under them is not "
+            "simulated.",
         ),
     ),
 )
