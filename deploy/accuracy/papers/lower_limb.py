@@ -1,4 +1,4 @@
-"""Paper C: a person walks with sensors worn askew; the knees' axes and angles from gyros and accelerometers."""
+"""Paper C: a person walks with sensors worn askew: the knees from gyros and accelerometers alone."""
 
 from __future__ import annotations
 
