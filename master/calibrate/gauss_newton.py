@@ -50,7 +50,8 @@ def gauss_newton(
         gained = 0.0
         while damping < _MOST_DAMPING:
             damped = normal + damping * (np.diag(np.diag(normal)) + 1e-12 * np.eye(len(normal)))
-            trial = step(state, -np.linalg.lstsq(damped, gradient, rcond=None)[0])
+            walk = -np.linalg.lstsq(damped, gradient, rcond=None)[0].astype(np.float64)
+            trial = step(state, walk)
             residual_there, jacobian_there = linearise(trial)
             cost_there = 0.5 * float(residual_there @ residual_there)
             if cost_there < cost:

@@ -79,9 +79,9 @@ def find_hinge(gyr1_rad_s: Array, gyr2_rad_s: Array, rate_hz: float) -> Hinge:
     misfit = math.sqrt(2.0 * best.cost / len(gyr1))
     # neighbouring samples of a band-limited misfit do not count as independent
     independent = max(len(gyr1) / max(rate_hz / 10.0, 1.0), 5.0)
-    eigenvalues = np.linalg.eigvalsh(best.normal)
+    eigenvalues = np.linalg.eigvalsh(best.normal).astype(np.float64)
     variance = misfit**2 * len(gyr1) / independent
-    covariance = variance * np.linalg.pinv(best.normal, rcond=1e-14)
+    covariance = variance * np.linalg.pinv(best.normal, rcond=1e-14).astype(np.float64)
     about1, about2 = gyr1 @ axis1, gyr2 @ axis2
     bending = min(float(np.mean((about1 - sign * about2) ** 2)) for sign in (1.0, -1.0))
     return Hinge(

@@ -28,6 +28,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.quaternion import Array, heading_turn, rotate, to_matrix
 from master.calibrate.gauss_newton import along_sphere, gauss_newton, tangents
@@ -51,8 +52,11 @@ _HEADINGS, _OFFSETS = 4, 8
 _SURE_RAD, _SURE_RIVAL = math.radians(10.0), 3.0
 """An offset known so well from the accelerations alone is where the axes' search starts."""
 _COARSE, _MOST = 250, 1500
-_KEPT = 3
+_KEPT = 4
 _ALIKE_RAD = math.radians(20.0)
+
+
+Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +74,7 @@ class Moving:
     r_stance: Array
     """(3, 3)."""
 
-    def some(self, rows: Array) -> Moving:
+    def some(self, rows: Rows) -> Moving:
         """The samples of these rows."""
         return replace(self, r=self.r[rows], rate=self.rate[rows], acc=self.acc[rows], lever=self.lever[rows])
 
@@ -99,6 +103,8 @@ class JointFit:
     offset_sigma_rad: float
     rival: float
     """Cost of the best answer with quite another δ, in units of this one's."""
+    axis_rival: float
+    """Cost of the best answer with quite other axes, in units of this one's."""
     misfit: dict[str, float]
     """RMS of each kind of residual: `aligned` rad, `rate` rad/s, `acceleration` m/s²."""
 
@@ -123,16 +129,17 @@ def fit_joint(parent: Moving, child: Moving, zero_axes: Sequence[Array] | None, 
     )
     kept: list[Unknowns] = []
     for unknowns, _, _ in tried:
-        if all(abs(_wrap(unknowns.offset_rad - k.offset_rad)) > _ALIKE_RAD for k in kept):
+        if not any(_same_offset(unknowns, k) and _same_axes(unknowns, k) for k in kept):
             kept.append(unknowns)
     fine = _Problem(parent.some(many), child.some(many), zero_axes)
     refined = sorted((fine.descend(start, most_steps=30) for start in kept[:_KEPT]), key=lambda m: m[1])
     best, cost, normal = refined[0]
-    rivals = [c for u, c, _ in refined[1:] if abs(_wrap(u.offset_rad - best.offset_rad)) > _ALIKE_RAD]
+    rivals = [c for u, c, _ in refined[1:] if not _same_offset(u, best)]
+    axis_rivals = [c for u, c, _ in refined[1:] if not _same_axes(u, best)]
     independent = max(1.0, _INDEPENDENT_S / (spacing_s * max(1, many[1] - many[0] if len(many) > 1 else 1)))
     # residuals are in units of what they may be: data that fit better count as no better than half of it
     scale = max(0.25, 2.0 * cost / fine.rows)
-    covariance = scale * independent * np.linalg.pinv(normal, rcond=1e-12)
+    covariance = scale * independent * np.linalg.pinv(normal, rcond=1e-12).astype(np.float64)
     axes = 4 if zero_axes is not None else 0
     return JointFit(
         best.axes,
@@ -140,9 +147,21 @@ def fit_joint(parent: Moving, child: Moving, zero_axes: Sequence[Array] | None, 
         best.levers_m.reshape(2, 3),
         (_worst(covariance[:2, :2]), _worst(covariance[2:4, 2:4])) if axes else (math.pi, math.pi),
         min(math.pi, math.sqrt(covariance[axes, axes])),
-        min(rivals, default=math.inf) / cost if cost > 0.0 else math.inf,
+        min(rivals, default=math.inf) / max(cost, 1e-12),
+        min(axis_rivals, default=math.inf) / max(cost, 1e-12),
         fine.misfit(best),
     )
+
+
+def _same_offset(one: Unknowns, other: Unknowns) -> bool:
+    return abs(_wrap(one.offset_rad - other.offset_rad)) < _ALIKE_RAD
+
+
+def _same_axes(one: Unknowns, other: Unknowns) -> bool:
+    """Up to their signs, which joints leave open."""
+    if one.axes is None or other.axes is None:
+        return True
+    return all(abs(float(a @ b)) > math.cos(_ALIKE_RAD) for a, b in zip(one.axes, other.axes, strict=True))
 
 
 def _starts(

@@ -45,8 +45,8 @@ _PLAIN_RAD = math.radians(1.5)
 """Mean excess over the limits by which the wrong sign of an axis is told."""
 _AXIS_FLOOR_RAD = math.radians(1.0)
 """No axis of a person is known better."""
-_FARTHEST_RAD = math.radians(70.0)
-"""An axis that points so far from where all the others have it stood otherwise in the stance, or is wrong."""
+_ONE_LIMB_RAD, _PAIR_RAD = math.radians(15.0), math.radians(8.0)
+"""How far a person's limb, or the mean of a pair of them, faces from ahead in the stance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +162,12 @@ def _fit(skeleton: Skeleton, i: int, parent: Moving, child: Moving, spacing_s: f
         refusal = f"heading only known to ± {math.degrees(fit.offset_sigma_rad):.0f}°; {ask}"
     elif fit.rival < _WORST_RIVAL:
         refusal = f"another heading explains the motion as well; {ask}"
-    known = axes is not None and max(fit.axis_sigma_rad) < _WORST_AXIS_RAD and refusal is None
+    known = (
+        axes is not None
+        and refusal is None
+        and max(fit.axis_sigma_rad) < _WORST_AXIS_RAD
+        and fit.axis_rival > _WORST_RIVAL
+    )
     return JointMotion(entry.name, entry.parent, kind, fit, refusal, known)
 
 
@@ -285,7 +290,7 @@ def _excess(
 
 
 def _angles(skeleton: Skeleton, suit: Oriented, i: int, ends: Mapping[str, tuple[float, Array]]) -> Array:
-    """Intrinsic angles (3, K) of a joint over the recording at some 20 Hz, for heading and mounting by name."""
+    """Intrinsic angles (3, K) of a joint at some 20 Hz, for heading and mounting by name."""
     entry = skeleton.segments[i]
     step = max(1, round(suit.rate_hz / 20.0))
     q = [
@@ -306,17 +311,34 @@ def _limits(skeleton: Skeleton, angle: str | None) -> tuple[float, float] | None
     return None
 
 
-def _facing(axes: dict[str, list[_Axis]]) -> float | None:
-    """Which way the person faced in the stance, by all axes whose sign is told; settles the signs of the rest."""
+def _facing(axes: dict[str, list[_Axis]]) -> tuple[float, float] | None:
+    """Which way the person faced in the stance, and its standard deviation; settles signs that were open.
+
+    Limbs are turned in or out alike on both sides: a pair of limbs says more than either.
+    """
     every = [axis for mine in axes.values() for axis in mine]
-    told = [axis for axis in every if axis.told]
+    told = [axis.facing_rad for axis in every if axis.told]
     if not told:
         return None
-    facing = math.atan2(sum(math.sin(a.facing_rad) for a in told), sum(math.cos(a.facing_rad) for a in told))
+    about = _mean_angle(told)
     for axis in every:
-        if not axis.told and math.cos(axis.facing_rad - facing) < 0.0:
+        if not axis.told and math.cos(axis.facing_rad - about) < 0.0:
             axis.facing_rad += math.pi
-    return facing
+    by_segment = {name: _mean_angle([a.facing_rad for a in mine]) for name, mine in axes.items()}
+    pairs = [
+        _mean_angle([facing, by_segment[other]])
+        for name, facing in by_segment.items()
+        if name.startswith("left_") and (other := name.replace("left_", "right_", 1)) in by_segment
+    ]
+    single = _ONE_LIMB_RAD if not pairs else _PAIR_RAD
+    said = pairs or list(by_segment.values())
+    facing = _mean_angle(said)
+    spread = math.sqrt(sum(math.remainder(s - facing, 2.0 * math.pi) ** 2 for s in said) / len(said))
+    return facing, max(single, spread) / math.sqrt(len(said))
+
+
+def _mean_angle(angles_rad: list[float]) -> float:
+    return math.atan2(sum(map(math.sin, angles_rad)), sum(map(math.cos, angles_rad)))
 
 
 def _node(
@@ -325,17 +347,18 @@ def _node(
     q_stance: Array,
     island: Island,
     axes: dict[str, list[_Axis]],
-    facing_rad: float,
+    facing: tuple[float, float],
     joints: list[JointMotion],
 ) -> NodeMounting:
     """Its own axes' facing, else that of the segment it hangs on, else everyone's."""
+    facing_rad, facing_sigma = facing
     offset, variance = island[name]
     source: str | None = name
     while source is not None and not axes.get(source):
         parent = skeleton.segments[skeleton.segment_names.index(source)].parent
         source = parent if parent in island else None
     if source is None:
-        mine, sigma, told_by = facing_rad, _spread(axes), "the limbs' mean"
+        mine, sigma, told_by = facing_rad, facing_sigma, "the limbs' mean"
     else:
         weights = [1.0 / a.sigma_rad**2 for a in axes[source]]
         mine = facing_rad + sum(
@@ -361,17 +384,10 @@ def _node(
 
 def _tilt(skeleton: Skeleton, joint: JointMotion, name: str, q_stance: Array) -> float:
     """How far the joint's axis is from level (or from where the zero pose has it) in the stance, rad."""
-    assert joint.fit is not None and joint.fit.axes is not None
+    assert joint.fit is not None
+    assert joint.fit.axes is not None
     axis = joint.fit.axes[0 if name == joint.parent else 1]
     return math.asin(max(-1.0, min(1.0, float(rotate(q_stance, axis)[2]))))
-
-
-def _spread(axes: dict[str, list[_Axis]]) -> float:
-    """Standard error of the mean facing of all axes that were found."""
-    every = [axis for mine in axes.values() for axis in mine]
-    mean = math.atan2(sum(math.sin(a.facing_rad) for a in every), sum(math.cos(a.facing_rad) for a in every))
-    squares = [math.remainder(a.facing_rad - mean, 2.0 * math.pi) ** 2 + a.sigma_rad**2 for a in every]
-    return math.sqrt(sum(squares)) / len(every)
 
 
 def _with_flexion(

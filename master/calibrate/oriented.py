@@ -10,7 +10,7 @@ from vqf import offlineVQF
 
 from common.quaternion import Array, normalise, to_matrix
 from master.calibrate.hinge import PoorMotionError
-from master.calibrate.joint_fit import Moving
+from master.calibrate.joint_fit import Moving, Rows
 from master.calibrate.recording import NodeRecording
 
 _SMOOTH_HZ = 10.0
@@ -87,7 +87,7 @@ def _lowpass(values: Array, cutoff_hz: float, rate_hz: float) -> Array:
     return out
 
 
-def rows_moving(parent: Moving, child: Moving) -> Array:
+def rows_moving(parent: Moving, child: Moving) -> Rows:
     """Samples in which either unit of a pair turns."""
     rate = np.maximum(np.linalg.norm(parent.rate, axis=1), np.linalg.norm(child.rate, axis=1))
     return np.flatnonzero(rate > _MOVING_RAD_S)
