@@ -102,9 +102,9 @@ def nominal_scale(moves: Moves) -> float:
     """The unit of the readings, rad/s each, by trying all that converters have on the shorter moves."""
     # the fastest reading of a session made by hand, 0.5 to 100 rad/s; 5 % apart, near enough to start from
     fastest = float(np.max(np.linalg.norm(moves.pairs, axis=-1)))
-    short = moves.of(moves.counts <= np.median(moves.counts))
+    short = moves.of(moves.counts <= np.quantile(moves.counts, 0.3))
     coarse = _best(np.exp(np.arange(np.log(0.5), np.log(100.0), 0.05)) / fastest, short)
-    return _best(coarse * np.linspace(0.95, 1.05, 21), moves)
+    return _best(coarse * np.linspace(0.95, 1.05, 11), moves)
 
 
 def _best(scales: Array, moves: Moves) -> float:

@@ -41,6 +41,8 @@ _TRIAL_ERROR_M_S2 = 0.01
 _WORST_GAIN, _WORST_BIAS_M_S2 = 0.02, 0.1
 """What an error of that size in every still interval may make of the fit."""
 _WORST_GYRO_GAIN = 0.02
+_PLAUSIBLE_ERROR_RAD = 0.2
+"""Of gravity after a move, by an uncalibrated gyro in the right unit."""
 _ONE_DEGREE = np.pi / 180.0
 
 
@@ -223,6 +225,8 @@ def _moves(recording: NodeRecording, rates: Array, still: Intervals, force: Arra
 
 def _gyro_unit(moves: gyr.Moves, *, counts: bool) -> float:
     """rad/s of one unit of the readings: 1 where they are in rad/s, and refused where they cannot be."""
+    if not counts and np.mean(gyr.gravity_errors(np.eye(3), moves)) < _PLAUSIBLE_ERROR_RAD:
+        return 1.0
     scale = gyr.nominal_scale(moves)
     if counts:
         return scale

@@ -1,0 +1,140 @@
+"""The magnetometer of one node from a recording of free rotation (paper B, 2.2.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import date
+
+import numpy as np
+
+from common.quaternion import Array
+from master.calibrate.affine import Made
+from master.calibrate.ellipsoid import (
+    Ellipsoid,
+    NoEllipsoidError,
+    affine_sigma,
+    amplification,
+    coverage,
+    fit_ellipsoid,
+)
+from master.calibrate.node_file import Part
+from master.calibrate.recording import NodeRecording, RecordingError
+from master.calibrate.soundness import check_clipped, check_samples
+from master.calibrate.uncertainty import folds
+
+LEAST_COVERAGE = 0.5
+GOOD_COVERAGE = 0.8
+MOST_AMPLIFICATION = 1.0
+MOST_SPREAD = 0.1
+"""Of the calibrated strength over itself; beyond it the field is not one field."""
+_FEWEST_SAMPLES = 100
+_BLOCK_S = 2.0
+"""Neighbouring samples are alike: what is held out are blocks of this length."""
+_LIMIT_S = 0.5
+"""No turning node reads the very same so long."""
+_TURN = "turn the node slowly through every attitude, as if to paint the inside of a ball"
+
+
+@dataclass(frozen=True, slots=True)
+class MagneticCalibration:
+    """What was found, and how good it is."""
+
+    name: str
+    fit: Ellipsoid
+    sigma: Array
+    """1σ of the map, (3, 4)."""
+    coverage: float
+    """Share of the sphere seen, 0 to 1."""
+    readings_ut: Array
+    """(K, 3), those that were used."""
+    hold_out_ut: Array
+    """(K,), calibrated strength minus the field, by fits that did not see the reading."""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def spread_before_ut(self) -> float:
+        """Standard deviation of the strength as it came."""
+        return float(np.std(np.linalg.norm(self.readings_ut, axis=1)))
+
+    @property
+    def spread_after_ut(self) -> float:
+        """Standard deviation of the calibrated strength."""
+        return float(np.std(self.fit.norms(self.readings_ut)))
+
+    @property
+    def hold_out_spread_ut(self) -> float:
+        """Root mean square of `hold_out_ut`."""
+        return float(np.sqrt(np.mean(self.hold_out_ut**2)))
+
+    def parts(self, day: date, recording: str) -> dict[Part, tuple[Array, Made]]:
+        """As `write_calibration` takes them."""
+        made = Made(
+            date=day,
+            recording=recording,
+            unit="µT",
+            residual_before=self.spread_before_ut,
+            residual_after=self.spread_after_ut,
+            hold_out=self.hold_out_spread_ut,
+            sigma=self.sigma.tolist(),
+        )
+        return {"magnetometer": (self.fit.affine, made)}
+
+
+def calibrate_magnetic(recording: NodeRecording) -> MagneticCalibration:
+    """Find the magnetometer's map. Raises RecordingError when the recording does not determine it."""
+    if recording.mag_ut is None:
+        raise RecordingError("there are no magnetometer readings; record a node that has one")
+    check_samples("magnetometer", recording.mag_ut)
+    everywhere = np.ones(len(recording.mag_ut), dtype=np.bool_)
+    check_clipped(
+        "magnetometer",
+        recording.mag_ut,
+        everywhere,
+        max(3, round(_LIMIT_S * recording.rate_hz)),
+        "set a larger range, or take it away from the magnet",
+    )
+    known = np.all(np.isfinite(recording.mag_ut), axis=1)
+    readings = recording.mag_ut[known]
+    if len(readings) < _FEWEST_SAMPLES:
+        raise RecordingError(f"{len(readings)} readings are too few; {_TURN}, for 3 minutes")
+    try:
+        fit = fit_ellipsoid(readings)
+        seen = _check_coverage(fit, readings)
+        hold_out = _held_out(readings, np.flatnonzero(known) // max(1, round(_BLOCK_S * recording.rate_hz)))
+    except NoEllipsoidError as error:
+        raise RecordingError(f"the sphere is covered too thinly: {error}; {_TURN}") from None
+    spread = float(np.std(fit.norms(readings))) / fit.field_ut
+    if spread > MOST_SPREAD:
+        raise RecordingError(
+            f"the calibrated field varies by {100 * spread:.0f} %: it was disturbed; go away from iron, "
+            "motors and magnets, and record again"
+        )
+    notes = () if seen >= GOOD_COVERAGE else (f"{100 * seen:.0f} % of the sphere seen; more makes it surer",)
+    return MagneticCalibration(
+        recording.name, fit, affine_sigma(fit, readings), seen, readings, hold_out, notes
+    )
+
+
+def _check_coverage(fit: Ellipsoid, readings: Array) -> float:
+    seen = coverage(fit, readings)
+    carried = amplification(fit, readings)
+    if seen < LEAST_COVERAGE:
+        raise RecordingError(
+            f"the sphere is covered too thinly: {100 * seen:.0f} % of it was seen, at least "
+            f"{100 * LEAST_COVERAGE:.0f} % is needed; {_TURN}"
+        )
+    if carried > MOST_AMPLIFICATION:
+        raise RecordingError(f"the sphere is covered too thinly: one side of it was not seen; {_TURN}")
+    return seen
+
+
+def _held_out(readings: Array, blocks: Array) -> Array:
+    """Calibrated strength minus the field (K,), each by a fit to the other blocks (K,) of readings."""
+    _, place = np.unique(blocks, return_inverse=True)
+    errors = np.empty(len(readings))
+    for out in folds(int(place.max()) + 1):
+        held = out[place]
+        if held.any():
+            fit = fit_ellipsoid(readings[~held])
+            errors[held] = fit.norms(readings[held]) - fit.field_ut
+    return errors
