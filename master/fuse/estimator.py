@@ -16,13 +16,15 @@ from common.errors import ConfigError, ConfigMistake
 from common.messages import Mask
 from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate
 from master.calibrate.affine import ACC, GYR, MAG, Calibration, apply, load_calibration
-from master.fuse.filter import FilterBank
+from master.fuse.ekf import EkfConfig
+from master.fuse.filter import FilterBank, FilterName
+from master.fuse.filters import makers
 from master.fuse.heading import HeadingMemory
 from master.fuse.liveness import Liveness
 from master.fuse.lowpass import LowPass
-from master.fuse.mahony import MahonyConfig, MahonyFilter
+from master.fuse.mahony import MahonyConfig
 from master.fuse.stance import Stance
-from master.fuse.vqf import VqfConfig, VqfFilter
+from master.fuse.vqf import VqfConfig
 
 _GRAVITY_M_S2 = 9.81
 
@@ -30,7 +32,7 @@ _GRAVITY_M_S2 = 9.81
 class EstimationConfig(Section):
     """`[estimation]`: how readings become orientations."""
 
-    filter: Literal["vqf", "mahony"] = "vqf"
+    filter: FilterName = "vqf"
     """Orientation filter of every node that does not name its own."""
     order: Literal[2, 4, 6, 8] = 2
     """Order of the Butterworth low-passes."""
@@ -50,6 +52,7 @@ class EstimationConfig(Section):
     """Where the operator faces meanwhile, from east towards north."""
     vqf: VqfConfig = VqfConfig()
     mahony: MahonyConfig = MahonyConfig()
+    ekf: EkfConfig = EkfConfig()
 
     @property
     def cutoffs_hz(self) -> tuple[float, float, float]:
@@ -144,10 +147,7 @@ class Estimator:
         self._lowpass = LowPass(config.cutoffs_hz, config.order, rate_hz, count)
         self._bank = FilterBank(
             [node.filter or config.filter for node in nodes],
-            {
-                "vqf": lambda n: VqfFilter(config.vqf, rate_hz, n),
-                "mahony": lambda n: MahonyFilter(config.mahony, rate_hz, n),
-            },
+            makers(rate_hz, config.vqf, config.mahony, config.ekf),
         )
         self._liveness = Liveness(count, math.ceil(config.settle_s * rate_hz))
         self._heading = HeadingMemory(count)

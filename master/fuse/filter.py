@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.messages import Mask
 from common.quaternion import Array
+
+FilterName = Literal["vqf", "mahony", "ekf"]
+"""What a TOML calls the filters; `filters.py` makes them."""
 
 
 class OrientationFilter(Protocol):
@@ -51,7 +54,7 @@ MakeFilter = Callable[[int], OrientationFilter]
 class FilterBank:
     """N nodes, each filtered by the filter it names; itself an `OrientationFilter`."""
 
-    def __init__(self, names: Sequence[str], make: dict[str, MakeFilter]) -> None:
+    def __init__(self, names: Sequence[str], make: Mapping[str, MakeFilter]) -> None:
         self._count = len(names)
         self._parts: list[tuple[NDArray[np.intp] | slice, OrientationFilter]] = []
         for name in dict.fromkeys(names):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 from pydantic import Field
 
 from common.config import RelativePath, Section
 from common.errors import ConfigMistake
+from master.fuse.filter import FilterName
 
 
 class BusConfig(Section):
@@ -35,7 +35,7 @@ class NodeConfig(Section):
     """Name of the bus it hangs on."""
     magnetometer: bool = True
     """False: it has none, and its filter runs on gyro and accelerometer."""
-    filter: Literal["vqf", "mahony"] | None = None
+    filter: FilterName | None = None
     """Orientation filter of this node; None takes the suit's."""
     calibration: RelativePath | None = None
     """Its calibration TOML; None leaves the readings as they come."""

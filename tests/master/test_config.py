@@ -40,7 +40,7 @@ def test_the_example_is_right() -> None:
         ("nodes.head.bus='left'", ["nodes.head.bus = 'left'", "one of suit"]),
         ("profile='octopus'", ["profile = 'octopus'", "nursing"]),
         ("estimation.gyroscope_cutoff_hz=100.0", ["gyroscope_cutoff_hz = 100.0", "less than half the rate"]),
-        ("estimation.filter='magic'", ["estimation.filter = 'magic'", "'vqf' or 'mahony'"]),
+        ("estimation.filter='magic'", ["estimation.filter = 'magic'", "'vqf', 'mahony' or 'ekf'"]),
         ("robot='robot 1'", ["robot = 'robot 1'", "pattern"]),
     ],
 )

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from master.fuse.filter import FilterBank
+from master.fuse.filter import FilterBank, MakeFilter
 from master.fuse.mahony import MahonyConfig, MahonyFilter
 from master.fuse.vqf import VqfConfig, VqfFilter
 
 RATE_HZ = 200.0
 NAMES = ["vqf", "mahony", "vqf", "mahony", "mahony"]
-MAKE = {
+MAKE: dict[str, MakeFilter] = {
     "vqf": lambda n: VqfFilter(VqfConfig(), RATE_HZ, n),
     "mahony": lambda n: MahonyFilter(MahonyConfig(ki=0.1), RATE_HZ, n),
 }

@@ -1,0 +1,64 @@
+"""Errors over time as a picture: a row a recording, a line a filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from common.messages import Mask
+from common.quaternion import Array
+
+_POINTS = 1500
+"""So many points a line: each is the largest of its share of samples, so that no peak is lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One recording's curves."""
+
+    name: str
+    rate_hz: float
+    movement: Mask
+    """(T,) shaded."""
+    curves: Mapping[str, Mapping[str, Array]]
+    """Column's title ▸ filter ▸ (T,) °."""
+
+
+def draw(panels: list[Panel], path: Path) -> None:
+    """Write the PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    columns = list(dict.fromkeys(title for panel in panels for title in panel.curves))
+    figure = Figure(figsize=(5.0 * len(columns), 0.6 + 2.4 * len(panels)), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(len(panels), len(columns), squeeze=False)
+    for row, panel in zip(grid, panels, strict=True):
+        step = max(1, len(panel.movement) // _POINTS)
+        time_s = np.arange(0, len(panel.movement) - step + 1, step) / panel.rate_hz
+        moving = _peaks(panel.movement.astype(np.float64), step) > 0.0
+        for axes, title in zip(row, columns, strict=True):
+            for name, curve in panel.curves.get(title, {}).items():
+                axes.plot(time_s, _peaks(curve, step), label=name, linewidth=0.8)
+            if not moving.all():
+                axes.fill_between(
+                    time_s, 0, 1, where=moving, transform=axes.get_xaxis_transform(), alpha=0.08, color="k"
+                )
+            axes.set_title(f"{panel.name}: {title}", fontsize=8)
+            axes.set_ylabel("°")
+            axes.grid(alpha=0.3)
+    for axes in grid[-1]:
+        axes.set_xlabel("s")
+    grid[0, 0].legend(fontsize=8)
+    figure.savefig(path, dpi=110, format="png")
+
+
+def _peaks(values: Array, step: int) -> Array:
+    """The largest of every `step` values; NaN only where all of them are."""
+    count = len(values) // step
+    blocks = values[: count * step].reshape(count, step)
+    out: Array = np.max(np.where(np.isnan(blocks), -np.inf, blocks), axis=1)
+    return np.where(np.isinf(out), np.nan, out)
