@@ -51,6 +51,14 @@ Figures = Annotated[
         help="Write what was counted, as JSON, when stopped.", dir_okay=False, callback=_in_a_folder
     ),
 ]
+
+
+def _a_png(path: Path | None) -> Path | None:
+    if path is not None and path.suffix.lower() != ".png":
+        raise typer.BadParameter(f"{path.name}: expected a name that ends in .png")
+    return _in_a_folder(path)
+
+
 ReportFile = Annotated[
     Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=_in_a_folder)
 ]
@@ -119,26 +127,46 @@ def demo(
     replay: Annotated[
         Path | None, typer.Option(help="A person's recording (.npz) instead of a simulated one.", exists=True)
     ] = None,
-    motion: Annotated[str, typer.Option(help="bottle, sweep or calibration_pose.")] = "bottle",
+    profile: Annotated[str, typer.Option(help="nursing, hand or lower_limb.")] = "nursing",
+    motion: Annotated[
+        str | None,
+        typer.Option(
+            help="sweep, calibration_pose or the profile's own, which is the default: bottle, grasp, walk.",
+            show_default=False,
+        ),
+    ] = None,
     strategy: Annotated[str, typer.Option(help="predict, interpolate or hold.")] = "predict",
-    filter_: Annotated[str, typer.Option("--filter", help="vqf or mahony.")] = "vqf",
+    filter_: Annotated[str, typer.Option("--filter", help="vqf, mahony or ekf.")] = "vqf",
     seed: Annotated[int, typer.Option(help="Of the simulated sensors' errors.")] = 1,
+    plots: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw every joint's angle and angular velocity (PNG).", dir_okay=False, callback=_a_png
+        ),
+    ] = None,
 ) -> None:
     """Run the whole way here: simulated suit, master and robot as three processes, and judge it.
 
-    Example: `tandem demo --seconds 60 --report report.json --transport udp`
+    Example: `tandem demo --profile hand --seconds 20 --report report.json --plots fingers.png`
     """
+    from deploy.demo.draw_curves import as_png
     from deploy.demo.run import DemoOptions, run_demo
     from deploy.demo.view import print_report
 
     console = Console()
-    options = DemoOptions(seconds, transport, replay, motion, strategy, filter_, seed)
+    options = DemoOptions(
+        profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
+        strategy=strategy, filter=filter_, seed=seed,
+    )  # fmt: skip
 
     async def tell(stop: asyncio.Event) -> None:
         result = await run_demo(options, stop, console)
         if report is not None:
             report.write_text(json.dumps(result.tree, indent=2, ensure_ascii=False) + "\n", "utf-8")
         print_report(result, console)
+        if plots is not None and result.curves is not None:
+            as_png(result.curves, plots)
+            console.print(f"every joint's curves: {plots}", highlight=False)
         if result.problems:
             raise TandemError("the demo failed: " + "; ".join(result.problems))
 

@@ -11,7 +11,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from deploy.judge.accuracy import SIDES, Accuracy
+from deploy.judge.accuracy import SIDES, Accuracy, JointAccuracy
 from deploy.judge.motion import Motion
 from deploy.judge.paper import ETA_PERCENT, TABLE_1
 from deploy.targets import Verdict
@@ -48,7 +48,12 @@ def latency_table(
 
 
 def accuracy_table(judged: Accuracy) -> RenderableType:
-    """Solved against truth: the paper's Table 1 beside ours, η beside what it hides, then every joint."""
+    """Solved against truth: the paper's Table 1 beside ours, η beside what it hides, then every joint.
+
+    A robot that has none of Table 1's joints gets the last part alone.
+    """
+    if not judged.fast:
+        return _joints_table(judged)
     table = _table("solved against truth, fast periods", "joint")
     for head in ("°/step", "left °", "right °", "paper °", "ratio", "paper"):
         table.add_column(head, justify="right", no_wrap=True)
@@ -105,6 +110,15 @@ def strategies_table(as_run: Motion, replayed: Mapping[str, Motion]) -> Renderab
             _number(judged.aligned_rmse_deg, 2),
             _number(judged.roughness, 2),
         )
+    return table
+
+
+def synergy_table(judged: Mapping[str, Mapping[str, float] | None]) -> RenderableType:
+    """The joints of a coarser robot, solved against truth: from a report's `synergies`."""
+    table = _table("as a robot's joints, by its synergies", "joint", "mean abs °", "RMSE °", "largest °")
+    for name, row in judged.items():
+        figures = [None if row is None else row[key] for key in ("mae_deg", "rmse_deg", "max_deg")]
+        table.add_row(name, *(_number(figure, 3) for figure in figures))
     return table
 
 
@@ -203,18 +217,20 @@ def live_view(live: Live, worst: int = 5) -> RenderableType:
 
 
 def _joints_table(judged: Accuracy) -> Table:
-    table = _table("solved against truth, whole run", "joint", "mean abs °", "RMSE °", "bias °")
+    table = _table("solved against truth, whole run", "joint", "mean abs °", "RMSE °", "bias °", "largest °")
     for name, joint in judged.joints.items():
         if joint is None:
-            table.add_row(name, *[UNKNOWN] * 3)
+            table.add_row(name, *[UNKNOWN] * 4)
         else:
-            table.add_row(name, *(_number(x, 3) for x in (joint.mae_deg, joint.rmse_deg, joint.bias_deg)))
+            table.add_row(name, *_joint_cells(joint))
     if judged.overall is not None:
-        overall = judged.overall
         table.add_section()
-        figures = (overall.mae_deg, overall.rmse_deg, overall.bias_deg)
-        table.add_row("all joints", *(_number(f, 3) for f in figures), style="bold")
+        table.add_row("all joints", *_joint_cells(judged.overall), style="bold")
     return table
+
+
+def _joint_cells(joint: JointAccuracy) -> list[str]:
+    return [_number(x, 3) for x in (joint.mae_deg, joint.rmse_deg, joint.bias_deg, joint.max_deg)]
 
 
 def _within(report: Mapping[str, Any], path: Iterable[str]) -> Any:

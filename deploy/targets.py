@@ -33,7 +33,7 @@ class Verdict:
         return None if self.value is None else self.value <= self.target.limit
 
 
-DEMO = (
+_WHOLE_WAY = (
     Target("capture ticks missed", ("ticks", "missed"), 0),
     Target("master, of one core", ("cpu_percent", "master"), 35.0, "%"),
     Target("master, memory", ("rss_mb", "master"), 150.0, "MB"),
@@ -41,6 +41,11 @@ DEMO = (
     Target("motion lag", ("motion_lag_ms",), 25.0, "ms"),
     Target("same-instant RMSE / hold's", ("rmse_over_hold",), 0.333),
     Target("roughness", ("motion", "roughness"), 2.5),
+)
+"""What any profile's demo is held against."""
+
+DEMO = (
+    *_WHOLE_WAY,
     Target("η (Eq. 25)", ("eta_percent",), ETA_PERCENT, "%"),
     *(
         Target(
@@ -52,7 +57,23 @@ DEMO = (
         for joint, row in TABLE_1.items()
     ),
 )
-"""What a report of `tandem demo` is held against."""
+"""What a report of `tandem demo` is held against, with the nursing robot."""
+
+HAND = (
+    *_WHOLE_WAY,
+    Target("sampled → encoder moved, p99 (paper B)", ("end_to_end_ms", "p99"), 60.0, "ms"),
+    Target("finger joint's RMSE, the worst (paper B)", ("worst_joint", "rmse_deg"), 1.0, "°"),
+    Target("finger joint's error, the largest (paper B)", ("worst_joint", "max_deg"), 2.0, "°"),
+)
+"""The same with the hand: half of what paper B allows its units against a reference unit, 1.5° and 3°."""
+
+LOWER_LIMB = (
+    *_WHOLE_WAY,
+    Target("knee's RMSE (paper C)", ("accuracy", "*_knee_flexion", "rmse_deg"), 2.0, "°"),
+)
+"""The same with the legs."""
+
+BY_PROFILE = {"nursing": DEMO, "hand": HAND, "lower_limb": LOWER_LIMB}
 
 BENCH = (
     Target("fuse + filter, 36 nodes", ("pipeline", "nodes_36", "fuse_us", "median"), 200.0, "µs"),

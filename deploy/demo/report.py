@@ -5,10 +5,18 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from common.config import load_config
+from common.messages import Mask
+from common.skeleton import Skeleton, load_skeleton
+from common.skeleton.synergy import synergy_positions
 from deploy.demo.baseline import MOST_S, Comparison, arrivals, compare
-from deploy.demo.rig import EXAMPLES, Rig
-from deploy.judge import Accuracy, Motion, accuracy, motion
+from deploy.demo.curves import Curves, curves
+from deploy.demo.rig import Rig
+from deploy.judge import Accuracy, Motion, SolvedSeries, TruthSeries, accuracy, motion
+from deploy.profiles import example
+from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig
 
 if TYPE_CHECKING:
@@ -29,6 +37,8 @@ class Report:
     motion: Motion | None
     comparison: Comparison | None
     """With the other strategies, on the same commands; None where there is nothing to judge."""
+    curves: Curves | None
+    """What to draw; None where the robot never tracked."""
     tree: dict[str, Any]
     problems: list[str] = field(default_factory=list)
     """Why the run counts as failed, empty where it does not."""
@@ -38,10 +48,11 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
     """Judge a finished run from what was observed and what the processes counted."""
     observer, children = rig.observer, rig.children.values()
     names = observer.trace.joint_names
+    skeleton = load_skeleton(options.profile)
     truth, solved, moved = observer.trace.truth(), observer.trace.solved(), observer.trace.moved()
     solved_right = accuracy(truth, solved, names)
     moved_right = motion(truth, moved, names)
-    slave_config = load_config(EXAMPLES / "slave.toml", SlaveConfig)
+    slave_config = load_config(example("slave", options.profile), SlaveConfig)
     accepted = arrivals(observer.commands, observer.states)
     compared = compare(truth, moved, accepted, slave_config) if moved_right else None
     figures = {child.role: child.figures() for child in children}
@@ -52,9 +63,10 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
         problems.append("the robot never reached track")
     tree = {
         "options": {
+            "profile": options.profile,
             "seconds": options.seconds,
             "transport": options.transport,
-            "motion": str(options.replay.name) if options.replay else options.motion,
+            "motion": _what_moved(options),
             "strategy": options.strategy,
             "filter": options.filter,
             "seed": options.seed,
@@ -72,6 +84,8 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
         "motion_by_strategy_is": REPLAYED,
         "rmse_over_hold": compared.rmse_over_hold if compared else None,
         "accuracy": _accuracy(solved_right),
+        "worst_joint": _worst_joint(solved_right),
+        "synergies": _synergies(truth, solved, skeleton),
         "eta_percent": solved_right.eta_percent,
         "table_1": _table_1(solved_right),
         "cpu_percent": {child.role: round(child.cpu_percent, 1) for child in children},
@@ -84,7 +98,14 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
         "exit_status": statuses,
         "problems": problems,
     }
-    return Report(solved_right, moved_right, compared, tree, problems)
+    drawn = curves(truth, moved, skeleton)
+    return Report(solved_right, moved_right, compared, drawn, tree, problems)
+
+
+def _what_moved(options: DemoOptions) -> str:
+    if options.replay is not None:
+        return options.replay.name
+    return options.motion or load_config(example("suit", options.profile), SuitConfig).motion
 
 
 def _commands(master: dict[str, Any], slave: dict[str, Any]) -> dict[str, Any]:
@@ -126,10 +147,26 @@ def _motion_by_strategy(compared: Comparison | None) -> dict[str, dict[str, floa
 
 
 def _accuracy(judged: Accuracy) -> dict[str, dict[str, float] | None]:
-    return {
-        name: None if row is None else {"mae_deg": row.mae_deg, "rmse_deg": row.rmse_deg}
-        for name, row in judged.joints.items()
-    }
+    return {name: None if row is None else asdict(row) for name, row in judged.joints.items()}
+
+
+def _worst_joint(judged: Accuracy) -> dict[str, float]:
+    """The largest figures of any joint, which need not be one and the same joint's."""
+    rows = [row for row in judged.joints.values() if row is not None]
+    if not rows:
+        return {}
+    return {key: max(getattr(row, key) for row in rows) for key in ("mae_deg", "rmse_deg", "max_deg")}
+
+
+def _synergies(truth: TruthSeries, solved: SolvedSeries, skeleton: Skeleton) -> dict[str, Any]:
+    """What a coarser robot, such as the nursing robot's hand, would be told; {} without one in the table."""
+    if not skeleton.synergies:
+        return {}
+    position_rad = synergy_positions(skeleton, solved.position_rad)
+    whole: Mask = np.repeat(solved.valid.all(axis=1, keepdims=True), position_rad.shape[1], axis=1)
+    told = SolvedSeries(solved.tick, position_rad, whole)
+    true = TruthSeries(truth.tick, truth.sampled_ns, synergy_positions(skeleton, truth.position_rad))
+    return _accuracy(accuracy(true, told, [synergy.name for synergy in skeleton.synergies]))
 
 
 def _table_1(judged: Accuracy) -> dict[str, dict[str, float] | None]:

@@ -18,8 +18,8 @@ from common.topics import CONTROL
 from deploy.demo.child import Child
 from deploy.demo.endpoints import Endpoints, local_endpoints
 from deploy.demo.observer import Observer
+from deploy.profiles import NURSING, example
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
 ROBOT, OPERATOR = "robot-1", "nurse-1"
 ROLES = ("slave", "suit", "master")
 
@@ -28,18 +28,24 @@ class Rig:
     """The running processes by role, what the observer hears, and the way to ask the robot."""
 
     def __init__(
-        self, folder: Path, endpoints: Endpoints, overrides: Mapping[str, Sequence[str]], link: Link
+        self,
+        folder: Path,
+        endpoints: Endpoints,
+        overrides: Mapping[str, Sequence[str]],
+        link: Link,
+        profile: str = NURSING,
     ) -> None:
+        self.skeleton = load_skeleton(profile)
         self._overrides = overrides
         self._endpoints = endpoints
         self._link = link
-        self.observer = Observer(link, load_skeleton("nursing"))
+        self.observer = Observer(link, self.skeleton)
         self.children = {role: Child(role, folder) for role in ROLES}
 
     async def start(self, role: str) -> None:
-        """Start one process on the shipped example file, moved to this run's endpoints."""
+        """Start one process on the profile's example file, moved to this run's endpoints."""
         overrides = [*_local(role, self._endpoints), *self._overrides.get(role, ())]
-        await self.children[role].start(EXAMPLES / f"{role}.toml", overrides)
+        await self.children[role].start(example(role, self.skeleton.name), overrides)
 
     async def control(self, action: Action, operator: str = OPERATOR, key: str = "") -> ControlReply:
         """Ask the robot."""
@@ -68,14 +74,18 @@ class Rig:
 
 @asynccontextmanager
 async def open_rig(
-    transport: str = "tcp", overrides: Mapping[str, Sequence[str]] | None = None
+    transport: str = "tcp", overrides: Mapping[str, Sequence[str]] | None = None, profile: str = NURSING
 ) -> AsyncIterator[Rig]:
-    """Open a rig on free local endpoints; nothing is started yet, everything is stopped at the end."""
+    """Open a rig on free local endpoints; nothing is started yet, everything is stopped at the end.
+
+    Raises ConfigError for a transport or a profile that there is not.
+    """
+    load_skeleton(profile)
     async with AsyncExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-")))
         endpoints = local_endpoints(transport, folder)
         link = await stack.enter_async_context(open_link(endpoints.observing, ROBOT))
-        rig = Rig(folder, endpoints, overrides or {}, link)
+        rig = Rig(folder, endpoints, overrides or {}, link, profile)
         stack.push_async_callback(rig.stop)
         yield rig
 

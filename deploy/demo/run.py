@@ -15,6 +15,7 @@ from common.messages import Action
 from deploy.demo.report import Report, make_report
 from deploy.demo.rig import Rig, at_most, open_rig
 from deploy.demo.view import draw
+from deploy.profiles import NURSING
 
 START_S = 30.0
 """Processes up, filters settled, clock trusted, lease held."""
@@ -28,17 +29,21 @@ LOST_S = 1.0
 class DemoOptions:
     """What the command line chose."""
 
+    profile: str = NURSING
     seconds: float = 20.0
     transport: str = "tcp"
     replay: Path | None = None
-    motion: str = "bottle"
+    motion: str | None = None
+    """None: the one in the profile's example file."""
     strategy: str = "predict"
     filter: str = "vqf"
     seed: int = 1
 
     def overrides(self) -> dict[str, list[str]]:
         """What it changes in the processes' files."""
-        suit = [f'motion="{self.motion}"', f"seed={self.seed}"]
+        suit = [f"seed={self.seed}"]
+        if self.motion is not None:
+            suit.append(f'motion="{self.motion}"')
         # simulated and recorded operators begin in the zero pose: zeroed there, as the paper's reference was
         master = [f'estimation.filter="{self.filter}"', "estimation.stance_s=1.0"]
         if self.replay is not None:
@@ -58,7 +63,7 @@ async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) 
 
 
 async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
-    async with open_rig(options.transport, options.overrides()) as rig:
+    async with open_rig(options.transport, options.overrides(), options.profile) as rig:
         observer = rig.observer
         with Live(console=console, refresh_per_second=4, transient=True) as live:
             show = _Show(rig, stop, live)

@@ -6,6 +6,7 @@ import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
+from deploy.demo.draw_curves import in_terminal
 from deploy.demo.report import Report
 from deploy.demo.rig import Rig
 from deploy.tables import (
@@ -15,9 +16,10 @@ from deploy.tables import (
     live_view,
     motion_table,
     strategies_table,
+    synergy_table,
     verdict_table,
 )
-from deploy.targets import DEMO, verdicts
+from deploy.targets import BY_PROFILE, verdicts
 
 
 def draw(rig: Rig, elapsed_s: float) -> RenderableType:
@@ -48,7 +50,7 @@ def draw(rig: Rig, elapsed_s: float) -> RenderableType:
 
 
 def print_report(report: Report, console: Console) -> None:
-    """Latency budget, accuracy beside the paper's, motion, and the targets met or missed."""
+    """Latency budget, accuracy beside the paper's, motion, curves, and the targets met or missed."""
     tree = report.tree
     console.print(latency_table(tree["stages_ms"], tree["end_to_end_ms"], tree["one_way_ms"]))
     if report.accuracy.overall is None:
@@ -57,7 +59,12 @@ def print_report(report: Report, console: Console) -> None:
         console.print(accuracy_table(report.accuracy), motion_table(report.motion))
     if report.comparison is not None:
         console.print(strategies_table(report.comparison.as_run, report.comparison.replayed))
-    console.print(verdict_table("targets", verdicts(tree, DEMO)))
+    if tree["synergies"]:
+        console.print(synergy_table(tree["synergies"]))
+    shown = None if report.curves is None else in_terminal(report.curves)
+    if shown is not None:
+        console.print(shown)
+    console.print(verdict_table("targets", verdicts(tree, BY_PROFILE[tree["options"]["profile"]])))
 
 
 def _errors_deg(rig: Rig) -> dict[str, float]:

@@ -36,6 +36,8 @@ class JointAccuracy:
     mae_deg: float
     rmse_deg: float
     bias_deg: float
+    max_deg: float
+    """The largest, without its sign."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +156,7 @@ def _whole(error_deg: Array) -> JointAccuracy | None:
         mae_deg=float(np.mean(np.abs(error_deg))),
         rmse_deg=float(np.sqrt(np.mean(error_deg**2))),
         bias_deg=float(np.mean(error_deg)),
+        max_deg=float(np.max(np.abs(error_deg))),
     )
 
 
