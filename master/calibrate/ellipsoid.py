@@ -92,7 +92,8 @@ def cells(directions: Array) -> NDArray[np.intp]:
     band = np.clip(((unit[:, 2] + 1.0) / 2.0 * _BANDS).astype(np.intp), 0, _BANDS - 1)
     turn = np.arctan2(unit[:, 1], unit[:, 0]) / (2.0 * np.pi) % 1.0
     sector = np.clip((turn * _SECTORS).astype(np.intp), 0, _SECTORS - 1)
-    return band * _SECTORS + sector
+    out: NDArray[np.intp] = band * _SECTORS + sector
+    return out
 
 
 def coverage(fit: Ellipsoid, readings: Array) -> float:
@@ -158,7 +159,8 @@ def _from_quadric(quadratic: Array, linear: Array, constant: float) -> tuple[Arr
     values, vectors = np.linalg.eigh(quadratic)
     if not (values[0] > 1e-9 * values[-1] and radius_squared > 0.0):
         raise NoEllipsoidError("the quadric nearest to the readings is no ellipsoid")
-    return vectors * np.sqrt(values / radius_squared) @ vectors.T, centre
+    shape: Array = vectors * np.sqrt(values / radius_squared) @ vectors.T
+    return shape, centre.astype(np.float64)
 
 
 def _refined(first: tuple[Array, Array], m: Array) -> tuple[Array, Array]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import date
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.quaternion import Array
 from master.calibrate.affine import Made
@@ -128,7 +129,7 @@ def _check_coverage(fit: Ellipsoid, readings: Array) -> float:
     return seen
 
 
-def _held_out(readings: Array, blocks: Array) -> Array:
+def _held_out(readings: Array, blocks: NDArray[np.intp]) -> Array:
     """Calibrated strength minus the field (K,), each by a fit to the other blocks (K,) of readings."""
     _, place = np.unique(blocks, return_inverse=True)
     errors = np.empty(len(readings))
