@@ -9,6 +9,7 @@ from common.quaternion import Array
 from master.calibrate.recording import NodeRecording, RecordingError
 
 _MOST_MISSING = 0.1
+_CLIPPED_S = 0.06
 _CLIPPED_RUN = 3
 """So many equal readings in a row at the end of the range are no coincidence while the node turns."""
 _AXES = "xyz"
@@ -49,7 +50,8 @@ def check_inertial(recording: NodeRecording, level: Array, fast: float) -> None:
         "gyroscope",
         recording.gyr_rad_s,
         turning,
-        _CLIPPED_RUN,
+        # whole counts hold the very top of a slow turn for three samples now and then
+        max(_CLIPPED_RUN, round(_CLIPPED_S * recording.rate_hz)),
         "turn the node more slowly, and record again",
     )
     # noise moves a sound accelerometer all the time; a perfect one, as in a simulation, has none to tell by

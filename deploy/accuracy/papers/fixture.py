@@ -136,11 +136,16 @@ def record(
     """
     t_s = np.arange(round(seconds * rate_hz)) / rate_hz
     ideal = ideal_readings(skeleton, motion, t_s, q_segment_from_sensor)
-    scale = _count_values()
-    counts, _ = quantise(units.apply(ideal[:, list(on_segment)]), scale)
-    samples = (counts * scale).reshape(len(t_s), -1, 3, 3).swapaxes(1, 2)
+    samples = read_by(units, ideal[:, list(on_segment)])
     position_rad = motion.state(t_s)[0]
     return Take(rate_hz, samples, position_rad, orientations(skeleton, position_rad))
+
+
+def read_by(units: Imperfections, ideal: Array) -> Array:
+    """What units read, (T, 3, N, 3), and send in whole counts, for what they should read, (T, N, 9)."""
+    scale = _count_values()
+    counts, _ = quantise(units.apply(ideal), scale)
+    return (counts * scale).reshape(*ideal.shape[:-1], 3, 3).swapaxes(1, 2)
 
 
 def ideal_readings(

@@ -1,0 +1,57 @@
+"""Units as delivered, calibrated from a session of their own as paper B has it: `tandem calibrate` without files.
+
+All units lie in one tray: 26 attitudes of 10 s each, then 3 minutes of tumbling.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.quaternion import IDENTITY, Array
+from deploy.accuracy.papers.fixture import FIELD_UT, read_by
+from master.calibrate.affine import Calibration
+from master.calibrate.inertial import calibrate_inertial
+from master.calibrate.magnetic import MagneticCalibration, calibrate_magnetic
+from master.calibrate.recording import NodeRecording
+from master.suit.simulated.imperfections import Imperfections
+from master.suit.simulated.tray import Tray, TrayConfig
+
+RATE_HZ = 100.0
+"""As the paper's units send."""
+SESSION = TrayConfig(attitudes=26, still_s=10.0, tumble_s=180.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """What a session made of N units."""
+
+    calibration: Calibration
+    magnetic: tuple[MagneticCalibration, ...]
+
+
+def calibrate(units: Imperfections, places: int, chosen: list[int], seed: int) -> Calibrated:
+    """Calibrate the `chosen` of the `places` units in the tray; the others keep their raw readings.
+
+    Raises RecordingError where the session does not determine a unit.
+    """
+    samples, tumbling = session(units, places, seed)
+    affine = np.tile(np.eye(3, 4), (3, places, 1, 1))
+    magnetic = []
+    for unit in chosen:
+        acc, gyr, mag = samples[:, :, unit].swapaxes(0, 1)
+        inertial = calibrate_inertial(NodeRecording(f"unit {unit}", RATE_HZ, acc, gyr))
+        whole = (acc[tumbling], gyr[tumbling], mag[tumbling])
+        field = calibrate_magnetic(NodeRecording(f"unit {unit}", RATE_HZ, *whole))
+        affine[:, unit] = inertial.accelerometer.affine, inertial.gyroscope.affine, field.fit.affine
+        magnetic.append(field)
+    return Calibrated(Calibration(affine, np.tile(IDENTITY, (places, 1))), tuple(magnetic))
+
+
+def session(units: Imperfections, places: int, seed: int) -> tuple[Array, slice]:
+    """Samples (T, 3, N, 3) of a session, and the rows in which the tray is tumbled about."""
+    tray = Tray(SESSION, places, seed)
+    t_s = np.arange(0.0, tray.period_s, 1.0 / RATE_HZ)
+    ideal = np.array([tray.readings(t, FIELD_UT) for t in t_s.tolist()])
+    return read_by(units, ideal), slice(round((tray.period_s - SESSION.tumble_s) * RATE_HZ), None)
