@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import typer
 
+from deploy.calibrate.imu import imu
+from deploy.calibrate.mag import mag
+
 app = typer.Typer(no_args_is_help=True)
 
 
 @app.callback()
 def _group() -> None:
     """Find the sensors' errors and how they sit, and write them to TOML."""
+
+
+app.command("imu")(imu)
+app.command("mag")(mag)

@@ -1,0 +1,63 @@
+"""`tandem calibrate mag`: the magnetometer from free rotation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+
+from deploy.calibrate.options import AsJson, Nodes, OutFolder, RecordingFile, ReportFile
+
+if TYPE_CHECKING:
+    from deploy.calibrate.session import Session
+    from master.calibrate.magnetic import MagneticCalibration
+    from master.calibrate.recording import NodeRecording
+
+
+def mag(
+    recording: RecordingFile,
+    out: OutFolder = Path("calibration"),
+    node: Nodes = None,
+    report: ReportFile = None,
+    as_json: AsJson = False,
+) -> None:
+    """Calibrate magnetometers from a recording: 3 minutes of free rotation through every attitude.
+
+    Example: `tandem calibrate mag rotation.npz --out calibration --node left_hand`
+    """
+    from deploy.calibrate import session as sessions
+    from deploy.calibrate.pictures import draw_magnetic
+    from master.calibrate.magnetic import calibrate_magnetic
+
+    def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
+        return calibrate_magnetic(raw)
+
+    sessions.make_folder(out)
+    day = date.today()
+    session = sessions.calibrate_nodes(recording, node or [], calibrate, Console(stderr=True))
+    written = sessions.write_nodes(session, recording, out, day)
+    for name, found in session.found.items():
+        draw_magnetic(found, out / f"{name}_mag.png")
+    sessions.tell_machines(sessions.report(session, recording, day, _gist), report, to_stdout=as_json)
+    if not as_json:
+        _print(session, written, Console())
+    sessions.refuse(session, recording)
+
+
+def _gist(found: MagneticCalibration) -> dict[str, Any]:
+    return {
+        "field_ut": found.fit.field_ut,
+        "coverage": found.coverage,
+        "hold_out_percent": 100.0 * found.hold_out_spread_ut / found.fit.field_ut,
+    }
+
+
+def _print(session: Session[MagneticCalibration], written: dict[str, Path], console: Console) -> None:
+    from deploy.calibrate.views import magnetic_table, notes
+
+    if session.found:
+        console.print(magnetic_table(session.found))
+        notes(session.found, written, console)

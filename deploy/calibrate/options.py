@@ -1,0 +1,29 @@
+"""Options that the calibrations from a recording share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def in_a_folder(path: Path | None) -> Path | None:
+    """Before the work that is to be written there, not after."""
+    if path is not None and not path.absolute().parent.is_dir():
+        raise typer.BadParameter(f"there is no folder {path.parent}")
+    return path
+
+
+RecordingFile = Annotated[
+    Path,
+    typer.Argument(metavar="RECORDING", help=".npz or .mcap of one unit or a whole suit.", dir_okay=False),
+]
+OutFolder = Annotated[
+    Path, typer.Option("--out", help="Folder for NODE.toml and its picture; other parts of a file stay.")
+]
+Nodes = Annotated[list[str] | None, typer.Option("--node", help="Only this node; may be repeated.")]
+ReportFile = Annotated[
+    Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")]

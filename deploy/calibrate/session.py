@@ -1,0 +1,131 @@
+"""What `calibrate imu` and `calibrate mag` have in common: nodes of a recording, one by one, to files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from common.errors import TandemError
+from common.quaternion import Array
+from master.calibrate.affine import Made
+from master.calibrate.node_file import Part, write_calibration
+from master.calibrate.recording import NodeRecording, load_recordings
+
+
+class Found(Protocol):
+    """What a calibration gives."""
+
+    @property
+    def name(self) -> str:
+        """The node's."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know."""
+
+    def parts(self, day: date, recording: str) -> dict[Part, tuple[Array, Made]]:
+        """As `write_calibration` takes them."""
+
+
+Result = TypeVar("Result", bound=Found)
+Calibrate = Callable[[NodeRecording, Callable[[float], None]], Result]
+
+
+@dataclass(frozen=True, slots=True)
+class Session(Generic[Result]):
+    """The nodes that could be calibrated, and why others could not."""
+
+    found: Mapping[str, Result]
+    refused: Mapping[str, str]
+
+
+def calibrate_nodes(
+    path: Path, names: list[str], calibrate: Calibrate[Result], console: Console
+) -> Session[Result]:
+    """Calibrate the named nodes of a recording, all without names, with a progress bar.
+
+    Raises TandemError when the recording cannot be read or has no such node.
+    """
+    nodes = load_recordings(path)
+    unknown = [name for name in names if name not in nodes]
+    if unknown:
+        raise TandemError(f"{path}: has no node {', '.join(unknown)}; it has {', '.join(nodes)}")
+    found: dict[str, Result] = {}
+    refused: dict[str, str] = {}
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        chosen = names or list(nodes)
+        task = progress.add_task("", total=len(chosen))
+        for n, name in enumerate(chosen):
+            progress.update(task, description=name)
+
+            def tell(share: float, before: int = n) -> None:
+                progress.update(task, completed=before + share)
+
+            try:
+                found[name] = calibrate(nodes[name], tell)
+            except TandemError as error:
+                refused[name] = str(error)
+            tell(1.0)
+    return Session(found, refused)
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder for the results, before the work. Raises TandemError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TandemError(f"--out {folder}: cannot be made ({error.strerror})") from None
+
+
+def write_nodes(session: Session[Result], recording: Path, folder: Path, day: date) -> dict[str, Path]:
+    """Write each node's TOML into the folder; a file that is there keeps its other parts. Their paths."""
+    written = {}
+    for name, found in session.found.items():
+        written[name] = folder / f"{name}.toml"
+        write_calibration(written[name], found.parts(day, recording.name))
+    return written
+
+
+def report(
+    session: Session[Result], recording: Path, day: date, gist: Callable[[Result], Any]
+) -> dict[str, Any]:
+    """The figures for machines: a node's parts as its file has them, and the command's own figures."""
+    return {
+        "recording": recording.name,
+        "date": day.isoformat(),
+        "nodes": {
+            name: {
+                **gist(found),
+                "notes": list(found.notes),
+                **{
+                    part: {"value": values.tolist(), **made.model_dump(mode="json", exclude_none=True)}
+                    for part, (values, made) in found.parts(day, recording.name).items()
+                },
+            }
+            for name, found in session.found.items()
+        },
+        "refused": dict(session.refused),
+    }
+
+
+def tell_machines(figures: dict[str, Any], path: Path | None, *, to_stdout: bool) -> None:
+    """As JSON to a file, to the standard output, or both."""
+    text = json.dumps(figures, indent=2, ensure_ascii=False)
+    if path is not None:
+        path.write_text(text + "\n", "utf-8")
+    if to_stdout:
+        Console().print(text, highlight=False, soft_wrap=True, markup=False)
+
+
+def refuse(session: Session[Result], recording: Path) -> None:
+    """Raises TandemError, a line a refused node; after what was found has been written."""
+    if session.refused:
+        raise TandemError("\n".join(f"{recording}: {name}: {why}" for name, why in session.refused.items()))
