@@ -27,6 +27,8 @@ _BLUR_RAD_S = 0.02
 _ALIKE_RAD = math.radians(20.0)
 """Two answers nearer than that to each other are one."""
 
+_GAIN_RAD = math.radians(0.2)
+"""What a calibrated gyro's gains and cross-axis errors (0.2 %) turn an axis by, whatever the data."""
 _LEAST_RATE_RAD_S = 0.3
 """RMS rate of bending below which nobody has moved the joint."""
 _WORST_SIGMA_RAD = math.radians(4.0)
@@ -176,4 +178,4 @@ def _sigma(covariance: Array, eigenvalues: Array) -> float:
     """Direction's standard deviation; π where the data leave it open altogether."""
     if eigenvalues[0] <= 1e-12 * eigenvalues[-1]:
         return math.pi
-    return min(math.pi, math.sqrt(max(0.0, float(np.linalg.eigvalsh(covariance)[-1]))))
+    return min(math.pi, math.hypot(_GAIN_RAD, math.sqrt(max(0.0, float(np.linalg.eigvalsh(covariance)[-1])))))

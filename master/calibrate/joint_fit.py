@@ -6,7 +6,7 @@ is its own. Between two neighbours, first unit on the parent and second on the c
     j1, j2   the joint's axes, in the sensors' frames: of a hinge one and the same line; of a joint of two
              axes the parent's fixed one and the child's fixed one
     δ        the heading that turns the child's own earth frame into the parent's
-    r1, r2   the joint's centre as seen from each sensor, in its frame
+    r1, r2   the way from the joint's centre to each sensor, in its frame
 
 All at once they are what comes nearest, by Gauss-Newton from several starts, to
 
@@ -70,13 +70,16 @@ class Moving:
     acc: Array
     """(K, 3) m/s², specific force in the own earth frame, low-passed."""
     lever: Array
-    """(K, 3, 3): times r, the acceleration of a point r (sensor frame) against the sensor, earth frame."""
+    """(K, 3, 3): times r, the acceleration of the sensor against a point it is r away from, earth frame."""
     r_stance: Array
     """(3, 3)."""
 
     def some(self, rows: Rows) -> Moving:
         """The samples of these rows."""
         return replace(self, r=self.r[rows], rate=self.rate[rows], acc=self.acc[rows], lever=self.lever[rows])
+
+
+Axes = tuple[Array, Array]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +101,7 @@ class JointFit:
     offset_rad: float
     """δ."""
     levers_m: Array
-    """(2, 3): the joint's centre from each sensor, in its frame."""
+    """(2, 3): from the joint's centre to each sensor, in its frame."""
     axis_sigma_rad: tuple[float, float]
     offset_sigma_rad: float
     rival: float
@@ -109,11 +112,18 @@ class JointFit:
     """RMS of each kind of residual: `aligned` rad, `rate` rad/s, `acceleration` m/s²."""
 
 
-def fit_joint(parent: Moving, child: Moving, zero_axes: Sequence[Array] | None, spacing_s: float) -> JointFit:
+def fit_joint(
+    parent: Moving,
+    child: Moving,
+    zero_axes: Sequence[Array] | None,
+    spacing_s: float,
+    near: Sequence[Axes] | None = None,
+) -> JointFit:
     """The unknowns of one joint.
 
     `zero_axes` are its axes in the zero pose (3,), body frame: one for a hinge, two for a joint of two, None
-    for a ball joint. `spacing_s` is the time between samples.
+    for a ball joint. `spacing_s` is the time between samples. Where there was no stance, `near` are axes to
+    start from, and of `zero_axes` only their number and the angle between them count.
     """
     count = len(parent.r)
     few, many = (np.arange(0, count, max(1, -(-count // most))) for most in (_COARSE, _MOST))
@@ -122,16 +132,23 @@ def fit_joint(parent: Moving, child: Moving, zero_axes: Sequence[Array] | None, 
         ball = fit_joint(parent, child, None, spacing_s)
         if ball.offset_sigma_rad < _SURE_RAD and ball.rival > _SURE_RIVAL:
             offsets = np.array([ball.offset_rad, ball.offset_rad + math.pi])
-    coarse = _Problem(parent.some(few), child.some(few), zero_axes)
+    stood = near is None
+    if zero_axes is None:
+        starts = [Unknowns(None, float(offset), np.zeros(6)) for offset in offsets]
+    elif near is None:
+        starts = _starts_of_stance(parent, child, zero_axes, offsets)
+    else:
+        starts = [Unknowns(axes, float(offset), np.zeros(6)) for axes in near for offset in offsets]
+    coarse = _Problem(parent.some(few), child.some(few), zero_axes, stood)
     tried = sorted(
-        (coarse.descend(start, most_steps=12) for start in _starts(parent, child, zero_axes, offsets)),
+        (coarse.descend(start, most_steps=12) for start in starts),
         key=lambda m: m[1],
     )
     kept: list[Unknowns] = []
     for unknowns, _, _ in tried:
         if not any(_same_offset(unknowns, k) and _same_axes(unknowns, k) for k in kept):
             kept.append(unknowns)
-    fine = _Problem(parent.some(many), child.some(many), zero_axes)
+    fine = _Problem(parent.some(many), child.some(many), zero_axes, stood)
     refined = sorted((fine.descend(start, most_steps=30) for start in kept[:_KEPT]), key=lambda m: m[1])
     best, cost, normal = refined[0]
     rivals = [c for u, c, _ in refined[1:] if not _same_offset(u, best)]
@@ -164,27 +181,24 @@ def _same_axes(one: Unknowns, other: Unknowns) -> bool:
     return all(abs(float(a @ b)) > math.cos(_ALIKE_RAD) for a, b in zip(one.axes, other.axes, strict=True))
 
 
-def _starts(
-    parent: Moving, child: Moving, zero_axes: Sequence[Array] | None, offsets: Array
+def _starts_of_stance(
+    parent: Moving, child: Moving, zero_axes: Sequence[Array], offsets: Array
 ) -> list[Unknowns]:
-    levers = np.zeros(6)
-    if zero_axes is None:
-        return [Unknowns(None, float(offset), levers) for offset in offsets]
     starts = []
     for heading in np.arange(_HEADINGS) * math.pi / _HEADINGS:
         for offset in offsets:
             # R_stance j = Rz(heading) a, in the parent's earth frame
             axis1 = parent.r_stance.T @ rotate(heading_turn(heading), zero_axes[0])
             axis2 = child.r_stance.T @ rotate(heading_turn(heading - offset), zero_axes[-1])
-            starts.append(Unknowns((axis1, axis2), float(offset), levers))
+            starts.append(Unknowns((axis1, axis2), float(offset), np.zeros(6)))
     return starts
 
 
 class _Problem:
     """Residuals and Jacobian of one joint over some samples."""
 
-    def __init__(self, parent: Moving, child: Moving, zero_axes: Sequence[Array] | None) -> None:
-        self._1, self._2, self._zero_axes = parent, child, zero_axes
+    def __init__(self, parent: Moving, child: Moving, zero_axes: Sequence[Array] | None, stood: bool) -> None:
+        self._1, self._2, self._zero_axes, self._stood = parent, child, zero_axes, stood
         self.rows = 0
 
     def descend(self, start: Unknowns, most_steps: int) -> tuple[Unknowns, float, Array]:
@@ -198,7 +212,7 @@ class _Problem:
         jacobian = np.concatenate([p[1].reshape(-1, p[1].shape[-1]) for p in pieces])
         self.rows = len(residual)
         residual, jacobian = _huber(residual, jacobian)
-        if unknowns.axes is None:
+        if unknowns.axes is None or not self._stood:
             return residual, jacobian
         stance, slope = self._stance(unknowns.axes, jacobian.shape[1])
         return np.concatenate([residual, stance]), np.concatenate([jacobian, slope])
