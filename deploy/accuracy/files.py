@@ -1,4 +1,4 @@
-"""`tandem accuracy FILE...`: the orientation filters on recordings."""
+"""`tandem accuracy FILE...`: the orientation filters on recordings, a table, a picture and a report."""
 
 from __future__ import annotations
 
@@ -7,11 +7,56 @@ from typing import Annotated
 
 import typer
 
-from common.errors import TandemError
+
+def _in_a_folder(path: Path | None) -> Path | None:
+    """Before the work that is to be written there, not after."""
+    if path is not None and not path.absolute().parent.is_dir():
+        raise typer.BadParameter(f"there is no folder {path.parent}")
+    return path
 
 
 def files(
-    recordings: Annotated[list[Path], typer.Argument(metavar="FILE...", help="npz of one unit.")],
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...", help="npz of one unit: gyr, acc, rate_hz, perhaps mag, quat, movement."
+        ),
+    ],
+    filter_: Annotated[str, typer.Option("--filter", help="vqf, mahony, ekf or all.")] = "all",
+    report: Annotated[
+        Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=_in_a_folder)
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw the errors over time (PNG); beside the report unless told.",
+            dir_okay=False,
+            callback=_in_a_folder,
+        ),
+    ] = None,
 ) -> None:
-    """Score the orientation filters on recordings."""
-    raise TandemError(f"{recordings[0]}: nothing scores recordings yet")
+    """Score the orientation filters on recordings, sample by sample, by BROAD's measure.
+
+    Where a file has no optical truth (`quat`), how far the filters are from the first of them.
+
+    Example: `tandem accuracy recording.npz --filter all --report scores.json --plot errors.png`
+    """
+    import json
+
+    from rich.console import Console
+
+    from deploy.accuracy.judge import FILTERS, judge
+    from deploy.accuracy.picture import draw
+    from deploy.accuracy.view import accuracy_of_files
+
+    if filter_ != "all" and filter_ not in FILTERS:
+        raise typer.BadParameter(f"{filter_!r}: expected {', '.join(FILTERS)} or all", param_hint="--filter")
+    console = Console()
+    judged = judge(recordings, FILTERS if filter_ == "all" else (filter_,), console)
+    console.print(accuracy_of_files(judged.tree))
+    if report is not None:
+        report.write_text(json.dumps(judged.tree, indent=2, ensure_ascii=False) + "\n", "utf-8")
+    picture = plot or (report.with_suffix(".png") if report is not None else None)
+    if picture is not None and any(panel.curves for panel in judged.panels):
+        draw(judged.panels, picture)
+        console.print(f"errors over time: {picture}", highlight=False)

@@ -41,7 +41,8 @@ class Trial:
     @property
     def dropped(self) -> Mask:
         """(T,)."""
-        return np.isnan(self.gyr_rad_s.sum(axis=1) + self.acc_m_s2.sum(axis=1))
+        out: Mask = np.isnan(self.gyr_rad_s.sum(axis=1) + self.acc_m_s2.sum(axis=1))
+        return out
 
     @property
     def has_magnetometer(self) -> bool:

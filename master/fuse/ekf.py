@@ -10,7 +10,8 @@ nodes at once. Three things differ from the paper:
 - The gyro's bias is estimated too (three more states), in motion through the accelerometer and at rest from
   the gyro itself.
 - The accelerometer's reading is compared with gravity as it is, not at unit length: a linear acceleration
-  then averages out, since it is gone when the motion ends. The magnetometer updates nothing but the heading.
+  then averages out, since it is gone when the motion ends. Its noise grows with the linear acceleration of
+  the last second, the magnetometer's with how unusual the field is, and that one turns only the heading.
 """
 
 from __future__ import annotations
@@ -38,20 +39,28 @@ from master.fuse.rest import Rest, RestState
 _GRAVITY_M_S2 = 9.81
 _EAST, _NORTH, _UP = 0, 1, 2
 _BIAS = slice(3, 6)
+_IDENTITY_6 = np.eye(6)
+_FAINTEST_UT = 1e-9
+_DIP_RAD = math.radians(100.0)
+"""Times the tolerance: a dip that far off is at the tolerance."""
+_ACCELERATED_TAU_S = 1.0
 _START_INCLINATION_RAD, _START_HEADING_RAD = 0.1, 0.2
 
 
 class EkfConfig(Section):
     """`[estimation.ekf]`. Noises are densities: the same values hold at every rate."""
 
-    gyroscope_noise: float = Field(default=1.5e-3, gt=0.0, allow_inf_nan=False)
+    gyroscope_noise: float = Field(default=3e-3, gt=0.0, allow_inf_nan=False)
     """rad/s/√Hz, with what scale errors make of it in motion. More: the other two sensors pull faster."""
     bias_walk: float = Field(default=2e-5, ge=0.0, allow_inf_nan=False)
     """rad/s/√s: how fast the gyro's bias may wander. More: it is learnt faster, and less steadily."""
     accelerometer_noise: float = Field(default=0.1, gt=0.0, allow_inf_nan=False)
     """m/s²/√Hz, mostly the wearer's own acceleration. Over g and over `gyroscope_noise` it is the time
     constant, s, with which the inclination is corrected."""
-    heading_noise: float = Field(default=0.03, gt=0.0, allow_inf_nan=False)
+    accelerated_m_s2: float = Field(default=3.0, gt=0.0, allow_inf_nan=False)
+    """Linear acceleration, RMS over about the last second, at which the accelerometer's noise counts √2-fold.
+    Less: the gyro carries the inclination through lively motion for longer."""
+    heading_noise: float = Field(default=0.06, gt=0.0, allow_inf_nan=False)
     """rad/√Hz, of the magnetometer's azimuth. Over `gyroscope_noise` it is the heading's time constant, s."""
     field_tolerance: float = Field(default=0.1, gt=0.0, allow_inf_nan=False)
     """A field this share stronger or weaker than the usual, or with its dip off by as many radians × 1.75
@@ -78,6 +87,8 @@ class _State:
     """(n, 6, 6) of φ (world) and of the bias (sensor)."""
     field: Array
     """The usual field's strength and dip, µT and rad (n, 2); NaN until a magnetometer speaks."""
+    accelerated: Array
+    """Mean square of the linear acceleration, m²/s⁴ (n,)."""
     pulled_rad: Array
     """How far the magnetometer has turned the heading since the start (n,)."""
     rest: RestState
@@ -96,6 +107,7 @@ class EkfFilter:
             bias=np.zeros((count, 3)),
             covariance=np.zeros((count, 6, 6)),
             field=np.full((count, 2), np.nan),
+            accelerated=np.zeros(count),
             pulled_rad=np.zeros(count),
             rest=self._rest.start(count),
             started=np.zeros(count, dtype=np.bool_),
@@ -115,7 +127,7 @@ class EkfFilter:
         self._take_magnetometer(correction, covariance, matrix, mag_ut, dt_s)
         self._take_rest(correction, covariance, gyr_rad_s, acc_m_s2, dt_s)
         state.covariance = covariance
-        state.q = multiply(from_rotation_vector(correction[:, :3]), state.q)
+        state.q = turn_by(correction[:, :3], state.q)
         limit = config.bias_limit_rad_s
         state.bias = np.clip(state.bias + correction[:, _BIAS], -limit, limit)
 
@@ -129,43 +141,57 @@ class EkfFilter:
     def _take_accelerometer(
         self, correction: Array, covariance: Array, matrix: Array, acc: Array, dt_s: float
     ) -> None:
-        tilt = np.einsum("nij,nj->ni", matrix[:, :_UP], acc) / _GRAVITY_M_S2
-        variance = np.full(len(acc), (self._config.accelerometer_noise / _GRAVITY_M_S2) ** 2 / dt_s)
-        scalar_update(correction, covariance, _EAST, tilt[:, 1], variance)
-        scalar_update(correction, covariance, _NORTH, -tilt[:, 0], variance)
+        linear = np.einsum("nij,nj->ni", matrix, acc)
+        linear[:, _UP] -= _GRAVITY_M_S2
+        mean = self._state.accelerated
+        mean += min(1.0, dt_s / _ACCELERATED_TAU_S) * (np.einsum("ni,ni->n", linear, linear) - mean)
+        variance = (self._config.accelerometer_noise / _GRAVITY_M_S2) ** 2 / dt_s
+        variance = variance * (1.0 + mean / self._config.accelerated_m_s2**2)
+        tilt = linear / _GRAVITY_M_S2
+        scalar_update(correction, covariance, _EAST, tilt[:, _NORTH], variance)
+        scalar_update(correction, covariance, _NORTH, -tilt[:, _EAST], variance)
 
     def _take_magnetometer(
         self, correction: Array, covariance: Array, matrix: Array, mag: Array, dt_s: float
     ) -> None:
-        known = np.isfinite(mag[:, 0])
-        if not known.any():
+        missing = np.isnan(mag[:, 0])
+        if missing.all():
             return
-        east, north, up = np.einsum("nij,nj->in", matrix, np.where(known[:, None], mag, 0.0))
-        level = np.hypot(east, north)
-        found = np.stack([np.hypot(level, up), np.arctan2(up, level)], axis=-1)
-        noise = self._config.heading_noise * (1.0 + self._disturbance(found, known, dt_s))
-        variance = np.where(known, noise**2 / dt_s, np.inf)
+        field = np.einsum("nij,nj->ni", matrix, mag)
         # a positive turn is from north to west: a field found east of north asks for it
-        turned = heading_update(correction, covariance, np.arctan2(east, north), variance)
-        self._state.pulled_rad += turned
+        azimuth = np.arctan2(field[:, _EAST], field[:, _NORTH])
+        noise = self._config.heading_noise * (1.0 + self._disturbance(field, dt_s))
+        variance = noise * noise / dt_s
+        if missing.any():
+            azimuth[missing], variance[missing] = 0.0, np.inf
+        self._state.pulled_rad += heading_update(correction, covariance, azimuth, variance)
 
-    def _disturbance(self, found: Array, known: Mask, dt_s: float) -> Array:
-        """0 in the usual field, 1 at the tolerance; strengths and dips (n, 2) in, (n,) out."""
+    def _disturbance(self, field: Array, dt_s: float) -> Array:
+        """0 in the usual field, 1 at the tolerance; field (n, 3), world, in, (n,) out; NaN from NaN."""
         config, usual = self._config, self._state.field
-        first = known & np.isnan(usual[:, 0])
-        usual[first] = found[first]
+        squares = field * field
+        level = squares[:, 0] + squares[:, 1]
+        found = np.empty_like(usual)
+        np.sqrt(level + squares[:, _UP], out=found[:, 0])
+        np.arctan2(field[:, _UP], np.sqrt(level), out=found[:, 1])
+        unknown = np.isnan(usual[:, 0])
+        if unknown.any():
+            usual[unknown] = found[unknown]
         off = found - usual
-        usual += np.where(known[:, None], min(1.0, dt_s / config.field_tau_s) * off, 0.0)
-        off[:, 0] /= np.maximum(usual[:, 0], 1e-9)
-        off[:, 1] /= math.radians(100.0)
-        out: Array = np.einsum("ni,ni->n", off, off) / config.field_tolerance**2
-        return np.where(known, out, 0.0)
+        moved = min(1.0, dt_s / config.field_tau_s) * off
+        if np.isnan(found[:, 0]).any():
+            moved[np.isnan(found[:, 0])] = 0.0
+        usual += moved
+        share = off[:, 0] / np.maximum(usual[:, 0], _FAINTEST_UT) / config.field_tolerance
+        tilt = off[:, 1] / (_DIP_RAD * config.field_tolerance)
+        out: Array = share * share + tilt * tilt
+        return out
 
     def _take_rest(self, correction: Array, covariance: Array, gyr: Array, acc: Array, dt_s: float) -> None:
         still = self._rest.update(self._state.rest, gyr, acc, dt_s)
         if not still.any():
             return
-        residual = self._state.rest.gyr_rad_s - self._state.bias
+        residual = self._state.rest.gyr_rad_s() - self._state.bias
         variance = np.where(still, self._config.rest_noise**2 / dt_s, np.inf)
         for axis in range(3):
             scalar_update(correction, covariance, 3 + axis, residual[:, axis], variance)
@@ -188,6 +214,7 @@ class EkfFilter:
         state.started[nodes] = False
         state.bias[nodes] = 0.0
         state.field[nodes] = np.nan
+        state.accelerated[nodes] = 0.0
         state.rest.forget(nodes)
 
     def snapshot(self) -> object:
@@ -203,7 +230,15 @@ class EkfFilter:
 
 def propagate(q: Array, rate_rad_s: Array, dt_s: float) -> Array:
     """Turn orientations (n, 4) by the sensors' rates (n, 3) over `dt_s`, exact for a constant rate."""
-    q = multiply(q, from_rotation_vector(rate_rad_s * dt_s))
+    return multiply(q, from_rotation_vector(rate_rad_s * dt_s))
+
+
+def turn_by(phi_rad: Array, q: Array) -> Array:
+    """Orientations (n, 4) after a small turn φ (n, 3) in the world, to its second order, at unit length."""
+    step = np.empty_like(q)
+    step[:, 0] = 1.0
+    np.multiply(phi_rad, 0.5, out=step[:, 1:])
+    q = multiply(step, q)
     q /= np.sqrt(np.einsum("ni,ni->n", q, q))[:, None]
     return q
 
@@ -211,10 +246,11 @@ def propagate(q: Array, rate_rad_s: Array, dt_s: float) -> Array:
 def transition(matrix: Array, dt_s: float) -> Array:
     """Jacobian (n, 6, 6) of one prediction's (φ, bias error), from world-from-sensor matrices (n, 3, 3).
 
-    A bias larger than thought turns the estimate too far: dφ/dt = −R δb (Eq. 39's part in error states).
+    A bias larger than thought turns the estimate too far: dφ/dt = −R δb (Eq. 39 in error states).
     """
-    out = np.tile(np.eye(6), (len(matrix), 1, 1))
-    out[:, :3, _BIAS] = -dt_s * matrix
+    out = np.zeros((len(matrix), 6, 6))
+    out[:] = _IDENTITY_6
+    np.multiply(matrix, -dt_s, out=out[:, :3, _BIAS])
     return out
 
 
@@ -222,9 +258,7 @@ def predict(covariance: Array, matrix: Array, dt_s: float, turn_noise: float, bi
     """Covariances (n, 6, 6) after `dt_s`: F P Fᵀ + Q, Q from the densities' squares (rad²/s, rad²/s³)."""
     step = transition(matrix, dt_s)
     out: Array = step @ covariance @ step.transpose(0, 2, 1)
-    diagonal = np.einsum("nii->ni", out)
-    diagonal[:, :3] += turn_noise * dt_s
-    diagonal[:, _BIAS] += bias_noise * dt_s
+    out += np.diag(np.repeat([turn_noise * dt_s, bias_noise * dt_s], 3))
     return out
 
 
@@ -248,7 +282,7 @@ def heading_update(correction: Array, covariance: Array, residual_rad: Array, va
     """
     gain = covariance[:, _UP, _UP] / (covariance[:, _UP, _UP] + variance)
     off = residual_rad - correction[:, _UP]
-    turn: Array = gain * np.arctan2(np.sin(off), np.cos(off))
+    turn: Array = gain * (off - math.tau * np.rint(off / math.tau))
     correction[:, _UP] += turn
     left = 1.0 - gain
     own = covariance[:, _UP, _UP] * left

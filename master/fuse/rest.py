@@ -13,49 +13,51 @@ _TAU_S = 0.5
 _NEAR_RAD_S, _NEAR_M_S2 = np.radians(2.0), 0.5
 _LARGEST_BIAS_RAD_S = np.radians(6.0)
 _AFTER_S = 1.5
+_SHARES: Array = np.repeat([[_NEAR_RAD_S**-2, 0.0], [0.0, _NEAR_M_S2**-2]], 3, axis=0)
+"""Squares (n, 6) times this: how far gyro and accelerometer are off, as shares of the thresholds squared."""
 
 
 @dataclass(slots=True)
 class RestState:
     """n nodes; NaN where a node has yet to start."""
 
-    gyr_rad_s: Array
-    """Low-passed (n, 3)."""
-    acc_m_s2: Array
-    """Low-passed (n, 3)."""
+    low: Array
+    """Low-passed (n, 6): gyro, rad/s, then accelerometer, m/s²."""
     still_s: Array
     """For how long nothing has moved (n,)."""
 
+    def gyr_rad_s(self) -> Array:
+        """Low-passed (n, 3): the bias of who is still."""
+        return self.low[:, :3]
+
     def forget(self, nodes: Mask) -> None:
         """Start some nodes anew, mask (n,)."""
-        self.gyr_rad_s[nodes] = np.nan
+        self.low[nodes] = np.nan
 
 
 class Rest:
     """Still is a node whose gyro and accelerometer stay near their own low-passed values for a while.
 
-    Thresholds as VQF has them: 2 °/s and 0.5 m/s² for 1.5 s. A steady turn slower than 6 °/s looks like
-    rest to any such test; faster ones are told apart by that bound.
+    Thresholds as VQF has them: 2 °/s and 0.5 m/s² for 1.5 s. To any such test a steady turn looks like
+    rest; turns beyond 6 °/s are told apart by their rate.
     """
 
     def start(self, count: int) -> RestState:
         """State of that many nodes that have yet to start."""
-        return RestState(np.full((count, 3), np.nan), np.zeros((count, 3)), np.zeros(count))
+        return RestState(np.full((count, 6), np.nan), np.zeros(count))
 
     def update(self, state: RestState, gyr_rad_s: Array, acc_m_s2: Array, dt_s: float) -> Mask:
         """Take one tick (n, 3) each; who has been still for long enough, (n,)."""
-        new = np.isnan(state.gyr_rad_s[:, 0])
+        readings = np.concatenate([gyr_rad_s, acc_m_s2], axis=1)
+        new = np.isnan(state.low[:, 0])
         if new.any():
-            state.gyr_rad_s[new], state.acc_m_s2[new], state.still_s[new] = gyr_rad_s[new], acc_m_s2[new], 0.0
-        share = dt_s / (_TAU_S + dt_s)
-        gyr_off, acc_off = gyr_rad_s - state.gyr_rad_s, acc_m_s2 - state.acc_m_s2
-        state.gyr_rad_s += share * gyr_off
-        state.acc_m_s2 += share * acc_off
-        near = (
-            (np.einsum("ni,ni->n", gyr_off, gyr_off) < _NEAR_RAD_S**2)
-            & (np.einsum("ni,ni->n", acc_off, acc_off) < _NEAR_M_S2**2)
-            & (np.abs(state.gyr_rad_s).max(axis=1) < _LARGEST_BIAS_RAD_S)
-        )
-        state.still_s = np.where(near, state.still_s + dt_s, 0.0)
+            state.low[new], state.still_s[new] = readings[new], 0.0
+        readings -= state.low
+        state.low += (dt_s / (_TAU_S + dt_s)) * readings
+        readings *= readings
+        near: Mask = (readings @ _SHARES < 1.0).all(axis=1)
+        near &= (np.abs(state.gyr_rad_s()) < _LARGEST_BIAS_RAD_S).all(axis=1)
+        state.still_s += dt_s
+        state.still_s *= near
         out: Mask = state.still_s > _AFTER_S
         return out
