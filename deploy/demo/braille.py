@@ -29,7 +29,8 @@ def plot(curves: Sequence[Array], columns: int, rows: int, unit: str) -> Text:
             for y in range(top, bottom + 1):
                 bits[y // 4, x // 2] |= _DOT[y % 4][x % 2]
                 owner[y // 4, x // 2] = index
-    labels = {0: f"{high:.0f}{unit}", rows - 1: f"{low:.0f}{unit}"}
+    digits = 0 if high - low >= 10.0 else 1
+    labels = {0: f"{high:z.{digits}f}{unit}", rows - 1: f"{low:z.{digits}f}{unit}"}
     text = Text(no_wrap=True)
     for row in range(rows):
         text.append(f"{labels.get(row, ''):>{_LABEL}} ", "dim")

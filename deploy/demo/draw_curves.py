@@ -60,7 +60,7 @@ def as_png(drawn: Curves, path: Path) -> None:
         _draw(right, drawn.time_s, robot.rate_deg_s, operator.rate_deg_s if operator else None, group)
         left.set_ylabel(f"{group.title}, °")
         right.set_ylabel("°/s")
-        left.legend(loc="upper left", fontsize="small", ncols=len(group.joints))
+        left.legend(loc="lower left", bbox_to_anchor=(0.0, 0.99), frameon=False, ncols=len(group.joints))
     for place in places[-1]:
         place.set_xlabel("time in track, s")
     dotted = "" if operator is None else "; dotted: the operator's true ones"

@@ -10,12 +10,16 @@ from rich.console import Console
 from rich.live import Live
 
 from common.clock import monotonic_ns, to_ns
+from common.config import load_config
 from common.errors import TandemError
 from common.messages import Action
 from deploy.demo.report import Report, make_report
 from deploy.demo.rig import Rig, at_most, open_rig
 from deploy.demo.view import draw
-from deploy.profiles import NURSING
+from deploy.profiles import NURSING, example
+from master.config import MasterConfig
+from master.suit.simulated.config import SuitConfig
+from slave.config import SlaveConfig
 
 START_S = 30.0
 """Processes up, filters settled, clock trusted, lease held."""
@@ -62,7 +66,16 @@ async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) 
         raise
 
 
+def check(options: DemoOptions) -> None:
+    """Read the files as the processes will. Raises ConfigError for what they would refuse."""
+    overrides = options.overrides()
+    load_config(example("suit", options.profile), SuitConfig, overrides["suit"])
+    load_config(example("slave", options.profile), SlaveConfig, overrides["slave"])
+    load_config(example("master", options.profile), MasterConfig, overrides["master"])
+
+
 async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
+    check(options)
     async with open_rig(options.transport, options.overrides(), options.profile) as rig:
         observer = rig.observer
         with Live(console=console, refresh_per_second=4, transient=True) as live:
