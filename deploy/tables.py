@@ -152,6 +152,7 @@ _BENCH_ROWS = (
     ("filter + fuse, 8 nodes, µs", ("pipeline", "nodes_8", "fuse_us")),
     ("filter + fuse, 36 nodes, µs", ("pipeline", "nodes_36", "fuse_us")),
     ("the same with mahony, µs", ("pipeline", "nodes_36_mahony", "fuse_us")),
+    ("the same with ekf, µs", ("pipeline", "nodes_36_ekf", "fuse_us")),
     ("solve 25 joints, µs", ("pipeline", "solve_us")),
     ("encode + decode, µs", ("pipeline", "codec_us")),
     ("one way, tandem, µs", ("link", "one_way_us", "tandem")),

@@ -77,6 +77,7 @@ BY_PROFILE = {"nursing": DEMO, "hand": HAND, "lower_limb": LOWER_LIMB}
 
 BENCH = (
     Target("fuse + filter, 36 nodes", ("pipeline", "nodes_36", "fuse_us", "median"), 200.0, "µs"),
+    Target("the same with ekf", ("pipeline", "nodes_36_ekf", "fuse_us", "median"), 400.0, "µs"),
     Target("solve 25 joints", ("pipeline", "solve_us", "median"), 150.0, "µs"),
     Target("encode + decode a command", ("pipeline", "codec_us", "median"), 15.0, "µs"),
     Target("put → received / bare Zenoh", ("link", "over_bare_zenoh"), 1.5),

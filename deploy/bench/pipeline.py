@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from common.runtime import freeze_heap
 from common.skeleton import load_skeleton
 from deploy.bench.measure import spread_us, time_calls
 from master.fuse.estimator import EstimationConfig, Estimator
+from master.fuse.filter import FilterName
 from master.solve.solver import JointSolver
 from master.suit.frame import Frame
 from master.suit.nodes import NodeConfig
@@ -36,15 +37,16 @@ def pipeline(seconds: float) -> dict[str, Any]:
     """µs of every step, one after another in this process."""
     return {
         "nodes_36": ticks(0.3 * seconds, 36),
-        "nodes_8": ticks(0.2 * seconds, 8),
-        "nodes_36_mahony": ticks(0.2 * seconds, 36, filter_name="mahony"),
+        "nodes_8": ticks(0.1 * seconds, 8),
+        "nodes_36_mahony": ticks(0.15 * seconds, 36, filter_name="mahony"),
+        "nodes_36_ekf": ticks(0.15 * seconds, 36, filter_name="ekf"),
         "solve_us": solve(0.15 * seconds),
         "codec_us": codec(0.15 * seconds),
     }
 
 
 def ticks(
-    seconds: float, count: int, fd: bool = True, filter_name: Literal["vqf", "mahony"] = "vqf"
+    seconds: float, count: int, fd: bool = True, filter_name: FilterName = "vqf"
 ) -> dict[str, Any]:
     """µs a tick: `decode_us` from frames to SI units, `fuse_us` to calibrate, low-pass and fuse."""
     protocol = SuitProtocol.load()

@@ -145,8 +145,8 @@ class EkfFilter:
         linear[:, _UP] -= _GRAVITY_M_S2
         mean = self._state.accelerated
         mean += min(1.0, dt_s / _ACCELERATED_TAU_S) * (np.einsum("ni,ni->n", linear, linear) - mean)
-        variance = (self._config.accelerometer_noise / _GRAVITY_M_S2) ** 2 / dt_s
-        variance = variance * (1.0 + mean / self._config.accelerated_m_s2**2)
+        calm = (self._config.accelerometer_noise / _GRAVITY_M_S2) ** 2 / dt_s
+        variance = calm * (1.0 + mean / self._config.accelerated_m_s2**2)
         tilt = linear / _GRAVITY_M_S2
         scalar_update(correction, covariance, _EAST, tilt[:, _NORTH], variance)
         scalar_update(correction, covariance, _NORTH, -tilt[:, _EAST], variance)

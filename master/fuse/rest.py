@@ -55,8 +55,8 @@ class Rest:
         readings -= state.low
         state.low += (dt_s / (_TAU_S + dt_s)) * readings
         readings *= readings
-        near: Mask = (readings @ _SHARES < 1.0).all(axis=1)
-        near &= (np.abs(state.gyr_rad_s()) < _LARGEST_BIAS_RAD_S).all(axis=1)
+        near = (readings @ _SHARES).max(axis=1) < 1.0
+        near &= np.abs(state.gyr_rad_s()).max(axis=1) < _LARGEST_BIAS_RAD_S
         state.still_s += dt_s
         state.still_s *= near
         out: Mask = state.still_s > _AFTER_S
