@@ -53,7 +53,10 @@ class Tray:
             [place % side - 0.5 * (side - 1), place // side - 0.5 * (side - 1), np.zeros(units)], axis=1
         )
         rests = _spread(config.attitudes, random)
-        begins, lasts, froms, turns = [], [], [], []
+        begins: list[float] = []
+        lasts: list[float] = []
+        froms: list[Array] = []
+        turns: list[Array] = []
         now_s = 0.0
         at = rests[0]
         for to in (*rests[1:], *_tumbles(config.tumble_s, random), rests[0]):

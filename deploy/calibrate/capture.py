@@ -1,0 +1,71 @@
+"""From the bus into a recording: what `calibrate record` and `calibrate live` share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from common.errors import TandemError
+from common.quaternion import Array
+from common.recording import Recorder
+from master.config import MasterConfig
+from master.suit.capture import OnSweep, SuitCapture
+from master.suit.poll import Sweep
+from master.suit.protocol import SuitProtocol
+from master.suit.recorded import TOPIC, describe, encode_sweep
+
+
+def names(config: MasterConfig) -> tuple[str, ...]:
+    """The nodes, by segment, in the order of all arrays."""
+    return config.skeleton.segment_names
+
+
+def open_capture(config: MasterConfig, on_sweep: OnSweep) -> SuitCapture:
+    """The suit of a master's file, to be polled as the master does. Opens no bus yet."""
+    capture = config.capture
+    nodes = [config.nodes[name] for name in names(config)]
+    protocol = SuitProtocol.load(capture.dbc)
+    return SuitCapture(nodes, capture.buses, protocol, capture.rate_hz, capture.lost_after, on_sweep)
+
+
+def open_recorder(config: MasterConfig, path: Path) -> Recorder:
+    """A new recording of that suit. Raises RecordingError."""
+    return Recorder(path, describe(config.profile, names(config), config.capture.rate_hz))
+
+
+def record(recorder: Recorder, sweep: Sweep) -> None:
+    """Put one tick."""
+    recorder.put(TOPIC, encode_sweep(sweep), sweep.sampled_ns)
+
+
+def readings(sweep: Sweep) -> Array:
+    """(N, 9) of one tick in the order of the wire; NaN where a node did not answer."""
+    out = np.concatenate([sweep.acc_m_s2, sweep.gyr_rad_s, sweep.mag_ut], axis=1)
+    out[~sweep.fresh] = np.nan
+    return out
+
+
+def check_written(recorder: Recorder) -> None:
+    """Raise TandemError for a recording that is not whole."""
+    counters = recorder.counters
+    missing = counters.refused + counters.lost
+    if counters.failed:
+        raise TandemError(
+            f"{recorder.path}: the recording ended early: {counters.failed}; {counters.written} ticks are in "
+            "it. Make room and record again"
+        )
+    if missing:
+        raise TandemError(
+            f"{recorder.path}: the disk was too slow for {missing} of {counters.put} ticks; they are missing"
+        )
+
+
+def heard(answered: Sequence[int], of: Sequence[str]) -> str:
+    """How many nodes answer, and which do not."""
+    silent = [name for name, count in zip(of, answered, strict=True) if not count]
+    if not silent:
+        return f"all {len(of)} nodes answer"
+    shown = ", ".join(silent[:4]) + (" …" if len(silent) > 4 else "")
+    return f"{len(of) - len(silent)} of {len(of)} nodes answer; silent: {shown}"

@@ -1,0 +1,334 @@
+"""The steps of a guided calibration, each pure: raw readings go in, what is still wanted comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.quaternion import Array
+
+Mask = NDArray[np.bool_]
+
+WINDOW_S = 0.25
+"""Readings are judged over windows this long."""
+STILL_GYR_RAD_S = 0.03
+"""Standard deviation within a window, of one axis: noise is a tenth of it, a hand's tremor more."""
+STILL_ACC_M_S2 = 0.2
+_SAME_REST_COS = float(np.cos(np.radians(2.0)))
+_DISTINCT_COS = float(np.cos(np.radians(12.0)))
+LEAST_SPREAD = 0.12
+"""Smallest eigenvalue of the mean of u uᵀ over the attitudes: 1/3 where they lie evenly all around."""
+_DIFFERENT_RAD_S = 0.8
+_WORN_S = 1.5
+_BENT_RAD_S = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class NodeProgress:
+    """One node in the step that is on."""
+
+    share: float
+    """0 to 1: of what is wanted."""
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A stretch of readings, summed up: N nodes."""
+
+    seconds: float
+    answered: Mask
+    """(N,) at least half of the time."""
+    mean: Array
+    """(N, 9)."""
+    deviation: Array
+    """(N, 9)."""
+
+    @property
+    def still(self) -> Mask:
+        """(N,)."""
+        calm = (self.deviation[:, 3:6] < STILL_GYR_RAD_S).all(axis=1)
+        out: Mask = calm & (self.deviation[:, 0:3] < STILL_ACC_M_S2).all(axis=1) & self.answered
+        return out
+
+
+def summed_up(readings: Array, rate_hz: float) -> Window:
+    """A window of readings (K, N, 9), NaN where a node did not answer."""
+    there = np.isfinite(readings[:, :, 3])
+    share = there.mean(axis=0)
+    answered = share >= 0.5
+    known = np.where(there[:, :, None], readings, 0.0)
+    count = np.maximum(there.sum(axis=0), 1)[:, None]
+    mean = known.sum(axis=0) / count
+    square = np.where(there[:, :, None], (readings - mean) ** 2, 0.0).sum(axis=0) / count
+    return Window(len(readings) / rate_hz, answered, mean, np.sqrt(square))
+
+
+class Step(Protocol):
+    """One thing the person is asked to do."""
+
+    title: str
+    todo: str
+
+    def add(self, window: Window) -> None:
+        """Take the next window of readings."""
+
+    def progress(self) -> list[NodeProgress]:
+        """Every node, in order."""
+
+
+class Attitudes:
+    """Rest in many attitudes (paper B, 2.2.1): counts each node's distinct ones."""
+
+    title = "Rest in many attitudes"
+
+    def __init__(self, nodes: int, still_s: float, wanted: int) -> None:
+        self.todo = (
+            f"Lay all units in a tray. Put it down in {wanted} or more attitudes, on every face and on edges "
+            f"between, upside down too; keep each for {still_s:g} s."
+        )
+        self._still_s = still_s + 2.0 * WINDOW_S
+        self._wanted = wanted
+        self._rest_s = np.zeros(nodes)
+        self._rest_direction = np.zeros((nodes, 3))
+        self._found: list[list[Array]] = [[] for _ in range(nodes)]
+        self._counted = np.zeros(nodes, dtype=np.bool_)
+
+    def add(self, window: Window) -> None:
+        """Take the next window of readings."""
+        norm = np.maximum(np.linalg.norm(window.mean[:, :3], axis=1, keepdims=True), 1e-9)
+        direction = window.mean[:, :3] / norm
+        same = np.sum(direction * self._rest_direction, axis=1) > _SAME_REST_COS
+        goes_on = window.still & same
+        begins = window.still & ~same
+        self._rest_direction[begins] = direction[begins]
+        self._rest_direction[~window.still] = 0.0
+        self._rest_s = np.where(goes_on, self._rest_s + window.seconds, np.where(begins, window.seconds, 0.0))
+        self._counted &= goes_on
+        for i in np.flatnonzero((self._rest_s >= self._still_s) & ~self._counted):
+            self._counted[i] = True
+            found = self._found[i]
+            if all(direction[i] @ other < _DISTINCT_COS for other in found):
+                found.append(direction[i])
+
+    def progress(self) -> list[NodeProgress]:
+        """Every node, in order."""
+        return [self._of(i) for i in range(len(self._found))]
+
+    def _of(self, i: int) -> NodeProgress:
+        found = self._found[i]
+        count = f"{len(found)} of {self._wanted}"
+        if len(found) >= self._wanted:
+            if spread(np.array(found)) >= LEAST_SPREAD:
+                return NodeProgress(1.0, f"{len(found)} attitudes")
+            return NodeProgress(0.95, f"{count}, all alike: put it upside down, on its edges")
+        if self._counted[i]:
+            hint = "turn it on"
+        elif self._rest_s[i] > 0.0:
+            hint = f"keep still, {max(0.0, self._still_s - self._rest_s[i]):.1f} s"
+        else:
+            hint = "lay it down"
+        return NodeProgress(len(found) / self._wanted, f"{count}; {hint}")
+
+
+def spread(directions: Array) -> float:
+    """How evenly unit vectors (K, 3) lie around: 1/3 at best, 0 where all lie in one plane."""
+    return float(np.linalg.eigvalsh(directions.T @ directions / len(directions))[0])
+
+
+class Tumble:
+    """Turn about freely for the magnetometer: counts the cells of the sphere that each node has seen.
+
+    The attitudes' readings count too, so this step listens from the beginning.
+    """
+
+    title = "Turn about freely"
+    todo = (
+        "Away from iron, turn the tray slowly about every way, as if to show each of its sides to each wall, "
+        "to the ceiling and to the floor."
+    )
+    _CELLS = 60
+    _LEAST_UT = 10.0
+    """Half the range of an axis; the earth's field is 25 to 65 µT."""
+
+    def __init__(self, nodes: int, magnetometer: Sequence[bool], wanted_share: float, least_s: float) -> None:
+        self._has = list(magnetometer)
+        self._wanted = wanted_share
+        self._least_s = least_s
+        self._seconds = 0.0
+        self._seen: list[Array] = []
+        self._cells = sphere_cells(self._CELLS)
+        self._nodes = nodes
+
+    def listen(self, window: Window) -> None:
+        """Take readings of another step."""
+        field = np.where(window.answered[:, None], window.mean[:, 6:9], np.nan)
+        if np.isfinite(field).any():
+            self._seen.append(field)
+
+    def add(self, window: Window) -> None:
+        """Take the next window of readings."""
+        self._seconds += window.seconds
+        self.listen(window)
+
+    def progress(self) -> list[NodeProgress]:
+        """Every node, in order."""
+        field = np.array(self._seen).reshape(-1, self._nodes, 3)
+        return [self._of(i, field[:, i]) for i in range(self._nodes)]
+
+    def _of(self, i: int, field: Array) -> NodeProgress:
+        if not self._has[i]:
+            return NodeProgress(1.0, "no magnetometer")
+        covered = self._coverage(field[np.isfinite(field).all(axis=1)])
+        text = f"{100.0 * covered:.0f} % of all directions, {100.0 * self._wanted:.0f} % wanted"
+        share = covered / self._wanted
+        if self._least_s > 0.0:
+            share = min(share, self._seconds / self._least_s)
+        if share >= 1.0:
+            return NodeProgress(1.0, f"{100.0 * covered:.0f} % of all directions")
+        return NodeProgress(share, text)
+
+    def _coverage(self, field: Array) -> float:
+        if len(field) < 2:
+            return 0.0
+        low, high = field.min(axis=0), field.max(axis=0)
+        half = 0.5 * (high - low)
+        # without this, noise about one direction would look like a sphere
+        if half.min() < max(self._LEAST_UT, 0.5 * half.max()):
+            return 0.0
+        u = (field - 0.5 * (low + high)) / half
+        u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-9)
+        return len(np.unique(np.argmax(u @ self._cells.T, axis=1))) / self._CELLS
+
+
+def sphere_cells(count: int) -> Array:
+    """Directions (count, 3) spread evenly over the sphere (a Fibonacci spiral)."""
+    k = np.arange(count)
+    z = 1.0 - (2.0 * k + 1.0) / count
+    azimuth = k * np.pi * (3.0 - np.sqrt(5.0))
+    radius = np.sqrt(1.0 - z**2)
+    return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1)
+
+
+class Wear:
+    """Put the suit on: over once the units no longer turn as one."""
+
+    title = "Put the suit on"
+    todo = "Fix every unit on its segment, then move arms, hands and legs about."
+
+    def __init__(self, nodes: int) -> None:
+        self._nodes = nodes
+        self._seconds = 0.0
+
+    def add(self, window: Window) -> None:
+        """Take the next window of readings."""
+        # deviation within the window: the gyros' biases are not known yet, but steady
+        turning = np.linalg.norm(window.deviation[:, 3:6], axis=1)[window.answered]
+        rate = np.linalg.norm(window.mean[:, 3:6], axis=1)[window.answered]
+        if len(rate) and max(np.ptp(turning), np.ptp(rate)) > _DIFFERENT_RAD_S:
+            self._seconds += window.seconds
+
+    def progress(self) -> list[NodeProgress]:
+        """Every node, in order."""
+        share = min(1.0, self._seconds / _WORN_S)
+        return [NodeProgress(share, "worn" if share >= 1.0 else "not moving by itself yet")] * self._nodes
+
+
+class Stance:
+    """Stand in the zero pose: all nodes at rest at once."""
+
+    title = "Stand in the zero pose"
+    todo = "Stand upright, look ahead, arms hanging, palms facing the thighs, fingers straight. Keep still."
+
+    def __init__(self, nodes: int, stance_s: float, wait_for_word: bool) -> None:
+        """With `wait_for_word` the stance counts only once the person says so."""
+        self._wanted_s = stance_s
+        self._said = not wait_for_word
+        if wait_for_word:
+            self.todo += " Press Enter as you begin."
+        self._rest_s = 0.0
+        self._past_s = 0.0
+        self._still = np.zeros(nodes, dtype=np.bool_)
+        self._mean_rates: list[Array] = []
+        self._nodes = nodes
+
+    def word(self) -> None:
+        """The person says: I stand."""
+        self._said = True
+
+    def add(self, window: Window) -> None:
+        """Take the next window of readings."""
+        self._past_s += window.seconds
+        if self._rest_s >= self._wanted_s:
+            return
+        self._still = window.still | ~window.answered
+        if self._said and self._still.all() and window.answered.any():
+            self._rest_s += window.seconds
+            self._mean_rates.append(window.mean[:, 3:6])
+        else:
+            self._rest_s = 0.0
+            self._mean_rates.clear()
+        self.stance_s = (self._past_s - self._rest_s, self._past_s)
+        """From when until when, since the step began."""
+
+    @property
+    def bias_rad_s(self) -> Array:
+        """(N, 3) what the gyros read at rest."""
+        if not self._mean_rates:
+            return np.zeros((self._nodes, 3))
+        out: Array = np.mean(self._mean_rates, axis=0)
+        return out
+
+    def progress(self) -> list[NodeProgress]:
+        """Every node, in order."""
+        share = min(1.0, self._rest_s / self._wanted_s)
+        return [
+            NodeProgress(share, f"still, {self._rest_s:.1f} s" if still else "moves")
+            for still in self._still.tolist()
+        ]
+
+
+class Limber:
+    """Move every joint: counts the seconds in which the two units of each turned differently."""
+
+    title = "Move every joint"
+    todo = (
+        "Bend elbows, knees and every finger joint through their range, again and again, while the whole "
+        "limb moves about; bow and turn."
+    )
+
+    def __init__(self, parents: Sequence[int], wanted_s: float, bias_rad_s: Array) -> None:
+        """`parents` (N,) rows; -1 where there is none that was recorded."""
+        self._parents = np.asarray(parents)
+        self._wanted_s = wanted_s
+        self._bias = bias_rad_s
+        self._seconds = np.zeros(len(parents))
+
+    def add(self, window: Window) -> None:
+        """Take the next window of readings."""
+        mean = window.mean[:, 3:6] - self._bias
+        # what a unit turned in the window, to and fro included
+        rate = np.sqrt(np.sum(mean**2 + window.deviation[:, 3:6] ** 2, axis=1))
+        difference = np.abs(rate - rate[self._parents])
+        # two units that turn as fast about different axes bend as well, which the norms do not tell
+        sideways = 0.5 * np.minimum(rate, rate[self._parents])
+        bent = (np.maximum(difference, sideways) > 0.5 * _BENT_RAD_S) & window.answered
+        self._seconds[bent] += window.seconds
+
+    def progress(self) -> list[NodeProgress]:
+        """Every node, in order."""
+        return [
+            self._of(seconds, alone)
+            for seconds, alone in zip(self._seconds.tolist(), (self._parents < 0).tolist(), strict=True)
+        ]
+
+    def _of(self, seconds: float, alone: bool) -> NodeProgress:
+        if alone:  # it hangs on no other: the joints on it tell how it sits
+            return NodeProgress(1.0, "moves with its neighbours")
+        if seconds >= self._wanted_s:
+            return NodeProgress(1.0, "moved enough")
+        return NodeProgress(seconds / self._wanted_s, f"moved {seconds:.0f} of {self._wanted_s:.0f} s")

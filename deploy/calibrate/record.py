@@ -1,0 +1,87 @@
+"""`tandem calibrate record`: raw readings of all nodes from the bus into a file."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from master.config import MasterConfig
+
+_TELL_S = 0.2
+
+
+def record(
+    config: Annotated[Path, typer.Argument(metavar="MASTER.toml", help="The master's file: nodes, buses.")],
+    out: Annotated[Path, typer.Option(help="New .mcap file.", dir_okay=False)],
+    seconds: Annotated[float | None, typer.Option(help="Stop by itself.", min=0.1)] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
+    ] = None,
+) -> None:
+    """Record the raw readings of all nodes, until Ctrl-C: for `calibrate imu`, `mag` and `mount`.
+
+    Example: `tandem calibrate record deploy/examples/master.toml --out session.mcap --seconds 300`
+    """
+    from common.config import load_config
+    from common.runtime import run as run_until_stopped
+    from master.config import MasterConfig
+
+    checked = load_config(config, MasterConfig, set_ or ())
+    run_until_stopped(lambda stop: _record(checked, out, seconds, stop, Console(stderr=True)))
+
+
+async def _record(
+    config: MasterConfig, out: Path, seconds: float | None, stop: asyncio.Event, console: Console
+) -> None:
+    import numpy as np
+
+    from common.errors import TandemError
+    from common.runtime import until_stopped
+    from deploy.calibrate import capture as shared
+    from master.suit.poll import Sweep
+
+    if out.suffix.lower() != ".mcap":
+        raise TandemError(f"{out}: expected a name that ends in .mcap")
+    nodes = shared.names(config)
+    answered = np.zeros(len(nodes), dtype=np.int64)
+    ticks = 0
+    last = None if seconds is None else round(seconds * config.capture.rate_hz)
+
+    def on_sweep(sweep: Sweep) -> None:
+        nonlocal ticks
+        answered[sweep.fresh] += 1
+        shared.record(recorder, sweep)
+        ticks += 1
+        if last is not None and ticks >= last:
+            stop.set()
+
+    async def tell() -> None:
+        with console.status("waiting for the suit") as status:
+            while True:
+                took_s = ticks / config.capture.rate_hz
+                who = shared.heard(answered.tolist(), nodes)
+                status.update(f"recording, {took_s:6.1f} s: {who} (Ctrl-C ends it)")
+                await asyncio.sleep(_TELL_S)
+
+    async def work() -> None:
+        telling = asyncio.create_task(tell())
+        try:
+            await shared.open_capture(config, on_sweep).run()
+        finally:
+            telling.cancel()
+
+    recorder = shared.open_recorder(config, out)
+    try:
+        await until_stopped(stop, work())
+    finally:
+        await asyncio.to_thread(recorder.close)
+    shared.check_written(recorder)
+    if not answered.any():
+        raise TandemError(f"{out}: no node answered; is the suit on, and the bus right?")
+    took_s = ticks / config.capture.rate_hz
+    console.print(f"{out}: {took_s:.1f} s; {shared.heard(answered.tolist(), nodes)}", highlight=False)

@@ -1,0 +1,85 @@
+"""Polls the suit and hands every tick's raw readings on: what the master does, without what it does next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from common.clock import monotonic_ns
+from common.pacing import TickGrid
+from common.ticker import ticks
+from master.suit.bus import SuitBus
+from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.poll import Poll, Sweep
+from master.suit.protocol import SuitProtocol
+
+OnSweep = Callable[[Sweep], None]
+
+
+@dataclass(slots=True)
+class CaptureCounters:
+    """Ticks since the start."""
+
+    expected: int = 0
+    missed: int = 0
+
+
+class SuitCapture:
+    """The polling of one suit."""
+
+    def __init__(
+        self,
+        nodes: Sequence[NodeConfig],
+        buses: Sequence[BusConfig],
+        protocol: SuitProtocol,
+        rate_hz: float,
+        lost_after: int,
+        on_sweep: OnSweep,
+    ) -> None:
+        """`nodes` in the order of the sweeps' rows; `lost_after` in ticks."""
+        self.counters = CaptureCounters()
+        self._poll = Poll(nodes, protocol, lost_after, {bus.name: bus.fd for bus in buses})
+        self._period_ns = round(1e9 / rate_hz)
+        self._on_sweep = on_sweep
+        self._buses = [SuitBus(bus, self._on_frame, self._on_bus) for bus in buses]
+        self._open = False
+
+    async def run(self) -> None:
+        """Poll until cancelled. Raises BusError where a bus cannot be opened."""
+        try:
+            for bus in self._buses:
+                bus.open()
+            async for due in ticks(TickGrid(monotonic_ns() + self._period_ns, self._period_ns)):
+                self.counters.expected += 1 + due.missed
+                self.counters.missed += due.missed
+                for bus in self._buses:
+                    bus.read()
+                if self._open:
+                    self._close()
+                sync = self._poll.open_window(due.tick, monotonic_ns())
+                self._open = True
+                for bus in self._buses:
+                    bus.send(sync)
+        finally:
+            for bus in self._buses:
+                await bus.close()
+
+    def summary(self) -> Mapping[str, object]:
+        """Ticks, nodes and buses, as plain values."""
+        return {
+            "ticks": {"expected": self.counters.expected, "missed": self.counters.missed},
+            "nodes": self._poll.summary(),
+            "buses": {bus.name: bus.summary() for bus in self._buses},
+        }
+
+    def _on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        if self._poll.on_frame(bus, frame_id, data, now_ns) and self._open:
+            self._close()
+
+    def _on_bus(self, bus: str, up: bool) -> None:
+        if not up:
+            self._poll.bus_down(bus)
+
+    def _close(self) -> None:
+        self._open = False
+        self._on_sweep(self._poll.close_window(monotonic_ns()))
