@@ -1,4 +1,4 @@
-"""Units as delivered, calibrated from a session of their own as paper B has it: `tandem calibrate` without files.
+"""Units as delivered, calibrated by a session of their own as in paper B: `tandem calibrate` without files.
 
 All units lie in one tray: 26 attitudes of 10 s each, then 3 minutes of tumbling.
 """
@@ -12,9 +12,11 @@ import numpy as np
 from common.quaternion import IDENTITY, Array
 from deploy.accuracy.papers.fixture import FIELD_UT, read_by
 from master.calibrate.affine import Calibration
+from master.calibrate.alignment import align_magnetometer
 from master.calibrate.inertial import calibrate_inertial
 from master.calibrate.magnetic import MagneticCalibration, calibrate_magnetic
 from master.calibrate.recording import NodeRecording
+from master.calibrate.still import interval_means
 from master.suit.simulated.imperfections import Imperfections
 from master.suit.simulated.tray import Tray, TrayConfig
 
@@ -44,9 +46,23 @@ def calibrate(units: Imperfections, places: int, chosen: list[int], seed: int) -
         inertial = calibrate_inertial(NodeRecording(f"unit {unit}", RATE_HZ, acc, gyr))
         whole = (acc[tumbling], gyr[tumbling], mag[tumbling])
         field = calibrate_magnetic(NodeRecording(f"unit {unit}", RATE_HZ, *whole))
-        affine[:, unit] = inertial.accelerometer.affine, inertial.gyroscope.affine, field.fit.affine
+        force, strength = (
+            interval_means(apply_map(map_, readings), inertial.still)
+            for map_, readings in ((inertial.accelerometer.affine, acc), (field.fit.affine, mag))
+        )
+        affine[:, unit] = (
+            inertial.accelerometer.affine,
+            inertial.gyroscope.affine,
+            align_magnetometer(force, strength).apply(field.fit.affine),
+        )
         magnetic.append(field)
     return Calibrated(Calibration(affine, np.tile(IDENTITY, (places, 1))), tuple(magnetic))
+
+
+def apply_map(affine: Array, readings: Array) -> Array:
+    """Calibrated readings (T, 3) for a map (3, 4)."""
+    out: Array = readings @ affine[:, :3].T + affine[:, 3]
+    return out
 
 
 def session(units: Imperfections, places: int, seed: int) -> tuple[Array, slice]:
