@@ -6,6 +6,7 @@ import typer
 
 from deploy.accuracy.files import files
 from deploy.accuracy.group import FilesByDefault
+from deploy.accuracy.hinge import hinge
 from deploy.accuracy.papers.command import papers
 
 app = typer.Typer(no_args_is_help=True, cls=FilesByDefault)
@@ -23,3 +24,4 @@ def _group() -> None:
 
 app.command("files")(files)
 app.command("papers")(papers)
+app.command("hinge")(hinge)

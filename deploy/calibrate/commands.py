@@ -6,6 +6,7 @@ import typer
 
 from deploy.calibrate.imu import imu
 from deploy.calibrate.mag import mag
+from deploy.calibrate.mount import mount
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -17,3 +18,4 @@ def _group() -> None:
 
 app.command("imu")(imu)
 app.command("mag")(mag)
+app.command("mount")(mount)

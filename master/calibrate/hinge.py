@@ -100,23 +100,34 @@ def find_hinge(gyr1_rad_s: Array, gyr2_rad_s: Array, rate_hz: float) -> Hinge:
 
 def check(hinge: Hinge, joint: str) -> None:
     """Raise PoorMotionError where the hinge cannot be trusted, saying what to do."""
-    again = f"record again: bend {joint} ten times through its range while the whole limb moves about"
+    check_moved(hinge, joint)
+    sigma = max(hinge.sigma1_rad, hinge.sigma2_rad)
+    if sigma > _WORST_SIGMA_RAD:
+        raise PoorMotionError(
+            f"{joint}: its axis is only known to ± {math.degrees(sigma):.0f}°; {again(joint)}"
+        )
+    if hinge.rival < _WORST_RIVAL:
+        raise PoorMotionError(f"{joint}: a quite different axis explains the motion as well; {again(joint)}")
+
+
+def check_moved(hinge: Hinge, joint: str) -> None:
+    """Raise PoorMotionError where nobody moved the joint, or it moves like no hinge."""
     if hinge.bending_rad_s < _LEAST_RATE_RAD_S:
         raise PoorMotionError(
             f"{joint}: it was hardly bent ({math.degrees(hinge.bending_rad_s):.0f}°/s RMS, "
-            f"{math.degrees(_LEAST_RATE_RAD_S):.0f} needed); {again}"
+            f"{math.degrees(_LEAST_RATE_RAD_S):.0f} needed); {again(joint)}"
         )
-    sigma = max(hinge.sigma1_rad, hinge.sigma2_rad)
     if hinge.misfit_rad_s > _WORST_MISFIT * hinge.bending_rad_s:
         raise PoorMotionError(
             f"{joint}: the two units do not move as on a hinge (misfit "
             f"{hinge.misfit_rad_s / hinge.bending_rad_s:.0%} of the bending); are they on the two segments "
-            f"of this joint, and fixed? Then {again}"
+            f"of this joint, and fixed? Then {again(joint)}"
         )
-    if sigma > _WORST_SIGMA_RAD:
-        raise PoorMotionError(f"{joint}: its axis is only known to ± {math.degrees(sigma):.0f}°; {again}")
-    if hinge.rival < _WORST_RIVAL:
-        raise PoorMotionError(f"{joint}: a quite different axis explains the motion as well; {again}")
+
+
+def again(joint: str) -> str:
+    """What to do about poor motion."""
+    return f"record again: bend {joint} ten times through its range while the whole limb moves about"
 
 
 def residuals(gyr1: Array, gyr2: Array, axis1: Array, axis2: Array) -> tuple[Array, Array]:

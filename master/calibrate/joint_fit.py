@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.quaternion import Array, heading_turn, rotate, to_matrix
-from master.calibrate.gauss_newton import along_sphere, gauss_newton, tangents
+from master.calibrate.gauss_newton import along_sphere, gauss_newton, half_sphere, tangents
 
 ALIGNED_RAD = math.radians(6.0)
 """How far soft tissue and anatomy turn a segment's axis from the ideal joint's."""
@@ -49,6 +49,7 @@ _INDEPENDENT_S = 0.2
 """Samples nearer than that to each other say the same."""
 _HEADINGS, _OFFSETS = 4, 8
 """Starts: headings of the zero pose over half a turn, and offsets over a whole one."""
+_DIRECTIONS = 8
 _SURE_RAD, _SURE_RIVAL = math.radians(10.0), 3.0
 """An offset known so well from the accelerations alone is where the axes' search starts."""
 _COARSE, _MOST = 250, 1500
@@ -122,8 +123,8 @@ def fit_joint(
     """The unknowns of one joint.
 
     `zero_axes` are its axes in the zero pose (3,), body frame: one for a hinge, two for a joint of two, None
-    for a ball joint. `spacing_s` is the time between samples. Where there was no stance, `near` are axes to
-    start from, and of `zero_axes` only their number and the angle between them count.
+    for a ball joint. `spacing_s` is the time between samples. Where there was no stance, `near` are a hinge's
+    axes to start from besides others, and `zero_axes` only says that it is one.
     """
     count = len(parent.r)
     few, many = (np.arange(0, count, max(1, -(-count // most))) for most in (_COARSE, _MOST))
@@ -139,6 +140,7 @@ def fit_joint(
         starts = _starts_of_stance(parent, child, zero_axes, offsets)
     else:
         starts = [Unknowns(axes, float(offset), np.zeros(6)) for axes in near for offset in offsets]
+        starts += _starts_anywhere(parent, child, offsets)
     coarse = _Problem(parent.some(few), child.some(few), zero_axes, stood)
     tried = sorted(
         (coarse.descend(start, most_steps=12) for start in starts),
@@ -191,6 +193,17 @@ def _starts_of_stance(
             axis1 = parent.r_stance.T @ rotate(heading_turn(heading), zero_axes[0])
             axis2 = child.r_stance.T @ rotate(heading_turn(heading - offset), zero_axes[-1])
             starts.append(Unknowns((axis1, axis2), float(offset), np.zeros(6)))
+    return starts
+
+
+def _starts_anywhere(parent: Moving, child: Moving, offsets: Array) -> list[Unknowns]:
+    """Of a hinge: at every instant, so also in the reference pose, both units have its axis the same way."""
+    starts = []
+    for axis in half_sphere(_DIRECTIONS):
+        there = parent.r_stance @ axis
+        for offset in offsets:
+            axis2 = child.r_stance.T @ rotate(heading_turn(-offset), there)
+            starts.append(Unknowns((axis, axis2), float(offset), np.zeros(6)))
     return starts
 
 

@@ -49,8 +49,8 @@ def orient(recordings: Mapping[str, NodeRecording], names: Sequence[str]) -> Ori
     length = min(len(recordings[name].gyr_rad_s) for name in names)
     acc, gyr, q = [], [], []
     for name in names:
-        a = _bridged(recordings[name].acc_m_s2[:length], name, rate_hz)
-        g = _bridged(recordings[name].gyr_rad_s[:length], name, rate_hz)
+        a = bridged(recordings[name].acc_m_s2[:length], name, rate_hz)
+        g = bridged(recordings[name].gyr_rad_s[:length], name, rate_hz)
         _plausible(a, g, name)
         out = offlineVQF(g, a, None, 1.0 / rate_hz)
         acc.append(a)
@@ -106,7 +106,7 @@ def _cross_matrices(v: Array) -> Array:
     return out
 
 
-def _bridged(values: Array, name: str, rate_hz: float) -> Array:
+def bridged(values: Array, name: str, rate_hz: float) -> Array:
     """Missing samples drawn straight from the last to the next."""
     there = np.isfinite(values).all(axis=1)
     if there.all():

@@ -1,0 +1,177 @@
+"""`tandem calibrate mount`: how each unit sits on its segment, from a stance and a motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from common.errors import TandemError
+from deploy.calibrate.options import AsJson, OutFolder, RecordingFile, ReportFile
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from common.skeleton import Skeleton
+    from master.calibrate.mounting import JointMotion, Mounting
+    from master.calibrate.recording import NodeRecording
+
+
+def _times(text: str | None) -> str | None:
+    if text is not None:
+        parts = text.split(":")
+        if len(parts) != 2 or not all(p.replace(".", "", 1).isdigit() for p in parts):
+            raise typer.BadParameter("expected FROM:TO in seconds from the beginning, such as 0.5:4")
+    return text
+
+
+def mount(
+    recording: RecordingFile,
+    profile: Annotated[str, typer.Option(help="Whose segments the nodes are on.")] = "nursing",
+    out: OutFolder = Path("calibration"),
+    stance: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FROM:TO",
+            help="Seconds of the zero pose; left out, the first stretch in which everyone rests.",
+            callback=_times,
+        ),
+    ] = None,
+    report: ReportFile = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find how sensors worn askew sit: stand still in the zero pose, then move every joint about.
+
+    Stand upright, arms hanging, palms to the thighs, for three seconds; then bend elbows, knees and fingers
+    ten times each while you walk, bow and turn, 20 s or more. No magnetometer is needed. Calibrations of
+    `imu` in the folder are applied first.
+
+    Example: `tandem calibrate mount session.mcap --profile nursing --out calibration`
+    """
+    from rich.progress import Progress
+
+    from common.skeleton import load_skeleton
+    from deploy.calibrate.mount_picture import draw_angles
+    from deploy.calibrate.session import make_folder, tell_machines
+    from master.calibrate.mounting import find_mounting
+    from master.calibrate.mounting_files import calibrated, write_mounting
+    from master.calibrate.recording import load_recordings
+
+    skeleton = load_skeleton(profile)
+    make_folder(out)
+    nodes = calibrated(of_profile(load_recordings(recording), skeleton), out)
+    between = None if stance is None else (float(stance.split(":")[0]), float(stance.split(":")[1]))
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("joints", total=None)
+        found = find_mounting(
+            nodes, skeleton, between, lambda done, of: bar.update(task, completed=done, total=of)
+        )
+    write_mounting(found, recording, out, date.today())
+    draw_angles(nodes, skeleton, found, out / "mounting.png")
+    figures = as_report(found, recording)
+    tell_machines(figures, report, to_stdout=as_json)
+    if not as_json:
+        console = Console()
+        console.print(nodes_table(found), joints_table(found))
+        console.print(
+            f"stance {found.stance_s[0]:.1f} to {found.stance_s[1]:.1f} s; written to {out}; angles over the "
+            "recording: mounting.png"
+        )
+    if found.refused:
+        lines = [f"{recording}: {name} is not written: {why}" for name, why in found.refused.items()]
+        raise TandemError("\n".join(lines))
+
+
+def of_profile(recordings: Mapping[str, NodeRecording], skeleton: Skeleton) -> dict[str, NodeRecording]:
+    """The recordings by the skeleton's segments, also where the file uses the full-body names."""
+    from master.suit.simulated.replay import RECORDED_AS
+
+    out = {}
+    for segment in skeleton.segment_names:
+        name = segment if segment in recordings else RECORDED_AS.get(segment)
+        if name is not None and name in recordings:
+            out[segment] = recordings[name]
+    if not out:
+        there = ", ".join(sorted(recordings)[:6])
+        raise TandemError(
+            f"no node of the recording ({there} …) is a segment of the profile {skeleton.name}; "
+            "expected another --profile"
+        )
+    return out
+
+
+def as_report(found: Mounting, recording: Path) -> dict[str, Any]:
+    """Everything found, for machines; angles in degrees."""
+    return {
+        "recording": recording.name,
+        "stance_s": list(found.stance_s),
+        "nodes": {
+            name: {
+                "q_sensor_from_segment": node.q_sensor_from_segment.tolist(),
+                "sigma_deg": math.degrees(node.sigma_rad),
+                "tilt_deg": None if node.tilt_rad is None else math.degrees(node.tilt_rad),
+                "heading_deg": math.degrees(node.heading_rad),
+                "told_by": node.told_by,
+            }
+            for name, node in found.nodes.items()
+        },
+        "joints": {joint.segment: _joint(joint) for joint in found.joints},
+        "refused": found.refused,
+    }
+
+
+def _joint(joint: JointMotion) -> dict[str, Any]:
+    fit = joint.fit
+    axes = fit is not None and joint.axes_known
+    return {
+        "parent": joint.parent,
+        "kind": joint.kind,
+        "refusal": joint.refusal,
+        "offset_deg": None if fit is None else math.degrees(fit.offset_rad),
+        "offset_sigma_deg": None if fit is None else math.degrees(fit.offset_sigma_rad),
+        "axis_sigma_deg": [math.degrees(s) for s in fit.axis_sigma_rad] if fit and axes else None,
+        "misfit": None if fit is None else fit.misfit,
+        "flexion_deg": None if joint.flexion_deg is None else list(joint.flexion_deg),
+    }
+
+
+def nodes_table(found: Mounting) -> Table:
+    """One row a node: who told its heading, and how well it is known."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title="mounting", box=box.SIMPLE_HEAD)
+    for head in ("node", "facing told by", "± °", "axis off level °", ""):
+        table.add_column(head, justify="right" if "°" in head else "left")
+    for name, node in found.nodes.items():
+        tilt = "" if node.tilt_rad is None else f"{math.degrees(node.tilt_rad):.1f}"
+        table.add_row(name, node.told_by, f"{math.degrees(node.sigma_rad):.1f}", tilt, "[green]written")
+    for name in found.refused:
+        table.add_row(name, "", "", "", "[red]refused")
+    return table
+
+
+def joints_table(found: Mounting) -> Table:
+    """One row a joint: what its motion told."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title="joints", box=box.SIMPLE_HEAD)
+    for head in ("joint", "kind", "heading °", "± °", "axes ± °", "bent ° (5 to 95 %)"):
+        table.add_column(head, justify="left" if head in ("joint", "kind") else "right")
+    for joint in found.joints:
+        row = [f"{joint.segment}", joint.kind, "", "", "", ""]
+        if joint.fit is not None:
+            row[2] = f"{math.degrees(joint.fit.offset_rad):.0f}"
+            row[3] = f"{math.degrees(joint.fit.offset_sigma_rad):.1f}"
+            if joint.axes_known:
+                row[4] = " ".join(f"{math.degrees(s):.1f}" for s in joint.fit.axis_sigma_rad)
+        if joint.flexion_deg is not None:
+            row[5] = f"{joint.flexion_deg[0]:.0f} to {joint.flexion_deg[1]:.0f}"
+        table.add_row(*row, style="yellow" if joint.refusal else None)
+    return table

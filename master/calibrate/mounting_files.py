@@ -1,0 +1,69 @@
+"""The mounting at the rim: readings as the nodes' files calibrate them, and what is written back to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from common.config import load_config
+from common.quaternion import Array
+from master.calibrate.affine import Made, NodeCalibration
+from master.calibrate.mounting import Mounting
+from master.calibrate.node_file import write_calibration
+from master.calibrate.recording import NodeRecording, RecordingError
+
+
+def node_file(folder: Path, name: str) -> Path:
+    """A node's file in a folder of them."""
+    return folder / f"{name}.toml"
+
+
+def calibrated(recordings: Mapping[str, NodeRecording], folder: Path) -> dict[str, NodeRecording]:
+    """The readings with the maps of `folder`'s NODE.toml applied; as they are where there is no such file.
+
+    Raises RecordingError for raw counts without a file, ConfigError for a file that is not sound.
+    """
+    out = {}
+    for name, raw in recordings.items():
+        path = node_file(folder, name)
+        if not path.exists():
+            if raw.counts:
+                raise RecordingError(f"{name}: raw counts; calibrate it first (`tandem calibrate imu`)")
+            out[name] = raw
+            continue
+        file = load_config(path, NodeCalibration)
+        out[name] = replace(
+            raw,
+            acc_m_s2=_mapped(file.accelerometer, raw.acc_m_s2),
+            gyr_rad_s=_mapped(file.gyroscope, raw.gyr_rad_s),
+            mag_ut=None if raw.mag_ut is None else _mapped(file.magnetometer, raw.mag_ut),
+            counts=False,
+        )
+    return out
+
+
+def write_mounting(mounting: Mounting, recording: Path, folder: Path, day: date) -> dict[str, Path]:
+    """Write each node's mounting to its file; other parts of the files stay. Returns the files by node."""
+    written = {}
+    for name, node in mounting.nodes.items():
+        made = Made(
+            date=day,
+            recording=recording.name,
+            unit="rad",
+            residual_after=None if node.tilt_rad is None else abs(node.tilt_rad),
+            sigma=[[min(node.sigma_rad, math.pi)]],
+        )
+        written[name] = node_file(folder, name)
+        write_calibration(written[name], {"mounting": (node.q_sensor_from_segment, made)})
+    return written
+
+
+def _mapped(rows: list[list[float]], readings: Array) -> Array:
+    matrix = np.array(rows)
+    out: Array = readings @ matrix[:, :3].T + matrix[:, 3]
+    return out
