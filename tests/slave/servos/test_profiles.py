@@ -100,7 +100,7 @@ def test_all_joints_at_once_swing_through_their_ranges_28_ms_late(robot: Robot) 
         worst = np.maximum(worst, np.abs(data.qpos[robot.leaders] - late))
     assert np.isfinite(data.qpos).all()
     # a servo is no pure delay: it rings when the motion begins, and the others shake it
-    assert np.rad2deg(worst).max() < 4.0, dict(zip(skeleton.joint_names, np.rad2deg(worst), strict=True))
+    assert np.rad2deg(worst).max() < 6.0, dict(zip(skeleton.joint_names, np.rad2deg(worst), strict=True))
 
 
 def test_the_hand_weighs_what_a_hand_does_and_its_palm_is_five_bones() -> None:
