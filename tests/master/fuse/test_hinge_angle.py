@@ -107,7 +107,8 @@ def test_a_drifting_gyro_is_found_and_taken_off() -> None:
     drift = np.radians(0.5)
     gyr = walked.gyr.copy()
     gyr[:, FAR] += drift * walked.hinge.axis2
-    online = HingeAngle(HingeAngleConfig(), walked.hinge, RATE_HZ)
+    # gyros that are better than a person's skin lets them be: so a drift stands out
+    online = HingeAngle(HingeAngleConfig(rate_noise=0.002), walked.hinge, RATE_HZ)
     angle = np.array([online.update(*s) for s in Walk(walked.hinge, gyr, walked.acc, gyr, gyr).samples()])
     np.testing.assert_allclose(np.degrees(online.drift_rad_s), 0.5, atol=0.03)
     # by the gyros alone it would be 6° off at the end
@@ -122,6 +123,23 @@ def test_a_recording_gives_what_its_samples_give_one_by_one() -> None:
     track = hinge_angles(HingeAngleConfig(), one, RATE_HZ, *sensors)
     np.testing.assert_allclose(track.angle_rad, online[:, 1], atol=1e-12)
     assert track.deviation_rad.shape == track.drift_rad_s.shape == track.angle_rad.shape
+
+
+def test_shaking_skin_is_averaged_out() -> None:
+    """Forces of single samples are then wrong by tens of degrees, as on a person who jogs."""
+    walked = walk(0, "ideal")
+    shaking = np.random.default_rng(9).standard_normal(walked.acc.shape) * 8.0
+    error = np.degrees(
+        followed(Walk(walked.hinge, walked.gyr, walked.acc + shaking, shaking, shaking)) - walked.knees
+    )
+    change = np.gradient(walked.gyr, 1.0 / RATE_HZ, axis=0)
+    forces = [
+        force_at_joint((walked.acc + shaking)[:, nodes], walked.gyr[:, nodes], change[:, nodes], lever)
+        for nodes, lever in ((NEAR, walked.hinge.lever1_m), (FAR, walked.hinge.lever2_m))
+    ]
+    single = np.degrees(angle_of_forces(walked.hinge, *forces).angle_rad - walked.knees)
+    assert np.sqrt(np.mean(single[400:] ** 2)) > 30.0
+    assert np.sqrt(np.mean(error[400:] ** 2)) < 5.0
 
 
 def test_missing_samples_are_bridged() -> None:
