@@ -5,8 +5,10 @@ from __future__ import annotations
 import typer
 
 from deploy.calibrate.imu import imu
+from deploy.calibrate.live.command import live
 from deploy.calibrate.mag import mag
 from deploy.calibrate.mount import mount
+from deploy.calibrate.record import record
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -19,3 +21,5 @@ def _group() -> None:
 app.command("imu")(imu)
 app.command("mag")(mag)
 app.command("mount")(mount)
+app.command("record")(record)
+app.command("live")(live)

@@ -1,0 +1,91 @@
+"""`tandem calibrate live`: guides a person at the suit, records, computes, writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from deploy.calibrate.options import AsJson, ReportFile
+
+if TYPE_CHECKING:
+    from deploy.calibrate.live.guide import What
+
+
+def live(
+    config: Annotated[Path, typer.Argument(metavar="MASTER.toml", help="The master's file: nodes, buses.")],
+    out: Annotated[Path, typer.Option(help="Folder for NODE.toml, pictures and recordings.")] = Path(
+        "calibration"
+    ),
+    what: Annotated[
+        str, typer.Option(help="Of imu, mag and mount, those to be done, with commas.")
+    ] = "imu,mag,mount",
+    still_s: Annotated[float, typer.Option(help="How long to rest in an attitude, s.", min=1.0)] = 3.0,
+    attitudes: Annotated[int, typer.Option(help="How many attitudes to rest in.", min=12, max=100)] = 20,
+    tumble_s: Annotated[float, typer.Option(help="Shortest time to turn about freely, s.", min=0.0)] = 30.0,
+    limber_s: Annotated[float, typer.Option(help="How long every joint is to move, s.", min=2.0)] = 20.0,
+    gravity: Annotated[float, typer.Option(help="m/s² where you are.", min=9.7, max=9.9)] = 9.80665,
+    report: ReportFile = None,
+    as_json: AsJson = False,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
+    ] = None,
+) -> None:
+    """Calibrate the suit, led step by step: what to do now, which node wants what, how good it became.
+
+    First all units lie in one tray that is put down in many attitudes and turned about; then they are worn.
+    Ctrl-C keeps what was recorded, for `calibrate imu`, `mag` and `mount`.
+
+    Example: `tandem calibrate live deploy/examples/master.toml --out calibration --what imu,mag`
+    """
+    from common.config import load_config
+    from common.errors import TandemError
+    from common.runtime import run as run_until_stopped
+    from deploy.calibrate.live.compute import Choice, compute
+    from deploy.calibrate.live.guide import GuideOptions
+    from deploy.calibrate.live.run import LiveSession, Session
+    from deploy.calibrate.session import tell_machines
+    from master.config import MasterConfig
+
+    checked = load_config(config, MasterConfig, set_ or ())
+    wanted = parts(what)
+    out.mkdir(parents=True, exist_ok=True)
+    console = Console(stderr=True)
+    by_word = console.is_terminal
+    options = GuideOptions(wanted, still_s, attitudes, tumble_s=tumble_s, limber_s=limber_s, by_word=by_word)
+    session = Session()
+
+    async def guide(stop: object) -> None:
+        import asyncio
+
+        nonlocal session
+        assert isinstance(stop, asyncio.Event)
+        led = LiveSession(checked, options, out, console)
+        session = led.session
+        await led.run(stop)
+
+    run_until_stopped(guide)
+    if not session.finished:
+        kept = ", ".join(str(path) for path in (session.tray, session.worn) if path is not None)
+        raise TandemError(
+            f"stopped before the end; recorded so far: {kept}. "
+            "`tandem calibrate imu`, `mag` and `mount` can read it"
+        )
+    figures, refusals = compute(checked, session, Choice(wanted, gravity, still_s), out, console)
+    tell_machines(figures, report, to_stdout=as_json)
+    if refusals:
+        raise TandemError("\n".join(refusals))
+
+
+def parts(text: str) -> tuple[What, ...]:
+    """`imu,mag` as the parts there are. Raises ConfigError."""
+    from common.errors import ConfigError, ConfigMistake
+    from deploy.calibrate.live.guide import WHATS
+
+    asked = [word.strip() for word in text.split(",") if word.strip()]
+    if not asked or any(word not in WHATS for word in asked):
+        expected = f"one or more of {', '.join(WHATS)}, with commas"
+        raise ConfigError("live", [ConfigMistake("--what", text, expected)])
+    return tuple(what for what in WHATS if what in asked)

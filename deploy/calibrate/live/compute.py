@@ -1,0 +1,135 @@
+"""From what was recorded to the nodes' files: the same calculations as `calibrate imu`, `mag` and `mount`."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress
+
+from common.errors import TandemError
+from deploy.calibrate import session as sessions
+from deploy.calibrate.live.guide import What
+from deploy.calibrate.live.run import Session
+from deploy.calibrate.mount import as_report, joints_table, nodes_table
+from deploy.calibrate.mount_picture import draw_angles
+from deploy.calibrate.pictures import draw_inertial, draw_magnetic
+from deploy.calibrate.views import inertial_table, magnetic_table, notes
+from master.calibrate.inertial import InertialCalibration, InertialOptions, calibrate_inertial
+from master.calibrate.magnetic import MagneticCalibration, calibrate_magnetic
+from master.calibrate.mounting import find_mounting
+from master.calibrate.mounting_files import calibrated, write_mounting
+from master.calibrate.recording import NodeRecording, load_recordings
+from master.config import MasterConfig
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What is to be computed, and how."""
+
+    what: tuple[What, ...]
+    gravity_m_s2: float
+    still_s: float
+
+
+def compute(
+    config: MasterConfig, session: Session, choice: Choice, folder: Path, console: Console
+) -> tuple[dict[str, Any], list[str]]:
+    """Write every node that could be calibrated; the figures, and a line for each refusal."""
+    day = date.today()
+    figures: dict[str, Any] = {**session.counters}
+    refusals: list[str] = []
+    inherit(config, folder)
+    if session.tray is not None:
+        if "imu" in choice.what:
+            figures["imu"] = _imu(session.tray, choice, folder, day, console, refusals)
+        if "mag" in choice.what:
+            figures["mag"] = _mag(config, session.tray, folder, day, console, refusals)
+    if session.worn is not None:
+        figures["mount"] = _mount(config, session, folder, day, console, refusals)
+    written = sorted(path.stem for path in folder.glob("*.toml") if path.stem in config.nodes)
+    if written:
+        console.print("To use them, name each in the master's file, as in")
+        console.print(
+            f'  {written[0]} = {{ …, calibration = "{(folder / written[0]).with_suffix(".toml")}" }}',
+            highlight=False,
+            markup=False,
+        )
+    return figures, refusals
+
+
+def inherit(config: MasterConfig, folder: Path) -> None:
+    """Begin with the files that the master's configuration names: what is not calibrated now is not lost."""
+    for name, node in config.nodes.items():
+        here = folder / f"{name}.toml"
+        if node.calibration is not None and node.calibration.is_file() and not here.exists():
+            shutil.copyfile(node.calibration, here)
+
+
+def _imu(
+    path: Path, choice: Choice, folder: Path, day: date, console: Console, refusals: list[str]
+) -> dict[str, Any]:
+    # rests were asked for a little longer than this
+    options = InertialOptions(choice.gravity_m_s2, min(2.0, 0.8 * choice.still_s))
+
+    def calibrate(raw: NodeRecording, tell: Callable[[float], None]) -> InertialCalibration:
+        return calibrate_inertial(raw, options, tell)
+
+    found = sessions.calibrate_nodes(path, [], calibrate, console)
+    written = sessions.write_nodes(found, path, folder, day)
+    for name, node in found.found.items():
+        draw_inertial(node, folder / f"{name}_imu.png")
+    if found.found:
+        console.print(inertial_table(found.found))
+        notes(found.found, written, console)
+    refusals += [f"imu: {name}: {why}" for name, why in found.refused.items()]
+    return sessions.report(found, path, day, lambda node: {"attitudes": node.attitudes})
+
+
+def _mag(
+    config: MasterConfig, path: Path, folder: Path, day: date, console: Console, refusals: list[str]
+) -> dict[str, Any]:
+    def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
+        return calibrate_magnetic(raw)
+
+    magnetic = [name for name in load_recordings(path) if config.nodes[name].magnetometer]
+    if not magnetic:
+        return {}
+    found = sessions.calibrate_nodes(path, magnetic, calibrate, console)
+    written = sessions.write_nodes(found, path, folder, day)
+    for name, node in found.found.items():
+        draw_magnetic(node, folder / f"{name}_mag.png")
+    if found.found:
+        console.print(magnetic_table(found.found))
+        notes(found.found, written, console)
+    refusals += [f"mag: {name}: {why}" for name, why in found.refused.items()]
+    return sessions.report(found, path, day, lambda node: {"coverage": node.coverage})
+
+
+def _mount(
+    config: MasterConfig, session: Session, folder: Path, day: date, console: Console, refusals: list[str]
+) -> dict[str, Any]:
+    assert session.worn is not None
+    try:
+        nodes = calibrated(load_recordings(session.worn), folder)
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task("joints", total=None)
+            mounting = find_mounting(
+                nodes,
+                config.skeleton,
+                session.stance_s,
+                lambda done, of: progress.update(task, completed=done, total=of),
+            )
+    except TandemError as error:
+        refusals.append(f"mount: {error}")
+        return {"refused": {"": str(error)}}
+    write_mounting(mounting, session.worn, folder, day)
+    draw_angles(nodes, config.skeleton, mounting, folder / "mounting.png")
+    console.print(nodes_table(mounting), joints_table(mounting))
+    refusals += [f"mount: {name}: {why}" for name, why in mounting.refused.items()]
+    return as_report(mounting, session.worn)
