@@ -20,8 +20,9 @@ EXPERIMENTS = (
         "the data glove: two units, held and moved (Yuan et al. 2022, section 4.2)",
         glove.experiment,
         (
-            "The reference is the truth. Each run begins with 3 s at the zero position, in which the units "
-            "take their zero.",
+            "Units as delivered, calibrated by a session of their own. The reference is the truth. Each run "
+            "begins with 3 s at the zero position, in which the units take their zero. The delay is the "
+            "estimate's alone; `tandem demo` measures the whole way's.",
         ),
     ),
     Experiment(

@@ -20,8 +20,8 @@ from master.calibrate.still import interval_means
 from master.suit.simulated.imperfections import Imperfections
 from master.suit.simulated.tray import Tray, TrayConfig
 
-RATE_HZ = 100.0
-"""As the paper's units send."""
+RATE_HZ = 50.0
+"""Enough for turns by hand."""
 SESSION = TrayConfig(attitudes=26, still_s=10.0, tumble_s=180.0)
 
 
