@@ -18,6 +18,8 @@ from master.calibrate.turns import turns
 from master.calibrate.uncertainty import covariance, folds, propagate
 
 UNKNOWNS = 9
+_MOST_EVALUATIONS = 60
+"""Sound moves take about ten; what takes more does not fit, and shows by its errors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +177,7 @@ def _solve(moves: Moves, start: Array) -> tuple[Array, Array, Array]:
         xtol=1e-8,
         ftol=1e-8,
         gtol=1e-10,
+        max_nfev=_MOST_EVALUATIONS,
     ).x
     left, slope = at(solved)
     return scale * solved.reshape(3, 3), left, slope / scale

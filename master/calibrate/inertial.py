@@ -41,9 +41,13 @@ _TRIAL_ERROR_M_S2 = 0.01
 _WORST_GAIN, _WORST_BIAS_M_S2 = 0.02, 0.1
 """What an error of that size in every still interval may make of the fit."""
 _WORST_GYRO_GAIN = 0.02
+_MOST_COMMON_GAIN = 0.1
+"""Makers keep to 3 % (MPU-6050); a wrong rate is a factor on all axes."""
 _PLAUSIBLE_ERROR_RAD = 0.2
 """Of gravity after a move, by an uncalibrated gyro in the right unit."""
 _ONE_DEGREE = np.pi / 180.0
+_HOPELESS_ERROR_RAD, _WORST_ERROR_RAD = 30.0 * _ONE_DEGREE, 5.0 * _ONE_DEGREE
+"""Of gravity after a move, on average: with the best single scale, and calibrated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +129,7 @@ def calibrate_inertial(
     held = np.concatenate([rates[a:b] for a, b in still])
     noise = np.nanstd(held, axis=0) / np.sqrt(len(held))
     turned = gyr.fit_gyroscope(moves, still_rates, noise, scale, lambda share: progress(0.2 + 0.8 * share))
-    _check_gyro(turned, scale)
+    _check_gyro(turned, scale, counts=recording.counts)
     plain = acc.nominal(readings, options.gravity_m_s2, counts=recording.counts)
     return InertialCalibration(
         name=recording.name,
@@ -228,6 +232,9 @@ def _gyro_unit(moves: gyr.Moves, *, counts: bool) -> float:
     if not counts and np.mean(gyr.gravity_errors(np.eye(3), moves)) < _PLAUSIBLE_ERROR_RAD:
         return 1.0
     scale = gyr.nominal_scale(moves)
+    error = float(np.mean(gyr.gravity_errors(scale * np.eye(3), moves)))
+    if error > _HOPELESS_ERROR_RAD:
+        raise _unexplained(error)
     if counts:
         return scale
     if 0.8 < scale / _ONE_DEGREE < 1.25:
@@ -240,13 +247,23 @@ def _gyro_unit(moves: gyr.Moves, *, counts: bool) -> float:
     return 1.0
 
 
-def _check_gyro(fit: gyr.GyroscopeFit, scale: float) -> None:
+def _unexplained(error_rad: float) -> RecordingError:
+    return RecordingError(
+        f"the gyroscope does not explain how gravity turns ({error_rad / _ONE_DEGREE:.0f}° off on average); "
+        "were samples lost, or are its axes not the accelerometer's?"
+    )
+
+
+def _check_gyro(fit: gyr.GyroscopeFit, scale: float, *, counts: bool) -> None:
     worst = float(fit.sigma.max()) / scale
     error = float(np.mean(fit.errors_rad))
-    if error > 5.0 * _ONE_DEGREE:
+    if error > _WORST_ERROR_RAD:
+        raise _unexplained(error)
+    gain = float(np.cbrt(np.linalg.det(fit.gain))) / scale
+    if not counts and abs(gain - 1.0) > _MOST_COMMON_GAIN:
         raise RecordingError(
-            f"the gyroscope does not explain how gravity turns ({error / _ONE_DEGREE:.0f}° off on average); "
-            "were samples lost, or are its axes not the accelerometer's?"
+            f"all of the gyroscope's gains are off together by a factor of {gain:.2f}, "
+            "more than a sensor's are; is the rate of the recording right?"
         )
     if not worst < _WORST_GYRO_GAIN:
         raise RecordingError(
