@@ -158,7 +158,7 @@ def test_a_field_of_another_strength_is_left_out_save_by_mahony(
 ) -> None:
     filter_ = make(name)
     # vqf takes a field for the usual one after 5 s of motion
-    truth = move(filter_, attitudes(5), np.full(1100, 1.0 / RATE_HZ))
+    truth = move(filter_, attitudes(5), np.full(1800, 1.0 / RATE_HZ))
     # by direction the field is then 55° off
     end = move(filter_, truth, np.full(600, 1.0 / RATE_HZ), FIELD_UT + [40.0, 0.0, 0.0])
     assert least_deg <= off_deg(filter_.q_world_from_sensor(), end) <= most_deg
