@@ -81,6 +81,14 @@ def test_every_command_s_help_has_an_example_that_it_would_take(command: str) ->
             ["--transport = 'carrier-pigeon': expected one of tcp, udp, ws, unixsock-stream"],
         ),
         (
+            "demo --profile octopus",
+            ["skeleton: profile = 'octopus': expected one of hand, lower_limb, nursing"],
+        ),
+        (
+            "demo --profile hand --motion bottle",
+            ["hand/suit.toml: motion = 'bottle': expected one of grasp, "],
+        ),
+        (
             "status --connect nowhere --robot r",
             ["connect.0 = 'nowhere': expected a protocol out of tcp, udp"],
         ),
@@ -118,6 +126,12 @@ def test_a_report_that_could_not_be_written_is_said_before_the_work(
     status, said = tandem(f"{command} {tmp_path}/no/report.json")
     assert status == 2
     assert "there is no folder" in said
+
+
+def test_a_picture_of_another_kind_is_refused_before_the_work(tandem: Tandem) -> None:
+    status, said = tandem("demo --profile hand --plots fingers.jpg")
+    assert status == 2
+    assert "expected a name that ends in .png" in said
 
 
 def test_debug_shows_the_traceback(monkeypatch: pytest.MonkeyPatch) -> None:

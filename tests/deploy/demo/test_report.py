@@ -17,7 +17,7 @@ from deploy.demo.rig import Rig
 from deploy.demo.run import DemoOptions
 from deploy.demo.view import print_report
 from deploy.judge import Trace
-from deploy.targets import DEMO, verdicts
+from deploy.targets import BY_PROFILE, DEMO, verdicts
 from deploy.virtual import VirtualRun, World
 
 ENDED_WELL: dict[str, int | None] = {"master": 0, "suit": 0, "slave": 0}
@@ -42,17 +42,21 @@ def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
     return cast(Rig, SimpleNamespace(observer=observer, children=children))
 
 
-@pytest.fixture(scope="module")
-def tracked() -> VirtualRun:
-    """Twelve seconds on one host: one clock, half a millisecond of link."""
-    run = VirtualRun(World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000))
+def followed(profile: str, seconds: float) -> VirtualRun:
+    """Some seconds on one host: one clock, half a millisecond of link."""
+    run = VirtualRun(World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile))
     run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
     run.run(1.0)
     assert run.ask(Action.ENGAGE).done
-    run.run(12.0)
+    run.run(seconds)
     for state in run.states:
         run.trace.add(state)
     return run
+
+
+@pytest.fixture(scope="module")
+def tracked() -> VirtualRun:
+    return followed("nursing", 12.0)
 
 
 @pytest.fixture(scope="module")
@@ -111,3 +115,27 @@ def test_every_problem_is_named(tracked: VirtualRun) -> None:
         "slave left no figures",
         "the robot never reached track",
     ]
+
+
+def test_a_hand_s_report_has_its_five_joints_its_curves_and_paper_b_s_targets() -> None:
+    run = followed("hand", 5.0)
+    report = make_report(DemoOptions(profile="hand"), rig(run, ["hold", "align", "track"]), ENDED_WELL)
+    tree = json.loads(json.dumps(report.tree, allow_nan=False))
+    assert tree["options"]["profile"] == "hand"
+    assert tree["options"]["motion"] == "grasp"
+    assert list(tree["synergies"]) == [f"right_{f}" for f in ("thumb", "index", "middle", "ring", "little")]
+    assert tree["worst_joint"]["max_deg"] == max(row["max_deg"] for row in tree["accuracy"].values())
+    found = {v.target.name: v.met for v in verdicts(tree, BY_PROFILE["hand"])}
+    assert found["finger joint's RMSE, the worst (paper B)"]
+    assert found["finger joint's error, the largest (paper B)"]
+    shown = text(report)
+    for words in ("right_little_dipj", "as a robot's joints", "angular velocity, °/s", "(paper B)"):
+        assert words in shown
+    for words in ("η", "elbow"):
+        assert words not in shown
+
+
+def test_every_profile_has_its_targets_and_the_nursing_robot_no_others_than_before() -> None:
+    assert set(BY_PROFILE) == {"nursing", "hand", "lower_limb"}
+    assert BY_PROFILE["nursing"] is DEMO
+    assert len(DEMO) == 13
