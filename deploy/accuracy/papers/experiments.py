@@ -16,6 +16,15 @@ EXPERIMENTS = (
         ),
     ),
     Experiment(
+        "A-raw",
+        "the same with units as delivered, calibrated and put on as the master's own commands do",
+        telerobot.own_calibration,
+        (
+            "The arms' and chest's units, calibrated by a session of their own (26 attitudes, 3 minutes of "
+            "tumbling); how they sit is taken from 2 s of standing in the zero pose.",
+        ),
+    ),
+    Experiment(
         "B",
         "the data glove: two units, held and moved (Yuan et al. 2022, section 4.2)",
         glove.experiment,

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import json
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 
+from common.skeleton import load_skeleton
 from deploy.accuracy.papers.figures import Figure
+from deploy.accuracy.papers.units import calibrate
 from deploy.judge import Accuracy, accuracy
 from deploy.judge.accuracy import SIDES
 from deploy.judge.paper import ETA_PERCENT, TABLE_1
 from deploy.virtual import VirtualRun, World
+from master.suit.simulated.imperfections import Imperfections
 
 ETA_TARGET_PERCENT = 1.0
+ARMS = ("chest", "left_upper_arm", "left_forearm", "right_upper_arm", "right_forearm")
+"""The segments that Table 1's angles lie between."""
+STANCE_S = 2.0
+"""Of the motion's first 3.5 s, in which the operator stands in the zero pose."""
 SECONDS = 32.5
 """Two periods of the motion, take and deliver a bottle."""
 
@@ -22,6 +32,22 @@ def whole_way(
     run = VirtualRun(World(overrides={"suit": [f"seed={seed}", *suit], "master": list(master)}))
     run.run(seconds)
     return judge(accuracy(run.trace.truth(), run.trace.solved(), run.trace.joint_names))
+
+
+def own_calibration(seed: int, seconds: float = SECONDS) -> list[Figure]:
+    """The same with units as delivered, calibrated by a session of their own and put on in the zero pose."""
+    names = load_skeleton("nursing").segment_names
+    chosen = [names.index(name) for name in ARMS]
+    units = Imperfections("raw", len(names), seed)
+    affine = calibrate(units, len(names), chosen, seed).calibration.affine
+    with tempfile.TemporaryDirectory() as folder:
+        master = [f"estimation.stance_s={STANCE_S}"]
+        for name, unit in zip(ARMS, chosen, strict=True):
+            path = Path(folder) / f"{name}.toml"
+            parts = zip(("accelerometer", "gyroscope", "magnetometer"), affine[:, unit].tolist(), strict=True)
+            path.write_text("".join(f"{part} = {rows}\n" for part, rows in parts), "utf-8")
+            master.append(f"nodes.{name}.calibration={json.dumps(str(path))}")
+        return whole_way(seed, seconds, ['grade="raw"'], master)
 
 
 def judge(judged: Accuracy) -> list[Figure]:

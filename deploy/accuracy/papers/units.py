@@ -38,11 +38,10 @@ def calibrate(units: Imperfections, places: int, chosen: list[int], seed: int) -
 
     Raises RecordingError where the session does not determine a unit.
     """
-    samples, tumbling = session(units, places, seed)
+    samples, tumbling = session(units, places, chosen, seed)
     affine = np.tile(np.eye(3, 4), (3, places, 1, 1))
     magnetic = []
-    for unit in chosen:
-        acc, gyr, mag = samples[:, :, unit].swapaxes(0, 1)
+    for unit, (acc, gyr, mag) in zip(chosen, samples.transpose(2, 1, 0, 3), strict=True):
         inertial = calibrate_inertial(NodeRecording(f"unit {unit}", RATE_HZ, acc, gyr))
         whole = (acc[tumbling], gyr[tumbling], mag[tumbling])
         field = calibrate_magnetic(NodeRecording(f"unit {unit}", RATE_HZ, *whole))
@@ -65,9 +64,14 @@ def apply_map(affine: Array, readings: Array) -> Array:
     return out
 
 
-def session(units: Imperfections, places: int, seed: int) -> tuple[Array, slice]:
-    """Samples (T, 3, N, 3) of a session, and the rows in which the tray is tumbled about."""
+def session(units: Imperfections, places: int, chosen: list[int], seed: int) -> tuple[Array, slice]:
+    """Samples (T, 3, len(chosen), 3) of a session, and the rows in which the tray is tumbled about."""
     tray = Tray(SESSION, places, seed)
-    t_s = np.arange(0.0, tray.period_s, 1.0 / RATE_HZ)
-    ideal = np.array([tray.readings(t, FIELD_UT) for t in t_s.tolist()])
-    return read_by(units, ideal), slice(round((tray.period_s - SESSION.tumble_s) * RATE_HZ), None)
+    times_s = np.arange(0.0, tray.period_s, 1.0 / RATE_HZ)
+    samples = [
+        # a part at a time: all units' readings at once would take hundreds of MB
+        read_by(units, np.array([tray.readings(t, FIELD_UT) for t in some.tolist()]))[:, :, chosen]
+        for some in np.array_split(times_s, 20)
+    ]
+    tumbling = slice(round((tray.period_s - SESSION.tumble_s) * RATE_HZ), None)
+    return np.concatenate(samples), tumbling
