@@ -82,9 +82,10 @@ def _arrays(path: Path) -> dict[str, NDArray[np.generic]]:
     if not path.exists():
         raise TandemError(f"{path}: there is no such file (and no such command: see tandem accuracy --help)")
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if isinstance(archive, np.ndarray):
-                raise _refusal(path, "is one array (npy), not an npz: save it by np.savez(gyr=…, acc=…, …)")
+        found = np.load(path, allow_pickle=False)
+        if isinstance(found, np.ndarray):
+            raise _refusal(path, "is one array (npy), not an npz: save it by np.savez(gyr=…, acc=…, …)")
+        with found as archive:
             return {key: archive[key] for key in archive}
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise _refusal(path, "cannot be read as npz: save it again by np.savez, of plain numbers") from error
