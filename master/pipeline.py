@@ -49,7 +49,7 @@ class MasterPipeline:
             lost_after=config.capture.lost_after,
             fd={bus.name: bus.fd for bus in config.capture.buses},
         )
-        self.estimator = Estimator(config.estimation, nodes, config.capture.rate_hz)
+        self.estimator = Estimator(config.estimation, nodes, config.capture.rate_hz, skeleton=self.skeleton)
         self.solver = JointSolver(self.skeleton)
         self._decimation = config.capture.decimation
         self._window_open = False

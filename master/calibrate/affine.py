@@ -22,6 +22,7 @@ import numpy as np
 from pydantic import AfterValidator
 
 from common.config import Section, load_config
+from common.messages import Mask
 from common.quaternion import IDENTITY, Array, normalise
 
 ACC, GYR, MAG = 0, 1, 2
@@ -104,6 +105,14 @@ class Calibration:
     """(3, N, 3, 4): accelerometer, gyroscope, magnetometer."""
     q_sensor_from_segment: Array
     """(N, 4)."""
+    mounting_made: Mask | None = None
+    """(N,) whose file says how the mounting was found; None: nobody's."""
+
+    @property
+    def mounted(self) -> Mask:
+        """(N,) nodes whose mounting is known: found, or at least not the identity."""
+        askew: Mask = np.any(self.q_sensor_from_segment != IDENTITY, axis=-1)
+        return askew if self.mounting_made is None else askew | self.mounting_made
 
 
 def identity(count: int) -> Calibration:
@@ -130,6 +139,7 @@ def _stack(nodes: list[NodeCalibration]) -> Calibration:
             ]
         ),
         q_sensor_from_segment=normalise(np.array([node.q_sensor_from_segment for node in nodes])),
+        mounting_made=np.array([node.made.mounting is not None for node in nodes], dtype=np.bool_),
     )
 
 

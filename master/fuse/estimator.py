@@ -15,11 +15,13 @@ from common.config import Section
 from common.errors import ConfigError, ConfigMistake
 from common.messages import Mask
 from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate
+from common.skeleton import Skeleton
 from master.calibrate.affine import ACC, GYR, MAG, Calibration, apply, load_calibration
 from master.fuse.ekf import EkfConfig
 from master.fuse.filter import FilterBank, FilterName
 from master.fuse.filters import makers
 from master.fuse.heading import HeadingMemory
+from master.fuse.joints.online import OnlineConfig, OnlineHeadings
 from master.fuse.liveness import Liveness
 from master.fuse.lowpass import LowPass
 from master.fuse.mahony import MahonyConfig
@@ -47,12 +49,17 @@ class EstimationConfig(Section):
     settle_s: float = Field(default=1.0, ge=0.0, le=60.0)
     """From a node's first answer, or its return, until its orientation counts as valid."""
     stance_s: float = Field(default=0.0, ge=0.0, le=60.0)
-    """So long standing still in the zero pose then gives the sensors' mounting; 0: as calibrated."""
+    """So long standing still in the zero pose then gives the nodes' headings, and the mounting of those whose
+    file does not give it; 0: headings by the magnetometers, mounting as calibrated."""
     stance_heading_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
     """Where the operator faces meanwhile, from east towards north."""
     vqf: VqfConfig = VqfConfig()
     mahony: MahonyConfig = MahonyConfig()
     ekf: EkfConfig = EkfConfig()
+    constraints: Literal["online", "off"] = "off"
+    """`online`: headings by the gyros, corrected by what the joints cannot do and by the magnetometers as far
+    as the field is undisturbed. `off`: each node's heading by its own filter alone."""
+    online: OnlineConfig = OnlineConfig()
 
     @property
     def cutoffs_hz(self) -> tuple[float, float, float]:
@@ -113,6 +120,22 @@ class _Stateful(Protocol):
     def restore(self, snapshot: object) -> None: ...
 
 
+class _Headings(_Stateful, Protocol):
+    """What turns the filters' orientations about the vertical; see `OnlineHeadings`."""
+
+    turn: Array
+
+    def lose(self, nodes: Mask, q: Array, /) -> None: ...
+
+    def find(self, nodes: Mask, q: Array, mag_ut: Array, /) -> None: ...
+
+    def stand(self, nodes: Mask, correction_rad: Array, q: Array, mag_ut: Array, /) -> None: ...
+
+    def due(self) -> bool: ...
+
+    def correct(self, q: Array, mag_ut: Array, mounting: Array, usable: Mask, /) -> None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Posture:
     """The operator at the newest tick."""
@@ -134,8 +157,12 @@ class Estimator:
         nodes: Sequence[Node],
         rate_hz: float,
         calibration: Calibration | None = None,
+        skeleton: Skeleton | None = None,
     ) -> None:
-        """Without a `calibration` the files that the nodes name are read. Raises ConfigError."""
+        """Without a `calibration` the files that the nodes name are read. Raises ConfigError.
+
+        Without a `skeleton`, whose segments the nodes are, there are no constraints.
+        """
         mistakes = config.mistakes_at(rate_hz)
         if mistakes:
             raise ConfigError("configuration", mistakes)
@@ -150,12 +177,18 @@ class Estimator:
             makers(rate_hz, config.vqf, config.mahony, config.ekf),
         )
         self._liveness = Liveness(count, math.ceil(config.settle_s * rate_hz))
-        self._heading = HeadingMemory(count)
+        self._heading: _Headings = HeadingMemory(count)
+        self._q_of_filters = self._bank.q_world_from_sensor
+        if config.constraints == "online" and skeleton is not None:
+            self._heading = OnlineHeadings(config.online, skeleton, rate_hz)
+            self._q_of_filters = self._bank.q_inertial_from_sensor
         self._stance = Stance(
             calibration.q_sensor_from_segment,
             math.ceil(config.stance_s * rate_hz),
             math.radians(config.stance_heading_deg),
+            calibration.mounted,
         )
+        self._mounted = calibration.mounted
         self._parts: tuple[_Stateful, ...] = (
             self._lowpass,
             self._bank,
@@ -174,7 +207,7 @@ class Estimator:
         was_valid = self._liveness.settled
         changes = self._liveness.update(readings.fresh, readings.lost)
         if changes.went.any():
-            self._heading.lose(changes.went & was_valid, self._bank.q_world_from_sensor())
+            self._heading.lose(changes.went & was_valid, self._q_of_filters())
         if not self._liveness.alive.all():
             self._idle(~self._liveness.alive)
         if changes.came.any():
@@ -184,11 +217,21 @@ class Estimator:
         self._gyr_rad_s = filtered[GYR]
         self._bank.update(filtered[GYR], filtered[ACC], filtered[MAG])
         if changes.settled.any():
-            self._heading.find(
-                changes.settled & np.isnan(samples[MAG, :, 0]), self._bank.q_world_from_sensor()
-            )
+            self._heading.find(changes.settled, self._q_of_filters(), filtered[MAG])
         if not self._stance.known.all():
-            self._stance.add(self._oriented(self._rate_of_sensors()), self._liveness.settled)
+            self._stand(filtered[MAG])
+        if self._heading.due():
+            usable = self._liveness.settled & self._stance.known
+            mounting = self._stance.q_sensor_from_segment
+            self._heading.correct(self._q_of_filters(), filtered[MAG], mounting, usable)
+
+    def _stand(self, mag_ut: Array) -> None:
+        """One tick of the stance."""
+        done = self._stance.add(self._oriented(self._rate_of_sensors()), self._liveness.settled)
+        # apart: the heading of a mounting found now is the magnetometer's own
+        for nodes in (done & self._mounted, done & ~self._mounted):
+            if nodes.any():
+                self._heading.stand(nodes, self._stance.correction_rad, self._q_of_filters(), mag_ut)
 
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""
@@ -211,7 +254,7 @@ class Estimator:
 
     def _oriented(self, rate_rad_s: Array) -> Array:
         """The filters' orientations brought forward over the delay of the gyro's low-pass, (N, 4)."""
-        q = multiply(self._heading.turn, self._bank.q_world_from_sensor())
+        q = multiply(self._heading.turn, self._q_of_filters())
         return multiply(q, from_rotation_vector(self._advance_s * rate_rad_s))
 
     def snapshot(self) -> object:

@@ -22,11 +22,26 @@ class HeadingMemory:
         """Keep the orientations (N, 4), as the filters give them, of nodes that were trusted until now."""
         self._held[nodes] = multiply(self.turn[nodes], q_world_from_sensor[nodes])
 
-    def find(self, nodes: Mask, q_world_from_sensor: Array) -> None:
-        """Turn the restarted nodes (six-axis only) so that their heading goes on from the one held."""
-        back = nodes & np.isfinite(self._held[:, 0])
+    def find(self, nodes: Mask, q_world_from_sensor: Array, mag_ut: Array) -> None:
+        """Turn the restarted nodes so that their heading goes on from the one held.
+
+        Only those without a magnetometer, whose field (N, 3) is NaN.
+        """
+        back = nodes & np.isfinite(self._held[:, 0]) & np.isnan(mag_ut[:, 0])
         between = multiply(self._held[back], conjugate(q_world_from_sensor[back]))
         self.turn[back] = heading_turn(heading_rad(between))
+
+    def stand(self, nodes: Mask, correction_rad: Array, q_world_from_sensor: Array, mag_ut: Array) -> None:
+        """Turn those of the nodes without a magnetometer by what a stance gives, (N,)."""
+        six_axis = nodes & np.isnan(mag_ut[:, 0])
+        self.turn[six_axis] = multiply(heading_turn(correction_rad[six_axis]), self.turn[six_axis])
+
+    def due(self) -> bool:
+        """Never: nothing is corrected from tick to tick."""
+        return False
+
+    def correct(self, q_world_from_sensor: Array, mag_ut: Array, mounting: Array, usable: Mask) -> None:
+        """Nothing."""
 
     def snapshot(self) -> object:
         """The state, to be given to `restore`."""

@@ -7,6 +7,7 @@ from master.fuse.heading import HeadingMemory
 from master.fuse.stance import Stance
 
 SAME = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
+NO_FIELD = np.full((3, 3), np.nan)
 ALL = np.ones(3, dtype=np.bool_)
 MOUNTED = Rotation.random(3, rng=0).as_quat(scalar_first=True)
 
@@ -82,12 +83,12 @@ def test_a_lost_heading_is_taken_up_again() -> None:
     memory.lose(np.array([True, True, False]), held)
     # the restarted filters know the inclination, and some heading of their own
     restarted = multiply(heading_turn(np.array([1.0, 1.0, 1.0])), held)
-    memory.find(ALL, restarted)
+    memory.find(ALL, restarted, NO_FIELD)
     back = angle_between(multiply(memory.turn, restarted), held)
     assert np.allclose(back, [0.0, 0.0, 1.0], atol=1e-7)
     # and once more, from what was held with the turn
     memory.lose(ALL, restarted)
-    memory.find(ALL, held)
+    memory.find(ALL, held, NO_FIELD)
     assert np.allclose(angle_between(multiply(memory.turn, held), held)[:2], 0.0, atol=1e-7)
 
 
@@ -95,7 +96,7 @@ def test_heading_memory_goes_on_from_a_snapshot() -> None:
     memory = HeadingMemory(3)
     snapshot = memory.snapshot()
     memory.lose(ALL, heading_turn(np.ones(3)))
-    memory.find(ALL, SAME)
+    memory.find(ALL, SAME, NO_FIELD)
     assert not np.allclose(memory.turn, SAME)
     memory.restore(snapshot)
     assert np.array_equal(memory.turn, SAME)

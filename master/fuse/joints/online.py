@@ -1,0 +1,160 @@
+"""The suit's headings online: gyros for the short term, joints and magnetometers for the long."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from common.config import Section
+from common.messages import Mask
+from common.quaternion import Array, conjugate, heading_rad, heading_turn, multiply, rotate
+from common.skeleton import Skeleton
+from master.fuse.joints.constraints import JointConstraints
+from master.fuse.joints.field import MagneticHeadings
+from master.fuse.joints.headings import Headings
+
+_EVERY = 16
+"""Ticks from one correction to the next."""
+_LARGEST = 3.0
+"""Standard deviations beyond which a joint's error counts no more than in proportion (Huber)."""
+
+
+class OnlineConfig(Section):
+    """`[estimation.online]`: what is believed of joints, magnetometers and gyros.
+
+    Joints and fields err for a while, not at random from one tick to the next: each comes with the time for
+    which it keeps its error, and counts as one measurement in twice that time.
+    """
+
+    joint_sd_deg: float = Field(default=2.0, gt=0.0, le=90.0, allow_inf_nan=False)
+    """How far a joint turns about an axis about which it should not, degrees: mounting, skin, anatomy.
+    Larger: joints correct more slowly, and wrong ones do less harm."""
+    joint_memory_s: float = Field(default=1.0, gt=0.0, allow_inf_nan=False)
+    """For how long it keeps that error, s."""
+    magnetic_sd_deg: float = Field(default=1.5, gt=0.0, le=90.0, allow_inf_nan=False)
+    """How far an undisturbed magnetometer's north is off, degrees. Larger: magnetometers count for less."""
+    magnetic_memory_s: float = Field(default=10.0, gt=0.0, allow_inf_nan=False)
+    """For how long it keeps that error, s."""
+    disturbance_memory_s: float = Field(default=30.0, gt=0.0, allow_inf_nan=False)
+    """Time constant with which a disturbance of the field is forgotten, s."""
+    drift_deg_sqrt_s: float = Field(default=0.3, gt=0.0, allow_inf_nan=False)
+    """Random walk of a gyro's heading: degrees after a second, ten times that after a hundred. Larger: joints
+    and magnetometers correct faster, and disturb more."""
+    start_sd_deg: float = Field(default=10.0, gt=0.0, le=180.0, allow_inf_nan=False)
+    """Of the heading with which a node begins, by its magnetometer or as it was when it was lost."""
+    stance_sd_deg: float = Field(default=2.0, gt=0.0, le=90.0, allow_inf_nan=False)
+    """Of the heading that a stance gives."""
+
+
+class OnlineHeadings:
+    """One heading correction for each of N nodes, on top of their filters without magnetometer.
+
+    Each 16th tick the joints' constraints and the magnetometers correct all headings together. Where joints
+    tell enough, magnetic disturbances do not come in; where they do not (ball joints, axes that stand
+    upright), the gyros carry the heading over a disturbance for as long as they can.
+    """
+
+    def __init__(self, config: OnlineConfig, skeleton: Skeleton, rate_hz: float) -> None:
+        count = len(skeleton.segments)
+        self._config = config
+        self._rate_hz = rate_hz
+        self._joints = JointConstraints(skeleton)
+        self._rows = np.arange(len(self._joints))
+        self._field = MagneticHeadings(count, config.disturbance_memory_s)
+        self._start = math.radians(config.start_sd_deg) ** 2
+        self._headings = Headings(np.full(count, self._start))
+        self._held = np.full((count, 4), np.nan)
+        self._ticks = 0
+        self.turn: Array = heading_turn(np.zeros(count))
+        """(N, 4) the corrections as rotations of the world."""
+
+    def lose(self, nodes: Mask, q_inertial_from_sensor: Array) -> None:
+        """Keep the orientations (N, 4), as the filters give them, of nodes that were trusted until now."""
+        self._held[nodes] = multiply(self.turn[nodes], q_inertial_from_sensor[nodes])
+
+    def find(self, nodes: Mask, q_inertial_from_sensor: Array, mag_ut: Array) -> None:
+        """Begin with nodes that have settled: by their magnetometer, else by the heading they had."""
+        theta = self._field.direction(rotate(q_inertial_from_sensor, mag_ut))
+        before = heading_rad(multiply(self._held, conjugate(q_inertial_from_sensor)))
+        theta = np.where(np.isfinite(theta), theta, np.nan_to_num(before))
+        self._field.restart(nodes)
+        self._headings.set(nodes, theta, np.full(len(theta), self._start))
+        self._turn()
+
+    def stand(self, nodes: Mask, correction_rad: Array, q_inertial_from_sensor: Array, mag_ut: Array) -> None:
+        """Take the headings that a stance gives some nodes: by `correction_rad` (N,) from those so far."""
+        theta = self._headings.theta_rad + np.where(nodes, correction_rad, 0.0)
+        variance = np.full(len(theta), math.radians(self._config.stance_sd_deg) ** 2)
+        self._headings.set(nodes, theta, variance)
+        self._field.set_north(nodes, theta, rotate(q_inertial_from_sensor, mag_ut))
+        self._turn()
+
+    def due(self) -> bool:
+        """One tick passes; True where it is time to correct."""
+        self._ticks += 1
+        return self._ticks % _EVERY == 0
+
+    def correct(self, q_inertial_from_sensor: Array, mag_ut: Array, mounting: Array, usable: Mask) -> None:
+        """Takes the filters' orientations (N, 4), calibrated fields (N, 3), `q_sensor_from_segment` (N, 4).
+
+        Nodes that are not `usable` (N,) neither correct nor are corrected.
+        """
+        config, headings = self._config, self._headings
+        dt_s = _EVERY / self._rate_hz
+        headings.drift(np.full(len(usable), math.radians(config.drift_deg_sqrt_s) ** 2 * dt_s))
+        information, gain = self._from_field(rotate(q_inertial_from_sensor, mag_ut), usable, dt_s)
+        if len(self._joints):
+            q = multiply(multiply(self.turn, q_inertial_from_sensor), mounting)
+            of_joints, gain_of_joints = self._from_joints(q, usable, dt_s)
+            information += of_joints
+            gain += gain_of_joints
+        headings.correct(information, gain)
+        self._turn()
+
+    def _from_field(self, mag_world_ut: Array, usable: Mask, dt_s: float) -> tuple[Array, Array]:
+        """Information (N, N) and gain (N,) of the magnetometers."""
+        config, headings = self._config, self._headings
+        field = np.where(usable[:, None], mag_world_ut, np.nan)
+        away, disturbed = self._field.measure(field, headings.theta_rad, headings.variance, dt_s)
+        share = dt_s / (2.0 * config.magnetic_memory_s)
+        weight = share / (math.radians(config.magnetic_sd_deg) ** 2 + disturbed)
+        return np.diag(weight), weight * away
+
+    def _from_joints(self, q_world_from_segment: Array, usable: Mask, dt_s: float) -> tuple[Array, Array]:
+        """Information (N, N) and gain (N,) of the joints."""
+        config, joints, rows = self._config, self._joints, self._rows
+        error, slope = joints.measure(q_world_from_segment)
+        variance = math.radians(config.joint_sd_deg) ** 2
+        foretold = variance + slope**2 * self._headings.variance_between(joints.child, joints.parent)
+        trust = np.minimum(1.0, _LARGEST * np.sqrt(foretold) / np.maximum(np.abs(error), 1e-12))
+        trust[~(usable[joints.child] & usable[joints.parent])] = 0.0
+        weight = trust * (dt_s / (2.0 * config.joint_memory_s) / variance)
+        matrix = np.zeros((len(joints), len(usable)))
+        matrix[rows, joints.child] = slope
+        matrix[rows, joints.parent] = -slope
+        weighted = matrix.T * weight
+        return weighted @ matrix, -(weighted @ error)
+
+    def _turn(self) -> None:
+        self.turn = heading_turn(self._headings.theta_rad)
+
+    @property
+    def sd_rad(self) -> Array:
+        """(N,) standard deviation of each heading."""
+        return np.sqrt(self._headings.variance)
+
+    def snapshot(self) -> object:
+        """The state, to be given to `restore`."""
+        return self._field.snapshot(), self._headings.snapshot(), self._held.copy(), self._ticks
+
+    def restore(self, snapshot: object) -> None:
+        """Go on from a snapshot."""
+        if not isinstance(snapshot, tuple):
+            raise TypeError("not a snapshot of these headings")
+        field, headings, held, self._ticks = snapshot
+        self._field.restore(field)
+        self._headings.restore(headings)
+        self._held = held.copy()
+        self._turn()
