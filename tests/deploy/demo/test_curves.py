@@ -165,6 +165,14 @@ def test_a_gap_stays_empty_and_colours_tell_the_curves_apart() -> None:
     assert {span.style for span in text.spans} >= {"cyan", "magenta"}
 
 
+def test_what_comes_after_a_gap_is_not_joined_to_what_was_before() -> None:
+    step = np.r_[np.zeros(100), np.full(100, np.nan), np.full(100, 50.0)]
+    found = dots(plot([step], columns=30, rows=4, unit=""))
+    assert not any(any(row) for row in found[1:3])
+    joined = dots(plot([np.r_[np.zeros(150), np.full(150, 50.0)]], columns=30, rows=4, unit=""))
+    assert all(any(row) for row in joined)
+
+
 def test_the_extremes_are_written_and_zero_has_no_sign() -> None:
     lines = plot([np.linspace(-0.4, 123.4, 50)], columns=5, rows=3, unit="°").plain.split("\n")
     assert (lines[0][:7], lines[2][:7]) == ("  123° ", "    0° ")
