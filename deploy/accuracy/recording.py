@@ -82,11 +82,11 @@ def _arrays(path: Path) -> dict[str, NDArray[np.generic]]:
     if not path.exists():
         raise TandemError(f"{path}: there is no such file (and no such command: see tandem accuracy --help)")
     try:
-        found = np.load(path, allow_pickle=False)
-        if isinstance(found, np.ndarray):
-            raise _refusal(path, "is one array (npy), not an npz: save it by np.savez(gyr=…, acc=…, …)")
-        with found as archive:
-            return {key: archive[key] for key in archive}
+        with path.open("rb") as file:  # np.load by path leaves a broken archive open
+            found = np.load(file, allow_pickle=False)
+            if isinstance(found, np.ndarray):
+                raise _refusal(path, "is one array (npy), not an npz: save it by np.savez(gyr=…, acc=…, …)")
+            return {key: found[key] for key in found}
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise _refusal(path, "cannot be read as npz: save it again by np.savez, of plain numbers") from error
 
