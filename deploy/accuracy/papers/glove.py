@@ -12,13 +12,14 @@ from common.quaternion import Array, conjugate, multiply, to_matrix
 from common.skeleton import Segment, Skeleton
 from deploy.accuracy.papers.figures import Figure
 from deploy.accuracy.papers.fixture import Take, Wave, Waves, free_joint, record, ticks, turntable
-from deploy.accuracy.papers.units import calibrate
+from deploy.accuracy.papers.units import SESSION, calibrate
 from master.calibrate.affine import Calibration, identity
 from master.fuse.estimator import EstimationConfig, Estimator
 from master.solve.angles import intrinsic_angles
 from master.solve.solver import JointSolver
 from master.suit.simulated.imperfections import Imperfections
 from master.suit.simulated.minimum_jerk import MinimumJerkMotion, Move
+from master.suit.simulated.tray import TrayConfig
 
 FILTERS = ("ekf", "vqf")
 """The paper's and our default."""
@@ -40,10 +41,12 @@ class _Node:
     calibration: None = None
 
 
-def experiment(seed: int, hold_s: float = 10.0, moved_s: float = 60.0) -> list[Figure]:
+def experiment(
+    seed: int, hold_s: float = 10.0, moved_s: float = 60.0, session: TrayConfig = SESSION
+) -> list[Figure]:
     """The paper's section 4 with two units as delivered, calibrated by a session of their own."""
     units = Imperfections("raw", 2, seed)
-    calibrated = calibrate(units, 2, [0, 1], seed)
+    calibrated = calibrate(units, 2, [0, 1], seed, session)
     spread = tuple(100.0 * m.hold_out_spread_ut / m.fit.field_ut for m in calibrated.magnetic)
     found = [Figure("ellipsoid, hold-out spread", "%", spread, None, SPREAD_TARGET_PERCENT)]
     still, rows = held(units, hold_s)
@@ -134,10 +137,10 @@ def moving_figures(take: Take, q: Array) -> list[Figure]:
     """Roll, pitch and yaw of both units against the truth, and by how much they are late."""
     after = round(SETTLED_S * RATE_HZ)
     truth = take.q_world_from_segment[after:, 0]
-    true_deg = _euler_deg(truth)
+    true_deg = euler_deg(truth)
     rmse, most = [], []
     for unit in range(q.shape[1]):
-        error_deg = _euler_deg(q[after:, unit]) - true_deg
+        error_deg = euler_deg(q[after:, unit]) - true_deg
         error_deg = (error_deg + 180.0) % 360.0 - 180.0
         rmse.extend(np.sqrt(np.mean(error_deg**2, axis=0)).tolist())
         most.extend(np.abs(error_deg).max(axis=0).tolist())
@@ -166,7 +169,7 @@ def _between(p: Array, q: Array) -> Array:
     return out
 
 
-def _euler_deg(q: Array) -> Array:
+def euler_deg(q: Array) -> Array:
     """Yaw, pitch and roll (T, 3), intrinsic z-y-x."""
     # x-y-z of the inverse, its signs turned, is z-y-x
     roll, pitch, yaw = intrinsic_angles(to_matrix(conjugate(q)))

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from common.skeleton import load_skeleton
 from deploy.accuracy.papers.figures import Figure
-from deploy.accuracy.papers.units import calibrate
+from deploy.accuracy.papers.units import SESSION, calibrate
 from deploy.judge import Accuracy, accuracy
 from deploy.judge.accuracy import SIDES
 from deploy.judge.paper import ETA_PERCENT, TABLE_1
 from deploy.virtual import VirtualRun, World
 from master.suit.simulated.imperfections import Imperfections
+from master.suit.simulated.tray import TrayConfig
 
 ETA_TARGET_PERCENT = 1.0
 ARMS = ("chest", "left_upper_arm", "left_forearm", "right_upper_arm", "right_forearm")
@@ -34,12 +35,12 @@ def whole_way(
     return judge(accuracy(run.trace.truth(), run.trace.solved(), run.trace.joint_names))
 
 
-def own_calibration(seed: int, seconds: float = SECONDS) -> list[Figure]:
+def own_calibration(seed: int, seconds: float = SECONDS, session: TrayConfig = SESSION) -> list[Figure]:
     """The same with units as delivered, calibrated by a session of their own and put on in the zero pose."""
     names = load_skeleton("nursing").segment_names
     chosen = [names.index(name) for name in ARMS]
     units = Imperfections("raw", len(names), seed)
-    affine = calibrate(units, len(names), chosen, seed).calibration.affine
+    affine = calibrate(units, len(names), chosen, seed, session).calibration.affine
     with tempfile.TemporaryDirectory() as folder:
         master = [f"estimation.stance_s={STANCE_S}"]
         for name, unit in zip(ARMS, chosen, strict=True):

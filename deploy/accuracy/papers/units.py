@@ -22,6 +22,8 @@ from master.suit.simulated.tray import Tray, TrayConfig
 
 RATE_HZ = 50.0
 """Enough for turns by hand."""
+SHORT_SESSION = TrayConfig(attitudes=20, still_s=2.5, tumble_s=60.0)
+"""For whoever cannot wait."""
 SESSION = TrayConfig(attitudes=26, still_s=10.0, tumble_s=180.0)
 
 
@@ -33,12 +35,14 @@ class Calibrated:
     magnetic: tuple[MagneticCalibration, ...]
 
 
-def calibrate(units: Imperfections, places: int, chosen: list[int], seed: int) -> Calibrated:
+def calibrate(
+    units: Imperfections, places: int, chosen: list[int], seed: int, handled: TrayConfig = SESSION
+) -> Calibrated:
     """Calibrate the `chosen` of the `places` units in the tray; the others keep their raw readings.
 
     Raises RecordingError where the session does not determine a unit.
     """
-    samples, tumbling = session(units, places, chosen, seed)
+    samples, tumbling = session(units, places, chosen, seed, handled)
     affine = np.tile(np.eye(3, 4), (3, places, 1, 1))
     magnetic = []
     for unit, (acc, gyr, mag) in zip(chosen, samples.transpose(2, 1, 0, 3), strict=True):
@@ -64,14 +68,16 @@ def apply_map(affine: Array, readings: Array) -> Array:
     return out
 
 
-def session(units: Imperfections, places: int, chosen: list[int], seed: int) -> tuple[Array, slice]:
+def session(
+    units: Imperfections, places: int, chosen: list[int], seed: int, handled: TrayConfig = SESSION
+) -> tuple[Array, slice]:
     """Samples (T, 3, len(chosen), 3) of a session, and the rows in which the tray is tumbled about."""
-    tray = Tray(SESSION, places, seed)
+    tray = Tray(handled, places, seed)
     times_s = np.arange(0.0, tray.period_s, 1.0 / RATE_HZ)
     samples = [
         # a part at a time: all units' readings at once would take hundreds of MB
         read_by(units, np.array([tray.readings(t, FIELD_UT) for t in some.tolist()]))[:, :, chosen]
         for some in np.array_split(times_s, 20)
     ]
-    tumbling = slice(round((tray.period_s - SESSION.tumble_s) * RATE_HZ), None)
+    tumbling = slice(round((tray.period_s - handled.tumble_s) * RATE_HZ), None)
     return np.concatenate(samples), tumbling
