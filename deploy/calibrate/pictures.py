@@ -45,6 +45,9 @@ def draw_magnetic(found: MagneticCalibration, path: Path) -> None:
     step = max(1, len(found.readings_ut) // _POINTS)
     raw = found.readings_ut[::step]
     after = (raw - found.fit.centre) @ found.fit.shape
+    strengths = np.linalg.norm(np.concatenate([raw, after]), axis=1)
+    margin = 0.01 * found.fit.field_ut
+    bins = np.linspace(strengths.min() - margin, strengths.max() + margin, 80)
     circle = np.linspace(0.0, 2.0 * np.pi, 200)
     for row, points, title in ((grid[0], raw, "before"), (grid[1], after, "after")):
         for axes, (i, j) in zip(row, ((0, 1), (0, 2), (1, 2)), strict=False):
@@ -56,7 +59,7 @@ def draw_magnetic(found: MagneticCalibration, path: Path) -> None:
             axes.set_aspect("equal", adjustable="datalim")
             axes.set_title(f"{title}: {'xyz'[j]} over {'xyz'[i]}, µT", fontsize=9)
             axes.grid(alpha=0.3)
-        row[3].hist(np.linalg.norm(points, axis=1), bins=60)
+        row[3].hist(np.linalg.norm(points, axis=1), bins=bins)
         row[3].axvline(found.fit.field_ut, color="k", linewidth=0.8)
         row[3].set_title(f"{title}: strength, µT", fontsize=9)
     figure.suptitle(found.name)

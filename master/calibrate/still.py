@@ -50,7 +50,8 @@ def still_intervals(level: Array, limit: float, rate_hz: float, shortest_s: floa
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (level < limit).astype(np.int8), [0]])))
     found = edges.reshape(-1, 2)
-    long_enough = found[:, 1] - found[:, 0] >= shortest_s * rate_hz
+    # a rest is longer by a window than what lies below the limit
+    long_enough = found[:, 1] - found[:, 0] >= (shortest_s - WINDOW_S) * rate_hz
     half = round(0.5 * WINDOW_S * rate_hz)
     cut = found[long_enough] + np.array([half, -half])
     out: Intervals = cut[cut[:, 1] - cut[:, 0] >= 2]

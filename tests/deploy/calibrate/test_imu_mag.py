@@ -1,0 +1,121 @@
+"""`tandem calibrate imu` and `mag`: what a person types, and the files that come of it."""
+
+import json
+import shlex
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from common.config import load_config
+from common.errors import TandemError
+from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate
+from deploy import cli
+from master.calibrate.affine import NodeCalibration
+
+RATE_HZ = 50.0
+BIAS: Array = np.array([0.3, -0.2, 0.1])
+
+
+def session() -> dict[str, Array]:
+    """Sixteen rests of 2.4 s with even turns of 1 s between them, and noise."""
+    rng = np.random.default_rng(4)
+    q, rows, rates = np.array([1.0, 0.0, 0.0, 0.0]), [], []
+    for _ in range(16):
+        turn = rng.normal(size=3)
+        for angle, rate in ((np.zeros(120), np.zeros(3)), (np.arange(50) / 50, turn)):
+            rows.append(multiply(q, from_rotation_vector(angle[:, None] * turn)))
+            rates.append(np.tile(rate, (len(angle), 1)))
+        q = multiply(q, from_rotation_vector(turn))
+    acc = rotate(conjugate(np.concatenate(rows)), np.array([0.0, 0.0, 9.80665])) - BIAS
+    noise = rng.normal(scale=2e-3, size=(2, len(acc), 3))
+    return {"acc": acc + 10 * noise[0], "gyr": np.concatenate(rates) - 0.1 * BIAS + noise[1]}
+
+
+def sphere() -> Array:
+    v = np.random.default_rng(0).normal(size=(6000, 3))
+    out: Array = 48.0 * v / np.linalg.norm(v, axis=1, keepdims=True) + 20.0 * BIAS
+    return out
+
+
+def run(line: str) -> str:
+    """What it prints; errors pass."""
+    result = CliRunner().invoke(cli.app, shlex.split(line), catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+@pytest.fixture(scope="module")
+def suit(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One sound node, and one whose gyro is broken."""
+    path = tmp_path_factory.mktemp("suit") / "session.npz"
+    s = session()
+    time = np.arange(len(s["acc"])) / RATE_HZ
+    np.savez(path, t_s=time, head_acc=s["acc"], head_gyr=s["gyr"], hip_acc=s["acc"], hip_gyr=0 * s["gyr"])
+    return path
+
+
+def test_imu_writes_file_picture_table_and_report(suit: Path, tmp_path: Path) -> None:
+    said = run(f"calibrate imu {suit} --node head --out {tmp_path}/new/out --report {tmp_path}/r.json")
+    assert "head" in said
+    assert "15 moves" in said
+    node = load_config(tmp_path / "new" / "out" / "head.toml", NodeCalibration)
+    assert np.allclose(np.array(node.accelerometer)[:, 3], BIAS, atol=0.02)
+    assert node.made.accelerometer is not None
+    assert node.made.gyroscope is not None
+    assert node.made.accelerometer.recording == "session.npz"
+    assert node.made.accelerometer.date == date.today()
+    assert (tmp_path / "new" / "out" / "head_imu.png").read_bytes().startswith(b"\x89PNG")
+    figures = json.loads((tmp_path / "r.json").read_text())
+    assert figures["nodes"]["head"]["still_intervals"] == 16
+    assert figures["nodes"]["head"]["accelerometer"]["residual_after"] < 0.01
+    assert figures["refused"] == {}
+
+
+def test_a_refused_node_does_not_cost_the_others(suit: Path, tmp_path: Path) -> None:
+    with pytest.raises(TandemError, match=r"session\.npz: hip: the gyroscope reads the same all along"):
+        run(f"calibrate imu {suit} --out {tmp_path}")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["head.toml", "head_imu.png"]
+
+
+def test_mag_adds_to_the_file_that_is_there(suit: Path, tmp_path: Path) -> None:
+    mag = sphere()
+    np.savez(tmp_path / "head.npz", acc=0 * mag, gyr=0 * mag, mag=mag, rate_hz=50.0)
+    (tmp_path / "head.toml").write_text("# worn on the left\nq_sensor_from_segment = [0.6, 0.8, 0.0, 0.0]\n")
+    figures = json.loads(run(f"calibrate mag {tmp_path}/head.npz --out {tmp_path} --json"))
+    assert figures["nodes"]["head"]["field_ut"] == pytest.approx(48.0)
+    assert figures["nodes"]["head"]["coverage"] > 0.9
+    node = load_config(tmp_path / "head.toml", NodeCalibration)
+    assert np.allclose(np.array(node.magnetometer)[:, 3], -20.0 * BIAS, atol=1e-6)
+    assert node.q_sensor_from_segment == [0.6, 0.8, 0.0, 0.0]
+    assert "# worn on the left" in (tmp_path / "head.toml").read_text()
+    assert (tmp_path / "head_mag.png").read_bytes().startswith(b"\x89PNG")
+
+
+Line = Callable[[Path], str]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (lambda suit: f"calibrate imu {suit} --node tail", r"has no node tail; it has head, hip"),
+        (lambda suit: f"calibrate imu {suit}.npz", "no such file"),
+        (lambda suit: f"calibrate mag {suit} --node head", "no magnetometer"),
+        (lambda suit: f"calibrate mag {suit} --out {suit}", "cannot be made"),
+    ],
+)
+def test_mistakes_are_one_clear_line(
+    suit: Path, line: Line, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(TandemError, match=message) as refused:
+        run(line(suit))
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("command", ["imu", "mag"])
+def test_help_has_an_example(command: str) -> None:
+    assert f"Example: tandem calibrate {command} " in run(f"calibrate {command} --help").replace("`", "")
