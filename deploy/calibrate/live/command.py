@@ -25,8 +25,12 @@ def live(
     still_s: Annotated[float, typer.Option(help="How long to rest in an attitude, s.", min=1.0)] = 3.0,
     attitudes: Annotated[int, typer.Option(help="How many attitudes to rest in.", min=12, max=100)] = 20,
     tumble_s: Annotated[float, typer.Option(help="Shortest time to turn about freely, s.", min=0.0)] = 30.0,
+    coverage: Annotated[
+        float, typer.Option(help="Share of all directions a magnetometer is to see.", min=0.5, max=0.95)
+    ] = 0.85,
     limber_s: Annotated[float, typer.Option(help="How long every joint is to move, s.", min=2.0)] = 20.0,
     gravity: Annotated[float, typer.Option(help="m/s² where you are.", min=9.7, max=9.9)] = 9.80665,
+    pictures: Annotated[bool, typer.Option(help="Draw every node before and after.")] = True,
     report: ReportFile = None,
     as_json: AsJson = False,
     set_: Annotated[
@@ -73,7 +77,7 @@ def live(
             f"stopped before the end; recorded so far: {kept}. "
             "`tandem calibrate imu`, `mag` and `mount` can read it"
         )
-    figures, refusals = compute(checked, session, Choice(wanted, gravity, still_s), out, console)
+    figures, refusals = compute(checked, session, Choice(wanted, gravity, still_s, pictures), out, console)
     tell_machines(figures, report, to_stdout=as_json)
     if refusals:
         raise TandemError("\n".join(refusals))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import Progress, track
 
 from common.errors import TandemError
 from deploy.calibrate import session as sessions
@@ -27,6 +27,8 @@ from master.calibrate.mounting_files import calibrated, write_mounting
 from master.calibrate.recording import NodeRecording, load_recordings
 from master.config import MasterConfig
 
+Node = TypeVar("Node")
+
 
 @dataclass(frozen=True, slots=True)
 class Choice:
@@ -35,6 +37,8 @@ class Choice:
     what: tuple[What, ...]
     gravity_m_s2: float
     still_s: float
+    pictures: bool = True
+    """Draw each node before and after: a second or more a node."""
 
 
 def compute(
@@ -49,9 +53,9 @@ def compute(
         if "imu" in choice.what:
             figures["imu"] = _imu(session.tray, choice, folder, day, console, refusals)
         if "mag" in choice.what:
-            figures["mag"] = _mag(config, session.tray, folder, day, console, refusals)
+            figures["mag"] = _mag(config, session.tray, choice, folder, day, console, refusals)
     if session.worn is not None:
-        figures["mount"] = _mount(config, session, folder, day, console, refusals)
+        figures["mount"] = _mount(config, session, choice, folder, day, console, refusals)
     written = sorted(path.stem for path in folder.glob("*.toml") if path.stem in config.nodes)
     if written:
         console.print("To use them, name each in the master's file, as in")
@@ -82,8 +86,9 @@ def _imu(
 
     found = sessions.calibrate_nodes(path, [], calibrate, console)
     written = sessions.write_nodes(found, path, folder, day)
-    for name, node in found.found.items():
-        draw_inertial(node, folder / f"{name}_imu.png")
+    if choice.pictures:
+        for name, node in _with_progress(found.found, console):
+            draw_inertial(node, folder / f"{name}_imu.png")
     if found.found:
         console.print(inertial_table(found.found))
         notes(found.found, written, console)
@@ -92,7 +97,13 @@ def _imu(
 
 
 def _mag(
-    config: MasterConfig, path: Path, folder: Path, day: date, console: Console, refusals: list[str]
+    config: MasterConfig,
+    path: Path,
+    choice: Choice,
+    folder: Path,
+    day: date,
+    console: Console,
+    refusals: list[str],
 ) -> dict[str, Any]:
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
         return calibrate_magnetic(raw)
@@ -102,8 +113,9 @@ def _mag(
         return {}
     found = sessions.calibrate_nodes(path, magnetic, calibrate, console)
     written = sessions.write_nodes(found, path, folder, day)
-    for name, node in found.found.items():
-        draw_magnetic(node, folder / f"{name}_mag.png")
+    if choice.pictures:
+        for name, node in _with_progress(found.found, console):
+            draw_magnetic(node, folder / f"{name}_mag.png")
     if found.found:
         console.print(magnetic_table(found.found))
         notes(found.found, written, console)
@@ -111,8 +123,18 @@ def _mag(
     return sessions.report(found, path, day, lambda node: {"coverage": node.coverage})
 
 
+def _with_progress(found: Mapping[str, Node], console: Console) -> Iterator[tuple[str, Node]]:
+    yield from track(found.items(), "pictures", console=console, transient=True)
+
+
 def _mount(
-    config: MasterConfig, session: Session, folder: Path, day: date, console: Console, refusals: list[str]
+    config: MasterConfig,
+    session: Session,
+    choice: Choice,
+    folder: Path,
+    day: date,
+    console: Console,
+    refusals: list[str],
 ) -> dict[str, Any]:
     assert session.worn is not None
     try:
@@ -129,7 +151,8 @@ def _mount(
         refusals.append(f"mount: {error}")
         return {"refused": {"": str(error)}}
     write_mounting(mounting, session.worn, folder, day)
-    draw_angles(nodes, config.skeleton, mounting, folder / "mounting.png")
+    if choice.pictures:
+        draw_angles(nodes, config.skeleton, mounting, folder / "mounting.png")
     console.print(nodes_table(mounting), joints_table(mounting))
     refusals += [f"mount: {name}: {why}" for name, why in mounting.refused.items()]
     return as_report(mounting, session.worn)

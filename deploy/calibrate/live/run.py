@@ -59,6 +59,7 @@ class LiveSession:
         self._recorder: Recorder | None = None
         self._recorders: list[Recorder] = []
         self._ticks = 0
+        self._said_s = -_LOG_S
         self.session = Session()
 
     async def run(self, stop: asyncio.Event) -> None:
@@ -78,16 +79,18 @@ class LiveSession:
     def on_sweep(self, sweep: Sweep) -> None:
         """Take one tick of the suit, and record it."""
         self._ticks += 1
-        self._block.append(shared.readings(sweep))
-        if self._recorder is not None:
-            shared.record(self._recorder, sweep)
+        block, recorder = self._block, self._recorder
+        block.append(shared.readings(sweep))
+        if recorder is not None:
+            shared.record(recorder, sweep)
 
     def take(self) -> View:
         """Give the guide what has come; what the person is to do now."""
-        if self._block:
-            block, self._block = np.stack(self._block), []
+        # off the loop: a tick that comes in this very moment may miss the guide, never the recording
+        block, self._block = self._block, []
+        if block:
             before = self._guide.step
-            self._guide.add(block)
+            self._guide.add(np.stack(block))
             if self._guide.step != before:
                 self._switch(self._guide.step)
         return self._guide.view()
@@ -121,22 +124,30 @@ class LiveSession:
         interactive = self._console.is_terminal and sys.stdin.isatty()
         if interactive:
             loop.add_reader(sys.stdin.fileno(), self._on_key)
-        said_s = -_LOG_S
         try:
             with Live(console=self._console, auto_refresh=False, transient=True) as live:
                 while self._guide.step != "done":
                     await asyncio.sleep(_SHOW_S)
-                    before = self._guide.step
-                    view = self.take()
-                    now_s = self._ticks / self._config.capture.rate_hz
-                    if self._console.is_terminal:
-                        live.update(screen(view, self._names, now_s), refresh=True)
-                    elif view.step != before or now_s >= said_s + _LOG_S:
-                        said_s = now_s
-                        self._log(view, now_s)
+                    # off the loop: drawing takes longer than a tick
+                    showing = asyncio.ensure_future(asyncio.to_thread(self._show, live))
+                    try:
+                        await asyncio.shield(showing)
+                    except asyncio.CancelledError:
+                        await showing
+                        raise
         finally:
             if interactive:
                 loop.remove_reader(sys.stdin.fileno())
+
+    def _show(self, live: Live) -> None:
+        before = self._guide.step
+        view = self.take()
+        now_s = self._ticks / self._config.capture.rate_hz
+        if self._console.is_terminal:
+            live.update(screen(view, self._names, now_s), refresh=True)
+        elif view.step != before or now_s >= self._said_s + _LOG_S:
+            self._said_s = now_s
+            self._log(view, now_s)
 
     def _log(self, view: View, now_s: float) -> None:
         self._console.print(line(view, self._names, now_s), highlight=False, soft_wrap=True, markup=False)

@@ -96,7 +96,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
             break
     led.end()
     figures, refusals = compute(
-        config, led.session, Choice(OPTIONS.what, 9.80665, OPTIONS.still_s), folder, console
+        config, led.session, Choice(OPTIONS.what, 9.80665, OPTIONS.still_s, pictures=False), folder, console
     )
     units = Imperfections("raw", len(names), SEED)
     q = np.array([mounting[name] for name in names])
@@ -179,9 +179,6 @@ def test_every_part_says_how_it_came_about(done: Done) -> None:
         assert "mounting" not in made or made["mounting"]["recording"] == "worn.mcap"
         for sensor in ("accelerometer", "gyroscope", "magnetometer"):
             assert made[sensor]["residual_after"] < 0.2 * made[sensor]["residual_before"]
-        for picture in ("imu", "mag"):
-            assert (done.folder / f"{name}_{picture}.png").stat().st_size > 1000
-    assert (done.folder / "mounting.png").stat().st_size > 1000
     assert "left_shank" in done.said
 
 
