@@ -174,7 +174,7 @@ def _solve(moves: Moves, start: Array) -> tuple[Array, Array, Array]:
         start.ravel() / scale,
         slope_at,
         method="lm",
-        xtol=1e-8,
+        xtol=1e-6,
         ftol=1e-8,
         gtol=1e-10,
         max_nfev=_MOST_EVALUATIONS,
