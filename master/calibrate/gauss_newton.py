@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
 
-from common.quaternion import Array
+from common.quaternion import Array, cross
 
 State = TypeVar("State")
 
@@ -47,11 +48,12 @@ def gauss_newton(
     damping = _FIRST_DAMPING
     for _ in range(most_steps):
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
+        # keeps the solution finite where the data say nothing of a parameter
+        floor = 1e-12 * (1.0 + float(np.trace(normal)))
         gained = 0.0
         while damping < _MOST_DAMPING:
-            damped = normal + damping * (np.diag(np.diag(normal)) + 1e-12 * np.eye(len(normal)))
-            walk = -np.linalg.lstsq(damped, gradient, rcond=None)[0].astype(np.float64)
-            trial = step(state, walk)
+            damped = normal + np.diag(damping * np.diag(normal) + floor)
+            trial = step(state, np.linalg.solve(damped, -gradient).astype(np.float64))
             residual_there, jacobian_there = linearise(trial)
             cost_there = 0.5 * float(residual_there @ residual_there)
             if cost_there < cost:
@@ -68,17 +70,17 @@ def gauss_newton(
 def tangents(axis: Array) -> Array:
     """Two orthonormal columns (3, 2) that touch the unit sphere at `axis` (3,)."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = np.cross(axis, helper)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first)], axis=-1)
+    first = cross(axis, helper)
+    first /= math.sqrt(first @ first)
+    return np.array([first, cross(axis, first)]).T
 
 
 def along_sphere(axis: Array, x: Array) -> Array:
     """The unit vector ‖x‖ rad from `axis` along its `tangents` times x (2,), on the great circle."""
     way = tangents(axis) @ x
-    angle = float(np.linalg.norm(way))
-    out: Array = np.cos(angle) * axis + np.sinc(angle / np.pi) * way
-    return out / np.linalg.norm(out)
+    angle = math.sqrt(way @ way)
+    out: Array = math.cos(angle) * axis + (math.sin(angle) / angle if angle > 0.0 else 1.0) * way
+    return out / math.sqrt(out @ out)
 
 
 def half_sphere(count: int) -> Array:

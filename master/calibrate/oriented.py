@@ -120,10 +120,12 @@ def bridged(values: Array, name: str, rate_hz: float) -> Array:
 
 
 def _plausible(acc: Array, gyr: Array, name: str) -> None:
-    gravity = float(np.median(np.linalg.norm(acc, axis=1)))
+    # where it turns least: a walking thigh feels a quarter more than gravity most of the time
+    rate = np.linalg.norm(gyr, axis=1)
+    gravity = float(np.median(np.linalg.norm(acc[rate <= np.quantile(rate, 0.1)], axis=1)))
     if not 8.0 < gravity < 12.0:
         raise PoorMotionError(
-            f"{name}: its accelerometer reads {gravity:.2f} m/s² (median); expected about 9.81. "
+            f"{name}: its accelerometer reads {gravity:.2f} m/s² at rest; expected about 9.81. "
             "Calibrate it first (`tandem calibrate imu`)"
         )
     if float(np.max(np.ptp(gyr, axis=0))) == 0.0:

@@ -1,0 +1,327 @@
+"""Mounting: simulated persons with sensors askew, and a real one; no magnetometer anywhere."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.config import load_config
+from common.errors import TandemError
+from common.quaternion import IDENTITY, Array, angle_between, conjugate, from_axis_angle, rotate
+from common.skeleton import Skeleton, load_skeleton
+from master.calibrate.affine import NodeCalibration
+from master.calibrate.hinge import PoorMotionError
+from master.calibrate.hinge_pair import find_hinge_pair
+from master.calibrate.mounting import Mounting, find_mounting, posture, zero_axes
+from master.calibrate.mounting_files import calibrated, write_mounting
+from master.calibrate.oriented import orient
+from master.calibrate.recording import NodeRecording, load_recordings
+from master.fuse.hinge_angle import HingeAngleConfig, hinge_angles
+from master.solve.solver import JointSolver
+from master.suit.simulated.imperfections import Imperfections
+from master.suit.simulated.replay import RECORDED_AS
+from master.suit.simulated.sensors import IdealSensors, earth_field_ut
+
+RATE_HZ = 100.0
+STILL_S, MOVING_S = 3.0, 20.0
+FINGERS = ("thumb", "index", "middle", "ring", "little")
+
+
+@dataclass(frozen=True)
+class Worn:
+    """What a simulated person's units read, and the truth."""
+
+    skeleton: Skeleton
+    nodes: dict[str, NodeRecording]
+    q_segment_from_sensor: dict[str, Array]
+    angles_rad: Array
+    """(T, J)."""
+
+
+def wear(profile: str, seed: int, askew_deg: float = 40.0, moving_s: float = MOVING_S) -> Worn:
+    """Stand in the zero pose, then swing all joints; units of the grade `calibrated`, each askew."""
+    skeleton = load_skeleton(profile)
+    random = np.random.default_rng(seed)
+    lower, upper = np.maximum(skeleton.lower_rad, -1.2), np.minimum(skeleton.upper_rad, 1.6)
+    f, phase = random.uniform(0.25, 0.7, (3, len(lower))), random.uniform(0.0, 2.0 * math.pi, (3, len(lower)))
+
+    def position(t: Array) -> Array:
+        s = np.clip((t - STILL_S) / 1.5, 0.0, 1.0)[:, None]
+        waves = np.sin(2.0 * math.pi * f[:, None] * (t[None, :, None] - STILL_S) + phase[:, None]).mean(
+            axis=0
+        )
+        out: Array = (
+            s**3 * (10.0 - 15.0 * s + 6.0 * s**2) * 0.5 * (lower + upper + 0.8 * (upper - lower) * waves)
+        )
+        return out
+
+    t, h = np.arange(round((STILL_S + moving_s) * RATE_HZ)) / RATE_HZ, 1e-4
+    before, now, after = position(t - h), position(t), position(t + h)
+    count = len(skeleton.segments)
+    axis = random.normal(size=(count, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    mounting = from_axis_angle(axis, np.radians(askew_deg) * random.uniform(0.5, 1.0, count))
+    sensors = IdealSensors(skeleton, earth_field_ut(50.0, 60.0), mounting)
+    flaws = Imperfections("calibrated", count, seed)
+    motion = zip(now, (after - before) / (2.0 * h), (after - 2.0 * now + before) / h**2, strict=True)
+    readings = np.array([flaws.apply(sensors.read(*state)) for state in motion])
+    names = [n for n in skeleton.segment_names if profile == "hand" or not any(x in n for x in FINGERS)]
+    rows = {name: skeleton.segment_names.index(name) for name in names}
+    return Worn(
+        skeleton,
+        {n: NodeRecording(n, RATE_HZ, readings[:, i, :3], readings[:, i, 3:6]) for n, i in rows.items()},
+        {n: mounting[i] for n, i in rows.items()},
+        now,
+    )
+
+
+@pytest.fixture(scope="module")
+def upper_body() -> Worn:
+    return wear("nursing", 0)
+
+
+@pytest.fixture(scope="module")
+def upper_body_mounting(upper_body: Worn) -> Mounting:
+    return find_mounting(upper_body.nodes, upper_body.skeleton)
+
+
+@pytest.fixture(scope="module")
+def legs() -> Worn:
+    return wear("lower_limb", 0)
+
+
+@pytest.fixture(scope="module")
+def legs_mounting(legs: Worn) -> Mounting:
+    return find_mounting(legs.nodes, legs.skeleton)
+
+
+def errors_deg(worn: Worn, found: Mounting) -> dict[str, float]:
+    return {
+        name: math.degrees(
+            float(angle_between(node.q_sensor_from_segment, conjugate(worn.q_segment_from_sensor[name])))
+        )
+        for name, node in found.nodes.items()
+    }
+
+
+def solved_deg(nodes: dict[str, NodeRecording], skeleton: Skeleton, found: Mounting, step: int) -> Array:
+    """Joint angles (K, J), of every `step`-th sample."""
+    q = posture(orient(nodes, list(found.nodes)), found)[::step]
+    everyone = np.tile(IDENTITY, (len(q), len(skeleton.segments), 1))
+    everyone[:, [skeleton.segment_names.index(name) for name in found.nodes]] = q
+    solver, still = JointSolver(skeleton), np.zeros((len(skeleton.segments), 3))
+    return np.degrees([solver.solve(now, still)[0] for now in everyone])
+
+
+def test_every_unit_s_mounting_is_found_within_two_degrees(
+    upper_body: Worn, upper_body_mounting: Mounting
+) -> None:
+    assert upper_body_mounting.refused == {}
+    errors = errors_deg(upper_body, upper_body_mounting)
+    assert set(errors) == set(upper_body.nodes)
+    assert max(errors.values()) < 2.0, errors
+
+
+def test_it_states_its_uncertainty_honestly(upper_body: Worn, upper_body_mounting: Mounting) -> None:
+    for name, error in errors_deg(upper_body, upper_body_mounting).items():
+        assert error < 0.5 + 3.0 * math.degrees(upper_body_mounting.nodes[name].sigma_rad), name
+
+
+def test_the_arms_work_with_sensors_askew_and_no_magnetometer(
+    upper_body: Worn, upper_body_mounting: Mounting
+) -> None:
+    angles = solved_deg(upper_body.nodes, upper_body.skeleton, upper_body_mounting, 5)
+    rmse = np.sqrt(np.mean((angles - np.degrees(upper_body.angles_rad[::5])) ** 2, axis=0))
+    by_name = dict(zip(upper_body.skeleton.joint_names, rmse.tolist(), strict=True))
+    for joint, error in by_name.items():
+        if not any(finger in joint for finger in FINGERS):
+            assert error < (1.0 if "elbow" in joint else 2.0), (joint, error)
+
+
+@pytest.mark.parametrize("which", ["upper_body", "legs"])
+def test_axes_are_within_two_degrees_of_the_truth(which: str, request: pytest.FixtureRequest) -> None:
+    worn: Worn = request.getfixturevalue(which)
+    found: Mounting = request.getfixturevalue(f"{which}_mounting")
+    judged = 0
+    for joint in found.joints:
+        if joint.axes_known and joint.fit is not None and joint.fit.axes is not None:
+            zero = zero_axes(worn.skeleton, worn.skeleton.segment_names.index(joint.segment))
+            assert zero is not None
+            ends = ((joint.parent, zero[0]), (joint.segment, zero[-1]))
+            for (name, axis), answer in zip(ends, joint.fit.axes, strict=True):
+                truth = rotate(conjugate(worn.q_segment_from_sensor[name]), axis)
+                assert math.degrees(math.acos(min(1.0, abs(float(truth @ answer))))) < 2.0, joint.segment
+                judged += 1
+    assert judged >= 4
+
+
+def test_knees_are_solved_and_a_pelvis_that_never_moved_is_refused(
+    legs: Worn, legs_mounting: Mounting
+) -> None:
+    assert set(legs_mounting.refused) == {"pelvis"}
+    assert "walk some steps" in legs_mounting.refused["pelvis"]
+    assert max(errors_deg(legs, legs_mounting).values()) < 2.0
+    angles = solved_deg(legs.nodes, legs.skeleton, legs_mounting, 5)
+    for side in ("left", "right"):
+        j = legs.skeleton.joint_names.index(f"{side}_knee_flexion")
+        assert np.sqrt(np.mean((angles[:, j] - np.degrees(legs.angles_rad[::5, j])) ** 2)) < 2.0
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_hinge_between_two_units_alone_and_its_fused_angle(legs: Worn, side: str) -> None:
+    one, two = legs.nodes[f"{side}_thigh"], legs.nodes[f"{side}_shank"]
+    pair = find_hinge_pair(one, two)
+    axis = np.array(legs.skeleton.segments[legs.skeleton.segment_names.index(two.name)].axes[0], np.float64)
+    signs = []
+    for name, answers in (
+        (one.name, (pair.found.axis1, pair.hinge.axis1)),
+        (two.name, (pair.found.axis2, pair.hinge.axis2)),
+    ):
+        truth = rotate(conjugate(legs.q_segment_from_sensor[name]), axis)
+        for answer in answers:
+            assert math.degrees(math.acos(min(1.0, abs(float(truth @ answer))))) < 2.0
+            signs.append(math.copysign(1.0, float(truth @ answer)))
+    assert len(set(signs)) == 1
+    track = hinge_angles(
+        HingeAngleConfig(), pair.hinge, RATE_HZ, one.gyr_rad_s, one.acc_m_s2, two.gyr_rad_s, two.acc_m_s2
+    )
+    truth_deg = np.degrees(legs.angles_rad[:, legs.skeleton.joint_names.index(f"{side}_knee_flexion")])
+    assert np.sqrt(np.mean((signs[0] * np.degrees(track.angle_rad) - truth_deg) ** 2)) < 2.0
+
+
+def still(worn: Worn, samples: slice) -> dict[str, NodeRecording]:
+    return {
+        n: replace(r, acc_m_s2=r.acc_m_s2[samples], gyr_rad_s=r.gyr_rad_s[samples])
+        for n, r in worn.nodes.items()
+    }
+
+
+def test_without_any_motion_every_node_is_refused_with_what_to_do(upper_body: Worn) -> None:
+    found = find_mounting(still(upper_body, slice(0, 290)), upper_body.skeleton)
+    assert found.nodes == {}
+    assert set(found.refused) == set(upper_body.nodes)
+    assert "bend left_forearm against left_upper_arm ten times" in found.refused["left_forearm"]
+
+
+def test_without_a_stance_it_is_refused(upper_body: Worn) -> None:
+    with pytest.raises(PoorMotionError, match="nobody stood still"):
+        find_mounting(still(upper_body, slice(500, 1500)), upper_body.skeleton)
+
+
+def test_a_stance_outside_the_recording_is_refused(upper_body: Worn) -> None:
+    with pytest.raises(PoorMotionError, match="not in the recording"):
+        find_mounting(upper_body.nodes, upper_body.skeleton, (100.0, 104.0))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda acc, gyr: (acc * 0.1, gyr), "accelerometer reads"),
+        (lambda acc, gyr: (acc, gyr * 0.0), "gyroscope says the same"),
+        (lambda acc, gyr: (acc, np.where(np.arange(len(gyr))[:, None] < 900, gyr, np.nan)), "missing"),
+    ],
+)
+def test_a_unit_that_reads_nonsense_is_named(
+    upper_body: Worn, spoil: Callable[[Array, Array], tuple[Array, Array]], said: str
+) -> None:
+    unit = upper_body.nodes["head"]
+    acc, gyr = spoil(unit.acc_m_s2, unit.gyr_rad_s)
+    nodes = {**upper_body.nodes, "head": replace(unit, acc_m_s2=acc, gyr_rad_s=gyr)}
+    with pytest.raises(PoorMotionError, match=f"head: .*{said}"):
+        find_mounting(nodes, upper_body.skeleton)
+
+
+def test_files_carry_it_and_what_was_there_is_applied_and_kept(
+    upper_body_mounting: Mounting, upper_body: Worn, tmp_path: Path
+) -> None:
+    (tmp_path / "head.toml").write_text(
+        "accelerometer = [[2.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]\n", "utf-8"
+    )
+    readings = calibrated(upper_body.nodes, tmp_path)
+    np.testing.assert_allclose(
+        readings["head"].acc_m_s2[:, 0], 2.0 * upper_body.nodes["head"].acc_m_s2[:, 0] + 1.0
+    )
+    assert readings["chest"] is upper_body.nodes["chest"]
+    files = write_mounting(upper_body_mounting, Path("folder/session.npz"), tmp_path, date(2026, 11, 22))
+    for name, path in files.items():
+        said = load_config(path, NodeCalibration)
+        np.testing.assert_allclose(
+            said.q_sensor_from_segment, upper_body_mounting.nodes[name].q_sensor_from_segment, atol=1e-9
+        )
+        assert said.made.mounting is not None
+        assert said.made.mounting.recording == "session.npz"
+    assert load_config(files["head"], NodeCalibration).accelerometer[0][0] == 2.0
+
+
+def test_raw_counts_need_a_calibration_first(upper_body: Worn, tmp_path: Path) -> None:
+    counts = {"head": replace(upper_body.nodes["head"], counts=True)}
+    with pytest.raises(TandemError, match="head: raw counts; calibrate it first"):
+        calibrated(counts, tmp_path)
+
+
+POSSIBLE_DEG = {
+    "neck_yaw": (-80, 80),
+    "neck_pitch": (-60, 60),
+    "waist_pitch": (-20, 90),
+    "shoulder_pitch": (-60, 180),
+    "shoulder_roll": (-20, 120),
+    "shoulder_yaw": (-90, 90),
+    "elbow_pitch": (-17, 150),
+    "elbow_roll": (-100, 100),
+    "wrist_yaw": (-60, 60),
+    "hip_flexion": (-30, 125),
+    "hip_abduction": (-30, 50),
+    "hip_rotation": (-50, 50),
+    "knee_flexion": (-12, 150),
+    "ankle_flexion": (-55, 40),
+}
+FASTEST_DEG_S = 900.0
+"""A step's swing bends a knee at up to 700°/s; a thigh's skin at heel strike turns its unit faster still."""
+SKIN_DEG_S = 1500.0
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
+def test_a_real_person_moves_as_people_can(profile: str, recordings_folder: Path) -> None:
+    skeleton = load_skeleton(profile)
+    there = load_recordings(recordings_folder / "human_full_body.npz")
+    nodes = {n: there[RECORDED_AS[n]] for n in skeleton.segment_names if n in RECORDED_AS}
+    found = find_mounting(nodes, skeleton)
+    assert found.refused == {}
+    angles = solved_deg(nodes, skeleton, found, 2)
+    for j, name in enumerate(skeleton.joint_names):
+        kind = name.removeprefix("left_").removeprefix("right_")
+        if kind not in POSSIBLE_DEG:
+            continue
+        low, high = POSSIBLE_DEG[kind]
+        assert low < angles[:, j].min(), name
+        assert angles[:, j].max() < high, name
+        fastest = np.max(np.abs(np.diff(angles[:, j]))) * 50.0
+        assert fastest < (SKIN_DEG_S if kind == "hip_rotation" else FASTEST_DEG_S), (name, fastest)
+        if kind in ("elbow_pitch", "knee_flexion"):
+            # bends one way only, and far
+            assert np.quantile(angles[:, j], 0.99) > 60.0, name
+            assert np.quantile(angles[:, j], 0.05) > -15.0, name
+
+
+@pytest.mark.recordings
+def test_what_the_real_person_s_halves_say_agrees(recordings_folder: Path) -> None:
+    """Sitting down and standing up, and walking: two motions without a sample in common, one mounting."""
+    skeleton = load_skeleton("lower_limb")
+    there = load_recordings(recordings_folder / "human_full_body.npz")
+    halves = []
+    for part in (slice(0, 5300), np.r_[0:480, 5300:10000]):
+        nodes = {
+            n: replace(there[RECORDED_AS[n]], **{
+                key: getattr(there[RECORDED_AS[n]], key)[part] for key in ("acc_m_s2", "gyr_rad_s")
+            })
+            for n in skeleton.segment_names
+        }  # fmt: skip
+        halves.append(find_mounting(nodes, skeleton, (0.2, 2.0)))
+    for name in ("left_thigh", "left_shank", "right_thigh", "right_shank"):
+        one, other = (half.nodes[name].q_sensor_from_segment for half in halves)
+        assert math.degrees(float(angle_between(one, other))) < 10.0, name
