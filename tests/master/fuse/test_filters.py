@@ -1,14 +1,23 @@
 """What every filter must do, through the one interface."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from common.config import Section
 from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, multiply, rotate
+from master import fuse
+from master.fuse.ekf import EkfConfig
+from master.fuse.estimator import EstimationConfig, Estimator
 from master.fuse.filter import OrientationFilter
 from master.fuse.filters import makers
+from master.fuse.mahony import MahonyConfig
+from master.fuse.vqf import VqfConfig
+from master.suit.nodes import NodeConfig
 
 RATE_HZ = 200.0
 GRAVITY = np.array([0.0, 0.0, 9.81])
@@ -263,3 +272,39 @@ def test_what_it_hands_out_is_the_caller_s_own(name: str) -> None:
         before = of()
         of()[:] = 7.0
         assert np.array_equal(of(), before)
+
+
+@pytest.mark.parametrize(
+    ("name", "config"), [("vqf", VqfConfig()), ("mahony", MahonyConfig()), ("ekf", EkfConfig())]
+)
+def test_the_readme_has_every_parameter_with_its_default(name: str, config: Section) -> None:
+    text = (Path(next(iter(fuse.__path__))) / "README.md").read_text("utf-8")
+    rows = text.partition(f"| `[estimation.{name}]` |")[2].partition("\n\n")[0].splitlines()[2:]
+    found = [row.split("|")[1:3] for row in rows]
+    expected = {key: str(value).replace("True", "true") for key, value in config.model_dump().items()}
+    assert {key.strip(" `"): default.strip() for key, default in found} == expected
+
+
+def test_a_toml_gives_each_node_its_filter_and_each_filter_its_keys() -> None:
+    nodes = [
+        NodeConfig.model_validate({"id": i, "bus": "b", "filter": name})
+        for i, name in enumerate([*makers(RATE_HZ), None], 1)
+    ]
+    config = EstimationConfig.model_validate({"filter": "ekf", "ekf": {"bias_limit_rad_s": 0.001}})
+    estimator, rest_ = Estimator(config, nodes, RATE_HZ), Readings()
+    for _ in range(800):
+        estimator.update(rest_)
+    bias = np.abs(estimator._bank.bias_rad_s()).max(axis=1)
+    # two run ekf, by their own choice and by the suit's, and stop where the suit's file says
+    assert np.allclose(bias[2:], 0.001)
+    assert np.max(np.abs(bias[:2] - 0.001)) > 1e-4
+
+
+class Readings:
+    """Four nodes at rest on the table, with a bias."""
+
+    acc_m_s2 = np.tile(GRAVITY, (4, 1))
+    gyr_rad_s = np.full((4, 3), 0.02)
+    mag_ut = np.full((4, 3), np.nan)
+    fresh = np.ones(4, dtype=np.bool_)
+    lost = np.zeros(4, dtype=np.bool_)
