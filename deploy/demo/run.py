@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import tempfile
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +15,8 @@ from common.clock import monotonic_ns, to_ns
 from common.config import load_config
 from common.errors import TandemError
 from common.messages import Action
+from common.skeleton import load_skeleton
+from deploy.demo.mounted import mount
 from deploy.demo.report import Report, make_report
 from deploy.demo.rig import Rig, at_most, open_rig
 from deploy.demo.view import draw
@@ -76,7 +80,12 @@ def check(options: DemoOptions) -> None:
 
 async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
     check(options)
-    async with open_rig(options.transport, options.overrides(), options.profile) as rig:
+    async with AsyncExitStack() as stack:
+        overrides = options.overrides()
+        if options.replay is not None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-mounting-"))
+            overrides["master"] += await _mount(options, options.replay, Path(folder), console)
+        rig = await stack.enter_async_context(open_rig(options.transport, overrides, options.profile))
         observer = rig.observer
         with Live(console=console, refresh_per_second=4, transient=True) as live:
             show = _Show(rig, stop, live)
@@ -94,6 +103,15 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
             await _must(rig, Action.DISENGAGE)
             await rig.until(lambda: observer.guard == "hold", HOLD_S, "hold after disengaging", show.look)
         return make_report(options, rig, await rig.stop())
+
+
+async def _mount(options: DemoOptions, replay: Path, folder: Path, console: Console) -> list[str]:
+    """What the master's file must say of sensors that sit askew."""
+    console.print(f"finding from {replay.name} how its sensors sit …")
+    mounted = await asyncio.to_thread(mount, replay, load_skeleton(options.profile), folder)
+    for name, why in mounted.left.items():
+        console.print(f"[yellow]{name}: by the stance alone ({why})", highlight=False)
+    return mounted.overrides
 
 
 class _Show:
