@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from deploy.accuracy.papers import glove, lower_limb, telerobot
+from deploy.accuracy.papers import beyond, glove, lower_limb, telerobot
 from deploy.accuracy.papers.figures import Experiment
 
 EXPERIMENTS = (
@@ -42,6 +42,15 @@ EXPERIMENTS = (
             "The page prints no figures. Mounting, axes and levers are found from the same recording; no "
             "magnetometer is read. Sensors are fixed to the segments: skin that moves under them is not "
             "simulated.",
+        ),
+    ),
+    Experiment(
+        "beyond",
+        "elbows and knees while the field at forearms and shanks is turned by 40°",
+        beyond.experiment,
+        (
+            "From 5 s on the field is turned about the vertical at the far node of each joint, its strength "
+            "and dip as they were, so that no node alone can tell. RMSE over the whole run.",
         ),
     ),
 )
