@@ -17,11 +17,12 @@ EXPERIMENTS = (
     ),
     Experiment(
         "A-raw",
-        "the same with units as delivered, calibrated and put on as the master's own commands do",
+        "the same with units as delivered, calibrated by a session of their own",
         telerobot.own_calibration,
         (
-            "The arms' and chest's units, calibrated by a session of their own (26 attitudes, 3 minutes of "
-            "tumbling); how they sit is taken from 2 s of standing in the zero pose.",
+            "The arms' and chest's units: 26 attitudes of 10 s and 3 minutes of tumbling, the magnetometer's "
+            "axes turned into the accelerometer's by the dip. How they sit is taken from 2 s of standing in "
+            "the zero pose.",
         ),
     ),
     Experiment(
