@@ -192,17 +192,18 @@ def _check_acc_unit(readings: Array, gravity_m_s2: float, *, counts: bool) -> No
 
 
 def _check_attitudes(fit: acc.AccelerometerFit, readings: Array, gravity_m_s2: float) -> int:
-    attitudes = distinct_attitudes(_unit((readings + fit.bias) @ fit.gain.T))
-    if attitudes < FEWEST_ATTITUDES:
-        raise RecordingError(
-            f"too few attitudes: {attitudes} distinct ones (10° apart), at least {FEWEST_ATTITUDES} are "
-            f"needed; lay the node down in {PAPER_ATTITUDES} or more, on every face and on edges between them"
-        )
+    # first whether the fit is one at all: directions by a fit that is none cannot be counted
     gain, bias = acc.determined(fit.theta, readings, gravity_m_s2, _TRIAL_ERROR_M_S2)
     if not (gain < _WORST_GAIN and bias < _WORST_BIAS_M_S2):
         raise RecordingError(
             "the attitudes are too much alike to tell the accelerometer's nine unknowns; "
             "lay the node down on every face, also upside down, and on edges between them"
+        )
+    attitudes = distinct_attitudes(_unit((readings + fit.bias) @ fit.gain.T))
+    if attitudes < FEWEST_ATTITUDES:
+        raise RecordingError(
+            f"too few attitudes: {attitudes} distinct ones (10° apart), at least {FEWEST_ATTITUDES} are "
+            f"needed; lay the node down in {PAPER_ATTITUDES} or more, on every face and on edges between them"
         )
     return attitudes
 
@@ -259,16 +260,16 @@ def _check_gyro(fit: gyr.GyroscopeFit, scale: float, *, counts: bool) -> None:
     error = float(np.mean(fit.errors_rad))
     if error > _WORST_ERROR_RAD:
         raise _unexplained(error)
+    if not worst < _WORST_GYRO_GAIN:
+        raise RecordingError(
+            f"the moves do not determine the gyroscope's matrix (1σ of {100 * worst:.0f} %); "
+            "turn the node about each of its axes, a quarter turn or more each time"
+        )
     gain = float(np.cbrt(np.linalg.det(fit.gain))) / scale
     if not counts and abs(gain - 1.0) > _MOST_COMMON_GAIN:
         raise RecordingError(
             f"all of the gyroscope's gains are off together by a factor of {gain:.2f}, "
             "more than a sensor's are; is the rate of the recording right?"
-        )
-    if not worst < _WORST_GYRO_GAIN:
-        raise RecordingError(
-            f"the moves do not determine the gyroscope's matrix (1σ of {100 * worst:.0f} %); "
-            "turn the node about each of its axes, a quarter turn or more each time"
         )
 
 

@@ -168,9 +168,23 @@ def test_what_cannot_be_calibrated_from_is_refused(
         calibrate_inertial(spoil(worn()))
 
 
-def test_a_node_turned_about_one_axis_only_is_refused(worn: Worn) -> None:
-    with pytest.raises(RecordingError, match=r"attitudes"):
-        calibrate_inertial(worn(axis=np.array([0.3, 0.2, 1.0])))
+def test_many_attitudes_in_one_plane_are_refused(worn: Worn, session) -> None:  # type: ignore[no-untyped-def]
+    level_axis = np.cross(session(attitudes=1).acc[0], [1.0, 0.0, 0.0])
+    with pytest.raises(RecordingError, match=r"attitudes are too much alike"):
+        calibrate_inertial(worn(axis=level_axis))
+
+
+def test_moves_about_one_axis_only_are_refused(worn: Worn) -> None:
+    """Attitudes enough for the accelerometer, but of all moves only those about z have no gap."""
+    free, about_z = worn(attitudes=16), worn(attitudes=12, seed=3, axis=np.array([0.0, 0.0, 1.0]))
+    for move in range(16):
+        free.gyr_rad_s[450 * move + 370 : 450 * move + 380] = np.nan
+    acc, gyr = (
+        np.concatenate(pair)
+        for pair in ((free.acc_m_s2, about_z.acc_m_s2), (free.gyr_rad_s, about_z.gyr_rad_s))
+    )
+    with pytest.raises(RecordingError, match=r"moves do not determine the gyroscope's matrix"):
+        calibrate_inertial(NodeRecording("unit", 100.0, acc, gyr))
 
 
 def test_a_node_that_is_never_still_is_refused() -> None:

@@ -70,6 +70,19 @@ def test_too_little_of_the_sphere_is_refused(reach: float) -> None:
         calibrate_magnetic(recorded(as_delivered(free_rotation(reach=reach), 1)))
 
 
+def test_the_share_seen_is_said() -> None:
+    with pytest.raises(RecordingError, match=r"covered too thinly: 3\d % of it was seen, at least 50 %"):
+        calibrate_magnetic(recorded(as_delivered(free_rotation(180.0, reach=0.4), 1)))
+
+
+def test_half_of_the_sphere_is_too_little() -> None:
+    upper = np.random.default_rng(0).normal(size=(4000, 3))
+    upper *= FIELD_UT / np.linalg.norm(upper, axis=1, keepdims=True)
+    upper[:, 2] = np.abs(upper[:, 2])
+    with pytest.raises(RecordingError, match="one side of it was not seen"):
+        calibrate_magnetic(recorded(as_delivered(upper, 1)))
+
+
 def test_less_of_the_sphere_than_is_good_is_said() -> None:
     found = calibrate_magnetic(recorded(as_delivered(free_rotation(reach=0.6), 1)))
     assert any("of the sphere seen" in note for note in found.notes)
