@@ -170,28 +170,28 @@ def _unpack_echo(value: object) -> CommandEcho | None:
 
 
 def _pack_control_request(m: ControlRequest) -> tuple[Any, ...]:
-    return (m.robot, m.action.value, m.operator, m.key, m.clock)
+    return (m.robot, m.action.value, m.operator, m.key, m.clock, m.challenge)
 
 
 def _unpack_control_request(f: tuple[Any, ...], _: int) -> ControlRequest:
-    fields.length(f, 5)
+    fields.length(f, 6)
     try:
         action = Action(fields.text(f[1], MAX_NAME))
     except ValueError:
         raise CodecError(f"action {fields.short(f[1])}, expected one of {', '.join(Action)}") from None
     operator, key = fields.text(f[2], MAX_NAME), fields.text(f[3], MAX_TEXT)
-    return ControlRequest(fields.text(f[0], MAX_NAME), action, operator, key, fields.count(f[4]))
+    robot = fields.text(f[0], MAX_NAME)
+    return ControlRequest(robot, action, operator, key, fields.count(f[4]), fields.count(f[5]))
 
 
 def _pack_control_reply(m: ControlReply) -> tuple[Any, ...]:
-    return (m.done, m.guard, m.text[:MAX_TEXT], m.lease)
+    return (m.done, m.guard, m.text[:MAX_TEXT], m.lease, m.challenge)
 
 
 def _unpack_control_reply(f: tuple[Any, ...], _: int) -> ControlReply:
-    fields.length(f, 4)
-    return ControlReply(
-        fields.flag(f[0]), fields.text(f[1], MAX_NAME), fields.text(f[2], MAX_TEXT), fields.count(f[3])
-    )
+    fields.length(f, 5)
+    guard, text = fields.text(f[1], MAX_NAME), fields.text(f[2], MAX_TEXT)
+    return ControlReply(fields.flag(f[0]), guard, text, fields.count(f[3]), fields.count(f[4]))
 
 
 def _pack_clock_query(m: ClockQuery) -> tuple[Any, ...]:

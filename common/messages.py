@@ -130,6 +130,8 @@ class ControlRequest:
     """The reset key, for `reset`."""
     clock: int = 0
     """For `claim`: the asker whose clock queries tell of the clock that stamps this master's commands."""
+    challenge: int = 0
+    """For `engage` and `reset`: the one that the robot's last `status` gave. Else a late one would count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +143,8 @@ class ControlReply:
     text: str
     lease: int = 0
     """The token granted, for `claim`."""
+    challenge: int = 0
+    """For `status`: what an `engage` or `reset` must quote soon, once."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from common.codec import decode, encode
 from common.config import LinkConfig, check_config
+from common.control import ask_control
 from common.errors import LinkTimeoutError
 from common.link import open_link
 from common.messages import Action, ControlReply, ControlRequest
@@ -29,5 +29,5 @@ async def ask_robot(
                 f"{robot} does not answer at {where}: is `tandem slave` running, with that robot name, "
                 "and listening there?"
             ) from None
-        reply = await link.ask(CONTROL, encode(ControlRequest(robot, action, operator, key)))
-        return decode(reply, ControlReply)
+        request = ControlRequest(robot, action, operator, key)
+        return await ask_control(lambda payload: link.ask(CONTROL, payload), request)

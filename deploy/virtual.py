@@ -8,12 +8,13 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from common.clock import NS_PER_MS, NS_PER_S
 from common.codec import decode, encode
 from common.config import Model, load_config
+from common.control import CHALLENGED
 from common.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState
 from common.offset import MasterExchange
 from deploy.judge import Trace
@@ -93,6 +94,8 @@ class VirtualRun:
         """Ask the robot, as the operator, now."""
         operator = self.master_config.operator.name
         request = ControlRequest(self.master_config.robot, action, operator, key)
+        if action in CHALLENGED:
+            request = replace(request, challenge=self.ask(Action.STATUS).challenge)
         return decode(self.slave.on_control(encode(request), self.slave_ns), ControlReply)
 
     def _step(self) -> None:

@@ -9,7 +9,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 from common.clock import monotonic_ns, to_ns
-from common.codec import decode, encode
+from common.control import ask_control
 from common.errors import TandemError
 from common.link import Link, open_link
 from common.messages import Action, ControlReply, ControlRequest
@@ -50,7 +50,7 @@ class Rig:
     async def control(self, action: Action, operator: str = OPERATOR, key: str = "") -> ControlReply:
         """Ask the robot."""
         request = ControlRequest(ROBOT, action, operator, key)
-        return decode(await self._link.ask(CONTROL, encode(request)), ControlReply)
+        return await ask_control(lambda payload: self._link.ask(CONTROL, payload), request)
 
     async def until(
         self,

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hmac
+from dataclasses import replace
 from typing import Protocol
 
 from common.messages import Action, ControlReply, ControlRequest
+from slave.guard.challenge import Challenges
 from slave.guard.engage import holder_only
 from slave.guard.lease import Lease
 from slave.guard.states import State
@@ -45,10 +47,14 @@ class Controlled(Protocol):
 
 
 class Control:
-    """Answers requests. Anybody may stop; only the lease's holder may move; only the key resets."""
+    """Answers requests. Anybody may stop; only the lease's holder may move; only the key resets.
+
+    What could lead to motion must be of now (`challenge.py`): what the network held back does nothing.
+    """
 
     def __init__(self, guard: Controlled, reset_key: str) -> None:
         self._guard = guard
+        self._challenges = Challenges()
         self._reset_key = reset_key.encode()
 
     def answer(self, request: ControlRequest, now_ns: int) -> ControlReply:
@@ -66,14 +72,17 @@ class Control:
             case Action.RELEASE:
                 return self._release(request.operator, now_ns)
             case Action.ENGAGE:
-                why = guard.engage(request.operator, now_ns)
+                why = self._late(request, now_ns) or guard.engage(request.operator, now_ns)
                 return self._reply(why is None, why or "moves slowly to the operator's posture")
             case Action.DISENGAGE:
                 return self._disengage(request.operator, now_ns)
             case Action.RESET:
                 return self._reset(request, now_ns)
             case Action.STATUS:
-                return self._reply(True, guard.reason)
+                return replace(self._reply(True, guard.reason), challenge=self._challenges.issue(now_ns))
+
+    def _late(self, request: ControlRequest, now_ns: int) -> str | None:
+        return self._challenges.refusal(request.challenge, now_ns)
 
     def _claim(self, operator: str, now_ns: int) -> ControlReply:
         if not operator:
@@ -100,7 +109,8 @@ class Control:
             return self._reply(False, "no reset key is configured: restart the slave at the robot")
         if not hmac.compare_digest(request.key.encode("utf-8", "replace"), self._reset_key):
             return self._reply(False, "wrong reset key")
-        why = self._guard.reset(now_ns, f"reset by {request.operator or 'somebody'}; engage to move")
+        reason = f"reset by {request.operator or 'somebody'}; engage to move"
+        why = self._late(request, now_ns) or self._guard.reset(now_ns, reason)
         return self._reply(why is None, why or "holds; engage to move")
 
     def _reply(self, done: bool, text: str, lease: int = 0) -> ControlReply:

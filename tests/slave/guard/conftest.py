@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.control import CHALLENGED
 from common.messages import Action, Command, CommandStamps, ControlReply, ControlRequest
 from common.offset import Offset
 from common.quaternion import Array
@@ -92,8 +93,20 @@ class Rig:
         self.sequence += 1
         return self.give(self.command(**changes))
 
-    def ask(self, action: Action, operator: str = "anna", key: str = "", robot: str = ROBOT) -> ControlReply:
-        return self.guard.on_control(ControlRequest(robot, action, operator, key), self.now_ns)
+    def ask(
+        self,
+        action: Action,
+        operator: str = "anna",
+        key: str = "",
+        robot: str = ROBOT,
+        challenge: int | None = None,
+    ) -> ControlReply:
+        """Ask in the way of `common.control`, or with a challenge of one's own."""
+        request = ControlRequest(robot, action, operator, key, challenge=challenge or 0)
+        if challenge is None and action in CHALLENGED:
+            given = self.guard.on_control(replace(request, action=Action.STATUS), self.now_ns).challenge
+            request = replace(request, challenge=given)
+        return self.guard.on_control(request, self.now_ns)
 
     def claim(self, operator: str = "anna") -> ControlReply:
         reply = self.ask(Action.CLAIM, operator)
