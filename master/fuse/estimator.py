@@ -14,7 +14,7 @@ from pydantic import Field
 from common.config import Section
 from common.errors import ConfigError, ConfigMistake
 from common.messages import Mask
-from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate
+from common.quaternion import Array, conjugate, from_rotation_vector, heading_rad, multiply, rotate
 from common.skeleton import Skeleton
 from master.calibrate.affine import ACC, GYR, MAG, Calibration, apply, load_calibration
 from master.fuse.ekf import EkfConfig
@@ -127,7 +127,7 @@ class _Headings(_Stateful, Protocol):
 
     def lose(self, nodes: Mask, q: Array, /) -> None: ...
 
-    def find(self, nodes: Mask, q: Array, mag_ut: Array, /) -> None: ...
+    def find(self, nodes: Mask, q: Array, magnetic_rad: Array, /) -> None: ...
 
     def stand(self, nodes: Mask, correction_rad: Array, q: Array, mag_ut: Array, /) -> None: ...
 
@@ -217,13 +217,19 @@ class Estimator:
         self._gyr_rad_s = filtered[GYR]
         self._bank.update(filtered[GYR], filtered[ACC], filtered[MAG])
         if changes.settled.any():
-            self._heading.find(changes.settled, self._q_of_filters(), filtered[MAG])
+            self._find(changes.settled, np.isfinite(filtered[MAG, :, 0]))
         if not self._stance.known.all():
             self._stand(filtered[MAG])
         if self._heading.due():
             usable = self._liveness.settled & self._stance.known
             mounting = self._stance.q_sensor_from_segment
             self._heading.correct(self._q_of_filters(), filtered[MAG], mounting, usable)
+
+    def _find(self, settled: Mask, magnetic: Mask) -> None:
+        """Give nodes that have settled their heading."""
+        q = self._q_of_filters()
+        between = multiply(self._bank.q_world_from_sensor(), conjugate(q))
+        self._heading.find(settled, q, np.where(magnetic, heading_rad(between), np.nan))
 
     def _stand(self, mag_ut: Array) -> None:
         """One tick of the stance."""

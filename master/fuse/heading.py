@@ -22,12 +22,12 @@ class HeadingMemory:
         """Keep the orientations (N, 4), as the filters give them, of nodes that were trusted until now."""
         self._held[nodes] = multiply(self.turn[nodes], q_world_from_sensor[nodes])
 
-    def find(self, nodes: Mask, q_world_from_sensor: Array, mag_ut: Array) -> None:
+    def find(self, nodes: Mask, q_world_from_sensor: Array, magnetic_rad: Array) -> None:
         """Turn the restarted nodes so that their heading goes on from the one held.
 
-        Only those without a magnetometer, whose field (N, 3) is NaN.
+        Only those without a magnetometer, whose `magnetic_rad` (N,) is NaN.
         """
-        back = nodes & np.isfinite(self._held[:, 0]) & np.isnan(mag_ut[:, 0])
+        back = nodes & np.isfinite(self._held[:, 0]) & np.isnan(magnetic_rad)
         between = multiply(self._held[back], conjugate(q_world_from_sensor[back]))
         self.turn[back] = heading_turn(heading_rad(between))
 

@@ -29,11 +29,12 @@ class MagneticHeadings:
         self._memory_s = memory_s
         self._usual_ut = np.full(2, np.nan)
         self._disturbance_ut2 = np.zeros(count)
-        self._north_rad = np.zeros(count)
+        self.north_rad: Array = np.zeros(count)
+        """(N,) by how much north is west of where each magnetometer says, as far as a stance told."""
 
     def direction(self, mag_world_ut: Array) -> Array:
         """Heading errors θ (N,), rad, that bring fields (N, 3) to where north is; NaN without one."""
-        out: Array = 0.5 * math.pi - np.arctan2(mag_world_ut[:, 1], mag_world_ut[:, 0]) - self._north_rad
+        out: Array = 0.5 * math.pi - np.arctan2(mag_world_ut[:, 1], mag_world_ut[:, 0]) - self.north_rad
         return out
 
     def set_north(self, nodes: Mask, theta_rad: Array, mag_world_ut: Array) -> None:
@@ -42,13 +43,13 @@ class MagneticHeadings:
         The median, so that the few that stand near iron do not count.
         """
         self._disturbance_ut2[nodes] = 0.0
-        self._north_rad[nodes] = 0.0
+        self.north_rad[nodes] = 0.0
         away = wrap(self.direction(mag_world_ut) - theta_rad)[nodes]
         away = away[np.isfinite(away)]
         if len(away):
             # angles about a middle of their own, or a median across ±π would fall between
             middle = math.atan2(np.sin(away).sum(), np.cos(away).sum())
-            self._north_rad[nodes] = middle + np.median(wrap(away - middle))
+            self.north_rad[nodes] = middle + np.median(wrap(away - middle))
 
     def restart(self, nodes: Mask) -> None:
         """Forget what disturbed some nodes, mask (N,)."""
@@ -83,13 +84,13 @@ class MagneticHeadings:
 
     def snapshot(self) -> object:
         """The state, to be given to `restore`."""
-        return self._usual_ut.copy(), self._disturbance_ut2.copy(), self._north_rad.copy()
+        return self._usual_ut.copy(), self._disturbance_ut2.copy(), self.north_rad.copy()
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
         if not isinstance(snapshot, tuple):
             raise TypeError("not a snapshot of these magnetic headings")
-        self._usual_ut, self._disturbance_ut2, self._north_rad = (part.copy() for part in snapshot)
+        self._usual_ut, self._disturbance_ut2, self.north_rad = (part.copy() for part in snapshot)
 
 
 def wrap(angle_rad: Array) -> Array:

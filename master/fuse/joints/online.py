@@ -39,9 +39,13 @@ class OnlineConfig(Section):
     """For how long it keeps that error, s."""
     disturbance_memory_s: float = Field(default=30.0, gt=0.0, allow_inf_nan=False)
     """Time constant with which a disturbance of the field is forgotten, s."""
-    drift_deg_sqrt_s: float = Field(default=0.3, gt=0.0, allow_inf_nan=False)
+    walk_deg_sqrt_s: float = Field(default=0.2, gt=0.0, allow_inf_nan=False)
     """Random walk of a gyro's heading: degrees after a second, ten times that after a hundred. Larger: joints
     and magnetometers correct faster, and disturb more."""
+    drift_deg_s: float = Field(default=0.05, gt=0.0, allow_inf_nan=False)
+    """Steady drift of a gyro's heading at the start, degrees/s: what its filter's bias estimate leaves."""
+    drift_walk_deg_s_sqrt_s: float = Field(default=0.01, gt=0.0, allow_inf_nan=False)
+    """How that drift changes: a random walk, degrees/s after a second."""
     start_sd_deg: float = Field(default=10.0, gt=0.0, le=180.0, allow_inf_nan=False)
     """Of the heading with which a node begins, by its magnetometer or as it was when it was lost."""
     stance_sd_deg: float = Field(default=2.0, gt=0.0, le=90.0, allow_inf_nan=False)
@@ -64,7 +68,8 @@ class OnlineHeadings:
         self._rows = np.arange(len(self._joints))
         self._field = MagneticHeadings(count, config.disturbance_memory_s)
         self._start = math.radians(config.start_sd_deg) ** 2
-        self._headings = Headings(np.full(count, self._start))
+        self._drift = math.radians(config.drift_deg_s) ** 2
+        self._headings = Headings(np.full(count, self._start), np.full(count, self._drift))
         self._held = np.full((count, 4), np.nan)
         self._ticks = 0
         self.turn: Array = heading_turn(np.zeros(count))
@@ -74,20 +79,24 @@ class OnlineHeadings:
         """Keep the orientations (N, 4), as the filters give them, of nodes that were trusted until now."""
         self._held[nodes] = multiply(self.turn[nodes], q_inertial_from_sensor[nodes])
 
-    def find(self, nodes: Mask, q_inertial_from_sensor: Array, mag_ut: Array) -> None:
-        """Begin with nodes that have settled: by their magnetometer, else by the heading they had."""
-        theta = self._field.direction(rotate(q_inertial_from_sensor, mag_ut))
+    def find(self, nodes: Mask, q_inertial_from_sensor: Array, magnetic_rad: Array) -> None:
+        """Begin with nodes that have settled: with the heading their filter found by its magnetometer.
+
+        `magnetic_rad` (N,) leads to it from `q_inertial_from_sensor` (N, 4). Without one (NaN) they begin
+        with the heading they had.
+        """
         before = heading_rad(multiply(self._held, conjugate(q_inertial_from_sensor)))
-        theta = np.where(np.isfinite(theta), theta, np.nan_to_num(before))
+        magnetic = magnetic_rad - self._field.north_rad
+        theta = np.where(np.isfinite(magnetic), magnetic, np.nan_to_num(before))
         self._field.restart(nodes)
-        self._headings.set(nodes, theta, np.full(len(theta), self._start))
+        self._headings.set(nodes, theta, self._start)
+        self._headings.restart_drift(nodes, self._drift)
         self._turn()
 
     def stand(self, nodes: Mask, correction_rad: Array, q_inertial_from_sensor: Array, mag_ut: Array) -> None:
         """Take the headings that a stance gives some nodes: by `correction_rad` (N,) from those so far."""
         theta = self._headings.theta_rad + np.where(nodes, correction_rad, 0.0)
-        variance = np.full(len(theta), math.radians(self._config.stance_sd_deg) ** 2)
-        self._headings.set(nodes, theta, variance)
+        self._headings.set(nodes, theta, math.radians(self._config.stance_sd_deg) ** 2)
         self._field.set_north(nodes, theta, rotate(q_inertial_from_sensor, mag_ut))
         self._turn()
 
@@ -103,7 +112,11 @@ class OnlineHeadings:
         """
         config, headings = self._config, self._headings
         dt_s = _EVERY / self._rate_hz
-        headings.drift(np.full(len(usable), math.radians(config.drift_deg_sqrt_s) ** 2 * dt_s))
+        headings.drift(
+            dt_s,
+            math.radians(config.walk_deg_sqrt_s) ** 2,
+            math.radians(config.drift_walk_deg_s_sqrt_s) ** 2,
+        )
         information, gain = self._from_field(rotate(q_inertial_from_sensor, mag_ut), usable, dt_s)
         if len(self._joints):
             q = multiply(multiply(self.turn, q_inertial_from_sensor), mounting)

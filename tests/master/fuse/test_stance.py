@@ -7,7 +7,7 @@ from master.fuse.heading import HeadingMemory
 from master.fuse.stance import Stance
 
 SAME = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
-NO_FIELD = np.full((3, 3), np.nan)
+NO_FIELD = np.full(3, np.nan)
 ALL = np.ones(3, dtype=np.bool_)
 MOUNTED = Rotation.random(3, rng=0).as_quat(scalar_first=True)
 
