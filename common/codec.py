@@ -142,7 +142,7 @@ def _short_faults(faults: dict[str, str]) -> dict[str, str]:
 def _pack_base(base: BaseAttitude | None) -> tuple[Any, ...] | None:
     if base is None:
         return None
-    return (base.measured_ns, base.inclination_rad, base.azimuth_rad, base.tool_face_rad)
+    return (base.measured_ns, base.inclination_rad, base.azimuth_rad, base.tool_face_rad, base.tilt_rad)
 
 
 def _unpack_base(value: object) -> BaseAttitude | None:
@@ -150,13 +150,14 @@ def _unpack_base(value: object) -> BaseAttitude | None:
         return None
     if not isinstance(value, tuple):
         raise CodecError("base is not an array")
-    fields.length(value, 4)
-    azimuth = value[2]
+    fields.length(value, 5)
+    azimuth, tool_face = value[2:4]
     return BaseAttitude(
         fields.count(value[0]),
         fields.number(value[1], 0.0, math.pi),
         None if azimuth is None else fields.number(azimuth, 0.0, math.tau),
-        fields.number(value[3], 0.0, math.tau),
+        None if tool_face is None else fields.number(tool_face, 0.0, math.tau),
+        fields.number(value[4], 0.0, math.pi),
     )
 
 

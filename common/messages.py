@@ -71,8 +71,10 @@ class BaseAttitude:
     """Of the base's axis from the vertical, 0 to π."""
     azimuth_rad: float | None
     """True azimuth of the axis's horizontal projection, 0 to 2π; None where it has no direction."""
-    tool_face_rad: float
-    """Rotation about the axis itself, 0 to 2π."""
+    tool_face_rad: float | None
+    """Rotation about the axis itself, 0 to 2π; None where neither gravity nor field tells it."""
+    tilt_rad: float
+    """Of the base from level, 0 to π: whatever its axis is, this is what it falls over by."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,7 +71,14 @@ def commands(draw: st.DrawFn, joints: int = 25) -> Command:
 
 
 turns = st.floats(0.0, 2.0 * math.pi)
-bases = st.builds(BaseAttitude, counts, st.floats(0.0, math.pi), st.none() | turns, turns)
+bases = st.builds(
+    BaseAttitude,
+    counts,
+    st.floats(0.0, math.pi),
+    st.none() | turns,
+    st.none() | turns,
+    st.floats(0.0, math.pi),
+)
 
 
 @st.composite
@@ -142,7 +149,7 @@ COMMAND = Command(
 )
 STATE = RobotState(
     "robot-1", 1, 2, 3, "hold", "", "", np.ones(3, np.bool_), np.zeros(3), np.zeros(3),
-    CommandEcho(1, 2, 3, 4, 5), -5, 6, {"left_elbow_pitch": "over-current"}, BaseAttitude(7, 0.1, None, 0.2),
+    CommandEcho(1, 2, 3, 4, 5), -5, 6, {"left_elbow_pitch": "over-current"}, BaseAttitude(7, 0.1, None, 0.2, 0.1),
 )  # fmt: skip
 
 
