@@ -40,9 +40,9 @@ EXPERIMENTS = (
         "the knees, sensors 40° askew, 20 s of walking (lower-limb paper, section 4.1)",
         lower_limb.experiment,
         (
-            "The page prints no figures. Axes and mounting are found from the same recording, the levers are the table's; no "
-            "magnetometer is read. Sensors are fixed to the segments: skin that moves under them is not "
-            "simulated.",
+            "The page prints no figures. Axes and mounting are found from the same recording, the levers are "
+            "the table's; no magnetometer is read. Sensors are fixed to the segments: skin that moves under "
+            "them is not simulated.",
         ),
     ),
     Experiment(
