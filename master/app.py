@@ -7,6 +7,7 @@ import logging
 import secrets
 from collections.abc import Callable
 
+from common.can.bus import CanBus
 from common.clock import monotonic_ns, to_ns
 from common.codec import decode, encode
 from common.errors import CodecError, LinkError
@@ -24,7 +25,6 @@ from master.config import MasterConfig
 from master.lease import LeaseKeeper
 from master.pipeline import CommandWriter, MasterPipeline, Solved
 from master.robot_watch import RobotWatch
-from master.suit.bus import SuitBus
 from master.suit.protocol import SuitProtocol
 
 log = logging.getLogger("tandem.master")
@@ -47,7 +47,7 @@ class Master:
         self._ticks_expected = 0
         self._ticks_missed = 0
         self._undecodable = 0
-        self._buses = [SuitBus(bus, self._on_frame, self._on_bus) for bus in config.capture.buses]
+        self._buses = [CanBus(bus, self._on_frame, self._on_bus) for bus in config.capture.buses]
         self._put_command: Callable[[bytes], None] = link.publish(COMMAND)
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
         link.subscribe(STATE, self._on_state)

@@ -6,12 +6,13 @@ from typing import Literal
 
 from pydantic import Field
 
+from common.can.config import BusConfig
 from common.config import LinkConfig, RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
 from common.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from master.fuse.estimator import EstimationConfig
-from master.suit.nodes import BusConfig, NodeConfig, wiring_mistakes
+from master.suit.nodes import NodeConfig, wiring_mistakes
 
 
 class CaptureConfig(Section):

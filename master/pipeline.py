@@ -10,13 +10,13 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from common.can.frame import Frame
 from common.messages import Command, CommandStamps, Mask
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from master.config import MasterConfig
 from master.fuse.estimator import Estimator
 from master.solve.solver import JointSolver
-from master.suit.frame import Frame
 from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol

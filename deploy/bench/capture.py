@@ -9,6 +9,8 @@ from typing import Any
 
 import uvloop
 
+from common.can.bus import CanBus
+from common.can.config import BusConfig
 from common.clock import monotonic_ns, to_ns
 from common.errors import BusError
 from common.pacing import TickGrid
@@ -17,8 +19,6 @@ from common.ticker import ticks
 from deploy.bench.measure import spread, spread_us
 from deploy.bench.pipeline import BUS, LOST_AFTER, RATE_HZ, answers, nodes
 from deploy.bench.worker import beside, in_worker
-from master.suit.bus import SuitBus
-from master.suit.nodes import BusConfig
 from master.suit.poll import Poll
 from master.suit.protocol import SuitProtocol
 
@@ -50,7 +50,7 @@ def suit(port: int, count: int, fd: bool) -> None:
                 for frame in prepared[protocol.parse_sync(data) % _WRAP]:
                     bus.send(frame)
 
-        bus = SuitBus(_config(port, fd), on_frame)
+        bus = CanBus(_config(port, fd), on_frame)
         bus.open()
         await asyncio.Event().wait()
 
@@ -68,7 +68,7 @@ class _Listener:
     def __init__(self, port: int, count: int, fd: bool) -> None:
         self._poll = Poll(nodes(count), SuitProtocol.load(), LOST_AFTER, {BUS: fd})
         self._open = False
-        self.bus = SuitBus(_config(port, fd), self._on_frame)
+        self.bus = CanBus(_config(port, fd), self._on_frame)
         self.answered_ns: list[int] = []
         """From SYNC to the last answer, of ticks that every node answered."""
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from common.can.frame import Frame
 from common.codec import decode, encode
 from common.messages import Command, CommandStamps
 from common.quaternion import Array
@@ -17,7 +18,6 @@ from deploy.bench.measure import spread_us, time_calls
 from master.fuse.estimator import EstimationConfig, Estimator
 from master.fuse.filter import FilterName
 from master.solve.solver import JointSolver
-from master.suit.frame import Frame
 from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll
 from master.suit.protocol import SuitProtocol
@@ -45,9 +45,7 @@ def pipeline(seconds: float) -> dict[str, Any]:
     }
 
 
-def ticks(
-    seconds: float, count: int, fd: bool = True, filter_name: FilterName = "vqf"
-) -> dict[str, Any]:
+def ticks(seconds: float, count: int, fd: bool = True, filter_name: FilterName = "vqf") -> dict[str, Any]:
     """µs a tick: `decode_us` from frames to SI units, `fuse_us` to calibrate, low-pass and fuse."""
     protocol = SuitProtocol.load()
     poll = Poll(nodes(count), protocol, LOST_AFTER, {BUS: fd})

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from common.can.bus import CanBus
+from common.can.config import BusConfig
 from common.clock import monotonic_ns
 from common.pacing import TickGrid
 from common.ticker import ticks
-from master.suit.bus import SuitBus
-from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol
 
@@ -41,7 +42,7 @@ class SuitCapture:
         self._poll = Poll(nodes, protocol, lost_after, {bus.name: bus.fd for bus in buses})
         self._period_ns = round(1e9 / rate_hz)
         self._on_sweep = on_sweep
-        self._buses = [SuitBus(bus, self._on_frame, self._on_bus) for bus in buses]
+        self._buses = [CanBus(bus, self._on_frame, self._on_bus) for bus in buses]
         self._open = False
 
     async def run(self) -> None:

@@ -1,4 +1,4 @@
-"""What a TOML says of the CAN buses and of the nodes on them; master and simulated suit share it."""
+"""What a TOML says of the nodes on the CAN buses; master and simulated suit share it."""
 
 from __future__ import annotations
 
@@ -6,24 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import Field
 
+from common.can.config import BusConfig, names_used_twice
 from common.config import RelativePath, Section
 from common.errors import ConfigMistake
 from master.fuse.filter import FilterName
-
-
-class BusConfig(Section):
-    """`[[capture.buses]]` of the master, `[[buses]]` of the suit: one CAN bus, opened by python-can."""
-
-    name: str = Field(min_length=1)
-    """What nodes, logs and counters call it."""
-    interface: str = Field(min_length=1)
-    """A python-can interface: `socketcan`, `udp_multicast`, `virtual`, ..."""
-    channel: str = Field(min_length=1)
-    """What that interface calls the bus: `can0`, a multicast group such as `239.74.163.2`, any text."""
-    fd: bool = True
-    """True: CAN FD, a node answers in one frame. False: classic CAN, in three."""
-    options: dict[str, str | int | float | bool] = Field(default_factory=dict)
-    """More keywords for `can.Bus`: `port` and `hop_limit` of udp_multicast, `bitrate` of an adapter, ..."""
 
 
 class NodeConfig(Section):
@@ -46,8 +32,7 @@ def wiring_mistakes(
 ) -> list[ConfigMistake]:
     """Bus names used twice, nodes on a bus that there is not, and two nodes with one id on one bus."""
     names = [bus.name for bus in buses]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    mistakes = [ConfigMistake(buses_key, name, "a bus name used once") for name in twice]
+    mistakes = names_used_twice(buses, buses_key)
     taken: dict[tuple[str, int], str] = {}
     for segment, node in nodes.items():
         if node.bus not in names:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.can.frame import Frame
 from common.messages import Mask
 from common.quaternion import Array
-from master.suit.frame import Frame
 from master.suit.health import BusHealth, NodeCounters, NodeHealth
 from master.suit.intake import Intake, Place
 from master.suit.layout import Raw

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from common.can.frame import Frame
 from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
-from master.suit.frame import Frame
 from master.suit.layout import AnswerLayout, LayoutError, Raw
 
 if TYPE_CHECKING:

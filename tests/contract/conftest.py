@@ -15,9 +15,9 @@ import can
 import pytest
 from _pytest.mark.structures import ParameterSet
 
+from common.can.config import BusConfig
+from common.can.interface import open_bus
 from common.errors import BusError
-from master.suit.interface import open_bus
-from master.suit.nodes import BusConfig
 
 _channel_number = itertools.count()
 P = ParamSpec("P")

@@ -14,9 +14,9 @@ import can
 import pytest
 import uvloop
 
-from master.suit.bus import SuitBus
-from master.suit.frame import Frame
-from master.suit.nodes import BusConfig
+from common.can.bus import CanBus
+from common.can.config import BusConfig
+from common.can.frame import Frame
 
 if TYPE_CHECKING:
     from tests.contract.conftest import Wire
@@ -36,13 +36,13 @@ def run(test: Coroutine[Any, Any, None]) -> None:
 
 
 class End:
-    """One end of a wire: a SuitBus and all it tells."""
+    """One end of a wire: a CanBus and all it tells."""
 
     def __init__(self, wire: Wire, config: BusConfig) -> None:
         self.frames: list[tuple[int, bytes]] = []
         self.changes: list[bool] = []
         self._stirred = asyncio.Event()
-        self.bus = SuitBus(config, self._on_frame, self._on_change, wire.open)
+        self.bus = CanBus(config, self._on_frame, self._on_change, wire.open)
 
     def _on_frame(self, name: str, frame_id: int, data: bytes, now_ns: int) -> None:
         assert name == self.bus.name

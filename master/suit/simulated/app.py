@@ -7,10 +7,10 @@ from dataclasses import asdict
 
 import can
 
+from common.can.bus import CanBus
+from common.can.config import BusConfig
 from common.clock import to_s
 from common.realtime import take_priority
-from master.suit.bus import SuitBus
-from master.suit.nodes import BusConfig
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.echo import open_deaf_to_answers
@@ -44,7 +44,7 @@ async def run(
 
     peer = SuitPeer(suit, protocol, send, publish_truth)
     newest = NewestSync(protocol.sync_id, peer.on_frame, loop.call_soon)
-    buses = {bus.name: SuitBus(bus, newest.on_frame, opener=opener) for bus in config.buses}
+    buses = {bus.name: CanBus(bus, newest.on_frame, opener=opener) for bus in config.buses}
     try:
         for bus in buses.values():
             bus.open()

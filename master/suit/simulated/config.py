@@ -7,11 +7,12 @@ from typing import Annotated
 
 from pydantic import Field
 
+from common.can.config import BusConfig
 from common.config import LinkConfig, RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
 from common.realtime import ProcessConfig
 from common.skeleton import load_skeleton
-from master.suit.nodes import BusConfig, NodeConfig, wiring_mistakes
+from master.suit.nodes import NodeConfig, wiring_mistakes
 from master.suit.protocol import SHIPPED_DBC
 from master.suit.simulated.disturbance import DisturbanceConfig
 from master.suit.simulated.faults import FaultsConfig

@@ -14,9 +14,9 @@ import struct
 import can
 from can.interfaces.udp_multicast.utils import pack_message
 
-from master.suit.frame import Frame
-from master.suit.interface import descriptor, open_bus
-from master.suit.nodes import BusConfig
+from common.can.config import BusConfig
+from common.can.frame import Frame
+from common.can.interface import descriptor, open_bus
 
 _SO_ATTACH_FILTER = getattr(socket, "SO_ATTACH_FILTER", 26)
 _UDP_HEADER_BYTES = 8

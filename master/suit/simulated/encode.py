@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from master.suit.frame import Frame
+from common.can.frame import Frame
 from master.suit.layout import AnswerLayout
 from master.suit.protocol import AnswerFormat
 from master.suit.simulated.imperfections import Counts

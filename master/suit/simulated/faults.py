@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
+from common.can.frame import Frame
 from common.clock import NS_PER_MS, to_s
 from common.config import Section
 from common.errors import ConfigMistake
-from master.suit.frame import Frame
 
 
 class Span(Section):

@@ -9,11 +9,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from common.can.config import BusConfig
 from common.clock import to_s
 from common.messages import Truth
 from common.quaternion import IDENTITY, Array
 from common.skeleton import Skeleton, load_skeleton
-from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.nodes import NodeConfig
 from master.suit.protocol import NO_VALUE, Status, SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.disturbance import Disturbance, DisturbanceConfig

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from master.suit.frame import Frame
+from common.can.frame import Frame
 from master.suit.health import NodeHealth
 from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll, Sweep

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.can.frame import Frame
 from master.suit.crc import frame_crc
-from master.suit.frame import Frame
 
 if TYPE_CHECKING:
     from tests.master.suit.conftest import Suit

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from common.can.config import BusConfig
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.calibrate.live.guide import Guide, GuideOptions
-from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.nodes import NodeConfig
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.suit import _wearer
 from master.suit.simulated.tray import TrayConfig

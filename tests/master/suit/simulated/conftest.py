@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import pytest
 
+from common.can.config import BusConfig
 from common.skeleton import Skeleton, load_skeleton
-from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.nodes import NodeConfig
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from common.can.bus import CanBus
+from common.can.config import BusConfig
 from common.errors import BusError
 from common.messages import Truth
-from master.suit.bus import SuitBus
-from master.suit.nodes import BusConfig
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.app import run
 from master.suit.simulated.config import SuitConfig
@@ -32,7 +32,7 @@ async def ask(config: SuitConfig, protocol: SuitProtocol, ticks: int) -> tuple[l
         if len(heard) % len(config.nodes) == 0:
             complete.set()
 
-    master = SuitBus(config.buses[0], on_frame)
+    master = CanBus(config.buses[0], on_frame)
     master.open()
     suit = asyncio.create_task(run(config, stop, truths.append))
     await asyncio.sleep(0)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.can.frame import Frame
 from common.clock import NS_PER_MS, to_ns
 from master.suit.crc import frame_crc
-from master.suit.frame import Frame
 from master.suit.simulated.faults import Faults, FaultsConfig, NodeAnswer, Outgoing
 
 NODES = ("chest", "head", "left_hand")

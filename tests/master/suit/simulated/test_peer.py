@@ -1,7 +1,8 @@
 from __future__ import annotations
 
+from common.can.config import BusConfig
 from common.messages import Truth
-from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.nodes import NodeConfig
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.faults import Outgoing

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from common.can.config import BusConfig
 from common.clock import to_ns
 from common.quaternion import rotate
 from common.skeleton import Skeleton
-from master.suit.nodes import BusConfig, NodeConfig
+from master.suit.nodes import NodeConfig
 from master.suit.protocol import NO_VALUE, SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.faults import FaultsConfig

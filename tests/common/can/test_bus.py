@@ -14,11 +14,11 @@ import msgpack
 import pytest
 import uvloop
 
+from common.can.bus import LONGEST_WAIT_S, SEND_ERRORS_IN_A_ROW, CanBus, wait_s
+from common.can.config import BusConfig
+from common.can.frame import Frame
+from common.can.interface import open_bus
 from common.errors import BusError
-from master.suit.bus import LONGEST_WAIT_S, SEND_ERRORS_IN_A_ROW, SuitBus, wait_s
-from master.suit.frame import Frame
-from master.suit.interface import open_bus
-from master.suit.nodes import BusConfig
 
 SYNC = Frame(0x080, b"1234", fd=False)
 NODE = Frame(0x105, bytes(24), fd=True)
@@ -59,7 +59,7 @@ class ScriptedBus(can.BusABC):
 
 
 class Scene:
-    """A SuitBus on scripted buses; `opened` are those it was given."""
+    """A CanBus on scripted buses; `opened` are those it was given."""
 
     def __init__(self, interface: str = "socketcan", opener: Callable[[], can.BusABC] | None = None) -> None:
         config = BusConfig(name="suit", interface=interface, channel="can0")
@@ -67,7 +67,7 @@ class Scene:
         self.frames: list[tuple[str, int, bytes]] = []
         self.stirred = asyncio.Event()
         self._open = opener or ScriptedBus
-        self.bus = SuitBus(config, self.on_frame, self.on_change, self.opener)
+        self.bus = CanBus(config, self.on_frame, self.on_change, self.opener)
 
     def opener(self, config: BusConfig) -> can.BusABC:
         self.opened.append(self._open())
@@ -282,7 +282,7 @@ def test_foreign_datagrams_are_counted_and_harm_nothing(group: BusConfig) -> Non
             heard.append((frame_id, data))
             good.set()
 
-        bus = SuitBus(group, on_frame)
+        bus = CanBus(group, on_frame)
         bus.open()
         peer = open_bus(group)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
@@ -310,7 +310,7 @@ def test_own_echo_is_told_apart_from_answers(group: BusConfig) -> None:
             heard.append(frame_id)
             came.set()
 
-        bus = SuitBus(group, on_frame)
+        bus = CanBus(group, on_frame)
         bus.open()
         peer = open_bus(group)
         bus.send(SYNC)

@@ -15,13 +15,13 @@ from dataclasses import asdict, dataclass
 
 import can
 
+from common.can.config import BusConfig
+from common.can.frame import Frame
+from common.can.interface import descriptor, error_number, open_bus
+from common.can.quiet import OncePerSecond
+from common.can.reader import DescriptorReader, Reader, ThreadReader
 from common.clock import monotonic_ns
 from common.errors import BusError
-from master.suit.frame import Frame
-from master.suit.interface import descriptor, error_number, open_bus
-from master.suit.nodes import BusConfig
-from master.suit.quiet import OncePerSecond
-from master.suit.reader import DescriptorReader, Reader, ThreadReader
 
 FIRST_WAIT_S = 0.1
 LONGEST_WAIT_S = 2.0
@@ -70,7 +70,7 @@ def is_bad_frame(error: BaseException) -> bool:
     return isinstance(error, can.CanOperationError) and cause is not None and error_number(error) is None
 
 
-class SuitBus:
+class CanBus:
     """A bus that is kept open. Use it from the event loop on which `open` was called."""
 
     def __init__(

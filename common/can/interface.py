@@ -10,8 +10,8 @@ from typing import Any
 
 import can
 
+from common.can.config import BusConfig
 from common.errors import BusError
-from master.suit.nodes import BusConfig
 
 RECEIVE_BUFFER_BYTES = 1 << 20
 """Some 4000 waiting udp_multicast frames: half a second of 36 nodes."""
@@ -97,7 +97,8 @@ def explain(config: BusConfig, error: BaseException) -> str:
     reason = _reason(error)
     what = f"bus {config.name}: cannot open {config.interface} {config.channel}: {reason}"
     advice = _advice(config, error)
-    simulated = "without hardware, put this bus on udp_multicast and start the simulated suit (tandem suit)"
+    peers = "tandem suit for the nodes, tandem drives for the robot's drives"
+    simulated = f"without hardware, put this bus on udp_multicast and start its peers: {peers}"
     return f"{what}; " + "; ".join(filter(None, [advice, simulated]))
 
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from master.suit.quiet import OncePerSecond
+from common.can.quiet import OncePerSecond
 
 SECOND = 1_000_000_000
 

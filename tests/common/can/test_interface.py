@@ -8,9 +8,9 @@ from pathlib import Path
 import can
 import pytest
 
+from common.can.config import BusConfig
+from common.can.interface import RECEIVE_BUFFER_BYTES, descriptor, error_number, explain, open_bus
 from common.errors import BusError
-from master.suit.interface import RECEIVE_BUFFER_BYTES, descriptor, error_number, explain, open_bus
-from master.suit.nodes import BusConfig
 
 
 def bus(interface: str, channel: str, fd: bool = True, **options: str | int | float | bool) -> BusConfig:
