@@ -19,6 +19,7 @@ from common.messages import Action, ClockReply, Command, ControlReply, ControlRe
 from common.offset import MasterExchange
 from deploy.judge import Trace
 from deploy.profiles import NURSING, example
+from deploy.troubles import Troubles, Way
 from master.config import MasterConfig
 from master.lease import LeaseKeeper
 from master.pipeline import CommandWriter, MasterPipeline, Solved
@@ -52,14 +53,15 @@ class World:
 
 
 class VirtualRun:
-    """One run; `now_ns` is the master's clock. Deterministic."""
+    """One run; `now_ns` is true time, and the master's clock until that is stepped. Deterministic."""
 
     def __init__(self, world: World) -> None:
         self._world = world
+        self.troubles = Troubles()
         self.master_config = _load(MasterConfig, "master", world)
         self.slave_config = _load(SlaveConfig, "slave", world)
         self._protocol = SuitProtocol.load(self.master_config.capture.dbc)
-        self._suit = build_suit(_load(SuitConfig, "suit", world), self._protocol)
+        self.suit = build_suit(_load(SuitConfig, "suit", world), self._protocol)
         self._master = MasterPipeline(self.master_config, self._protocol)
         self._writer = CommandWriter(self.master_config.robot)
         self._lease = LeaseKeeper(self.master_config.robot, self.master_config.operator.name)
@@ -79,8 +81,18 @@ class VirtualRun:
         self._tick = 0
 
     @property
+    def master_ns(self) -> int:
+        """The master's clock now."""
+        return self.now_ns + self.troubles.master_stepped_ns
+
+    @property
     def slave_ns(self) -> int:
         """The slave's clock now."""
+        return self._robot_ns + self.troubles.slave_stepped_ns
+
+    @property
+    def _robot_ns(self) -> int:
+        """Time at the robot itself, however the slave's clock is stepped."""
         drift = self.now_ns * self._world.slave_drift_ppm * 1e-6
         return self.now_ns + self._world.slave_ahead_ns + round(drift)
 
@@ -90,12 +102,12 @@ class VirtualRun:
         while self.now_ns < end_ns and not until():
             self._step()
 
-    def ask(self, action: Action, key: str = "") -> ControlReply:
-        """Ask the robot, as the operator, now."""
-        operator = self.master_config.operator.name
+    def ask(self, action: Action, key: str = "", operator: str | None = None) -> ControlReply:
+        """Ask the robot now; as the master's operator unless told."""
+        operator = self.master_config.operator.name if operator is None else operator
         request = ControlRequest(self.master_config.robot, action, operator, key)
         if action in CHALLENGED:
-            request = replace(request, challenge=self.ask(Action.STATUS).challenge)
+            request = replace(request, challenge=self.ask(Action.STATUS, operator=operator).challenge)
         return decode(self.slave.on_control(encode(request), self.slave_ns), ControlReply)
 
     def _step(self) -> None:
@@ -114,10 +126,14 @@ class VirtualRun:
         heapq.heappush(self._under_way, (when_ns, next(self._order), event))
 
     def _capture(self) -> None:
-        sync, late = self._master.tick(self._tick - 1, self.now_ns)
+        sync, late = self._master.tick(self._tick - 1, self.master_ns)
         if late is not None:
             self._put(late)
-        answer = self._suit.on_sync(self._protocol.parse_sync(sync.data), self.now_ns)
+        if not self.troubles.suit_heard:
+            for bus in self.master_config.capture.buses:
+                self._master.bus_down(bus.name)
+            return
+        answer = self.suit.on_sync(self._protocol.parse_sync(sync.data), self.now_ns)
         if answer.truth is not None:
             self.trace.add(answer.truth)
         for delay_ns, together in itertools.groupby(answer.frames, key=lambda frame: frame.delay_ns):
@@ -125,54 +141,59 @@ class VirtualRun:
 
     def _on_frames(self, frames: list[Outgoing]) -> None:
         for bus, frame, _ in frames:
-            if self._master.frame(bus, frame.id, frame.data, self.now_ns):
-                solved = self._master.close(self.now_ns)
+            if self._master.frame(bus, frame.id, frame.data, self.master_ns):
+                solved = self._master.close(self.master_ns)
                 if solved is not None:
                     self._put(solved)
 
     def _put(self, solved: Solved) -> None:
-        put_ns = self.now_ns + SOLVE_NS
+        put_ns = self.master_ns + SOLVE_NS
         command = self._writer.write(solved, self._lease.token, True, put_ns, put_ns)
         self.commands.append(command)
         self.trace.add(command)
         payload = encode(command)
         if self.deliver(payload):
-            self._at(put_ns + self._world.one_way_ns, lambda: self._on_command(payload))
+            self._carry(Way.COMMAND, payload, self.on_command, SOLVE_NS)
 
-    def _on_command(self, payload: bytes) -> None:
+    def on_command(self, payload: bytes) -> None:
+        """A command reaches the slave now."""
         self.slave.on_command(payload, self.slave_ns, self.slave_ns)
+
+    def _carry(self, way: Way, payload: bytes, arrive: Callable[[bytes], None], after_ns: int = 0) -> None:
+        for later_ns, arrived in self.troubles.carry(way, payload):
+            self._at(self.now_ns + after_ns + self._world.one_way_ns + later_ns, partial(arrive, arrived))
 
     def _drive(self) -> None:
         now_ns = self.slave_ns
-        self._robot.advance(now_ns)
-        setpoint = self.slave.tick(now_ns, self._robot.read())
+        self._robot.advance(self._robot_ns)
+        true = self._robot.read()
+        reading = replace(true, read_ns=true.read_ns + self.troubles.slave_stepped_ns)
+        setpoint = self.slave.tick(now_ns, self.troubles.read(reading), self.troubles.body())
+        self.troubles.watch(true, setpoint)
         if setpoint.ready:
-            self._robot.write(setpoint.position_rad)
+            self._robot.write(self.troubles.write(setpoint.position_rad))
             self.slave.written(now_ns)
         if self._tick % self.slave_config.loop.state_every == 0:
-            payload = self.slave.state(now_ns)
-            self._at(self.now_ns + self._world.one_way_ns, lambda: self._on_state(payload))
+            self._carry(Way.STATE, self.slave.state(now_ns), self._on_state)
 
     def _on_state(self, payload: bytes) -> None:
         state = decode(payload, RobotState, len(self.slave_config.skeleton.joints))
         self.states.append(state)
-        self._lease.on_state(state, self.now_ns)
-        request = self._lease.request(self.now_ns)
+        self._lease.on_state(state, self.master_ns)
+        request = self._lease.request(self.master_ns)
         if request is not None:
             reply = self.slave.on_control(encode(request), self.slave_ns)
-            self._lease.on_reply(decode(reply, ControlReply), self.now_ns)
+            self._lease.on_reply(decode(reply, ControlReply), self.master_ns)
 
     def _exchange_clocks(self) -> None:
-        query = encode(self.clock.query(self.now_ns))
-        self._at(self.now_ns + self._world.one_way_ns, lambda: self._on_clock(query))
+        self._carry(Way.QUERY, encode(self.clock.query(self.master_ns)), self._on_clock)
 
     def _on_clock(self, query: bytes) -> None:
         reply = self.slave.on_clock(query, self.slave_ns, self.slave_ns)
-        back_ns = self.now_ns + self._world.one_way_ns
-        self._at(back_ns, lambda: self._on_clock_reply(reply))
+        self._carry(Way.REPLY, reply, self._on_clock_reply)
 
     def _on_clock_reply(self, reply: bytes) -> None:
-        self.clock.on_reply(decode(reply, ClockReply), self.now_ns)
+        self.clock.on_reply(decode(reply, ClockReply), self.master_ns)
 
 
 def _load(model: type[Model], role: str, world: World) -> Model:
