@@ -80,12 +80,12 @@ def _pack_command(m: Command) -> tuple[Any, ...]:
     return (
         m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.solved_ns, s.put_ns,
         m.deadman_held, fields.pack_mask(m.valid), fields.pack_floats(m.position_rad, m.velocity_rad_s),
-        m.seen_frame,
+        m.seen_frame, m.seen_ns,
     )  # fmt: skip
 
 
 def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
-    fields.length(f, 12)
+    fields.length(f, 13)
     lease, sequence, tick, sampled_ns, frames_in_ns, solved_ns, put_ns = fields.counts(f[1:8])
     position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
     return Command(
@@ -98,7 +98,7 @@ def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
         fields.mask(f[9], joints),
         position_rad,
         velocity_rad_s,
-        fields.count(f[11]),
+        *fields.counts(f[11:]),
     )
 
 

@@ -46,6 +46,8 @@ class Command:
     velocity_rad_s: Array
     seen_frame: int = 0
     """Number of the newest video frame that the operator had seen when he moved so; 0 where there is none."""
+    seen_ns: int = 0
+    """When that frame arrived, ns of the master's clock; 0 where there is none."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 
@@ -13,6 +13,7 @@ class Priority(StrEnum):
     INTERACTIVE_HIGH = "interactive_high"
     DATA = "data"
     DATA_LOW = "data_low"
+    BACKGROUND = "background"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,15 @@ CONTROL = Topic("control", "tandem/{robot}/control", 0.0, 1.0, Priority.REAL_TIM
 CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 0.5, Priority.REAL_TIME, True, True, True)
 STATISTICS = Topic("statistics", "tandem/{robot}/statistics", 1.0, 5.0, Priority.DATA_LOW, False, True, False)
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
+VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUND, False, True, False)
 TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
 
-TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, CLOCK, STATISTICS, ALIVE, TRUTH)}
+TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, CLOCK, STATISTICS, ALIVE, VIDEO, TRUTH)}
+
+VIDEO_NAME = r"^[A-Za-z0-9_-]{1,32}$"
+"""What a camera may be called."""
+
+
+def video(camera: str) -> Topic:
+    """The pictures of one camera; its rate is whatever the link bears."""
+    return replace(VIDEO, key=f"tandem/{{robot}}/video/{camera}")
