@@ -1,8 +1,9 @@
 """The link between the two sides: one Zenoh session a process, live data first, nothing kept.
 
-Read configuration (what Zenoh is told), inbox (foreign thread → loop), queries, waiting, then session.
+Read configuration (what Zenoh is told), inbox (foreign thread → loop), queries, waiting, link, then session.
 """
 
-from common.link.session import Link, open_link
+from common.link.link import Link
+from common.link.session import Session, open_link, open_session
 
-__all__ = ["Link", "open_link"]
+__all__ = ["Link", "Session", "open_link", "open_session"]

@@ -1,4 +1,4 @@
-"""One Zenoh session on the event loop: publish, subscribe, answer, ask, be alive, close in bounded time."""
+"""One Zenoh session on the event loop, shared by the links of many robots; closed in bounded time."""
 
 from __future__ import annotations
 
@@ -9,24 +9,18 @@ import re
 import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import asdict
 
 import zenoh
 from zenoh.handlers import Callback
 
-from common.clock import monotonic_ns
 from common.config import LinkConfig
 from common.errors import LinkError
 from common.link.configuration import zenoh_configuration
-from common.link.counters import TopicCounters
-from common.link.inbox import Inbox, wake
-from common.link.queries import Answerer, ask
-from common.link.waiting import wait_for_peer
-from common.throttle import Throttle
-from common.topics import ALIVE, Topic
+from common.link.inbox import wake
+from common.link.link import Link
+from common.topics import ALIVE
 
 CLOSE_TIMEOUT_S = 1.0
-CONNECT_TIMEOUT_S = 3.0
 _ROBOT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _RUST_PLACE = re.compile(r" at \S+\.rs:\d+\.?")
 
@@ -34,141 +28,69 @@ log = logging.getLogger(__name__)
 
 
 @asynccontextmanager
-async def open_link(config: LinkConfig, robot: str) -> AsyncIterator[Link]:
-    """A link of one robot's topics. Raises LinkError where it cannot be opened; a peer may come later."""
+async def open_session(config: LinkConfig) -> AsyncIterator[Session]:
+    """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later."""
     if not (config.listen or config.connect):
         raise LinkError("the link has no endpoint: set `listen` or `connect` under [link]")
-    if not _ROBOT_NAME.fullmatch(robot):
-        raise LinkError(f"robot {robot!r}: expected a name of at most 64 letters, digits, '_', '.' and '-'")
     try:
         settings = zenoh.Config.from_json5(json.dumps(zenoh_configuration(config)))
-        session = await asyncio.to_thread(zenoh.open, settings)
+        opened = await asyncio.to_thread(zenoh.open, settings)
     except zenoh.ZError as error:
         raise LinkError(f"the link cannot be opened: {_RUST_PLACE.sub('', str(error))}") from None
-    link = Link(session, robot, asyncio.get_running_loop())
+    session = Session(opened, asyncio.get_running_loop())
     try:
-        yield link
+        yield session
     finally:
-        await link.close()
+        await session.close()
 
 
-class Link:
-    """The topics of one robot over one Zenoh session. All methods are for the loop's own thread.
+@asynccontextmanager
+async def open_link(config: LinkConfig, robot: str) -> AsyncIterator[Link]:
+    """A session for one robot alone. Raises LinkError where it cannot be opened; a peer may come later."""
+    check_robot_name(robot)
+    async with open_session(config) as session:
+        yield session.link(robot)
 
-    A link never hears itself: what it publishes reaches other sessions only. Nothing is kept for a late
-    subscriber.
-    """
 
-    def __init__(self, session: zenoh.Session, robot: str, loop: asyncio.AbstractEventLoop) -> None:
-        self.robot = robot
+def check_robot_name(robot: str) -> None:
+    """Raises LinkError for a name that is no part of a key."""
+    if not _ROBOT_NAME.fullmatch(robot):
+        raise LinkError(f"robot {robot!r}: expected a name of at most 64 letters, digits, '_', '.' and '-'")
+
+
+class Session:
+    """One Zenoh session. `link(robot)` gives the topics of a robot; all links end with the session."""
+
+    def __init__(self, session: zenoh.Session, loop: asyncio.AbstractEventLoop) -> None:
         self._session = session
         self._loop = loop
-        self._counters: dict[str, TopicCounters] = {}
-        self._receivers: list[Inbox | Answerer] = []
+        self._links: dict[str, Link] = {}
         self._held: list[object] = []
-        self._roles: set[str] = set()
         self._closed = False
 
-    def publish(self, topic: Topic) -> Callable[[bytes], None]:
-        """A function that puts a payload on the topic. It never blocks and never raises: failures count."""
-        if not topic.drop:
-            raise ValueError(f"{topic.name} would block under congestion, and stall the loop")
-        counters = self._count(topic)
-        throttle = Throttle()
-        publisher = self._session.declare_publisher(
-            topic.key_for(self.robot),
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=getattr(zenoh.Priority, topic.priority.name),
-            express=topic.express,
-            reliability=zenoh.Reliability.RELIABLE if topic.reliable else zenoh.Reliability.BEST_EFFORT,
-            allowed_destination=zenoh.Locality.REMOTE,
-        )
-        put = publisher.put
+    def link(self, robot: str) -> Link:
+        """The link of that robot, the same one each time. Raises LinkError for a name that is none."""
+        check_robot_name(robot)
+        if robot not in self._links:
+            self._links[robot] = Link(self._session, robot, self._loop)
+        return self._links[robot]
 
-        def publish(payload: bytes) -> None:
-            try:
-                put(payload)
-            except Exception as error:  # Zenoh's errors share no base that promises to be the only one
-                counters.put_errors += 1
-                if throttle.passes(monotonic_ns()):
-                    log.warning("%s: put failed: %s", topic.name, error)
-            else:
-                counters.sent += 1
+    def watch_robots(self, on_change: Callable[[str, bool], None]) -> None:
+        """Call `on_change(robot, alive)` on the loop as slaves come and go; those there already at once."""
 
-        return publish
-
-    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
-        """Call `on_payload(payload, arrived_ns)` on the loop with the newest payload of other sessions.
-
-        `arrived_ns` is stamped in Zenoh's thread, before the loop is woken.
-        """
-        key = topic.key_for(self.robot)
-        inbox = Inbox(key, on_payload, self._loop, self._count(topic))
-        self._receivers.append(inbox)
-        self._held.append(self._session.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
-
-    def answer(self, topic: Topic, handler: Callable[[bytes, int], bytes]) -> None:
-        """Answer other sessions' questions with `handler(payload, arrived_ns)`, run on the loop.
-
-        An exception in the handler is counted, logged, and sent as an error's text to who asked.
-        """
-        key = topic.key_for(self.robot)
-        answerer = Answerer(key, handler, self._loop, self._count(topic))
-        self._receivers.append(answerer)
-        self._held.append(
-            self._session.declare_queryable(key, Callback(answerer.on_query, indirect=False), complete=True)
-        )
-
-    async def connected(self, topic: Topic | None = None, timeout_s: float = CONNECT_TIMEOUT_S) -> None:
-        """Wait for another session, and where a topic is given, for one that answers its questions.
-
-        Raises LinkTimeoutError when none comes.
-        """
-        key = None if topic is None else topic.key_for(self.robot)
-        await wait_for_peer(self._session, key, timeout_s)
-
-    async def ask(self, topic: Topic, payload: bytes) -> bytes:
-        """The answer. LinkTimeoutError after the topic's time-out; LinkError where nobody can answer."""
-        return (await self.ask_stamped(topic, payload))[0]
-
-    async def ask_stamped(self, topic: Topic, payload: bytes) -> tuple[bytes, int]:
-        """As `ask`, with the answer's arrival in ns, stamped in Zenoh's thread."""
-        return await ask(self._session, topic, topic.key_for(self.robot), payload, self._count(topic))
-
-    def declare_alive(self, role: str) -> None:
-        """Show other sessions that this role lives, until the session closes or dies."""
-        self._roles.add(role)
-        self._held.append(self._session.liveliness().declare_token(self._alive_key(role)))
-
-    def watch_alive(self, on_change: Callable[[str, bool], None]) -> None:
-        """Call `on_change(role, alive)` on the loop as other sessions' roles come and go.
-
-        Those already alive are reported at once. It informs people; it protects nobody: a dead link is
-        noticed only after its lease.
-        """
-
-        def deliver(role: str, alive: bool) -> None:
-            if self._closed or role in self._roles:
-                return
-            try:
-                on_change(role, alive)
-            except Exception:
-                self._count(ALIVE).handler_errors += 1
-                log.exception("handler of %s failed", ALIVE.name)
+        def deliver(robot: str, alive: bool) -> None:
+            if not self._closed:
+                on_change(robot, alive)
 
         def on_sample(sample: zenoh.Sample) -> None:
-            role = str(sample.key_expr).rpartition("/")[2]
-            wake(self._loop, deliver, role, sample.kind == zenoh.SampleKind.PUT)
+            robot = str(sample.key_expr).split("/")[1]
+            wake(self._loop, deliver, robot, sample.kind == zenoh.SampleKind.PUT)
 
         self._held.append(
             self._session.liveliness().declare_subscriber(
-                self._alive_key("*"), Callback(on_sample, indirect=False), history=True
+                f"{ALIVE.key_for('*')}/slave", Callback(on_sample, indirect=False), history=True
             )
         )
-
-    def counters(self) -> dict[str, dict[str, int]]:
-        """Counters per topic name."""
-        return {name: asdict(counters) for name, counters in self._counters.items()}
 
     @property
     def peers(self) -> int:
@@ -183,8 +105,8 @@ class Link:
         if self._closed:
             return True
         self._closed = True
-        for receiver in self._receivers:
-            receiver.close()
+        for link in self._links.values():
+            link.close()
         closed: asyncio.Future[None] = self._loop.create_future()
         threading.Thread(target=self._close_session, args=(closed,), name="link-close", daemon=True).start()
         done, _ = await asyncio.wait({closed}, timeout=timeout_s)
@@ -198,12 +120,6 @@ class Link:
         except Exception as error:  # a link that leads nowhere: nothing to be done about it now
             log.debug("close: %s", error)
         wake(self._loop, _settle, closed)
-
-    def _alive_key(self, role: str) -> str:
-        return f"{ALIVE.key_for(self.robot)}/{role}"
-
-    def _count(self, topic: Topic) -> TopicCounters:
-        return self._counters.setdefault(topic.name, TopicCounters())
 
 
 def _settle(closed: asyncio.Future[None]) -> None:

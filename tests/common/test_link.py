@@ -15,7 +15,7 @@ from zenoh.handlers import Callback
 from common.clock import monotonic_ns
 from common.config import LinkConfig
 from common.errors import LinkError, LinkTimeoutError
-from common.link import Link, open_link
+from common.link import Link, Session, open_link, open_session
 from common.link.counters import TopicCounters
 from common.link.queries import MAX_WAITING, Answerer
 from common.topics import CLOCK, COMMAND, CONTROL, STATE
@@ -405,7 +405,7 @@ class HangingSession:
 def test_closing_is_bounded_and_off_the_loop() -> None:
     async def test() -> None:
         session: Any = HangingSession()
-        link = Link(session, ROBOT, asyncio.get_running_loop())
+        link = Session(session, asyncio.get_running_loop())
         turns = 0
 
         async def other_work() -> None:
@@ -420,5 +420,40 @@ def test_closing_is_bounded_and_off_the_loop() -> None:
         assert turns > 3
         work.cancel()
         assert await link.close() is True  # once is enough
+
+    run(test)
+
+
+def test_one_session_serves_many_robots_and_keeps_them_apart() -> None:
+    async def test() -> None:
+        ends = {f"robot-{i}": free_endpoint() for i in (1, 2)}
+        seen: list[tuple[str, bool]] = []
+        async with (
+            open_link(LinkConfig(listen=[ends["robot-1"]]), "robot-1") as first,
+            open_session(LinkConfig(connect=list(ends.values()))) as session,
+        ):
+            session.watch_robots(lambda robot, alive: seen.append((robot, alive)))
+            links = {robot: session.link(robot) for robot in ends}
+            assert session.link("robot-1") is links["robot-1"]
+            heard = {robot: Heard() for robot in ends}
+            first.subscribe(COMMAND, heard["robot-1"])
+            first.declare_alive("slave")
+            await heard_through(links["robot-1"].publish(COMMAND), heard["robot-1"], b"for 1")
+            async with open_link(LinkConfig(listen=[ends["robot-2"]]), "robot-2") as second:
+                second.subscribe(COMMAND, heard["robot-2"])
+                second.answer(CONTROL, lambda payload, _: b"robot-2")
+                second.declare_alive("slave")
+                await heard_through(links["robot-2"].publish(COMMAND), heard["robot-2"], b"for 2")
+                await links["robot-2"].connected(CONTROL)
+                assert await links["robot-2"].ask(CONTROL, b"") == b"robot-2"
+                with pytest.raises(LinkError, match="nobody"):
+                    await links["robot-1"].ask(CONTROL, b"")
+                await until(lambda: len(seen) == 2)
+                assert session.peers == 2
+            await until(lambda: len(seen) == 3)
+            # the other went, this one goes on
+            await heard_through(links["robot-1"].publish(COMMAND), heard["robot-1"], b"again for 1")
+        assert set(heard["robot-2"].payloads) == {b"for 2"}
+        assert seen == [("robot-1", True), ("robot-2", True), ("robot-2", False)]
 
     run(test)

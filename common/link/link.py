@@ -1,0 +1,159 @@
+"""The topics of one robot over a session: publish, subscribe, answer, ask, be alive."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import asdict
+
+import zenoh
+from zenoh.handlers import Callback
+
+from common.clock import monotonic_ns
+from common.link.counters import TopicCounters
+from common.link.inbox import Inbox, wake
+from common.link.queries import Answerer, ask
+from common.link.waiting import wait_for_peer
+from common.throttle import Throttle
+from common.topics import ALIVE, Topic
+
+CONNECT_TIMEOUT_S = 3.0
+
+log = logging.getLogger(__name__)
+
+
+class Link:
+    """The topics of one robot over one Zenoh session. All methods are for the loop's own thread.
+
+    A link never hears its own session: what it publishes reaches other sessions only. Nothing is kept for
+    a late subscriber.
+    """
+
+    def __init__(self, session: zenoh.Session, robot: str, loop: asyncio.AbstractEventLoop) -> None:
+        self.robot = robot
+        self._session = session
+        self._loop = loop
+        self._counters: dict[str, TopicCounters] = {}
+        self._receivers: list[Inbox | Answerer] = []
+        self._held: list[object] = []
+        self._roles: set[str] = set()
+        self._closed = False
+
+    def publish(self, topic: Topic) -> Callable[[bytes], None]:
+        """A function that puts a payload on the topic. It never blocks and never raises: failures count."""
+        if not topic.drop:
+            raise ValueError(f"{topic.name} would block under congestion, and stall the loop")
+        counters = self._count(topic)
+        throttle = Throttle()
+        publisher = self._session.declare_publisher(
+            topic.key_for(self.robot),
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=getattr(zenoh.Priority, topic.priority.name),
+            express=topic.express,
+            reliability=zenoh.Reliability.RELIABLE if topic.reliable else zenoh.Reliability.BEST_EFFORT,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+        put = publisher.put
+
+        def publish(payload: bytes) -> None:
+            try:
+                put(payload)
+            except Exception as error:  # Zenoh's errors share no base that promises to be the only one
+                counters.put_errors += 1
+                if throttle.passes(monotonic_ns()):
+                    log.warning("%s: put failed: %s", topic.name, error)
+            else:
+                counters.sent += 1
+
+        return publish
+
+    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
+        """Call `on_payload(payload, arrived_ns)` on the loop with the newest payload of other sessions.
+
+        `arrived_ns` is stamped in Zenoh's thread, before the loop is woken.
+        """
+        key = topic.key_for(self.robot)
+        inbox = Inbox(key, on_payload, self._loop, self._count(topic))
+        self._receivers.append(inbox)
+        self._held.append(self._session.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
+
+    def answer(self, topic: Topic, handler: Callable[[bytes, int], bytes]) -> None:
+        """Answer other sessions' questions with `handler(payload, arrived_ns)`, run on the loop.
+
+        An exception in the handler is counted, logged, and sent as an error's text to who asked.
+        """
+        key = topic.key_for(self.robot)
+        answerer = Answerer(key, handler, self._loop, self._count(topic))
+        self._receivers.append(answerer)
+        self._held.append(
+            self._session.declare_queryable(key, Callback(answerer.on_query, indirect=False), complete=True)
+        )
+
+    async def connected(self, topic: Topic | None = None, timeout_s: float = CONNECT_TIMEOUT_S) -> None:
+        """Wait for another session, and where a topic is given, for one that answers its questions.
+
+        Raises LinkTimeoutError when none comes.
+        """
+        key = None if topic is None else topic.key_for(self.robot)
+        await wait_for_peer(self._session, key, timeout_s)
+
+    async def ask(self, topic: Topic, payload: bytes) -> bytes:
+        """The answer. LinkTimeoutError after the topic's time-out; LinkError where nobody can answer."""
+        return (await self.ask_stamped(topic, payload))[0]
+
+    async def ask_stamped(self, topic: Topic, payload: bytes) -> tuple[bytes, int]:
+        """As `ask`, with the answer's arrival in ns, stamped in Zenoh's thread."""
+        return await ask(self._session, topic, topic.key_for(self.robot), payload, self._count(topic))
+
+    def declare_alive(self, role: str) -> None:
+        """Show other sessions that this role lives, until the session closes or dies."""
+        self._roles.add(role)
+        self._held.append(self._session.liveliness().declare_token(self._alive_key(role)))
+
+    def watch_alive(self, on_change: Callable[[str, bool], None]) -> None:
+        """Call `on_change(role, alive)` on the loop as other sessions' roles come and go.
+
+        Those already alive are reported at once. It informs people; it protects nobody: a dead link is
+        noticed only after its lease.
+        """
+
+        def deliver(role: str, alive: bool) -> None:
+            if self._closed or role in self._roles:
+                return
+            try:
+                on_change(role, alive)
+            except Exception:
+                self._count(ALIVE).handler_errors += 1
+                log.exception("handler of %s failed", ALIVE.name)
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            role = str(sample.key_expr).rpartition("/")[2]
+            wake(self._loop, deliver, role, sample.kind == zenoh.SampleKind.PUT)
+
+        self._held.append(
+            self._session.liveliness().declare_subscriber(
+                self._alive_key("*"), Callback(on_sample, indirect=False), history=True
+            )
+        )
+
+    def counters(self) -> dict[str, dict[str, int]]:
+        """Counters per topic name."""
+        return {name: asdict(counters) for name, counters in self._counters.items()}
+
+    @property
+    def peers(self) -> int:
+        """How many sessions this one is connected to now."""
+        return 0 if self._closed else len(self._session.info.peers_zid())
+
+    def close(self) -> None:
+        """Hear and answer nothing from now on. The session stays open for the other robots' links."""
+        self._closed = True
+        for receiver in self._receivers:
+            receiver.close()
+
+    def _alive_key(self, role: str) -> str:
+        return f"{ALIVE.key_for(self.robot)}/{role}"
+
+    def _count(self, topic: Topic) -> TopicCounters:
+        return self._counters.setdefault(topic.name, TopicCounters())
