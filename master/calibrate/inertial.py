@@ -8,10 +8,10 @@ from datetime import date
 
 import numpy as np
 
+from common.calibration import Made
 from common.quaternion import Array
 from master.calibrate import accelerometer as acc
 from master.calibrate import gyroscope as gyr
-from master.calibrate.affine import Made
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
 from master.calibrate.soundness import check_inertial, check_samples, filled

@@ -8,8 +8,8 @@ from datetime import date
 import numpy as np
 from numpy.typing import NDArray
 
+from common.calibration import Made
 from common.quaternion import Array
-from master.calibrate.affine import Made
 from master.calibrate.ellipsoid import (
     Ellipsoid,
     NoEllipsoidError,

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from common.calibration import Made, NodeCalibration
 from common.config import load_config
 from common.quaternion import Array
-from master.calibrate.affine import Made, NodeCalibration
 from master.calibrate.mounting import Mounting
 from master.calibrate.node_file import write_calibration
 from master.calibrate.recording import NodeRecording, RecordingError

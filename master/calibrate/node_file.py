@@ -14,10 +14,10 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Array as TomlArray
 from tomlkit.items import Table
 
+from common.calibration import Made, NodeCalibration
 from common.config import check_config
 from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
-from master.calibrate.affine import Made, NodeCalibration
 
 Part = Literal["accelerometer", "gyroscope", "magnetometer", "mounting"]
 _KEY: dict[Part, str] = {

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from common.calibration import NodeCalibration
 from common.config import load_config
 from common.errors import TandemError
 from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate
 from deploy import cli
-from master.calibrate.affine import NodeCalibration
 
 RATE_HZ = 50.0
 BIAS: Array = np.array([0.3, -0.2, 0.1])

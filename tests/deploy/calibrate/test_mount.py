@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import typer
 
+from common.calibration import NodeCalibration
 from common.config import load_config
 from common.errors import TandemError
 from deploy.calibrate.mount import _times, mount
-from master.calibrate.affine import NodeCalibration
 
 
 @pytest.mark.parametrize("text", ["3", "1:2:3", "a:b", "-1:2", ":"])

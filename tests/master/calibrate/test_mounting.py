@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.calibration import NodeCalibration
 from common.config import load_config
 from common.errors import TandemError
 from common.quaternion import IDENTITY, Array, angle_between, conjugate, from_axis_angle, rotate
 from common.skeleton import Skeleton, load_skeleton
-from master.calibrate.affine import NodeCalibration
 from master.calibrate.hinge import PoorMotionError
 from master.calibrate.hinge_pair import find_hinge_pair
 from master.calibrate.mounting import Mounting, find_mounting, posture, zero_axes

@@ -4,10 +4,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.calibration import Made, NodeCalibration
 from common.config import load_config
 from common.errors import ConfigError
 from common.quaternion import Array
-from master.calibrate.affine import ACC, Made, NodeCalibration, load_calibration
+from master.calibrate.affine import ACC, load_calibration
 from master.calibrate.node_file import write_calibration
 
 MADE = Made(date=date(2026, 11, 22), recording="session.npz", unit="m/s²", residual_after=0.00113)

@@ -13,6 +13,7 @@ import pytest
 from rich.console import Console
 from scipy.spatial.transform import Rotation
 
+from common.calibration import NodeCalibration
 from common.config import load_config
 from common.errors import TandemError
 from common.quaternion import Array, from_rotation_vector
@@ -22,7 +23,6 @@ from deploy.calibrate.live.guide import GuideOptions, What
 from deploy.calibrate.live.run import LiveSession, free_name
 from deploy.calibrate.live.screen import line, screen
 from deploy.profiles import EXAMPLES
-from master.calibrate.affine import NodeCalibration
 from master.config import MasterConfig
 from master.suit.poll import Sweep
 from master.suit.simulated.config import SuitConfig
