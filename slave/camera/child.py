@@ -1,0 +1,92 @@
+"""What the camera's process does: take a request, make a picture, answer."""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from common.errors import RobotError
+from slave.camera.config import CameraConfig
+from slave.camera.jpeg import Fitter, decode, size_of
+from slave.camera.pipe import REQUEST, Answer, Reply, Request, pack_reply, request_of
+
+Make = Callable[[Request], Reply]
+
+
+def main(setting: str) -> None:
+    """Serve requests from standard input until it ends. `setting`: profile, then the `[camera]` as JSON."""
+    profile, _, config = setting.partition(" ")
+    # whatever a driver prints must not get between the pictures
+    answers = os.dup(1)
+    os.dup2(2, 1)
+    requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(requests,), name="requests", daemon=True).start()
+    try:
+        make = open_camera(profile, CameraConfig.model_validate_json(config))
+    except RobotError as error:
+        _write(answers, Reply(Answer.NEVER, body=str(error).encode()))
+        os._exit(0)  # a half-built OpenGL context makes trouble when it is taken down
+    _write(answers, Reply(Answer.READY))
+    while True:
+        request = requests.get()
+        try:
+            reply = make(request)
+        except (RobotError, ValueError) as error:
+            reply = Reply(Answer.TROUBLE, body=str(error).encode())
+        _write(answers, reply)
+
+
+def open_camera(profile: str, config: CameraConfig) -> Make:
+    """What makes pictures. Raises RobotError where this machine cannot."""
+    fitter = Fitter()
+    if config.source == "v4l2":
+        if not Path(config.device).exists():
+            raise RobotError(f"there is no camera {config.device}")
+        from slave.camera.v4l2 import V4l2Camera
+
+        real = V4l2Camera(config.device, config.width, config.height)
+        return lambda request: passed_on(*real.newest(), request.most_bytes, fitter)
+
+    from slave.camera.drawn import DrawnCamera
+
+    drawn = DrawnCamera(profile, config.name, config.width, config.height)
+    drawn.draw(np.zeros(drawn.joints))  # the first one takes the longest
+
+    def make(request: Request) -> Reply:
+        jpeg, width, height = fitter.fit(drawn.draw(request.position_rad), request.most_bytes)
+        return Reply(Answer.PICTURE, request.read_ns, width, height, jpeg)
+
+    return make
+
+
+def passed_on(taken_ns: int, jpeg: bytes, most_bytes: int, fitter: Fitter) -> Reply:
+    """The camera's own JPEG where it is small enough, else one that is. Raises ValueError on garbage."""
+    if len(jpeg) > most_bytes:
+        smaller, width, height = fitter.fit(decode(jpeg), most_bytes)
+        return Reply(Answer.PICTURE, taken_ns, width, height, smaller)
+    return Reply(Answer.PICTURE, taken_ns, *size_of(jpeg), jpeg)
+
+
+def _listen(requests: queue.SimpleQueue[Request]) -> None:
+    stdin = sys.stdin.buffer
+    while True:
+        head = stdin.read(REQUEST.size)
+        if len(head) < REQUEST.size:
+            os._exit(0)  # the slave has gone, whatever the driver is busy with
+        read_ns, most_bytes, length = request_of(head)
+        requests.put(Request(read_ns, most_bytes, np.frombuffer(stdin.read(length), "<f8")))
+
+
+def _write(answers: int, reply: Reply) -> None:
+    data = memoryview(pack_reply(reply))
+    try:
+        while data:
+            data = data[os.write(answers, data) :]
+    except BrokenPipeError:
+        os._exit(0)

@@ -1,0 +1,32 @@
+"""`[camera]`: what the operator sees, and how much of the link it may take."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from common.config import Section
+from common.topics import VIDEO_NAME
+
+
+class CameraConfig(Section):
+    """`[camera]` of the slave's TOML."""
+
+    source: Literal["off", "robot", "v4l2"] = "off"
+    """`robot`: through the eyes of the simulated robot, drawn from the encoders; `v4l2`: a real camera."""
+    name: str = Field("head", pattern=VIDEO_NAME)
+    """Names the topic, and with `robot` the model's camera; where it has none the whole robot is shown."""
+    device: str = "/dev/video0"
+    """Of a `v4l2` camera."""
+    width: int = Field(320, ge=80, le=1920, multiple_of=16)
+    """Pixels at best; with `height`. A poor link gets a half or a quarter of each."""
+    height: int = Field(240, ge=60, le=1080, multiple_of=4)
+    most_rate_hz: float = Field(12.0, gt=0.0, le=60.0)
+    """Pictures a second at best."""
+    least_rate_hz: float = Field(1.0, gt=0.0, le=10.0)
+    """And at worst, which is also what is sent while no operator says that he sees any."""
+    most_delay_s: float = Field(0.03, gt=0.0, le=1.0)
+    """How long a picture may keep the link busy: what is sent beside it waits for no longer."""
+    most_kb: float = Field(40.0, ge=4.0, le=1000.0)
+    """Size of one picture at best, kB."""

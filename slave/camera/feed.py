@@ -1,0 +1,242 @@
+"""The slave's side of its camera: a thread that asks for pictures and puts them on the link.
+
+Never on the loop. Whatever happens to the camera is words in `fault`, never a loss of motion.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns, to_s
+from common.errors import CodecError, RobotError
+from common.latency import Durations
+from common.messages import Command
+from common.offset import Offset
+from common.quaternion import Array
+from common.video import VideoFrame, encode_frame
+from slave.camera.config import CameraConfig
+from slave.camera.pipe import Reply, Request
+from slave.camera.process import CameraProcess, NeverError
+from slave.camera.rate import RateControl, RateLimits
+from slave.camera.sight import Seen, Sight
+
+_FIRST_BACK_OFF_S, _LONGEST_BACK_OFF_S = 0.5, 30.0
+_WELL_AFTER = 20
+"""Pictures after which a restarted process counts as well."""
+_IDLE_S = 0.25
+_JOIN_S = 1.0
+_BUSY_SHARE = 0.5
+"""Of one core, that making pictures may take."""
+
+log = logging.getLogger("tandem.camera")
+
+
+class Camera(Protocol):
+    """What the feed asks of a camera's process."""
+
+    def wait_ready(self) -> None:
+        """Wait until it can be asked."""
+        ...
+
+    def ask(self, request: Request) -> Reply:
+        """A picture. Raises RobotError."""
+        ...
+
+    def kill(self) -> None:
+        """End it now, from any thread."""
+        ...
+
+    def close(self) -> None:
+        """End it, and wait for that."""
+        ...
+
+
+class CameraFeed:
+    """One camera. `look`, `seen_by` and `figures` are for the loop, and cost it microseconds."""
+
+    def __init__(
+        self,
+        config: CameraConfig,
+        put: Callable[[bytes], None],
+        open_camera: Callable[[], Camera],
+        clock: Clock = monotonic_ns,
+    ) -> None:
+        """`put` must be safe in another thread than the loop's, and must not block."""
+        self.sight = Sight()
+        self.fault = ""
+        """What is wrong with the camera, in words; empty where nothing is."""
+        self._put = put
+        self._open = open_camera
+        self._clock = clock
+        self._rate = RateControl(
+            RateLimits(
+                config.most_rate_hz,
+                config.least_rate_hz,
+                to_ns(config.most_delay_s),
+                round(1000 * config.most_kb),
+            )
+        )
+        self._angles: tuple[Array, int] | None = None
+        self._seen: deque[Seen] = deque(maxlen=64)
+        self._wake = threading.Event()
+        self._stopping = False
+        self._camera: Camera | None = None
+        # above any number of an earlier run on this machine, which the master may still tell of
+        self._number = clock() // NS_PER_MS
+        self._count = _Count(clock())
+        self._make = Durations()
+        self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
+
+    def start(self) -> None:
+        """Let pictures come."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and the camera's process."""
+        self._stopping = True
+        camera = self._camera
+        if camera is not None:
+            camera.kill()
+        self._wake.set()
+        self._thread.join(_JOIN_S)
+
+    def look(self, position_rad: Array, read_ns: int) -> None:
+        """The newest joint angles (J,), and when they were read."""
+        self._angles = position_rad, read_ns
+
+    def on_command(self, command: Command, now_ns: int, offset: Offset) -> None:
+        """Take what an accepted command says of the picture that its master has."""
+        seen = self.sight.on_command(command, now_ns, offset)
+        if seen is not None:
+            self._seen.append(seen)
+            self._wake.set()
+
+    def figures(self) -> dict[str, object]:
+        """Rates of the last seconds, counters, and percentiles in ms."""
+        return {
+            **self._count.rates(self._clock()),
+            "budget_bytes": self._rate.budget_bytes,
+            "gave_way": self._rate.lowered,
+            "unseen": self._rate.lost,
+            "make_ms": self._make.summary(),
+            "transit_ms": self.sight.transit.summary(),
+            "action_to_observation_ms": self.sight.observation_age.summary(),
+            "fault": self.fault,
+        }
+
+    def _run(self) -> None:
+        back_off_s = _FIRST_BACK_OFF_S
+        while not self._stopping:
+            taken = self._count.pictures
+            try:
+                self._camera = self._open()
+                if not self._stopping:
+                    self._camera.wait_ready()
+                    self._serve(self._camera)
+            except NeverError as error:
+                self._say(str(error))
+                return
+            except RobotError as error:
+                self._say(str(error))
+            except Exception as error:  # a thread that dies would say nothing
+                log.exception("the camera's thread")
+                self._say(f"{type(error).__name__}: {error}")
+            finally:
+                if self._camera is not None:
+                    self._camera.close()
+            if self._count.pictures - taken > _WELL_AFTER:
+                back_off_s = _FIRST_BACK_OFF_S
+            self._pause(back_off_s)
+            back_off_s = min(2 * back_off_s, _LONGEST_BACK_OFF_S)
+
+    def _serve(self, camera: Camera) -> None:
+        rest_until_ns = 0
+        while not self._stopping:
+            self._wake.clear()
+            while self._seen:
+                seen = self._seen.popleft()
+                self._rate.seen(seen.number, seen.known_ns, seen.transit_ns)
+            now_ns = self._clock()
+            due_ns, angles = self._rate.due_ns(now_ns), self._angles
+            if due_ns is None or angles is None:
+                self._wake.wait(_IDLE_S)
+                continue
+            wait_ns = max(due_ns, rest_until_ns) - now_ns
+            if wait_ns > 0:
+                self._wake.wait(to_s(wait_ns))
+                continue
+            reply = camera.ask(Request(angles[1], self._rate.budget_bytes, angles[0]))
+            made_ns = self._clock()
+            rest_until_ns = now_ns + round((made_ns - now_ns) / _BUSY_SHARE)
+            self._make.record(made_ns - now_ns)
+            self._send(reply)
+            self.fault = ""
+
+    def _send(self, reply: Reply) -> None:
+        self._number += 1
+        now_ns = self._clock()
+        frame = VideoFrame(self._number, reply.captured_ns, now_ns, reply.width, reply.height, reply.body)
+        try:
+            payload = encode_frame(frame)
+        except CodecError as error:
+            raise RobotError(f"the camera made no picture: {error}") from None
+        # before it is put: its acknowledgement may be quicker than this thread
+        self.sight.sent(self._number, reply.captured_ns, now_ns)
+        self._rate.sent(self._number, len(payload), now_ns)
+        self._put(payload)
+        self._count.add(len(payload), reply.width, now_ns)
+
+    def _say(self, words: str) -> None:
+        if not self._stopping and words != self.fault:
+            log.warning("no video: %s", words)
+            self.fault = words
+
+    def _pause(self, seconds: float) -> None:
+        until_ns = self._clock() + to_ns(seconds)
+        while not self._stopping and (left_ns := until_ns - self._clock()) > 0:
+            self._wake.clear()
+            self._wake.wait(to_s(left_ns))
+
+
+def open_feed(config: CameraConfig, profile: str, put: Callable[[bytes], None]) -> CameraFeed | None:
+    """The configured camera's feed, not yet started; None where it is off."""
+    if config.source == "off":
+        return None
+    return CameraFeed(config, put, lambda: CameraProcess(profile, config))
+
+
+class _Count:
+    """Pictures and bytes, in all and over the last seconds. Written by one thread, read by another."""
+
+    _OVER_NS = 5_000_000_000
+
+    def __init__(self, now_ns: int) -> None:
+        self.pictures = 0
+        self._bytes = 0
+        self._width = 0
+        self._since_ns = now_ns
+        self._lately: deque[tuple[int, int]] = deque(maxlen=512)
+
+    def add(self, size: int, width: int, now_ns: int) -> None:
+        self.pictures += 1
+        self._bytes += size
+        self._width = width
+        self._lately.append((now_ns, size))
+
+    def rates(self, now_ns: int) -> dict[str, object]:
+        since_ns = max(now_ns - self._OVER_NS, self._since_ns)
+        # copied at once: the other thread may add to it meanwhile
+        sizes = [size for at_ns, size in self._lately.copy() if at_ns > since_ns]
+        over_s = max(to_s(now_ns - since_ns), 1e-3)
+        return {
+            "pictures": self.pictures,
+            "fps": len(sizes) / over_s,
+            "kb_s": sum(sizes) / over_s / 1000,
+            "mean_kb": sum(sizes) / len(sizes) / 1000 if sizes else 0.0,
+            "width": self._width,
+            "sent_kb": self._bytes / 1000,
+        }

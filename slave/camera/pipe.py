@@ -1,0 +1,92 @@
+"""What the slave and its camera's process say to each other over two pipes. Pure.
+
+The slave asks for one picture at a time, with the newest joint angles; the process answers with it, or with
+words. So nothing ever queues, and a picture is never older than its making.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from common.errors import CodecError
+from common.quaternion import Array
+from common.video import MAX_JPEG
+
+REQUEST = struct.Struct("<QII")
+REPLY = struct.Struct("<BQHHI")
+MOST_JOINTS = 1024
+
+
+class Answer(IntEnum):
+    """Kinds of reply."""
+
+    READY = 1
+    """Open, and waiting to be asked."""
+    PICTURE = 2
+    TROUBLE = 3
+    """It failed, in words, and may go when tried again."""
+    NEVER = 4
+    """This machine cannot, in words: no use in trying again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One picture, please."""
+
+    read_ns: int
+    """When the angles were read."""
+    most_bytes: int
+    position_rad: Array
+    """(J,)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """A picture, or words."""
+
+    answer: Answer
+    captured_ns: int = 0
+    width: int = 0
+    height: int = 0
+    body: bytes = b""
+    """JPEG, or UTF-8."""
+
+    @property
+    def words(self) -> str:
+        """What it says, where it is not a picture."""
+        return self.body.decode("utf-8", "replace")
+
+
+def pack_request(request: Request) -> bytes:
+    """The request's bytes."""
+    angles = np.ascontiguousarray(request.position_rad, "<f8").tobytes()
+    return REQUEST.pack(request.read_ns, request.most_bytes, len(request.position_rad)) + angles
+
+
+def pack_reply(reply: Reply) -> bytes:
+    """The reply's bytes."""
+    head = (reply.answer, reply.captured_ns, reply.width, reply.height, len(reply.body))
+    return REPLY.pack(*head) + reply.body
+
+
+def request_of(head: bytes) -> tuple[int, int, int]:
+    """`read_ns`, `most_bytes` and how many bytes of angles follow. Raises CodecError."""
+    read_ns, most_bytes, joints = REQUEST.unpack(head)
+    if joints > MOST_JOINTS:
+        raise CodecError(f"{joints} joints")
+    return read_ns, most_bytes, 8 * joints
+
+
+def reply_of(head: bytes) -> tuple[Reply, int]:
+    """A reply without its body, and how many bytes of it follow. Raises CodecError."""
+    answer, captured_ns, width, height, length = REPLY.unpack(head)
+    if length > MAX_JPEG:
+        raise CodecError(f"{length} bytes from the camera's process")
+    try:
+        return Reply(Answer(answer), captured_ns, width, height), length
+    except ValueError:
+        raise CodecError(f"an answer of kind {answer} from the camera's process") from None

@@ -1,0 +1,137 @@
+"""How large the next picture may be, and when it is due: so that video never holds up what matters. Pure.
+
+Additive increase, multiplicative decrease (Chiu and Jain 1989) of a picture's size, steered by the delay
+that the picture itself met, as LEDBAT (RFC 6817) does: its transit less the least transit of late. A link
+keeps what it cannot send at once in a queue, and a state sent behind a picture waits as long as the
+picture's last byte. So that wait is what is bounded. At most two pictures are under way at a time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LEAST_BYTES = 1500
+START_BYTES = 6000
+_MORE_BYTES = 1000
+_LESS = 0.6
+_SLOWER, _FASTER = 1.5, 0.7
+_WINDOW = 2
+_SHARE = 0.5
+"""Of the link's time that pictures may take."""
+_USED = 0.6
+"""A picture that needed less of its budget says nothing about a larger one."""
+_LOST_NS = 1_000_000_000
+_BASE_NS = 10_000_000_000
+"""The least transit is that of the last one to two times this long: routes change."""
+
+
+@dataclass(frozen=True, slots=True)
+class RateLimits:
+    """Bounds of what the control may choose."""
+
+    most_rate_hz: float
+    least_rate_hz: float
+    most_delay_ns: int
+    most_bytes: int
+
+
+@dataclass(slots=True)
+class _Sent:
+    size: int
+    sent_ns: int
+    budget: float
+
+
+class RateControl:
+    """Pictures under way, and what their acknowledgements teach."""
+
+    def __init__(self, limits: RateLimits) -> None:
+        self._limits = limits
+        self._fastest_ns = 1e9 / limits.most_rate_hz
+        self._slowest_ns = max(1e9 / limits.least_rate_hz, self._fastest_ns)
+        self._interval_ns = self._fastest_ns
+        self._budget = float(min(START_BYTES, limits.most_bytes))
+        self._under_way: dict[int, _Sent] = {}
+        self._last_sent_ns: int | None = None
+        self._rest_until_ns = 0
+        self._lowered_ns = -1
+        self._base = _LeastTransit()
+        self.lowered = 0
+        """Times that it gave way."""
+        self.lost = 0
+        """Pictures that nobody said he had seen."""
+
+    @property
+    def budget_bytes(self) -> int:
+        """What the next picture may weigh."""
+        return int(self._budget)
+
+    @property
+    def under_way(self) -> int:
+        """Pictures sent and not yet seen."""
+        return len(self._under_way)
+
+    def due_ns(self, now_ns: int) -> int | None:
+        """When the next picture may be sent; None while as many are under way as may be."""
+        self._give_up(now_ns)
+        if len(self._under_way) >= _WINDOW:
+            return None
+        if self._last_sent_ns is None:
+            return now_ns
+        return max(self._last_sent_ns + round(self._interval_ns), self._rest_until_ns)
+
+    def sent(self, number: int, size: int, now_ns: int) -> None:
+        """Note that a picture has been put on the link."""
+        self._under_way[number] = _Sent(size, now_ns, self._budget)
+        self._last_sent_ns = now_ns
+
+    def seen(self, number: int, now_ns: int, transit_ns: int | None) -> None:
+        """The operator's side has received this picture; those before it will not be told of any more.
+
+        `transit_ns`: from sent to received; None where the clocks' offset is not trusted, and then only the
+        number under way is learnt.
+        """
+        sent = self._under_way.get(number)
+        self._under_way = {n: s for n, s in self._under_way.items() if n > number}
+        if sent is None or transit_ns is None:
+            return
+        delay_ns = max(0, transit_ns - self._base.take(transit_ns, now_ns))
+        self._rest_until_ns = sent.sent_ns + round(delay_ns / _SHARE)
+        if delay_ns > self._limits.most_delay_ns:
+            if sent.sent_ns > self._lowered_ns:  # what was sent before the last step down taught it already
+                self._lower(now_ns)
+            return
+        self._interval_ns = max(self._interval_ns * _FASTER, self._fastest_ns)
+        if sent.size > _USED * sent.budget:
+            self._budget = min(self._budget + _MORE_BYTES, float(self._limits.most_bytes))
+
+    def _give_up(self, now_ns: int) -> None:
+        lost = [n for n, s in self._under_way.items() if now_ns - s.sent_ns > _LOST_NS]
+        for number in lost:
+            del self._under_way[number]
+        if lost:
+            self.lost += len(lost)
+            self._interval_ns = self._slowest_ns
+            self._lower(now_ns)
+
+    def _lower(self, now_ns: int) -> None:
+        self.lowered += 1
+        self._lowered_ns = now_ns
+        if self._budget <= LEAST_BYTES:
+            self._interval_ns = min(self._interval_ns * _SLOWER, self._slowest_ns)
+        self._budget = max(self._budget * _LESS, float(LEAST_BYTES))
+
+
+class _LeastTransit:
+    """Minimum over a sliding window, in two halves."""
+
+    def __init__(self) -> None:
+        self._since_ns: int | None = None
+        self._now: int | None = None
+        self._before: int | None = None
+
+    def take(self, transit_ns: int, now_ns: int) -> int:
+        if self._since_ns is None or now_ns - self._since_ns > _BASE_NS:
+            self._since_ns, self._before, self._now = now_ns, self._now, None
+        self._now = transit_ns if self._now is None else min(self._now, transit_ns)
+        return self._now if self._before is None else min(self._now, self._before)

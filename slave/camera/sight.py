@@ -1,0 +1,61 @@
+"""What the operator had seen when he moved: which picture, and how old it was by then. Pure."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+from common.latency import Durations
+from common.messages import Command
+from common.offset import Offset
+
+_KEPT = 256
+"""Pictures that are remembered: 20 s of them at the usual rate."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A command's word on the newest picture its master had."""
+
+    number: int
+    known_ns: int
+    """When the slave learnt of it, slave's clock."""
+    transit_ns: int | None
+    """From sent to received; None while the clocks' offset is not trusted."""
+
+
+class Sight:
+    """Remembers when each picture was taken and sent. `sent` may be called from another thread."""
+
+    def __init__(self) -> None:
+        self._pictures: OrderedDict[int, tuple[int, int]] = OrderedDict()
+        self._newest = 0
+        self.observation_age = Durations()
+        """From a picture taken to the posture sampled of the operator who had seen none newer."""
+        self.transit = Durations()
+        """From a picture sent to the master's receiving it."""
+
+    def sent(self, number: int, captured_ns: int, sent_ns: int) -> None:
+        """Remember a picture."""
+        self._pictures[number] = (captured_ns, sent_ns)
+        while len(self._pictures) > _KEPT:
+            self._pictures.popitem(last=False)
+
+    def on_command(self, command: Command, now_ns: int, offset: Offset) -> Seen | None:
+        """Take an accepted command; what it says of a picture that it is the first to tell of, else None."""
+        known = self._pictures.get(command.seen_frame)
+        if known is None:
+            return None
+        captured_ns, sent_ns = known
+        transit_ns: int | None = None
+        if offset.trusted:
+            sampled_ns = offset.local_ns(command.stamps.sampled_ns)
+            self.observation_age.record(sampled_ns - captured_ns)
+            if command.seen_ns:
+                transit_ns = offset.local_ns(command.seen_ns) - sent_ns
+        if command.seen_frame <= self._newest:
+            return None
+        self._newest = command.seen_frame
+        if transit_ns is not None:
+            self.transit.record(transit_ns)
+        return Seen(command.seen_frame, now_ns, transit_ns)

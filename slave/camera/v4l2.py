@@ -1,0 +1,76 @@
+"""A camera of metal through Video4Linux. For the camera's process.
+
+Its JPEGs (MJPG) are passed on as they are for as long as they are small enough.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from common.clock import NS_PER_S
+from common.errors import RobotError
+
+WAIT_S = 1.0
+
+
+class V4l2Camera:
+    """Keeps the newest picture of a device. `open_device` is linuxpy's, or a stand-in."""
+
+    def __init__(
+        self, device: str, width: int, height: int, open_device: Callable[[str], Any] | None = None
+    ) -> None:
+        """Raises RobotError where there is no such camera, or it gives no MJPG."""
+        if open_device is None:
+            try:
+                from linuxpy.video.device import Device
+            except ImportError:
+                raise RobotError("a V4L2 camera needs linuxpy: pip install 'tandem[v4l2]'") from None
+            open_device = Device
+        try:
+            self._device = open_device(device)
+            self._device.open()
+            self._capture = _capture(self._device)
+            self._capture.set_format(width, height, "MJPG")
+            self._capture.open()
+        except Exception as error:  # OSError and what linuxpy makes of it
+            raise RobotError(f"{device} gives no MJPG pictures: {error}") from None
+        self._fresh = threading.Condition()
+        self._newest: tuple[int, bytes] | None = None
+        self._ended: str | None = None
+        threading.Thread(target=self._read, name="v4l2", daemon=True).start()
+
+    def newest(self) -> tuple[int, bytes]:
+        """When it was taken, ns of the monotonic clock, and the JPEG; each once.
+
+        Raises RobotError where none comes.
+        """
+        with self._fresh:
+            if not self._fresh.wait_for(lambda: self._newest or self._ended, WAIT_S):
+                raise RobotError(f"the camera gave no picture for {WAIT_S:g} s")
+            newest, self._newest = self._newest, None
+        if newest is None:
+            raise RobotError(f"the camera has failed: {self._ended}")
+        return newest
+
+    def _read(self) -> None:
+        why = "it ended"
+        try:
+            for frame in self._capture:
+                # the driver's stamps are of the monotonic clock
+                taken = round(frame.timestamp * NS_PER_S), bytes(frame.data)
+                with self._fresh:
+                    self._newest = taken
+                    self._fresh.notify()
+        except Exception as error:
+            why = str(error)
+        with self._fresh:
+            self._ended = why
+            self._fresh.notify()
+
+
+def _capture(device: Any) -> Any:
+    from linuxpy.video.device import VideoCapture
+
+    return VideoCapture(device)
