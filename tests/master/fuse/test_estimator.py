@@ -374,3 +374,32 @@ def test_a_cutoff_must_lie_below_half_the_rate() -> None:
     assert mistake.expected == "less than half the rate of 200 Hz, or 0"
     with pytest.raises(ConfigError, match=r"estimation\.accelerometer_cutoff_hz = 100\.0"):
         Estimator(config, [Node()], RATE_HZ, identity(1))
+
+
+@pytest.mark.parametrize("name", ["vqf", "mahony", "ekf"])
+def test_with_constraints_it_finds_the_same_headings_and_goes_on_from_a_snapshot(name: str) -> None:
+    config = EstimationConfig.model_validate({"filter": name, "settle_s": 0.1, "constraints": "online"})
+    skeleton = load_skeleton("lower_limb")
+    fuse = Estimator(config, [Node()] * 7, RATE_HZ, identity(7), skeleton)
+    rng = np.random.default_rng(0)
+    truth = orientations(skeleton, rng.uniform(skeleton.lower_rad, skeleton.upper_rad)[None], 0.4)[0]
+    rest(fuse, truth, 100)
+    assert np.max(angle_between(fuse.posture().q_world_from_segment, truth)) < np.radians(0.5)
+    snapshot, ends = fuse.snapshot(), []
+    for _ in range(2):
+        rest(fuse, truth, 40, mag_ut=np.tile([9.0, 30.0, 4.0], (7, 1)))
+        ends.append(fuse.posture().q_world_from_segment)
+        fuse.restore(snapshot)
+    assert np.array_equal(ends[0], ends[1])
+
+
+def test_with_constraints_a_stance_gives_nodes_without_magnetometer_their_headings() -> None:
+    config = EstimationConfig(settle_s=0.1, stance_s=0.2, stance_heading_deg=40.0, constraints="online")
+    mounting = attitudes(7, 5)
+    calibration = replace(identity(7), q_sensor_from_segment=mounting)
+    fuse = Estimator(config, [Node()] * 7, RATE_HZ, calibration, load_skeleton("lower_limb"))
+    facing = heading_turn(np.full(7, np.radians(40.0)))
+    rest(fuse, multiply(facing, conjugate(mounting)), 80, mag_ut=np.full((7, 3), np.nan))
+    posture = fuse.posture()
+    assert posture.valid.all()
+    assert np.max(angle_between(posture.q_world_from_segment, facing)) < np.radians(0.5)

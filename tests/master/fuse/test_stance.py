@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from common.quaternion import angle_between, from_rotation_vector, heading_turn, multiply
+from common.quaternion import angle_between, conjugate, from_rotation_vector, heading_turn, multiply
 from master.fuse.heading import HeadingMemory
 from master.fuse.stance import Stance
 
@@ -102,3 +102,19 @@ def test_heading_memory_goes_on_from_a_snapshot() -> None:
     assert np.array_equal(memory.turn, SAME)
     with pytest.raises(TypeError, match="not a snapshot"):
         memory.restore(None)
+
+
+def test_of_mounted_nodes_it_takes_the_heading_and_says_how_far_they_lean() -> None:
+    mounted = np.array([True, True, False])
+    stance = Stance(MOUNTED, 2, 0.7, mounted)
+    # the heading is arbitrary; the second node's segment leans by 3° besides
+    lean = from_rotation_vector(np.array([[0.0, 0.0, 0.0], [np.radians(3.0), 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    standing = multiply(multiply(heading_turn(np.array([1.0, -2.0, 0.3])), lean), conjugate(MOUNTED))
+    assert not stance.add(standing, ALL).any()
+    assert stance.add(standing, ALL).all()
+    assert np.array_equal(stance.q_sensor_from_segment[mounted], MOUNTED[mounted])
+    assert np.allclose(stance.correction_rad, [-0.3, 2.7, 0.0], atol=0.01)
+    assert np.allclose(np.degrees(stance.lean_rad[mounted]), [0.0, 3.0], atol=0.01)
+    assert np.isnan(stance.lean_rad[2])
+    zero = multiply(standing[2:], stance.q_sensor_from_segment[2:])
+    assert np.max(angle_between(zero, heading_turn(0.7))) < 1e-7
