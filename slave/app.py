@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from contextlib import nullcontext
 
 from common.clock import monotonic_ns, to_ms
 from common.codec import encode
@@ -15,7 +16,8 @@ from common.pacing import TickGrid
 from common.realtime import take_priority
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
-from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS
+from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, video
+from slave.camera.feed import CameraFeed, open_feed
 from slave.config import SlaveConfig
 from slave.guard.body import Body
 from slave.guard.states import State
@@ -38,6 +40,10 @@ class Slave:
         self._ticks_missed = 0
         self._put_state: Callable[[bytes], None] = link.publish(STATE)
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
+        self._camera: CameraFeed | None = None
+        if config.camera.source != "off":
+            self._camera = open_feed(config.camera, config.profile, link.publish(video(config.camera.name)))
+            self._pipeline.on_accepted = self._camera.on_command
         link.subscribe(COMMAND, self._on_command)
         link.answer(CONTROL, self._on_control)
         link.answer(CLOCK, self._on_clock)
@@ -45,9 +51,10 @@ class Slave:
     async def run(self) -> None:
         """Guard, drive and tell until cancelled."""
         self._link.declare_alive("slave")
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._drive())
-            tasks.create_task(self._tell())
+        with self._camera or nullcontext():
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._drive())
+                tasks.create_task(self._tell())
 
     async def _drive(self) -> None:
         loop = self._config.loop
@@ -57,11 +64,15 @@ class Slave:
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
             body = Body(drives=self._servos.faults())
-            setpoint = self._pipeline.tick(monotonic_ns(), self._servos.read(), body)
+            reading = self._servos.read()
+            setpoint = self._pipeline.tick(monotonic_ns(), reading, body)
             self._brake_drives(self._pipeline.guard.state is State.ESTOP)
             if setpoint.ready:
                 self._servos.write(setpoint.position_rad)
                 self._pipeline.written(monotonic_ns())
+            if self._camera is not None:
+                self._camera.look(self._pipeline.position_rad, reading.read_ns)
+                self._pipeline.camera_fault = self._camera.fault
             # where the very tick was missed the next one tells, or an overloaded robot would seem dead
             if due.tick // loop.state_every != told:
                 told = due.tick // loop.state_every
@@ -112,6 +123,7 @@ class Slave:
                 "trusted": offset.trusted,
             },
             "undecodable": pipeline.undecodable,
+            "video": self._camera.figures() if self._camera else {},
             "link": self._link.counters(),
         }
 

@@ -8,6 +8,7 @@ from common.config import LinkConfig, Section
 from common.errors import ConfigError, ConfigMistake
 from common.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
+from slave.camera.config import CameraConfig
 from slave.encoders import EncoderConfig
 from slave.guard.config import GuardConfig
 from slave.servos.config import ServosConfig
@@ -33,6 +34,7 @@ class SlaveConfig(Section):
     track: TrackConfig = TrackConfig()
     servos: ServosConfig = ServosConfig()
     encoders: EncoderConfig = EncoderConfig()
+    camera: CameraConfig = CameraConfig()
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
 

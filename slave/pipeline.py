@@ -5,6 +5,8 @@ decode ▸ guard (gates) ▸ track ▸ limit ▸ servos ▸ encoders ▸ state
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from common.codec import decode, encode
@@ -18,7 +20,8 @@ from common.messages import (
     ControlRequest,
     RobotState,
 )
-from common.offset import SlaveExchange
+from common.offset import Offset, SlaveExchange
+from common.quaternion import Array
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
 from slave.guard import Guard, Setpoint
@@ -45,6 +48,10 @@ class SlavePipeline:
         self.one_way = Durations()
         """From put to received, of every command of the lease's holder while the offset was trusted."""
         self.undecodable: dict[str, int] = {}
+        self.on_accepted: Callable[[Command, int, Offset], None] | None = None
+        """Called with every command that the guard accepts, now_ns, and the clocks' offset."""
+        self.camera_fault = ""
+        """Told with the state; no reason to stop moving."""
         self._states_sent = 0
         self._reading: EncoderReading | None = None
         self._body = WELL
@@ -64,6 +71,8 @@ class SlavePipeline:
             self.one_way.record(offset.remote_ns(received_ns) - command.stamps.put_ns)
         if self.guard.on_command(command, received_ns, now_ns, offset).accepted:
             self.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
+            if self.on_accepted is not None:
+                self.on_accepted(command, now_ns, offset)
 
     def on_control(self, payload: bytes, now_ns: int) -> bytes:
         """Answer a request of a person or a master; never with silence."""
@@ -115,9 +124,18 @@ class SlavePipeline:
                 echo=self.journeys.echo,
                 master_offset_ns=offset.offset_ns,
                 offset_bound_ns=offset.bound_ns if offset.trusted else -1,
-                faults={**self._body.drives, **({"base": self._body.base} if self._body.base else {})},
+                faults=self._faults(),
             )
         )
+
+    @property
+    def position_rad(self) -> Array:
+        """(J,) of the newest encoder reading."""
+        return self._position_rad
+
+    def _faults(self) -> dict[str, str]:
+        named = {"base": self._body.base, "camera": self.camera_fault}
+        return {**self._body.drives, **{name: words for name, words in named.items() if words}}
 
     def _count(self, topic: str) -> None:
         self.undecodable[topic] = self.undecodable.get(topic, 0) + 1

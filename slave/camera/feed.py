@@ -91,11 +91,12 @@ class CameraFeed:
         self._make = Durations()
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
 
-    def start(self) -> None:
+    def __enter__(self) -> CameraFeed:
         """Let pictures come."""
         self._thread.start()
+        return self
 
-    def stop(self) -> None:
+    def __exit__(self, *_: object) -> None:
         """End the thread and the camera's process."""
         self._stopping = True
         camera = self._camera
@@ -202,10 +203,8 @@ class CameraFeed:
             self._wake.wait(to_s(left_ns))
 
 
-def open_feed(config: CameraConfig, profile: str, put: Callable[[bytes], None]) -> CameraFeed | None:
-    """The configured camera's feed, not yet started; None where it is off."""
-    if config.source == "off":
-        return None
+def open_feed(config: CameraConfig, profile: str, put: Callable[[bytes], None]) -> CameraFeed:
+    """The configured camera's feed, not yet started."""
     return CameraFeed(config, put, lambda: CameraProcess(profile, config))
 
 
