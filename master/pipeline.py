@@ -137,8 +137,19 @@ class CommandWriter:
         self._sequence = 0
         self.sent = 0
 
-    def write(self, solved: Solved, lease: int, deadman_held: bool, solved_ns: int, put_ns: int) -> Command:
-        """The command to put now. The sequence never restarts within a process, so no lease sees it fall."""
+    def write(
+        self,
+        solved: Solved,
+        lease: int,
+        deadman_held: bool,
+        solved_ns: int,
+        put_ns: int,
+        seen: tuple[int, int] = (0, 0),
+    ) -> Command:
+        """The command to put now. The sequence never restarts within a process, so no lease sees it fall.
+
+        `seen`: number and arrival of the newest video frame that the operator had when he moved so.
+        """
         self._sequence += 1
         self.sent += 1
         stamps = CommandStamps(solved.sampled_ns, solved.frames_in_ns, solved_ns, put_ns)
@@ -152,4 +163,6 @@ class CommandWriter:
             valid=solved.valid,
             position_rad=solved.position_rad,
             velocity_rad_s=solved.velocity_rad_s,
+            seen_frame=seen[0],
+            seen_ns=seen[1],
         )
