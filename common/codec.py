@@ -108,12 +108,12 @@ def _pack_state(m: RobotState) -> tuple[Any, ...]:
     return (
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, m.reason[:MAX_TEXT], m.operator,
         fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad), echo,
-        m.master_offset_ns, m.offset_bound_ns, _short_faults(m.faults), _pack_base(m.base),
+        m.master_offset_ns, m.offset_bound_ns, _short_faults(m.faults), _pack_base(m.base), m.lease_id,
     )  # fmt: skip
 
 
 def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
-    fields.length(f, 14)
+    fields.length(f, 15)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -132,6 +132,7 @@ def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
         offset_bound_ns=fields.signed(f[11]),
         faults=fields.texts(f[12], MAX_NAME, MAX_TEXT),
         base=_unpack_base(f[13]),
+        lease_id=fields.count(f[14]),
     )
 
 

@@ -108,6 +108,8 @@ class RobotState:
     """What is wrong with the robot's body, in words: by joint, or `base`, `camera`."""
     base: BaseAttitude | None = None
     """None where the base carries no sensor, or it has never answered."""
+    lease_id: int = 0
+    """Which lease it is (`common.lease.lease_id`): two masters may bear one name. 0 where there is none."""
 
 
 class Action(StrEnum):

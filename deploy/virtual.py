@@ -43,6 +43,8 @@ SLAVE_PHASE_NS = 2_300_000
 class World:
     """How the two hosts and the way between them are."""
 
+    start_ns: int = NS_PER_S
+    """What the master's clock shows when the run begins."""
     slave_ahead_ns: int = 7_123_456_789_012
     """The slave's clock minus the master's at the start."""
     slave_drift_ppm: float = 20.0
@@ -59,15 +61,16 @@ class VirtualRun:
         self._world = world
         self.troubles = Troubles()
         self.master_config = _load(MasterConfig, "master", world)
+        self.robot = self.master_config.commanded[0]
         self.slave_config = _load(SlaveConfig, "slave", world)
         self._protocol = SuitProtocol.load(self.master_config.capture.dbc)
         self.suit = build_suit(_load(SuitConfig, "suit", world), self._protocol)
         self._master = MasterPipeline(self.master_config, self._protocol)
-        self._writer = CommandWriter(self.master_config.robot)
-        self._lease = LeaseKeeper(self.master_config.robot, self.master_config.operator.name)
+        self._writer = CommandWriter(self.robot)
+        self._lease = LeaseKeeper(self.robot, self.master_config.operator.name)
         self.clock = MasterExchange()
         self.slave = SlavePipeline(self.slave_config, draw_token=itertools.count(1).__next__)
-        self.now_ns = NS_PER_S
+        self.now_ns = world.start_ns
         self._robot = SimulatedRobot(
             self.slave_config.skeleton, self.slave_config.encoders, origin_ns=self.slave_ns
         )
@@ -105,7 +108,7 @@ class VirtualRun:
     def ask(self, action: Action, key: str = "", operator: str | None = None) -> ControlReply:
         """Ask the robot now; as the master's operator unless told."""
         operator = self.master_config.operator.name if operator is None else operator
-        request = ControlRequest(self.master_config.robot, action, operator, key)
+        request = ControlRequest(self.robot, action, operator, key)
         if action in CHALLENGED:
             request = replace(request, challenge=self.ask(Action.STATUS, operator=operator).challenge)
         return decode(self.slave.on_control(encode(request), self.slave_ns), ControlReply)

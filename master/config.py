@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -13,6 +13,8 @@ from common.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from master.fuse.estimator import EstimationConfig
 from master.suit.nodes import NodeConfig, wiring_mistakes
+
+RobotName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
 
 
 class CaptureConfig(Section):
@@ -40,14 +42,23 @@ class OperatorConfig(Section):
 class MasterConfig(Section):
     """The whole file."""
 
-    robot: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")
+    robots: list[RobotName] = Field(default_factory=list)
+    """Whom to command, by the names in the slaves' own files. Each has a lease and a guard of its own."""
+    robot: RobotName | None = None
+    """Short for `robots` with one name."""
     profile: str = "nursing"
+    """Of all the robots: they are commanded the same joint angles."""
     operator: OperatorConfig
     capture: CaptureConfig
     estimation: EstimationConfig = EstimationConfig()
     nodes: dict[str, NodeConfig]
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
+
+    @property
+    def commanded(self) -> list[str]:
+        """The names of the robots to command."""
+        return self.robots if self.robot is None else [self.robot]
 
     @property
     def skeleton(self) -> Skeleton:
@@ -66,10 +77,19 @@ class MasterConfig(Section):
         except ConfigError as error:
             return error.mistakes
         return [
+            *self._robot_mistakes(),
             *wiring_mistakes(self.nodes, self.capture.buses, "capture.buses"),
             *node_mistakes(self.nodes, skeleton),
             *self.estimation.mistakes_at(self.capture.rate_hz),
         ]
+
+    def _robot_mistakes(self) -> list[ConfigMistake]:
+        if self.robot is not None and self.robots:
+            return [ConfigMistake("robot", self.robot, "only one of robot and robots")]
+        if not self.commanded:
+            return [ConfigMistake("robots", self.robots, "the name of at least one robot")]
+        twice = [name for i, name in enumerate(self.robots) if name in self.robots[:i]]
+        return [ConfigMistake("robots", name, "each robot once") for name in twice]
 
 
 def node_mistakes(nodes: dict[str, NodeConfig], skeleton: Skeleton) -> list[ConfigMistake]:

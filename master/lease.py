@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from common.clock import to_ns
+from common.lease import lease_id
 from common.messages import Action, ControlReply, ControlRequest, RobotState
 
 RETRY_S = 0.25
@@ -12,7 +13,7 @@ GRACE_S = 0.5
 
 
 class LeaseKeeper:
-    """Claims once the robot is heard, keeps the token, drops it when the robot names another holder."""
+    """Claims once the robot is heard, keeps the token, drops it when the robot names another lease."""
 
     def __init__(self, robot: str, operator: str, clock: int = 0) -> None:
         """`clock`: the number by which this master asks for the slave's clock (`MasterExchange.asker`)."""
@@ -38,9 +39,18 @@ class LeaseKeeper:
             self.token = reply.lease
             self._granted_ns = now_ns
 
+    def holds(self, state: RobotState) -> bool:
+        """Whether the robot says that this master's lease is the live one; another's may bear its name."""
+        return self.token != 0 and state.lease_id == lease_id(self.token)
+
     def on_state(self, state: RobotState, now_ns: int) -> None:
         """Notice a lease that was lost: it is claimed anew, but only a person engages again."""
         settled = now_ns - self._granted_ns > to_ns(GRACE_S)
-        if self.token and settled and state.operator != self._operator:
+        if self.token and settled and not self.holds(state):
             self.token = 0
-            self.answer = f"the lease was lost to {state.operator or 'nobody'}"
+            self.answer = f"the lease was lost to {self._other(state.operator)}"
+
+    def _other(self, operator: str) -> str:
+        if operator == self._operator:
+            return f"another master of {operator}"
+        return operator or "nobody"

@@ -11,9 +11,7 @@ from common.topics import STATE
 class RobotWatch:
     """The newest state, whether the robot has fallen silent, and round-trip times."""
 
-    def __init__(self, operator: str | None = None) -> None:
-        """`operator`: only while that one holds the lease the echoes are of this master's commands."""
-        self._operator = operator
+    def __init__(self) -> None:
         self.state: RobotState | None = None
         self.round_trip = RoundTrip()
         self._heard_ns = 0
@@ -21,12 +19,14 @@ class RobotWatch:
         self._was_silent = True
         self.times_lost = 0
 
-    def on_state(self, state: RobotState, arrived_ns: int) -> None:
-        """Take a state message; each command's echo closes one round trip."""
+    def on_state(self, state: RobotState, arrived_ns: int, ours: bool = True) -> None:
+        """Take a state message; each command's echo closes one round trip.
+
+        `ours`: whether this master holds the lease. Else the echoes are of another's commands.
+        """
         self.state = state
         self._heard_ns = arrived_ns
         echo = state.echo
-        ours = self._operator is None or state.operator == self._operator
         if ours and echo is not None and echo.sequence != self._echoed:
             self._echoed = echo.sequence
             # the time on the slave is measured on the slave's clock alone, so no offset enters

@@ -12,6 +12,7 @@ import numpy as np
 from common.codec import decode, encode
 from common.errors import CodecError
 from common.latency import Durations
+from common.lease import lease_id
 from common.messages import (
     Action,
     ClockQuery,
@@ -125,6 +126,7 @@ class SlavePipeline:
                 master_offset_ns=offset.offset_ns,
                 offset_bound_ns=offset.bound_ns if offset.trusted else -1,
                 faults=self._faults(),
+                lease_id=lease_id(self.guard.lease.token),
             )
         )
 

@@ -13,7 +13,7 @@ from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.synergy import synergy_positions
 from deploy.demo.baseline import MOST_S, Comparison, arrivals, compare
 from deploy.demo.curves import Curves, curves
-from deploy.demo.rig import Rig
+from deploy.demo.rig import ROBOT, Rig
 from deploy.judge import Accuracy, Motion, SolvedSeries, TruthSeries, accuracy, motion
 from deploy.profiles import example
 from master.suit.simulated.config import SuitConfig
@@ -57,6 +57,7 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
     compared = compare(truth, moved, accepted, slave_config) if moved_right else None
     figures = {child.role: child.figures() for child in children}
     master, slave = figures.get("master", {}), figures.get("slave", {})
+    of_robot = master.get("robots", {}).get(ROBOT, {})
     problems = [f"{role} ended with status {status}" for role, status in statuses.items() if status != 0]
     problems += [f"{role} left no figures" for role in ("master", "slave") if not figures.get(role)]
     if "track" not in observer.guards_seen:
@@ -72,12 +73,12 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
             "seed": options.seed,
         },
         "ticks": master.get("ticks", {}),
-        "commands": _commands(master, slave),
+        "commands": _commands(of_robot, slave),
         "stages_ms": slave.get("stages_ms", {}),
         "frames_in_to_put_ms": master.get("frames_in_to_put_ms", {}),
         "end_to_end_ms": slave.get("end_to_end_ms", {}),
         "one_way_ms": _one_way(slave),
-        "round_trip_ms": master.get("round_trip_ms", {}),
+        "round_trip_ms": of_robot.get("round_trip_ms", {}),
         "motion_lag_ms": moved_right.lag_ms if moved_right else None,
         "motion": _motion(moved_right),
         "motion_by_strategy": _motion_by_strategy(compared),
@@ -108,10 +109,10 @@ def _what_moved(options: DemoOptions) -> str:
     return options.motion or load_config(example("suit", options.profile), SuitConfig).motion
 
 
-def _commands(master: dict[str, Any], slave: dict[str, Any]) -> dict[str, Any]:
+def _commands(of_robot: dict[str, Any], slave: dict[str, Any]) -> dict[str, Any]:
     guard = slave.get("guard", {})
     return {
-        "sent": master.get("commands_sent", 0),
+        "sent": of_robot.get("commands_sent", 0),
         "received": guard.get("received", 0),
         "accepted": guard.get("accepted", 0),
         "dropped": guard.get("dropped", {}),

@@ -109,6 +109,8 @@ def test_a_file_of_the_other_side_is_one_line_a_key_that_does_not_belong(tandem:
     assert status == 1
     lines = said.splitlines()
     assert [re.sub(r".*master\.toml: (\w+) = .*", r"\1", line) for line in lines] == [
+        "robot",
+        "robots",
         "operator",
         "capture",
         "estimation",

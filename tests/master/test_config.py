@@ -26,6 +26,12 @@ def test_the_example_is_right() -> None:
     assert config.capture.dbc.is_file()
 
 
+def test_robots_are_named_in_a_list_or_one_alone() -> None:
+    assert load_config(EXAMPLE, MasterConfig).commanded == ["robot-1"]
+    assert load_config(EXAMPLE, MasterConfig, ["robots=['b', 'a']"]).commanded == ["b", "a"]
+    assert load_config(EXAMPLE, MasterConfig, ["robots=[]", "robot='b'"]).commanded == ["b"]
+
+
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
@@ -42,6 +48,10 @@ def test_the_example_is_right() -> None:
         ("estimation.gyroscope_cutoff_hz=100.0", ["gyroscope_cutoff_hz = 100.0", "less than half the rate"]),
         ("estimation.filter='magic'", ["estimation.filter = 'magic'", "'vqf', 'mahony' or 'ekf'"]),
         ("robot='robot 1'", ["robot = 'robot 1'", "pattern"]),
+        ("robots=['robot 1']", ["robots.0 = 'robot 1'", "pattern"]),
+        ("robots=[]", ["robots = []", "at least one robot"]),
+        ("robots=['a', 'b', 'a']", ["robots = 'a'", "each robot once"]),
+        ("robot='robot-2'", ["robot = 'robot-2'", "only one of robot and robots"]),
     ],
 )
 def test_one_line_a_mistake(override: str, expected: list[str]) -> None:

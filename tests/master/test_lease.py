@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from common.clock import NS_PER_S, to_ns
+from common.lease import lease_id
 from common.messages import Action, ControlReply, RobotState
 from master.lease import GRACE_S, RETRY_S, LeaseKeeper
 
 
-def state(operator: str) -> RobotState:
+def state(operator: str, token: int = 0) -> RobotState:
     zeros = np.zeros(25)
-    return RobotState("r", 1, 1, 1, "hold", "", operator, np.ones(25, np.bool_), zeros, zeros, None, 0, 1)
+    return RobotState(
+        "r", 1, 1, 1, "hold", "", operator, np.ones(25, np.bool_), zeros, zeros, None, 0, 1,
+        lease_id=lease_id(token),
+    )  # fmt: skip
 
 
 def test_the_claim_names_the_clock_that_will_stamp_the_commands() -> None:
@@ -45,7 +49,7 @@ def test_a_refused_claim_is_repeated_but_not_hammered() -> None:
 
 def test_a_granted_lease_is_kept() -> None:
     keeper = granted()
-    keeper.on_state(state("nurse"), 10 * NS_PER_S)
+    keeper.on_state(state("nurse", token=7), 10 * NS_PER_S)
     assert keeper.token == 7
     assert keeper.request(20 * NS_PER_S) is None
 
@@ -62,3 +66,16 @@ def test_a_lost_lease_is_noticed_and_claimed_anew() -> None:
     assert keeper.token == 0
     assert "lost to nobody" in keeper.answer
     assert keeper.request(5 * NS_PER_S) is not None
+
+
+def test_the_loser_to_another_master_of_the_same_name_notices() -> None:
+    keeper = granted()
+    assert keeper.holds(state("nurse", token=7))
+    assert not keeper.holds(state("nurse", token=8))
+    keeper.on_state(state("nurse", token=8), 10 * NS_PER_S)
+    assert keeper.token == 0
+    assert "another master of nurse" in keeper.answer
+
+
+def test_who_holds_no_lease_holds_none_that_is_free() -> None:
+    assert not LeaseKeeper("r", "nurse").holds(state(""))

@@ -1,0 +1,110 @@
+"""One commanded robot as the master has it: its lease, clock and topics. Robots share none of this."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Callable, Mapping
+
+from common.clock import monotonic_ns, to_ns
+from common.codec import decode, encode
+from common.errors import CodecError, LinkError
+from common.link import Link
+from common.messages import ClockReply, ControlReply, RobotState, Statistics
+from common.offset import MasterExchange
+from common.pacing import TickGrid
+from common.ticker import ticks
+from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
+from master.lease import LeaseKeeper
+from master.pipeline import CommandWriter, Solved
+from master.robot_watch import RobotWatch
+from master.video import VideoWatch
+
+log = logging.getLogger("tandem.master")
+
+
+class CommandedRobot:
+    """Sends one robot the operator's postures, keeps its lease and measures its clock."""
+
+    def __init__(self, name: str, operator: str, joints: int, link: Link) -> None:
+        self.name = name
+        self._joints = joints
+        self._link = link
+        asker = 1 + secrets.randbelow((1 << 63) - 1)
+        self._writer = CommandWriter(name)
+        self._clock = MasterExchange(asker)
+        self._lease = LeaseKeeper(name, operator, asker)
+        self._watch = RobotWatch()
+        self._undecodable = 0
+        self._put_command: Callable[[bytes], None] = link.publish(COMMAND)
+        self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
+        self.video = VideoWatch()
+        link.subscribe(STATE, self._on_state)
+        link.subscribe(VIDEO, self.video.on_payload)
+
+    async def run(self) -> None:
+        """Keep the lease and the clock until cancelled."""
+        self._link.declare_alive("master")
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._keep_lease())
+            tasks.create_task(self._keep_clock())
+
+    def send(self, solved: Solved, deadman_held: bool, solved_ns: int) -> None:
+        """Put the posture on this robot's topic. It never blocks."""
+        seen = self.video.seen_by(solved.sampled_ns)
+        command = self._writer.write(solved, self._lease.token, deadman_held, solved_ns, monotonic_ns(), seen)
+        self._put_command(encode(command))
+
+    def tell(self, now_ns: int, shared: Mapping[str, object]) -> None:
+        """Publish what the master counted, and what of it is this robot's own."""
+        self._put_statistics(encode(Statistics("master", now_ns, {**shared, **self.figures()})))
+
+    def _on_state(self, payload: bytes, arrived_ns: int) -> None:
+        try:
+            state = decode(payload, RobotState, self._joints)
+        except CodecError:
+            self._undecodable += 1
+            return
+        self._lease.on_state(state, arrived_ns)
+        self._watch.on_state(state, arrived_ns, ours=self._lease.holds(state))
+
+    async def _keep_lease(self) -> None:
+        async for due in ticks(TickGrid(monotonic_ns(), to_ns(0.05))):
+            change = self._watch.change(due.scheduled_ns)
+            if change:
+                log.warning("%s: %s", self.name, change)
+            request = self._lease.request(monotonic_ns())
+            if request is None or self._watch.silent(monotonic_ns()):
+                continue
+            try:
+                reply = decode(await self._link.ask(CONTROL, encode(request)), ControlReply)
+            except (LinkError, CodecError) as error:
+                log.info("%s: claim: %s", self.name, error)
+                continue
+            self._lease.on_reply(reply, monotonic_ns())
+            log.info("%s: claim: %s", self.name, reply.text)
+
+    async def _keep_clock(self) -> None:
+        async for _ in ticks(TickGrid(monotonic_ns(), round(1e9 / CLOCK.rate_hz))):
+            query = self._clock.query(monotonic_ns())
+            try:
+                payload, arrived_ns = await self._link.ask_stamped(CLOCK, encode(query))
+                self._clock.on_reply(decode(payload, ClockReply), arrived_ns)
+            except (LinkError, CodecError):
+                continue
+
+    def figures(self) -> dict[str, object]:
+        """Counters and percentiles of this robot alone."""
+        return {
+            "commands_sent": self._writer.sent,
+            "round_trip_ms": self._watch.round_trip.summary(),
+            "robot": {
+                "silent": self._watch.silent(monotonic_ns()),
+                "times_lost": self._watch.times_lost,
+                "undecodable": self._undecodable,
+            },
+            "lease": {"held": bool(self._lease.token), "answer": self._lease.answer},
+            "video": self.video.figures(),
+            "link": self._link.counters(),
+        }

@@ -1,0 +1,170 @@
+"""Robots of one master: each has its own lease, clock, numbers; what fails at one does not reach another."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.clock import monotonic_ns
+from common.codec import decode, encode
+from common.config import load_config
+from common.lease import lease_id
+from common.messages import (
+    Action,
+    ClockQuery,
+    ClockReply,
+    Command,
+    CommandEcho,
+    ControlReply,
+    ControlRequest,
+    RobotState,
+)
+from common.topics import CLOCK, CONTROL, STATE, Topic
+from master.app import Master
+from master.config import MasterConfig
+from master.pipeline import Solved
+from master.robot import CommandedRobot
+
+EXAMPLE = Path(__file__).parents[2] / "deploy" / "examples" / "master.toml"
+JOINTS = 25
+
+
+@dataclass
+class FakeLink:
+    """A robot's topics; `fails` is what every question to it ends with."""
+
+    token: int = 7
+    fails: type[Exception] | None = None
+    put: dict[str, list[bytes]] = field(default_factory=dict)
+    asked: list[Action] = field(default_factory=list)
+    hear: dict[str, Callable[[bytes, int], None]] = field(default_factory=dict)
+
+    def publish(self, topic: Topic) -> Callable[[bytes], None]:
+        return self.put.setdefault(topic.name, []).append
+
+    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
+        self.hear[topic.name] = on_payload
+
+    def declare_alive(self, role: str) -> None: ...
+
+    def counters(self) -> dict[str, dict[str, int]]:
+        return {}
+
+    async def ask(self, topic: Topic, payload: bytes) -> bytes:
+        return (await self.ask_stamped(topic, payload))[0]
+
+    async def ask_stamped(self, topic: Topic, payload: bytes) -> tuple[bytes, int]:
+        if self.fails is not None:
+            raise self.fails("planted")
+        if topic is CLOCK:
+            query = decode(payload, ClockQuery)
+            return encode(ClockReply(query.asked_ns, 10**15, 10**15)), query.asked_ns + 1000
+        assert topic is CONTROL
+        self.asked.append(decode(payload, ControlRequest).action)
+        return encode(ControlReply(True, "hold", "yours", self.token)), 0
+
+    def state(self, now_ns: int, token: int = 0, echo: CommandEcho | None = None) -> None:
+        zeros, valid = np.zeros(JOINTS), np.ones(JOINTS, np.bool_)
+        state = RobotState(
+            "r", 1, now_ns, now_ns, "hold", "", "nurse-1" if token else "", valid, zeros, zeros, echo, 0, 1,
+            lease_id=lease_id(token),
+        )  # fmt: skip
+        self.hear[STATE.name](encode(state), now_ns)
+
+    def commands(self) -> list[Command]:
+        return [decode(payload, Command, JOINTS) for payload in self.put["command"]]
+
+
+class FakeSession:
+    def __init__(self, **links: FakeLink) -> None:
+        self.links = links
+
+    def link(self, robot: str) -> Any:
+        return self.links[robot]
+
+
+def solved() -> Solved:
+    return Solved(16, 1, 2, np.zeros(JOINTS), np.zeros(JOINTS), np.ones(JOINTS, np.bool_))
+
+
+def master_of(**links: FakeLink) -> Master:
+    config = load_config(
+        EXAMPLE, MasterConfig, [f"robots={list(links)}", "capture.buses.0.channel='239.0.0.1'"]
+    )
+    session: Any = FakeSession(**links)
+    return Master(config, session)
+
+
+async def served(master: Master, until: Callable[[], bool]) -> None:
+    """Run the robots' parts of a master, without its buses, until something is so."""
+    tasks = [asyncio.create_task(master._serve(robot)) for robot in master._robots]
+    try:
+        async with asyncio.timeout(10.0):
+            while not until():  # noqa: ASYNC110
+                await asyncio.sleep(0.005)
+    finally:
+        for task in tasks:
+            task.cancel()
+        results = await asyncio.gather(*tasks, return_exceptions=True)
+    for result in results:
+        if isinstance(result, Exception):
+            raise result
+
+
+def test_each_robot_gets_the_same_posture_under_its_own_name_lease_and_number() -> None:
+    links = {"a": FakeLink(token=7), "b": FakeLink(token=8)}
+    master = master_of(**links)
+
+    async def story() -> None:
+        def all_asked() -> bool:
+            for link in links.values():
+                link.state(monotonic_ns())
+            return all(link.asked for link in links.values())
+
+        await served(master, all_asked)
+
+    asyncio.run(story())
+    master._send(solved())
+    [to_a], [to_b] = (link.commands() for link in links.values())
+    assert (to_a.robot, to_a.lease, to_a.sequence) == ("a", 7, 1)
+    assert (to_b.robot, to_b.lease, to_b.sequence) == ("b", 8, 1)
+    assert to_a.tick == to_b.tick == 16
+    figures: Any = master.figures()
+    assert {name: one["commands_sent"] for name, one in figures["robots"].items()} == {"a": 1, "b": 1}
+
+
+@pytest.mark.parametrize("fails", [ValueError, OSError])
+def test_what_fails_unforeseen_at_one_robot_ends_that_one_alone(fails: type[Exception]) -> None:
+    links = {"a": FakeLink(), "b": FakeLink(fails=fails)}
+    master = master_of(**links)
+
+    def until() -> bool:
+        links["a"].state(monotonic_ns())
+        return bool(links["a"].asked) and master._given_up == {"b"}
+
+    asyncio.run(served(master, until))
+    master._send(solved())
+    assert len(links["a"].commands()) == 1
+    assert links["b"].commands() == []
+
+
+def test_a_master_with_no_robot_left_ends() -> None:
+    master = master_of(a=FakeLink(fails=ValueError))
+    with pytest.raises(ExceptionGroup):
+        asyncio.run(served(master, lambda: bool(master._given_up)))
+
+
+def test_a_state_that_is_garbage_is_counted_at_its_robot() -> None:
+    link: Any = FakeLink()
+    robot = CommandedRobot("a", "nurse-1", JOINTS, link)
+    link.hear["state"](b"garbage", 1)
+    link.hear["state"](encode(ControlReply(True, "hold", "")), 2)
+    figures: Any = robot.figures()
+    assert figures["robot"]["undecodable"] == 2
+    assert figures["robot"]["silent"] is True
