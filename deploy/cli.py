@@ -138,6 +138,7 @@ def demo(
     strategy: Annotated[str, typer.Option(help="predict, interpolate or hold.")] = "predict",
     filter_: Annotated[str, typer.Option("--filter", help="vqf, mahony or ekf.")] = "vqf",
     seed: Annotated[int, typer.Option(help="Of the simulated sensors' errors.")] = 1,
+    camera: Annotated[bool, typer.Option(help="Whether the robot sends what it sees.")] = True,
     plots: Annotated[
         Path | None,
         typer.Option(
@@ -156,7 +157,7 @@ def demo(
     console = Console()
     options = DemoOptions(
         profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
-        strategy=strategy, filter=filter_, seed=seed,
+        strategy=strategy, filter=filter_, seed=seed, camera=camera,
     )  # fmt: skip
 
     async def tell(stop: asyncio.Event) -> None:

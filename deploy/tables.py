@@ -113,6 +113,19 @@ def strategies_table(as_run: Motion, replayed: Mapping[str, Motion]) -> Renderab
     return table
 
 
+def video_table(video: Mapping[str, Any]) -> RenderableType:
+    """What the operator saw: rate and size, and how old it was when he acted; from a report's `video`."""
+    if video["fault"]:
+        return Text(f"no video: {video['fault']}", "yellow")
+    ages = {"picture sent→received": "transit_ms", "picture taken→operator's act": "action_to_observation_ms"}
+    table = _table("video, ms", "", "mean", "p50", "p99", "max", "count")
+    for name, key in ages.items():
+        table.add_row(name, *_stage_cells(video[key]))
+    size = f"{video['fps']:.1f} Hz, {video['kb_s']:.0f} kB/s, {video['mean_kb']:.1f} kB each"
+    seen = f"{video['width']} pixels wide; gave way {video['gave_way']} times, {video['unseen']} unseen"
+    return Group(table, Text(f"{size}, {seen}", "dim"))
+
+
 def synergy_table(judged: Mapping[str, Mapping[str, float] | None]) -> RenderableType:
     """The joints of a coarser robot, solved against truth: from a report's `synergies`."""
     table = _table("as a robot's joints, by its synergies", "joint", "mean abs °", "RMSE °", "largest °")

@@ -38,7 +38,7 @@ class VideoWatch:
         self._arrivals.append((frame.number, arrived_ns))
 
     def seen_by(self, sampled_ns: int) -> tuple[int, int]:
-        """Number and arrival of the newest frame that was here when the posture was sampled; (0, 0) if none."""
+        """Number and arrival of the newest frame here when the posture was sampled; (0, 0) if none."""
         for number, arrived_ns in reversed(self._arrivals):
             if arrived_ns <= sampled_ns:
                 return number, arrived_ns

@@ -34,6 +34,8 @@ class Observer:
         """While recording."""
         self.commands: list[Command] = []
         """While recording."""
+        self.video: dict[str, Any] = {}
+        """What the robot last counted of its camera while recording; empty where it has none."""
         self._news = asyncio.Event()
         self._marks: dict[str, tuple[int, int]] = {}
         self.rates_hz: dict[str, float] = {}
@@ -50,6 +52,8 @@ class Observer:
             return
         if isinstance(message, Statistics):
             self.statistics[message.role] = message.figures
+            if self.recording and message.role == "slave":
+                self.video = self.statistics["slave"].get("video", {})
             ticks = self.statistics.get("master", {}).get("ticks", {})
             if message.role == "master" and ticks:
                 self._rate("capture", ticks.get("expected", 0) - ticks.get("missed", 0), message.sent_ns)

@@ -89,6 +89,8 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
         "synergies": _synergies(truth, solved, skeleton),
         "eta_percent": solved_right.eta_percent,
         "table_1": _table_1(solved_right),
+        # the newest told while it tracked: at its end nobody is left to see anything
+        "video": observer.video,
         "cpu_percent": {child.role: round(child.cpu_percent, 1) for child in children},
         "rss_mb": {child.role: round(child.rss_mb, 1) for child in children},
         "guard": slave.get("guard", {}),

@@ -101,7 +101,7 @@ async def at_most(wait: Awaitable[object], seconds: float) -> None:
 def _local(role: str, endpoints: Endpoints) -> list[str]:
     bus_options = f"{{ port = {endpoints.can_port}, hop_limit = 0 }}"
     if role == "slave":
-        return [f'link.listen=["{endpoints.robot}"]']
+        return [f'link.listen=["{endpoints.robot}"]', 'camera.source="off"']
     if role == "master":
         return [
             f'link.connect=["{endpoints.robot}"]',

@@ -46,6 +46,8 @@ class DemoOptions:
     strategy: str = "predict"
     filter: str = "vqf"
     seed: int = 1
+    camera: bool = True
+    """Whether the robot shows what it sees."""
 
     def overrides(self) -> dict[str, list[str]]:
         """What it changes in the processes' files."""
@@ -56,7 +58,8 @@ class DemoOptions:
         master = [f'estimation.filter="{self.filter}"', "estimation.stance_s=1.0"]
         if self.replay is not None:
             suit.append(f'replay="{self.replay.resolve()}"')
-        return {"slave": [f'track.strategy="{self.strategy}"'], "suit": suit, "master": master}
+        slave = [f'track.strategy="{self.strategy}"', f'camera.source="{"robot" if self.camera else "off"}"']
+        return {"slave": slave, "suit": suit, "master": master}
 
 
 async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:

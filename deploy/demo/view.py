@@ -18,6 +18,7 @@ from deploy.tables import (
     strategies_table,
     synergy_table,
     verdict_table,
+    video_table,
 )
 from deploy.targets import BY_PROFILE, verdicts
 
@@ -31,6 +32,7 @@ def draw(rig: Rig, elapsed_s: float) -> RenderableType:
     reason = state.reason if state else "not heard"
     if not observer.ready and observer.guard == "hold":
         reason = observer.waiting_for()
+    video = slave.get("video", {})
     usage = {f"{role} CPU %": child.cpu_percent for role, child in rig.children.items()}
     view = live_view(
         Live(
@@ -46,13 +48,18 @@ def draw(rig: Rig, elapsed_s: float) -> RenderableType:
             },
         )
     )
-    return Group(view, Text("   ".join(f"{name} {value:.0f}" for name, value in usage.items()), "dim"))
+    words = [f"{name} {value:.0f}" for name, value in usage.items()]
+    if video:
+        words.append(video["fault"] or f"video {video['fps']:.0f} Hz, {video['kb_s']:.0f} kB/s")
+    return Group(view, Text("   ".join(words), "dim"))
 
 
 def print_report(report: Report, console: Console) -> None:
     """Latency budget, accuracy beside the paper's, motion, curves, and the targets met or missed."""
     tree = report.tree
     console.print(latency_table(tree["stages_ms"], tree["end_to_end_ms"], tree["one_way_ms"]))
+    if tree["video"]:
+        console.print(video_table(tree["video"]))
     if report.accuracy.overall is None:
         console.print(Text("no truth to judge by: a recording has none", "yellow"))
     else:
