@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
@@ -26,14 +27,18 @@ def mag(
 ) -> None:
     """Calibrate magnetometers from a recording: 3 minutes of free rotation through every attitude.
 
+    Where the folder has the node's accelerometer already and the recording has rests in eight attitudes or
+    more, the magnetometer's axes are turned into the accelerometer's.
+
     Example: `tandem calibrate mag rotation.npz --out calibration --node left_hand`
     """
     from deploy.calibrate import session as sessions
     from deploy.calibrate.pictures import draw_magnetic
     from master.calibrate.magnetic import calibrate_magnetic
+    from master.calibrate.node_file import accelerometer_map
 
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
-        return calibrate_magnetic(raw)
+        return calibrate_magnetic(raw, accelerometer_map(out, raw.name))
 
     sessions.make_folder(out)
     day = date.today()
@@ -51,6 +56,7 @@ def _gist(found: MagneticCalibration) -> dict[str, Any]:
     return {
         "field_ut": found.fit.field_ut,
         "coverage": found.coverage,
+        "aligned_deg": None if found.alignment is None else math.degrees(found.alignment.angle_rad),
         "hold_out_percent": 100.0 * found.hold_out_spread_ut / found.fit.field_ut,
     }
 

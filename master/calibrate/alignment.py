@@ -37,6 +37,11 @@ class Alignment:
     sigma_rad: float
     """One standard deviation of the rotation, about its worst axis."""
 
+    @property
+    def angle_rad(self) -> float:
+        """How far apart the axes were."""
+        return 2.0 * float(np.arccos(min(1.0, abs(float(self.q_acc_from_mag[0])))))
+
     def apply(self, affine: Array) -> Array:
         """A magnetometer's map (3, 4) with its outcome in the accelerometer's axes."""
         return rotate(self.q_acc_from_mag, affine.T).T
@@ -63,18 +68,19 @@ def align_magnetometer(acc: Array, mag: Array) -> Alignment:
         step = np.linalg.lstsq(jacobian, np.mean(product) - product, rcond=None)[0]
         q = normalise(multiply(from_rotation_vector(step[:3]), q))
     after = _dip_errors(up, rotate(q, field))
-    if 2.0 * np.arccos(min(1.0, abs(float(q[0])))) > _LARGEST_RAD:
-        raise RecordingError("accelerometer and magnetometer sit more than 10° apart; is one of them turned?")
     product = np.sum(up * rotate(q, field), axis=1)
     variance = float(np.sum((product - product.mean()) ** 2)) / (len(up) - 4)
     covariance = variance * np.linalg.inv(jacobian.T @ jacobian)[:3, :3]
-    return Alignment(
+    found = Alignment(
         q,
         -float(np.mean(np.arcsin(np.clip(product, -1.0, 1.0)))),
         float(np.sqrt(np.mean(before**2))),
         float(np.sqrt(np.mean(after**2))),
         float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),
     )
+    if found.angle_rad > _LARGEST_RAD:
+        raise RecordingError("accelerometer and magnetometer sit more than 10° apart; is one of them turned?")
+    return found
 
 
 def _dip_errors(up: Array, field: Array) -> Array:

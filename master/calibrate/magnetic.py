@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from common.calibration import Made
 from common.quaternion import Array
+from master.calibrate.alignment import Alignment, align_magnetometer
 from master.calibrate.ellipsoid import (
     Ellipsoid,
     NoEllipsoidError,
@@ -21,6 +22,7 @@ from master.calibrate.ellipsoid import (
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
 from master.calibrate.soundness import check_clipped, check_samples
+from master.calibrate.still import interval_means, motion_level, still_intervals, stillest_level
 from master.calibrate.uncertainty import folds
 
 LEAST_COVERAGE = 0.5
@@ -33,6 +35,9 @@ _BLOCK_S = 2.0
 """Neighbouring samples are alike: what is held out are blocks of this length."""
 _LIMIT_S = 0.5
 """No turning node reads the very same so long."""
+_REST_S = 1.0
+_MOST_AT_REST_RAD_S = 0.05
+"""Slower than anybody turns a node about: a recording without rests has none."""
 _TURN = "turn the node slowly through every attitude, as if to paint the inside of a ball"
 
 
@@ -50,7 +55,14 @@ class MagneticCalibration:
     """(K, 3), those that were used."""
     hold_out_ut: Array
     """(K,), calibrated strength minus the field, by fits that did not see the reading."""
+    alignment: Alignment | None = None
+    """Into the accelerometer's axes; None where they are not known."""
     notes: tuple[str, ...] = ()
+
+    @property
+    def affine(self) -> Array:
+        """(3, 4): calibrated µT, in the accelerometer's axes where they are known, from readings."""
+        return self.fit.affine if self.alignment is None else self.alignment.apply(self.fit.affine)
 
     @property
     def spread_before_ut(self) -> float:
@@ -78,11 +90,15 @@ class MagneticCalibration:
             hold_out=self.hold_out_spread_ut,
             sigma=self.sigma.tolist(),
         )
-        return {"magnetometer": (self.fit.affine, made)}
+        return {"magnetometer": (self.affine, made)}
 
 
-def calibrate_magnetic(recording: NodeRecording) -> MagneticCalibration:
-    """Find the magnetometer's map. Raises RecordingError when the recording does not determine it."""
+def calibrate_magnetic(recording: NodeRecording, accelerometer: Array | None = None) -> MagneticCalibration:
+    """Find the magnetometer's map. Raises RecordingError when the recording does not determine it.
+
+    With the accelerometer's map (3, 4), and rests in the recording, the magnetometer's axes are turned into
+    the accelerometer's; a note says where that was not possible.
+    """
     if recording.mag_ut is None:
         raise RecordingError("there are no magnetometer readings; record a node that has one")
     check_samples("magnetometer", recording.mag_ut)
@@ -111,9 +127,38 @@ def calibrate_magnetic(recording: NodeRecording) -> MagneticCalibration:
             "motors and magnets, and record again"
         )
     notes = () if seen >= GOOD_COVERAGE else (f"{100 * seen:.0f} % of the sphere seen; more makes it surer",)
+    alignment, words = _align(recording, recording.mag_ut, fit, accelerometer)
     return MagneticCalibration(
-        recording.name, fit, affine_sigma(fit, readings), seen, readings, hold_out, notes
+        recording.name,
+        fit,
+        affine_sigma(fit, readings),
+        seen,
+        readings,
+        hold_out,
+        alignment,
+        (*notes, *words),
     )
+
+
+def _align(
+    recording: NodeRecording, mag_ut: Array, fit: Ellipsoid, accelerometer: Array | None
+) -> tuple[Alignment | None, tuple[str, ...]]:
+    """The turn into the accelerometer's axes, or words why there is none."""
+    without = "its axes are not turned into the accelerometer's, which may turn headings by a degree"
+    if accelerometer is None:
+        return None, (f"{without}: calibrate imu first, into the same folder",)
+    level = motion_level(recording.gyr_rad_s, recording.rate_hz)
+    limit = min(6.0 * stillest_level(level, floor=1e-3), _MOST_AT_REST_RAD_S)
+    still = still_intervals(level, limit, recording.rate_hz, _REST_S)
+    force, field = (
+        interval_means(readings @ map_[:, :3].T + map_[:, 3], still)
+        for readings, map_ in ((recording.acc_m_s2, accelerometer), (mag_ut, fit.affine))
+    )
+    whole = np.isfinite(force).all(axis=1) & np.isfinite(field).all(axis=1)
+    try:
+        return align_magnetometer(force[whole], field[whole]), ()
+    except RecordingError as error:
+        return None, (f"{without}: {error}",)
 
 
 def _check_coverage(fit: Ellipsoid, readings: Array) -> float:

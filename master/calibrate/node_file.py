@@ -15,7 +15,7 @@ from tomlkit.items import Array as TomlArray
 from tomlkit.items import Table
 
 from common.calibration import Made, NodeCalibration
-from common.config import check_config
+from common.config import check_config, load_config
 from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
 
@@ -95,3 +95,15 @@ def _replace(path: Path, text: str) -> None:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+def accelerometer_map(folder: Path, name: str) -> Array | None:
+    """The accelerometer's map (3, 4) that a calibration wrote to the node's file, None where none did.
+
+    Raises ConfigError for a file that is not sound.
+    """
+    path = folder / f"{name}.toml"
+    if not path.exists():
+        return None
+    file = load_config(path, NodeCalibration)
+    return None if file.made.accelerometer is None else np.array(file.accelerometer)

@@ -24,6 +24,7 @@ from master.calibrate.inertial import InertialCalibration, InertialOptions, cali
 from master.calibrate.magnetic import MagneticCalibration, calibrate_magnetic
 from master.calibrate.mounting import find_mounting
 from master.calibrate.mounting_files import calibrated, write_mounting
+from master.calibrate.node_file import accelerometer_map
 from master.calibrate.recording import NodeRecording, load_recordings
 from master.config import MasterConfig
 
@@ -106,7 +107,7 @@ def _mag(
     refusals: list[str],
 ) -> dict[str, Any]:
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
-        return calibrate_magnetic(raw)
+        return calibrate_magnetic(raw, accelerometer_map(folder, raw.name))
 
     magnetic = [name for name in load_recordings(path) if config.nodes[name].magnetometer]
     if not magnetic:

@@ -13,18 +13,18 @@ from typer.testing import CliRunner
 from common.calibration import NodeCalibration
 from common.config import load_config
 from common.errors import TandemError
-from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate
+from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate, to_matrix
 from deploy import cli
 
 RATE_HZ = 50.0
 BIAS: Array = np.array([0.3, -0.2, 0.1])
 
 
-def session() -> dict[str, Array]:
-    """Sixteen rests of 2.4 s with even turns of 1 s between them, and noise."""
+def session(turns: int = 16) -> dict[str, Array]:
+    """Rests of 2.4 s with even turns of 1 s between them, and noise; orientations as `q`."""
     rng = np.random.default_rng(4)
     q, rows, rates = np.array([1.0, 0.0, 0.0, 0.0]), [], []
-    for _ in range(16):
+    for _ in range(turns):
         turn = rng.normal(size=3)
         for angle, rate in ((np.zeros(120), np.zeros(3)), (np.arange(50) / 50, turn)):
             rows.append(multiply(q, from_rotation_vector(angle[:, None] * turn)))
@@ -32,7 +32,8 @@ def session() -> dict[str, Array]:
         q = multiply(q, from_rotation_vector(turn))
     acc = rotate(conjugate(np.concatenate(rows)), np.array([0.0, 0.0, 9.80665])) - BIAS
     noise = rng.normal(scale=2e-3, size=(2, len(acc), 3))
-    return {"acc": acc + 10 * noise[0], "gyr": np.concatenate(rates) - 0.1 * BIAS + noise[1]}
+    gyr = np.concatenate(rates) - 0.1 * BIAS + noise[1]
+    return {"acc": acc + 10 * noise[0], "gyr": gyr, "q": np.concatenate(rows)}
 
 
 def sphere() -> Array:
@@ -119,3 +120,30 @@ def test_mistakes_are_one_clear_line(
 @pytest.mark.parametrize("command", ["imu", "mag"])
 def test_help_has_an_example(command: str) -> None:
     assert f"Example: tandem calibrate {command} " in run(f"calibrate {command} --help").replace("`", "")
+
+
+@pytest.fixture(scope="module")
+def whole_session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Rests in sixteen attitudes, the magnetometer's axes 2° off the accelerometer's."""
+    path = tmp_path_factory.mktemp("whole") / "unit.npz"
+    s = session(turns=40)
+    apart = from_rotation_vector(np.radians([0.0, 2.0, 0.0]))
+    mag = rotate(conjugate(apart), rotate(conjugate(s.pop("q")), np.array([0.0, 25.0, -43.3])))
+    mag += np.random.default_rng(5).normal(scale=0.1, size=mag.shape)
+    np.savez(path, rate_hz=RATE_HZ, mag=mag + BIAS, **s)
+    return path
+
+
+def test_the_magnetometers_axes_are_turned_into_the_accelerometers(
+    whole_session: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    alone = json.loads(run(f"calibrate mag {whole_session} --out {out} --json"))["nodes"]["unit"]
+    assert alone["aligned_deg"] is None
+    assert "calibrate imu first" in " ".join(alone["notes"])
+    run(f"calibrate imu {whole_session} --out {out}")
+    found = json.loads(run(f"calibrate mag {whole_session} --out {out} --json"))["nodes"]["unit"]
+    assert found["aligned_deg"] == pytest.approx(2.0, abs=0.1)
+    map_ = np.array(load_config(out / "unit.toml", NodeCalibration).magnetometer)[:, :3]
+    turn = map_ @ np.linalg.inv(np.array(alone["magnetometer"]["value"])[:, :3])
+    np.testing.assert_allclose(turn, to_matrix(from_rotation_vector(np.radians([0.0, 2.0, 0.0]))), atol=2e-3)
