@@ -17,6 +17,8 @@ from common.realtime import take_priority
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, video
+from slave.attitude.open import open_base
+from slave.attitude.sensor import BaseSensor
 from slave.camera.feed import CameraFeed, open_feed
 from slave.config import SlaveConfig
 from slave.guard.body import Body
@@ -30,10 +32,13 @@ log = logging.getLogger("tandem.slave")
 class Slave:
     """One robot's servo loop and its conversation with the master."""
 
-    def __init__(self, config: SlaveConfig, link: Link, servos: Servos) -> None:
+    def __init__(
+        self, config: SlaveConfig, link: Link, servos: Servos, base: BaseSensor | None = None
+    ) -> None:
         self._config = config
         self._link = link
         self._servos = servos
+        self._base = base
         self._pipeline = SlavePipeline(config)
         self._stopped = False
         self._ticks_expected = 0
@@ -63,7 +68,7 @@ class Slave:
         async for due in ticks(TickGrid(monotonic_ns() + period_ns, period_ns)):
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
-            body = Body(drives=self._servos.faults())
+            body = self._body()
             reading = self._servos.read()
             setpoint = self._pipeline.tick(monotonic_ns(), reading, body)
             self._brake_drives(self._pipeline.guard.state is State.ESTOP)
@@ -81,6 +86,11 @@ class Slave:
             if guard.state != said:
                 said = guard.state
                 log.info("%s: %s: %s", self._config.robot, guard.state, guard.reason)
+
+    def _body(self) -> Body:
+        if self._base is not None:
+            self._pipeline.base = self._base.read()
+        return Body(drives=self._servos.faults())
 
     def _brake_drives(self, stop: bool) -> None:
         """On an e-stop the drives brake by themselves too: whatever becomes of this process."""
@@ -123,6 +133,7 @@ class Slave:
                 "trusted": offset.trusted,
             },
             "undecodable": pipeline.undecodable,
+            "base": self._base.counters() if self._base else {},
             "video": self._camera.figures() if self._camera else {},
             "link": self._link.counters(),
         }
@@ -132,10 +143,13 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
     """Run a slave until `stop` is set; the servos are left holding. Raises LinkError or RobotError."""
     take_priority(config.process)  # first, so that every thread has it
     servos = open_servos(config.servos, config.skeleton, config.encoders)
+    base = open_base(config.base)
     servos.start()
     try:
+        if base is not None:
+            base.start()
         async with open_link(config.link, config.robot) as link:
-            slave = Slave(config, link, servos)
+            slave = Slave(config, link, servos, base)
             where = ", ".join(config.link.listen or config.link.connect)
             log.info("%s: waits for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
@@ -146,4 +160,6 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
                 write_figures(slave.figures())
     finally:
         servos.stop()
+        if base is not None:
+            base.stop()
     log.info("stopped; the servos hold")

@@ -8,6 +8,7 @@ from common.config import LinkConfig, Section
 from common.errors import ConfigError, ConfigMistake
 from common.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
+from slave.attitude.config import BaseConfig
 from slave.camera.config import CameraConfig
 from slave.encoders import EncoderConfig
 from slave.guard.config import GuardConfig
@@ -34,6 +35,7 @@ class SlaveConfig(Section):
     track: TrackConfig = TrackConfig()
     servos: ServosConfig = ServosConfig()
     encoders: EncoderConfig = EncoderConfig()
+    base: BaseConfig = BaseConfig()
     camera: CameraConfig = CameraConfig()
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
@@ -49,4 +51,8 @@ class SlaveConfig(Section):
             skeleton = self.skeleton
         except ConfigError as error:
             return error.mistakes
-        return [*self.guard.mistakes_for(skeleton), *self.encoders.mistakes_for(skeleton)]
+        return [
+            *self.guard.mistakes_for(skeleton),
+            *self.encoders.mistakes_for(skeleton),
+            *self.base.mistakes(),
+        ]

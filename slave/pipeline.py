@@ -15,6 +15,7 @@ from common.latency import Durations
 from common.lease import lease_id
 from common.messages import (
     Action,
+    BaseAttitude,
     ClockQuery,
     Command,
     ControlReply,
@@ -56,6 +57,8 @@ class SlavePipeline:
         self._states_sent = 0
         self._reading: EncoderReading | None = None
         self._body = WELL
+        self.base: BaseAttitude | None = None
+        """How the base stands, where it carries a sensor; `Body.base` says whether that is well."""
         self._position_rad = np.zeros(len(self.skeleton.joints))
         self._setpoint = Setpoint(self._position_rad, np.zeros_like(self._position_rad), ready=False)
 
@@ -126,6 +129,7 @@ class SlavePipeline:
                 master_offset_ns=offset.offset_ns,
                 offset_bound_ns=offset.bound_ns if offset.trusted else -1,
                 faults=self._faults(),
+                base=self.base,
                 lease_id=lease_id(self.guard.lease.token),
             )
         )
