@@ -115,7 +115,8 @@ class _Asker:
         else:
             return False
         self._measured_ns = received_ns
-        self._replied[query.asked_ns] = now_ns
+        # a query that the network doubled is replied to twice, and the first reply is the one that counts
+        self._replied.setdefault(query.asked_ns, now_ns)
         _forget_oldest(self._replied)
         return True
 

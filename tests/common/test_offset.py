@@ -253,6 +253,25 @@ def test_a_reply_to_no_question_or_heard_twice_is_ignored() -> None:
     assert master.query(4_000_000) == ClockQuery(4_000_000, 1000, 2_000_000)
 
 
+def test_a_query_that_the_network_doubles_is_measured_by_its_first_reply() -> None:
+    slave_clock = RemoteClock(7 * HOUR, 30.0, 0)
+    master, slave = MasterExchange(), SlaveExchange()
+    now_ns = 0
+    for i in range(40):
+        query = master.query(NS_PER_S + i * NS_PER_S // 4)
+        replies = [
+            slave.on_query(query, slave_clock.at(arrived_ns), slave_clock.at(arrived_ns + 20_000))
+            for arrived_ns in (query.asked_ns + 300_000, query.asked_ns + 110_000_000)
+        ]
+        assert master.on_reply(replies[0], query.asked_ns + 420_000)
+        now_ns = query.asked_ns + 110_000_000
+        assert not master.on_reply(replies[1], now_ns)
+    offset = slave.estimator.estimate(slave_clock.at(now_ns))
+    assert offset.trusted
+    assert abs(offset.offset_ns + slave_clock.offset_at(now_ns)) <= offset.bound_ns < 400_000
+    assert slave.estimator.steps == 0
+
+
 def test_a_question_is_forgotten_after_sixteen_more() -> None:
     master = MasterExchange()
     queries = [master.query(i * 1000) for i in range(17)]
