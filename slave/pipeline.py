@@ -141,7 +141,9 @@ class SlavePipeline:
 
     def _faults(self) -> dict[str, str]:
         named = {"base": self._body.base, "camera": self.camera_fault}
-        return {**self._body.drives, **{name: words for name, words in named.items() if words}}
+        # what a drive says of itself comes before what the guard makes of its encoder
+        doubts_and_drives = {**self.guard.doubts, **self._body.drives}
+        return {**doubts_and_drives, **{name: words for name, words in named.items() if words}}
 
     def _count(self, topic: str) -> None:
         self.undecodable[topic] = self.undecodable.get(topic, 0) + 1

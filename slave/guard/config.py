@@ -54,8 +54,21 @@ class GuardConfig(Section):
     """How long every valid joint must have been aligned before `track` begins."""
     align_timeout_s: float = Field(15.0, gt=0.0, le=120.0)
     """`align` that takes longer ends in `hold`."""
-    engage_window_rad: float = Field(0.2, gt=0.0, le=1.0)
+    engage_window_rad: float = Field(0.1, gt=0.0, le=1.0)
     """`engage` is refused where an encoder is further than this from the held setpoint."""
+
+    follow_lag_s: float = Field(0.1, gt=0.0, le=1.0)
+    """How late a servo may be: an encoder is compared with where the setpoint was during this time."""
+    follow_window_rad: float = Field(0.1, gt=0.0, le=1.0)
+    """An encoder further than this from there is not believed."""
+    follow_patience_s: float = Field(0.1, gt=0.0, le=1.0)
+    """For how long it must be so before the joint is held."""
+    max_doubted_joints: int = Field(3, ge=0, le=100)
+    """With more joints than these held for their encoders, the whole robot holds."""
+    max_tilt_deg: float = Field(10.0, gt=0.0, le=90.0)
+    """A base that tilts by more than this makes the robot hold; asked of a base that carries a sensor."""
+    base_timeout_s: float = Field(0.5, gt=0.0, le=10.0)
+    """And so does a base whose sensor is silent for longer than this."""
 
     velocity_scale: float = Field(1.0, gt=0.0, le=1.0)
     """Share of the velocity limits that is used."""
@@ -105,6 +118,12 @@ class GuardConfig(Section):
                 "lease_timeout_s",
                 self.lease_timeout_s,
                 f"at least command_timeout_s, {self.command_timeout_s}",
+            )
+        if self.follow_window_rad < self.engage_window_rad:
+            yield (
+                "follow_window_rad",
+                self.follow_window_rad,
+                f"at least engage_window_rad, {self.engage_window_rad}",
             )
         if self.align_timeout_s <= self.align_dwell_s:
             yield "align_timeout_s", self.align_timeout_s, f"more than align_dwell_s, {self.align_dwell_s}"

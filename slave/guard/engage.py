@@ -26,6 +26,8 @@ class Readiness:
     """What is amiss with the drives or the base."""
     any_valid: bool
     """Whether the last command has a valid joint."""
+    unsettled: str | None
+    """The doubted joint whose encoder does not agree yet."""
     at_rest: bool
     strayed: str | None
     """The joint that is not where it is held."""
@@ -69,6 +71,10 @@ def _body(at: Readiness) -> str | None:
     return at.body_fault
 
 
+def _unsettled(at: Readiness) -> str | None:
+    return at.unsettled
+
+
 def _rest(at: Readiness) -> str | None:
     return None if at.at_rest else "still braking"
 
@@ -77,7 +83,9 @@ def _strayed(at: Readiness) -> str | None:
     return at.strayed
 
 
-CONDITIONS: tuple[Condition, ...] = (_state, _holder, _command, _valid, _encoder, _body, _rest, _strayed)
+CONDITIONS: tuple[Condition, ...] = (
+    _state, _holder, _command, _valid, _encoder, _body, _unsettled, _rest, _strayed,
+)  # fmt: skip
 
 
 def refusal(at: Readiness) -> str | None:

@@ -40,17 +40,26 @@ class Change:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """A joint began to be held because its encoder is not believed."""
+
+    at_ns: int
+    joint: str
+    words: str
+
+
 class Journal:
     """The newest events; older ones fall out, and only the counters remember them."""
 
     def __init__(self, size: int) -> None:
-        self._events: deque[Clamp | Change] = deque(maxlen=size)
+        self._events: deque[Clamp | Change | Doubt] = deque(maxlen=size)
 
-    def add(self, event: Clamp | Change) -> None:
+    def add(self, event: Clamp | Change | Doubt) -> None:
         """Append one."""
         self._events.append(event)
 
-    def __iter__(self) -> Iterator[Clamp | Change]:
+    def __iter__(self) -> Iterator[Clamp | Change | Doubt]:
         """Oldest first."""
         return iter(tuple(self._events))
 
@@ -70,6 +79,8 @@ class GuardCounters:
     """Holds by what was lost."""
     clamps: Counter[str] = field(default_factory=Counter)
     """Clamps begun, by rule."""
+    doubts: Counter[str] = field(default_factory=Counter)
+    """Times that a joint was held because its encoder was not believed, by joint."""
     late_steps: int = 0
     """Steps so late that the setpoint was moved by less than the time that had passed."""
 
@@ -81,5 +92,6 @@ class GuardCounters:
             "dropped": dict(self.dropped),
             "losses": dict(self.losses),
             "clamps": {str(rule): count for rule, count in self.clamps.items()},
+            "doubts": dict(self.doubts),
             "late_steps": self.late_steps,
         }

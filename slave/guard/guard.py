@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +20,10 @@ from slave.guard.body import WELL, Body
 from slave.guard.config import GuardConfig
 from slave.guard.control import Control
 from slave.guard.engage import Readiness, refusal
-from slave.guard.events import Change, GuardCounters, Journal
+from slave.guard.events import Change, Doubt, GuardCounters, Journal
 from slave.guard.lease import DrawToken, Lease, random_token
 from slave.guard.limit import SetpointLimiter
+from slave.guard.plausible import Plausibility
 from slave.guard.states import MOVING, Event, State, next_state
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES, EncoderLife, Signs, Watch, first_loss
 from slave.track import Target, Tracker
@@ -78,6 +79,7 @@ class Guard:
         self._command_timeout_ns = to_ns(config.command_timeout_s)
         self._control = Control(self, config.reset_key)
         self._encoders = EncoderLife(names, to_ns(config.encoder_timeout_s))
+        self._plausible = Plausibility(names, skeleton.max_velocity_rad_s, config)
         self._body = WELL
         self._limiter = SetpointLimiter(names, limits)
         self._alignment = Alignment(names, config)
@@ -93,6 +95,11 @@ class Guard:
     def operator(self) -> str:
         """Who holds the lease, empty where nobody does."""
         return self.lease.operator
+
+    @property
+    def doubts(self) -> Mapping[str, str]:
+        """Joints that are held because their encoder is not believed, and why."""
+        return self._plausible.words
 
     # inputs
 
@@ -143,6 +150,7 @@ class Guard:
         dt_s = self._elapsed_s(now_ns)
         self._body = body
         self._encoders.update(position_rad, encoder_valid, encoder_ns)
+        self._doubt(now_ns, position_rad, encoder_valid, encoder_ns)
         self._watch(now_ns, self._watches)
         if not self._seated:
             return self._wait(now_ns, position_rad)
@@ -154,6 +162,7 @@ class Guard:
             self._limiter.stop(dt_s)
         else:
             self._follow(now_ns, dt_s, target)
+        self._plausible.note(now_ns, self._limiter.position_rad)
         return Setpoint(self._limiter.position_rad, self._limiter.velocity_rad_s)
 
     def estop(self, now_ns: int, reason: str = "e-stop at the robot") -> None:
@@ -188,12 +197,14 @@ class Guard:
                 command_loss=arrival[1] if arrival else None,
                 encoder_loss=body,
                 body_fault=self._body.amiss,
+                unsettled=self._plausible.unsettled(),
                 any_valid=bool(self._valid.any()),
                 at_rest=self._limiter.at_rest,
                 strayed=self._strayed(),
             )
         )
         if why is None:
+            self._plausible.trust()
             self._alignment.begin(now_ns)
             self._change(now_ns, Event.ENGAGE, f"engaged by {operator}")
         return why
@@ -216,7 +227,10 @@ class Guard:
         if not self._limiter.at_rest:
             return "still braking"
         if self._strayed():
-            self._limiter.seat(self._encoders.position_rad)
+            # nor to where an encoder says it is that is not believed
+            self._limiter.seat(
+                np.where(self._plausible.doubted, self._limiter.position_rad, self._encoders.position_rad)
+            )
         self._change(now_ns, Event.RESET, reason)
         return None
 
@@ -225,8 +239,14 @@ class Guard:
     def _signs(self, now_ns: int) -> Signs:
         return Signs(
             now_ns, self.lease.token != 0, self._command_ns, self._command_timeout_ns, self._refusal,
-            self._encoders, self._body,
+            self._encoders, self._plausible.too_many(), self._body,
         )  # fmt: skip
+
+    def _doubt(self, now_ns: int, position_rad: Array, encoder_valid: Mask, encoder_ns: int) -> None:
+        moving = self.state in MOVING
+        for joint in self._plausible.judge(position_rad, encoder_valid, encoder_ns, moving):
+            self.counters.doubts[joint] += 1
+            self.events.add(Doubt(now_ns, joint, self._plausible.words[joint]))
 
     def _watch(self, now_ns: int, watches: Sequence[Watch]) -> None:
         self.lease.lapse(now_ns)
@@ -248,7 +268,7 @@ class Guard:
         self.events.add(Change(now_ns, self.state, after, reason))
         self.state, self.reason = after, reason
         if after is State.TRACK:
-            self._rejoin.begin(now_ns, self._valid)
+            self._rejoin.begin(now_ns, self._believed())
         else:
             # what the operator did before must not move the robot after
             self._tracker.reset()
@@ -275,22 +295,25 @@ class Guard:
 
     def _follow(self, now_ns: int, dt_s: float, target: Target) -> None:
         error = self._limiter.limits.reachable(target.position_rad) - self._limiter.position_rad
-        aligning = self.state is State.ALIGN
+        aligning, free = self.state is State.ALIGN, self._believed()
         if aligning:
             maxima = self._rejoin.slow_velocity_rad_s, self._rejoin.slow_acceleration_rad_s2
         else:
-            maxima = self._rejoin.maxima(now_ns, error, self._valid)
-        clamps = self._limiter.step(
-            now_ns, dt_s, target.position_rad, target.velocity_rad_s, ~self._valid, *maxima
-        )
+            maxima = self._rejoin.maxima(now_ns, error, free)
+        clamps = self._limiter.step(now_ns, dt_s, target.position_rad, target.velocity_rad_s, ~free, *maxima)
         for clamp in clamps:
             self.counters.clamps[clamp.rule] += 1
             self.events.add(clamp)
         if aligning:
-            self._align(now_ns, error)
+            self._align(now_ns, error, free)
 
-    def _align(self, now_ns: int, error_rad: Array) -> None:
-        if self._alignment.done(now_ns, error_rad, self._valid):
+    def _believed(self) -> Mask:
+        """Joints that may move: both the operator's nodes and the joint's own encoder are to be believed."""
+        free: Mask = self._valid & ~self._plausible.doubted
+        return free
+
+    def _align(self, now_ns: int, error_rad: Array, free: Mask) -> None:
+        if self._alignment.done(now_ns, error_rad, free):
             self._change(now_ns, Event.ALIGNED, f"follows {self.operator}")
             return
         overdue = self._alignment.overdue(now_ns)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 
+from common.clock import to_s
+from common.lease import lease_id
+
 DrawToken = Callable[[], int]
 """Gives a new token, 1 to 2⁶³ - 1, that nobody can guess. Tests pass a counter."""
 
@@ -20,7 +23,7 @@ class Lease:
     def __init__(self, timeout_ns: int, draw_token: DrawToken = random_token) -> None:
         self._timeout_ns = timeout_ns
         self._draw_token = draw_token
-        self._renewed_ns = 0
+        self._granted_ns = self._renewed_ns = 0
         self.operator = ""
         """The holder's name, empty where nobody holds it."""
         self.token = 0
@@ -34,7 +37,8 @@ class Lease:
         self.lapse(now_ns)
         if self.token or not operator:
             return 0
-        self.operator, self.token, self._renewed_ns = operator, self._draw_token(), now_ns
+        self.operator, self.token = operator, self._draw_token()
+        self._granted_ns = self._renewed_ns = now_ns
         return self.token
 
     def renew(self, arrived_ns: int) -> None:
@@ -59,3 +63,14 @@ class Lease:
     def held_by(self, operator: str) -> bool:
         """Whether an operator of that name holds it; call `lapse` first."""
         return self.token != 0 and operator == self.operator
+
+    def summary(self, now_ns: int) -> dict[str, object]:
+        """Whose it is, which, since when, and how long ago a command renewed it; {} where nobody holds it."""
+        if not self.token:
+            return {}
+        return {
+            "operator": self.operator,
+            "id": lease_id(self.token),
+            "held_s": round(to_s(now_ns - self._granted_ns), 3),
+            "renewed_s": round(to_s(now_ns - self._renewed_ns), 3),
+        }

@@ -61,6 +61,8 @@ class Signs:
     refusal: str
     """Why the last command since then was refused, empty where none was."""
     encoders: EncoderLife
+    implausible: str | None
+    """More encoders than may be do not agree with the setpoint."""
     body: Body
 
 
@@ -91,6 +93,10 @@ def _encoder(signs: Signs) -> str | None:
     return signs.encoders.silence(signs.now_ns)
 
 
+def _plausible(signs: Signs) -> str | None:
+    return signs.implausible
+
+
 def _drive(signs: Signs) -> str | None:
     return signs.body.drive_fault
 
@@ -101,7 +107,12 @@ def _base(signs: Signs) -> str | None:
 
 ARRIVAL_WATCHES: tuple[Watch, ...] = (Watch("command", _command), Watch("lease", _lease))
 """Looked at in every step, and before a command is judged: what comes after a gap must not hide the gap."""
-BODY_WATCHES: tuple[Watch, ...] = (Watch("encoder", _encoder), Watch("drive", _drive), Watch("base", _base))
+BODY_WATCHES: tuple[Watch, ...] = (
+    Watch("encoder", _encoder),
+    Watch("plausible", _plausible),
+    Watch("drive", _drive),
+    Watch("base", _base),
+)
 """Looked at in every step, right after the encoders were read."""
 
 

@@ -48,6 +48,17 @@ def drive_faulty(rig: Any) -> None:
     rig.run(0.1)
 
 
+def encoder_doubted(rig: Any) -> None:
+    rig.to_track()
+    rig.coupled = False
+    rig.measured = rig.measured.copy()
+    rig.measured[6] += 0.15
+    rig.run(0.3)
+    rig.ask(Action.DISENGAGE)
+    rig.measured = rig.setpoints[-1].position_rad.copy()
+    rig.run(0.1)
+
+
 def still_moving(rig: Any) -> None:
     rig.to_track()
     rig.target = rig.skeleton.lower_rad.copy()
@@ -71,8 +82,9 @@ CASES: list[tuple[Callable[..., Any], Callable[[Any], None], str]] = [
     (engage._valid, all_nodes_lost, "no joint of the last command is valid"),
     (engage._encoder, encoder_lost, "left_elbow_pitch"),
     (engage._body, drive_faulty, "the drive of left_elbow_pitch: over-current"),
+    (engage._unsettled, encoder_doubted, "left_elbow_pitch: the encoder is"),
     (engage._rest, still_moving, "still braking"),
-    (engage._strayed, moved_by_hand, "left_elbow_pitch is 0.20 rad from where it is held"),
+    (engage._strayed, moved_by_hand, "left_elbow_pitch is 0.10 rad from where it is held"),
 ]
 
 
