@@ -14,10 +14,10 @@ from rich.console import Console
 
 from common.config import load_config
 from common.errors import TandemError
-from common.messages import Action
 from common.runtime import run as run_until_stopped
 from deploy.accuracy.commands import app as accuracy_app
 from deploy.calibrate.commands import app as calibrate_app
+from deploy.control.commands import COMMANDS as OPERATORS_ACTS
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -62,9 +62,6 @@ def _a_png(path: Path | None) -> Path | None:
 ReportFile = Annotated[
     Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=_in_a_folder)
 ]
-Connect = Annotated[list[str], typer.Option(help="The robot's endpoint.")]
-Robot = Annotated[str, typer.Option(help="The robot's name.")]
-Operator = Annotated[str, typer.Option(help="Your name, as in the master's file.")]
 
 
 @app.callback()
@@ -190,65 +187,8 @@ def bench(
         report.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", "utf-8")
 
 
-@app.command()
-def engage(connect: Connect, robot: Robot, operator: Operator) -> None:
-    """Let the robot follow: it moves slowly to the operator's posture, then tracks.
-
-    Example: `tandem engage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
-    """
-    _ask(robot, Action.ENGAGE, connect, operator)
-
-
-@app.command()
-def disengage(connect: Connect, robot: Robot, operator: Operator) -> None:
-    """Let the robot hold where it is.
-
-    Example: `tandem disengage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
-    """
-    _ask(robot, Action.DISENGAGE, connect, operator)
-
-
-@app.command()
-def estop(connect: Connect, robot: Robot) -> None:
-    """Stop the robot now. Anyone may; it stays stopped until it is reset.
-
-    Example: `tandem estop --connect tcp/192.168.7.2:7447 --robot robot-1`
-    """
-    _ask(robot, Action.ESTOP, connect)
-
-
-@app.command()
-def reset(
-    connect: Connect,
-    robot: Robot,
-    key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
-) -> None:
-    """Leave an emergency stop: the robot then holds, it does not move.
-
-    Example: `tandem reset --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
-    """
-    _ask(robot, Action.RESET, connect, key=key)
-
-
-@app.command()
-def status(connect: Connect, robot: Robot) -> None:
-    """Ask a robot what it does.
-
-    Example: `tandem status --connect tcp/192.168.7.2:7447 --robot robot-1`
-    """
-    _ask(robot, Action.STATUS, connect)
-
-
-def _ask(robot: str, action: Action, connect: list[str], operator: str = "", key: str = "") -> None:
-    from deploy.control import ask_robot
-
-    async def tell(_: asyncio.Event) -> None:
-        reply = await ask_robot(robot, action, connect, operator, key)
-        Console().print(f"{robot}: {reply.guard}: {reply.text}", highlight=False)
-        if not reply.done:
-            raise TandemError(f"{action} was refused: {reply.text}")
-
-    run_until_stopped(tell)
+for _act in OPERATORS_ACTS:
+    app.command()(_act)
 
 
 def _write_figures(path: Path | None) -> Any:

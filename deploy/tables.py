@@ -207,13 +207,13 @@ class Live:
     """What was lost or refused, by reason; zeros are not shown."""
 
 
-_GUARD_STYLE = {"track": "bold green", "align": "bold cyan", "hold": "yellow", "estop": "bold red"}
+GUARD_STYLE = {"track": "bold green", "align": "bold cyan", "hold": "yellow", "estop": "bold red"}
 
 
 def live_view(live: Live, worst: int = 5) -> RenderableType:
     """One screen, redrawn a few times a second."""
     head = Text.assemble(
-        f"{live.elapsed_s:6.1f} s   robot ", (live.guard or UNKNOWN, _GUARD_STYLE.get(live.guard, "")),
+        f"{live.elapsed_s:6.1f} s   robot ", (live.guard or UNKNOWN, GUARD_STYLE.get(live.guard, "")),
         f"   {live.reason}", overflow="ellipsis", no_wrap=True,
     )  # fmt: skip
     rates = "   ".join(f"{name} {rate:.1f} Hz" for name, rate in live.rates_hz.items()) or UNKNOWN
@@ -252,6 +252,11 @@ def _within(report: Mapping[str, Any], path: Iterable[str]) -> Any:
     for key in path:
         found = found.get(key, {})
     return found
+
+
+def plain_table(first: str, *others: str) -> Table:
+    """A table of ours without a title: the first column of words, the others right-aligned."""
+    return _table("", first, *others)
 
 
 def _table(title: str, first: str, *others: str) -> Table:

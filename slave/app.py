@@ -122,6 +122,7 @@ class Slave:
                 "reason": pipeline.guard.reason,
                 **pipeline.guard.counters.summary(),
             },
+            "lease": pipeline.guard.lease.summary(monotonic_ns()),
             "stages_ms": pipeline.journeys.budget.summary(),
             "end_to_end_ms": pipeline.journeys.budget.total(),
             "one_way_ms": pipeline.one_way.summary(),

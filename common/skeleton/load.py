@@ -14,6 +14,12 @@ from common.skeleton.table import WORLD, Joint, Post, Segment, Shape, Skeleton, 
 _UNIT = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 
 
+def profile_names() -> list[str]:
+    """The profiles that ship with tandem."""
+    files = resources.files(__package__).iterdir()
+    return sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml"))
+
+
 @cache
 def load_skeleton(name: str) -> Skeleton:
     """The named profile that ships with tandem, such as `nursing`.
@@ -21,7 +27,7 @@ def load_skeleton(name: str) -> Skeleton:
     Raises ConfigError naming the profiles there are, or the entry that is wrong.
     """
     folder = resources.files(__package__)
-    names = sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml"))
+    names = profile_names()
     if name not in names:
         raise ConfigError("skeleton", [ConfigMistake("profile", name, f"one of {', '.join(names)}")])
     return parse_skeleton(folder.joinpath(f"{name}.toml").read_text("utf-8"), source=f"{name}.toml")

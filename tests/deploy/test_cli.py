@@ -93,6 +93,11 @@ def test_every_command_s_help_has_an_example_that_it_would_take(command: str) ->
             ["connect.0 = 'nowhere': expected a protocol out of tcp, udp"],
         ),
         ("status --connect tcp/127.0.0.1:1 --robot a/b", ["robot 'a/b': expected a name"]),
+        ("status --robot a", ["where is the robot?", "--connect", "--master"]),
+        ("engage --connect tcp/127.0.0.1:1 --operator a", ["which robot?", "--robot"]),
+        ("engage --connect tcp/127.0.0.1:1 --robot a", ["who are you?", "--operator"]),
+        ("estop --connect tcp/127.0.0.1:1", ["which robot?", "--all"]),
+        ("status --master nosuch.toml", ["nosuch.toml: file = 'nosuch.toml': expected a readable file"]),
     ],
 )
 def test_a_mistake_is_one_line_and_status_1(tandem: Tandem, line: str, parts: list[str]) -> None:

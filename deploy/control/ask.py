@@ -1,0 +1,54 @@
+"""One question to each of some robots, and what each answered: none waits for another."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+from common.control import ask_control
+from common.errors import CodecError, LinkError, LinkTimeoutError
+from common.link import Link, open_session
+from common.messages import Action, ControlRequest
+from common.topics import CONTROL
+from deploy.control.reach import Reach
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of a request to one robot."""
+
+    robot: str
+    done: bool
+    text: str
+    """What happened, or why not."""
+    guard: str = ""
+    """The guard's state; empty where the robot did not answer."""
+
+    @property
+    def line(self) -> str:
+        """For people."""
+        return ": ".join(part for part in (self.robot, self.guard, self.text) if part)
+
+
+async def ask_robots(where: Reach, action: Action, key: str = "") -> list[Answer]:
+    """The answers, in the robots' order. Raises LinkError where the link cannot be opened at all."""
+    async with open_session(where.link) as session:
+        links = [session.link(robot) for robot in where.robots]
+        return await asyncio.gather(*(ask(link, where, action, key) for link in links))
+
+
+async def ask(link: Link, where: Reach, action: Action, key: str = "") -> Answer:
+    """One robot's answer, or that there was none. It never raises for a robot that is not there."""
+    try:
+        await link.connected(CONTROL)
+        request = ControlRequest(link.robot, action, where.operator, key)
+        reply = await ask_control(lambda payload: link.ask(CONTROL, payload), request)
+    except LinkTimeoutError:
+        at = ", ".join(where.link.connect)
+        return Answer(
+            link.robot, False,
+            f"does not answer at {at}: is `tandem slave` running, with that robot name, and listening there?",
+        )  # fmt: skip
+    except (LinkError, CodecError) as error:
+        return Answer(link.robot, False, str(error))
+    return Answer(link.robot, reply.done, reply.text, reply.guard)

@@ -1,0 +1,169 @@
+"""`tandem engage|disengage|estop|reset|status`: a person's acts, answered with what happened and why not."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Coroutine, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from common.errors import TandemError
+from common.messages import Action
+from common.runtime import run as run_until_stopped
+from deploy.control.reach import Reach, reach
+
+Connect = Annotated[list[str] | None, typer.Option(help="A robot's endpoint; may be given several times.")]
+Robot = Annotated[list[str] | None, typer.Option(help="A robot's name; may be given several times.")]
+Operator = Annotated[str, typer.Option(help="Your name, as in the master's file.")]
+MasterFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--master", help="The master's TOML file: endpoints, robots, operator from there.", dir_okay=False
+    ),
+]
+
+
+def engage(
+    connect: Connect = None, robot: Robot = None, operator: Operator = "", master: MasterFile = None
+) -> None:
+    """Let robots follow: each moves slowly to the operator's posture, then tracks.
+
+    Example: `tandem engage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
+    """
+    _act(Action.ENGAGE, _holder(connect, robot, operator, master))
+
+
+def disengage(
+    connect: Connect = None, robot: Robot = None, operator: Operator = "", master: MasterFile = None
+) -> None:
+    """Let robots hold where they are.
+
+    Example: `tandem disengage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
+    """
+    _act(Action.DISENGAGE, _holder(connect, robot, operator, master))
+
+
+def estop(
+    connect: Connect = None,
+    robot: Robot = None,
+    all_: Annotated[
+        bool, typer.Option("--all", help="Every robot that is reached at the endpoints.")
+    ] = False,
+    operator: Operator = "",
+    master: MasterFile = None,
+) -> None:
+    """Stop robots now. Anyone may. It is repeated until each has acknowledged it; a reset ends it.
+
+    Example: `tandem estop --connect tcp/192.168.7.2:7447 --connect tcp/192.168.7.3:7447 --all`
+    """
+    from deploy.control.stop import stop_robots
+
+    where = reach(connect, robot, operator, master)
+    if not (all_ or where.robots):
+        raise TandemError("which robot? Name it by --robot, or stop every one by --all")
+
+    async def tell() -> None:
+        console = Console()
+        said = await stop_robots(where, all_, lambda answer: console.print(answer.line, highlight=False))
+        failed = [answer for answer in said if not answer.done]
+        if failed:
+            raise TandemError("NOT EVERY ROBOT IS STOPPED: " + "; ".join(answer.line for answer in failed))
+
+    _run(tell)
+
+
+def reset(
+    key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+) -> None:
+    """Leave an emergency stop: the robot then holds, it does not move.
+
+    Example: `tandem reset --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
+    """
+    _act(Action.RESET, _named(reach(connect, robot, operator, master)), key)
+
+
+def status(
+    connect: Connect = None,
+    robot: Robot = None,
+    master: MasterFile = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+) -> None:
+    """Ask robots what they do: guard, why, who commands, faults, base, offset, latency.
+
+    Example: `tandem status --connect tcp/192.168.7.2:7447 --robot robot-1 --json`
+    """
+    from deploy.control.status import ask_status, status_table
+
+    where = _named(reach(connect, robot, master=master))
+
+    async def tell() -> None:
+        robots = await ask_status(where)
+        if as_json:
+            typer.echo(json.dumps(robots, indent=2, ensure_ascii=False))
+        else:
+            Console().print(status_table(robots))
+        silent = [f"{name} {one['reason']}" for name, one in robots.items() if not one["answers"]]
+        if silent:
+            raise TandemError("; ".join(silent))
+
+    _run(tell)
+
+
+COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, status)
+"""In the order of the help."""
+
+
+def _act(action: Action, where: Reach, key: str = "") -> None:
+    from deploy.control.ask import ask_robots
+
+    async def tell() -> None:
+        console = Console()
+        answers = await ask_robots(where, action, key)
+        for answer in answers:
+            if answer.guard:
+                console.print(answer.line, highlight=False)
+        silent = [f"{a.robot} {a.text}" for a in answers if not a.guard]
+        refused = [f"{a.robot}: {action} was refused: {a.text}" for a in answers if a.guard and not a.done]
+        if silent or refused:
+            raise TandemError("\n".join([*silent, *refused]))
+
+    _run(tell)
+
+
+def _named(where: Reach) -> Reach:
+    if not where.robots:
+        raise TandemError("which robot? Name it by --robot, or the master's file by --master")
+    return where
+
+
+def _holder(
+    connect: Sequence[str] | None, robot: Sequence[str] | None, operator: str, master: Path | None
+) -> Reach:
+    where = _named(reach(connect, robot, operator, master))
+    if not where.operator:
+        raise TandemError("who are you? Give your name by --operator, or the master's file by --master")
+    return where
+
+
+def _run(work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """Run it; a Ctrl-C ends it, and says that it is not known what the robot did."""
+
+    async def main(stop: asyncio.Event) -> None:
+        working = asyncio.create_task(work())
+        stopping = asyncio.create_task(stop.wait())
+        await asyncio.wait({working, stopping}, return_when=asyncio.FIRST_COMPLETED)
+        stopping.cancel()
+        if working.done():
+            return working.result()
+        working.cancel()
+        raise TandemError("interrupted: whether the robot heard it is not known")
+
+    run_until_stopped(main)

@@ -1,0 +1,165 @@
+"""What robots say of themselves: their answer, their newest state, and their figures of the last second."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from common.clock import to_ms
+from common.codec import decode
+from common.errors import CodecError
+from common.link import Link, open_session
+from common.messages import Action, RobotState, Statistics
+from common.skeleton import load_skeleton
+from common.skeleton.load import profile_names
+from common.topics import STATE, STATISTICS
+from deploy.control.ask import Answer, ask
+from deploy.control.reach import Reach
+from deploy.tables import GUARD_STYLE, UNKNOWN, plain_table
+
+LISTEN_S = 1.5
+"""Statistics come once a second."""
+
+
+@dataclass(slots=True)
+class Heard:
+    """What one robot sent while it was listened to."""
+
+    state: RobotState | None = None
+    figures: Mapping[str, Any] | None = None
+    all: asyncio.Event = field(default_factory=asyncio.Event)
+    """Set when there is nothing more to wait for."""
+
+    def take(self, state: RobotState | None = None, figures: Mapping[str, Any] | None = None) -> None:
+        """Keep what is newer."""
+        self.state, self.figures = state or self.state, figures or self.figures
+        if self.state is not None and self.figures is not None:
+            self.all.set()
+
+
+async def ask_status(where: Reach, listen_s: float = LISTEN_S) -> dict[str, dict[str, Any]]:
+    """Each robot's status as plain values. Raises LinkError where the link cannot be opened at all."""
+    async with open_session(where.link) as session:
+        links = [session.link(robot) for robot in where.robots]
+        each = await asyncio.gather(*(_status(link, where, listen_s) for link in links))
+    return {answer.robot: as_tree(answer, heard) for answer, heard in each}
+
+
+async def _status(link: Link, where: Reach, listen_s: float) -> tuple[Answer, Heard]:
+    heard = listen(link)
+    answer = await ask(link, where, Action.STATUS)
+    if answer.done:
+        with suppress(TimeoutError):
+            await asyncio.wait_for(heard.all.wait(), listen_s)
+    return answer, heard
+
+
+def listen(link: Link) -> Heard:
+    """Keep the newest of what the robot says from now on."""
+    heard = Heard()
+
+    def on_state(payload: bytes, _: int) -> None:
+        heard.take(state=decode_state(payload))
+
+    def on_statistics(payload: bytes, _: int) -> None:
+        try:
+            statistics = decode(payload, Statistics)
+        except CodecError:
+            return
+        if statistics.role == "slave":
+            heard.take(figures=statistics.figures)
+
+    link.subscribe(STATE, on_state)
+    link.subscribe(STATISTICS, on_statistics)
+    return heard
+
+
+def decode_state(payload: bytes) -> RobotState | None:
+    """A state of a robot of any profile; None where it is none."""
+    for joints in sorted({len(load_skeleton(name).joints) for name in profile_names()}):
+        try:
+            return decode(payload, RobotState, joints)
+        except CodecError:
+            continue
+    return None
+
+
+def as_tree(answer: Answer, heard: Heard) -> dict[str, Any]:
+    """A robot's status as plain JSON values; None where the robot did not tell."""
+    state, figures = heard.state, heard.figures or {}
+    base = state.base if state else None
+    return {
+        "answers": bool(answer.guard),
+        "guard": answer.guard or None,
+        "reason": answer.text,
+        "operator": state.operator if state else None,
+        "lease": figures.get("lease"),
+        "faults": dict(state.faults) if state else None,
+        "encoders_invalid": int((~state.encoder_valid).sum()) if state else None,
+        "base": None
+        if base is None
+        else {
+            "tilt_deg": _degrees(base.tilt_rad),
+            "inclination_deg": _degrees(base.inclination_rad),
+            "azimuth_deg": _degrees(base.azimuth_rad),
+            "tool_face_deg": _degrees(base.tool_face_rad),
+        },
+        "offset_ms": _offset(state),
+        "latency_ms": {"one_way": figures.get("one_way_ms"), "end_to_end": figures.get("end_to_end_ms")},
+        "ticks": figures.get("ticks"),
+    }
+
+
+def _degrees(angle_rad: float | None) -> float | None:
+    return None if angle_rad is None else round(math.degrees(angle_rad), 2)
+
+
+def _offset(state: RobotState | None) -> dict[str, Any] | None:
+    if state is None:
+        return None
+    trusted = state.offset_bound_ns >= 0
+    bound_ms = to_ms(state.offset_bound_ns) if trusted else None
+    return {"offset": to_ms(state.master_offset_ns), "bound": bound_ms, "trusted": trusted}
+
+
+def status_table(robots: Mapping[str, Mapping[str, Any]]) -> RenderableType:
+    """One row a robot, then each one's reason and faults in words."""
+    table = plain_table("robot", "guard", "operator", "lease s", "tilt °", "± ms", "p99 ms", "faults")
+    words = [Text(f"{name}: {why}", style) for name, one in robots.items() for why, style in _words(one)]
+    for name, one in robots.items():
+        _add_row(table, name, one)
+    return Group(table, *words)
+
+
+def _add_row(table: Table, name: str, one: Mapping[str, Any]) -> None:
+    guard = one["guard"] or "no answer"
+    table.add_row(
+        name,
+        Text(guard, GUARD_STYLE.get(guard, "bold red" if not one["answers"] else "")),
+        one["operator"] or UNKNOWN,
+        _number((one["lease"] or {}).get("held_s"), 0),
+        _number((one["base"] or {}).get("tilt_deg"), 1),
+        _number((one["offset_ms"] or {}).get("bound"), 3),
+        _number((one["latency_ms"]["end_to_end"] or {}).get("p99"), 1),
+        UNKNOWN if one["faults"] is None else str(len(one["faults"]) + one["encoders_invalid"]),
+    )
+
+
+def _words(one: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
+    words = [(str(one["reason"]), "")]
+    words += [(f"{what}: {why}", "red") for what, why in (one["faults"] or {}).items()]
+    if one["encoders_invalid"]:
+        words.append((f"encoders not heard: {one['encoders_invalid']}", "red"))
+    return words
+
+
+def _number(value: float | None, digits: int) -> str:
+    return UNKNOWN if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,109 @@
+"""A robot's status: from what it sends, as plain values and as a table."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from common.codec import encode
+from common.messages import BaseAttitude, RobotState
+from common.skeleton import load_skeleton
+from common.skeleton.load import profile_names
+from deploy.control.ask import Answer
+from deploy.control.status import Heard, as_tree, decode_state, status_table
+
+
+def state(joints: int = 25, bound_ns: int = 40_000) -> RobotState:
+    zeros, valid = np.zeros(joints), np.ones(joints, np.bool_)
+    valid[3] = False
+    base = BaseAttitude(1, math.radians(90.0), None, 0.0, math.radians(2.0))
+    return RobotState(
+        "robot-1", 1, 1, 1, "track", "follows anna", "anna", valid, zeros, zeros, None, 5_000_000, bound_ns,
+        {"left_elbow": "over-current"}, base, 9,
+    )  # fmt: skip
+
+
+def tree(heard: Heard) -> dict[str, object]:
+    return as_tree(Answer("robot-1", True, "follows anna", "track"), heard)
+
+
+def heard() -> Heard:
+    figures = {
+        "lease": {"operator": "anna", "held_s": 61.2},
+        "end_to_end_ms": {"p99": 31.25},
+        "one_way_ms": {},
+    }
+    return Heard(state(), figures)
+
+
+def test_a_status_is_json_and_tells_all() -> None:
+    said = json.loads(json.dumps(tree(heard())))
+    assert (said["guard"], said["reason"], said["operator"]) == ("track", "follows anna", "anna")
+    assert said["faults"] == {"left_elbow": "over-current"}
+    assert said["encoders_invalid"] == 1
+    assert said["base"] == {
+        "tilt_deg": 2.0,
+        "inclination_deg": 90.0,
+        "azimuth_deg": None,
+        "tool_face_deg": 0.0,
+    }
+    assert said["offset_ms"] == {"offset": 5.0, "bound": 0.04, "trusted": True}
+    assert said["lease"]["held_s"] == 61.2
+
+
+def test_an_offset_that_is_not_trusted_has_no_bound() -> None:
+    said = tree(Heard(state(bound_ns=-1)))
+    assert said["offset_ms"] == {"offset": 5.0, "bound": None, "trusted": False}
+
+
+def test_a_robot_that_told_nothing_is_said_to_have_told_nothing() -> None:
+    said = as_tree(Answer("robot-1", False, "does not answer"), Heard())
+    assert said["answers"] is False
+    assert said["faults"] is None
+    shown = rendered({"robot-1": said})
+    assert "no answer" in shown
+    assert "robot-1: does not answer" in shown
+
+
+def test_the_table_fits_and_says_faults_in_words() -> None:
+    shown = rendered({"robot-1": tree(heard()), "robot-2": tree(Heard())})
+    assert max(map(len, shown.splitlines())) <= 80
+    row = next(line for line in shown.splitlines() if line.split()[:1] == ["robot-1"])
+    assert row.split() == ["robot-1", "track", "anna", "61", "2.0", "0.040", "31.2", "2"]
+    assert "robot-1: left_elbow: over-current" in shown
+    assert "robot-1: encoders not heard: 1" in shown
+
+
+@pytest.mark.parametrize("profile", profile_names())
+def test_states_of_any_profile_are_understood(profile: str) -> None:
+    decoded = decode_state(encode(state(len(load_skeleton(profile).joints))))
+    assert decoded is not None
+    assert decoded.lease_id == 9
+
+
+def test_what_is_no_state_is_none() -> None:
+    assert decode_state(b"garbage") is None
+    assert decode_state(encode(state(joints=7))) is None
+
+
+def test_it_waits_until_both_have_come() -> None:
+    async def story() -> None:
+        heard = Heard()
+        heard.take(figures={"ticks": {}})
+        assert not heard.all.is_set()
+        heard.take(state=state())
+        assert heard.all.is_set()
+
+    asyncio.run(story())
+
+
+def rendered(robots: dict[str, dict[str, object]]) -> str:
+    out = io.StringIO()
+    Console(file=out, width=80).print(status_table(robots))
+    return out.getvalue()
