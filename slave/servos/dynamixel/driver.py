@@ -1,0 +1,286 @@
+"""All servos of a robot on one bus, a cycle at a time, without a thread: what may move, what is wrong."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from common.clock import Clock, to_ns
+from common.errors import RobotError
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT, Counts, EncoderConfig, Encoders
+from slave.servos.dynamixel import registers as x
+from slave.servos.dynamixel.bus import Bus, ServoError
+from slave.servos.dynamixel.config import DynamixelConfig
+from slave.servos.dynamixel.port import Port, PortLostError
+from slave.servos.dynamixel.settings import Settings, settings_of
+from slave.servos.dynamixel.startup import arm, prepare
+from slave.servos.servos import EncoderReading
+
+log = logging.getLogger("tandem.slave.dynamixel")
+
+_FIRST_PAUSE_NS = to_ns(0.1)
+_LONGEST_PAUSE_NS = to_ns(2.0)
+_TAKE_IN = "it holds until an e-stop has been reset"
+
+
+class Driver:
+    """The bus, and the state of each joint's servo. Its methods block for as long as the bus needs.
+
+    A servo with a fault takes no setpoints, and none comes back by itself: `recover` makes it ready
+    where it stands, and it moves slowly from there to its setpoint.
+    """
+
+    def __init__(
+        self,
+        config: DynamixelConfig,
+        skeleton: Skeleton,
+        encoders: EncoderConfig,
+        clock: Clock,
+        open_port: Callable[[str, int, float], Port] = Port,
+    ) -> None:
+        """Raises ConfigError where the encoders are not of this skeleton."""
+        self._config = config
+        self._clock = clock
+        self._open_port = open_port
+        self._skeleton = skeleton
+        self._encoders = Encoders(skeleton, encoders)
+        self._servos = settings_of(config, skeleton, self._encoders)
+        self._joint_of = {servo.id: j for j, servo in enumerate(self._servos)}
+        count = len(self._servos)
+        self._rejoin_counts = max(1, round(config.rejoin_velocity_rad_s / RAD_PER_COUNT / config.rate_hz))
+        self._watchdog_ns = to_ns(self._servos[0].watchdog * 0.02)
+        self._bus: Bus | None = None
+        self._broken_before = 0
+        self._pause_ns = _FIRST_PAUSE_NS
+        self._retry_ns = 0
+        self._sent_ns = 0
+        self._polled = 0
+        self._stopping = False
+        self._misses = np.zeros(count, np.int64)
+        self._stands: Counts = np.zeros(count, np.int64)  # as the servos tell it: below 0 past their end
+        self._goal: Counts = np.zeros(count, np.int64)
+        self._rejoining = np.zeros(count, np.bool_)
+        self._faults: dict[str, str] = {}
+        self.reading = EncoderReading(clock(), self._stands.copy(), np.zeros(count, np.bool_))
+        """Of the newest cycle."""
+        self.faults: Mapping[str, str] = {}
+        """By joint, in words; replaced whole."""
+        self.missed = 0
+        """Answers that did not come."""
+        self.lost = 0
+        """Times that the port went."""
+
+    @property
+    def broken(self) -> int:
+        """Answers that were cut short or failed their checksum."""
+        return self._broken_before + (self._bus.broken if self._bus else 0)
+
+    def start(self) -> None:
+        """Open the port and make all servos ready. Raises RobotError naming what cannot be used."""
+        try:
+            self._open()
+            wrong = self._prepare(self._servos)
+        except PortLostError:
+            self._drop()
+            raise
+        if wrong:
+            self.close()
+            lines = "\n".join(f"  {servo.joint} (id {servo.id}): {why}" for servo, why in wrong)
+            raise RobotError(
+                f"{self._config.port}: {len(wrong)} of {len(self._servos)} servos cannot be used; "
+                f"check power, cable, ids and baud rate:\n{lines}"
+            )
+        self._faults.clear()
+        self._publish()
+
+    def cycle(self, setpoint_rad: Array | None, stop: bool = False) -> None:
+        """Write the setpoints (J,), read the positions, look after one servo's health.
+
+        None: nobody has written yet, hold. `stop`: hold where the servos stand, from the first such
+        cycle on. A port that has gone is tried again, seldom.
+        """
+        try:
+            if self._bus is None:
+                self._reopen()
+            if self._bus is not None:
+                self._converse(self._bus, setpoint_rad, stop)
+        except PortLostError as error:
+            self._lose(error)
+        self._publish()
+
+    def recover(self) -> None:
+        """Make the servos with faults ready again where they stand; all move slowly to their setpoints."""
+        self._rejoining[:] = True
+        if self._bus is None:
+            return
+        try:
+            self._prepare([servo for servo in self._servos if servo.joint in self._faults])
+        except PortLostError as error:
+            self._lose(error)
+        self._publish()
+
+    def close(self) -> None:
+        """Leave the servos holding, their watchdogs off. Safe to call twice."""
+        bus = self._bus
+        if bus is None:
+            return
+        try:
+            # a servo with a fault keeps the state that tells of it
+            well = [servo.id for servo in self._servos if servo.joint not in self._faults]
+            bus.write_all(x.BUS_WATCHDOG, dict.fromkeys(well, 0))
+        except PortLostError:
+            log.warning("%s: the port had gone; the servos stop by themselves", self._config.port)
+        self._drop()
+
+    # the port
+
+    def _open(self) -> Bus:
+        config = self._config
+        self._bus = Bus(self._open_port(config.port, config.baud, config.reply_timeout_s))
+        return self._bus
+
+    def _drop(self) -> None:
+        if self._bus is not None:
+            self._broken_before = self.broken
+            bus, self._bus = self._bus, None
+            bus.close()
+
+    def _lose(self, error: PortLostError) -> None:
+        if self._bus is not None:
+            self.lost += 1
+            log.error("the servos' port has gone: %s", error)
+            for servo in self._servos:
+                self._faults[servo.joint] = f"the servos' port has gone ({error}); they stop by themselves"
+            self._rejoining[:] = True
+        self._drop()
+        self._retry_ns = self._clock() + self._pause_ns
+        self._pause_ns = min(2 * self._pause_ns, _LONGEST_PAUSE_NS)
+
+    def _reopen(self) -> None:
+        if self._clock() < self._retry_ns:
+            return
+        self._open()
+        self._sent_ns = self._clock()
+        self._misses[:] = 0
+        log.info("%s: open again", self._config.port)
+        for servo in self._servos:
+            self._faults[servo.joint] = f"the servos' port had gone; {_TAKE_IN}"
+
+    # the servos
+
+    def _prepare(self, servos: list[Settings]) -> list[tuple[Settings, str]]:
+        assert self._bus is not None
+        wrong = []
+        for servo in servos:
+            j = self._joint_of[servo.id]
+            try:
+                self._goal[j] = self._stands[j] = prepare(self._bus, servo)
+            except ServoError as error:
+                wrong.append((servo, str(error)))
+                self._faults[servo.joint] = str(error)
+        failed = {servo.id for servo, _ in wrong}
+        # armed together and last: nothing may trip them while the others are made ready
+        for servo in servos:
+            if servo.id in failed:
+                continue
+            try:
+                arm(self._bus, servo)
+                self._faults.pop(servo.joint, None)
+                self._misses[self._joint_of[servo.id]] = 0
+            except ServoError as error:
+                wrong.append((servo, str(error)))
+                self._faults[servo.joint] = str(error)
+        self._sent_ns = self._clock()
+        return wrong
+
+    def _converse(self, bus: Bus, setpoint_rad: Array | None, stop: bool) -> None:
+        self._notice_gap()
+        self._aim(setpoint_rad, stop)
+        well = [j for j, servo in enumerate(self._servos) if servo.joint not in self._faults]
+        bus.write_all(x.GOAL_POSITION, {self._servos[j].id: int(self._goal[j]) for j in well})
+        present = [j for j in range(len(self._servos)) if self._misses[j] < self._config.silent_after]
+        asked_ns = self._clock()
+        answers = bus.read_all(x.PRESENT_POSITION, [self._servos[j].id for j in present])
+        valid = np.zeros(len(self._servos), np.bool_)
+        for servo, answer in answers.items():
+            j = self._joint_of[servo]
+            self._stands[j] = answer.value
+            self._misses[j] = 0
+            valid[j] = True
+            if answer.alert:
+                self._polled = j
+        for j in present:
+            if not valid[j]:
+                self._miss(j)
+        # the answers may be as old as the question
+        self.reading = EncoderReading(asked_ns, self._stands % COUNTS_PER_TURN, valid)
+        self._look_after(bus, self._polled)
+        self._polled = (self._polled + 1) % len(self._servos)
+        self._sent_ns = self._clock()
+        if valid.any():
+            self._pause_ns = _FIRST_PAUSE_NS
+
+    def _aim(self, setpoint_rad: Array | None, stop: bool) -> None:
+        if stop:
+            if not self._stopping:
+                # what a faulty servo's goal is does not matter: nobody writes it
+                self._goal[:] = np.clip(self._stands, *self._ends())
+            self._rejoining[:] = True
+        elif setpoint_rad is not None:
+            limited = np.clip(setpoint_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
+            way = self._encoders.counts(limited) - self._goal
+            near = np.abs(way) <= self._rejoin_counts
+            self._rejoining &= ~near
+            slow = np.clip(way, -self._rejoin_counts, self._rejoin_counts)
+            self._goal += np.where(self._rejoining, slow, way)
+        self._stopping = stop
+
+    def _ends(self) -> tuple[Counts, Counts]:
+        return (
+            np.array([servo.lowest for servo in self._servos]),
+            np.array([servo.highest for servo in self._servos]),
+        )
+
+    def _notice_gap(self) -> None:
+        gap_ns = self._clock() - self._sent_ns
+        if gap_ns > self._watchdog_ns:
+            for servo in self._servos:
+                self._fault(servo, f"stopped by itself: nothing came over the bus for {gap_ns / 1e9:.2f} s")
+
+    def _miss(self, j: int) -> None:
+        self.missed += 1
+        self._misses[j] += 1
+        if self._misses[j] >= self._config.silent_after:
+            self._fault(self._servos[j], f"servo {self._servos[j].id} does not answer")
+
+    def _look_after(self, bus: Bus, j: int) -> None:
+        """Read one servo's health. One that was silent is asked only here, so it costs one wait a round."""
+        servo = self._servos[j]
+        try:
+            words = x.health_words(bus.read_bytes(servo.id, x.HEALTH, tries=1))
+        except ServoError:
+            return
+        silent = self._misses[j] >= self._config.silent_after
+        self._misses[j] = 0
+        if silent:
+            self._fault(servo, words or f"servo {servo.id} was silent and answers again; {_TAKE_IN}", True)
+        elif words:
+            self._fault(servo, words)
+
+    def _fault(self, servo: Settings, words: str, instead: bool = False) -> None:
+        """Say what is wrong; the first cause stands."""
+        if instead or servo.joint not in self._faults:
+            log.error("%s (id %d): %s", servo.joint, servo.id, words)
+            self._faults[servo.joint] = words
+            self._rejoining[self._joint_of[servo.id]] = True
+
+    def _publish(self) -> None:
+        if self._bus is None:
+            none = np.zeros(len(self._servos), np.bool_)
+            self.reading = EncoderReading(self.reading.read_ns, self.reading.counts, none)
+        if self.faults != self._faults:
+            self.faults = dict(self._faults)

@@ -1,0 +1,85 @@
+"""One servo made ready: known, set, holding where it stands."""
+
+from __future__ import annotations
+
+from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT
+from slave.servos.dynamixel import registers as x
+from slave.servos.dynamixel.bus import Bus, ServoError
+from slave.servos.dynamixel.settings import Settings
+
+_DEG_PER_COUNT = RAD_PER_COUNT * 180.0 / 3.141592653589793
+
+
+def prepare(bus: Bus, servo: Settings) -> int:
+    """Check and set a servo, and switch its torque on with the goal where it stands: counts.
+
+    A servo that holds already never lets go meanwhile. Its watchdog is left off: see `arm`.
+    Raises ServoError, in words, for one that cannot be used; PortLostError.
+    """
+    _know(bus, servo)
+    for register, value in servo.passing:
+        bus.write(servo.id, register, value)
+    # a servo that its watchdog has stopped refuses goals until this. What it does until the goal is set,
+    # a few ms later, is bounded by the velocity profile: the stop had lifted it
+    if bus.read(servo.id, x.BUS_WATCHDOG):
+        bus.write(servo.id, x.BUS_WATCHDOG, 0)
+    holding = bool(bus.read(servo.id, x.TORQUE))
+    stands = bus.read(servo.id, x.PRESENT_POSITION)
+    if holding:
+        _set_goal(bus, servo, stands)
+    _set_lasting(bus, servo, holding)
+    # read again: the settings decide how a position is told
+    stands = bus.read(servo.id, x.PRESENT_POSITION)
+    _check_place(servo, stands)
+    if not holding:
+        # with the torque on first some servos take the goal that was left from before
+        _set_goal(bus, servo, stands)
+        bus.write(servo.id, x.TORQUE, 1)
+    return stands
+
+
+def arm(bus: Bus, servo: Settings) -> None:
+    """From here on the servo stops by itself when the bus falls silent. Raises ServoError."""
+    bus.write(servo.id, x.BUS_WATCHDOG, servo.watchdog)
+
+
+def _know(bus: Bus, servo: Settings) -> None:
+    model = bus.ping(servo.id)
+    # by the bus-wide way, which needs no answer: a servo may be set to give none but to a ping
+    bus.write_all(x.STATUS_RETURN, {servo.id: x.ANSWER_ALL})
+    if not x.is_x_series(model):
+        raise ServoError(f"it is model {model}, not of the X series (model numbers 1000 to 1299)")
+    firmware = bus.read(servo.id, x.FIRMWARE)
+    if firmware < x.WATCHDOG_FIRMWARE:
+        raise ServoError(
+            f"its firmware {firmware} has no bus watchdog; update it to {x.WATCHDOG_FIRMWARE} or later"
+        )
+    error = x.hardware_words(bus.read(servo.id, x.HARDWARE_ERROR))
+    if error:
+        raise ServoError(f"{error}; it has let go: mend the cause, switch its power off and on")
+
+
+def _set_lasting(bus: Bus, servo: Settings, holding: bool) -> None:
+    for register, value in servo.lasting:
+        found = bus.read(servo.id, register)
+        if found == value:
+            continue
+        if holding:
+            raise ServoError(
+                f"register {register.address} is {found}, should be {value}, and can be set only while "
+                "the torque is off: support the robot, switch the servos' power off and on"
+            )
+        bus.write(servo.id, register, value)
+
+
+def _set_goal(bus: Bus, servo: Settings, stands: int) -> None:
+    bus.write(servo.id, x.GOAL_POSITION, min(max(stands, 0), COUNTS_PER_TURN - 1))
+
+
+def _check_place(servo: Settings, stands: int) -> None:
+    beyond = max(servo.lowest - stands, stands - servo.highest)
+    if beyond > 0:
+        raise ServoError(
+            f"it stands {beyond * _DEG_PER_COUNT:.1f}° beyond its range; turn it back by hand, "
+            "or correct its zero count"
+        )
