@@ -115,6 +115,13 @@ class CanBus:
         if self._reopening is not None:
             await self._reopening
 
+    def close_now(self) -> None:
+        """Close it for good, where nothing can be awaited: blocks while the driver lets go of it."""
+        self._closing.set()
+        bus, reader = self._detach()
+        if bus is not None:
+            _shut_down(bus, reader)
+
     def send(self, frame: Frame) -> None:
         """Send without waiting. Never raises: what cannot be sent is counted, and brings the bus down."""
         self._sent_ids.add(frame.id)

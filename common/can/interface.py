@@ -16,6 +16,7 @@ from common.errors import BusError
 RECEIVE_BUFFER_BYTES = 1 << 20
 """Some 4000 waiting udp_multicast frames: half a second of 36 nodes."""
 _LOOPBACK = "127.0.0.1"
+_IP_MULTICAST_ALL = getattr(socket, "IP_MULTICAST_ALL", 49)
 _SO_BINDTODEVICE = getattr(socket, "SO_BINDTODEVICE", 25)
 
 log = logging.getLogger("tandem.bus")
@@ -64,6 +65,9 @@ def _set_up_socket(config: BusConfig, bus: can.BusABC) -> None:
         raise
     with wire:
         wire.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        if config.interface == "udp_multicast" and ":" not in config.channel:
+            # else Linux also hands it what comes for other groups at this port
+            wire.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
         if stays_on_host(config):
             _keep_on_host(wire, config.channel)
         # a CAN socket can be bound to an interface that is down: only its pending error says so

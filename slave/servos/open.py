@@ -16,3 +16,7 @@ def open_servos(config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfi
             from slave.servos.mujoco import MujocoServos
 
             return MujocoServos(skeleton, encoders)
+        case "canopen":
+            from slave.servos.canopen.servos import CanopenServos
+
+            return CanopenServos(config.canopen, skeleton)

@@ -1,0 +1,66 @@
+"""The power state machine of a CiA 402 drive, as its master sees it (CiA 402-2, device control). Pure."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+CYCLIC_SYNCHRONOUS_POSITION = 8
+"""Mode of operation (6060h)."""
+
+
+class Power(StrEnum):
+    """The states, in words that a person may be told."""
+
+    NOT_READY = "not ready to switch on"
+    SWITCH_ON_DISABLED = "switch on disabled"
+    READY = "ready to switch on"
+    SWITCHED_ON = "switched on"
+    ENABLED = "operation enabled"
+    QUICK_STOP = "quick stop active"
+    FAULT_REACTION = "fault reaction active"
+    FAULT = "fault"
+
+
+SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, FAULT_RESET = 0x06, 0x07, 0x0F, 0x02, 0x80
+"""Controlwords (6040h). A drive takes FAULT_RESET at the rising edge of its bit only."""
+
+_PATTERNS = (
+    # mask and value of the statusword (6041h), CiA 402-2
+    (0x4F, 0x00, Power.NOT_READY),
+    (0x4F, 0x40, Power.SWITCH_ON_DISABLED),
+    (0x6F, 0x21, Power.READY),
+    (0x6F, 0x23, Power.SWITCHED_ON),
+    (0x6F, 0x27, Power.ENABLED),
+    (0x6F, 0x07, Power.QUICK_STOP),
+    (0x4F, 0x0F, Power.FAULT_REACTION),
+    (0x4F, 0x08, Power.FAULT),
+)
+STATE_BITS = 0x6F
+"""The bits of a statusword that tell the state."""
+ENABLED_BITS = 0x27
+
+
+def power(statusword: int) -> Power | None:
+    """The state that a statusword tells, or None for a pattern that the standard has not got."""
+    for mask, value, state in _PATTERNS:
+        if statusword & mask == value:
+            return state
+    return None
+
+
+def towards_enabled(state: Power | None, last_controlword: int, reset_fault: bool) -> int:
+    """The controlword that leads one step nearer to ENABLED.
+
+    From QUICK_STOP straight back, without ever letting the joint go (transition 16). A fault is reset only
+    where allowed, with the bit lowered in between.
+    """
+    match state:
+        case Power.SWITCH_ON_DISABLED:
+            return SHUTDOWN
+        case Power.READY:
+            return SWITCH_ON
+        case Power.SWITCHED_ON | Power.ENABLED | Power.QUICK_STOP:
+            return ENABLE
+        case Power.FAULT if reset_fault and last_controlword != FAULT_RESET:
+            return FAULT_RESET
+    return SHUTDOWN

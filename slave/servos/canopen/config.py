@@ -1,0 +1,151 @@
+"""`[servos.canopen]`: the buses, and which drive turns which joint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from pydantic import Field
+
+from common.can.config import BusConfig, names_used_twice
+from common.config import Section
+from common.errors import NOT_SET, ConfigMistake
+from common.skeleton import Skeleton
+
+INCREMENTS_PER_TURN = 65536
+"""Of a motor's own encoder."""
+_LIMIT_MARGIN_RAD = math.radians(2.0)
+"""A drive's software limits lie this far beyond the joint's: the guard limits first."""
+_INT32 = 2**31 - 1
+
+
+class DriveConfig(Section):
+    """`[servos.canopen.drives.<joint>]`: one CiA 402 drive."""
+
+    id: int = Field(ge=1, le=126)
+    """Its CANopen node id."""
+    bus: str = Field(min_length=1)
+    """Name of the bus it hangs on."""
+    gear_ratio: float = Field(1.0, gt=0.0, le=10_000.0)
+    """Turns of the motor for one turn of the joint."""
+    increments_per_turn: int = Field(INCREMENTS_PER_TURN, ge=256, le=2**24)
+    """Of the motor."""
+    reversed: bool = False
+    """True: the drive's position falls as the joint's angle rises."""
+    zero_increments: int = Field(0, ge=-(2**30), le=2**30)
+    """The drive's position where the joint's angle is 0."""
+    lower_deg: float | None = Field(None, ge=-360.0, le=360.0)
+    """Lower software limit; None: 2° beyond the joint's own."""
+    upper_deg: float | None = Field(None, ge=-360.0, le=360.0)
+
+    @property
+    def increments_per_rad(self) -> float:
+        """Signed: below 0 where reversed."""
+        scale = self.gear_ratio * self.increments_per_turn / (2.0 * math.pi)
+        return -scale if self.reversed else scale
+
+
+def _two_groups() -> list[BusConfig]:
+    options: dict[str, str | int | float | bool] = {"hop_limit": 0}
+    return [
+        BusConfig(name=name, interface="udp_multicast", channel=group, fd=False, options=options)
+        for name, group in (("left", "239.74.163.21"), ("right", "239.74.163.22"))
+    ]
+
+
+class CanopenConfig(Section):
+    """The drives as one network, which one SYNC moves."""
+
+    buses: list[BusConfig] = Field(default_factory=_two_groups, min_length=1)
+    """`[[servos.canopen.buses]]`; without any: two multicast groups of this host, for `tandem drives`."""
+    drives: dict[str, DriveConfig] = Field(default_factory=dict)
+    """By joint: all of them or none. Without any: ids from 1 upwards in the order of the joints, the right
+    side on the second bus where there is one, all else on the first."""
+    sync_hz: int = Field(50, ge=10, le=200)
+    """SYNC: targets out, positions in."""
+    node_id: int = Field(127, ge=1, le=127)
+    """The slave's own, of its heartbeat."""
+    heartbeat_ms: int = Field(40, ge=10, le=1000)
+    """Between two heartbeats of the slave, rounded up to whole SYNC periods."""
+    dead_ms: int = Field(200, ge=50, le=5000)
+    """Without the slave's heartbeat for so long a drive stops by itself and holds."""
+    drive_heartbeat_ms: int = Field(100, ge=20, le=5000)
+    """Between two heartbeats of a drive."""
+    drive_dead_ms: int = Field(350, ge=50, le=10_000)
+    """A drive unheard for so long is lost."""
+    following_error_deg: float = Field(20.0, gt=0.0, le=180.0)
+    """At the joint: further than this from its target for `following_error_ms` a drive faults."""
+    following_error_ms: int = Field(200, ge=1, le=10_000)
+    fault_reset: bool = True
+    """Whether a start, or a reset after an e-stop, may reset a drive's fault. False: only at the drive."""
+    join_deg_s: float = Field(15.0, gt=0.0, le=90.0)
+    """A drive that has just been enabled goes from where it stands to its setpoint at most so fast."""
+    start_timeout_s: float = Field(10.0, gt=0.0, le=120.0)
+    """All drives configured and enabled within, or the slave does not start."""
+
+    def drives_of(self, skeleton: Skeleton) -> dict[str, DriveConfig]:
+        """One drive a joint, in the order of the joints."""
+        if self.drives:
+            return {name: self.drives[name] for name in skeleton.joint_names}
+        last = self.buses[-1].name
+        used: dict[str, int] = {}
+        drives = {}
+        for name in skeleton.joint_names:
+            bus = last if name.startswith("right_") else self.buses[0].name
+            used[bus] = used.get(bus, 0) + 1
+            drives[name] = DriveConfig(id=used[bus], bus=bus)
+        return drives
+
+    def mistakes_for(self, skeleton: Skeleton) -> list[ConfigMistake]:
+        """Joints without a drive, drives without a joint, ids used twice, times that do not fit."""
+        key = "servos.canopen"
+        mistakes = names_used_twice(self.buses, f"{key}.buses")
+        if self.dead_ms < 3 * max(self.heartbeat_ms, 1000 // self.sync_hz):
+            expected = "at least three heartbeats and three SYNC periods"
+            mistakes.append(ConfigMistake(f"{key}.dead_ms", self.dead_ms, expected))
+        if self.drive_dead_ms < 3 * self.drive_heartbeat_ms:
+            expected = "at least three times drive_heartbeat_ms"
+            mistakes.append(ConfigMistake(f"{key}.drive_dead_ms", self.drive_dead_ms, expected))
+        if 1000 % self.sync_hz:
+            expected = "a rate whose period is whole milliseconds: 10, 20, 25, 40, 50, 100, 125 or 200"
+            mistakes.append(ConfigMistake(f"{key}.sync_hz", self.sync_hz, expected))
+        for name in self.drives:
+            if name not in skeleton.joint_names:
+                expected = f"a joint of the {skeleton.name} profile"
+                mistakes.append(ConfigMistake(f"{key}.drives.{name}", name, expected))
+        missing = [name for name in skeleton.joint_names if self.drives and name not in self.drives]
+        mistakes += [
+            ConfigMistake(f"{key}.drives.{name}", NOT_SET, "a drive for each joint") for name in missing
+        ]
+        if not missing and not mistakes:
+            mistakes += self._wiring(self.drives_of(skeleton), skeleton)
+        return mistakes
+
+    def _wiring(self, drives: Mapping[str, DriveConfig], skeleton: Skeleton) -> list[ConfigMistake]:
+        names = [bus.name for bus in self.buses]
+        taken: dict[tuple[str, int], str] = dict.fromkeys(((n, self.node_id) for n in names), "the slave")
+        mistakes = []
+        for joint in skeleton.joints:
+            drive, key = drives[joint.name], f"servos.canopen.drives.{joint.name}"
+            if drive.bus not in names:
+                mistakes.append(ConfigMistake(f"{key}.bus", drive.bus, f"one of {', '.join(names)}"))
+            other = taken.setdefault((drive.bus, drive.id), joint.name)
+            if other != joint.name:
+                mistakes.append(ConfigMistake(f"{key}.id", drive.id, f"an id that {other} does not have"))
+            lower, upper = limits_rad(drive, joint.lower_rad, joint.upper_rad)
+            if lower >= upper:
+                mistakes.append(ConfigMistake(f"{key}.lower_deg", drive.lower_deg, "less than upper_deg"))
+            furthest = max(abs(lower), abs(upper)) * abs(drive.increments_per_rad) + abs(
+                drive.zero_increments
+            )
+            if furthest > _INT32:
+                expected = "the joint's whole range within 32 bits of increments"
+                mistakes.append(ConfigMistake(f"{key}.gear_ratio", drive.gear_ratio, expected))
+        return mistakes
+
+
+def limits_rad(drive: DriveConfig, lower_rad: float, upper_rad: float) -> tuple[float, float]:
+    """The software limits of a drive at a joint of these limits, rad."""
+    lower = lower_rad - _LIMIT_MARGIN_RAD if drive.lower_deg is None else math.radians(drive.lower_deg)
+    upper = upper_rad + _LIMIT_MARGIN_RAD if drive.upper_deg is None else math.radians(drive.upper_deg)
+    return lower, upper

@@ -1,0 +1,140 @@
+"""Where one drive stands on its way from unknown to running, and what is wrong with it. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum, auto
+
+from common.clock import NS_PER_MS
+from slave.servos.canopen.cia402 import FAULT_RESET, QUICK_STOP, SHUTDOWN, Power, power, towards_enabled
+from slave.servos.canopen.emergency import Emergency
+from slave.servos.canopen.sdo import Transfer, answer, request
+
+SDO_TIMEOUT_NS = 300 * NS_PER_MS
+SDO_TRIES = 3
+ENABLE_TIMEOUT_NS = 2000 * NS_PER_MS
+
+
+class Phase(Enum):
+    """What is being done with a drive."""
+
+    CONFIGURING = auto()
+    ENABLING = auto()
+    RUNNING = auto()
+    FAILED = auto()
+    """Latched: it is told to stop and stay, and is not enabled again before somebody asks for it."""
+
+
+@dataclass(slots=True)
+class Drive:
+    """One drive. Its frames come in by `on_sdo`, what it shall do goes out by `controlword`."""
+
+    setup: list[Transfer]
+    phase: Phase = Phase.FAILED
+    failure: str = "not started"
+    emergency: Emergency | None = None
+    configured: bool = False
+    encoder: str = ""
+    """What its encoder says of itself."""
+    since_ns: int = 0
+    """When the phase began."""
+    _controlword: int = SHUTDOWN
+    _may_reset: bool = False
+    _asked_ns: int = 0
+    _step: int = 0
+    _tries: int = field(default=0)
+
+    def start(self, now_ns: int, may_reset: bool, configure: bool) -> bytes | None:
+        """On the way to RUNNING, whatever was before; the SDO request that comes first, if any."""
+        self.failure, self.emergency, self._may_reset = "", None, may_reset
+        self.since_ns = now_ns
+        if not configure and self.configured:
+            self.phase = Phase.ENABLING
+            return None
+        self.phase, self.configured = Phase.CONFIGURING, False
+        self._step = self._tries = 0
+        return self._ask(now_ns)
+
+    def fail(self, why: str, reconfigure: bool = False) -> None:
+        """Latch a failure; the first one stays."""
+        if self.phase is not Phase.FAILED:
+            self.phase, self.failure = Phase.FAILED, why
+        if reconfigure:
+            self.configured = False
+
+    def on_sdo(self, data: bytes, now_ns: int) -> bytes | None:
+        """The next request, or None: nothing was waited for, it failed, or all is done (`configured`)."""
+        if self.phase is not Phase.CONFIGURING or self.configured:
+            return None
+        said = answer(self.setup[self._step], data)
+        if said is None:
+            return None
+        if not said.done:
+            self.fail(f"refuses its configuration: {said.words}")
+            return None
+        self._step += 1
+        self._tries = 0
+        if self._step < len(self.setup):
+            return self._ask(now_ns)
+        self.configured = True
+        self.phase, self.since_ns = Phase.ENABLING, now_ns
+        return None
+
+    def overdue(self, now_ns: int) -> bytes | None:
+        """The request once more, where its answer is overdue; after the last try it has failed."""
+        if self.phase is not Phase.CONFIGURING or now_ns - self._asked_ns < SDO_TIMEOUT_NS:
+            return None
+        if self._tries >= SDO_TRIES:
+            self.fail("does not answer")
+            return None
+        return self._ask(now_ns)
+
+    def controlword(self, statusword: int, answered: bool, stopping: bool, now_ns: int) -> int:
+        """What to tell it, by the statusword it last sent (`answered`: since the last SYNC)."""
+        state = power(statusword)
+        if self.phase is Phase.FAILED or stopping:
+            if stopping and answered and state in (Power.FAULT, Power.FAULT_REACTION):
+                self.fail("drive fault")
+            self._controlword = QUICK_STOP
+        elif self.phase is Phase.ENABLING and answered:
+            self._enable(state, now_ns)
+        elif self.phase is Phase.RUNNING and answered and state is not Power.ENABLED:
+            self.fail(_why_not(state, statusword))
+            self._controlword = QUICK_STOP
+        return self._controlword
+
+    def _enable(self, state: Power | None, now_ns: int) -> None:
+        if state is Power.ENABLED:
+            self.phase = Phase.RUNNING
+        elif now_ns - self.since_ns > ENABLE_TIMEOUT_NS or (state is Power.FAULT and not self._may_reset):
+            self.fail(f"cannot be enabled: it is in {state or 'no state'}")
+            self._controlword = QUICK_STOP
+            return
+        self._controlword = towards_enabled(state, self._controlword, self._may_reset)
+        if self._controlword == FAULT_RESET:
+            self.emergency = None
+
+    def _ask(self, now_ns: int) -> bytes:
+        self._asked_ns = now_ns
+        self._tries += 1
+        return request(self.setup[self._step])
+
+    @property
+    def words(self) -> str:
+        """What is wrong with it; empty where all is well."""
+        said = [self.failure] if self.failure else []
+        if self.phase in (Phase.CONFIGURING, Phase.ENABLING):
+            said.append("is being enabled")
+        if self.emergency is not None:
+            said.append(self.emergency.words)
+        if self.encoder:
+            said.append(self.encoder)
+        return "; ".join(said)
+
+
+def _why_not(state: Power | None, statusword: int) -> str:
+    if state in (Power.FAULT, Power.FAULT_REACTION):
+        return "drive fault"
+    if state is None:
+        return f"has left operation: statusword {statusword:04X}"
+    return f"has left operation by itself: {state}"

@@ -1,0 +1,87 @@
+"""Emergency messages of a drive, in words (CiA 301 emergency object, CiA 402-1 error codes). Pure."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+NO_ERROR = 0x0000
+
+CODES = {
+    0x1000: "generic error",
+    0x2310: "over-current at the output",
+    0x2320: "short circuit at the output",
+    0x3210: "over-voltage of the supply",
+    0x3220: "under-voltage of the supply",
+    0x4210: "over-temperature of the drive",
+    0x4310: "over-temperature of the motor",
+    0x5200: "control hardware failed",
+    0x5530: "its memory failed",
+    0x6100: "its software failed",
+    0x6320: "a parameter is wrong",
+    0x7121: "the motor is blocked",
+    0x7300: "a sensor failed",
+    0x7305: "the motor's encoder failed",
+    0x8110: "CAN frames lost",
+    0x8120: "CAN error passive",
+    0x8130: "it missed the slave's heartbeat",
+    0x8140: "recovered from bus-off",
+    0x8210: "a PDO was too short",
+    0x8611: "following error",
+    0x8612: "position limit reached",
+    0xFF01: "fault asked for",
+}
+"""By error code."""
+
+CLASSES = {
+    0x1: "generic error",
+    0x2: "current",
+    0x3: "voltage",
+    0x4: "temperature",
+    0x5: "hardware",
+    0x6: "software",
+    0x7: "an additional module",
+    0x8: "monitoring",
+    0x9: "an external error",
+    0xF: "of the manufacturer's own",
+}
+"""By the code's first digit, for codes that CODES has not got."""
+
+REGISTER = (
+    "generic",
+    "current",
+    "voltage",
+    "temperature",
+    "communication",
+    "profile",
+    "reserved",
+    "manufacturer",
+)
+"""Bits of the error register (1001h)."""
+
+_HEAD = struct.Struct("<HB")
+
+
+@dataclass(frozen=True, slots=True)
+class Emergency:
+    """One message."""
+
+    code: int
+    register: int
+
+    @property
+    def over(self) -> bool:
+        """Whether it says that all errors are gone."""
+        return self.code == NO_ERROR
+
+    @property
+    def words(self) -> str:
+        """What a person is told."""
+        named = CODES.get(self.code) or f"{CLASSES.get(self.code >> 12, 'unknown')}"
+        bits = [name for bit, name in enumerate(REGISTER) if self.register >> bit & 1 and name != "generic"]
+        return f"{named} (code {self.code:04X}{', ' if bits else ''}{', '.join(bits)})"
+
+
+def emergency(data: bytes) -> Emergency | None:
+    """Read a message; None where it is not 8 bytes long."""
+    return Emergency(*_HEAD.unpack_from(data)) if len(data) == 8 else None

@@ -1,0 +1,308 @@
+"""All drives as one: frames in, frames out, SYNC by SYNC. Pure; the clock is handed in.
+
+configure (SDO) ▸ operational (NMT) ▸ enable (402) ▸ run: each SYNC takes in targets and answers positions
+                                                      └▸ failed, latched, until `start` or `release`
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.clock import NS_PER_MS, NS_PER_S
+from common.messages import Mask
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from slave.servos.canopen import pdo
+from slave.servos.canopen.cia402 import ENABLED_BITS, SHUTDOWN, STATE_BITS
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.drive import Drive, Phase
+from slave.servos.canopen.emergency import emergency
+from slave.servos.canopen.setup import transfers
+from slave.servos.servos import EncoderReading
+
+Outgoing = tuple[str, int, bytes]
+"""Bus name, identifier, data."""
+_START, _PRE_OPERATIONAL = 0x01, 0x80
+"""NMT commands."""
+_BOOTED, _OPERATIONAL = 0x00, 0x05
+"""NMT states in a heartbeat."""
+_FLAGS = np.uint16(pdo.MAGNET_LOST | pdo.PARITY_ERROR)
+
+
+class DriveNetwork:
+    """The drives of one robot, in the order of its joints."""
+
+    def __init__(self, config: CanopenConfig, skeleton: Skeleton) -> None:
+        self._config = config
+        self._names = skeleton.joint_names
+        drives = list(config.drives_of(skeleton).values())
+        count = len(drives)
+        self._where = [(drive.bus, drive.id) for drive in drives]
+        self._by_tpdo = {(bus, pdo.TPDO1 + n): i for i, (bus, n) in enumerate(self._where)}
+        self._by_node = {where: i for i, where in enumerate(self._where)}
+        self._rpdo = [(bus, pdo.RPDO1 + n) for bus, n in self._where]
+        self._drives = [
+            Drive(transfers(config, drive, joint))
+            for drive, joint in zip(drives, skeleton.joints, strict=True)
+        ]
+        self._scale = np.array([drive.increments_per_rad for drive in drives])
+        self._zero = np.array([drive.zero_increments for drive in drives], dtype=np.float64)
+        self._step_rad = math.radians(config.join_deg_s) / config.sync_hz
+        self._dead_ns = config.drive_dead_ms * NS_PER_MS
+        self._beat_every = max(1, config.heartbeat_ms * config.sync_hz // 1000)
+        self._beat = pdo.HEARTBEAT + config.node_id
+        self._answers = pdo.Answers(count)
+        self._target_rad = np.zeros(count)
+        self._joined = np.zeros(count, np.bool_)
+        self._running = np.zeros(count, np.bool_)
+        self._flags = np.zeros(count, np.uint16)
+        self._words = np.full(count, SHUTDOWN, np.uint16)
+        self._answered_ns = np.zeros(count, np.int64)
+        self._heard_ns = [0] * count
+        self._down: dict[str, str] = {}
+        self._stopping = False
+        self._settled = False
+        self._cycles = 0
+        self._synced_ns = 0
+        self._told: dict[str, str] = {}
+        self.reading = EncoderReading(0, np.zeros(count, np.int64), np.zeros(count, np.bool_))
+        self.faults: Mapping[str, str] = MappingProxyType({})
+        """By joint, in words. Replaced, never changed."""
+        self.outbox: list[Outgoing] = []
+        """What must be sent at once: the adapter empties it."""
+        self.answered_after_ns: int | None = None
+        """From the last SYNC to the last drive's answer; None until all have answered."""
+        self.unanswered = 0
+        """SYNCs that not every drive answered before the next."""
+        self.unknown = 0
+        """Frames that no drive of this robot sends."""
+
+    # in
+
+    def start(self, now_ns: int) -> None:
+        """Configure every drive afresh, then enable it."""
+        self._stopping = False
+        for i in range(len(self._drives)):
+            self._start(i, now_ns, configure=True)
+        self._tell()
+
+    def release(self, now_ns: int) -> None:
+        """After a stop: enable every drive again, and those that had failed, too."""
+        self._stopping = False
+        for i in range(len(self._drives)):
+            self._start(i, now_ns, configure=False)
+        self._tell()
+
+    def stop(self) -> None:
+        """From the next cycle on every drive brakes and stays."""
+        self._stopping = True
+        self._settled = False
+
+    def on_bus(self, bus: str, down: str) -> None:
+        """A bus has failed, for the reason told, or works (again): an empty reason."""
+        if down:
+            self._down[bus] = down
+        else:
+            self._down.pop(bus, None)
+        self._tell()
+
+    def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        """One frame of any drive."""
+        drive = self._by_tpdo.get((bus, frame_id))
+        if drive is None:
+            self._on_other(bus, frame_id, data, now_ns)
+        elif self._answers.take(drive, data):
+            if self._answers.complete:
+                if self.answered_after_ns is None:
+                    self.answered_after_ns = now_ns - self._synced_ns
+                self._publish()
+        else:
+            self.unknown += 1
+
+    def _on_other(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        i = self._by_node.get((bus, frame_id & 0x7F))
+        if i is None:
+            self.unknown += 1
+            return
+        drive = self._drives[i]
+        match frame_id & 0x780:
+            case pdo.SDO_ANSWER:
+                following = drive.on_sdo(data, now_ns)
+                if following is not None:
+                    self._ask(i, following)
+                elif drive.phase is Phase.ENABLING:
+                    self._operate(i, now_ns)
+                else:
+                    self._tell()
+            case pdo.HEARTBEAT if len(data) == 1:
+                self._heard_ns[i] = now_ns
+                self._on_state(drive, data[0] & 0x7F)
+            case pdo.EMERGENCY:
+                said = emergency(data)
+                if said is not None:
+                    drive.emergency = None if said.over else said
+                    self._tell()
+            case _:
+                self.unknown += 1
+
+    def _on_state(self, drive: Drive, state: int) -> None:
+        # while it is enabled, a heartbeat from before NMT's start may still be on its way
+        left = drive.phase is Phase.RUNNING and state != _OPERATIONAL
+        if left or (drive.phase is Phase.ENABLING and state == _BOOTED):
+            drive.fail("has restarted" if state == _BOOTED else "is not operational", reconfigure=True)
+            self._tell()
+
+    # out
+
+    def pending(self, now_ns: int) -> None:
+        """Repeat SDO requests whose answers are overdue, into the outbox."""
+        for i, drive in enumerate(self._drives):
+            again = drive.overdue(now_ns)
+            if again is not None:
+                self._ask(i, again)
+
+    def cycle(self, now_ns: int, setpoint_rad: Array | None) -> list[Outgoing]:
+        """The frames before a SYNC: heartbeats, and every drive's controlword and target (RPDOs)."""
+        if not self._answers.complete:
+            self.unanswered += self._cycles > 0
+            self._publish()
+        fresh = self._answers.fresh
+        self._answered_ns[fresh] = now_ns
+        self.pending(now_ns)
+        controlwords = self._supervise(fresh, now_ns)
+        targets = self._targets(setpoint_rad)
+        beat = self._cycles % self._beat_every == 0
+        out = [(bus.name, self._beat, bytes([_OPERATIONAL])) for bus in self._config.buses] if beat else []
+        data = pdo.pack_targets(controlwords, targets)
+        out += [(bus, frame_id, part) for (bus, frame_id), part in zip(self._rpdo, data, strict=True)]
+        self._cycles += 1
+        return out
+
+    def sync(self, now_ns: int) -> list[Outgoing]:
+        """The SYNCs, to be sent right now."""
+        self._answers.begin()
+        self._synced_ns = now_ns
+        self.answered_after_ns = None
+        return [(bus.name, pdo.SYNC, b"") for bus in self._config.buses]
+
+    @property
+    def running(self) -> bool:
+        """Whether every drive is enabled."""
+        return bool(self._running.all())
+
+    @property
+    def failed(self) -> dict[str, str]:
+        """Drives that have failed, with node, bus and reason, by joint."""
+        return {
+            name: f"node {node} on bus {bus} {drive.words}"
+            for name, (bus, node), drive in zip(self._names, self._where, self._drives, strict=True)
+            if drive.phase is Phase.FAILED
+        }
+
+    def where(self, joint: str) -> tuple[str, int]:
+        """Bus and node id of a joint's drive."""
+        return self._where[self._names.index(joint)]
+
+    # within
+
+    def _start(self, i: int, now_ns: int, configure: bool) -> None:
+        drive, (bus, node) = self._drives[i], self._where[i]
+        self._joined[i] = self._running[i] = False
+        self._settled = False
+        first = drive.start(now_ns, self._config.fault_reset, configure)
+        if first is not None:
+            self.outbox.append((bus, pdo.NMT, bytes([_PRE_OPERATIONAL, node])))
+            self._ask(i, first)
+        else:
+            self._heard_ns[i] = self._answered_ns[i] = now_ns
+
+    def _ask(self, i: int, data: bytes) -> None:
+        bus, node = self._where[i]
+        self.outbox.append((bus, pdo.SDO_REQUEST + node, data))
+
+    def _operate(self, i: int, now_ns: int) -> None:
+        bus, node = self._where[i]
+        self._heard_ns[i] = self._answered_ns[i] = now_ns
+        self.outbox.append((bus, pdo.NMT, bytes([_START, node])))
+
+    def _supervise(self, fresh: Mask, now_ns: int) -> NDArray[np.uint16]:
+        statusword = self._answers.statusword
+        silent = now_ns - np.minimum(self._answered_ns, self._heard_ns) > self._dead_ns
+        enabled = statusword & STATE_BITS == ENABLED_BITS
+        if self._settled and not silent.any() and enabled[fresh].all():
+            # all run, and all that answered are enabled: the words are those of the last time
+            return self._words
+        words = np.empty_like(self._words)
+        for i, drive in enumerate(self._drives):
+            if silent[i] and drive.phase in (Phase.ENABLING, Phase.RUNNING):
+                drive.fail("silent: neither heartbeat nor position", reconfigure=True)
+            was_running = drive.phase is Phase.RUNNING
+            words[i] = drive.controlword(int(statusword[i]), bool(fresh[i]), self._stopping, now_ns)
+            self._running[i] = drive.phase is Phase.RUNNING and not self._stopping
+            if self._running[i] and not was_running:
+                self._joined[i] = False
+        self._words = words
+        self._tell()
+        self._settled = self.running and not self._told
+        return words
+
+    def _targets(self, setpoint_rad: Array | None) -> NDArray[np.int32]:
+        """Increments: where it stands for a drive that does not run; its setpoint, once it has joined it."""
+        position = self._answers.position
+        stands_rad = (position - self._zero) / self._scale
+        idle = ~self._running
+        self._joined[idle] = False
+        if setpoint_rad is None:
+            self._target_rad = np.where(idle, stands_rad, self._target_rad)
+        elif self._joined.all():
+            self._target_rad = setpoint_rad
+        else:
+            way = setpoint_rad - self._target_rad
+            towards = self._target_rad + np.clip(way, -self._step_rad, self._step_rad)
+            self._joined |= self._running & (np.abs(way) <= self._step_rad)
+            self._target_rad = np.where(idle, stands_rad, np.where(self._joined, setpoint_rad, towards))
+        wanted = np.rint(self._zero + self._scale * self._target_rad)
+        return np.where(idle, position, wanted).astype(np.int32)
+
+    def _publish(self) -> None:
+        words = self._answers.encoder
+        flags = words & _FLAGS
+        counts = (words & pdo.COUNT_BITS).astype(np.int64)
+        self.reading = EncoderReading(self._synced_ns, counts, self._answers.fresh & (flags == 0))
+        if (flags != self._flags).any():
+            self._flags = flags
+            for drive, flag in zip(self._drives, flags.tolist(), strict=True):
+                drive.encoder = _encoder_words(flag)
+            self._tell()
+
+    def _tell(self) -> None:
+        said = {}
+        for name, (bus, _), drive in zip(self._names, self._where, self._drives, strict=True):
+            words = drive.words
+            if bus in self._down:
+                words = "; ".join(filter(None, [f"bus {bus} is down: {self._down[bus]}", words]))
+            if words:
+                said[name] = words
+        if said != self._told:
+            self._told = said
+            self._settled = False
+            self.faults = MappingProxyType(said)
+
+
+def period_ns(config: CanopenConfig) -> int:
+    """Between two SYNCs."""
+    return NS_PER_S // config.sync_hz
+
+
+def _encoder_words(flags: int) -> str:
+    said = []
+    if flags & pdo.MAGNET_LOST:
+        said.append("encoder: magnet lost")
+    if flags & pdo.PARITY_ERROR:
+        said.append("encoder: parity error")
+    return "; ".join(said)

@@ -1,0 +1,200 @@
+"""CiA 402 drives on CAN as the slave's servos: the pure network, real buses and the clock.
+
+It has no thread and no timer of its own: the slave's ticks drive SYNC and heartbeat. A slave that hangs
+therefore falls silent, and the drives stop by themselves.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+import can
+import numpy as np
+
+from common.can.bus import CanBus
+from common.can.config import BusConfig
+from common.can.deaf import open_deaf_to
+from common.can.frame import Frame
+from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
+from common.errors import RobotError
+from common.latency import Durations
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.network import DriveNetwork, Outgoing, period_ns
+from slave.servos.canopen.pdo import RPDO1
+from slave.servos.servos import EncoderReading
+
+_POLL_S = 0.0005
+_EARLY_NS = 2 * NS_PER_MS
+"""A setpoint written this long before its SYNC is due goes with it: ticks jitter, SYNC must not skip one."""
+
+Opener = Callable[[BusConfig], can.BusABC]
+
+
+def open_deaf_to_targets(config: BusConfig) -> can.BusABC:
+    """A bus that does not hear the targets it sends."""
+    return open_deaf_to(config, RPDO1)
+
+
+class CanopenServos:
+    """Servos (see `slave.servos.Servos`) of drives on one or more CAN buses.
+
+    Use it on the thread of a running event loop, on which frames come in. `write` sends every SYNC that is
+    due; `read` does where nobody writes, so that encoders are heard from the start.
+    """
+
+    def __init__(
+        self,
+        config: CanopenConfig,
+        skeleton: Skeleton,
+        clock: Clock = monotonic_ns,
+        opener: Opener = open_deaf_to_targets,
+    ) -> None:
+        self._config = config
+        self._skeleton = skeleton
+        self._clock = clock
+        self._period_ns = period_ns(config)
+        self._opener = opener
+        self._network = DriveNetwork(config, skeleton)
+        self._buses: dict[str, CanBus] = {}
+        self._setpoint: Array | None = None
+        self._due_ns = 0
+        self._answered = Durations()
+        self._period = Durations()
+        self._synced_ns = 0
+        self._fd = {bus.name: bus.fd for bus in config.buses}
+
+    def start(self) -> None:
+        """Configure and enable all drives; they hold where they stand. Takes some tenths of a second.
+
+        Raises BusError where a bus cannot be opened, RobotError naming each drive that does not come up.
+        """
+        if self._buses:
+            raise RobotError("the drives run already: stop them before they are started again")
+        self._setpoint = None
+        try:
+            for config in self._config.buses:
+                bus = CanBus(config, self._on_frame, self._on_change, self._opener)
+                bus.open()
+                self._buses[config.name] = bus
+            self._come_up()
+        except BaseException:
+            self.stop()
+            raise
+
+    def write(self, position_rad: Array) -> None:
+        """Setpoints (J,) for the next SYNC. Raises ValueError if not finite or not J."""
+        if position_rad.shape != (len(self._skeleton.joints),) or not np.isfinite(position_rad).all():
+            raise ValueError(f"setpoints must be {len(self._skeleton.joints)} finite angles")
+        self._setpoint = np.clip(position_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
+        if self._clock() >= self._due_ns - _EARLY_NS:
+            self._cycle()
+
+    def read(self) -> EncoderReading:
+        """All positions of the newest SYNC that all drives have answered, or that the next has ended."""
+        for bus in self._buses.values():
+            bus.read()
+        if self._clock() >= self._due_ns + self._period_ns // 2:
+            self._cycle()
+        return self._network.reading
+
+    def faults(self) -> Mapping[str, str]:
+        """What drives, encoders and buses say is wrong, by joint."""
+        return self._network.faults
+
+    def quick_stop(self, stop: bool) -> None:
+        """Brake and stay, at once; or enable all drives again, those with a fault too (`fault_reset`)."""
+        if stop:
+            self._network.stop()
+        else:
+            self._network.release(self._clock())
+        self._flush()
+        self._cycle()
+
+    def stop(self) -> None:
+        """Tell the drives to stop and stay, and close the buses."""
+        if self._buses:
+            self._network.stop()
+            self._cycle()
+        for bus in self._buses.values():
+            bus.close_now()
+        self._buses = {}
+
+    def figures(self) -> dict[str, object]:
+        """Counters and times: SYNC to the last drive's answer, and from SYNC to SYNC."""
+        return {
+            "sync_to_positions_ms": self._answered.summary(),
+            "sync_period_ms": self._period.summary(),
+            "unanswered_syncs": self._network.unanswered,
+            "unknown_frames": self._network.unknown,
+            "buses": {name: bus.summary() for name, bus in self._buses.items()},
+        }
+
+    def _come_up(self) -> None:
+        now_ns = self._clock()
+        deadline_ns = now_ns + to_ns(self._config.start_timeout_s)
+        self._due_ns = now_ns
+        self._network.start(now_ns)
+        self._flush()
+        while not self._network.running:
+            now_ns = self._clock()
+            for bus in self._buses.values():
+                bus.read()
+            if now_ns >= self._due_ns:
+                self._cycle()
+            failed = self._network.failed
+            if failed or now_ns > deadline_ns:
+                raise RobotError(self._not_up(failed))
+            time.sleep(_POLL_S)
+
+    def _not_up(self, failed: Mapping[str, str]) -> str:
+        said = failed or self._network.faults
+        listed = "; ".join(f"{joint}: {words}" for joint, words in said.items())
+        return (
+            f"{len(said)} of {len(self._skeleton.joints)} drives do not start: {listed}; check their power, "
+            "node ids and buses in [servos.canopen]; without hardware, start `tandem drives` on the same file"
+        )
+
+    def _cycle(self) -> None:
+        now_ns = self._clock()
+        network = self._network
+        for outgoing in network.cycle(now_ns, self._setpoint):
+            self._send(outgoing)
+        self._flush()
+        synced_ns = self._clock()
+        for outgoing in network.sync(synced_ns):
+            self._send(outgoing)
+        if self._synced_ns:
+            self._period.record(synced_ns - self._synced_ns)
+        self._synced_ns = synced_ns
+        # on the grid while on time; from now where a whole period was missed
+        self._due_ns += self._period_ns
+        if self._due_ns <= now_ns - _EARLY_NS:
+            self._due_ns = now_ns + self._period_ns
+
+    def _flush(self) -> None:
+        outbox, self._network.outbox = self._network.outbox, []
+        for outgoing in outbox:
+            self._send(outgoing)
+
+    def _send(self, outgoing: Outgoing) -> None:
+        name, frame_id, data = outgoing
+        bus = self._buses.get(name)
+        if bus is not None:
+            bus.send(Frame(frame_id, data, False))
+
+    def _on_frame(self, name: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        network = self._network
+        waiting = network.answered_after_ns is None
+        network.on_frame(name, frame_id, data, now_ns)
+        if network.outbox:
+            self._flush()
+        if waiting and network.answered_after_ns is not None and self._synced_ns:
+            self._answered.record(network.answered_after_ns)
+
+    def _on_change(self, name: str, up: bool) -> None:
+        bus = self._buses.get(name)
+        if bus is not None:
+            self._network.on_bus(name, "" if up else bus.last_error)

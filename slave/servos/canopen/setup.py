@@ -1,0 +1,62 @@
+"""What each drive is told before it may move: entries of its object dictionary, by SDO. Pure."""
+
+from __future__ import annotations
+
+import math
+
+from common.skeleton import Joint
+from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION
+from slave.servos.canopen.config import CanopenConfig, DriveConfig, limits_rad
+from slave.servos.canopen.pdo import RPDO1, RPDO_MAPPING, TPDO1, TPDO_MAPPING
+from slave.servos.canopen.sdo import Read, Transfer, Write
+
+_INVALID = 0x8000_0000
+"""Bit of a PDO's COB-ID: it does not exist (while its mapping is changed)."""
+_NO_RTR = 0x4000_0000
+_EVERY_SYNC = 1
+_QUICK_STOP_AND_STAY = 6
+"""605Ah: slow down on the quick stop ramp, then hold. Never let go."""
+_ON_ABORT_QUICK_STOP = 3
+"""6007h: a lost connection is answered by a quick stop."""
+_MILLISECONDS = -3
+
+
+def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint) -> list[Transfer]:
+    """Everything from "are you a drive" to its limits, in this order."""
+    scale = drive.increments_per_rad
+    lower, upper = sorted(
+        round(drive.zero_increments + scale * limit)
+        for limit in limits_rad(drive, joint.lower_rad, joint.upper_rad)
+    )
+    window = round(abs(scale) * math.radians(config.following_error_deg))
+    ramp = round(abs(scale) * joint.max_acceleration_rad_s2)
+    return [
+        Read(0x1000, 0, 0xFFFF, 402, "a CiA 402 drive"),
+        Write(0x1016, 1, 4, config.node_id << 16 | config.dead_ms),
+        Write(0x1017, 0, 2, config.drive_heartbeat_ms),
+        *_pdo(0x1400, RPDO1 + drive.id, RPDO_MAPPING),
+        *_pdo(0x1800, TPDO1 + drive.id | _NO_RTR, TPDO_MAPPING),
+        Write(0x6007, 0, 2, _ON_ABORT_QUICK_STOP),
+        Write(0x605A, 0, 2, _QUICK_STOP_AND_STAY),
+        Write(0x6060, 0, 1, CYCLIC_SYNCHRONOUS_POSITION),
+        Write(0x6065, 0, 4, window),
+        Write(0x6066, 0, 2, config.following_error_ms),
+        Write(0x607D, 1, 4, lower),
+        Write(0x607D, 2, 4, upper),
+        Write(0x6085, 0, 4, ramp),
+        Write(0x60C2, 1, 1, 1000 // config.sync_hz),
+        Write(0x60C2, 2, 1, _MILLISECONDS),
+    ]
+
+
+def _pdo(index: int, cob_id: int, mapping: tuple[int, ...]) -> list[Transfer]:
+    """CiA 301's order for a new mapping: off, no entries, the entries, their number, on."""
+    entries = index + 0x200
+    return [
+        Write(index, 1, 4, cob_id | _INVALID),
+        Write(index, 2, 1, _EVERY_SYNC),
+        Write(entries, 0, 1, 0),
+        *(Write(entries, sub, 4, entry) for sub, entry in enumerate(mapping, 1)),
+        Write(entries, 0, 1, len(mapping)),
+        Write(index, 1, 4, cob_id),
+    ]

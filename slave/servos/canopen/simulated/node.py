@@ -1,0 +1,268 @@
+"""One simulated CiA 402 drive: a CANopen node whose dictionary comes from `drive.eds`.
+
+The `canopen` library answers NMT and SDO (expedited and segmented). SYNC, PDOs and heartbeats, which come
+thousands of times a minute, are done here.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import canopen
+from canopen.sdo.exceptions import SdoAbortedError
+
+from common.clock import NS_PER_MS
+from slave.servos.canopen import pdo
+from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION, Power
+from slave.servos.canopen.simulated.faults import CODES, DEMAND, Fault
+from slave.servos.canopen.simulated.machine import after, statusword
+
+EDS = Path(__file__).with_name("drive.eds")
+Send = Callable[[int, bytes], None]
+"""(identifier, data)."""
+_RPDO_COMMUNICATION, _RPDO_ENTRIES, _TPDO_COMMUNICATION, _TPDO_ENTRIES = 0x1400, 0x1600, 0x1800, 0x1A00
+_INVALID = 0x8000_0000
+_FORMATS = {8: "B", 16: "H", 32: "i"}
+_TAKEN = {0x6040: "controlword", 0x607A: "target"}
+_GIVEN = {0x6041: "statusword", pdo.ENCODER: "encoder", 0x6064: "position"}
+_NOT_MAPPABLE, _PRESENT_STATE = 0x0604_0041, 0x0800_0022
+_BOOT, _PRE_OPERATIONAL, _OPERATIONAL = 0x00, 0x7F, 0x05
+_RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
+
+
+class _Wire(canopen.Network):
+    """The library's network without its threads: what it sends goes to the bus, what beats is timed here."""
+
+    def __init__(self, send: Send) -> None:
+        super().__init__()
+        self._deliver = send
+
+    def send_message(self, can_id: int, data: Any, remote: bool = False) -> None:
+        self._deliver(can_id, bytes(data))
+
+    def send_periodic(self, can_id: int, data: Any, period: float, remote: bool = False) -> Any:
+        return _Beat()
+
+
+class _Beat:
+    """A heartbeat as the library sees it; `SimulatedDrive.beat` sends the real one."""
+
+    def update(self, data: object) -> None:
+        """The state is read when it is sent."""
+
+    def stop(self) -> None:
+        """The period is read when it is due."""
+
+
+class SimulatedDrive:
+    """A drive without its motor: `target` is what it wants, `position` and `count` are what it is told."""
+
+    def __init__(self, node_id: int, send: Send) -> None:
+        self.id = node_id
+        self.position = 0
+        """Increments."""
+        self.count = 0
+        """Of the output encoder."""
+        self.target = 0
+        self.state = Power.SWITCH_ON_DISABLED
+        self.fault = Fault.NONE
+        self.rebooted = False
+        """Set where the drive has lost what it was told; whoever reads it clears it."""
+        self._send_frame = send
+        self._controlword = 0
+        self._pending: bytes | None = None
+        self._rpdo: tuple[struct.Struct, list[str]] | None = None
+        self._tpdo: tuple[struct.Struct, list[str]] | None = None
+        self._stuck = 0
+        self._beaten_ns = 0
+        self._heard_ns: int | None = None
+        self._boot()
+
+    def _boot(self) -> None:
+        self._node = canopen.LocalNode(self.id, str(EDS))
+        self._network = _Wire(self._send)
+        self._node.associate_network(self._network)
+        node: Any = self._node  # half of the library is untyped
+        node.add_read_callback(self._read)
+        node.add_write_callback(self._write)
+        self._rpdo = self._tpdo = self._pending = self._heard_ns = None
+        self._controlword = 0
+        self.rebooted = True
+        self._send(pdo.HEARTBEAT + self.id, bytes([_BOOT]))
+        self._node.nmt._state = _PRE_OPERATIONAL
+
+    # what comes in
+
+    def on_frame(self, frame_id: int, data: bytes, now_ns: int) -> None:
+        """NMT, SDO, the targets, and the master's heartbeat."""
+        if frame_id == pdo.RPDO1 + self.id:
+            self._pending = data
+        elif frame_id == pdo.NMT:
+            self._on_nmt(data)
+        elif frame_id == self._master_beat and len(data) == 1:
+            self._heard_ns = now_ns
+        else:
+            self._network.notify(frame_id, bytearray(data), 0.0)
+
+    def _on_nmt(self, data: bytes) -> None:
+        if len(data) != 2 or data[1] not in (0, self.id):
+            return
+        if data[0] in (_RESET_NODE, _RESET_COMMUNICATION):
+            self._lose_connection()
+            self._boot()
+            return
+        self._network.notify(pdo.NMT, bytearray(data), 0.0)
+        if not self.operational:
+            self._lose_connection()
+
+    @property
+    def operational(self) -> bool:
+        """Whether PDOs pass."""
+        return bool(self._node.nmt._state == _OPERATIONAL)
+
+    def on_sync(self) -> None:
+        """Take in what was told since the last SYNC, and tell how things are."""
+        if not self.operational:
+            return
+        if self._pending is not None and self._rpdo is not None:
+            layout, names = self._rpdo
+            if len(self._pending) == layout.size:
+                taken = dict(zip(names, layout.unpack(self._pending), strict=True))
+                self.target = taken.get("target", self.target)
+                self._command(taken.get("controlword", self._controlword))
+            else:
+                self._emergency(0x8210, 0x11)
+            self._pending = None
+        if self._tpdo is not None:
+            layout, names = self._tpdo
+            now = {"statusword": statusword(self.state), "encoder": self.encoder, "position": self.position}
+            self._send(pdo.TPDO1 + self.id, layout.pack(*(now[name] for name in names)))
+
+    def beat(self, now_ns: int) -> None:
+        """Send a heartbeat that is due, and miss the master's that is overdue."""
+        period_ms = self.value(0x1017)
+        if period_ms and now_ns - self._beaten_ns >= period_ms * NS_PER_MS:
+            self._beaten_ns = now_ns
+            self._send(pdo.HEARTBEAT + self.id, bytes([self._node.nmt._state]))
+        allowed_ns = (self._consumer & 0xFFFF) * NS_PER_MS
+        if self._heard_ns is not None and allowed_ns and now_ns - self._heard_ns > allowed_ns:
+            self._heard_ns = None
+            if self.state is Power.ENABLED:
+                self._emergency(0x8130, 0x11)
+            self._lose_connection()
+
+    def at_rest(self) -> None:
+        """The motor stands: a fault's reaction is over."""
+        if self.state is Power.FAULT_REACTION:
+            self.state = Power.FAULT
+
+    def fail(self, code: int, register: int) -> None:
+        """A fault of the drive's own: tell it, brake, and stay in fault until it is reset."""
+        if self.state not in (Power.FAULT, Power.FAULT_REACTION):
+            self._emergency(code, register)
+            self.state = Power.FAULT_REACTION
+
+    def happen(self, fault: Fault) -> None:
+        """A fault on demand; NONE ends what lasts."""
+        self._stuck = self.count
+        self.fault = fault
+        if fault in CODES:
+            self.fail(*CODES[fault])
+        elif fault is Fault.RESTART:
+            self.fault = Fault.NONE
+            self._lose_connection()
+            self._boot()
+
+    # what it says
+
+    @property
+    def encoder(self) -> int:
+        """The encoder's word (2000h)."""
+        if self.fault is Fault.ENCODER_STUCK:
+            return self._stuck
+        flag = {Fault.MAGNET_LOST: pdo.MAGNET_LOST, Fault.PARITY: pdo.PARITY_ERROR}.get(self.fault, 0)
+        return self.count | flag
+
+    def value(self, index: int, subindex: int = 0) -> int:
+        """An entry of its dictionary."""
+        raw: Any = self._node.object_dictionary[index]
+        entry = raw[subindex] if subindex or not hasattr(raw, "decode_raw") else raw
+        return int(entry.decode_raw(self._node.get_data(index, subindex)))
+
+    @property
+    def _consumer(self) -> int:
+        return self.value(0x1016, 1)
+
+    @property
+    def _master_beat(self) -> int:
+        return pdo.HEARTBEAT + (self._consumer >> 16 & 0x7F)
+
+    # within
+
+    def _command(self, controlword: int) -> None:
+        was = self.state
+        state = after(self.state, controlword, self._controlword)
+        if state is Power.ENABLED and self.value(0x6060) != CYCLIC_SYNCHRONOUS_POSITION:
+            state = was
+        self.state, self._controlword = state, controlword
+        recovered = was is Power.FAULT or (was is Power.QUICK_STOP and state is Power.ENABLED)
+        if recovered and state is not was:
+            if self.fault in CODES:
+                self.fault = Fault.NONE
+            self._emergency(0, 0)
+
+    def _lose_connection(self) -> None:
+        if self.state is Power.ENABLED:
+            self.state = Power.QUICK_STOP
+
+    def _emergency(self, code: int, register: int) -> None:
+        self._node.set_data(0x603F, 0, code.to_bytes(2, "little"))
+        self._node.set_data(0x1001, 0, bytes([register]))
+        self._send(pdo.EMERGENCY + self.id, struct.pack("<HB5x", code, register))
+
+    def _send(self, frame_id: int, data: bytes) -> None:
+        if self.fault is not Fault.SILENT:
+            self._send_frame(frame_id, data)
+
+    def _read(self, index: int, subindex: int, **_: object) -> int | None:
+        match index:
+            case 0x6041:
+                return statusword(self.state)
+            case 0x6064:
+                return self.position
+            case 0x6061:
+                return self.value(0x6060)
+            case pdo.ENCODER:
+                return self.encoder
+        return None
+
+    def _write(self, index: int, subindex: int, data: bytes, **_: object) -> None:
+        if index in (0x1400, 0x1800) and subindex == 1:
+            self._activate(index, int.from_bytes(data, "little"))
+        elif index in (0x1600, 0x1A00) and (self._rpdo if index == 0x1600 else self._tpdo) is not None:
+            raise SdoAbortedError(_PRESENT_STATE)
+        elif index == 0x6040:
+            self._command(int.from_bytes(data, "little"))
+        elif index == DEMAND:
+            if data[0] > max(Fault):
+                raise SdoAbortedError(0x0609_0030)
+            self.happen(Fault(data[0]))
+
+    def _activate(self, index: int, cob_id: int) -> None:
+        known = _TAKEN if index == _RPDO_COMMUNICATION else _GIVEN
+        layout = None
+        if not cob_id & _INVALID:
+            entries = index + 0x200
+            mapped = [self.value(entries, sub) for sub in range(1, self.value(entries) + 1)]
+            names = [known.get(entry >> 16, "") for entry in mapped]
+            formats = [_FORMATS.get(entry & 0xFF, "") for entry in mapped]
+            if not mapped or not all(names) or not all(formats):
+                raise SdoAbortedError(_NOT_MAPPABLE)
+            layout = struct.Struct("<" + "".join(formats)), names
+        if index == _RPDO_COMMUNICATION:
+            self._rpdo = layout
+        else:
+            self._tpdo = layout
