@@ -18,6 +18,7 @@ from common.runtime import run as run_until_stopped
 from deploy.accuracy.commands import app as accuracy_app
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.control.commands import COMMANDS as OPERATORS_ACTS
+from deploy.drives import drives
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -28,6 +29,7 @@ app = typer.Typer(
 )
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(accuracy_app, name="accuracy")
+app.command()(drives)
 _debug = False
 
 
