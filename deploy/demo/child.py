@@ -22,12 +22,18 @@ class Child:
     """One `tandem ROLE FILE` process. Its log and its figures lie in the run's folder."""
 
     def __init__(
-        self, role: str, folder: Path, tandem: Sequence[str] = (sys.executable, "-m", "deploy")
+        self,
+        role: str,
+        folder: Path,
+        tandem: Sequence[str] = (sys.executable, "-m", "deploy"),
+        name: str | None = None,
     ) -> None:
+        """`name`: of one among several with the same role."""
         self.role = role
+        self.name = name or role
         self._tandem = tandem
-        self.log = folder / f"{role}.log"
-        self.figures_file = folder / f"{role}.figures.json"
+        self.log = folder / f"{self.name}.log"
+        self.figures_file = folder / f"{self.name}.figures.json"
         self._process: asyncio.subprocess.Process | None = None
         self._usage: psutil.Process | None = None
         self._cpu_from = (0.0, 0.0)
@@ -55,7 +61,7 @@ class Child:
         """Raise TandemError with the process's last words if it has ended."""
         process = self._process
         if process is not None and process.returncode is not None:
-            raise TandemError(f"the {self.role} ended with status {process.returncode}: {self.last_words()}")
+            raise TandemError(f"the {self.name} ended with status {process.returncode}: {self.last_words()}")
 
     def measure(self, first: bool = False) -> None:
         """Take a sample of CPU time and memory; `first` begins the period that `cpu_percent` covers."""

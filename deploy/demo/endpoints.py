@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,34 +15,38 @@ TRANSPORTS = ("tcp", "udp", "ws", "unixsock-stream")
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """Who listens where: the robot for the master, the master and the observer for those who watch."""
+    """Who listens where: each robot for the master, the master and the observer for those who watch."""
 
-    robot: str
+    robots: tuple[str, ...]
     master: str
     observer: str
     can_port: int
 
     @property
     def observing(self) -> LinkConfig:
-        """The observer's link: commands from the master, states from the robot, truth at its own door."""
-        return LinkConfig(listen=[self.observer], connect=[self.robot, self.master])
+        """The observer's link: commands from the master, states from each robot, truth at its own door."""
+        return LinkConfig(listen=[self.observer], connect=[*self.robots, self.master])
 
 
-def local_endpoints(transport: str, folder: Path) -> Endpoints:
+def local_endpoints(transport: str, folder: Path, robots: int = 1) -> Endpoints:
     """Endpoints for one run. Raises ConfigError for a transport that the demo does not know."""
     if transport not in TRANSPORTS:
         known = ", ".join(TRANSPORTS)
         raise ConfigError("demo", [ConfigMistake("--transport", transport, f"one of {known}")])
     if transport == "unixsock-stream":
-        robot, master = (f"{transport}/{folder / name}.sock" for name in ("robot", "master"))
+        names = ["master", *(f"robot-{i + 1}" for i in range(robots))]
+        master, *each = (f"{transport}/{folder / name}.sock" for name in names)
     else:
-        robot, master = (f"{transport}/127.0.0.1:{_free_port(transport)}" for _ in range(2))
-    return Endpoints(robot, master, f"tcp/127.0.0.1:{_free_port('tcp')}", _free_port("udp"))
+        ports = _free_ports(transport, 1 + robots)
+        master, *each = (f"{transport}/127.0.0.1:{port}" for port in ports)
+    [observer], [can] = _free_ports("tcp", 1), _free_ports("udp", 1)
+    return Endpoints(tuple(each), master, f"tcp/127.0.0.1:{observer}", can)
 
 
-def _free_port(transport: str) -> int:
+def _free_ports(transport: str, count: int) -> list[int]:
     kind = socket.SOCK_DGRAM if transport == "udp" else socket.SOCK_STREAM
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    with ExitStack() as held:  # all at once, so that they differ
+        probes = [held.enter_context(socket.socket(socket.AF_INET, kind)) for _ in range(count)]
+        for probe in probes:
+            probe.bind(("127.0.0.1", 0))
+        return [probe.getsockname()[1] for probe in probes]

@@ -11,7 +11,7 @@ from pathlib import Path
 from common.clock import monotonic_ns, to_ns
 from common.control import ask_control
 from common.errors import TandemError
-from common.link import Link, open_link
+from common.link import Session, open_session
 from common.messages import Action, ControlReply, ControlRequest
 from common.skeleton import load_skeleton
 from common.topics import CONTROL
@@ -24,33 +24,56 @@ ROBOT, OPERATOR = "robot-1", "nurse-1"
 ROLES = ("slave", "suit", "master")
 
 
+def robot_name(number: int) -> str:
+    """Of the first, second … robot of a run."""
+    return f"robot-{number}"
+
+
+def slave_name(number: int) -> str:
+    """Of the process of the first, second … robot of a run."""
+    return "slave" if number == 1 else f"slave-{number}"
+
+
 class Rig:
-    """The running processes by role, what the observer hears, and the way to ask the robot."""
+    """The running processes by name, what is heard of each robot, and the way to ask them."""
 
     def __init__(
         self,
         folder: Path,
         endpoints: Endpoints,
         overrides: Mapping[str, Sequence[str]],
-        link: Link,
+        session: Session,
         profile: str = NURSING,
     ) -> None:
         self.skeleton = load_skeleton(profile)
         self._overrides = overrides
         self._endpoints = endpoints
-        self._link = link
-        self.observer = Observer(link, self.skeleton)
-        self.children = {role: Child(role, folder) for role in ROLES}
+        self._session = session
+        numbers = range(1, 1 + len(endpoints.robots))
+        self.observers = {
+            robot: Observer(session.link(robot), self.skeleton) for robot in map(robot_name, numbers)
+        }
+        self.observer = self.observers[ROBOT]
+        """Of the first robot; the suit tells the truth under its name."""
+        self.slaves = tuple(map(slave_name, numbers))
+        children = [Child("slave", folder, name=name) for name in self.slaves]
+        self.children = {child.name: child for child in (*children, *(Child(r, folder) for r in ROLES[1:]))}
 
-    async def start(self, role: str) -> None:
+    async def start(self, name: str) -> None:
         """Start one process on the profile's example file, moved to this run's endpoints."""
-        overrides = [*_local(role, self._endpoints), *self._overrides.get(role, ())]
-        await self.children[role].start(example(role, self.skeleton.name), overrides)
+        role = self.children[name].role
+        theirs = dict.fromkeys((role, name))
+        given = [override for each in theirs for override in self._overrides.get(each, ())]
+        overrides = [*_local(name, self.slaves, self._endpoints), *given]
+        await self.children[name].start(example(role, self.skeleton.name), overrides)
 
-    async def control(self, action: Action, operator: str = OPERATOR, key: str = "") -> ControlReply:
-        """Ask the robot."""
-        request = ControlRequest(ROBOT, action, operator, key)
-        return await ask_control(lambda payload: self._link.ask(CONTROL, payload), request)
+    async def control(
+        self, action: Action, operator: str = OPERATOR, key: str = "", robot: str = ROBOT
+    ) -> ControlReply:
+        """Ask a robot."""
+        link = self._session.link(robot)
+        request = ControlRequest(robot, action, operator, key)
+        return await ask_control(lambda payload: link.ask(CONTROL, payload), request)
 
     async def until(
         self,
@@ -69,23 +92,27 @@ class Rig:
 
     async def stop(self) -> dict[str, int | None]:
         """Stop all, the master first, so that the robot shows that it holds by itself; exit statuses."""
-        return {role: await self.children[role].stop() for role in ("master", "suit", "slave")}
+        return {name: await self.children[name].stop() for name in ("master", "suit", *self.slaves)}
 
 
 @asynccontextmanager
 async def open_rig(
-    transport: str = "tcp", overrides: Mapping[str, Sequence[str]] | None = None, profile: str = NURSING
+    transport: str = "tcp",
+    overrides: Mapping[str, Sequence[str]] | None = None,
+    profile: str = NURSING,
+    robots: int = 1,
 ) -> AsyncIterator[Rig]:
     """Open a rig on free local endpoints; nothing is started yet, everything is stopped at the end.
 
+    `overrides` are by role, and where there are several robots by the process's name too.
     Raises ConfigError for a transport or a profile that there is not.
     """
     load_skeleton(profile)
     async with AsyncExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-")))
-        endpoints = local_endpoints(transport, folder)
-        link = await stack.enter_async_context(open_link(endpoints.observing, ROBOT))
-        rig = Rig(folder, endpoints, overrides or {}, link, profile)
+        endpoints = local_endpoints(transport, folder, robots)
+        session = await stack.enter_async_context(open_session(endpoints.observing))
+        rig = Rig(folder, endpoints, overrides or {}, session, profile)
         stack.push_async_callback(rig.stop)
         yield rig
 
@@ -98,13 +125,16 @@ async def at_most(wait: Awaitable[object], seconds: float) -> None:
         return
 
 
-def _local(role: str, endpoints: Endpoints) -> list[str]:
+def _local(name: str, slaves: Sequence[str], endpoints: Endpoints) -> list[str]:
     bus_options = f"{{ port = {endpoints.can_port}, hop_limit = 0 }}"
-    if role == "slave":
-        return [f'link.listen=["{endpoints.robot}"]', 'camera.source="off"']
-    if role == "master":
+    if name in slaves:
+        number = slaves.index(name)
+        listen = f'link.listen=["{endpoints.robots[number]}"]'
+        return [f'robot="{robot_name(1 + number)}"', listen, 'camera.source="off"']
+    if name == "master":
         return [
-            f'link.connect=["{endpoints.robot}"]',
+            f"robots={[robot_name(1 + i) for i in range(len(slaves))]}",
+            f"link.connect={list(endpoints.robots)}",
             f'link.listen=["{endpoints.master}"]',
             f"capture.buses.0.options={bus_options}",
         ]
