@@ -16,6 +16,7 @@ from common.config import load_config
 from common.errors import TandemError
 from common.runtime import run as run_until_stopped
 from deploy.accuracy.commands import app as accuracy_app
+from deploy.attitude.command import attitude
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.drives import drives
@@ -30,6 +31,7 @@ app = typer.Typer(
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(accuracy_app, name="accuracy")
 app.command()(drives)
+app.command()(attitude)
 _debug = False
 
 
