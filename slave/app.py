@@ -23,6 +23,7 @@ from slave.camera.feed import CameraFeed, open_feed
 from slave.config import SlaveConfig
 from slave.guard.body import Body
 from slave.guard.states import State
+from slave.guard.tilt import base_loss
 from slave.pipeline import SlavePipeline
 from slave.servos import Servos, open_servos
 
@@ -88,9 +89,11 @@ class Slave:
                 log.info("%s: %s: %s", self._config.robot, guard.state, guard.reason)
 
     def _body(self) -> Body:
-        if self._base is not None:
-            self._pipeline.base = self._base.read()
-        return Body(drives=self._servos.faults())
+        if self._base is None:
+            return Body(drives=self._servos.faults())
+        attitude = self._pipeline.base = self._base.read()
+        # the clock after the reading, or a thread's fresh one would be from the future
+        return Body(self._servos.faults(), base_loss(attitude, monotonic_ns(), self._config.guard))
 
     def _brake_drives(self, stop: bool) -> None:
         """On an e-stop the drives brake by themselves too: whatever becomes of this process."""
