@@ -12,7 +12,7 @@ import sys
 
 # first of all: the slave's real-time priority is not for what is imported and drawn here
 os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-os.nice(10)
+os.nice(19)
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 from slave.camera.child import main  # noqa: E402

@@ -7,6 +7,7 @@ import os
 from common.errors import RobotError
 from common.quaternion import Array
 from slave.camera.jpeg import Pixels
+from slave.camera.room import furnish
 
 NO_GL = "no OpenGL to draw with: install EGL (Debian: libegl1 libgl1-mesa-dri), or set camera.source to off"
 
@@ -27,6 +28,7 @@ class DrawnCamera:
             skeleton = load_skeleton(profile)
             model = build_model(skeleton)
             model.vis.quality.offsamples = 0
+            model.vis.headlight.ambient[:] = 0.35
             model.vis.global_.offwidth, model.vis.global_.offheight = width, height
             self._renderer = mujoco.Renderer(model, height, width)
         except Exception as error:  # what a missing library raises is AttributeError, ImportError, its own …
@@ -50,5 +52,6 @@ class DrawnCamera:
         for step in self._kinematics:
             step(self._model, self._data)
         self._renderer.update_scene(self._data, self._camera)
+        furnish(self._renderer.scene)
         pixels: Pixels = self._renderer.render()
         return pixels

@@ -64,6 +64,7 @@ class CameraFeed:
         put: Callable[[bytes], None],
         open_camera: Callable[[], Camera],
         clock: Clock = monotonic_ns,
+        make_rate: Callable[[RateLimits], RateControl] = RateControl,
     ) -> None:
         """`put` must be safe in another thread than the loop's, and must not block."""
         self.sight = Sight()
@@ -72,7 +73,7 @@ class CameraFeed:
         self._put = put
         self._open = open_camera
         self._clock = clock
-        self._rate = RateControl(
+        self._rate = make_rate(
             RateLimits(
                 config.most_rate_hz,
                 config.least_rate_hz,
