@@ -138,6 +138,7 @@ class Slave:
             },
             "undecodable": pipeline.undecodable,
             "base": self._base.counters() if self._base else {},
+            "servos": self._servos.figures(),
             "video": self._camera.figures() if self._camera else {},
             "link": self._link.counters(),
         }
@@ -148,7 +149,6 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
     take_priority(config.process)  # first, so that every thread has it
     servos = open_servos(config.servos, config.skeleton, config.encoders)
     base = open_base(config.base)
-    servos.start()
     try:
         if base is not None:
             base.start()
@@ -158,6 +158,8 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
             log.info("%s: waits for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
             freeze_heap()
+            # last: drives on a bus stop by themselves when they miss the loop's ticks
+            servos.start()
             try:
                 await until_stopped(stop, slave.run())
             finally:

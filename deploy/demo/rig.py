@@ -22,6 +22,8 @@ from deploy.profiles import NURSING, example
 
 ROBOT, OPERATOR = "robot-1", "nurse-1"
 ROLES = ("slave", "suit", "master")
+DRIVES = "drives"
+"""The role of the simulated drives, of a run whose overrides name them."""
 
 
 def robot_name(number: int) -> str:
@@ -57,7 +59,8 @@ class Rig:
         """Of the first robot; the suit tells the truth under its name."""
         self.slaves = tuple(map(slave_name, numbers))
         children = [Child("slave", folder, name=name) for name in self.slaves]
-        self.children = {child.name: child for child in (*children, *(Child(r, folder) for r in ROLES[1:]))}
+        others = [*ROLES[1:], *([DRIVES] if DRIVES in overrides else [])]
+        self.children = {child.name: child for child in (*children, *(Child(r, folder) for r in others))}
 
     async def start(self, name: str) -> None:
         """Start one process on the profile's example file, moved to this run's endpoints."""
@@ -65,7 +68,19 @@ class Rig:
         theirs = dict.fromkeys((role, name))
         given = [override for each in theirs for override in self._overrides.get(each, ())]
         overrides = [*_local(name, self.slaves, self._endpoints), *given]
-        await self.children[name].start(example(role, self.skeleton.name), overrides)
+        if DRIVES in self.children and role in ("slave", DRIVES):
+            overrides += drive_buses(self._endpoints.can_port)
+        file = example("slave" if role == DRIVES else role, self.skeleton.name)
+        await self.children[name].start(file, overrides)
+
+    async def logged(self, name: str, text: str, timeout_s: float) -> None:
+        """Wait until a process has logged something. Raises TandemError where it does not."""
+        deadline_ns = monotonic_ns() + to_ns(timeout_s)
+        while text not in self.children[name].said():
+            self.children[name].check()
+            if monotonic_ns() > deadline_ns:
+                raise TandemError(f"the {name} did not start: {self.children[name].last_words()}")
+            await asyncio.sleep(0.05)
 
     async def control(
         self, action: Action, operator: str = OPERATOR, key: str = "", robot: str = ROBOT
@@ -92,7 +107,8 @@ class Rig:
 
     async def stop(self) -> dict[str, int | None]:
         """Stop all, the master first, so that the robot shows that it holds by itself; exit statuses."""
-        return {name: await self.children[name].stop() for name in ("master", "suit", *self.slaves)}
+        last = [DRIVES] if DRIVES in self.children else []
+        return {name: await self.children[name].stop() for name in ("master", "suit", *self.slaves, *last)}
 
 
 @asynccontextmanager
@@ -125,12 +141,24 @@ async def at_most(wait: Awaitable[object], seconds: float) -> None:
         return
 
 
+def drive_buses(port: int) -> list[str]:
+    """The slave's two buses to its drives, on this host, at a port that nobody else uses."""
+    buses = [
+        f'{{ name = "{name}", interface = "udp_multicast", channel = "{group}", fd = false, '
+        f"options = {{ port = {port}, hop_limit = 0 }} }}"
+        for name, group in (("left", "239.74.163.21"), ("right", "239.74.163.22"))
+    ]
+    return [f"servos.canopen.buses=[{', '.join(buses)}]"]
+
+
 def _local(name: str, slaves: Sequence[str], endpoints: Endpoints) -> list[str]:
     bus_options = f"{{ port = {endpoints.can_port}, hop_limit = 0 }}"
     if name in slaves:
         number = slaves.index(name)
         listen = f'link.listen=["{endpoints.robots[number]}"]'
         return [f'robot="{robot_name(1 + number)}"', listen, 'camera.source="off"']
+    if name == DRIVES:
+        return []
     if name == "master":
         return [
             f"robots={[robot_name(1 + i) for i in range(len(slaves))]}",

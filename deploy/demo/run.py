@@ -7,6 +7,7 @@ import tempfile
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from rich.console import Console
 from rich.live import Live
@@ -46,6 +47,8 @@ class DemoOptions:
     strategy: str = "predict"
     filter: str = "vqf"
     seed: int = 1
+    servos: Literal["mujoco", "canopen"] = "mujoco"
+    """`canopen`: simulated drives in a process of their own, on two CAN buses."""
     camera: bool = True
     """Whether the robot shows what it sees."""
 
@@ -59,7 +62,11 @@ class DemoOptions:
         if self.replay is not None:
             suit.append(f'replay="{self.replay.resolve()}"')
         slave = [f'track.strategy="{self.strategy}"', f'camera.source="{"robot" if self.camera else "off"}"']
-        return {"slave": slave, "suit": suit, "master": master}
+        overrides = {"slave": slave, "suit": suit, "master": master}
+        if self.servos == "canopen":
+            slave.append('servos.backend="canopen"')
+            overrides["drives"] = []
+        return overrides
 
 
 async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
@@ -92,6 +99,9 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
         observer = rig.observer
         with Live(console=console, refresh_per_second=4, transient=True) as live:
             show = _Show(rig, stop, live)
+            if "drives" in rig.children:
+                await rig.start("drives")
+                await rig.logged("drives", "drives on", START_S)
             for role in ("slave", "suit"):
                 await rig.start(role)
             # the master last: processes that still start would take the time of its first ticks

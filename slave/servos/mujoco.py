@@ -63,6 +63,10 @@ class MujocoServos:
     def quick_stop(self, stop: bool) -> None:
         """Nothing to be done here: the guard's setpoint brakes, and these drives only follow it."""
 
+    def figures(self) -> dict[str, object]:
+        """Cycles that the machine has cost it."""
+        return {"skipped_cycles": self.skipped_cycles}
+
     def stop(self) -> None:
         """End the thread; the robot stays where it is, and its setpoint with it."""
         self._running = False

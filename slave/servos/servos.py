@@ -51,6 +51,10 @@ class Servos(Protocol):
         """
         ...
 
+    def figures(self) -> dict[str, object]:
+        """What was counted and measured since the start, as plain values."""
+        ...
+
     def stop(self) -> None:
         """Let go of the drives, which hold by themselves. Safe to call twice."""
         ...

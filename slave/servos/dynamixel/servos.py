@@ -84,6 +84,10 @@ class DynamixelServos:
             self._thread = None
             self._driver.close()
 
+    def figures(self) -> dict[str, object]:
+        """The counters, among others' figures."""
+        return dict(self.counters)
+
     @property
     def counters(self) -> dict[str, int]:
         """What went wrong on the bus."""
