@@ -7,7 +7,7 @@ import json
 import logging
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -139,6 +139,9 @@ def demo(
     strategy: Annotated[str, typer.Option(help="predict, interpolate or hold.")] = "predict",
     filter_: Annotated[str, typer.Option("--filter", help="vqf, mahony or ekf.")] = "vqf",
     seed: Annotated[int, typer.Option(help="Of the simulated sensors' errors.")] = 1,
+    servos: Annotated[
+        Literal["mujoco", "canopen"], typer.Option(help="The robot: in the slave, or drives on CAN buses.")
+    ] = "mujoco",
     camera: Annotated[bool, typer.Option(help="Whether the robot sends what it sees.")] = True,
     plots: Annotated[
         Path | None,
@@ -158,7 +161,7 @@ def demo(
     console = Console()
     options = DemoOptions(
         profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
-        strategy=strategy, filter=filter_, seed=seed, camera=camera,
+        strategy=strategy, filter=filter_, seed=seed, servos=servos, camera=camera,
     )  # fmt: skip
 
     async def tell(stop: asyncio.Event) -> None:
