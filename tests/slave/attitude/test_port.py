@@ -120,10 +120,8 @@ def test_a_port_that_goes_away_is_opened_again(
 
 
 def test_the_base_keeps_its_last_attitude_with_its_age(line: Any) -> None:
-    times = iter([5, 6, 7, 8])
-    base = SerialBase(
-        BaseConfig(source="serial", port=line.port, declination_deg=-2.5), clock=lambda: next(times, 99)
-    )
+    config = BaseConfig(source="serial", port=line.port, declination_deg=-2.5)
+    base = SerialBase(config, clock=lambda: 5)
     assert base.read() is None
     base.start()
     try:
