@@ -54,6 +54,6 @@ class SlaveConfig(Section):
         return [
             *self.guard.mistakes_for(skeleton),
             *self.encoders.mistakes_for(skeleton),
-            *self.servos.mistakes_for(skeleton),
+            *self.servos.mistakes_for(skeleton, self.encoders),
             *self.base.mistakes(),
         ]

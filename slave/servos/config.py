@@ -5,18 +5,31 @@ from __future__ import annotations
 from typing import Literal
 
 from common.config import Section
-from common.errors import ConfigMistake
+from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
+from slave.encoders import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig
+from slave.servos.dynamixel.config import DynamixelConfig
 
 
 class ServosConfig(Section):
     """`[servos]` of the slave's TOML."""
 
-    backend: Literal["mujoco", "canopen"] = "mujoco"
-    """`mujoco`: the simulated robot, inside the slave's process. `canopen`: CiA 402 drives on CAN buses."""
+    backend: Literal["mujoco", "canopen", "dynamixel"] = "mujoco"
+    """`mujoco`: the simulated robot, inside the slave's process. `canopen`: CiA 402 drives on CAN buses.
+    `dynamixel`: X series servos on a serial bus.
+    """
     canopen: CanopenConfig = CanopenConfig()
+    dynamixel: DynamixelConfig | None = None
 
-    def mistakes_for(self, skeleton: Skeleton) -> list[ConfigMistake]:
+    def mistakes_for(self, skeleton: Skeleton, encoders: EncoderConfig) -> list[ConfigMistake]:
         """What the chosen backend cannot be built from."""
-        return self.canopen.mistakes_for(skeleton) if self.backend == "canopen" else []
+        match self.backend:
+            case "mujoco":
+                return []
+            case "canopen":
+                return self.canopen.mistakes_for(skeleton)
+            case "dynamixel":
+                if self.dynamixel is None:
+                    return [ConfigMistake("servos.dynamixel", NOT_SET, "a section with port and ids")]
+                return self.dynamixel.mistakes_for(skeleton, encoders)

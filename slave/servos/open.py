@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from common.errors import RobotError
 from common.skeleton import Skeleton
 from slave.encoders import EncoderConfig
 from slave.servos.config import ServosConfig
@@ -20,3 +21,9 @@ def open_servos(config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfi
             from slave.servos.canopen.servos import CanopenServos
 
             return CanopenServos(config.canopen, skeleton)
+        case "dynamixel":
+            from slave.servos.dynamixel.servos import DynamixelServos
+
+            if config.dynamixel is None:
+                raise RobotError("servos.dynamixel is not set: a section with port and ids is needed")
+            return DynamixelServos(config.dynamixel, skeleton, encoders)

@@ -132,6 +132,11 @@ class Driver:
             # a servo with a fault keeps the state that tells of it
             well = [servo.id for servo in self._servos if servo.joint not in self._faults]
             bus.write_all(x.BUS_WATCHDOG, dict.fromkeys(well, 0))
+            if well:
+                # its answer tells that the bytes before are out
+                bus.read_bytes(well[0], x.BUS_WATCHDOG, tries=1)
+        except ServoError:
+            pass
         except PortLostError:
             log.warning("%s: the port had gone; the servos stop by themselves", self._config.port)
         self._drop()

@@ -85,11 +85,6 @@ class DynamixelServos:
             self._driver.close()
 
     def figures(self) -> dict[str, object]:
-        """The counters, among others' figures."""
-        return dict(self.counters)
-
-    @property
-    def counters(self) -> dict[str, int]:
         """What went wrong on the bus."""
         driver = self._driver
         return {
