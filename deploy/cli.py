@@ -139,6 +139,9 @@ def demo(
     strategy: Annotated[str, typer.Option(help="predict, interpolate or hold.")] = "predict",
     filter_: Annotated[str, typer.Option("--filter", help="vqf, mahony or ekf.")] = "vqf",
     seed: Annotated[int, typer.Option(help="Of the simulated sensors' errors.")] = 1,
+    robots: Annotated[
+        int, typer.Option(help="How many follow the one operator; with several, no cameras.", min=1, max=32)
+    ] = 1,
     servos: Annotated[
         Literal["mujoco", "canopen"], typer.Option(help="The robot: in the slave, or drives on CAN buses.")
     ] = "mujoco",
@@ -163,6 +166,12 @@ def demo(
         profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
         strategy=strategy, filter=filter_, seed=seed, servos=servos, camera=camera,
     )  # fmt: skip
+
+    if robots > 1:
+        from deploy.demo.many import show_many
+
+        run_until_stopped(lambda stop: show_many(options, robots, stop, console, report))
+        return
 
     async def tell(stop: asyncio.Event) -> None:
         result = await run_demo(options, stop, console)

@@ -1,0 +1,106 @@
+"""How each of many robots fared beside the others: one plain tree, and a row a robot for people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from deploy.demo.observer import Observer
+from deploy.demo.rig import Rig
+from deploy.judge import TruthSeries, motion
+from deploy.tables import UNKNOWN, plain_table
+
+if TYPE_CHECKING:
+    from deploy.demo.child import Child
+    from deploy.demo.run import DemoOptions
+
+
+@dataclass(frozen=True, slots=True)
+class ManyReport:
+    """Figures by robot and of the master, and why the run counts as failed."""
+
+    tree: dict[str, Any]
+    problems: list[str] = field(default_factory=list)
+
+
+def make_many_report(options: DemoOptions, rig: Rig, statuses: Mapping[str, int | None]) -> ManyReport:
+    """Judge a finished run from what was observed and what the processes counted."""
+    problems = [f"{name} ended with status {status}" for name, status in statuses.items() if status != 0]
+    truth = rig.observer.trace.truth()
+    robots = {
+        robot: _robot(observer, rig.children[slave], truth)
+        for slave, (robot, observer) in zip(rig.slaves, rig.observers.items(), strict=True)
+    }
+    for robot, one in robots.items():
+        if one["in_track"] < 1.0:
+            problems.append(f"{robot} was in track for {one['in_track']:.0%} of the time only")
+    master = rig.children["master"]
+    counted = master.figures()
+    tree = {
+        "options": {"profile": options.profile, "seconds": options.seconds, "transport": options.transport},
+        "master": {
+            "ticks": counted.get("ticks", {}),
+            "frames_in_to_put_ms": counted.get("frames_in_to_put_ms", {}),
+            "cpu_percent": round(master.cpu_percent, 1),
+            "rss_mb": round(master.rss_mb, 1),
+            "robots": counted.get("robots", {}),
+        },
+        "robots": robots,
+        "cpu_percent": {name: round(child.cpu_percent, 1) for name, child in rig.children.items()},
+        "exit_status": dict(statuses),
+        "problems": problems,
+    }
+    return ManyReport(tree, problems)
+
+
+def _robot(observer: Observer, child: Child, truth: TruthSeries) -> dict[str, Any]:
+    counted = child.figures()
+    guard = counted.get("guard", {})
+    moved = motion(truth, observer.trace.moved(), observer.trace.joint_names)
+    tracked = [state.guard == "track" for state in observer.states]
+    return {
+        "in_track": sum(tracked) / len(tracked) if tracked else 0.0,
+        "ticks": counted.get("ticks", {}),
+        "received": guard.get("received", 0),
+        "accepted": guard.get("accepted", 0),
+        "dropped": guard.get("dropped", {}),
+        "losses": guard.get("losses", {}),
+        "one_way_ms": counted.get("one_way_ms", {}),
+        "end_to_end_ms": counted.get("end_to_end_ms", {}),
+        "rmse_deg": moved.rmse_deg if moved else None,
+        "motion_lag_ms": moved.lag_ms if moved else None,
+        "cpu_percent": round(child.cpu_percent, 1),
+        "rss_mb": round(child.rss_mb, 1),
+    }
+
+
+def many_table(tree: Mapping[str, Any]) -> RenderableType:
+    """One row a robot, then the master."""
+    table = plain_table("robot", "track", "missed", "ticks", "CPU %", "one way", "whole p99", "RMSE °", "lag")
+    for robot, one in tree["robots"].items():
+        table.add_row(
+            robot,
+            f"{one['in_track']:.0%}",
+            str(one["ticks"].get("missed", UNKNOWN)),
+            str(one["ticks"].get("expected", UNKNOWN)),
+            f"{one['cpu_percent']:.0f}",
+            _number(one["one_way_ms"].get("p99"), 1),
+            _number(one["end_to_end_ms"].get("p99"), 1),
+            _number(one["rmse_deg"], 2),
+            _number(one["motion_lag_ms"], 0),
+        )
+    master, ticks = tree["master"], tree["master"]["ticks"]
+    put_ms = _number(master["frames_in_to_put_ms"].get("p99"), 2)
+    text = (
+        f"master: {ticks.get('missed', UNKNOWN)} of {ticks.get('expected', UNKNOWN)} ticks missed, "
+        f"{master['cpu_percent']:.0f} % of a core, last frame in → put p99 {put_ms} ms; times in ms, p99"
+    )
+    return Group(table, Text(text, "dim"))
+
+
+def _number(value: float | None, digits: int) -> str:
+    return UNKNOWN if value is None else f"{value:.{digits}f}"
