@@ -63,19 +63,11 @@ def hinge(
 
 def load_pair(path: Path) -> tuple[NodeRecording, NodeRecording]:
     """Two units of one file. Raises RecordingError naming file, array and what was expected."""
-    import zipfile
+    from common.errors import RecordingError
+    from common.npz import read_arrays
+    from master.calibrate.recording import NodeRecording
 
-    from master.calibrate.recording import NodeRecording, RecordingError
-
-    if not path.is_file():
-        raise RecordingError(f"{path}: there is no such file")
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            if not isinstance(data, np.lib.npyio.NpzFile):
-                raise RecordingError(f"{path}: expected an npz file, not a single array")
-            arrays = {key: data[key] for key in data.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise RecordingError(f"{path}: not a readable .npz file ({error})") from None
+    arrays = read_arrays(path)
     missing = [k for k in ("gyr1", "acc1", "gyr2", "acc2", "rate_hz") if k not in arrays]
     if missing:
         there = ", ".join(sorted(arrays)[:8]) or "nothing"
@@ -88,7 +80,7 @@ def load_pair(path: Path) -> tuple[NodeRecording, NodeRecording]:
     shapes = {key: arrays[key].shape for key in ("gyr1", "acc1", "gyr2", "acc2")}
     first = shapes["gyr1"]
     for key, shape in shapes.items():
-        if len(shape) != 2 or shape[1] != 3 or shape != first or arrays[key].dtype.kind not in "fiu":
+        if shape != first or shape[1:] != (3,) or not shape[0] or arrays[key].dtype.kind not in "fiu":
             raise RecordingError(
                 f"{path}: {key} is {arrays[key].dtype} of shape {shape}; expected numbers (T, 3), all alike"
             )

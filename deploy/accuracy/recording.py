@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from common.errors import TandemError
 from common.messages import Mask
+from common.npz import Arrays, read_arrays
 from common.quaternion import Array
 
 _NEEDED = ("gyr", "acc", "rate_hz")
@@ -71,24 +71,21 @@ def load_trial(path: Path) -> Trial:
     if "movement" in arrays:
         if arrays["movement"].shape != (count,):
             raise _refusal(path, f"movement has the shape {arrays['movement'].shape}, not ({count},)")
-        movement = np.asarray(arrays["movement"], dtype=np.bool_)
+        if arrays["movement"].dtype.kind not in "biuf":
+            raise _refusal(path, f"movement holds {arrays['movement'].dtype}, not true and false")
+        movement = np.nan_to_num(arrays["movement"]).astype(np.bool_)
+        if not movement.any():
+            raise _refusal(path, "movement is false all along: leave it out to score the whole recording")
     trial = Trial(path.stem, rate_hz, gyr, acc, mag, truth, movement)
     _check_units(path, trial)
     _check_truth(path, trial)
     return trial
 
 
-def _arrays(path: Path) -> dict[str, NDArray[np.generic]]:
+def _arrays(path: Path) -> Arrays:
     if not path.exists():
         raise TandemError(f"{path}: there is no such file (and no such command: see tandem accuracy --help)")
-    try:
-        with path.open("rb") as file:  # np.load by path leaves a broken archive open
-            found = np.load(file, allow_pickle=False)
-            if isinstance(found, np.ndarray):
-                raise _refusal(path, "is one array (npy), not an npz: save it by np.savez(gyr=…, acc=…, …)")
-            return {key: found[key] for key in found}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise _refusal(path, "cannot be read as npz: save it again by np.savez, of plain numbers") from error
+    return read_arrays(path)
 
 
 def _rate_hz(path: Path, value: NDArray[np.generic]) -> float:
@@ -98,9 +95,7 @@ def _rate_hz(path: Path, value: NDArray[np.generic]) -> float:
     return float(value.item())
 
 
-def _matrix(
-    path: Path, arrays: dict[str, NDArray[np.generic]], key: str, width: int, count: int | None = None
-) -> Array:
+def _matrix(path: Path, arrays: Arrays, key: str, width: int, count: int | None = None) -> Array:
     found = arrays[key]
     if found.ndim != 2 or found.shape[1] != width or (count is not None and len(found) != count):
         rows = "T" if count is None else count

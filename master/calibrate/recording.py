@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.errors import RecordingError as RecordingError
+from common.npz import Arrays, read_arrays
 from common.quaternion import Array
 
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 5.0, 20_000.0
@@ -55,15 +56,15 @@ def load_recordings(path: Path) -> dict[str, NodeRecording]:
         raise RecordingError(f"{path}: cannot read a {path.suffix or 'nameless'} file; expected {known}")
     if not path.is_file():
         raise RecordingError(f"{path}: there is no such file")
-    return reader(path)
+    nodes = reader(path)
+    for name in nodes:
+        if not name or name != Path(name).name or name.startswith("."):
+            raise RecordingError(f"{path}: {name!r:.40} cannot be a node's name: a file is to be called so")
+    return nodes
 
 
 def _load_npz(path: Path) -> dict[str, NodeRecording]:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {key: file[key] for key in file}
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise RecordingError(f"{path}: not a readable .npz file ({error})") from None
+    arrays = read_arrays(path)
     if "acc_raw" in arrays:
         return _raw_unit(path, arrays)
     if "acc" in arrays or "gyr" in arrays:
@@ -71,19 +72,19 @@ def _load_npz(path: Path) -> dict[str, NodeRecording]:
     return _suit(path, arrays)
 
 
-def _raw_unit(path: Path, arrays: Mapping[str, Array]) -> dict[str, NodeRecording]:
+def _raw_unit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
     acc, gyr = (_vectors(path, arrays, key) for key in ("acc_raw", "gyr_raw"))
     mag = _vectors(path, arrays, "mag_raw") if "mag_raw" in arrays else None
     rate_hz, slots = _grid(path, "t", _need(path, arrays, "t"), len(acc))
     return {path.stem: _node(path, path.stem, rate_hz, (acc, gyr, mag), slots, counts=True)}
 
 
-def _single_unit(path: Path, arrays: Mapping[str, Array]) -> dict[str, NodeRecording]:
+def _single_unit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
     acc, gyr = (_vectors(path, arrays, key) for key in ("acc", "gyr"))
     mag = _vectors(path, arrays, "mag") if "mag" in arrays else None
     slots = None
     if "rate_hz" in arrays:
-        rate_hz = _plausible(path, arrays["rate_hz"])
+        rate_hz = _rate(path, arrays["rate_hz"])
     else:
         time = next((key for key in ("t_s", "t") if key in arrays), None)
         if time is None:
@@ -92,15 +93,14 @@ def _single_unit(path: Path, arrays: Mapping[str, Array]) -> dict[str, NodeRecor
     return {path.stem: _node(path, path.stem, rate_hz, (acc, gyr, mag), slots)}
 
 
-def _suit(path: Path, arrays: Mapping[str, Array]) -> dict[str, NodeRecording]:
+def _suit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
     names = [key.removesuffix("_gyr") for key in arrays if key.endswith("_gyr")]
     if not names:
         raise RecordingError(
             f"{path}: has no gyroscope; expected gyr and acc of a unit, acc_raw and gyr_raw of a unit, "
             "or {segment}_gyr and {segment}_acc of a suit"
         )
-    time = _need(path, arrays, "t_s")
-    rate_hz, slots = _grid(path, "t_s", time, len(time))
+    rate_hz, slots = _grid(path, "t_s", _need(path, arrays, "t_s"))
     nodes = {}
     for name in names:
         acc, gyr = (_vectors(path, arrays, f"{name}_{key}") for key in ("acc", "gyr"))
@@ -130,13 +130,13 @@ def _node(
     return NodeRecording(name, rate_hz, acc, gyr, mag, counts)
 
 
-def _need(path: Path, arrays: Mapping[str, Array], key: str) -> Array:
+def _need(path: Path, arrays: Arrays, key: str) -> NDArray[np.generic]:
     if key not in arrays:
         raise RecordingError(f"{path}: has no array {key}")
     return arrays[key]
 
 
-def _vectors(path: Path, arrays: Mapping[str, Array], key: str) -> Array:
+def _vectors(path: Path, arrays: Arrays, key: str) -> Array:
     values = _need(path, arrays, key)
     if values.ndim != 2 or values.shape[1] != 3 or values.dtype.kind not in "fiu" or len(values) < 2:
         raise RecordingError(
@@ -145,8 +145,13 @@ def _vectors(path: Path, arrays: Mapping[str, Array], key: str) -> Array:
     return values.astype(np.float64)
 
 
-def _plausible(path: Path, rate_hz: Array | float) -> float:
-    rate = float(rate_hz) if np.size(rate_hz) == 1 else np.nan
+def _rate(path: Path, rate_hz: NDArray[np.generic]) -> float:
+    if rate_hz.size != 1 or rate_hz.dtype.kind not in "fiu":
+        raise RecordingError(f"{path}: rate_hz is {rate_hz!s:.40}; expected one number, Hz")
+    return _plausible(path, float(rate_hz.reshape(())))
+
+
+def _plausible(path: Path, rate: float) -> float:
     if not _LOWEST_RATE_HZ <= rate <= _HIGHEST_RATE_HZ:
         raise RecordingError(
             f"{path}: a rate of {rate:g} Hz cannot be a node's; expected {_LOWEST_RATE_HZ:g} to "
@@ -155,12 +160,14 @@ def _plausible(path: Path, rate_hz: Array | float) -> float:
     return rate
 
 
-def _grid(path: Path, key: str, time_s: Array, count: int) -> tuple[float, Array]:
+def _grid(path: Path, key: str, times: NDArray[np.generic], count: int | None = None) -> tuple[float, Array]:
     """The rate, and each sample's slot on the even grid, (T,) from 0. Refuses what is no even sampling."""
-    time_s = np.asarray(time_s, dtype=np.float64)
-    if time_s.ndim != 1 or len(time_s) < 2 or not np.isfinite(time_s).all():
+    if times.ndim != 1 or len(times) < 2 or times.dtype.kind not in "fiu":
+        raise RecordingError(f"{path}: {key} must be a row of times, one a sample, s")
+    time_s = times.astype(np.float64)
+    if not np.isfinite(time_s).all():
         raise RecordingError(f"{path}: {key} must be a row of finite times, one a sample")
-    if len(time_s) != count:
+    if count is not None and len(time_s) != count:
         raise RecordingError(f"{path}: {key} has {len(time_s)} times for {count} samples")
     steps_s = np.diff(time_s)
     period_s = float(np.median(steps_s))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import zipfile
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common.errors import ConfigError, ConfigMistake
+from common.errors import ConfigError, ConfigMistake, RecordingError
+from common.npz import Arrays, read_arrays
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from master.suit.simulated.sensors import CHANNELS
@@ -73,7 +73,10 @@ def load_replay(path: Path, skeleton: Skeleton, nodes: Collection[str]) -> Repla
     `nodes` are the segments that will be asked. Raises ConfigError with the file, the array, what it is and
     what it should be.
     """
-    arrays = _arrays(path)
+    try:
+        arrays = read_arrays(path)
+    except RecordingError as error:
+        raise _mistake(path, "replay", path.name, f"a readable npz file of plain arrays ({error})") from None
     t_s = _array(path, arrays, "t_s", None)
     if len(t_s) < 2 or not (np.diff(t_s) > 0.0).all():
         raise _mistake(path, "t_s", _shape(t_s), "two or more times, each later than the one before")
@@ -100,22 +103,7 @@ def _recorded_name(skeleton: Skeleton, segment: int) -> str | None:
     return None
 
 
-def _arrays(path: Path) -> Mapping[str, NDArray[np.generic]]:
-    try:
-        with path.open("rb") as stream:
-            file = np.load(stream, allow_pickle=False)
-            if isinstance(file, np.lib.npyio.NpzFile):
-                return {name: file[name] for name in file.files}
-    except OSError as error:
-        raise _mistake(
-            path, "replay", path.name, f"a readable npz file ({error.strerror or error})"
-        ) from None
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise _mistake(path, "replay", path.name, f"an npz file of plain arrays ({error})") from None
-    raise _mistake(path, "replay", path.name, "an npz file, not a single array")
-
-
-def _array(path: Path, arrays: Mapping[str, NDArray[np.generic]], name: str, samples: int | None) -> Array:
+def _array(path: Path, arrays: Arrays, name: str, samples: int | None) -> Array:
     """One array as float64: (T,) times, or (samples, 3) readings."""
     array = arrays.get(name)
     if array is None:

@@ -132,7 +132,9 @@ def test_every_sample_counts_towards_the_progress(tmp_path: Path) -> None:
         ({"quat": np.full((TICKS, 4), 1.0)}, "quat is not of unit length"),
         ({"quat": np.full((TICKS, 4), np.nan)}, "quat is unknown over the whole movement"),
         ({"movement": np.ones(3)}, "movement has the shape"),
-        ({"movement": np.zeros(TICKS)}, "unknown over the whole movement"),
+        ({"movement": np.zeros(TICKS)}, "movement is false all along"),
+        ({"movement": np.zeros(TICKS), "quat": None}, "movement is false all along"),
+        ({"movement": np.full(TICKS, "yes")}, "not true and false"),
         ({"rate_hz": 0.0}, "rate_hz is 0.0, not one number of 10 to 10000"),
         ({"rate_hz": np.nan}, "rate_hz is nan"),
         ({"rate_hz": np.ones(2)}, "rate_hz is"),
@@ -142,7 +144,7 @@ def test_every_sample_counts_towards_the_progress(tmp_path: Path) -> None:
         ({"gyr": np.full((TICKS, 3), 200.0)}, "rad/s"),
         ({"acc": trial()["acc"] / 9.81}, "m/s²"),
         ({"gyr": np.zeros((3, 3)), "acc": np.ones((3, 3))}, "has 3 samples: record at least 10"),
-        ({"acc": np.array([[None] * 3] * TICKS, dtype=object)}, "cannot be read as npz"),
+        ({"acc": np.array([[None] * 3] * TICKS, dtype=object)}, "not an npz file of plain arrays"),
     ],
 )
 def test_a_malformed_file_is_refused_with_what_to_change(
@@ -165,7 +167,7 @@ def test_what_is_no_npz_is_refused(tmp_path: Path) -> None:
             load_trial(path)
     cut = saved(tmp_path)
     cut.write_bytes(cut.read_bytes()[:2000])
-    with pytest.raises(TandemError, match="cannot be read"):
+    with pytest.raises(TandemError, match="not an npz file"):
         load_trial(cut)
 
 

@@ -25,6 +25,7 @@ def still(seconds: float = 10.0) -> dict[str, object]:
         ({"rate_hz": 1.0}, "expected 20 to 10000 Hz"),
         ({"gyr2": np.zeros((7, 3))}, r"gyr2 is float64 of shape \(7, 3\)"),
         ({"gyr1": np.full((1000, 3), "x")}, "gyr1 is <U1"),
+        ({key: np.zeros((0, 3)) for key in ("gyr1", "gyr2", "acc1", "acc2")}, r"shape \(0, 3\)"),
     ],
 )
 def test_a_file_that_is_no_pair_is_refused(change: dict[str, object], said: str, tmp_path: Path) -> None:
@@ -38,7 +39,7 @@ def test_what_is_no_npz_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="no such file"):
         load_pair(tmp_path / "none.npz")
     (tmp_path / "text.npz").write_text("knee", "utf-8")
-    with pytest.raises(RecordingError, match="not a readable"):
+    with pytest.raises(RecordingError, match="not an npz file"):
         load_pair(tmp_path / "text.npz")
 
 

@@ -81,6 +81,12 @@ EVEN: Array = np.arange(100) * 0.01
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": EVEN**1.5}, "not evenly spaced"),
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": np.append(EVEN[:-1], 9.0)}, "more than half"),
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": EVEN * np.nan}, "finite times"),
+        ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": np.float64(3.0)}, "a row of times"),
+        ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": np.full(len(ROWS), "now")}, "a row of times"),
+        ({"acc": ROWS, "gyr": ROWS, "rate_hz": "fast"}, "rate_hz is fast; expected one number"),
+        ({"acc": ROWS, "gyr": ROWS, "rate_hz": 1j}, "expected one number"),
+        ({"../n_acc": ROWS, "../n_gyr": ROWS, "t_s": EVEN}, "cannot be a node's name"),
+        ({"_acc": ROWS, "_gyr": ROWS, "t_s": EVEN}, "cannot be a node's name"),
     ],
 )
 def test_what_cannot_be_read_is_refused(tmp_path: Path, arrays: dict[str, object], message: str) -> None:
@@ -96,5 +102,5 @@ def test_files_that_are_none(tmp_path: Path) -> None:
         load_recordings(tmp_path / "none.csv")
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"nonsense")
-    with pytest.raises(RecordingError, match=r"not a readable \.npz"):
+    with pytest.raises(RecordingError, match="not an npz file"):
         load_recordings(bad)

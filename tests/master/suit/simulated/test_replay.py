@@ -109,7 +109,7 @@ def put(name: str, value: Any) -> Callable[[dict[str, Any]], object]:
         (put("t_s", np.zeros(SAMPLES)), "t_s = .*each later than the one before"),
         (put("t_s", np.zeros(1)), "t_s = .*two or more times"),
         (put("t_s", np.zeros((SAMPLES, 1))), r"t_s = .*shape \(T,\)"),
-        (put("t_s", np.array([{}] * SAMPLES)), "an npz file of plain arrays"),
+        (put("t_s", np.array([{}] * SAMPLES)), "npz file of plain arrays"),
     ],
 )
 def test_a_malformed_recording_is_refused_with_what_was_expected(
@@ -126,13 +126,13 @@ def test_a_malformed_recording_is_refused_with_what_was_expected(
 @pytest.mark.parametrize("content", [b"", b"not an archive", b"PK\x03\x04 truncated"])
 def test_a_file_of_another_kind_is_refused(path: Path, skeleton: Skeleton, content: bytes) -> None:
     path.write_bytes(content)
-    with pytest.raises(ConfigError, match="expected an npz file"):
+    with pytest.raises(ConfigError, match="expected a readable npz file"):
         load_replay(path, skeleton, skeleton.segment_names)
 
 
 def test_a_single_array_and_a_missing_file_are_refused(tmp_path: Path, skeleton: Skeleton) -> None:
     np.save(tmp_path / "one.npy", np.zeros(3))
-    with pytest.raises(ConfigError, match="not a single array"):
+    with pytest.raises(ConfigError, match="one array"):
         load_replay(tmp_path / "one.npy", skeleton, ["head"])
     with pytest.raises(ConfigError, match="a readable npz file"):
         load_replay(tmp_path / "none.npz", skeleton, ["head"])
