@@ -28,7 +28,7 @@ class BaseConfig(Section):
     """The tool-face that the instrument shows when the base stands level."""
     calibration: RelativePath | None = None
     """Of `simulated`: the file of the two sensors' maps, as a suit's node has one."""
-    time_constant_s: float = Field(2.0, ge=0.0, le=30.0)
+    time_constant_s: float = Field(3.0, ge=0.0, le=30.0)
     """Of `simulated`: smoothing of the readings. Another instrument smooths by itself."""
     lean_deg: float = Field(0.0, ge=-180.0, le=180.0)
     """Of `simulated`: how far the base leans to its right …"""

@@ -20,7 +20,7 @@ class Instrument:
         self,
         calibration: NodeCalibration | None = None,
         declination_rad: float = 0.0,
-        time_constant_s: float = 2.0,
+        time_constant_s: float = 3.0,
     ) -> None:
         sound = calibration or NodeCalibration()
         self._acc = np.array(sound.accelerometer)

@@ -26,7 +26,7 @@ from slave.attitude.attitude import NEAR_VERTICAL_RAD, attitude
 FIELD: Array = np.array([0.0, 34.5, -36.0])
 UP: Array = np.array([0.0, 0.0, 9.8])
 turns = st.floats(0.0, math.tau)
-quick = settings(max_examples=200, derandomize=True, deadline=None)
+quick = settings(max_examples=100, derandomize=True, deadline=None)
 
 
 def off(a: Array | float, b: Array | float) -> Array:

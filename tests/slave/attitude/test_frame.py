@@ -21,7 +21,7 @@ from slave.attitude.frame import (
 PAPER = bytes.fromhex("FF 01 00 23 44 05 61")
 turns = st.none() | st.integers(0, 3599)
 frames = st.builds(FrameAngles, st.integers(0, 1800), turns, turns)
-quick = settings(max_examples=200, derandomize=True, deadline=None)
+quick = settings(max_examples=100, derandomize=True, deadline=None)
 
 
 def test_the_papers_frame() -> None:
