@@ -12,6 +12,9 @@ from common.messages import Action, ControlRequest
 from common.topics import CONTROL
 from deploy.control.reach import Reach
 
+_NOT_THERE = "does not answer at {at}: is `tandem slave` running, with that robot name, and listening there?"
+_LATE = "is there, but gave no answer in {s:g} s: what it did is not known, `tandem status` tells"
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
@@ -41,14 +44,13 @@ async def ask(link: Link, where: Reach, action: Action, key: str = "") -> Answer
     """One robot's answer, or that there was none. It never raises for a robot that is not there."""
     try:
         await link.connected(CONTROL)
+    except LinkTimeoutError:
+        return Answer(link.robot, False, _NOT_THERE.format(at=", ".join(where.link.connect)))
+    try:
         request = ControlRequest(link.robot, action, where.operator, key)
         reply = await ask_control(lambda payload: link.ask(CONTROL, payload), request)
     except LinkTimeoutError:
-        at = ", ".join(where.link.connect)
-        return Answer(
-            link.robot, False,
-            f"does not answer at {at}: is `tandem slave` running, with that robot name, and listening there?",
-        )  # fmt: skip
+        return Answer(link.robot, False, _LATE.format(s=CONTROL.timeout_s))
     except (LinkError, CodecError) as error:
         return Answer(link.robot, False, str(error))
     return Answer(link.robot, reply.done, reply.text, reply.guard)
