@@ -16,8 +16,10 @@ _PROTOCOL = 2.0
 _TRIES = 3
 _ALERT = 0x80
 """In a status packet's error byte: the servo has a hardware error."""
-_ID, _PARAMETERS = 4, 9
+_ID, _LENGTH, _PARAMETERS = 4, 5, 9
 _STATUS_BYTES = 11
+_STATUS_LENGTH = 4
+"""Of an answer without parameters, as its length field counts."""
 _REFUSALS = {
     1: "it failed to carry this out",
     2: "it does not know this instruction",
@@ -118,7 +120,9 @@ class Bus:
             packet, result = self._packets.rxPacket(port, False)
             if result == COMM_SUCCESS:
                 servo, data = packet[_ID], bytes(packet[_PARAMETERS : _PARAMETERS + register.size])
-                if servo in asked and len(packet) >= _STATUS_BYTES + register.size:
+                length = packet[_LENGTH] | packet[_LENGTH + 1] << 8
+                # an answer to something else, that came too late for it, has another length
+                if servo in asked and length == _STATUS_LENGTH + register.size:
                     out[servo] = Answer(register.decode(data), bool(packet[_PARAMETERS - 1] & _ALERT))
                 continue
             self.broken += bool(packet)
@@ -127,7 +131,10 @@ class Bus:
         return out
 
     def _asked(self, ask: Any, tries: int = _TRIES) -> Any:
-        for _ in range(tries):
+        for i in range(tries):
+            if i:
+                # the answer that did not come in time must not be taken for the next one's
+                self._port.settle()
             answer = ask()
             result, error = answer[-2:]
             if result == COMM_SUCCESS:

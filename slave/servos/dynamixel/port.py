@@ -18,6 +18,7 @@ import serial
 from common.errors import RobotError
 
 _BITS_PER_BYTE = 10
+_AT_ONCE_BYTES = 4096
 
 
 class PortLostError(RobotError):
@@ -34,6 +35,7 @@ class Port:
         self._reply_timeout_s = reply_timeout_s
         self._byte_s = _BITS_PER_BYTE / baud
         self._deadline_s = 0.0
+        self._received = b""
         with self._named():
             # the adapter would rather fail than let two programs write to one robot
             self._serial = serial.Serial(device, baud, timeout=0, write_timeout=1.0, exclusive=True)
@@ -45,6 +47,7 @@ class Port:
 
     def clearPort(self) -> None:  # noqa: N802
         """Forget what was received before a request: it answers something older."""
+        self._received = b""
         with self._named():
             self._serial.reset_input_buffer()
 
@@ -54,14 +57,18 @@ class Port:
             return self._serial.write(bytes(packet)) or 0
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
-        """Up to `length` bytes: all there are by now, or those that come first before the time is up."""
+        """Up to `length` bytes: of those there are by now, or that come first before the time is up."""
         if length <= 0:
             return b""
-        with self._named():
-            wait_s = max(0.0, self._deadline_s - time.monotonic())
-            if not select.select([self._serial.fileno()], [], [], wait_s)[0]:
-                return b""
-            return bytes(self._serial.read(length))
+        if not self._received:
+            with self._named():
+                wait_s = max(0.0, self._deadline_s - time.monotonic())
+                if not select.select([self._serial.fileno()], [], [], wait_s)[0]:
+                    return b""
+                # more than was asked for: the answers of many servos come in one piece
+                self._received = bytes(self._serial.read(_AT_ONCE_BYTES))
+        out, self._received = self._received[:length], self._received[length:]
+        return out
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
         """So many bytes are expected from now on."""
@@ -70,6 +77,12 @@ class Port:
     def isPacketTimeout(self) -> bool:  # noqa: N802
         """Whether they should have come by now."""
         return time.monotonic() >= self._deadline_s
+
+    def settle(self) -> None:
+        """Throw away what comes late: wait as long as any answer may take."""
+        self.setPacketTimeout(0)
+        while not self.isPacketTimeout():
+            self.readPort(_AT_ONCE_BYTES)
 
     @contextlib.contextmanager
     def _named(self) -> Iterator[None]:

@@ -200,6 +200,8 @@ def test_when_the_slave_is_dead_the_servos_stop_by_themselves(rig: Rig) -> None:
         assert all(servo.get(x.BUS_WATCHDOG) == x.WATCHDOG_TRIPPED for servo in rig.servos)
         where = [servo.position for servo in rig.servos]
     # a slave that was only asleep says so, and moves nothing until a reset
+    rig.cycles(1, np.full(len(rig.names), 0.8))
+    assert set(rig.driver.faults) == set(rig.names)
     rig.cycles(20, np.full(len(rig.names), 0.8))
     assert [servo.position for servo in rig.servos] == pytest.approx(where, abs=0.6)
     assert all("stopped by itself" in words for words in rig.driver.faults.values())
@@ -216,6 +218,7 @@ def test_a_servo_past_the_end_of_its_turn_does_not_go_round(make_rig: Callable[.
     rig.servos[0].position = -2.0
     rig.servos[0].put(x.TORQUE, 0)
     rig.cycles(1)
+    assert rig.driver.reading.counts[0] == 4094
     rig.cycles(1, stop=True)
     assert rig.driver._goal[0] == rig.driver._servos[0].lowest
 
@@ -260,3 +263,47 @@ def test_answers_that_a_bad_cable_breaks_are_dropped_and_counted(rig: Rig) -> No
         assert np.abs(rig.measured_rad - rig.start_rad)[reading.valid].max(initial=0.0) <= COUNT_RAD
     assert rig.driver.missed > 0
     assert rig.driver.broken > 0
+
+
+def test_an_answer_that_comes_late_is_never_taken_for_anothers(make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig(reply_timeout_s=0.1)
+    held: list[bytes] = []
+    count = 0
+
+    def hold_back(answer: bytes) -> bytes:
+        # every fifth answer comes only with the one after it
+        nonlocal count
+        count += 1
+        if count % 5 == 0:
+            held.append(answer)
+            return b""
+        return held.pop() + answer if held else answer
+
+    rig.servos[0].put(x.RETURN_DELAY, 77)
+    rig.port.garble = hold_back
+    rig.driver._servos = rig.driver._servos[:1]
+    try:
+        assert rig.driver._open() is not None
+        assert rig.driver._prepare(rig.driver._servos) == []
+    finally:
+        rig.driver.close()
+    assert rig.servos[0].get(x.RETURN_DELAY) == 0
+
+
+def test_a_health_that_comes_late_is_no_position(make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig()
+    rig.driver.start()
+    rig.impatient()
+    held: list[bytes] = []
+
+    def hold_back(answer: bytes) -> bytes:
+        if len(answer) == 11 + x.HEALTH.size:
+            held.append(answer)
+            return b""
+        return b"".join(held) + answer
+
+    rig.port.garble = hold_back
+    for _ in range(4):
+        rig.cycles(1)
+        assert np.abs(rig.measured_rad - rig.start_rad).max() <= COUNT_RAD
+    assert len(held) == 4
