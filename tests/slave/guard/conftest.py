@@ -65,6 +65,8 @@ class Rig:
         self.encoder_delay_ns = 0
         self.body = WELL
         self.coupled = True
+        self.lies: dict[int, Callable[[float], float]] = {}
+        """What an encoder shows for the true angle, where it lies."""
         self.target = self.measured.copy()
         self.offset = GOOD_OFFSET
         self.sequence = 0
@@ -116,13 +118,19 @@ class Rig:
 
     def step(self, dt_ns: int = PERIOD_NS) -> Setpoint:
         self.now_ns += dt_ns
-        setpoint = self.guard.step(
-            self.now_ns, self.measured, self.encoder_valid, self.now_ns - self.encoder_delay_ns, self.body
-        )
+        read_ns = self.now_ns - self.encoder_delay_ns
+        setpoint = self.guard.step(self.now_ns, self.shown(), self.encoder_valid, read_ns, self.body)
         if self.coupled and setpoint.ready:
             self.measured = setpoint.position_rad.copy()
         self.setpoints.append(setpoint)
         return setpoint
+
+    def shown(self) -> Array:
+        """What the encoders say."""
+        out = self.measured.copy() if self.lies else self.measured
+        for joint, lie in self.lies.items():
+            out[joint] = lie(float(out[joint]))
+        return out
 
     # whole scenes
 
