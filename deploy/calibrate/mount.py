@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,15 +17,16 @@ from deploy.calibrate.options import AsJson, OutFolder, RecordingFile, ReportFil
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from common.skeleton import Skeleton
     from master.calibrate.mounting import JointMotion, Mounting
-    from master.calibrate.recording import NodeRecording
+
+
+_TIMES = re.compile(r"([0-9]+(?:\.[0-9]*)?):([0-9]+(?:\.[0-9]*)?)")
 
 
 def _times(text: str | None) -> str | None:
     if text is not None:
-        parts = text.split(":")
-        if len(parts) != 2 or not all(p.replace(".", "", 1).isdigit() for p in parts):
+        found = _TIMES.fullmatch(text)
+        if found is None or not float(found[1]) < float(found[2]):
             raise typer.BadParameter("expected FROM:TO in seconds from the beginning, such as 0.5:4")
     return text
 
@@ -59,7 +60,7 @@ def mount(
     from deploy.calibrate.mount_picture import draw_angles
     from deploy.calibrate.session import make_folder, tell_machines
     from master.calibrate.mounting import find_mounting
-    from master.calibrate.mounting_files import calibrated, write_mounting
+    from master.calibrate.mounting_files import calibrated, of_profile, write_mounting
     from master.calibrate.recording import load_recordings
 
     skeleton = load_skeleton(profile)
@@ -85,24 +86,6 @@ def mount(
     if found.refused:
         lines = [f"{recording}: {name} is not written: {why}" for name, why in found.refused.items()]
         raise TandemError("\n".join(lines))
-
-
-def of_profile(recordings: Mapping[str, NodeRecording], skeleton: Skeleton) -> dict[str, NodeRecording]:
-    """The recordings by the skeleton's segments, also where the file uses the full-body names."""
-    from master.suit.simulated.replay import RECORDED_AS
-
-    out = {}
-    for segment in skeleton.segment_names:
-        name = segment if segment in recordings else RECORDED_AS.get(segment)
-        if name is not None and name in recordings:
-            out[segment] = recordings[name]
-    if not out:
-        there = ", ".join(sorted(recordings)[:6])
-        raise TandemError(
-            f"no node of the recording ({there} …) is a segment of the profile {skeleton.name}; "
-            "expected another --profile"
-        )
-    return out
 
 
 def as_report(found: Mounting, recording: Path) -> dict[str, Any]:

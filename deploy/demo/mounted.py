@@ -26,10 +26,9 @@ def mount(recording: Path, skeleton: Skeleton, folder: Path) -> Mounted:
     Where nothing can be said, as of a recording without a stance, every node is among the `left`.
     Raises RecordingError for a file that is none.
     """
-    from deploy.calibrate.mount import of_profile
     from master.calibrate.hinge import PoorMotionError
     from master.calibrate.mounting import find_mounting
-    from master.calibrate.mounting_files import write_mounting
+    from master.calibrate.mounting_files import of_profile, write_mounting
     from master.calibrate.recording import load_recordings
 
     try:

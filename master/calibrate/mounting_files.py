@@ -13,6 +13,8 @@ import numpy as np
 from common.calibration import Made, NodeCalibration
 from common.config import load_config
 from common.quaternion import Array
+from common.skeleton import Skeleton
+from common.skeleton.full_body import RECORDED_AS
 from master.calibrate.mounting import Mounting
 from master.calibrate.node_file import write_calibration
 from master.calibrate.recording import NodeRecording, RecordingError
@@ -21,6 +23,25 @@ from master.calibrate.recording import NodeRecording, RecordingError
 def node_file(folder: Path, name: str) -> Path:
     """A node's file in a folder of them."""
     return folder / f"{name}.toml"
+
+
+def of_profile(recordings: Mapping[str, NodeRecording], skeleton: Skeleton) -> dict[str, NodeRecording]:
+    """The recordings by the skeleton's segments, also where the file has the full-body names for them.
+
+    Raises RecordingError where no node is one of the skeleton's.
+    """
+    out = {}
+    for segment in skeleton.segment_names:
+        name = segment if segment in recordings else RECORDED_AS.get(segment)
+        if name is not None and name in recordings:
+            out[segment] = recordings[name]
+    if not out:
+        there = ", ".join(sorted(recordings)[:6])
+        raise RecordingError(
+            f"no node of the recording ({there} …) is a segment of the profile {skeleton.name}; "
+            "expected another --profile"
+        )
+    return out
 
 
 def calibrated(recordings: Mapping[str, NodeRecording], folder: Path) -> dict[str, NodeRecording]:

@@ -12,27 +12,8 @@ from common.errors import ConfigError, ConfigMistake, RecordingError
 from common.npz import Arrays, read_arrays
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from common.skeleton.full_body import RECORDED_AS
 from master.suit.simulated.sensors import CHANNELS
-
-RECORDED_AS = {
-    "chest": "upper_back",
-    "head": "head",
-    "left_upper_arm": "upper_arm_left",
-    "left_forearm": "forearm_left",
-    "left_hand": "hand_left",
-    "right_upper_arm": "upper_arm_right",
-    "right_forearm": "forearm_right",
-    "right_hand": "hand_right",
-    "pelvis": "hip",
-    "left_thigh": "upper_leg_left",
-    "left_shank": "lower_leg_left",
-    "left_foot": "foot_left",
-    "right_thigh": "upper_leg_right",
-    "right_shank": "lower_leg_right",
-    "right_foot": "foot_right",
-}
-"""Our segments, and what the recording calls them. Others take their nearest recorded ancestor's readings:
-a phalanx reads what its hand reads, as on a flat, stiff hand."""
 
 
 class Replay:
@@ -69,6 +50,9 @@ class Replay:
 
 def load_replay(path: Path, skeleton: Skeleton, nodes: Collection[str]) -> Replay:
     """Read a recording (npz): `t_s` (T,), and `{name}_acc` m/s² and `{name}_gyr` rad/s (T, 3) a segment.
+
+    A segment that was not recorded takes its nearest recorded ancestor's readings: a phalanx reads what its
+    hand reads, as on a flat, stiff hand.
 
     `nodes` are the segments that will be asked. Raises ConfigError with the file, the array, what it is and
     what it should be.

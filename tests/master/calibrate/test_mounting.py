@@ -14,6 +14,7 @@ from common.config import load_config
 from common.errors import TandemError
 from common.quaternion import IDENTITY, Array, angle_between, conjugate, from_axis_angle, rotate
 from common.skeleton import Skeleton, load_skeleton
+from common.skeleton.full_body import RECORDED_AS
 from master.calibrate.hinge import PoorMotionError
 from master.calibrate.hinge_pair import find_hinge_pair
 from master.calibrate.mounting import Mounting, find_mounting, posture, zero_axes
@@ -23,7 +24,6 @@ from master.calibrate.recording import NodeRecording, load_recordings
 from master.fuse.hinge_angle import HingeAngleConfig, hinge_angles
 from master.solve.solver import JointSolver
 from master.suit.simulated.imperfections import Imperfections
-from master.suit.simulated.replay import RECORDED_AS
 from master.suit.simulated.sensors import IdealSensors, earth_field_ut
 
 RATE_HZ = 100.0

@@ -11,12 +11,12 @@ import pytest
 
 from common.quaternion import Array, conjugate, rotate
 from common.skeleton import load_skeleton
+from common.skeleton.full_body import RECORDED_AS
 from master.calibrate.mounting import find_mounting, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import load_recordings
 from master.fuse.hinge_angle import HingeAngle, HingeAngleConfig, hinge_of
 from master.solve.solver import JointSolver
-from master.suit.simulated.replay import RECORDED_AS
 
 pytestmark = pytest.mark.recordings
 

@@ -10,7 +10,8 @@ import pytest
 
 from common.errors import ConfigError
 from common.skeleton import Skeleton, load_skeleton
-from master.suit.simulated.replay import RECORDED_AS, Replay, load_replay
+from common.skeleton.full_body import RECORDED_AS
+from master.suit.simulated.replay import Replay, load_replay
 
 SAMPLES = 50
 

@@ -9,12 +9,12 @@ from common.can.config import BusConfig
 from common.clock import to_ns
 from common.quaternion import rotate
 from common.skeleton import Skeleton
+from common.skeleton.full_body import RECORDED_AS
 from master.suit.nodes import NodeConfig
 from master.suit.protocol import NO_VALUE, SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.faults import FaultsConfig
 from master.suit.simulated.motion import load_motion
-from master.suit.simulated.replay import RECORDED_AS
 from master.suit.simulated.sensors import GRAVITY_M_S2
 from master.suit.simulated.suit import SimulatedSuit, SuitAnswer, build_suit
 
