@@ -7,12 +7,7 @@ from typing import Annotated
 
 import typer
 
-
-def _in_a_folder(path: Path | None) -> Path | None:
-    """Before the work that is to be written there, not after."""
-    if path is not None and not path.absolute().parent.is_dir():
-        raise typer.BadParameter(f"there is no folder {path.parent}")
-    return path
+from deploy.output import in_a_folder, write_json
 
 
 def files(
@@ -24,14 +19,14 @@ def files(
     ],
     filter_: Annotated[str, typer.Option("--filter", help="vqf, mahony, ekf or all.")] = "all",
     report: Annotated[
-        Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=_in_a_folder)
+        Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
     ] = None,
     plot: Annotated[
         Path | None,
         typer.Option(
             help="Draw the errors over time (PNG); beside the report unless told.",
             dir_okay=False,
-            callback=_in_a_folder,
+            callback=in_a_folder,
         ),
     ] = None,
 ) -> None:
@@ -41,8 +36,6 @@ def files(
 
     Example: `tandem accuracy recording.npz --filter all --report scores.json --plot errors.png`
     """
-    import json
-
     from rich.console import Console
 
     from deploy.accuracy.judge import FILTERS, judge
@@ -55,7 +48,7 @@ def files(
     judged = judge(recordings, FILTERS if filter_ == "all" else (filter_,), console)
     console.print(accuracy_of_files(judged.tree))
     if report is not None:
-        report.write_text(json.dumps(judged.tree, indent=2, ensure_ascii=False) + "\n", "utf-8")
+        write_json(report, judged.tree)
     picture = plot or (report.with_suffix(".png") if report is not None else None)
     if picture is not None and any(panel.curves for panel in judged.panels):
         draw(judged.panels, picture)

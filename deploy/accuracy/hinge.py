@@ -11,7 +11,8 @@ import typer
 from rich.console import Console
 
 from common.quaternion import Array
-from deploy.calibrate.options import AsJson, ReportFile, in_a_folder
+from deploy.calibrate.options import AsJson, ReportFile
+from deploy.output import in_a_folder, writing
 
 if TYPE_CHECKING:
     from master.calibrate.hinge_pair import HingePair
@@ -144,7 +145,8 @@ def draw(angle_rad: Array, deviation_rad: Array, rate_hz: float, path: Path) -> 
     axes.set_xlabel("s")
     axes.set_ylabel("hinge angle, °")
     axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=110, format="png")
+    with writing(path):
+        figure.savefig(path, dpi=110, format="png")
 
 
 def _print(figures: dict[str, Any], console: Console) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from common.messages import Mask
 from common.quaternion import Array
+from deploy.output import writing
 
 _POINTS = 1500
 """So many points a line: each is the largest of its share of samples, so that no peak is lost."""
@@ -58,7 +59,8 @@ def draw(panels: list[Panel], path: Path) -> None:
             axes.grid(alpha=0.3)
     for axes in grid[-1]:
         axes.set_xlabel("s")
-    figure.savefig(path, dpi=110, format="png")
+    with writing(path):
+        figure.savefig(path, dpi=110, format="png")
 
 
 def _peaks(values: Array, step: int) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from common.quaternion import IDENTITY, Array
 from common.skeleton import Skeleton
+from deploy.output import writing
 from master.calibrate.mounting import Mounting, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import NodeRecording
@@ -59,4 +60,5 @@ def draw_angles(
         axes.set_ylabel(f"{joint.name} °", fontsize=7, rotation=0, ha="right")
         axes.grid(alpha=0.3)
     figure.axes[-1].set_xlabel("s")
-    figure.savefig(path, dpi=100, format="png")
+    with writing(path):
+        figure.savefig(path, dpi=100, format="png")

@@ -7,13 +7,7 @@ from typing import Annotated
 
 import typer
 
-
-def in_a_folder(path: Path | None) -> Path | None:
-    """Before the work that is to be written there, not after."""
-    if path is not None and not path.absolute().parent.is_dir():
-        raise typer.BadParameter(f"there is no folder {path.parent}")
-    return path
-
+from deploy.output import in_a_folder
 
 RecordingFile = Annotated[
     Path,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from common.quaternion import Array
+from deploy.output import writing
 from master.calibrate.inertial import InertialCalibration
 from master.calibrate.magnetic import MagneticCalibration
 
@@ -35,7 +36,8 @@ def draw_inertial(found: InertialCalibration, path: Path) -> None:
         for one in axes:
             one.set_xlabel(of)
     figure.suptitle(found.name)
-    figure.savefig(path, dpi=110, format="png")
+    with writing(path):
+        figure.savefig(path, dpi=110, format="png")
 
 
 def draw_magnetic(found: MagneticCalibration, path: Path) -> None:
@@ -64,7 +66,8 @@ def draw_magnetic(found: MagneticCalibration, path: Path) -> None:
         row[3].axvline(found.fit.field_ut, color="k", linewidth=0.8)
         row[3].set_title(f"{title}: strength, µT", fontsize=9)
     figure.suptitle(found.name)
-    figure.savefig(path, dpi=110, format="png")
+    with writing(path):
+        figure.savefig(path, dpi=110, format="png")
 
 
 def _figure(width: float, height: float) -> Figure:

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from common.calibration import Made
 from common.errors import TandemError
 from common.quaternion import Array
+from deploy.output import write_json
 from master.calibrate.node_file import Part, write_calibration
 from master.calibrate.recording import NodeRecording, load_recordings
 
@@ -118,10 +119,10 @@ def report(
 
 def tell_machines(figures: dict[str, Any], path: Path | None, *, to_stdout: bool) -> None:
     """As JSON to a file, to the standard output, or both."""
-    text = json.dumps(figures, indent=2, ensure_ascii=False)
     if path is not None:
-        path.write_text(text + "\n", "utf-8")
+        write_json(path, figures)
     if to_stdout:
+        text = json.dumps(figures, indent=2, ensure_ascii=False)
         Console().print(text, highlight=False, soft_wrap=True, markup=False)
 
 

@@ -16,7 +16,7 @@ from tomlkit.items import Table
 
 from common.calibration import Made, NodeCalibration
 from common.config import check_config, load_config
-from common.errors import ConfigError, ConfigMistake
+from common.errors import ConfigError, ConfigMistake, TandemError
 from common.quaternion import Array
 
 Part = Literal["accelerometer", "gyroscope", "magnetometer", "mounting"]
@@ -35,7 +35,8 @@ def write_calibration(path: Path, parts: dict[Part, tuple[Array, Made]]) -> Node
 
     Other parts and comments of an existing file stay. The file is replaced in one step, so that who reads
     it meanwhile sees the old or the new one. Returns what the file now says.
-    Raises ConfigError, before anything is written, when a part or the existing file is not sound.
+    Raises ConfigError, before anything is written, when a part or the existing file is not sound, and
+    TandemError where it cannot be written.
     """
     document = _existing(path)
     for part, (values, made) in parts.items():
@@ -43,7 +44,10 @@ def write_calibration(path: Path, parts: dict[Part, tuple[Array, Made]]) -> Node
         _made_table(document)[part] = _table(made)
     text = tomlkit.dumps(document)
     checked = check_config(path, tomllib.loads(text), NodeCalibration)
-    _replace(path, text)
+    try:
+        _replace(path, text)
+    except OSError as error:
+        raise TandemError(f"{path}: cannot be written ({error.strerror or error})") from None
     return checked
 
 
@@ -52,6 +56,10 @@ def _existing(path: Path) -> tomlkit.TOMLDocument:
         return tomlkit.document()
     try:
         return tomlkit.parse(path.read_text("utf-8"))
+    except OSError as error:
+        raise ConfigError(
+            path, [ConfigMistake("file", path.name, f"a readable file ({error.strerror or error})")]
+        ) from None
     except (TOMLKitError, UnicodeDecodeError) as error:
         raise ConfigError(path, [ConfigMistake("file", path.name, f"valid TOML ({error})")]) from None
 

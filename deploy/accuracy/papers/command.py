@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-
-def _in_a_folder(path: Path | None) -> Path | None:
-    """Before minutes of work that is to be written there, not after."""
-    if path is not None and not path.absolute().parent.is_dir():
-        raise typer.BadParameter(f"there is no folder {path.parent}")
-    return path
+from deploy.output import in_a_folder, write_json
 
 
 def papers(
@@ -22,7 +16,7 @@ def papers(
         str | None, typer.Option(metavar="KEYS", help="Experiments to run, such as `A,C`; all without it.")
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=_in_a_folder)
+        Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
     ] = None,
     strict: Annotated[bool, typer.Option(help="Exit with status 1 where a target is missed.")] = False,
     jobs: Annotated[
@@ -71,7 +65,6 @@ def papers(
         f"{seeds} seeds; targets missed: {missed}" if missed else f"{seeds} seeds; every target met"
     )
     if report is not None:
-        tree = {"seeds": seeds, "missed": missed, "experiments": trees}
-        report.write_text(json.dumps(tree, indent=2, ensure_ascii=False) + "\n", "utf-8")
+        write_json(report, {"seeds": seeds, "missed": missed, "experiments": trees})
     if strict and missed:
         raise typer.Exit(1)

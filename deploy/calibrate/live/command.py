@@ -50,15 +50,15 @@ def live(
     from deploy.calibrate.live.compute import Choice, compute
     from deploy.calibrate.live.guide import GuideOptions
     from deploy.calibrate.live.run import LiveSession, Session
-    from deploy.calibrate.session import tell_machines
+    from deploy.calibrate.session import make_folder, tell_machines
     from master.config import MasterConfig
 
     checked = load_config(config, MasterConfig, set_ or ())
     wanted = parts(what)
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     console = Console(stderr=True)
     by_word = console.is_terminal
-    options = GuideOptions(wanted, still_s, attitudes, tumble_s=tumble_s, limber_s=limber_s, by_word=by_word)
+    options = GuideOptions(wanted, still_s, attitudes, coverage, tumble_s, limber_s=limber_s, by_word=by_word)
     session = Session()
 
     async def guide(stop: object) -> None:

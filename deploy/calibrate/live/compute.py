@@ -20,6 +20,7 @@ from deploy.calibrate.mount import as_report, joints_table, nodes_table
 from deploy.calibrate.mount_picture import draw_angles
 from deploy.calibrate.pictures import draw_inertial, draw_magnetic
 from deploy.calibrate.views import inertial_table, magnetic_table, notes
+from deploy.output import writing
 from master.calibrate.inertial import InertialCalibration, InertialOptions, calibrate_inertial
 from master.calibrate.magnetic import MagneticCalibration, calibrate_magnetic
 from master.calibrate.mounting import find_mounting
@@ -73,7 +74,8 @@ def inherit(config: MasterConfig, folder: Path) -> None:
     for name, node in config.nodes.items():
         here = folder / f"{name}.toml"
         if node.calibration is not None and node.calibration.is_file() and not here.exists():
-            shutil.copyfile(node.calibration, here)
+            with writing(here):
+                shutil.copyfile(node.calibration, here)
 
 
 def _imu(

@@ -6,7 +6,7 @@ import pytest
 
 from common.calibration import Made, NodeCalibration
 from common.config import load_config
-from common.errors import ConfigError
+from common.errors import ConfigError, TandemError
 from common.quaternion import Array
 from master.calibrate.affine import ACC, load_calibration
 from master.calibrate.node_file import write_calibration
@@ -61,3 +61,12 @@ def test_what_is_not_sound_is_not_written(tmp_path: Path, old: str) -> None:
         write_calibration(path, {"accelerometer": (MAP if "gyr" in old or "nons" in old else singular, MADE)})
     assert path.read_text() == old
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_disk_that_takes_nothing_is_said(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(TandemError, match=r"node\.toml: cannot be written"):
+        write_calibration(tmp_path / "file" / "node.toml", {"accelerometer": (MAP, MADE)})
+    (tmp_path / "node.toml").mkdir()
+    with pytest.raises(ConfigError, match="expected a readable file"):
+        write_calibration(tmp_path / "node.toml", {"accelerometer": (MAP, MADE)})

@@ -99,7 +99,8 @@ def test_the_bottles_joints_do_not_start_in_step(bottle: Motion) -> None:
 
 def test_an_unknown_motion_is_refused_with_the_names_there_are(skeleton: Skeleton) -> None:
     with pytest.raises(
-        ConfigError, match="motion = 'dance': expected one of bottle, calibration_pose, sweep, limber, tray, calibration"
+        ConfigError,
+        match="motion = 'dance': expected one of bottle, calibration_pose, sweep, limber, tray, calibration",
     ):
         load_motion("dance", skeleton)
 

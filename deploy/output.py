@@ -1,0 +1,36 @@
+"""What a command writes where a person told it to: reports, pictures, or one clear line on why it cannot."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from common.errors import TandemError
+
+
+def in_a_folder(path: Path | None) -> Path | None:
+    """An option's callback: before the work that is to be written there, not after."""
+    if path is not None and not path.absolute().parent.is_dir():
+        raise typer.BadParameter(f"there is no folder {path.parent}")
+    return path
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Raise TandemError where the disk, or who owns it, does not let the path be written."""
+    try:
+        yield
+    except OSError as error:
+        raise TandemError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def write_json(path: Path, tree: Any) -> None:
+    """A report for machines. Raises TandemError."""
+    text = json.dumps(tree, indent=2, ensure_ascii=False) + "\n"
+    with writing(path):
+        path.write_text(text, "utf-8")
