@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-NO_ERROR = 0x0000
+NO_ERROR, HEARTBEAT_MISSED = 0x0000, 0x8130
 
 CODES = {
     0x1000: "generic error",
@@ -24,7 +24,7 @@ CODES = {
     0x7305: "the motor's encoder failed",
     0x8110: "CAN frames lost",
     0x8120: "CAN error passive",
-    0x8130: "it missed the slave's heartbeat",
+    HEARTBEAT_MISSED: "it missed the slave's heartbeat",
     0x8140: "recovered from bus-off",
     0x8210: "a PDO was too short",
     0x8611: "following error",

@@ -21,7 +21,7 @@ from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import ENABLED_BITS, SHUTDOWN, STATE_BITS
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drive import Drive, Phase
-from slave.servos.canopen.emergency import emergency
+from slave.servos.canopen.emergency import HEARTBEAT_MISSED, emergency
 from slave.servos.canopen.setup import transfers
 from slave.servos.servos import EncoderReading
 
@@ -54,6 +54,7 @@ class DriveNetwork:
         self._zero = np.array([drive.zero_increments for drive in drives], dtype=np.float64)
         self._step_rad = math.radians(config.join_deg_s) / config.sync_hz
         self._dead_ns = config.drive_dead_ms * NS_PER_MS
+        self._blind_ns = config.dead_ms * NS_PER_MS // 2
         self._beat_every = max(1, config.heartbeat_ms * config.sync_hz // 1000)
         self._beat = pdo.HEARTBEAT + config.node_id
         self._answers = pdo.Answers(count)
@@ -63,12 +64,15 @@ class DriveNetwork:
         self._flags = np.zeros(count, np.uint16)
         self._words = np.full(count, SHUTDOWN, np.uint16)
         self._answered_ns = np.zeros(count, np.int64)
+        self._known_ns = np.full(count, -(1 << 62), np.int64)
+        """(J,) the SYNC at which each last told its state."""
         self._heard_ns = [0] * count
         self._down: dict[str, str] = {}
         self._stopping = False
         self._settled = False
         self._cycles = 0
         self._synced_ns = 0
+        self._cycled_ns = 0
         self._told: dict[str, str] = {}
         self.reading = EncoderReading(0, np.zeros(count, np.int64), np.zeros(count, np.bool_))
         self.faults: Mapping[str, str] = MappingProxyType({})
@@ -146,6 +150,9 @@ class DriveNetwork:
                 said = emergency(data)
                 if said is not None:
                     drive.emergency = None if said.over else said
+                    if said.code == HEARTBEAT_MISSED and drive.phase is Phase.RUNNING:
+                        # told "enable" right after, it would go on as if nothing had been
+                        drive.fail("has stopped by itself")
                     self._tell()
             case _:
                 self.unknown += 1
@@ -173,13 +180,22 @@ class DriveNetwork:
             self._publish()
         fresh = self._answers.fresh
         self._answered_ns[fresh] = now_ns
+        self._known_ns[fresh] = self._synced_ns
+        if now_ns - self._cycled_ns > self._dead_ns // 2:
+            # it was this process that stood still: nobody else was silent
+            self._answered_ns[:] = now_ns
+            self._heard_ns = [now_ns] * len(self._heard_ns)
+        self._cycled_ns = now_ns
         self.pending(now_ns)
         controlwords = self._supervise(fresh, now_ns)
         targets = self._targets(setpoint_rad)
         beat = self._cycles % self._beat_every == 0
         out = [(bus.name, self._beat, bytes([_OPERATIONAL])) for bus in self._config.buses] if beat else []
         data = pdo.pack_targets(controlwords, targets)
-        out += [(bus, frame_id, part) for (bus, frame_id), part in zip(self._rpdo, data, strict=True)]
+        # a drive that may have stopped by itself meanwhile must not be told "enable" unseen: that moves it
+        seen = (now_ns - self._known_ns < self._blind_ns).tolist()
+        frames = zip(self._rpdo, data, seen, strict=True)
+        out += [(bus, frame_id, part) for (bus, frame_id), part, told in frames if told]
         self._cycles += 1
         return out
 

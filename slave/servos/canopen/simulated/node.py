@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,12 @@ _GIVEN = {0x6041: "statusword", pdo.ENCODER: "encoder", 0x6064: "position"}
 _NOT_MAPPABLE, _PRESENT_STATE = 0x0604_0041, 0x0800_0022
 _BOOT, _PRE_OPERATIONAL, _OPERATIONAL = 0x00, 0x7F, 0x05
 _RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
+
+
+@lru_cache(maxsize=1)
+def _dictionary() -> canopen.ObjectDictionary:
+    """Shared by all drives: what a drive is told is kept in its node, not here."""
+    return canopen.import_od(str(EDS), node_id=1)
 
 
 class _Wire(canopen.Network):
@@ -82,7 +89,7 @@ class SimulatedDrive:
         self._boot()
 
     def _boot(self) -> None:
-        self._node = canopen.LocalNode(self.id, str(EDS))
+        self._node = canopen.LocalNode(self.id, _dictionary())
         self._network = _Wire(self._send)
         self._node.associate_network(self._network)
         node: Any = self._node  # half of the library is untyped
