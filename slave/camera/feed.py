@@ -161,7 +161,7 @@ class CameraFeed:
             self._wake.clear()
             while self._seen:
                 seen = self._seen.popleft()
-                self._rate.seen(seen.number, seen.known_ns, seen.transit_ns)
+                self._rate.seen(seen.number, seen.known_ns, seen.delay_ns)
             now_ns = self._clock()
             due_ns, angles = self._rate.due_ns(now_ns), self._angles
             if due_ns is None or angles is None:

@@ -1,9 +1,10 @@
 """How large the next picture may be, and when it is due: so that video never holds up what matters. Pure.
 
 Additive increase, multiplicative decrease (Chiu and Jain 1989) of a picture's size, steered by the delay
-that the picture itself met, as LEDBAT (RFC 6817) does: its transit less the least transit of late. A link
-keeps what it cannot send at once in a queue, and a state sent behind a picture waits as long as the
-picture's last byte. So that wait is what is bounded. At most two pictures are under way at a time.
+that the picture itself met, as LEDBAT (RFC 6817) does: its transit less that of the clocks' quickest
+exchange, which is all but empty. A link keeps what it cannot send at once in a queue, and a state sent behind
+a picture waits as long as the picture's last byte. So that wait is what is bounded. At most two pictures are
+under way at a time.
 """
 
 from __future__ import annotations
@@ -11,8 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 LEAST_BYTES = 1500
-START_BYTES = 6000
-_MORE_BYTES = 1000
+_MORE_BYTES = 500
 _LESS = 0.6
 _SLOWER, _FASTER = 1.5, 0.7
 _WINDOW = 2
@@ -21,8 +21,6 @@ _SHARE = 0.5
 _USED = 0.6
 """A picture that needed less of its budget says nothing about a larger one."""
 _LOST_NS = 1_000_000_000
-_BASE_NS = 10_000_000_000
-"""The least transit is that of the last one to two times this long: routes change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +48,11 @@ class RateControl:
         self._fastest_ns = 1e9 / limits.most_rate_hz
         self._slowest_ns = max(1e9 / limits.least_rate_hz, self._fastest_ns)
         self._interval_ns = self._fastest_ns
-        self._budget = float(min(START_BYTES, limits.most_bytes))
+        self._budget = float(LEAST_BYTES)
         self._under_way: dict[int, _Sent] = {}
         self._last_sent_ns: int | None = None
         self._rest_until_ns = 0
         self._lowered_ns = -1
-        self._base = _LeastTransit()
         self.lowered = 0
         """Times that it gave way."""
         self.lost = 0
@@ -85,17 +82,16 @@ class RateControl:
         self._under_way[number] = _Sent(size, now_ns, self._budget)
         self._last_sent_ns = now_ns
 
-    def seen(self, number: int, now_ns: int, transit_ns: int | None) -> None:
+    def seen(self, number: int, now_ns: int, delay_ns: int | None) -> None:
         """The operator's side has received this picture; those before it will not be told of any more.
 
-        `transit_ns`: from sent to received; None where the clocks' offset is not trusted, and then only the
-        number under way is learnt.
+        `delay_ns`: by how much its transit was longer than an empty packet's on an idle link; None where the
+        clocks' offset is not trusted, and then only the number under way is learnt.
         """
         sent = self._under_way.get(number)
         self._under_way = {n: s for n, s in self._under_way.items() if n > number}
-        if sent is None or transit_ns is None:
+        if sent is None or delay_ns is None:
             return
-        delay_ns = max(0, transit_ns - self._base.take(transit_ns, now_ns))
         self._rest_until_ns = sent.sent_ns + round(delay_ns / _SHARE)
         if delay_ns > self._limits.most_delay_ns:
             if sent.sent_ns > self._lowered_ns:  # what was sent before the last step down taught it already
@@ -120,18 +116,3 @@ class RateControl:
         if self._budget <= LEAST_BYTES:
             self._interval_ns = min(self._interval_ns * _SLOWER, self._slowest_ns)
         self._budget = max(self._budget * _LESS, float(LEAST_BYTES))
-
-
-class _LeastTransit:
-    """Minimum over a sliding window, in two halves."""
-
-    def __init__(self) -> None:
-        self._since_ns: int | None = None
-        self._now: int | None = None
-        self._before: int | None = None
-
-    def take(self, transit_ns: int, now_ns: int) -> int:
-        if self._since_ns is None or now_ns - self._since_ns > _BASE_NS:
-            self._since_ns, self._before, self._now = now_ns, self._now, None
-        self._now = transit_ns if self._now is None else min(self._now, transit_ns)
-        return self._now if self._before is None else min(self._now, self._before)

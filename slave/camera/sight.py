@@ -20,8 +20,8 @@ class Seen:
     number: int
     known_ns: int
     """When the slave learnt of it, slave's clock."""
-    transit_ns: int | None
-    """From sent to received; None while the clocks' offset is not trusted."""
+    delay_ns: int | None
+    """By how much it travelled longer than the clocks' quickest exchange; None while that is not trusted."""
 
 
 class Sight:
@@ -58,4 +58,6 @@ class Sight:
         self._newest = command.seen_frame
         if transit_ns is not None:
             self.transit.record(transit_ns)
-        return Seen(command.seen_frame, now_ns, transit_ns)
+        # the bound is half the quickest round trip: what a packet takes that meets nothing on its way
+        delay_ns = None if transit_ns is None else max(0, transit_ns - offset.bound_ns)
+        return Seen(command.seen_frame, now_ns, delay_ns)
