@@ -1,0 +1,61 @@
+"""The camera's process killed while the robot tracks: the motion goes on, and the picture comes back."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+
+from common.clock import to_ns
+from common.messages import Action
+from deploy.demo.rig import ROLES, Rig, open_rig
+
+pytestmark = pytest.mark.hosts
+SEEN_S = 1.0
+"""How long the robot is watched after the kill."""
+
+
+def camera_process(rig: Rig) -> psutil.Process:
+    usage = rig.children["slave"]._usage
+    assert usage is not None
+    (camera,) = (c for c in usage.children() if "slave.camera" in " ".join(c.cmdline()))
+    return camera
+
+
+def ages(video: dict[str, Any]) -> int:
+    count: int = video.get("action_to_observation_ms", {}).get("count", 0)
+    return count
+
+
+def test_a_camera_killed_while_the_robot_tracks_is_a_word_in_the_state_and_nothing_else() -> None:
+    async def story() -> None:
+        async with open_rig(overrides={"slave": ['camera.source="robot"']}) as rig:
+            observer = rig.observer
+            for role in ROLES:
+                await rig.start(role)
+            await rig.until(lambda: observer.ready, 30.0, "readiness")
+            reply = await rig.control(Action.ENGAGE)
+            assert reply.done, reply.text
+            await rig.until(lambda: observer.guard == "track", 20.0, "track")
+            assert observer.state is not None
+            if "no OpenGL" in observer.state.faults.get("camera", ""):
+                pytest.skip(observer.state.faults["camera"])
+
+            observer.recording = True
+            # pictures come, and the operator's commands say which he had seen
+            await rig.until(lambda: ages(observer.video) > 0, 20.0, "an age of what the operator saw")
+            camera_process(rig).kill()
+            await rig.until(lambda: "camera" in observer.state.faults, 5.0, "word of the camera")  # type: ignore[union-attr]
+            killed_ns = observer.sent_ns
+            await rig.until(lambda: observer.sent_ns > killed_ns + to_ns(SEEN_S), 5.0, "a second of states")
+            after = [s for s in observer.states if s.sent_ns >= killed_ns]
+            assert {s.guard for s in after} == {"track"}
+            # it goes on following: the setpoint is where the operator has moved it
+            moved_rad = np.ptp([s.setpoint_rad for s in after], axis=0).max()
+            assert moved_rad > np.radians(1.0)
+            await rig.until(lambda: "camera" not in observer.state.faults, 20.0, "the camera again")  # type: ignore[union-attr]
+
+    asyncio.run(story())
