@@ -26,6 +26,7 @@ from master.pipeline import CommandWriter, MasterPipeline, Solved
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.faults import Outgoing
+from master.suit.simulated.motion import Motion
 from master.suit.simulated.suit import build_suit
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline
@@ -50,6 +51,8 @@ class World:
     slave_drift_ppm: float = 20.0
     one_way_ns: int = 2 * NS_PER_MS
     profile: str = NURSING
+    motion: Motion | None = None
+    """Of the operator, instead of the one that the suit's file names."""
     overrides: dict[str, list[str]] = field(default_factory=dict)
     """Of the example files, by role."""
 
@@ -64,7 +67,7 @@ class VirtualRun:
         self.robot = self.master_config.commanded[0]
         self.slave_config = _load(SlaveConfig, "slave", world)
         self._protocol = SuitProtocol.load(self.master_config.capture.dbc)
-        self.suit = build_suit(_load(SuitConfig, "suit", world), self._protocol)
+        self.suit = build_suit(_load(SuitConfig, "suit", world), self._protocol, world.motion)
         self._master = MasterPipeline(self.master_config, self._protocol)
         self._writer = CommandWriter(self.robot)
         self._lease = LeaseKeeper(self.robot, self.master_config.operator.name)

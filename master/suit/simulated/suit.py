@@ -188,14 +188,18 @@ def _group(
     )
 
 
-def build_suit(config: SuitConfig, protocol: SuitProtocol) -> SimulatedSuit:
-    """The suit that a configuration describes. Raises ConfigError; opens nothing but files."""
+def build_suit(config: SuitConfig, protocol: SuitProtocol, motion: Motion | None = None) -> SimulatedSuit:
+    """The suit that a configuration describes, worn in another motion where one is given.
+
+    Raises ConfigError; opens nothing but files.
+    """
     skeleton = load_skeleton(config.profile)
     faults = Faults(config.faults, config.seed)
-    return SimulatedSuit(skeleton, config.nodes, config.buses, protocol, _wearer(config, skeleton), faults)
+    wearer = _wearer(config, skeleton, motion)
+    return SimulatedSuit(skeleton, config.nodes, config.buses, protocol, wearer, faults)
 
 
-def _wearer(config: SuitConfig, skeleton: Skeleton) -> Wearer:
+def _wearer(config: SuitConfig, skeleton: Skeleton, motion: Motion | None) -> Wearer:
     if config.replay is not None:
         return RecordedOperator(load_replay(config.replay, skeleton, config.nodes))
     mounting = np.array([config.mounting.get(name, IDENTITY) for name in skeleton.segment_names])
@@ -205,7 +209,7 @@ def _wearer(config: SuitConfig, skeleton: Skeleton) -> Wearer:
         disturbance = Disturbance(config.disturbance, skeleton.segment_names, field_ut)
     imperfections = Imperfections(config.grade, len(skeleton.segments), config.seed)
     worn = SimulatedOperator(
-        load_motion(config.motion, skeleton),
+        motion or load_motion(config.motion, skeleton),
         IdealSensors(skeleton, field_ut, mounting, disturbance),
         imperfections,
     )

@@ -1,0 +1,1 @@
+"""What the robot does when anything fails: every fault as data, tried, and measured at the encoders."""

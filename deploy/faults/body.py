@@ -1,0 +1,128 @@
+"""What can fail at both ends: nodes and bus of the suit; clocks, encoders, drives, base of the robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from common.clock import NS_PER_S
+from common.messages import Action
+from common.quaternion import Array
+from deploy.faults.scene import Scene
+from master.suit.simulated.faults import FaultsConfig, Loss
+from slave.guard.body import Body
+from slave.servos.servos import EncoderReading
+
+HOUR_NS = 3_600 * NS_PER_S
+NODE = "right_forearm"
+JOINT = "right_shoulder_pitch"
+"""In the middle of its reach when the fault comes."""
+
+
+def node_lost(scene: Scene) -> None:
+    """A node of the moving arm answers no more."""
+    scene.run.suit.faults.config = FaultsConfig(lose=[Loss(node=NODE)])
+    scene.undo = lambda: setattr(scene.run.suit.faults, "config", FaultsConfig())
+
+
+def joints_of_node(scene: Scene) -> set[str]:
+    """The joints that are not known without it."""
+    column = scene.skeleton.joint_needs_node[:, scene.skeleton.segment_names.index(NODE)]
+    return {name for name, needs in zip(scene.skeleton.joint_names, column, strict=True) if needs}
+
+
+def suit_bus_off(scene: Scene) -> None:
+    """The CAN bus between suit and master fails."""
+    scene.run.troubles.suit_heard = False
+
+
+def drive_bus_off(scene: Scene) -> None:
+    """The drives' CAN bus fails: no reading comes, no setpoint gets there, and the drives hold their last."""
+    troubles = scene.run.troubles
+    last: list[EncoderReading] = []
+    held: list[Array] = []
+
+    def read(reading: EncoderReading) -> EncoderReading:
+        last.append(reading)
+        return last[0]
+
+    def write(position_rad: Array) -> Array:
+        held.append(position_rad)
+        return held[0]
+
+    troubles.read, troubles.write = read, write
+
+
+def one_joint(_: Scene) -> set[str]:
+    """The joint whose encoder or drive fails."""
+    return {JOINT}
+
+
+def drive_fault(scene: Scene) -> None:
+    """A drive reports over-current, and stands still where it is."""
+    joint, held = scene.skeleton.joint_names.index(JOINT), []
+
+    def write(position_rad: Array) -> Array:
+        held.append(position_rad[joint])
+        stuck: Array = position_rad.copy()
+        stuck[joint] = held[0]
+        return stuck
+
+    scene.run.troubles.write = write
+    scene.run.troubles.body = lambda: Body(drives={JOINT: "over-current"})
+
+
+def encoder_silent(scene: Scene) -> None:
+    """An encoder's readings are marked as not valid: magnet lost, parity wrong."""
+    valid = np.array([name != JOINT for name in scene.skeleton.joint_names])
+    scene.run.troubles.read = lambda reading: replace(reading, valid=reading.valid & valid)
+
+
+def encoder_stuck(scene: Scene) -> None:
+    """An encoder shows one angle for ever, and says that it is well."""
+    joint, shown = scene.skeleton.joint_names.index(JOINT), []
+
+    def read(reading: EncoderReading) -> EncoderReading:
+        shown.append(reading.counts[joint])
+        counts = reading.counts.copy()
+        counts[joint] = shown[0]
+        return replace(reading, counts=counts)
+
+    scene.run.troubles.read = read
+
+
+def base_tilted(scene: Scene) -> None:
+    """The base leans by more than it may."""
+    scene.run.troubles.body = lambda: Body(base="leans 12.0° from the vertical, at most 10.0° is allowed")
+
+
+def master_clock_ahead(scene: Scene) -> None:
+    """The master's clock is set ahead by an hour."""
+    scene.run.troubles.master_stepped_ns = HOUR_NS
+
+
+def master_clock_back(scene: Scene) -> None:
+    """And back."""
+    scene.run.troubles.master_stepped_ns = -HOUR_NS
+
+
+def slave_clock_ahead(scene: Scene) -> None:
+    """The robot's clock is set ahead by an hour."""
+    scene.run.troubles.slave_stepped_ns = HOUR_NS
+
+
+def slave_clock_back(scene: Scene) -> None:
+    """And back."""
+    scene.run.troubles.slave_stepped_ns = -HOUR_NS
+
+
+def estop(scene: Scene) -> None:
+    """Somebody asks for an emergency stop; then others try to go on, without the key."""
+    scene.run.ask(Action.ESTOP, operator="a visitor")
+
+    def others() -> None:
+        for action in (Action.ENGAGE, Action.RESET):
+            scene.ask(action, scene.run.master_config.operator.name)
+
+    scene.each_period = others

@@ -1,0 +1,306 @@
+"""The fault matrix: every row there is, but for those that need processes to kill (`processes.py`)."""
+
+from __future__ import annotations
+
+from deploy.faults import body, link
+from deploy.faults.fault import Fault, Reaction
+from slave.guard import State
+
+NOTICED_S = 0.21
+"""`command_timeout_s` of 0.2 s, and the step in which it is seen."""
+BRAKED_S = 0.3
+"""From the order to brake to standstill, the servos' settling included."""
+AT_ONCE_S = 0.01
+"""The next step but one."""
+ENGAGE = "Remove the cause, then engage; the robot goes slowly to the operator's posture."
+NOTHING = "Nothing."
+
+SHAKEN = (
+    "All joints at their limits of acceleration at once shake light ones (wrist, elbow roll) more than "
+    "their drives can hold: what is asked keeps every limit, but the joint falls behind, and then turns "
+    "faster than its limit as it catches up."
+)
+
+LINK = (
+    Fault(
+        "link cut",
+        "No message passes, either way, for 1 s; then the link is whole again.",
+        Reaction.HOLDS,
+        "Brakes and stands. When the link is back it still stands.",
+        ENGAGE,
+        link.cut,
+        reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S, lasts_s=1.0,
+        held_by=frozenset({"command", "lease"}),
+    ),
+    Fault(
+        "link delayed 1 s, then released",
+        "All messages of one second arrive together at its end.",
+        Reaction.HOLDS,
+        "Brakes and stands. What comes late moves nothing.",
+        ENGAGE,
+        link.held_back,
+        reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S,
+        held_by=frozenset({"command", "lease"}),
+    ),
+    Fault(
+        "link slow",
+        "From one moment to the next every message takes half a second.",
+        Reaction.HOLDS,
+        "Takes no command older than 0.3 s; brakes and stands.",
+        ENGAGE,
+        link.slow,
+        reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S,
+        refused_by=frozenset({"age"}), held_by=frozenset({"age", "command"}),
+    ),
+    Fault(
+        "packets reordered",
+        "Every second command arrives after its successor.",
+        Reaction.GOES_ON,
+        "Follows. It never goes back to an older command; half of them missing, it follows less exactly.",
+        NOTHING,
+        link.reordered,
+        ends=State.TRACK, strays_deg=25.0,
+        refused_by=frozenset({"sequence"}), held_by=frozenset({"sequence"}),
+    ),
+    Fault(
+        "packets duplicated",
+        "Every message arrives three times: at once, 10 ms and 110 ms later.",
+        Reaction.GOES_ON,
+        "Follows as if each had come once.",
+        NOTHING,
+        link.duplicated,
+        ends=State.TRACK, strays_deg=0.0,
+        refused_by=frozenset({"sequence"}), held_by=frozenset({"sequence"}),
+    ),
+)  # fmt: skip
+
+STRANGERS = (
+    Fault(
+        "yesterday's recording replayed",
+        "A session of another day, its requests to claim and to engage included, beside the operator's.",
+        Reaction.GOES_ON,
+        "Follows its operator. Nothing of the recording is accepted.",
+        "Find out who sends it.",
+        link.replayed_yesterday,
+        ends=State.TRACK, strays_deg=0.0,
+        refused_by=frozenset({"lease"}), held_by=frozenset({"lease", "sequence", "age", "future"}),
+    ),
+    Fault(
+        "this session's recording replayed",
+        "The operator's own commands of the last seconds once more.",
+        Reaction.GOES_ON,
+        "Follows its operator. Nothing of the recording is accepted.",
+        "Find out who sends it.",
+        link.replayed_today,
+        ends=State.TRACK, strays_deg=0.0,
+        refused_by=frozenset({"sequence"}), held_by=frozenset({"sequence", "age"}),
+    ),
+    Fault(
+        "second operator",
+        "Another person claims, engages, disengages, releases, and sends commands 12.5 times a second.",
+        Reaction.GOES_ON,
+        "Follows its operator, and tells the other who that is. Only an emergency stop is open to everybody.",
+        "Nothing; or the operator releases the robot, and the other claims it.",
+        link.second_operator,
+        ends=State.TRACK, strays_deg=0.0,
+        refused_by=frozenset({"lease"}), held_by=frozenset({"lease"}),
+    ),
+    Fault(
+        "wrong robot",
+        "Commands for another robot arrive here, with this robot's own lease.",
+        Reaction.GOES_ON,
+        "Follows its operator. What is not for it is not accepted.",
+        "Correct the robot's name in the file of the other side.",
+        link.wrong_robot,
+        ends=State.TRACK, strays_deg=0.0,
+        refused_by=frozenset({"robot"}), held_by=frozenset({"robot"}),
+    ),
+)  # fmt: skip
+
+VALUES = (
+    Fault(
+        "values that are not numbers",
+        "NaN and infinities as angles and as velocities, with the operator's lease.",
+        Reaction.GOES_ON,
+        "Follows the sound commands; takes none of the others.",
+        "Replace the program that sends them.",
+        link.not_numbers,
+        ends=State.TRACK, strays_deg=0.0,
+        refused_by=frozenset({"codec", "valid"}), held_by=frozenset({"valid"}),
+    ),
+    Fault(
+        "huge values",
+        "Angles beyond two turns, up to 1e30 rad, with the operator's lease.",
+        Reaction.GOES_ON,
+        "Follows the sound commands; takes none of the others.",
+        "Replace the program that sends them.",
+        link.huge,
+        ends=State.TRACK, strays_deg=0.0,
+        refused_by=frozenset({"codec"}),
+    ),
+    Fault(
+        "negative zeros",
+        "Every zero comes with a minus.",
+        Reaction.GOES_ON,
+        "Follows: it is the same number.",
+        NOTHING,
+        link.negative_zero,
+        ends=State.TRACK, strays_deg=0.0,
+    ),
+    Fault(
+        "largest values that a message can carry",
+        "The master asks for 12.5 rad at 99 rad/s of every joint, in command after command.",
+        Reaction.LIMITED,
+        "Cannot know that this is not meant: goes to the ends of its ranges within its limits.",
+        "Let go of the deadman, or emergency stop.",
+        link.largest,
+        ends=State.TRACK, missed=SHAKEN,
+        held_by=frozenset({"position", "velocity", "acceleration"}),
+    ),
+    Fault(
+        "valid but impossible jump",
+        "From one command to the next every joint is asked to be at the far end of its range.",
+        Reaction.LIMITED,
+        "Cannot know that this is not meant: goes there within its limits.",
+        "Let go of the deadman, or emergency stop.",
+        link.jump,
+        ends=State.TRACK, missed=SHAKEN,
+        held_by=frozenset({"velocity", "acceleration"}),
+    ),
+    Fault(
+        "a jump with every command",
+        "Each command asks for the other end of every joint's range than the one before.",
+        Reaction.LIMITED,
+        "Cannot know that this is not meant: goes to and fro within its limits.",
+        "Let go of the deadman, or emergency stop.",
+        link.jumps,
+        ends=State.TRACK, missed=SHAKEN,
+        held_by=frozenset({"velocity", "acceleration"}),
+    ),
+)  # fmt: skip
+
+SUIT = (
+    Fault(
+        "sensor node lost",
+        "A node of the reaching arm does not answer any more.",
+        Reaction.HOLDS_JOINTS,
+        "Holds the joints that need the node; the others follow.",
+        "Mend the node. Its joints come back slowly by themselves.",
+        body.node_lost,
+        ends=State.TRACK, concerns=body.joints_of_node, strays_deg=1.0, sway_deg=1.0,
+        stands_s=0.1 + 0.08 + BRAKED_S,
+    ),
+    Fault(
+        "CAN bus of the suit off",
+        "The bus between the suit and the master fails.",
+        Reaction.HOLDS_JOINTS,
+        "Holds every joint, and stays engaged: when the bus is back they come back slowly by themselves.",
+        "Mend the bus; disengage first if the robot must not move then.",
+        body.suit_bus_off,
+        ends=State.TRACK, stands_s=0.08 + BRAKED_S,
+    ),
+)  # fmt: skip
+
+ROBOT = (
+    Fault(
+        "CAN bus of the drives off",
+        "No reading comes from the drives, and no setpoint gets to them.",
+        Reaction.HOLDS,
+        "The drives hold their last setpoint, and stop by themselves when they miss the robot's heartbeat.",
+        ENGAGE,
+        body.drive_bus_off,
+        reacts_s=0.11, stands_s=0.11 + BRAKED_S, held_by=frozenset({"encoder"}),
+    ),
+    Fault(
+        "drive fault",
+        "The drive of a moving joint reports over-current and stands still.",
+        Reaction.HOLDS,
+        "Brakes all joints and stands; names the joint and what its drive says.",
+        ENGAGE,
+        body.drive_fault,
+        reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by=frozenset({"drive"}),
+    ),
+    Fault(
+        "encoder silent",
+        "The encoder of a moving joint says that its readings are not valid: magnet lost, wrong parity.",
+        Reaction.HOLDS,
+        "Brakes all joints and stands; names the joint.",
+        ENGAGE,
+        body.encoder_silent,
+        reacts_s=0.11, stands_s=0.11 + BRAKED_S, held_by=frozenset({"encoder"}),
+    ),
+    Fault(
+        "base tilted",
+        "The base leans by more than it may.",
+        Reaction.HOLDS,
+        "Brakes all joints and stands.",
+        ENGAGE,
+        body.base_tilted,
+        reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by=frozenset({"base"}),
+    ),
+)  # fmt: skip
+
+CLOCKS = (
+    Fault(
+        "master's clock an hour ahead",
+        "The clock that stamps the commands is set ahead by an hour.",
+        Reaction.HOLDS,
+        "Takes no command from the future; brakes and stands. It measures the clock anew within a second.",
+        ENGAGE,
+        body.master_clock_ahead,
+        reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S,
+        refused_by=frozenset({"future"}), held_by=frozenset({"future", "clock"}),
+    ),
+    Fault(
+        "master's clock an hour back",
+        "The same clock is set back by an hour.",
+        Reaction.HOLDS,
+        "Takes no command so old; brakes and stands.",
+        ENGAGE,
+        body.master_clock_back,
+        reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S,
+        refused_by=frozenset({"age"}), held_by=frozenset({"age"}),
+    ),
+    Fault(
+        "robot's clock an hour ahead",
+        "The clock by which the robot counts its own time-outs is set ahead by an hour.",
+        Reaction.HOLDS,
+        "Takes everything for an hour late; brakes at once and stands.",
+        ENGAGE,
+        body.slave_clock_ahead,
+        reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S,
+        held_by=frozenset({"command", "lease", "encoder", "age"}),
+    ),
+    Fault(
+        "robot's clock an hour back",
+        "The same clock is set back by an hour.",
+        Reaction.HOLDS,
+        "Sees that its time went back; brakes at once and stands.",
+        ENGAGE,
+        body.slave_clock_back,
+        reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S,
+        held_by=frozenset({"command", "lease", "encoder", "future"}),
+    ),
+)  # fmt: skip
+
+ESTOPS = tuple(
+    Fault(
+        f"emergency stop in {state}",
+        "A visitor asks for an emergency stop; then the operator tries to go on, without the key.",
+        Reaction.STOPS,
+        does,
+        "Make sure that all is well, reset with the key at the robot, then engage.",
+        body.estop,
+        begins=state, ends=State.ESTOP,
+        reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S,
+    )
+    for state, does in {
+        State.BOOT: "Has not begun to move, and will not: nothing is written to the drives.",
+        State.HOLD: "Stands already, and stays.",
+        State.ALIGN: "Brakes and stands.",
+        State.TRACK: "Brakes and stands.",
+        State.ESTOP: "Stands already; the second stop changes nothing.",
+    }.items()
+)  # fmt: skip
+
+FAULTS: tuple[Fault, ...] = (*LINK, *STRANGERS, *VALUES, *SUIT, *ROBOT, *CLOCKS, *ESTOPS)

@@ -1,0 +1,83 @@
+"""Every row of the fault matrix, and that it fails once what holds the fault off is taken away."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import pytest
+
+import slave.guard.limit
+from deploy.faults.fault import Reaction
+from deploy.faults.table import FAULTS
+from deploy.faults.trial import run_trial
+from slave.guard import GATES
+from slave.guard.states import TRANSITIONS, Event
+from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES
+
+TABLE = {fault.name: fault for fault in FAULTS}
+BARED = (
+    "link cut", "packets duplicated", "yesterday's recording replayed", "second operator", "wrong robot",
+    "values that are not numbers", "drive fault", "encoder silent", "base tilted",
+    "master's clock an hour back",
+)  # fmt: skip
+"""Of the rows with a protection to take away; more would say no more, and each takes a second."""
+RULES = {str(rule) for rule, _ in slave.guard.limit.RULES}
+
+
+def without(names: Collection[str]) -> dict[str, Any]:
+    """A guard that lacks some gates and watches."""
+    return {
+        "gates": [gate for gate in GATES if gate.name not in names],
+        "arrival_watches": [watch for watch in ARRIVAL_WATCHES if watch.name not in names],
+        "body_watches": [watch for watch in BODY_WATCHES if watch.name not in names],
+    }
+
+
+def rows() -> list[Any]:
+    """All, those that the table itself says are missed as expected failures."""
+    return [
+        pytest.param(f.name, marks=pytest.mark.xfail(strict=True, reason=f.missed)) if f.missed else f.name
+        for f in FAULTS
+    ]
+
+
+@pytest.mark.parametrize("name", rows())
+def test_the_robot_does_what_the_table_says(name: str) -> None:
+    outcome = run_trial(TABLE[name])
+    assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"
+
+
+@pytest.mark.parametrize("name", BARED)
+def test_the_row_fails_without_its_protection(name: str) -> None:
+    fault = TABLE[name]
+    assert fault.held_by
+    assert run_trial(fault, **without(fault.held_by)).wrong
+
+
+def test_the_rules_of_the_limiter_are_what_bounds_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
+    fault = TABLE["valid but impossible jump"]
+    assert not [word for word in run_trial(fault).wrong if "setpoint" in word]
+    kept = tuple(pair for pair in slave.guard.limit.RULES if str(pair[0]) not in fault.held_by)
+    monkeypatch.setattr(slave.guard.limit, "RULES", kept)
+    assert [word for word in run_trial(fault).wrong if "setpoint" in word]
+
+
+def test_an_emergency_stop_fails_without_its_transition(monkeypatch: pytest.MonkeyPatch) -> None:
+    fault = TABLE["emergency stop in track"]
+    monkeypatch.delitem(TRANSITIONS, (fault.begins, Event.ESTOP))
+    assert run_trial(fault).wrong
+
+
+def test_the_table_names_only_protections_there_are() -> None:
+    known = {part.name for part in (*GATES, *ARRIVAL_WATCHES, *BODY_WATCHES)} | RULES
+    assert set().union(*(fault.held_by for fault in FAULTS)) <= known
+    assert set().union(*(fault.refused_by for fault in FAULTS)) <= known | {"codec"}
+
+
+def test_every_row_that_stands_has_a_bound() -> None:
+    assert len(TABLE) == len(FAULTS), "two rows of one name"
+    for fault in FAULTS:
+        stands = fault.reaction not in (Reaction.GOES_ON, Reaction.LIMITED)
+        assert (fault.stands_s is not None) == stands, fault.name
+        assert stands or fault.strays_deg is not None or fault.reaction is Reaction.LIMITED, fault.name
