@@ -33,6 +33,7 @@ class SimulatedServo:
         """It takes in nothing and gives no answer."""
         self._table = bytearray(_TABLE_BYTES)
         self._heard_ns = 0
+        self._stopped_at = position
         self._moved_ns: int | None = None
         for register, value in (
             (x.MODEL, model), (x.FIRMWARE, firmware), (x.RETURN_DELAY, 250), (x.OPERATING_MODE, 3),
@@ -116,7 +117,8 @@ class SimulatedServo:
         self.put(x.BUS_WATCHDOG, x.WATCHDOG_TRIPPED)
         self.put(x.PROFILE_VELOCITY, 0)
         self.put(x.PROFILE_ACCELERATION, 0)
-        self.put(x.GOAL_POSITION, round(self.position))
+        # the goal from before stays, and counts again once the watchdog is cleared
+        self._stopped_at = self.position
         self.velocity = 0.0
 
     def _move(self, now_ns: int) -> None:
@@ -125,10 +127,13 @@ class SimulatedServo:
             return
         dt_s = (now_ns - before_ns) / 1e9
         # the closed form of x'' = ω² (goal - x) - 2 ω x'
-        error = self.position - self.get(x.GOAL_POSITION)
+        goal = float(self.get(x.GOAL_POSITION))
+        if self.get(x.BUS_WATCHDOG) == x.WATCHDOG_TRIPPED:
+            goal = self._stopped_at
+        error = self.position - goal
         slope = self.velocity + _OMEGA_RAD_S * error
         decay = math.exp(-_OMEGA_RAD_S * dt_s)
-        way = self.get(x.GOAL_POSITION) + (error + slope * dt_s) * decay - self.position
+        way = goal + (error + slope * dt_s) * decay - self.position
         fastest = self.get(x.PROFILE_VELOCITY) * x.RAD_S_PER_UNIT / RAD_PER_COUNT
         most = fastest * dt_s if fastest else math.inf
         self.position += min(max(way, -most), most)
