@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import threading
+from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
@@ -84,6 +85,7 @@ class ThreadReader:
         self._bus, self._loop = bus, loop
         self._told, self._failed = told, failed
         self._stopped = threading.Event()
+        self._waiting: deque[can.Message] = deque()
         self._thread = threading.Thread(target=self._read, name=f"can {bus.channel_info}", daemon=True)
         self._thread.start()
 
@@ -97,22 +99,21 @@ class ThreadReader:
                 self._stopped.wait(_THREAD_WAIT_S)
                 continue
             if message is not None:
-                self._hand_over(self._on_message, message)
+                self._waiting.append(message)
+                self._hand_over(self.read)
 
-    def _hand_over(self, callback: Callable[..., None], value: object) -> None:
+    def _hand_over(self, callback: Callable[..., None], *values: object) -> None:
         with contextlib.suppress(RuntimeError):  # the loop has closed: nobody is left to tell
-            self._loop.call_soon_threadsafe(callback, value)
-
-    def _on_message(self, message: can.Message) -> None:
-        if not self._stopped.is_set():
-            self._told(message)
+            self._loop.call_soon_threadsafe(callback, *values)
 
     def _on_error(self, error: Exception) -> None:
         if not self._stopped.is_set():
             self._failed(error)
 
     def read(self) -> None:
-        """What the thread has read is on its way already."""
+        """Call back for each message that the thread has read."""
+        while self._waiting and not self._stopped.is_set():
+            self._told(self._waiting.popleft())
 
     def stop(self) -> None:
         """Ask the thread to end."""

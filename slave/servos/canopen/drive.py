@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum, auto
 
 from common.clock import NS_PER_MS
@@ -42,10 +42,14 @@ class Drive:
     _may_reset: bool = False
     _asked_ns: int = 0
     _step: int = 0
-    _tries: int = field(default=0)
+    _tries: int = 0
+    _patient: bool = False
 
     def start(self, now_ns: int, may_reset: bool, configure: bool) -> bytes | None:
-        """On the way to RUNNING, whatever was before; the SDO request that comes first, if any."""
+        """On the way to RUNNING, whatever was before; the SDO request that comes first, if any.
+
+        With `configure` all is told anew, and an answer waited for without end: the caller sets it.
+        """
         self.failure, self.emergency, self._may_reset = "", None, may_reset
         self.since_ns = now_ns
         if not configure and self.configured:
@@ -53,6 +57,7 @@ class Drive:
             return None
         self.phase, self.configured = Phase.CONFIGURING, False
         self._step = self._tries = 0
+        self._patient = configure
         return self._ask(now_ns)
 
     def fail(self, why: str, reconfigure: bool = False) -> None:
@@ -84,7 +89,7 @@ class Drive:
         """The request once more, where its answer is overdue; after the last try it has failed."""
         if self.phase is not Phase.CONFIGURING or now_ns - self._asked_ns < SDO_TIMEOUT_NS:
             return None
-        if self._tries >= SDO_TRIES:
+        if self._tries >= SDO_TRIES and not self._patient:
             self.fail("does not answer")
             return None
         return self._ask(now_ns)
@@ -124,7 +129,7 @@ class Drive:
         """What is wrong with it; empty where all is well."""
         said = [self.failure] if self.failure else []
         if self.phase in (Phase.CONFIGURING, Phase.ENABLING):
-            said.append("is being enabled")
+            said.append("does not answer" if self._tries > 1 else "is being enabled")
         if self.emergency is not None:
             said.append(self.emergency.words)
         if self.encoder:

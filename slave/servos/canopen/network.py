@@ -212,12 +212,17 @@ class DriveNetwork:
         return bool(self._running.all())
 
     @property
-    def failed(self) -> dict[str, str]:
-        """Drives that have failed, with node, bus and reason, by joint."""
+    def failed(self) -> bool:
+        """Whether any drive has failed for good."""
+        return any(drive.phase is Phase.FAILED for drive in self._drives)
+
+    @property
+    def not_running(self) -> dict[str, str]:
+        """Drives that do not run, with node, bus and reason, by joint."""
         return {
             name: f"node {node} on bus {bus} {drive.words}"
             for name, (bus, node), drive in zip(self._names, self._where, self._drives, strict=True)
-            if drive.phase is Phase.FAILED
+            if drive.phase is not Phase.RUNNING
         }
 
     def where(self, joint: str) -> tuple[str, int]:

@@ -27,6 +27,8 @@ from slave.servos.canopen.pdo import RPDO1
 from slave.servos.servos import EncoderReading
 
 _POLL_S = 0.0005
+_TOLD = 3
+"""Of more drives than these only the number is told."""
 _EARLY_NS = 2 * NS_PER_MS
 """A setpoint written this long before its SYNC is due goes with it: ticks jitter, SYNC must not skip one."""
 
@@ -144,14 +146,14 @@ class CanopenServos:
                 bus.read()
             if now_ns >= self._due_ns:
                 self._cycle()
-            failed = self._network.failed
-            if failed or now_ns > deadline_ns:
-                raise RobotError(self._not_up(failed))
+            if self._network.failed or now_ns > deadline_ns:
+                raise RobotError(self._not_up())
             time.sleep(_POLL_S)
 
-    def _not_up(self, failed: Mapping[str, str]) -> str:
-        said = failed or self._network.faults
-        listed = "; ".join(f"{joint}: {words}" for joint, words in said.items())
+    def _not_up(self) -> str:
+        said = self._network.not_running
+        told = [f"{joint}: {words}" for joint, words in said.items()]
+        listed = "; ".join(told[:_TOLD]) + (f"; and {len(told) - _TOLD} more" if len(told) > _TOLD else "")
         return (
             f"{len(said)} of {len(self._skeleton.joints)} drives do not start: {listed}; check their power, "
             "node ids and buses in [servos.canopen]; without hardware, start `tandem drives` on the same file"

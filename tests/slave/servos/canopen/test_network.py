@@ -253,7 +253,7 @@ def test_a_drive_that_is_not_there_is_named_with_its_place(wired: Wired) -> None
     wired.start()
     wired.run(1.5)
     bus, node = wired.network.where(ELBOW)
-    assert wired.network.failed == {ELBOW: f"node {node} on bus {bus} does not answer"}
+    assert wired.network.not_running == {ELBOW: f"node {node} on bus {bus} does not answer"}
 
 
 def test_a_setting_that_is_refused_is_told_with_its_object(wired: Wired) -> None:
@@ -261,7 +261,7 @@ def test_a_setting_that_is_refused_is_told_with_its_object(wired: Wired) -> None
     drive._node.add_write_callback(_refuse_limits)
     wired.start()
     wired.run(0.2)
-    said = wired.network.failed["neck_yaw"]
+    said = wired.network.not_running["neck_yaw"]
     assert "refuses its configuration: object 607D:1: value out of range" in said
 
 
