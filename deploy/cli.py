@@ -20,6 +20,7 @@ from deploy.attitude.command import attitude
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.drives import drives
+from deploy.video import video
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -30,6 +31,7 @@ app = typer.Typer(
 )
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(accuracy_app, name="accuracy")
+app.command("video")(video)
 app.command()(drives)
 app.command()(attitude)
 _debug = False
