@@ -33,6 +33,7 @@ def test_it_starts_where_it_stands(rig: Rig) -> None:
         assert servo.get(x.TORQUE) == 1
         assert servo.get(x.RETURN_DELAY) == 0
         assert servo.get(x.BUS_WATCHDOG) == 5
+        assert servo.get(x.PROFILE_VELOCITY) == rig.driver._servos[0].velocity
 
 
 def test_it_goes_where_it_is_told_reversed_or_not(rig: Rig) -> None:
@@ -226,6 +227,8 @@ def test_a_new_slave_does_not_finish_what_a_dead_one_began(rig: Rig) -> None:
     rig.cycles(20)
     assert rig.driver.faults == {}
     assert [servo.position for servo in rig.servos] == pytest.approx(where, abs=0.6)
+    # the stop had lifted the servos' own velocity limit
+    assert all(servo.get(x.PROFILE_VELOCITY) for servo in rig.servos)
 
 
 def test_a_servo_past_the_end_of_its_turn_does_not_go_round(make_rig: Callable[..., Rig]) -> None:
