@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from common.clock import NS_PER_S
-from common.messages import Action
+from common.messages import Action, BaseAttitude
 from common.quaternion import Array
 from deploy.faults.scene import Scene
 from master.suit.simulated.faults import FaultsConfig, Loss
 from slave.guard.body import Body
+from slave.guard.tilt import base_loss
 from slave.servos.servos import EncoderReading
 
 HOUR_NS = 3_600 * NS_PER_S
@@ -93,8 +95,16 @@ def encoder_stuck(scene: Scene) -> None:
 
 
 def base_tilted(scene: Scene) -> None:
-    """The base leans by more than it may."""
-    scene.run.troubles.body = lambda: Body(base="leans 12.0° from the vertical, at most 10.0° is allowed")
+    """The base's sensor shows two degrees more tilt than is allowed."""
+    config = scene.run.slave_config.guard
+    tilt_rad = math.radians(config.max_tilt_deg + 2.0)
+
+    def body() -> Body:
+        now_ns = scene.run.slave_ns
+        attitude = BaseAttitude(now_ns, tilt_rad, azimuth_rad=None, tool_face_rad=None, tilt_rad=tilt_rad)
+        return Body(base=base_loss(attitude, now_ns, config))
+
+    scene.run.troubles.body = body
 
 
 def master_clock_ahead(scene: Scene) -> None:
