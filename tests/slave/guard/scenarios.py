@@ -1,0 +1,427 @@
+"""Short stories of what the guard must do, one for each thing that keeps a robot safe.
+
+Each is named after what it is about and raises AssertionError where the guard lets it happen.
+`test_mutants.py` takes that thing away and asks that its story notices: what is added to the guard without a
+story here fails there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from common.messages import Action, BaseAttitude
+from common.offset import Offset
+from slave.guard import GuardConfig, State, tilt
+from slave.guard.body import Body
+
+MakeRig = Callable[..., Any]
+Scenario = Callable[[MakeRig], None]
+SCENARIOS: dict[str, Scenario] = {}
+KEY = "a key kept at the robot"
+ELBOW = 6
+
+
+def about(*names: str) -> Callable[[Scenario], Scenario]:
+    """Enter a story under the names of what it is about."""
+
+    def enter(scenario: Scenario) -> Scenario:
+        SCENARIOS.update(dict.fromkeys(names, scenario))
+        return scenario
+
+    return enter
+
+
+def refused(**changes: Any) -> Scenario:
+    """A command with something changed is not accepted by a robot that tracks."""
+
+    def scenario(make_rig: MakeRig) -> None:
+        rig = make_rig().to_track()
+        rig.sequence += 1
+        assert not rig.give(rig.command(**{key: make(rig) for key, make in changes.items()})).accepted
+
+    return scenario
+
+
+# gates
+
+about("gate robot")(refused(robot=lambda _: "robot-2"))
+about("gate lease")(refused(lease=lambda rig: rig.lease + 1))
+about("gate valid")(refused(position_rad=lambda rig: np.full(rig.joints, np.nan)))
+about("gate sequence")(refused(sequence=lambda rig: rig.sequence - 1))
+about("gate age", "Situation.age_ns")(refused(sampled_ns=lambda rig: rig.now_ns - 299_000_000))
+about("gate future")(refused(sampled_ns=lambda rig: rig.now_ns + 23_000_000))
+
+
+@about("gate clock")
+def clock(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.offset = Offset(rig.offset.offset_ns, rig.offset.bound_ns, trusted=False)
+    assert not rig.send().accepted
+
+
+@about("gate deadman")
+def deadman(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.send(deadman_held=False)
+    assert rig.guard.state is State.HOLD
+
+
+# watches
+
+
+@about("watch command")
+def silence(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.run(0.3, commands=False)
+    assert rig.guard.state is State.HOLD
+
+
+@about("watch lease")
+def lease_lapses_first(make_rig: MakeRig) -> None:
+    """A command read late is older than the lease that the one before it renewed; then a clock goes back."""
+    rig = make_rig(GuardConfig(command_timeout_s=1.0, lease_timeout_s=1.0)).to_track()
+    rig.send()
+    rig.sequence += 1
+    assert rig.give(rig.command(), rig.now_ns - 80_000_000).accepted
+    rig.step(-1_000_000_001)
+    assert rig.guard.operator == ""
+    assert rig.guard.state is State.HOLD
+
+
+@about("watch encoder", "EncoderLife.silence")
+def encoder_lost(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.encoder_valid[ELBOW] = False
+    rig.run(0.1)
+    assert rig.guard.state is State.HOLD
+
+
+@about("watch plausible", "Plausibility.too_many")
+def many_liars(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.lies = {joint: lambda true: true + 0.2 for joint in range(5)}
+    rig.run(0.3)
+    assert rig.guard.state is State.HOLD
+
+
+@about("watch drive")
+def drive(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.body = Body(drives={"neck_yaw": "hot"})
+    rig.step()
+    assert rig.guard.state is State.HOLD
+
+
+@about("watch base", "tilt.base_loss")
+def base(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    attitude = BaseAttitude(rig.now_ns, 1.0, 1.0, 1.0, math.radians(11.0))
+    rig.body = Body(base=tilt.base_loss(attitude, rig.now_ns, rig.config))
+    rig.step()
+    assert rig.guard.state is State.HOLD
+
+
+# before it moves
+
+
+def not_engaged(prepare: Callable[[Any], None], operator: str = "anna") -> Scenario:
+    def scenario(make_rig: MakeRig) -> None:
+        rig = make_rig()
+        prepare(rig)
+        before = rig.guard.state
+        assert not rig.ask(Action.ENGAGE, operator).done
+        assert rig.guard.state is before
+
+    return scenario
+
+
+def sick(rig: Any) -> None:
+    rig.to_leased().body = Body(base="tilts")
+    rig.run(0.1)
+
+
+def deaf(rig: Any) -> None:
+    rig.to_leased().encoder_valid[ELBOW] = False
+    rig.run(0.1)
+
+
+def braking(rig: Any) -> None:
+    rig.to_track()
+    rig.target = rig.skeleton.lower_rad.copy()
+    rig.run(0.1)
+    rig.ask(Action.DISENGAGE)
+    rig.send()
+
+
+def astray(rig: Any) -> None:
+    rig.to_leased().lies[ELBOW] = lambda true: true + rig.config.engage_window_rad + 1e-6
+    rig.run(0.1)
+
+
+def doubtful(rig: Any) -> None:
+    rig.to_track().lies[ELBOW] = lambda true: true + 0.15
+    rig.run(0.3)
+    rig.ask(Action.DISENGAGE)
+    rig.lies.clear()
+    rig.run(0.1)
+
+
+about("condition _state")(not_engaged(lambda rig: rig.to_track()))
+about("condition _holder", "engage.holder_only")(not_engaged(lambda rig: rig.to_leased(), "ben"))
+about("condition _command")(not_engaged(lambda rig: rig.to_leased().run(0.25, commands=False)))
+about("condition _valid")(
+    not_engaged(lambda rig: rig.to_leased().run(0.1, valid=np.zeros(rig.joints, np.bool_)))
+)
+about("condition _encoder")(not_engaged(deaf))
+about("condition _body")(not_engaged(sick))
+about("condition _rest")(not_engaged(braking))
+about("condition _strayed", "Guard._strayed")(not_engaged(astray))
+about("condition _unsettled", "Plausibility.unsettled")(not_engaged(doubtful))
+
+
+# limits
+
+
+def within_limits(rig: Any, seconds: float) -> None:
+    for _ in range(round(seconds / 0.16)):
+        before = rig.setpoints[-1]
+        for after in rig.run(0.16):
+            v = after.velocity_rad_s
+            assert (np.abs(v) <= rig.skeleton.max_velocity_rad_s + 1e-9).all()
+            gain = rig.skeleton.max_acceleration_rad_s2 * 0.005
+            assert (np.abs(v - before.velocity_rad_s) <= gain + 1e-9).all()
+            assert (after.position_rad >= rig.skeleton.lower_rad).all()
+            assert (after.position_rad <= rig.skeleton.upper_rad).all()
+            before = after
+
+
+@about("rule velocity", "rule acceleration")
+def far_target(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.target = rig.skeleton.lower_rad.copy()
+    within_limits(rig, 0.8)
+
+
+def never_stopped_by_force(rig: Any) -> None:
+    """The setpoint moves by its own speed, also near the limit: it has braked, and is not cut off there."""
+    for i in range(100):
+        if i % 16 == 0:
+            rig.send(velocity_rad_s=rig.skeleton.max_velocity_rad_s.copy())
+        before, after = rig.setpoints[-1], rig.step()
+        moved = after.position_rad - before.position_rad
+        assert np.allclose(moved, after.velocity_rad_s * 0.005, rtol=0.0, atol=1e-9)
+
+
+@about("rule position")
+def target_at_the_limit(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.target = rig.skeleton.upper_rad.copy()
+    never_stopped_by_force(rig)
+
+
+@about("Limits.reachable")
+def target_beyond(make_rig: MakeRig) -> None:
+    """Who reaches beyond what the robot can is aligned where it stands at its limit."""
+    rig = make_rig().to_leased()
+    rig.target[ELBOW] = rig.skeleton.upper_rad[ELBOW] + 0.3
+    rig.engage()
+    rig.run(4.0)
+    assert rig.guard.state is State.TRACK
+
+
+@about("SetpointLimiter.stop")
+def brakes(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.target = rig.skeleton.lower_rad.copy()
+    rig.run(0.1)
+    rig.ask(Action.DISENGAGE)
+    rig.run(0.5, commands=False)
+    assert (rig.setpoints[-1].velocity_rad_s == 0.0).all()
+
+
+@about("Guard._elapsed_s")
+def late_step(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.target = rig.skeleton.lower_rad.copy()
+    rig.run(0.1)
+    before = rig.setpoints[-1].position_rad
+    rig.send()
+    moved = np.abs(rig.step(150_000_000).position_rad - before)
+    assert (moved <= rig.skeleton.max_velocity_rad_s * rig.config.max_step_s + 1e-9).all()
+
+
+@about("guard._finite")
+def broken_tracker(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.tracker.newest = type(rig.tracker.newest)(np.full(rig.joints, np.nan), np.zeros(rig.joints))
+    assert np.isfinite(rig.step().position_rad).all()
+    assert rig.guard.state is State.HOLD
+
+
+# align
+
+
+@about("Alignment.done")
+def slow_first(make_rig: MakeRig) -> None:
+    rig = make_rig().to_leased()
+    rig.target = rig.target + 0.3
+    rig.engage()
+    for setpoint in rig.run(0.3):
+        assert (np.abs(setpoint.velocity_rad_s) <= rig.config.align_velocity_rad_s + 1e-9).all()
+    assert rig.guard.state is State.ALIGN
+
+
+@about("Alignment.overdue")
+def never_there(make_rig: MakeRig) -> None:
+    rig = make_rig(GuardConfig(align_timeout_s=0.5)).to_leased()
+    rig.target = rig.target + 0.6
+    rig.engage()
+    rig.run(0.6)
+    assert rig.guard.state is State.HOLD
+
+
+@about("Rejoin.maxima")
+def slowly_back(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    lost = np.ones(rig.joints, np.bool_)
+    lost[ELBOW] = False
+    rig.target[ELBOW] += 0.5
+    rig.run(0.16, valid=lost)
+    for setpoint in rig.run(0.4):
+        assert abs(setpoint.velocity_rad_s[ELBOW]) <= rig.config.align_velocity_rad_s + 1e-9
+
+
+@about("Guard._believed")
+def lost_joint(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    lost = np.ones(rig.joints, np.bool_)
+    lost[ELBOW] = False
+    held = rig.setpoints[-1].position_rad[ELBOW]
+    rig.target = rig.target + 0.3
+    rig.run(0.4, valid=lost)
+    assert rig.setpoints[-1].position_rad[ELBOW] == held
+
+
+# encoders that lie
+
+
+@about("Plausibility.judge", "Past.span")
+def liar(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.lies[ELBOW] = lambda true: true + 0.15
+    rig.run(0.3)
+    assert list(rig.guard.doubts) == [rig.skeleton.joint_names[ELBOW]]
+    held = rig.setpoints[-1].position_rad[ELBOW]
+    rig.target = rig.target + 0.3
+    rig.run(0.3)
+    assert rig.setpoints[-1].position_rad[ELBOW] == held
+
+
+@about("Plausibility._jumps")
+def jumper(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    turn = iter(range(10**6))
+    rig.lies[ELBOW] = lambda true: true + 0.08 * (next(turn) % 2)
+    rig.run(0.1)
+    assert rig.guard.doubts
+
+
+@about("Plausibility.trust")
+def mended(make_rig: MakeRig) -> None:
+    rig = make_rig()
+    doubtful(rig)
+    rig.run(0.5)
+    rig.engage()
+    assert not rig.guard.doubts
+
+
+# who may
+
+
+@about("Lease.lapse")
+def lapsed(make_rig: MakeRig) -> None:
+    rig = make_rig().to_leased()
+    rig.run(1.1, commands=False)
+    assert rig.send().gate == "lease"
+    assert rig.claim("ben").done
+
+
+@about("Lease.claim")
+def second_operator(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    assert not rig.ask(Action.CLAIM, "ben").done
+    assert rig.guard.operator == "anna"
+
+
+@about("control.holder_only")
+def somebody_else(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    for action in (Action.RELEASE, Action.DISENGAGE):
+        assert not rig.ask(action, "ben").done
+    assert rig.guard.state is State.TRACK
+
+
+@about("Challenges.refusal")
+def late_engage(make_rig: MakeRig) -> None:
+    rig = make_rig().to_leased()
+    challenge = rig.ask(Action.STATUS).challenge
+    rig.run(2.1)
+    assert not rig.ask(Action.ENGAGE, challenge=challenge).done
+
+
+@about("hmac.compare_digest")
+def wrong_key(make_rig: MakeRig) -> None:
+    rig = make_rig().to(State.ESTOP)
+    assert not rig.ask(Action.RESET, key="wrong").done
+
+
+# states
+
+
+@about("(boot, all encoders valid)", "(hold, engage)", "(align, every joint within its window)")
+def from_boot_to_track(make_rig: MakeRig) -> None:
+    make_rig().to_track()
+
+
+def ends_motion(state: State, end: Callable[[Any], None]) -> Scenario:
+    def scenario(make_rig: MakeRig) -> None:
+        rig = make_rig().to(state)
+        end(rig)
+        assert rig.guard.state is State.HOLD
+
+    return scenario
+
+
+for _state in (State.ALIGN, State.TRACK):
+    about(f"({_state}, disengage)")(ends_motion(_state, lambda rig: rig.ask(Action.DISENGAGE)))
+    about(f"({_state}, loss of lease, deadman, command or encoder)")(
+        ends_motion(_state, lambda rig: rig.ask(Action.RELEASE))
+    )
+
+
+def stops(state: State) -> Scenario:
+    def scenario(make_rig: MakeRig) -> None:
+        rig = make_rig().to(state)
+        assert rig.ask(Action.ESTOP, "").done
+        assert rig.guard.state is State.ESTOP
+        for _ in range(20):
+            rig.step()
+        assert rig.guard.state is State.ESTOP
+        assert not rig.ask(Action.ENGAGE).done
+
+    return scenario
+
+
+for _state in State:
+    about(f"({_state}, e-stop)")(stops(_state))
+
+
+@about("(estop, reset)")
+def reset(make_rig: MakeRig) -> None:
+    rig = make_rig().to(State.ESTOP)
+    assert rig.ask(Action.RESET, key=KEY).done
+    assert rig.guard.state is State.HOLD

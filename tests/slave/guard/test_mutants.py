@@ -1,0 +1,176 @@
+"""Take one protection away, and a story must notice: each gate, watch, condition, limit, transition and more.
+
+The lists are read from the guard itself. A gate, watch, condition, rule or transition that is added without a
+story in `scenarios.py` survives here, and that fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from slave.guard import (
+    admit,
+    align,
+    challenge,
+    control,
+    engage,
+    guard,
+    lease,
+    limit,
+    plausible,
+    states,
+    tilt,
+    watchdog,
+)
+
+from .scenarios import SCENARIOS
+
+Patch = Callable[[pytest.MonkeyPatch], dict[str, Any]]
+"""Takes the protection away; returns what to give to the guard instead of its defaults."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    name: str
+    patch: Patch
+
+
+def without(sequence: tuple[Any, ...], one: Any) -> tuple[Any, ...]:
+    return tuple(item for item in sequence if item is not one)
+
+
+def listed() -> Iterator[Mutant]:
+    """What stands in the guard's own lists."""
+    for gate in admit.GATES:
+        yield Mutant(f"gate {gate.name}", lambda _, g=gate: {"gates": without(admit.GATES, g)})
+    for option, watches in (
+        ("arrival_watches", watchdog.ARRIVAL_WATCHES),
+        ("body_watches", watchdog.BODY_WATCHES),
+    ):
+        for watch in watches:
+            yield Mutant(
+                f"watch {watch.name}", lambda _, o=option, all_=watches, w=watch: {o: without(all_, w)}
+            )
+    for condition in engage.CONDITIONS:
+        yield Mutant(
+            f"condition {condition.__name__}",
+            lambda m, c=condition: replaced(m, engage, "CONDITIONS", without(engage.CONDITIONS, c)),
+        )
+    for rule in limit.RULES:
+        yield Mutant(
+            f"rule {rule[0]}", lambda m, r=rule: replaced(m, limit, "RULES", without(limit.RULES, r))
+        )
+    for (before, event), after in states.TRANSITIONS.items():
+        if before is not after:  # an e-stop in e-stop changes nothing, listed or not
+            yield Mutant(f"({before}, {event})", lambda m, key=(before, event): less(m, key))
+
+
+def replaced(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, by: Any) -> dict[str, Any]:
+    monkeypatch.setattr(owner, name, by)
+    return {}
+
+
+def less(monkeypatch: pytest.MonkeyPatch, key: Any) -> dict[str, Any]:
+    monkeypatch.delitem(states.TRANSITIONS, key)
+    return {}
+
+
+def nothing(*_: Any, **__: Any) -> None:
+    """Nothing is amiss."""
+
+
+def free_for_all(self: lease.Lease, operator: str, now_ns: int) -> int:
+    self.operator, self.token = operator, 5000 + len(operator)
+    return self.token
+
+
+def unbounded_s(self: guard.Guard, now_ns: int) -> float:
+    before_ns, self._stepped_ns = self._stepped_ns, now_ns
+    return 0.0 if before_ns is None else (now_ns - before_ns) * 1e-9
+
+
+PARTS: tuple[tuple[Any, str, Any], ...] = (
+    (admit.Situation, "age_ns", lambda *_: 0),
+    (watchdog.EncoderLife, "silence", nothing),
+    (tilt, "base_loss", nothing),
+    (engage, "holder_only", nothing),
+    (control, "holder_only", nothing),
+    (control.hmac, "compare_digest", lambda *_: True),
+    (challenge.Challenges, "refusal", nothing),
+    (lease.Lease, "lapse", lambda *_: False),
+    (lease.Lease, "claim", free_for_all),
+    (limit.SetpointLimiter, "stop", nothing),
+    (limit.Limits, "reachable", lambda _, position_rad: position_rad),
+    (align.Alignment, "done", lambda *_: True),
+    (align.Alignment, "overdue", nothing),
+    (
+        align.Rejoin,
+        "maxima",
+        lambda self, *_: (self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2),
+    ),
+    (plausible.Plausibility, "judge", lambda *_: []),
+    (plausible.Plausibility, "_jumps", lambda self, *_: np.zeros(len(self._names), np.bool_)),
+    (plausible.Plausibility, "too_many", nothing),
+    (plausible.Plausibility, "unsettled", nothing),
+    (plausible.Plausibility, "trust", nothing),
+    (plausible.Past, "span", lambda self, _: (self._low.min(0) - 9.0, self._high.max(0) + 9.0)),
+    (guard.Guard, "_strayed", nothing),
+    (guard.Guard, "_elapsed_s", unbounded_s),
+    (guard.Guard, "_believed", lambda self: np.ones_like(self._valid)),
+    (guard, "_finite", lambda _: True),
+)
+"""What stands in no list: owner, its attribute, and what it does once it is taken away."""
+
+
+def parts() -> Iterator[Mutant]:
+    for owner, name, by in PARTS:
+        yield Mutant(
+            f"{owner.__name__.rpartition('.')[2]}.{name}",
+            lambda m, o=owner, n=name, b=by: replaced(m, o, n, b),
+        )
+
+
+MUTANTS = [*listed(), *parts()]
+
+
+def notices(mutant: Mutant, make_rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> str | None:
+    """The first story that fails on it; the one named after it is told first."""
+    options = mutant.patch(monkeypatch)
+
+    def make(config: Any = None) -> Any:
+        return make_rig(config, **options)
+
+    for name in sorted(SCENARIOS, key=lambda name: name != mutant.name):
+        try:
+            with np.errstate(all="ignore"):
+                SCENARIOS[name](make)
+        except Exception:
+            return name
+    return None
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+def test_a_guard_that_lacks_it_is_noticed(
+    mutant: Mutant, make_rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noticed = notices(mutant, make_rig, monkeypatch)
+    assert noticed is not None, f"no story in scenarios.py notices that the guard lacks: {mutant.name}"
+    assert noticed == mutant.name, "the story named after it should be the one"
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_guard_as_it_is_passes_every_story(name: str, make_rig: Callable[..., Any]) -> None:
+    SCENARIOS[name](make_rig)
+
+
+def test_a_new_gate_without_a_story_would_survive(
+    make_rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gates = (*admit.GATES, admit.Gate("new", "it is new", lambda *_: None))
+    useless = Mutant("gate new", lambda _: {"gates": without(gates, gates[-1])})
+    assert notices(useless, make_rig, monkeypatch) is None
