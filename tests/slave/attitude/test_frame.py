@@ -56,6 +56,11 @@ def test_rounding_costs_half_a_tenth(
             assert abs((radians(now) - was + math.pi) % math.tau - math.pi) <= half
 
 
+def test_a_turn_that_rounds_up_is_none() -> None:
+    nearly = math.radians(359.96)
+    assert of_angles(0.0, nearly, nearly) == FrameAngles(0, 0, 0)
+
+
 @pytest.mark.parametrize(
     "frame",
     [
