@@ -88,6 +88,11 @@ class Child:
             self._process.kill()
             await self._process.wait()
 
+    def send(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        if self._process is not None and self._process.returncode is None:
+            self._process.send_signal(number)
+
     async def stop(self, by: signal.Signals = signal.SIGTERM) -> int | None:
         """Ask it to stop, kill it if it does not, and return its exit status."""
         process = self._process

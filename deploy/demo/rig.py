@@ -62,6 +62,11 @@ class Rig:
         others = [*ROLES[1:], *([DRIVES] if DRIVES in overrides else [])]
         self.children = {child.name: child for child in (*children, *(Child(r, folder) for r in others))}
 
+    @property
+    def can_port(self) -> int:
+        """Of this run's CAN buses."""
+        return self._endpoints.can_port
+
     async def start(self, name: str) -> None:
         """Start one process on the profile's example file, moved to this run's endpoints."""
         role = self.children[name].role
