@@ -86,10 +86,7 @@ class _Seen:
         frame, counted = self.watch.frame, self.watch.figures()
         if frame is None:
             return "no picture yet"
-        rates = (
-            f"{counted['received'] / self.elapsed_s:.1f} Hz, {self._bytes / self.elapsed_s / 1000:.1f} kB/s"
-        )
+        rate_hz, kb_s = counted["received"] / self.elapsed_s, self._bytes / self.elapsed_s / 1000
+        newest = f"picture {frame.number}: {frame.width}×{frame.height}, {len(frame.jpeg)} bytes"
         wrong = f"{counted['late']} late, {counted['undecodable']} broken"
-        return (
-            f"picture {frame.number}: {frame.width}×{frame.height}, {len(frame.jpeg)} bytes; {rates}; {wrong}"
-        )
+        return f"{newest}; {rate_hz:.1f} Hz, {kb_s:.1f} kB/s; {wrong}"
