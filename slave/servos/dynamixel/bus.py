@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,6 +57,16 @@ class Bus:
     def close(self) -> None:
         """Safe to call twice."""
         self._port.close()
+
+    @contextlib.contextmanager
+    def patient(self, reply_timeout_s: float) -> Iterator[None]:
+        """Wait at least so long for each answer."""
+        before_s = self._port.reply_timeout_s
+        self._port.reply_timeout_s = max(before_s, reply_timeout_s)
+        try:
+            yield
+        finally:
+            self._port.reply_timeout_s = before_s
 
     def ping(self, servo: int) -> int:
         """The model number of a servo. Raises ServoError."""

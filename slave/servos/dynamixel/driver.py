@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from common.clock import Clock, to_ns
+from common.clock import Clock, to_ns, to_s
 from common.errors import RobotError
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT, Counts, EncoderConfig, Encoders
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
-from slave.servos.dynamixel.config import DynamixelConfig
+from slave.servos.dynamixel.config import WATCHDOG_UNIT_S, DynamixelConfig
 from slave.servos.dynamixel.port import Port, PortLostError
 from slave.servos.dynamixel.settings import Settings, settings_of
 from slave.servos.dynamixel.startup import arm, prepare
@@ -24,6 +24,8 @@ log = logging.getLogger("tandem.slave.dynamixel")
 
 _FIRST_PAUSE_NS = to_ns(0.1)
 _LONGEST_PAUSE_NS = to_ns(2.0)
+_START_PATIENCE_S = 0.05
+"""Waited for an answer while servos are made ready: nothing hurries then, a busy host is no reason to fail."""
 _TAKE_IN = "it holds until an e-stop has been reset"
 
 
@@ -52,7 +54,7 @@ class Driver:
         self._joint_of = {servo.id: j for j, servo in enumerate(self._servos)}
         count = len(self._servos)
         self._rejoin_counts = max(1, round(config.rejoin_velocity_rad_s / RAD_PER_COUNT / config.rate_hz))
-        self._watchdog_ns = to_ns(self._servos[0].watchdog * 0.02)
+        self._watchdog_ns = to_ns(self._servos[0].watchdog * WATCHDOG_UNIT_S)
         self._bus: Bus | None = None
         self._broken_before = 0
         self._pause_ns = _FIRST_PAUSE_NS
@@ -83,7 +85,7 @@ class Driver:
         """Open the port and make all servos ready. Raises RobotError naming what cannot be used."""
         try:
             self._open()
-            wrong = self._prepare(self._servos)
+            wrong = self._prepare(self._servos, _START_PATIENCE_S)
         except PortLostError:
             self._drop()
             raise
@@ -118,7 +120,11 @@ class Driver:
         if self._bus is None:
             return
         try:
-            self._prepare([servo for servo in self._servos if servo.joint in self._faults])
+            # a servo that is silent is asked, waited for, and waited for again: the others must not be kept
+            # waiting by it for so long that they stop
+            patience_s = to_s(self._watchdog_ns) / 4.0
+            faulty = [servo for servo in self._servos if servo.joint in self._faults]
+            self._prepare(faulty, min(patience_s, _START_PATIENCE_S))
         except PortLostError as error:
             self._lose(error)
         self._publish()
@@ -177,13 +183,17 @@ class Driver:
 
     # the servos
 
-    def _prepare(self, servos: list[Settings]) -> list[tuple[Settings, str]]:
+    def _prepare(self, servos: list[Settings], patience_s: float) -> list[tuple[Settings, str]]:
         assert self._bus is not None
+        with self._bus.patient(patience_s):
+            return self._prepare_on(self._bus, servos)
+
+    def _prepare_on(self, bus: Bus, servos: list[Settings]) -> list[tuple[Settings, str]]:
         wrong = []
         for servo in servos:
             j = self._joint_of[servo.id]
             try:
-                self._goal[j] = self._stands[j] = prepare(self._bus, servo)
+                self._goal[j] = self._stands[j] = prepare(bus, servo)
             except ServoError as error:
                 wrong.append((servo, str(error)))
                 self._faults[servo.joint] = str(error)
@@ -193,7 +203,7 @@ class Driver:
             if servo.id in failed:
                 continue
             try:
-                arm(self._bus, servo)
+                arm(bus, servo)
                 self._faults.pop(servo.joint, None)
                 self._misses[self._joint_of[servo.id]] = 0
             except ServoError as error:

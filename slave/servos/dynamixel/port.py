@@ -32,7 +32,8 @@ class Port:
         """Raises PortLostError naming the device."""
         self.is_using = False  # the packet handler's own mark
         self._device = device
-        self._reply_timeout_s = reply_timeout_s
+        self.reply_timeout_s = reply_timeout_s
+        """Waited for an answer beyond its time on the wire."""
         self._byte_s = _BITS_PER_BYTE / baud
         self._deadline_s = 0.0
         self._received = b""
@@ -72,7 +73,7 @@ class Port:
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
         """So many bytes are expected from now on."""
-        self._deadline_s = time.monotonic() + self._reply_timeout_s + packet_length * self._byte_s
+        self._deadline_s = time.monotonic() + self.reply_timeout_s + packet_length * self._byte_s
 
     def isPacketTimeout(self) -> bool:  # noqa: N802
         """Whether they should have come by now."""

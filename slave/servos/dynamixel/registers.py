@@ -47,6 +47,10 @@ GOAL_POSITION = Register(116, 4, signed=True)
 PRESENT_POSITION = Register(132, 4, signed=True)
 HEALTH = Register(64, 35)
 """One stretch with TORQUE, HARDWARE_ERROR and BUS_WATCHDOG."""
+PLACE = Register(97, 39)
+"""A stretch that ends with PRESENT_POSITION. It is longer than any other that is read: an answer tells its
+length but not its address, so that a late answer to another read can never be taken for where a servo stands.
+"""
 
 POSITION_MODE = 3
 ANSWER_ALL = 2
@@ -94,6 +98,11 @@ def health_words(stretch: bytes) -> str:
     if value(BUS_WATCHDOG) == WATCHDOG_TRIPPED:
         return "stopped by itself: nothing came over the bus in time"
     return "" if value(TORQUE) else "its torque is off, as after a loss of power"
+
+
+def position_at_end(stretch: bytes) -> int:
+    """PRESENT_POSITION of PLACE's bytes."""
+    return PRESENT_POSITION.decode(stretch[-PRESENT_POSITION.size :])
 
 
 def profile_velocity(velocity_rad_s: Array | float) -> int:

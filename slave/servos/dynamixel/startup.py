@@ -24,12 +24,12 @@ def prepare(bus: Bus, servo: Settings) -> int:
     if bus.read(servo.id, x.BUS_WATCHDOG):
         bus.write(servo.id, x.BUS_WATCHDOG, 0)
     holding = bool(bus.read(servo.id, x.TORQUE))
-    stands = bus.read(servo.id, x.PRESENT_POSITION)
+    stands = x.position_at_end(bus.read_bytes(servo.id, x.PLACE))
     if holding:
         _set_goal(bus, servo, stands)
     _set_lasting(bus, servo, holding)
     # read again: the settings decide how a position is told
-    stands = bus.read(servo.id, x.PRESENT_POSITION)
+    stands = x.position_at_end(bus.read_bytes(servo.id, x.PLACE))
     _check_place(servo, stands)
     if not holding:
         # with the torque on first some servos take the goal that was left from before

@@ -59,7 +59,7 @@ class Rig:
     def impatient(self) -> None:
         """Wait less for servos that are going to be silent on purpose."""
         assert self.driver._bus is not None
-        self.driver._bus._port._reply_timeout_s = 0.1
+        self.driver._bus._port.reply_timeout_s = 0.1
 
 
 @pytest.fixture

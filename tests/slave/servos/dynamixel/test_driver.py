@@ -308,7 +308,7 @@ def test_an_answer_that_comes_late_is_never_taken_for_anothers(make_rig: Callabl
     rig.driver._servos = rig.driver._servos[:1]
     try:
         assert rig.driver._open() is not None
-        assert rig.driver._prepare(rig.driver._servos) == []
+        assert rig.driver._prepare(rig.driver._servos, 0.1) == []
     finally:
         rig.driver.close()
     assert rig.servos[0].get(x.RETURN_DELAY) == 0

@@ -75,8 +75,15 @@ def test_the_newest_setpoint_arrives_and_the_newest_reading_is_there(patient: Ri
         until(lambda: bool(np.abs(rig.encoders.position_rad(servos.read().counts) - 0.5).max() <= COUNT_RAD))
         assert servos.read().read_ns > first.read_ns
         servos.quick_stop(True)
+        servos.write(np.full(len(rig.names), 0.1))
+        with rig.port.lock:
+            rig.servos[4].power_cycle()
+        # within a round of all servos' healths; so long they have held
+        until(lambda: rig.names[4] in servos.faults())
+        assert np.abs(rig.encoders.position_rad(servos.read().counts) - 0.5).max() <= COUNT_RAD
         servos.quick_stop(False)
-        assert servos.faults() == {}
+        until(lambda: not servos.faults())
+        until(lambda: bool(np.abs(rig.encoders.position_rad(servos.read().counts) - 0.1).max() <= COUNT_RAD))
     finally:
         servos.stop()
         servos.stop()
