@@ -25,7 +25,7 @@ log = logging.getLogger("tandem.slave.dynamixel")
 _FIRST_PAUSE_NS = to_ns(0.1)
 _LONGEST_PAUSE_NS = to_ns(2.0)
 _START_PATIENCE_S = 0.05
-"""Waited for an answer while servos are made ready: nothing hurries then, a busy host is no reason to fail."""
+"""Waited for an answer while servos are made ready: nothing hurries then, and hosts may be busy."""
 _TAKE_IN = "it holds until an e-stop has been reset"
 
 
