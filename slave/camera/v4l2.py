@@ -16,24 +16,18 @@ WAIT_S = 1.0
 
 
 class V4l2Camera:
-    """Keeps the newest picture of a device. `open_device` is linuxpy's, or a stand-in."""
+    """Keeps the newest picture of a device. `open_capture` stands in for linuxpy in tests."""
 
     def __init__(
-        self, device: str, width: int, height: int, open_device: Callable[[str], Any] | None = None
+        self, device: str, width: int, height: int, open_capture: Callable[[str], Any] | None = None
     ) -> None:
         """Raises RobotError where there is no such camera, or it gives no MJPG."""
-        if open_device is None:
-            try:
-                from linuxpy.video.device import Device
-            except ImportError:
-                raise RobotError("a V4L2 camera needs linuxpy: pip install 'tandem[v4l2]'") from None
-            open_device = Device
         try:
-            self._device = open_device(device)
-            self._device.open()
-            self._capture = _capture(self._device)
+            self._capture = (open_capture or _open_capture)(device)
             self._capture.set_format(width, height, "MJPG")
             self._capture.open()
+        except ImportError:
+            raise RobotError("a V4L2 camera needs linuxpy: pip install 'tandem[v4l2]'") from None
         except Exception as error:  # OSError and what linuxpy makes of it
             raise RobotError(f"{device} gives no MJPG pictures: {error}") from None
         self._fresh = threading.Condition()
@@ -70,7 +64,9 @@ class V4l2Camera:
             self._fresh.notify()
 
 
-def _capture(device: Any) -> Any:
-    from linuxpy.video.device import VideoCapture
+def _open_capture(path: str) -> Any:
+    from linuxpy.video.device import Device, VideoCapture
 
+    device = Device(path)
+    device.open()
     return VideoCapture(device)
