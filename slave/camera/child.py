@@ -27,10 +27,13 @@ def main(setting: str) -> None:
     os.dup2(2, 1)
     requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests,), name="requests", daemon=True).start()
+    checked = CameraConfig.model_validate_json(config)
     try:
-        make = open_camera(profile, CameraConfig.model_validate_json(config))
+        make = open_camera(profile, checked)
     except RobotError as error:
-        _write(answers, Reply(Answer.NEVER, body=str(error).encode()))
+        # a camera may be plugged in again; a machine that cannot draw will not learn to
+        answer = Answer.NEVER if checked.source == "robot" else Answer.TROUBLE
+        _write(answers, Reply(answer, body=str(error).encode()))
         os._exit(0)  # a half-built OpenGL context makes trouble when it is taken down
     _write(answers, Reply(Answer.READY))
     while True:
