@@ -76,9 +76,9 @@ def stillness(course: Course, skeleton: Skeleton, concerned: Mask, still_rad: fl
 
 
 def speeds(at_s: Array, position_rad: Array) -> Array:
-    """Mean speed over the last `WINDOW_S` (T, J); 0 before there is a whole window."""
-    before = np.searchsorted(at_s, at_s - WINDOW_S - 1e-6)
-    whole = at_s - WINDOW_S >= at_s[0] - 1e-6
+    """Mean speed over the last `WINDOW_S`, or where rows are sparse a little more, (T, J); 0 before that."""
+    before = np.searchsorted(at_s, at_s - WINDOW_S + 1e-6, side="right") - 1
+    whole = before >= 0
     elapsed = np.where(whole, at_s - at_s[before], 1.0)
     out: Array = np.where(whole[:, None], np.abs(position_rad - position_rad[before]), 0.0) / elapsed[:, None]
     return out
