@@ -16,11 +16,16 @@ from deploy.accuracy.broad import Errors, errors, score, with_heading_of
 from deploy.accuracy.online import Run, run_online
 from deploy.accuracy.picture import Panel
 from deploy.accuracy.recording import Trial, load_trial
-from master.fuse.filter import FilterName
+from deploy.accuracy.spread import Tell, jobs_here, run_each
+from master.fuse.filter import FilterName, OrientationFilter
 from master.fuse.filters import makers
 
 FILTERS: tuple[str, ...] = get_args(FilterName)
 _PARTS = ("total", "heading", "inclination")
+_LITTLE = 30_000
+"""Samples × filters: below it starting processes takes longer than the work."""
+_TIMED = 2000
+"""Samples by which the cost of one is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,25 +38,51 @@ class Judged:
     """One a recording."""
 
 
-def judge(paths: Sequence[Path], filters: Sequence[str], console: Console) -> Judged:
-    """Read all recordings, then run each filter online over each. Raises TandemError for a bad recording."""
-    trials = [load_trial(path) for path in paths]
+def judge(paths: Sequence[Path], filters: Sequence[str], console: Console, jobs: int | None = None) -> Judged:
+    """Read all recordings, then run each filter online over each, in `jobs` processes at once.
+
+    `jobs` None: one a core, unless there is little to do. Raises TandemError for a bad recording.
+    """
+    trials = {path: load_trial(path) for path in paths}
+    samples = sum(len(trial.movement) for trial in trials.values()) * len(filters)
+    if jobs is None:
+        jobs = 1 if samples < _LITTLE else jobs_here()
+    # the slowest, as a rule the last, first: no core is left idle at the end
+    work = [(path, name) for name in reversed(filters) for path in trials]
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     tree: dict[str, Any] = {"files": {}}
     panels = []
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("", total=sum(len(trial.movement) for trial in trials) * len(filters))
-        for trial, path in zip(trials, paths, strict=True):
+        task = progress.add_task("samples", total=samples)
+        found = dict(run_each(_run, work, jobs, lambda count: progress.advance(task, count)))
+        timing = progress.add_task("µs a sample", total=len(work))
+        for path, trial in trials.items():
             runs = {}
             for name in filters:
-                progress.update(task, description=f"{trial.name}, {name}")
-                filter_ = makers(trial.rate_hz)[name](1)
-                runs[name] = run_online(trial, filter_, lambda count: progress.advance(task, count))
+                # others at work on this machine would count: timed again, alone
+                us = run_online(trial.beginning(_TIMED), _filter(trial, name), _unheard).us_per_sample
+                runs[name] = Run(found[path, name], us)
+                progress.advance(timing)
             figures, panel = of_trial(trial, runs)
             tree["files"][str(path)] = figures
             panels.append(panel)
     tree["mean"] = mean_over(tree["files"].values())
     return Judged(tree, panels)
+
+
+def _run(work: tuple[Path, str], tell: Tell) -> Array:
+    """Orientations (T, 4) of one recording by one filter."""
+    path, name = work
+    trial = load_trial(path)
+    return run_online(trial, _filter(trial, name), tell).q_world_from_sensor
+
+
+def _filter(trial: Trial, name: str) -> OrientationFilter:
+    return makers(trial.rate_hz)[name](1)
+
+
+def _unheard(_: int) -> None:
+    """Nobody waits for so little."""
 
 
 def of_trial(trial: Trial, runs: dict[str, Run]) -> tuple[dict[str, Any], Panel]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +43,20 @@ class Trial:
         """(T,)."""
         out: Mask = np.isnan(self.gyr_rad_s.sum(axis=1) + self.acc_m_s2.sum(axis=1))
         return out
+
+    def beginning(self, samples: int) -> Trial:
+        """As much of it, from its first sample on, as holds that many samples."""
+        kept = np.flatnonzero(~self.dropped)[:samples]
+        rows = slice(int(kept[0]), int(kept[-1]) + 1)
+        truth = self.q_world_from_sensor
+        return replace(
+            self,
+            gyr_rad_s=self.gyr_rad_s[rows],
+            acc_m_s2=self.acc_m_s2[rows],
+            mag_ut=self.mag_ut[rows],
+            q_world_from_sensor=None if truth is None else truth[rows],
+            movement=self.movement[rows],
+        )
 
     @property
     def has_magnetometer(self) -> bool:

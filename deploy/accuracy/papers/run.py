@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 
 from deploy.accuracy.papers.figures import Experiment, Figure
-
-MOST_JOBS = 4
-"""A run holds some 150 MB."""
+from deploy.accuracy.spread import Tell, jobs_here, run_each
 
 Done = tuple[Experiment, int, list[Figure]]
 
@@ -19,18 +14,11 @@ def run_all(
     experiments: Sequence[Experiment], seeds: Sequence[int], jobs: int | None = None
 ) -> Iterator[Done]:
     """Every experiment with every seed, as they finish. `jobs` None: one a core; 1: in this process."""
-    jobs = jobs or min(os.cpu_count() or 1, MOST_JOBS)
     work = [(experiment, seed) for experiment in experiments for seed in seeds]
-    if jobs == 1 or len(work) == 1:
-        for experiment, seed in work:
-            yield experiment, seed, experiment.run(seed)
-        return
-    # spawn: a fork would copy this process's threads' locks
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = {pool.submit(experiment.run, seed): (experiment, seed) for experiment, seed in work}
-        try:
-            for future in as_completed(futures):
-                experiment, seed = futures[future]
-                yield experiment, seed, future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    for (experiment, seed), figures in run_each(_run, work, jobs or jobs_here()):
+        yield experiment, seed, figures
+
+
+def _run(work: tuple[Experiment, int], _: Tell) -> list[Figure]:
+    experiment, seed = work
+    return experiment.run(seed)

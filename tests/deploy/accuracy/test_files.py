@@ -192,6 +192,24 @@ def test_the_command_tells_writes_and_draws(tmp_path: Path) -> None:
     assert (tmp_path / "scores.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_processes_change_no_figure(tmp_path: Path) -> None:
+    path = saved(tmp_path)
+    trees = []
+    for jobs in ("1", "2"):
+        report = tmp_path / f"{jobs}.json"
+        run_command(str(path), str(path), "--jobs", jobs, "--report", str(report))
+        trees.append(json.loads(report.read_text("utf-8")))
+        for figures in trees[-1]["files"][str(path)]["filters"].values():
+            assert figures.pop("us_per_sample")["count"] == TICKS
+    assert trees[0] == trees[1]
+
+
+def test_the_beginning_holds_so_many_samples(tmp_path: Path) -> None:
+    late = load_trial(saved(tmp_path, gyr=holed(trial()["gyr"], slice(0, 30))))
+    assert np.array_equal(late.beginning(10).gyr_rad_s, late.gyr_rad_s[30:40])
+    assert len(late.beginning(10_000).movement) == TICKS - 30
+
+
 def test_one_filter_alone_and_a_picture_by_its_own_name(tmp_path: Path) -> None:
     picture = tmp_path / "errors.png"
     said = run_command("--filter", "mahony", str(saved(tmp_path)), "--plot", str(picture))

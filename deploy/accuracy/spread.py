@@ -1,0 +1,92 @@
+"""Work spread over processes that end with this one, however it ends."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from multiprocessing.connection import wait as wait_for
+from typing import Any, TypeVar
+
+MOST_JOBS = 4
+"""A process holds some 150 MB."""
+_HEAR_S = 0.2
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Tell = Callable[[int], object]
+"""Takes how much was done since it was told last."""
+
+
+def jobs_here() -> int:
+    """One process a core, but not too many."""
+    return min(os.cpu_count() or 1, MOST_JOBS)
+
+
+def run_each(
+    call: Callable[[Item, Tell], Result],
+    items: Sequence[Item],
+    jobs: int,
+    told: Tell = lambda _: None,
+) -> Iterator[tuple[Item, Result]]:
+    """`call(item, tell)` of every item, as they finish; what it tells reaches `told` in this process.
+
+    One job works in this process; of more, `call`, items and results travel between processes. The first
+    error of a call ends all of it and passes through.
+    """
+    if jobs == 1 or len(items) <= 1:
+        for item in items:
+            yield item, call(item, told)
+        return
+    others = set(multiprocessing.active_children())
+    # spawn: a fork would copy this process's threads' locks
+    context = multiprocessing.get_context("spawn")
+    counter = context.Value("q", 0)
+    pool = ProcessPoolExecutor(min(jobs, len(items)), context, _begin, (counter,))
+    try:
+        open_ = {pool.submit(_call, call, item): item for item in items}
+        heard = 0
+        while open_:
+            done, _ = wait(open_, _HEAR_S, FIRST_COMPLETED)
+            now = counter.value
+            told(now - heard)
+            heard = now
+            for future in done:
+                yield open_.pop(future), future.result()
+    except BaseException:  # Ctrl-C too: nobody wants to wait for what runs
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in set(multiprocessing.active_children()) - others:
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown()
+
+
+_counter: Any = None
+
+
+def _begin(counter: Any) -> None:
+    """In a new process: Ctrl-C is for the first one to handle, and without that one there is no work."""
+    global _counter
+    _counter = counter
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        wait_for([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent-watch", daemon=True).start()
+
+
+def _call(call: Callable[[Item, Tell], Result], item: Item) -> Result:
+    return call(item, _tell)
+
+
+def _tell(count: int) -> None:
+    with _counter.get_lock():
+        _counter.value += count
