@@ -1,0 +1,78 @@
+"""What a run of several robots says of each, and when it counts as failed."""
+
+from __future__ import annotations
+
+import io
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+from rich.console import Console
+
+from common.messages import RobotState
+from deploy.demo.many_report import ManyReport, make_many_report, many_table
+from deploy.demo.rig import Rig, robot_name, slave_name
+from deploy.demo.run import DemoOptions
+from deploy.judge import Trace
+
+JOINTS = ("left_elbow_pitch",)
+ROBOTS = 8
+COUNTED: dict[str, Any] = {
+    "ticks": {"expected": 4000, "missed": 3},
+    "guard": {"received": 150, "accepted": 140, "dropped": {"lease": 10}},
+    "one_way_ms": {"p99": 1.25},
+    "end_to_end_ms": {"p99": 30.5},
+}
+
+
+def state(guard: str) -> RobotState:
+    zeros, valid = np.zeros(1), np.ones(1, np.bool_)
+    return RobotState("r", 1, 1, 1, guard, "", "nurse-1", valid, zeros, zeros, None, 0, 1)
+
+
+def report(lost_by: int = 0, ended: dict[str, int] | None = None) -> ManyReport:
+    """Of a run in which one robot was in `track` for half of the time only."""
+
+    def child(counted: dict[str, Any]) -> SimpleNamespace:
+        return SimpleNamespace(figures=lambda: counted, cpu_percent=12.34, rss_mb=98.76)
+
+    def observer(number: int) -> SimpleNamespace:
+        guards = ["track"] * 100 if number != lost_by else ["track", "hold"] * 50
+        return SimpleNamespace(trace=Trace(JOINTS), states=[state(guard) for guard in guards])
+
+    numbers = range(1, ROBOTS + 1)
+    slaves = [slave_name(n) for n in numbers]
+    observers = {robot_name(n): observer(n) for n in numbers}
+    children = {name: child(COUNTED) for name in slaves} | {"master": child({"ticks": {"missed": 0}})}
+    rig = SimpleNamespace(
+        slaves=slaves, observers=observers, observer=observers["robot-1"], children=children
+    )
+    statuses = dict.fromkeys(children, 0) | (ended or {})
+    return make_many_report(DemoOptions(), cast(Rig, rig), statuses)
+
+
+def test_each_robot_has_its_own_figures() -> None:
+    made = report()
+    assert made.problems == []
+    assert list(made.tree["robots"]) == [f"robot-{i}" for i in range(1, 9)]
+    assert made.tree["robots"]["robot-8"]["accepted"] == 140
+    assert made.tree["robots"]["robot-8"]["in_track"] == 1.0
+    assert made.tree["cpu_percent"]["slave-8"] == 12.3
+
+
+def test_a_robot_that_left_track_and_a_process_that_failed_are_named() -> None:
+    made = report(lost_by=3, ended={"slave-5": 1})
+    assert made.problems == [
+        "slave-5 ended with status 1",
+        "robot-3 was in track for 50% of the time only",
+    ]
+
+
+def test_the_table_has_a_row_each_and_fits() -> None:
+    out = io.StringIO()
+    Console(file=out, width=80).print(many_table(report(lost_by=3).tree))
+    lines = out.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    rows = {line.split()[0]: line.split()[1:] for line in lines if line.split()[:1] and "robot-" in line}
+    assert rows["robot-2"] == ["100%", "3", "4000", "12", "1.2", "30.5", "–", "–"]
+    assert rows["robot-3"][0] == "50%"
