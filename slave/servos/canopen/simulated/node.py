@@ -96,6 +96,9 @@ class SimulatedDrive:
         node.add_read_callback(self._read)
         node.add_write_callback(self._write)
         self._rpdo = self._tpdo = self._pending = self._heard_ns = None
+        # fetched where they are written, as they are needed hundreds of times a second
+        self._master_beat = pdo.HEARTBEAT
+        self._dead_ns = self._beat_ns = 0
         self._controlword = 0
         self.rebooted = True
         self._send(pdo.HEARTBEAT + self.id, bytes([_BOOT]))
@@ -150,12 +153,10 @@ class SimulatedDrive:
 
     def beat(self, now_ns: int) -> None:
         """Send a heartbeat that is due, and miss the master's that is overdue."""
-        period_ms = self.value(0x1017)
-        if period_ms and now_ns - self._beaten_ns >= period_ms * NS_PER_MS:
+        if self._beat_ns and now_ns - self._beaten_ns >= self._beat_ns:
             self._beaten_ns = now_ns
             self._send(pdo.HEARTBEAT + self.id, bytes([self._node.nmt._state]))
-        allowed_ns = (self._consumer & 0xFFFF) * NS_PER_MS
-        if self._heard_ns is not None and allowed_ns and now_ns - self._heard_ns > allowed_ns:
+        if self._heard_ns is not None and self._dead_ns and now_ns - self._heard_ns > self._dead_ns:
             self._heard_ns = None
             if self.state is Power.ENABLED:
                 self._emergency(0x8130, 0x11)
@@ -199,14 +200,6 @@ class SimulatedDrive:
         entry = raw[subindex] if subindex or not hasattr(raw, "decode_raw") else raw
         return int(entry.decode_raw(self._node.get_data(index, subindex)))
 
-    @property
-    def _consumer(self) -> int:
-        return self.value(0x1016, 1)
-
-    @property
-    def _master_beat(self) -> int:
-        return pdo.HEARTBEAT + (self._consumer >> 16 & 0x7F)
-
     # within
 
     def _command(self, controlword: int) -> None:
@@ -216,7 +209,7 @@ class SimulatedDrive:
             state = was
         self.state, self._controlword = state, controlword
         recovered = was is Power.FAULT or (was is Power.QUICK_STOP and state is Power.ENABLED)
-        if recovered and state is not was:
+        if recovered and state is not was and self.value(0x603F):
             if self.fault in CODES:
                 self.fault = Fault.NONE
             self._emergency(0, 0)
@@ -251,6 +244,12 @@ class SimulatedDrive:
             self._activate(index, int.from_bytes(data, "little"))
         elif index in (0x1600, 0x1A00) and (self._rpdo if index == 0x1600 else self._tpdo) is not None:
             raise SdoAbortedError(_PRESENT_STATE)
+        elif index == 0x1016:
+            consumer = int.from_bytes(data, "little")
+            self._master_beat = pdo.HEARTBEAT + (consumer >> 16 & 0x7F)
+            self._dead_ns = (consumer & 0xFFFF) * NS_PER_MS
+        elif index == 0x1017:
+            self._beat_ns = int.from_bytes(data, "little") * NS_PER_MS
         elif index == 0x6040:
             self._command(int.from_bytes(data, "little"))
         elif index == DEMAND:

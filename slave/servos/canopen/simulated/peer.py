@@ -21,6 +21,8 @@ from slave.servos.canopen.simulated.plant import Plant
 SendOn = Callable[[str, int, bytes], None]
 """(bus name, identifier, data)."""
 _FOLLOWING_ERROR = (0x8611, 0x21)
+_LOOK_NS = 10 * NS_PER_MS
+"""Between two looks at heartbeats and following errors."""
 _UNBOUNDED = 0xFFFF_FFFF
 
 log = logging.getLogger("tandem.drives")
@@ -52,6 +54,7 @@ class DrivePeer:
         self.plant = Plant(skeleton, encoders, origin_ns)
         self._names = skeleton.joint_names
         self._first_sync_ns: int | None = None
+        self._looked_ns = 0
         self._planned = sorted(faults, key=lambda fault: fault.after_s)
         drives = list(config.drives_of(skeleton).values())
         self._scale = np.array([drive.increments_per_rad for drive in drives])
@@ -74,8 +77,9 @@ class DrivePeer:
         i = self._by_id.get((bus, frame_id))
         if i is not None:
             self.drives[i].on_frame(frame_id, data, now_ns)
-            if frame_id == pdo.SDO_REQUEST + self.drives[i].id:
-                self._take_in_settings(i)
+            if frame_id == pdo.RPDO1 + self.drives[i].id:
+                return  # it waits for SYNC
+            self._take_in_settings(i)
         elif frame_id == pdo.SYNC:
             self._on_sync(bus, now_ns)
         elif frame_id == pdo.NMT or frame_id & 0x780 == pdo.HEARTBEAT:
@@ -86,6 +90,9 @@ class DrivePeer:
     def advance(self, now_ns: int) -> None:
         """Physics, heartbeats, following errors, and faults that are due. Call every few milliseconds."""
         self.plant.advance(now_ns)
+        if now_ns - self._looked_ns < _LOOK_NS:
+            return
+        self._looked_ns = now_ns
         self._show()
         if self._first_sync_ns is not None:
             while self._planned and now_ns - self._first_sync_ns >= self._planned[0].after_s * NS_PER_S:

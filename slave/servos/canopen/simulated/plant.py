@@ -13,6 +13,8 @@ from slave.encoders import EncoderConfig, Encoders
 from slave.servos.simulated import CYCLE_NS, SimulatedRobot
 
 _AT_REST_RAD_S = 1e-6
+MOST_CYCLES = 25
+"""A process held up for longer than these 100 ms does not catch up in a burst."""
 
 
 class Plant:
@@ -61,9 +63,12 @@ class Plant:
         self._follows[joint] = False
 
     def advance(self, now_ns: int) -> None:
-        """Run every cycle that ends by `now_ns`."""
+        """Run every cycle that ends by `now_ns`; stand still for what lies further back than MOST_CYCLES."""
         dt_s = CYCLE_NS / NS_PER_S
-        for _ in range(min((now_ns - self._robot.now_ns) // CYCLE_NS, 1000)):
+        due = (now_ns - self._robot.now_ns) // CYCLE_NS
+        if due > MOST_CYCLES:
+            self._robot.resume(self._robot.now_ns + (due - MOST_CYCLES) * CYCLE_NS)
+        for _ in range(min(due, MOST_CYCLES)):
             at_ns = self._robot.now_ns + CYCLE_NS
             share = np.clip((at_ns - self._since_ns) / self._period_ns, 0.0, 1.0)
             followed = self._from + (self._to - self._from) * share

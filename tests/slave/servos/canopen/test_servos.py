@@ -1,0 +1,370 @@
+"""The adapter on real buses: drives in a thread (virtual, udp_multicast), or in a process."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+import canopen
+import numpy as np
+import pytest
+import uvloop
+
+from common.can.config import BusConfig
+from common.can.interface import open_bus
+from common.config import LinkConfig
+from common.errors import BusError, RobotError
+from common.skeleton import load_skeleton
+from slave.config import SlaveConfig
+from slave.encoders import Encoders
+from slave.servos import open_servos
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.servos import CanopenServos
+from slave.servos.canopen.simulated.app import run as run_drives
+from slave.servos.canopen.simulated.faults import DEMAND, Fault
+from slave.servos.canopen.simulated.node import EDS
+from slave.servos.config import ServosConfig
+
+NURSING = load_skeleton("nursing")
+DEADLINE_S = 60.0
+_number = itertools.count()
+
+
+def virtual() -> list[BusConfig]:
+    n = next(_number)
+    return [
+        BusConfig(name=name, interface="virtual", channel=f"drives-{n}-{name}", fd=False)
+        for name in ("left", "right")
+    ]
+
+
+def udp_multicast() -> list[BusConfig]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("", 0))
+        options: dict[str, str | int | float | bool] = {"port": free.getsockname()[1], "hop_limit": 0}
+    groups = (("left", "239.74.163.31"), ("right", "239.74.163.32"))
+    return [
+        BusConfig(name=name, interface="udp_multicast", channel=group, fd=False, options=options)
+        for name, group in groups
+    ]
+
+
+@pytest.fixture(params=[virtual, udp_multicast])
+def config(request: pytest.FixtureRequest) -> CanopenConfig:
+    # generous times: the machine may be busy; what is tested does not depend on them
+    return CanopenConfig(
+        buses=request.param(), dead_ms=3000, drive_dead_ms=5000, start_timeout_s=30.0, join_deg_s=60.0
+    )
+
+
+class Heard(logging.Handler):
+    """Waits until the drives say that they are there."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ready = threading.Event()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if "drives on" in record.getMessage():
+            self.ready.set()
+
+
+@contextmanager
+def drives_on(config: CanopenConfig, folder: Path) -> Iterator[None]:
+    """The simulated drives: in a thread on `virtual`, which ends at the process, else in a process."""
+    if config.buses[0].interface == "virtual":
+        with drives_thread(config):
+            yield
+    else:
+        file = folder / "slave.toml"
+        file.write_text(as_toml(config), "utf-8")
+        with drives_process(file):
+            yield
+
+
+def as_toml(config: CanopenConfig) -> str:
+    """A slave's file with these buses and times."""
+    buses = "".join(
+        f'[[servos.canopen.buses]]\nname = "{bus.name}"\ninterface = "udp_multicast"\n'
+        f'channel = "{bus.channel}"\nfd = false\n'
+        f"options = {{ port = {bus.options['port']}, hop_limit = 0 }}\n"
+        for bus in config.buses
+    )
+    return (
+        'robot = "robot-1"\n[link]\n[servos]\nbackend = "canopen"\n[servos.canopen]\n'
+        f"dead_ms = {config.dead_ms}\ndrive_dead_ms = {config.drive_dead_ms}\n"
+        f"start_timeout_s = {config.start_timeout_s}\n{buses}"
+    )
+
+
+@contextmanager
+def drives_process(file: Path) -> Iterator[None]:
+    drives = subprocess.Popen([sys.executable, "-m", "deploy", "drives", str(file)], stderr=subprocess.PIPE)
+    try:
+        assert drives.stderr is not None
+        while b"25 drives on" not in drives.stderr.readline():
+            assert drives.poll() is None
+        # read on, or what it logs would fill the pipe and stop it
+        reading = threading.Thread(target=drives.stderr.read)
+        reading.start()
+        yield
+    finally:
+        drives.send_signal(signal.SIGTERM)
+        drives.wait()
+        reading.join()
+        drives.stderr.close()
+
+
+@contextmanager
+def drives_thread(config: CanopenConfig) -> Iterator[None]:
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(0.0005)  # as a process of tandem has it
+    slave = SlaveConfig(
+        robot="robot-1", link=LinkConfig(), servos=ServosConfig(backend="canopen", canopen=config)
+    )
+    loop, stop = uvloop.new_event_loop(), asyncio.Event()
+    thread = threading.Thread(target=lambda: loop.run_until_complete(run_drives(slave, stop)))
+    log, heard = logging.getLogger("tandem.drives"), Heard()
+    log.addHandler(heard)
+    level, _ = log.level, log.setLevel(logging.INFO)
+    thread.start()
+    try:
+        assert heard.ready.wait(DEADLINE_S)
+        log.removeHandler(heard)
+        log.setLevel(level)
+        yield
+    finally:
+        loop.call_soon_threadsafe(stop.set)
+        thread.join()
+        loop.close()
+        sys.setswitchinterval(interval)
+
+
+class Ticking:
+    """What the slave does with its servos, as fast as the loop goes."""
+
+    def __init__(self, servos: CanopenServos) -> None:
+        self.servos = servos
+        self.encoders = Encoders(NURSING)
+        self.setpoint = np.clip(np.zeros(25), NURSING.lower_rad, NURSING.upper_rad)
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        deadline_s = time.monotonic() + DEADLINE_S
+        while not condition():
+            assert time.monotonic() < deadline_s, (dict(self.servos.faults()), self.servos.figures())
+            self.servos.read()
+            self.servos.write(self.setpoint)
+            await asyncio.sleep(0.005)
+
+    def near(self) -> bool:
+        reading = self.servos.read()
+        off = np.abs(self.encoders.position_rad(reading.counts) - self.setpoint)
+        return bool(reading.valid.all() and off.max() < 0.006)
+
+
+def test_start_follow_quick_stop_fault_and_back(config: CanopenConfig, tmp_path: Path) -> None:
+    async def test() -> None:
+        servos = open_servos(ServosConfig(backend="canopen", canopen=config), NURSING, None)  # type: ignore[arg-type]
+        assert isinstance(servos, CanopenServos)
+        servos.start()
+        try:
+            ticking = Ticking(servos)
+            await ticking.until(lambda: bool(servos.read().valid.all()))
+            assert dict(servos.faults()) == {}
+            ticking.setpoint = np.clip(np.full(25, 0.2), NURSING.lower_rad, NURSING.upper_rad)
+            await ticking.until(ticking.near)
+
+            servos.quick_stop(True)
+            before = ticking.encoders.position_rad(servos.read().counts)
+            ticking.setpoint = ticking.setpoint * 0.5
+            syncs = servos.figures()["sync_to_positions_ms"]["count"]  # type: ignore[index]
+            await ticking.until(
+                lambda: servos.figures()["sync_to_positions_ms"]["count"] > syncs + 10  # type: ignore[index]
+            )
+            assert np.abs(ticking.encoders.position_rad(servos.read().counts) - before).max() < 0.05
+            servos.quick_stop(False)
+            await ticking.until(ticking.near)
+
+            # a fault on demand, by a third party on the bus: SDO write of one byte to 2010h of node 1
+            with can_bus(config) as bus:
+                data = bytes([0x2F, DEMAND & 0xFF, DEMAND >> 8, 0, Fault.OVER_CURRENT, 0, 0, 0])
+                bus.send(can.Message(arbitration_id=0x601, is_extended_id=False, data=data))
+                await ticking.until(lambda: "neck_yaw" in servos.faults())
+                await ticking.until(lambda: "drive fault" in servos.faults()["neck_yaw"])
+            assert "over-current" in servos.faults()["neck_yaw"]
+            servos.quick_stop(True)
+            servos.quick_stop(False)
+            await ticking.until(lambda: not servos.faults())
+            await ticking.until(ticking.near)
+        finally:
+            servos.stop()
+            servos.stop()
+
+    with drives_on(config, tmp_path):
+        uvloop.run(test())
+
+
+@contextmanager
+def can_bus(config: CanopenConfig) -> Iterator[can.BusABC]:
+    bus = open_bus(config.buses[0])
+    try:
+        yield bus
+    finally:
+        bus.shutdown()
+
+
+def test_a_second_start_takes_over_drives_that_hold(config: CanopenConfig, tmp_path: Path) -> None:
+    async def test() -> None:
+        for _ in range(2):
+            servos = CanopenServos(config, NURSING)
+            servos.start()
+            with pytest.raises(RobotError, match="run already"):
+                servos.start()
+            ticking = Ticking(servos)
+            await ticking.until(ticking.near)
+            servos.stop()
+
+    with drives_on(config, tmp_path):
+        uvloop.run(test())
+
+
+def test_without_drives_the_start_says_what_to_do(config: CanopenConfig, tmp_path: Path) -> None:
+    async def test() -> None:
+        with pytest.raises(RobotError, match=r"25 of 25 drives do not start: .*start `tandem drives`"):
+            CanopenServos(config.model_copy(update={"start_timeout_s": 0.5}), NURSING).start()
+
+    uvloop.run(test())
+
+
+def test_a_bus_that_cannot_be_opened_is_told() -> None:
+    config = CanopenConfig(buses=[BusConfig(name="left", interface="nothing", channel="x")])
+
+    async def test() -> None:
+        with pytest.raises(BusError, match="bus left: cannot open nothing x"):
+            CanopenServos(config, NURSING).start()
+
+    uvloop.run(test())
+
+
+@pytest.mark.parametrize("setpoint", [np.zeros(24), np.full(25, np.nan)])
+def test_a_setpoint_that_is_none_is_refused(setpoint: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="25 finite angles"):
+        CanopenServos(CanopenConfig(), NURSING).write(setpoint)
+
+
+def test_the_library_s_master_finds_a_cia_402_drive(config: CanopenConfig, tmp_path: Path) -> None:
+    """The `canopen` library, which knows nothing of this code, drives node 2 through its states by SDO."""
+    with drives_on(config, tmp_path), can_bus(config) as bus:
+        network = canopen.Network(bus)
+        network.connect()
+        try:
+            node = network.add_node(2, str(EDS))
+            node.sdo.RESPONSE_TIMEOUT = 10.0
+            assert node.sdo[0x1000].raw & 0xFFFF == 402
+            assert node.sdo[0x1008].raw == "tandem simulated CiA 402 drive"  # segmented
+            node.sdo[0x1017].raw = 50
+            node.nmt.wait_for_heartbeat(10.0)
+            assert node.nmt.state == "PRE-OPERATIONAL"
+            node.nmt.state = "OPERATIONAL"
+            with pytest.raises(canopen.SdoAbortedError):
+                node.sdo[0x6041].raw = 1
+            node.sdo[0x6060].raw = 8
+            seen = []
+            for controlword in (0x06, 0x07, 0x0F, 0x02, 0x0F):
+                node.sdo[0x6040].raw = controlword
+                seen.append(node.sdo[0x6041].raw & 0x6F)
+            assert seen == [0x21, 0x23, 0x27, 0x07, 0x27]
+            heard = threading.Event()
+            node.emcy.add_callback(lambda _: heard.set())
+            node.sdo[DEMAND].raw = Fault.OVER_TEMPERATURE
+            assert heard.wait(10.0)
+            assert [emergency.code for emergency in node.emcy.log] == [0x4310]
+            assert node.sdo[0x1001].raw == 0x09
+        finally:
+            network.bus = None
+            network.notifier.stop()
+
+
+SLAVE = """
+import asyncio, sys, uvloop
+import numpy as np
+from pathlib import Path
+from common.config import load_config
+from common.skeleton import load_skeleton
+from slave.config import SlaveConfig
+from slave.servos.canopen.servos import CanopenServos
+config = load_config(Path(sys.argv[1]), SlaveConfig)
+skeleton = load_skeleton("nursing")
+async def main():
+    servos = CanopenServos(config.servos.canopen, skeleton)
+    servos.start()
+    setpoint, up = np.zeros(25), 1.0
+    while True:
+        servos.read()
+        # at the hands, where nothing is heavy: back and forth at 1 rad/s
+        setpoint[-5:] = np.clip(setpoint[-5:] + up * 0.005, 0.0, 1.2)
+        up = -up if setpoint[-1] in (0.0, 1.2) else up
+        servos.write(np.clip(setpoint, skeleton.lower_rad, skeleton.upper_rad))
+        if not servos.faults():
+            print("moves", flush=True)
+        await asyncio.sleep(0.005)
+uvloop.run(main())
+"""
+
+
+def test_kill_9_of_the_slave_and_the_drives_stop_by_themselves(tmp_path: Path) -> None:
+    buses = udp_multicast()
+    dead_s = 0.5
+    config = CanopenConfig(buses=buses, dead_ms=500, start_timeout_s=30.0, drive_dead_ms=5000)
+    file = tmp_path / "slave.toml"
+    file.write_text(as_toml(config), "utf-8")
+    with drives_process(file):
+        slave = subprocess.Popen([sys.executable, "-c", SLAVE, str(file)], stdout=subprocess.PIPE)
+        assert slave.stdout is not None
+        for _ in range(200):
+            assert slave.stdout.readline() == b"moves\n"
+        slave.send_signal(signal.SIGKILL)
+        killed_s = time.monotonic()
+        slave.wait()
+        slave.stdout.close()
+        moved_until_s, states = watch_encoders(buses[1], killed_s + dead_s + 1.0)
+        # it did move on for a while, and the ramp and the motor's lag take less than 0.2 s
+        assert 0.05 < moved_until_s - killed_s < dead_s + 0.2
+        assert states == {0x07}
+
+
+def watch_encoders(config: BusConfig, until_s: float) -> tuple[float, set[int]]:
+    """When any encoder on a bus last moved by more than two counts, and the drives' last states.
+
+    The watcher sends SYNC, and nothing that could move a drive or keep it alive.
+    """
+    bus = open_bus(config)
+    counts: dict[int, int] = {}
+    states: dict[int, int] = {}
+    moved_s = 0.0
+    due_s = time.monotonic()
+    while (now_s := time.monotonic()) < until_s:
+        if now_s >= due_s:
+            due_s += 0.02
+            bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+        message = bus.recv(0.002)
+        if message is None or message.arbitration_id & 0x780 != 0x180:
+            continue
+        word = int.from_bytes(message.data[2:4], "little")
+        states[message.arbitration_id] = message.data[0] & 0x6F
+        if abs(word - counts.get(message.arbitration_id, word + 9)) > 2:
+            counts[message.arbitration_id] = word
+            moved_s = now_s
+    bus.shutdown()
+    return moved_s, set(states.values())
