@@ -26,6 +26,7 @@ def engaged(world: World) -> VirtualRun:
 def moved(strategy: str, seconds: float) -> Motion:
     run = engaged(World(overrides={"slave": [f'track.strategy="{strategy}"']}))
     run.run(seconds)
+    assert not run.slave.guard.counters.doubts
     judged = motion(run.trace.truth(), on_masters_clock(run), run.trace.joint_names)
     assert judged is not None
     return judged
@@ -51,6 +52,7 @@ def test_a_minute_passes_without_loss(minute: VirtualRun) -> None:
     counters = minute.slave.guard.counters
     assert minute.slave.guard.state == "track"
     assert not counters.losses
+    assert not counters.doubts
     assert not counters.dropped.keys() - {"lease", "clock"}, "only before the lease and the clock stood"
     sent_with_lease = sum(1 for c in minute.commands if c.lease)
     assert counters.accepted >= sent_with_lease - 15
@@ -100,6 +102,15 @@ def test_prediction_shows_the_patient_a_third_of_holds_error() -> None:
     assert abs(predict.lag_ms) <= 25
     assert predict.roughness is not None
     assert predict.roughness <= 2.5
+
+
+@pytest.mark.parametrize(("strategy", "one_way_ms"), [("interpolate", 2), ("predict", 80), ("hold", 80)])
+def test_no_encoder_is_doubted_whatever_the_strategy_and_the_delay(strategy: str, one_way_ms: int) -> None:
+    overrides = {"slave": [f'track.strategy="{strategy}"']}
+    run = engaged(World(one_way_ns=one_way_ms * 1_000_000, overrides=overrides))
+    run.run(12.0)
+    assert run.slave.guard.state == "track"
+    assert not run.slave.guard.counters.doubts
 
 
 def test_the_same_world_gives_the_same_bytes() -> None:

@@ -190,6 +190,7 @@ class Machine(RuleBasedStateMachine):
     @rule(body=st.sampled_from([WELL, WELL, Body(drives={"neck_yaw": "hot"}), Body(base="tilts")]))
     def change_body(self, body: Body) -> None:
         self.rig.body = body
+        self.step()
 
     # what must hold
 
@@ -307,7 +308,7 @@ def run(machine: type[Machine], make_rig: Callable[..., Any]) -> None:
     run_state_machine_as_test(
         machine,
         settings=settings(
-            max_examples=25,
+            max_examples=50,
             stateful_step_count=25,
             deadline=None,
             suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],

@@ -1,0 +1,42 @@
+"""The simulated robot's own encoders under setpoints flung about at their limits: none is doubted."""
+
+import numpy as np
+import pytest
+
+from common.skeleton import load_skeleton
+from slave.encoders import Encoders
+from slave.guard import GuardConfig
+from slave.guard.limit import SetpointLimiter
+from slave.guard.plausible import Plausibility
+from slave.servos.simulated import SimulatedRobot
+
+PERIOD_NS = 5_000_000
+
+
+@pytest.mark.parametrize("profile", ["nursing", "hand", "lower_limb"])
+def test_a_joint_flung_to_and_fro_at_its_limits_is_believed(profile: str) -> None:
+    skeleton, config = load_skeleton(profile), GuardConfig()
+    limits, names = config.limits(skeleton), skeleton.joint_names
+    rng = np.random.default_rng(3)
+    target = np.clip(np.zeros(len(names)), skeleton.lower_rad, skeleton.upper_rad)
+    robot = SimulatedRobot(skeleton, position_rad=target)
+    limiter, encoders = SetpointLimiter(names, limits), Encoders(skeleton)
+    part = Plausibility(names, skeleton.max_velocity_rad_s, config)
+    limiter.seat(target)
+    part.note(0, target)
+    held = np.zeros(len(names), np.bool_)
+    for i in range(1, 200 * 15):
+        now_ns = i * PERIOD_NS
+        if i % 60 == 0:
+            joint = rng.integers(len(names))
+            target[joint] = rng.uniform(skeleton.lower_rad[joint], skeleton.upper_rad[joint])
+        robot.advance(now_ns)
+        reading = robot.read()
+        shown = encoders.position_rad(reading.counts)
+        assert not part.judge(shown, reading.valid, reading.read_ns, moving=True), part.words
+        limiter.step(
+            now_ns, 0.005, target, np.zeros_like(target), held,
+            limits.max_velocity_rad_s, limits.max_acceleration_rad_s2,
+        )  # fmt: skip
+        robot.write(limiter.position_rad)
+        part.note(now_ns, limiter.position_rad)
