@@ -21,6 +21,7 @@ _KEPT_HZ = 20.0
 """Rate of the samples kept."""
 _MOVING_RAD_S = 0.3
 _LONGEST_GAP_S = 0.25
+_SHORTEST_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,8 @@ def orient(recordings: Mapping[str, NodeRecording], names: Sequence[str]) -> Ori
         raise PoorMotionError(f"the nodes were recorded at different rates ({sorted(rates)} Hz)")
     rate_hz = float(np.median(list(rates)))
     length = min(len(recordings[name].gyr_rad_s) for name in names)
+    if length < _SHORTEST_S * rate_hz:
+        raise PoorMotionError(f"{length / rate_hz:.1f} s are too short to tell anything: record 20 s or more")
     acc, gyr, q = [], [], []
     for name in names:
         a = bridged(recordings[name].acc_m_s2[:length], name, rate_hz)

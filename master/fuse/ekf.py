@@ -215,6 +215,7 @@ class EkfFilter:
         state.bias[nodes] = 0.0
         state.field[nodes] = np.nan
         state.accelerated[nodes] = 0.0
+        state.pulled_rad[nodes] = 0.0
         state.rest.forget(nodes)
 
     def snapshot(self) -> object:

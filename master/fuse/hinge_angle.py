@@ -179,11 +179,10 @@ class HingeAngle:
     def update(self, gyr1_rad_s: Array, acc1_m_s2: Array, gyr2_rad_s: Array, acc2_m_s2: Array) -> Array:
         """Take one sample, (K, 3) each, rad/s and m/s², sensor frames; returns the angle, (K,) rad.
 
-        The angle goes on past ±π. NaN stands for a missing sample: the rate before it is held.
+        The angle goes on past ±π. NaN stands for a missing sample: the rate before it is held, 0 before any.
         """
         gyr, acc = np.stack([gyr1_rad_s, gyr2_rad_s]), np.stack([acc1_m_s2, acc2_m_s2])
-        if self._gyr:
-            gyr = np.where(np.isnan(gyr), self._gyr[-1], gyr)
+        gyr = np.where(np.isnan(gyr), self._gyr[-1] if self._gyr else 0.0, gyr)
         self._gyr = [*self._gyr[-2:], gyr]
         if len(self._gyr) == 1:
             self._smooth = self._forces(gyr, acc, np.zeros_like(gyr))
@@ -205,10 +204,11 @@ class HingeAngle:
         return _into(self._frames, force_at_joint(acc, gyr, change, self._lever_m))
 
     def _add(self, forces: Array) -> None:
-        step = self._share * (_turned(forces, self._phase) - self._smooth)
+        turned = _turned(forces, self._phase)
         # both or none, or else they would no longer be the same signal
-        known = np.isfinite(step).all(axis=(0, -1))
-        self._smooth = self._smooth + np.where(known[:, None], step, 0.0)
+        known, begun = (np.isfinite(each).all(axis=(0, -1), keepdims=True) for each in (turned, self._smooth))
+        smooth = np.where(begun, self._smooth + self._share * (turned - self._smooth), turned)
+        self._smooth = np.where(known, smooth, self._smooth)
 
     def _seen(self) -> Seen:
         """The angle by the forces, brought from the turned-back frames to the present ones."""

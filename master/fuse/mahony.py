@@ -96,6 +96,7 @@ class MahonyFilter:
         self._integral[nodes] = 0.0
         self._error[nodes] = 0.0
         self._turn[nodes] = 0.0
+        self._pulled_rad[nodes] = 0.0
 
     def snapshot(self) -> object:
         """Orientation, its error and the bias."""

@@ -74,7 +74,7 @@ def live(
     if not session.finished:
         kept = ", ".join(str(path) for path in (session.tray, session.worn) if path is not None)
         raise TandemError(
-            f"stopped before the end; recorded so far: {kept}. "
+            f"stopped before the end; recorded so far: {kept or 'nothing'}. "
             "`tandem calibrate imu`, `mag` and `mount` can read it"
         )
     figures, refusals = compute(checked, session, Choice(wanted, gravity, still_s, pictures), out, console)

@@ -325,3 +325,10 @@ def test_what_the_real_person_s_halves_say_agrees(recordings_folder: Path) -> No
     for name in ("left_thigh", "left_shank", "right_thigh", "right_shank"):
         one, other = (half.nodes[name].q_sensor_from_segment for half in halves)
         assert math.degrees(float(angle_between(one, other))) < 10.0, name
+
+
+def test_a_recording_of_a_moment_is_refused() -> None:
+    up, none = np.tile([0.0, 0.0, 9.81], (4, 1)), np.zeros((4, 3))
+    nodes = {name: NodeRecording(name, 5.0, up, none) for name in ("left_upper_arm", "left_forearm")}
+    with pytest.raises(PoorMotionError, match=r"0\.8 s are too short"):
+        find_mounting(nodes, load_skeleton("nursing"), (0.0, 0.4))

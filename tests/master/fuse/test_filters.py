@@ -240,7 +240,9 @@ def test_restart_forgets_all_of_a_node_and_nothing_of_the_others(name: str) -> N
     filter_.restart(np.array([True, False, False]))
     for each in (filter_, alone, fresh):
         move(each, truth, dts_s, start_s=1.0)
-    for of in (lambda f: f.q_world_from_sensor(), lambda f: f.bias_rad_s()):
+    for of in (
+        lambda f: f.q_world_from_sensor(), lambda f: f.q_inertial_from_sensor(), lambda f: f.bias_rad_s(),
+    ):  # fmt: skip
         assert np.allclose(of(filter_)[0], of(fresh)[0], atol=1e-12)
         assert np.allclose(of(filter_)[1:], of(alone)[1:], atol=1e-12)
 

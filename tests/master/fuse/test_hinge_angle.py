@@ -152,6 +152,21 @@ def test_missing_samples_are_bridged() -> None:
     assert np.sqrt(np.mean(error**2)) < 1.0
 
 
+def test_a_first_sample_that_is_missing_spoils_nothing() -> None:
+    none, up = np.zeros((300, 3)), np.tile([0.0, 0.0, 9.81], (300, 1))
+    hinge = Hinge(
+        *(np.array(v) for v in ([0.0, 1, 0], [0.0, 1, 0], [1.0, 0, 0], [1.0, 0, 0], none[0], none[0]))
+    )
+    lost = np.vstack([np.full((1, 3), np.nan), up[1:]])
+    whole, late = (
+        hinge_angles(HingeAngleConfig(), hinge, 100.0, np.where(np.isnan(acc), np.nan, none), acc, none, up)
+        for acc in (up, lost)
+    )
+    assert np.isfinite(late.angle_rad).all()
+    assert late.angle_rad[-1] == pytest.approx(whole.angle_rad[-1], abs=1e-6)
+    assert late.deviation_rad[-1] == pytest.approx(whole.deviation_rad[-1], rel=1e-3)
+
+
 def vectors(scale: float) -> st.SearchStrategy[Array]:
     numbers = st.lists(st.floats(-scale, scale), min_size=3, max_size=3)
     return numbers.map(np.array).filter(lambda v: float(np.linalg.norm(v)) > 0.1 * scale)
