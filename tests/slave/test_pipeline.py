@@ -68,3 +68,9 @@ def test_a_new_holder_never_sees_the_echo_of_the_last_ones_commands(pipeline: Sl
     state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
     assert state.operator == "anna"
     assert state.echo is None
+
+
+def test_the_state_names_a_joint_whose_encoder_is_not_believed(pipeline: SlavePipeline) -> None:
+    pipeline.guard._plausible.words["neck_yaw"] = "the encoder jumps"
+    state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
+    assert state.faults["neck_yaw"] == "the encoder jumps"
