@@ -56,10 +56,10 @@ class Rig:
     def measured_rad(self) -> Array:
         return self.encoders.position_rad(self.driver.reading.counts)
 
-    def impatient(self) -> None:
-        """Wait less for servos that are going to be silent on purpose."""
+    def wait_for_answers(self, seconds: float) -> None:
+        """Less long, for servos that are going to be silent on purpose."""
         assert self.driver._bus is not None
-        self.driver._bus._port.reply_timeout_s = 0.1
+        self.driver._bus._port.reply_timeout_s = seconds
 
 
 @pytest.fixture
