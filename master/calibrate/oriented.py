@@ -21,7 +21,7 @@ _KEPT_HZ = 20.0
 """Rate of the samples kept."""
 _MOVING_RAD_S = 0.3
 _LONGEST_GAP_S = 0.25
-_SHORTEST_S = 3.0
+_SHORTEST_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
