@@ -215,13 +215,16 @@ def test_when_the_slave_is_dead_the_servos_stop_by_themselves(rig: Rig) -> None:
     assert np.abs(rig.measured_rad - 0.8).max() <= COUNT_RAD
 
 
-def test_a_new_slave_does_not_finish_what_a_dead_one_began(rig: Rig) -> None:
+def test_a_new_slave_does_not_finish_what_a_dead_one_began(make_rig: Callable[..., Rig]) -> None:
+    rig = make_rig(bus_watchdog_s=0.04)
     rig.driver.start()
-    rig.cycles(5, np.full(len(rig.names), 0.8))
+    rig.cycles(2, np.full(len(rig.names), 0.8))
     with rig.port.lock:
         rig.now_ns += 150_000_000
         rig.bus.advance(rig.now_ns)
     rig.driver._drop()
+    # far from where they were going
+    assert all(abs(servo.position - servo.get(x.GOAL_POSITION)) > 50 for servo in rig.servos)
     where = [servo.position for servo in rig.servos]
     rig.driver = Driver(rig.config, rig.skeleton, rig.encoder_config, rig.clock)
     rig.driver.start()
