@@ -20,6 +20,7 @@ from deploy.attitude.command import attitude
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.drives import drives
+from deploy.faults.command import faults
 from deploy.video import video
 
 app = typer.Typer(
@@ -34,6 +35,7 @@ app.add_typer(accuracy_app, name="accuracy")
 app.command("video")(video)
 app.command()(drives)
 app.command()(attitude)
+app.command()(faults)
 _debug = False
 
 

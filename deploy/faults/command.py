@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import track
 
 from common.errors import TandemError
+
+if TYPE_CHECKING:
+    from deploy.faults.fault import Fault
+    from deploy.faults.trial import Outcome
 
 
 def faults(
@@ -26,18 +31,30 @@ def faults(
     Example: `tandem faults "link" --report faults.json`
     """
     from deploy.faults.document import matrix, tree, within_page
+    from deploy.faults.processes import PROCESS_FAULTS, run_process_trial
     from deploy.faults.table import FAULTS
     from deploy.faults.trial import run_trial
     from deploy.faults.view import print_matrix
 
-    chosen = [f for f in FAULTS if not only or any(word.casefold() in f.name.casefold() for word in only)]
+    def wanted(fault: Fault) -> bool:
+        return not only or any(word.casefold() in fault.name.casefold() for word in only)
+
+    processes = {fault.row.name: fault for fault in PROCESS_FAULTS}
+    table = [*FAULTS, *(fault.row for fault in PROCESS_FAULTS)]
+    chosen = [fault for fault in table if wanted(fault)]
     if not chosen:
-        raise TandemError(f"no row is named so; there are: {', '.join(f.name for f in FAULTS)}")
-    if page is not None and len(chosen) < len(FAULTS):
+        raise TandemError(f"no row is named so; there are: {', '.join(fault.name for fault in table)}")
+    if page is not None and len(chosen) < len(table):
         raise TandemError("a page holds the whole matrix: name no rows with --page")
+
+    def tried(fault: Fault) -> Outcome:
+        if fault.name in processes:
+            return asyncio.run(run_process_trial(processes[fault.name]))
+        return run_trial(fault)
+
     console = Console()
     bar = track(chosen, "trying", console=console, transient=True)
-    outcomes = [run_trial(fault) for fault in bar]
+    outcomes = [tried(fault) for fault in bar]
     print_matrix(outcomes, console)
     try:
         if report is not None:

@@ -215,7 +215,11 @@ class EncoderWatch:
                 for bus in self._buses:
                     bus.send(can.Message(arbitration_id=SYNC, is_extended_id=False))
             for name, bus in zip(self._names, self._buses, strict=True):
-                while (message := bus.recv(0.001)) is not None:
+                # a few at a time: a bus that is never silent must not keep the other waiting
+                for _ in range(len(self._counts)):
+                    message = bus.recv(0.001)
+                    if message is None:
+                        break
                     self._take(name, message)
             self._note()
 

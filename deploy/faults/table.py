@@ -59,7 +59,7 @@ LINK = (
         "Follows. It never goes back to an older command; half of them missing, it follows less exactly.",
         NOTHING,
         link.reordered,
-        ends=State.TRACK, strays_deg=25.0,
+        ends=State.TRACK, strays_deg=10.0,
         refused_by=frozenset({"sequence"}), held_by=frozenset({"sequence"}),
     ),
     Fault(

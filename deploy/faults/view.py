@@ -14,18 +14,17 @@ from deploy.faults.trial import Outcome
 
 def print_matrix(outcomes: Sequence[Outcome], console: Console) -> None:
     """One row a fault, and under the table whatever was not as it should be."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(
+        box=box.SIMPLE_HEAD, pad_edge=False, caption="seconds, degrees, and shares of a speed limit"
+    )
     table.add_column("what fails")
-    table.add_column("the robot")
-    for head in ("reacted s", "stood s", "°/s (limit)", "way °", "over °", "strayed °"):
+    for head in ("decided", "stood", "°/s", "share", "way", "over", "off"):
         table.add_column(head, justify="right", no_wrap=True)
     for outcome in outcomes:
-        name, reacted, stood, _, way, over, strayed = figures(outcome)
-        peak = f"{figures(outcome)[3].split(' ')[0]} ({outcome.figures.peak_share:.0%})"
+        name, reacted, stood, peak, way, over, strayed = figures(outcome)
+        speed, share = peak.split(" ")[0], f"{outcome.figures.peak_share:.0%}"
         colour = ("yellow" if outcome.fault.missed else "red") if outcome.wrong else None
-        table.add_row(
-            name, str(outcome.fault.reaction), reacted, stood, peak, way, over, strayed, style=colour
-        )
+        table.add_row(name, reacted, stood, speed, share, way, over, strayed, style=colour)
     console.print(table)
     for outcome in outcomes:
         for word in outcome.wrong:
