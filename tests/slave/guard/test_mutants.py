@@ -76,8 +76,8 @@ def replaced(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, by: Any) ->
 
 
 def less(monkeypatch: pytest.MonkeyPatch, key: Any) -> dict[str, Any]:
-    monkeypatch.delitem(states.TRANSITIONS, key)
-    return {}
+    rest = {pair: after for pair, after in states.TRANSITIONS.items() if pair != key}
+    return replaced(monkeypatch, states, "TRANSITIONS", rest)
 
 
 def nothing(*_: Any, **__: Any) -> None:
