@@ -21,7 +21,13 @@ def knees_deg(recording: Path, overrides: list[str]) -> Array:
     """What the master commands of both knees over the first steps and sitting down, (T, 2)."""
     master = ["estimation.stance_s=1.0", *overrides]
     run = VirtualRun(
-        World(0, 0.0, 500_000, "lower_limb", {"suit": [f'replay="{recording}"'], "master": master})
+        World(
+            slave_ahead_ns=0,
+            slave_drift_ppm=0.0,
+            one_way_ns=500_000,
+            profile="lower_limb",
+            overrides={"suit": [f'replay="{recording}"'], "master": master},
+        )
     )
     run.run(13.0)
     positions = np.degrees([command.position_rad for command in run.commands if command.valid.all()])
