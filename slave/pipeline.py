@@ -43,7 +43,11 @@ class SlavePipeline:
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
         self.guard = Guard(
-            config.robot, self.skeleton, config.guard, make_tracker(config.track), draw_token=draw_token
+            config.robot,
+            self.skeleton,
+            config.guard,
+            make_tracker(config.track, config.servos.bus_lag_s),
+            draw_token=draw_token,
         )
         self.clock = SlaveExchange()
         self.journeys = Journeys()

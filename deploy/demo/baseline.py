@@ -130,7 +130,9 @@ class _Way:
 
     def __init__(self, strategy: Strategy, config: SlaveConfig, now_ns: int, position_rad: Array) -> None:
         skeleton = config.skeleton
-        self._tracker = make_tracker(config.track.model_copy(update={"strategy": strategy}))
+        self._tracker = make_tracker(
+            config.track.model_copy(update={"strategy": strategy}), config.servos.bus_lag_s
+        )
         self._limits = config.guard.limits(skeleton)
         self._limiter = SetpointLimiter(skeleton.joint_names, self._limits)
         self._limiter.seat(position_rad)

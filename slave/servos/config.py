@@ -22,6 +22,12 @@ class ServosConfig(Section):
     canopen: CanopenConfig = CanopenConfig()
     dynamixel: DynamixelConfig | None = None
 
+    @property
+    def bus_lag_s(self) -> float:
+        """How much later than at once a setpoint takes full effect on the way to the drives, on average."""
+        # it waits half a SYNC period, and the drives take a whole one to go there in a straight line
+        return 1.5 / self.canopen.sync_hz if self.backend == "canopen" else 0.0
+
     def mistakes_for(self, skeleton: Skeleton, encoders: EncoderConfig) -> list[ConfigMistake]:
         """What the chosen backend cannot be built from."""
         match self.backend:

@@ -25,7 +25,7 @@ class TrackConfig(Section):
     blend_s: float = Field(default=0.08, gt=0.0, le=1.0)
     """Time over which a difference between the old course and a new sample's is worked off."""
     servo_lag_s: float = Field(default=SERVO_LAG_S, ge=0.0, le=0.5)
-    """`predict`: how far the servos lag behind a ramp; aimed ahead by as much."""
+    """`predict`: how far the servos lag behind a ramp, without their bus; aimed ahead by as much."""
     max_horizon_s: float = Field(default=0.3, gt=0.0, le=2.0)
     """`predict`: age of a sample, servo lag included, at which it moves nothing any more; it coasts to rest
     from half of it. Wants to be twice the age at which samples are usually replaced."""
@@ -33,12 +33,12 @@ class TrackConfig(Section):
     """`interpolate`: how much later than usual a sample may arrive and still find the robot moving."""
 
 
-def make_tracker(config: TrackConfig) -> Tracker:
-    """The strategy that the configuration names."""
+def make_tracker(config: TrackConfig, bus_lag_s: float = 0.0) -> Tracker:
+    """The strategy that the configuration names, for servos whose bus adds some lag to their own."""
     match config.strategy:
         case "hold":
             return Hold()
         case "interpolate":
             return Interpolate(config.blend_s, config.jitter_margin_s)
         case "predict":
-            return Predict(config.blend_s, config.servo_lag_s, config.max_horizon_s)
+            return Predict(config.blend_s, config.servo_lag_s + bus_lag_s, config.max_horizon_s)

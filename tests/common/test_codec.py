@@ -149,7 +149,8 @@ COMMAND = Command(
 )
 STATE = RobotState(
     "robot-1", 1, 2, 3, "hold", "", "", np.ones(3, np.bool_), np.zeros(3), np.zeros(3),
-    CommandEcho(1, 2, 3, 4, 5), -5, 6, {"left_elbow_pitch": "over-current"}, BaseAttitude(7, 0.1, None, 0.2, 0.1),
+    CommandEcho(1, 2, 3, 4, 5), -5, 6, {"left_elbow_pitch": "over-current"},
+    BaseAttitude(7, 0.1, None, 0.2, 0.1),
 )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from common.config import check_config
 from common.errors import ConfigError
+from slave.servos.config import ServosConfig
 from slave.track import Tracker
 from slave.track.config import TrackConfig, make_tracker
 from slave.track.hold import Hold
@@ -77,6 +78,22 @@ def test_a_run_is_the_same_every_time() -> None:
 )
 def test_the_configuration_names_the_strategy(strategy: Strategy, kind: type[Tracker]) -> None:
     assert isinstance(make_tracker(TrackConfig(strategy=strategy)), kind)
+
+
+def test_predict_aims_ahead_by_the_bus_of_the_drives_too() -> None:
+    servos = ServosConfig.model_validate({"backend": "canopen", "canopen": {"sync_hz": 50}})
+    assert servos.bus_lag_s == pytest.approx(0.03)
+    assert ServosConfig().bus_lag_s == 0.0
+    still, ahead = (make_tracker(TrackConfig(), lag_s) for lag_s in (0.0, servos.bus_lag_s))
+    rate = np.array([1.0, -0.5])
+    for k in range(20):
+        now_ns = k * 80_000_000
+        for tracker in (still, ahead):
+            tracker.accept(now_ns, now_ns, 0.08 * k * rate, rate)
+    targets = [tracker.target(now_ns) for tracker in (still, ahead)]
+    assert targets[0] is not None
+    assert targets[1] is not None
+    np.testing.assert_allclose(targets[1].position_rad - targets[0].position_rad, 0.03 * rate, atol=2e-3)
 
 
 def test_a_strategy_that_does_not_exist_is_refused() -> None:
