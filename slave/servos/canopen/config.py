@@ -66,7 +66,7 @@ class CanopenConfig(Section):
     node_id: int = Field(127, ge=1, le=127)
     """The slave's own, of its heartbeat."""
     heartbeat_ms: int = Field(40, ge=10, le=1000)
-    """Between two heartbeats of the slave, rounded up to whole SYNC periods."""
+    """Between two heartbeats of the slave, rounded down to whole SYNC periods, one at least."""
     dead_ms: int = Field(200, ge=50, le=5000)
     """Without the slave's heartbeat for so long a drive stops by itself and holds."""
     drive_heartbeat_ms: int = Field(100, ge=20, le=5000)

@@ -145,7 +145,7 @@ class DriveNetwork:
                     self._tell()
             case pdo.HEARTBEAT if len(data) == 1:
                 self._heard_ns[i] = now_ns
-                self._on_state(drive, data[0] & 0x7F)
+                self._on_state(i, data[0] & 0x7F, now_ns)
             case pdo.EMERGENCY:
                 said = emergency(data)
                 if said is not None:
@@ -157,7 +157,12 @@ class DriveNetwork:
             case _:
                 self.unknown += 1
 
-    def _on_state(self, drive: Drive, state: int) -> None:
+    def _on_state(self, i: int, state: int, now_ns: int) -> None:
+        drive = self._drives[i]
+        if drive.phase is Phase.CONFIGURING and state == _BOOTED:
+            # what it was told before is forgotten, the slave's heartbeat that it shall watch for among it
+            self._start(i, now_ns, configure=True)
+            return
         # while it is enabled, a heartbeat from before NMT's start may still be on its way
         left = drive.phase is Phase.RUNNING and state != _OPERATIONAL
         if left or (drive.phase is Phase.ENABLING and state == _BOOTED):

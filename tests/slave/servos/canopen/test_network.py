@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from slave.encoders import EncoderConfig
+from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.simulated.faults import Fault
@@ -296,3 +297,21 @@ def test_an_emergency_without_a_fault_is_told_until_it_is_over(wired: Wired) -> 
     assert wired.network.running
     wired.network.on_frame("left", 0x081, bytes(8), wired.now_ns)
     assert dict(wired.network.faults) == {}
+
+
+def test_a_drive_that_restarts_while_it_is_configured_is_told_everything_again(wired: Wired) -> None:
+    """The heartbeat that it shall watch for among it: or it would not stop when the slave dies."""
+    network, now_ns = wired.network, wired.now_ns
+    network.start(now_ns)
+    bus, node = network.where(ELBOW)
+    request = pdo.SDO_REQUEST + node
+
+    def asked() -> list[bytes]:
+        frames, network.outbox = network.outbox, []
+        return [data for where, frame_id, data in frames if (where, frame_id) == (bus, request)]
+
+    first = asked()[0]
+    network.on_frame(bus, pdo.SDO_ANSWER + node, b"\x60" + first[1:4] + bytes(4), now_ns)
+    assert asked() != [first]
+    network.on_frame(bus, pdo.HEARTBEAT + node, b"\x00", now_ns)
+    assert asked() == [first]
