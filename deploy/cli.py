@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 import sys
 from pathlib import Path
@@ -21,6 +20,7 @@ from deploy.calibrate.commands import app as calibrate_app
 from deploy.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.drives import drives
 from deploy.faults.command import faults
+from deploy.output import in_a_folder, write_json
 from deploy.video import video
 
 app = typer.Typer(
@@ -39,13 +39,6 @@ app.command()(faults)
 _debug = False
 
 
-def _in_a_folder(path: Path | None) -> Path | None:
-    """Before the work that is to be written there, not after."""
-    if path is not None and not path.absolute().parent.is_dir():
-        raise typer.BadParameter(f"there is no folder {path.parent}")
-    return path
-
-
 ConfigFile = Annotated[Path, typer.Argument(help="TOML file; deploy/examples has one to start from.")]
 Overrides = Annotated[
     list[str] | None,
@@ -55,20 +48,18 @@ Overrides = Annotated[
 ]
 Figures = Annotated[
     Path | None,
-    typer.Option(
-        help="Write what was counted, as JSON, when stopped.", dir_okay=False, callback=_in_a_folder
-    ),
+    typer.Option(help="Write what was counted, as JSON, when stopped.", dir_okay=False, callback=in_a_folder),
 ]
 
 
 def _a_png(path: Path | None) -> Path | None:
     if path is not None and path.suffix.lower() != ".png":
         raise typer.BadParameter(f"{path.name}: expected a name that ends in .png")
-    return _in_a_folder(path)
+    return in_a_folder(path)
 
 
 ReportFile = Annotated[
-    Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=_in_a_folder)
+    Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
 ]
 
 
@@ -180,7 +171,7 @@ def demo(
     async def tell(stop: asyncio.Event) -> None:
         result = await run_demo(options, stop, console)
         if report is not None:
-            report.write_text(json.dumps(result.tree, indent=2, ensure_ascii=False) + "\n", "utf-8")
+            write_json(report, result.tree)
         print_report(result, console)
         if plots is not None and result.curves is not None:
             as_png(result.curves, plots)
@@ -204,7 +195,7 @@ def bench(
 
     figures = measure(quick=quick, console=Console())
     if report is not None:
-        report.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", "utf-8")
+        write_json(report, figures)
 
 
 for _act in OPERATORS_ACTS:
@@ -214,7 +205,7 @@ for _act in OPERATORS_ACTS:
 def _write_figures(path: Path | None) -> Any:
     def write(figures: dict[str, object]) -> None:
         if path is not None:
-            path.write_text(json.dumps(figures, ensure_ascii=False), "utf-8")
+            write_json(path, figures)
 
     return write
 

@@ -74,7 +74,7 @@ def test_every_command_s_help_has_an_example_that_it_would_take(command: str) ->
         (f"slave {EXAMPLES}/slave.toml --set robot.name=2", ["robot.name = '2': expected a key of a table"]),
         (
             f"suit {EXAMPLES}/suit.toml --set 'replay=\"nosuch.npz\"'",
-            [f"{EXAMPLES}/nosuch.npz: replay = ", "expected a readable npz file (No such file"],
+            [f"{EXAMPLES}/nosuch.npz: replay = ", "expected a readable npz file", "there is no such file"],
         ),
         (
             "demo --transport carrier-pigeon",

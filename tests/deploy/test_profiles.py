@@ -22,7 +22,7 @@ def test_the_three_files_of_a_profile_fit_together(profile: str) -> None:
     assert master.profile == slave.profile == suit.profile == profile
     assert master.nodes == suit.nodes
     assert (master.capture.buses, master.capture.dbc) == (suit.buses, suit.dbc)
-    assert master.robot == slave.robot == suit.robot
+    assert master.commanded == [slave.robot] == [suit.robot]
     assert slave.guard.limits(slave.skeleton).lower_rad.shape == (len(slave.skeleton.joints),)
 
 
