@@ -151,15 +151,15 @@ def test_a_deadline_that_was_met_does_not_strike_later() -> None:
 def test_a_link_whose_close_hangs_does_not_hold_the_process() -> None:
     done = process(
         """
-        from common.link import Link
+        from common.link.session import Session
 
         class HangingSession:
             def close(self):
                 time.sleep(60)
 
         async def main(stop):
-            link = Link(HangingSession(), "robot-1", asyncio.get_running_loop())
-            assert not await link.close(timeout_s=0.05)
+            session = Session(HangingSession(), asyncio.get_running_loop())
+            assert not await session.close(timeout_s=0.05)
         """,
         shutdown_s=10,
     )

@@ -199,7 +199,7 @@ def build_suit(config: SuitConfig, protocol: SuitProtocol, motion: Motion | None
     return SimulatedSuit(skeleton, config.nodes, config.buses, protocol, wearer, faults)
 
 
-def _wearer(config: SuitConfig, skeleton: Skeleton, motion: Motion | None) -> Wearer:
+def _wearer(config: SuitConfig, skeleton: Skeleton, motion: Motion | None = None) -> Wearer:
     if config.replay is not None:
         return RecordedOperator(load_replay(config.replay, skeleton, config.nodes))
     mounting = np.array([config.mounting.get(name, IDENTITY) for name in skeleton.segment_names])

@@ -67,6 +67,7 @@ def test_a_bench_that_fails_leaves_its_reason_and_the_others_their_figures(
     assert report["failed"] == {"unsound": "no such bus"}
     assert {v["figure"]: v["met"] for v in report["verdicts"]} == {
         "fuse + filter, 36 nodes": True,
+        "the same with ekf": None,
         "solve 25 joints": True,
         "encode + decode a command": True,
         "put → received / bare Zenoh": True,

@@ -36,7 +36,7 @@ class FakeChild:
 
 def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
     observer = SimpleNamespace(
-        trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen
+        trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen, video={}
     )
     children = {role: FakeChild(role) for role in ENDED_WELL}
     return cast(Rig, SimpleNamespace(observer=observer, children=children))

@@ -127,9 +127,8 @@ def worst(done: Done, sensor: int, strength: float) -> tuple[float, float]:
     for i in range(len(done.config.skeleton.segments)):
         turn, _ = Rotation.align_vectors(truth, calibrated(done, i, 0, 9.80665 * truth)[1])
         raw, mapped = calibrated(done, i, sensor, strength * truth)
-        if sensor == 2:  # its strength is relative, and nothing turns it to the others
+        if sensor == 2:  # its strength is relative
             mapped *= strength / np.linalg.norm(mapped, axis=1).mean()
-            turn = Rotation.identity()
         raw_error = max(raw_error, float(np.linalg.norm(raw - strength * truth, axis=1).max()))
         error = max(error, float(np.linalg.norm(turn.apply(mapped) - strength * truth, axis=1).max()))
     return raw_error, error
