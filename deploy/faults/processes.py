@@ -111,7 +111,7 @@ async def run_process_trial(fault: ProcessFault) -> Outcome:
         with EncoderWatch(rig.can_port, rig.skeleton) as watch:
             observer = rig.observer
             await rig.until(lambda: _fast(rig), START_S, "fast motion")
-            await rig.until(lambda: watch.rows > 50, 5.0, "readings on the drives' buses")
+            await _heard(watch)
             begun_ns = monotonic_ns()
             acting = asyncio.ensure_future(_done(fault.act(rig)))
             # until the slave's own SYNC must have stopped, another would disturb its cycle
@@ -123,6 +123,15 @@ async def run_process_trial(fault: ProcessFault) -> Outcome:
             state = observer.guard if fault.alive else "gone"
             reason = observer.state.reason if fault.alive and observer.state else "the program does not run"
     return _judge(fault, course, rig.skeleton, state, reason)
+
+
+async def _heard(watch: EncoderWatch) -> None:
+    """Until a second of readings is there. Raises TandemError naming the joints that are not heard."""
+    deadline_ns = monotonic_ns() + to_ns(10.0)
+    while watch.rows < 1.0 / SYNC_S:
+        if monotonic_ns() > deadline_ns:
+            raise TandemError(f"{watch.rows} readings in 10 s; not heard: {watch.silent() or 'nobody now'}")
+        await asyncio.sleep(0.05)
 
 
 async def _done(act: Awaitable[object]) -> None:
@@ -164,6 +173,7 @@ class EncoderWatch:
     """Listens on the drives' buses in a thread of its own, and sends SYNC where nobody else does any more."""
 
     def __init__(self, can_port: int, skeleton: Skeleton) -> None:
+        self._skeleton = skeleton
         overrides = ['servos.backend="canopen"', *drive_buses(can_port)]
         config = load_config(example("slave", NURSING), SlaveConfig, overrides)
         canopen = config.servos.canopen
@@ -199,6 +209,11 @@ class EncoderWatch:
     def rows(self) -> int:
         """Readings of the whole robot so far."""
         return len(self._seen)
+
+    def silent(self) -> list[str]:
+        """Joints whose encoders were not heard lately."""
+        late = monotonic_ns() - self._heard_ns > to_ns(5.0 * SYNC_S)
+        return [name for name, silent in zip(self._skeleton.joint_names, late, strict=True) if silent]
 
     def course(self, fault_ns: int) -> Course:
         """What the encoders showed; where they came to rest stands for the last setpoint."""
