@@ -15,12 +15,6 @@ AT_ONCE_S = 0.01
 ENGAGE = "Remove the cause, then engage; the robot goes slowly to the operator's posture."
 NOTHING = "Nothing."
 
-SHAKEN = (
-    "All joints at their limits of acceleration at once shake light ones (wrist, elbow roll) more than "
-    "their drives can hold: what is asked keeps every limit, but the joint falls behind, and then turns "
-    "faster than its limit as it catches up."
-)
-
 LINK = (
     Fault(
         "link cut",
@@ -151,30 +145,30 @@ VALUES = (
         "largest values that a message can carry",
         "The master asks for 12.5 rad at 99 rad/s of every joint, in command after command.",
         Reaction.LIMITED,
-        "Cannot know that this is not meant: goes to the ends of its ranges within its limits.",
+        "Cannot know that this is not meant: goes to the ends of its ranges, slowly.",
         "Let go of the deadman, or emergency stop.",
         link.largest,
-        ends=State.TRACK, missed=SHAKEN,
+        ends=State.TRACK,
         held_by=frozenset({"position", "velocity", "acceleration"}),
     ),
     Fault(
         "valid but impossible jump",
         "From one command to the next every joint is asked to be at the far end of its range.",
         Reaction.LIMITED,
-        "Cannot know that this is not meant: goes there within its limits.",
+        "Cannot know that this is not meant: goes there, slowly.",
         "Let go of the deadman, or emergency stop.",
         link.jump,
-        ends=State.TRACK, missed=SHAKEN,
+        ends=State.TRACK,
         held_by=frozenset({"velocity", "acceleration"}),
     ),
     Fault(
         "a jump with every command",
         "Each command asks for the other end of every joint's range than the one before.",
         Reaction.LIMITED,
-        "Cannot know that this is not meant: goes to and fro within its limits.",
+        "Cannot know that this is not meant: goes to and fro, slowly.",
         "Let go of the deadman, or emergency stop.",
         link.jumps,
-        ends=State.TRACK, missed=SHAKEN,
+        ends=State.TRACK,
         held_by=frozenset({"velocity", "acceleration"}),
     ),
 )  # fmt: skip

@@ -63,7 +63,10 @@ class Alignment:
 
 
 class Rejoin:
-    """Joints that were held in `track` and are valid again: slow until near, then as fast as the rest.
+    """Joints that must first come back to the operator: slow until near, then as fast as the rest.
+
+    They were held in `track` and are valid again. Or the target of any is so far away that it jumped: then
+    all come back slowly, since all together at their limits would shake the light ones off their drives.
 
     Near for the dwell time, as in `align`: a target that is still on its way from where the tracker had the
     lost joint (the master says 0) crosses the window, and must not let the joint go as it passes.
@@ -72,6 +75,7 @@ class Rejoin:
     def __init__(self, limits: Limits, config: GuardConfig) -> None:
         self._limits = limits
         self._window_rad = config.align_window_rad
+        self._jump_rad = config.jump_window_rad
         self._dwell_ns = to_ns(config.align_dwell_s)
         self.slow_velocity_rad_s: Array = np.minimum(limits.max_velocity_rad_s, config.align_velocity_rad_s)
         """(J,) the speed of `align`."""
@@ -89,11 +93,13 @@ class Rejoin:
 
     def maxima(self, now_ns: int, error_rad: Array, valid: Mask) -> tuple[Array, Array]:
         """Velocity and acceleration (J,) for this step; `error_rad` (J,) is from setpoint to target."""
-        if valid.all() and not self._away.any():
+        jumped = bool((valid & ~self._away & ~within(error_rad, self._jump_rad)).any())
+        if not jumped and valid.all() and not self._away.any():
             return self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2
         outside = ~valid | ~within(error_rad, self._window_rad)
         np.copyto(self._outside_ns, now_ns, where=outside)
-        self._away = ~valid | (self._away & (outside | (now_ns - self._outside_ns < self._dwell_ns)))
+        not_yet = outside | (now_ns - self._outside_ns < self._dwell_ns)
+        self._away = ~valid | jumped | (self._away & not_yet)
         return (
             np.where(self._away, self.slow_velocity_rad_s, self._limits.max_velocity_rad_s),
             np.where(self._away, self.slow_acceleration_rad_s2, self._limits.max_acceleration_rad_s2),

@@ -54,7 +54,7 @@ class Rig:
     def __init__(self, config: GuardConfig | None = None, **guard_options: Any) -> None:
         self.skeleton = load_skeleton("nursing")
         self.joints = len(self.skeleton.joints)
-        self.config = config or GuardConfig(reset_key=KEY, encoder_timeout_s=0.05)
+        self.config = config or GuardConfig(reset_key=KEY, encoder_timeout_s=0.05, jump_window_rad=4.0)
         self.tracker = NewestTracker()
         self.tokens = iter(range(1001, 1_000_000))
         guard_options.setdefault("draw_token", lambda: next(self.tokens))

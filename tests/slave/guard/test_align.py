@@ -172,6 +172,49 @@ def test_a_joint_that_returns_at_the_very_start_of_track_comes_back_slowly(rig: 
     assert 0.0 < fastest <= rig.config.align_velocity_rad_s + 1e-12
 
 
+def leap(rig: Any, rad: float) -> float:
+    """The elbow's fastest on its way to a target that jumped so far."""
+    rig.to_track()
+    rig.target = rig.target.copy()
+    rig.target[6] -= rad
+    steps = rig.run(4.0)
+    assert rig.guard.state is State.TRACK
+    assert rig.measured[6] == pytest.approx(rig.target[6])
+    return max(float(abs(s.velocity_rad_s[6])) for s in steps)
+
+
+def test_a_target_that_jumps_beyond_the_window_is_followed_slowly_all_the_way(make_rig: MakeRig) -> None:
+    """On either side: a robot that leaps to where a fault says the operator is hurts somebody."""
+    for sign in (1.0, -1.0):
+        rig = make_rig(GuardConfig(jump_window_rad=0.5))
+        assert leap(rig, sign * 0.51) <= rig.config.align_velocity_rad_s + 1e-12
+        assert leap(make_rig(GuardConfig(jump_window_rad=0.5)), sign * 0.49) > 1.0
+
+
+@pytest.mark.parametrize("returning", [False, True])
+def test_one_jump_makes_all_joints_slow_but_a_returning_joint_only_itself(
+    make_rig: MakeRig, returning: bool
+) -> None:
+    rig = make_rig(GuardConfig(jump_window_rad=0.5)).to_track()
+    slow = rig.config.align_velocity_rad_s + 1e-12
+    rig.target = rig.target.copy()
+    rig.target[6] -= 0.6
+    if returning:
+        rig.run(0.2, valid=lost(rig, 6))
+    rig.target[3] -= 0.3
+    steps = rig.run(1.0)
+    elbow, shoulder = (max(float(abs(s.velocity_rad_s[j])) for s in steps) for j in (6, 3))
+    assert elbow <= slow
+    assert (shoulder > 1.0) if returning else (shoulder <= slow)
+
+
+def test_a_joint_that_jumped_is_as_fast_as_the_rest_again_once_it_is_there(make_rig: MakeRig) -> None:
+    rig = make_rig(GuardConfig(jump_window_rad=0.5))
+    leap(rig, 0.6)
+    rig.target[6] += 0.4
+    assert max(abs(s.velocity_rad_s[6]) for s in rig.run(0.5)) > 1.0
+
+
 def test_flickering_validity_never_makes_a_joint_lurch(rig: Any) -> None:
     rig.to_track()
     rig.target = rig.target + 0.4
