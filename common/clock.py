@@ -1,4 +1,4 @@
-"""The one place that reads a clock: integer nanoseconds, of this host's monotonic clock but for recordings."""
+"""The one place that reads a clock: integer nanoseconds, this host's monotonic clock but for recordings."""
 
 from __future__ import annotations
 
