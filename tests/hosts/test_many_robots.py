@@ -29,9 +29,14 @@ async def ready(rig: Rig) -> None:
     for name in (*rig.slaves, "suit"):
         await rig.start(name)
     everyone = rig.observers.values()
-    await rig.until(lambda: all(o.state for o in everyone), 60.0, "word from every robot")
+
+    def alive() -> None:
+        for child in rig.children.values():
+            child.check()
+
+    await rig.until(lambda: all(o.state for o in everyone), 60.0, "word from every robot", alive)
     await rig.start("master")
-    await rig.until(lambda: all(o.ready for o in everyone), 60.0, "readiness of every robot")
+    await rig.until(lambda: all(o.ready for o in everyone), 60.0, "readiness of every robot", alive)
 
 
 async def engaged(rig: Rig, robot: str) -> None:

@@ -222,7 +222,7 @@ def test_the_whole_way_from_the_operators_command_to_the_servo(rig: Rig) -> None
     session.run(0.6)
     assert session.state is State.TRACK
     session.target = np.full(len(rig.names), 0.5)
-    session.run(1.0)
+    session.run(3.0)  # a jump: as slowly as to the operator at first
     assert np.abs(rig.measured_rad - 0.5).max() <= 2 * COUNT_RAD
     limits = np.array([joint.max_velocity_rad_s for joint in rig.skeleton.joints])
     # no servo's encoder ever went faster than the table allows, but by the rounding of a count a cycle
