@@ -18,6 +18,8 @@ ZERO_COUNTS = 1000
 OWN_LIMIT_DEG = 20.0
 OVERRIDES = {
     "master": ["estimation.stance_s=1.0"],
+    # three robots share this machine's cores: half the turns are enough to follow
+    "slave": ["loop.rate_hz=100"],
     # calibrated otherwise, so its encoders show other counts for the same angles
     "slave-2": [f"encoders.zero_counts.{ELBOW}={ZERO_COUNTS}", f'encoders.reversed=["{ELBOW}"]'],
     # a limit of its own
@@ -40,17 +42,10 @@ async def ready(rig: Rig) -> None:
 
 
 async def engaged(rig: Rig, robot: str) -> None:
-    """Engage; again where this machine, which is six programs' host, held commands up meanwhile."""
+    reply = await rig.control(Action.ENGAGE, robot=robot)
+    assert reply.done, reply.text
     observer = rig.observers[robot]
-    for _ in range(3):
-        reply = await rig.control(Action.ENGAGE, robot=robot)
-        assert reply.done, reply.text
-        await rig.until(lambda: observer.guard == "align", 5.0, f"align of {robot}")
-        await rig.until(lambda: observer.guard != "align", 20.0, f"track of {robot}")
-        if observer.guard == "track":
-            return
-    assert observer.state is not None
-    raise AssertionError(f"{robot}: {observer.state.reason}")
+    await rig.until(lambda: observer.guard == "track", 20.0, f"track of {robot}")
 
 
 def states(rig: Rig) -> dict[str, RobotState]:
@@ -93,10 +88,8 @@ def test_who_is_engaged_follows_and_what_befalls_one_does_not_reach_the_others()
             await rig.start("slave-3")
             await rig.until(lambda: rig.observers["robot-3"].ready, 60.0, "readiness of the new slave")
             assert rig.observers["robot-3"].guard == "hold"
-            # a program that starts beside it may have held robot 1 up: on a host of its own it would not
-            before = first.guard
             await engaged(rig, "robot-3")
-            assert first.guard == before
+            assert first.guard == "track"
             judge(rig)
 
     asyncio.run(story())

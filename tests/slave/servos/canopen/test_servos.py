@@ -339,8 +339,8 @@ def test_kill_9_of_the_slave_and_the_drives_stop_by_themselves(tmp_path: Path) -
         slave.wait()
         slave.stdout.close()
         moved_until_s, states = watch_encoders(buses[1], killed_s + dead_s + 1.0)
-        # it was moving, and the ramp and the motor's lag take less than 0.2 s
-        assert 0.0 < moved_until_s - killed_s < dead_s + 0.2
+        # it did move on for a while, and the ramp and the motor's lag take less than 0.2 s
+        assert 0.05 < moved_until_s - killed_s < dead_s + 0.2
         assert states == {0x07}
 
 
