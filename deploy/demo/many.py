@@ -17,8 +17,8 @@ from common.clock import monotonic_ns, to_ns
 from common.errors import LinkTimeoutError, TandemError
 from common.messages import Action
 from deploy.demo.many_report import ManyReport, make_many_report, many_table
-from deploy.demo.rig import Rig, at_most, open_rig
 from deploy.demo.run import ALIGN_S, HOLD_S, START_S, DemoOptions, check
+from deploy.rig.rig import Rig, at_most, open_rig
 
 AGREE_S = 10.0
 BECOMES = {Action.ENGAGE: ("align", "track"), Action.DISENGAGE: ("hold",)}

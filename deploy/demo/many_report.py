@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from deploy.demo.observer import Observer
-from deploy.demo.rig import Rig
 from deploy.judge import TruthSeries, motion
+from deploy.rig.observer import Observer
+from deploy.rig.rig import Rig
 from deploy.tables import UNKNOWN, plain_table
 
 if TYPE_CHECKING:
-    from deploy.demo.child import Child
     from deploy.demo.run import DemoOptions
+    from deploy.rig.child import Child
 
 
 @dataclass(frozen=True, slots=True)

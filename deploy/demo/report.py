@@ -13,9 +13,9 @@ from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.synergy import synergy_positions
 from deploy.demo.baseline import MOST_S, Comparison, arrivals, compare
 from deploy.demo.curves import Curves, curves
-from deploy.demo.rig import ROBOT, Rig
 from deploy.judge import Accuracy, Motion, SolvedSeries, TruthSeries, accuracy, motion
 from deploy.profiles import example
+from deploy.rig.rig import ROBOT, Rig
 from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig
 

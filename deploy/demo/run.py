@@ -19,9 +19,9 @@ from common.messages import Action
 from common.skeleton import load_skeleton
 from deploy.demo.mounted import mount
 from deploy.demo.report import Report, make_report
-from deploy.demo.rig import Rig, at_most, open_rig
 from deploy.demo.view import draw
 from deploy.profiles import NURSING, example
+from deploy.rig.rig import Rig, at_most, open_rig
 from master.config import MasterConfig
 from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig

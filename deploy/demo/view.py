@@ -8,7 +8,7 @@ from rich.text import Text
 
 from deploy.demo.draw_curves import in_terminal
 from deploy.demo.report import Report
-from deploy.demo.rig import Rig
+from deploy.rig.rig import Rig
 from deploy.tables import (
     Live,
     accuracy_table,

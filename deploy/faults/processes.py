@@ -22,13 +22,13 @@ from common.errors import TandemError
 from common.messages import Action
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from deploy.demo.rig import DRIVES, ROLES, Rig, drive_buses, open_rig
 from deploy.faults.fault import Fault, Reaction
 from deploy.faults.limits import moved_beyond
 from deploy.faults.scene import Scene
 from deploy.faults.stillness import Course, stillness
 from deploy.faults.trial import Outcome
 from deploy.profiles import NURSING, example
+from deploy.rig.rig import DRIVES, ROLES, Rig, drive_buses, open_rig
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
 from slave.servos.canopen.pdo import COUNT_BITS, SYNC, TPDO1

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from deploy.demo.endpoints import local_endpoints
 from deploy.profiles import EXAMPLES
+from deploy.rig.endpoints import local_endpoints
 from master.calibrate.recording import load_recordings
 
 pytestmark = pytest.mark.hosts

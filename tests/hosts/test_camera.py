@@ -11,7 +11,7 @@ import pytest
 
 from common.clock import to_ns
 from common.messages import Action
-from deploy.demo.rig import ROLES, Rig, open_rig
+from deploy.rig.rig import ROLES, Rig, open_rig
 
 pytestmark = pytest.mark.hosts
 SEEN_S = 1.0

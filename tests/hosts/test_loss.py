@@ -10,7 +10,7 @@ import pytest
 
 from common.clock import to_ns
 from common.messages import Action, RobotState
-from deploy.demo.rig import ROLES, Rig, open_rig
+from deploy.rig.rig import ROLES, Rig, open_rig
 
 pytestmark = pytest.mark.hosts
 

@@ -9,7 +9,7 @@ import pytest
 
 from common.messages import Action, RobotState
 from common.quaternion import Array
-from deploy.demo.rig import Rig, open_rig
+from deploy.rig.rig import Rig, open_rig
 
 pytestmark = pytest.mark.hosts
 

@@ -9,8 +9,8 @@ import pytest
 
 from common.messages import Action
 from common.skeleton import load_skeleton
-from deploy.demo.endpoints import TRANSPORTS
-from deploy.demo.rig import ROLES, Rig, open_rig
+from deploy.rig.endpoints import TRANSPORTS
+from deploy.rig.rig import ROLES, Rig, open_rig
 
 pytestmark = pytest.mark.hosts
 

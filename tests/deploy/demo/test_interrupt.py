@@ -16,7 +16,7 @@ DEMO = """
 import functools, sys
 from deploy import cli
 from deploy.demo import rig
-from deploy.demo.child import Child
+from deploy.rig.child import Child
 # processes that only wait, and end with an error by SIGINT: no suit, no robot
 waiting = "import socket, sys; socket.create_connection(('127.0.0.1', int(sys.argv[1]))).recv(1)"
 rig.Child = functools.partial(Child, tandem=(sys.executable, "-c", waiting, sys.argv[1]))

@@ -11,9 +11,9 @@ from rich.console import Console
 
 from common.messages import RobotState
 from deploy.demo.many_report import ManyReport, make_many_report, many_table
-from deploy.demo.rig import Rig, robot_name, slave_name
 from deploy.demo.run import DemoOptions
 from deploy.judge import Trace
+from deploy.rig.rig import Rig, robot_name, slave_name
 
 JOINTS = ("left_elbow_pitch",)
 ROBOTS = 8

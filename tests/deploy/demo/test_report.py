@@ -13,10 +13,10 @@ from rich.console import Console
 
 from common.messages import Action
 from deploy.demo.report import Report, make_report
-from deploy.demo.rig import Rig
 from deploy.demo.run import DemoOptions
 from deploy.demo.view import print_report
 from deploy.judge import Trace
+from deploy.rig.rig import Rig
 from deploy.targets import BY_PROFILE, DEMO, verdicts
 from deploy.virtual import VirtualRun, World
 

@@ -15,7 +15,7 @@ from common.link import Link
 from common.messages import Command, CommandEcho, CommandStamps, Message, RobotState, Statistics, Truth
 from common.skeleton import load_skeleton
 from common.topics import COMMAND, STATE, STATISTICS, TRUTH, Topic
-from deploy.demo.observer import RATE_OVER_NS, Observer
+from deploy.rig.observer import RATE_OVER_NS, Observer
 
 SKELETON = load_skeleton("nursing")
 JOINTS = len(SKELETON.joints)

@@ -14,7 +14,7 @@ import pytest
 
 from common.errors import TandemError
 from deploy.demo import child as child_module
-from deploy.demo.child import Child
+from deploy.rig.child import Child
 
 CALL = """
 import json, signal, socket, sys, time

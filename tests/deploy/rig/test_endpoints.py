@@ -4,7 +4,7 @@ import pytest
 
 from common.config import LinkConfig
 from common.errors import ConfigError
-from deploy.demo.endpoints import TRANSPORTS, Endpoints, local_endpoints
+from deploy.rig.endpoints import TRANSPORTS, Endpoints, local_endpoints
 
 
 def fields(endpoints: Endpoints) -> list[str]:

@@ -15,10 +15,10 @@ from common.link import Session, open_session
 from common.messages import Action, ControlReply, ControlRequest
 from common.skeleton import load_skeleton
 from common.topics import CONTROL
-from deploy.demo.child import Child
-from deploy.demo.endpoints import Endpoints, local_endpoints
-from deploy.demo.observer import Observer
 from deploy.profiles import NURSING, example
+from deploy.rig.child import Child
+from deploy.rig.endpoints import Endpoints, local_endpoints
+from deploy.rig.observer import Observer
 
 ROBOT, OPERATOR = "robot-1", "nurse-1"
 ROLES = ("slave", "suit", "master")

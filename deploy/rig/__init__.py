@@ -1,0 +1,1 @@
+"""The running processes of one experiment, and who watches them."""
