@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import TandemError
-from deploy.demo import child as child_module
+from deploy.rig import child as child_module
 from deploy.rig.child import Child
 
 CALL = """
