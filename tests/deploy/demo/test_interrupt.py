@@ -15,7 +15,7 @@ pytestmark = pytest.mark.hosts
 DEMO = """
 import functools, sys
 from deploy import cli
-from deploy.demo import rig
+from deploy.rig import rig
 from deploy.rig.child import Child
 # processes that only wait, and end with an error by SIGINT: no suit, no robot
 waiting = "import socket, sys; socket.create_connection(('127.0.0.1', int(sys.argv[1]))).recv(1)"
