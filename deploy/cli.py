@@ -21,6 +21,7 @@ from deploy.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.drives import drives
 from deploy.faults.command import faults
 from deploy.output import in_a_folder, write_json
+from deploy.record.command import record, recording
 from deploy.video import video
 
 app = typer.Typer(
@@ -36,6 +37,8 @@ app.command("video")(video)
 app.command()(drives)
 app.command()(attitude)
 app.command()(faults)
+app.command()(record)
+app.command()(recording)
 _debug = False
 
 

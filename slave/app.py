@@ -129,6 +129,7 @@ class Slave:
             "stages_ms": pipeline.journeys.budget.summary(),
             "end_to_end_ms": pipeline.journeys.budget.total(),
             "one_way_ms": pipeline.one_way.summary(),
+            "commands": pipeline.arrivals.summary(),
             "early": pipeline.one_way.clamped,
             "unmoved": pipeline.journeys.unmoved,
             "offset": {

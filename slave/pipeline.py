@@ -24,6 +24,7 @@ from common.messages import (
 )
 from common.offset import Offset, SlaveExchange
 from common.quaternion import Array
+from slave.arrivals import Arrivals
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
 from slave.guard import Guard, Setpoint
@@ -53,6 +54,8 @@ class SlavePipeline:
         self.journeys = Journeys()
         self.one_way = Durations()
         """From put to received, of every command of the lease's holder while the offset was trusted."""
+        self.arrivals = Arrivals()
+        """Of the commands of the lease's holder, by their numbers."""
         self.undecodable: dict[str, int] = {}
         self.on_accepted: Callable[[Command, int, Offset], None] | None = None
         """Called with every command that the guard accepts, now_ns, and the clocks' offset."""
@@ -75,8 +78,10 @@ class SlavePipeline:
             return
         offset = self.clock.estimator.estimate(now_ns)
         # another operator's stamps are of another clock
-        if offset.trusted and command.lease and command.lease == self.guard.lease.token:
-            self.one_way.record(offset.remote_ns(received_ns) - command.stamps.put_ns)
+        if command.lease and command.lease == self.guard.lease.token:
+            self.arrivals.note(command.lease, command.sequence)
+            if offset.trusted:
+                self.one_way.record(offset.remote_ns(received_ns) - command.stamps.put_ns)
         if self.guard.on_command(command, received_ns, now_ns, offset).accepted:
             self.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
             if self.on_accepted is not None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from common.errors import RecordingError
 from common.recording.recorder import METADATA
@@ -31,38 +32,62 @@ class Recording:
     """How it ends too early; empty where it was closed in order."""
 
 
+class RecordingStream:
+    """The entries of a file one after the other, in constant memory, as far as the file is whole.
+
+    `metadata` and `cut` are known once it has been gone through. Going through it raises RecordingError
+    where it cannot be opened or is no recording of ours.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.metadata: dict[str, str] | None = None
+        self.cut = ""
+        """How it ends too early; empty where it was closed in order."""
+
+    def __iter__(self) -> Iterator[Entry]:
+        try:
+            with self._path.open("rb") as stream:
+                yield from self._entries(stream)
+        except OSError as error:
+            raise RecordingError(f"{self._path}: cannot be read ({error.strerror or error})") from None
+        if self.metadata is None:
+            raise RecordingError(f"{self._path}: not a recording of tandem, or cut off at its very beginning")
+
+    def _entries(self, stream: BinaryIO) -> Iterator[Entry]:
+        from mcap.exceptions import InvalidMagic
+        from mcap.records import Channel, Message, Metadata
+        from mcap.stream_reader import StreamReader
+
+        topics: dict[int, str] = {}
+        records = iter(StreamReader(stream, validate_crcs=True).records)
+        while True:
+            try:
+                record = next(records, None)
+            except InvalidMagic:
+                if stream.tell() <= 8:
+                    raise RecordingError(f"{self._path}: not an MCAP file") from None
+                self.cut = "its last bytes are not MCAP's"
+                return
+            except Exception as error:  # a torn end looks like anything: no end of file, bad CRC, zstd's own
+                self.cut = f"it was cut off ({type(error).__name__})"
+                return
+            if record is None:
+                return
+            if isinstance(record, Message):
+                topic = topics[record.channel_id]
+                yield Entry(topic, record.data, record.log_time, record.publish_time)
+            elif isinstance(record, Channel):
+                topics[record.id] = record.topic
+            elif isinstance(record, Metadata) and record.name == METADATA:
+                self.metadata = dict(record.metadata)
+
+
 def read_recording(path: Path) -> Recording:
     """Read a whole file, or one that was cut off, up to its last whole chunk.
 
     Raises RecordingError where it cannot be opened or is no recording of ours.
     """
-    from mcap.exceptions import InvalidMagic
-    from mcap.records import Channel, Message, Metadata
-    from mcap.stream_reader import StreamReader
-
-    metadata: dict[str, str] | None = None
-    topics: dict[int, str] = {}
-    entries: list[Entry] = []
-    cut = ""
-    try:
-        with path.open("rb") as stream:
-            try:
-                for record in StreamReader(stream, validate_crcs=True).records:
-                    if isinstance(record, Message):
-                        topic = topics[record.channel_id]
-                        entries.append(Entry(topic, record.data, record.log_time, record.publish_time))
-                    elif isinstance(record, Channel):
-                        topics[record.id] = record.topic
-                    elif isinstance(record, Metadata) and record.name == METADATA:
-                        metadata = dict(record.metadata)
-            except InvalidMagic:
-                if stream.tell() <= 8:
-                    raise RecordingError(f"{path}: not an MCAP file") from None
-                cut = "its last bytes are not MCAP's"
-            except Exception as error:  # a torn end looks like anything: no end of file, bad CRC, zstd's own
-                cut = f"it was cut off ({type(error).__name__})"
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from None
-    if metadata is None:
-        raise RecordingError(f"{path}: not a recording of tandem, or cut off at its very beginning")
-    return Recording(metadata, entries, cut)
+    stream = RecordingStream(path)
+    entries = list(stream)
+    return Recording(stream.metadata or {}, entries, stream.cut)

@@ -1,0 +1,138 @@
+"""Hears one robot's topics and puts them into a recording, as they came: bytes and time of arrival."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from common.clock import monotonic_ns, to_s
+from common.config import LinkConfig
+from common.errors import TandemError
+from common.launch import WriteFigures
+from common.link import Link, open_link
+from common.recording import Recorder
+from common.runtime import until_stopped
+from common.topics import COMMAND, STATE, STATISTICS, Topic, video
+
+LIVE = (COMMAND, STATE, STATISTICS)
+"""What is always recorded."""
+TELL_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class RecordOptions:
+    """What the command line chose."""
+
+    link: LinkConfig
+    robot: str
+    out: Path
+    cameras: tuple[str, ...] = ()
+    seconds: float | None = None
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """The topics to hear; a camera's is named after it."""
+        return (*LIVE, *map(video, self.cameras))
+
+    def name(self, topic: Topic) -> str:
+        """What a topic is called in the file: its key."""
+        return topic.key_for(self.robot)
+
+
+@dataclass(slots=True)
+class Taken:
+    """What has been heard since the start, by topic name."""
+
+    since_ns: int
+    counts: dict[str, int] = field(default_factory=dict)
+    size: int = 0
+    """Bytes handed to the recording."""
+
+    def words(self, recorder: Recorder, now_ns: int) -> str:
+        """One line for people."""
+        elapsed_s = max(1e-3, to_s(now_ns - self.since_ns))
+        rates = ", ".join(f"{name} {count / elapsed_s:.1f} Hz" for name, count in self.counts.items())
+        line = f"{elapsed_s:6.1f} s: {rates or 'nothing is heard yet'}, {self.size / 1e6:.1f} MB"
+        return f"{line}; NOT WRITTEN: {recorder.counters.failed}" if recorder.counters.failed else line
+
+
+async def record(
+    options: RecordOptions,
+    stop: asyncio.Event,
+    tell: Callable[[str], None],
+    write_figures: WriteFigures = lambda _: None,
+) -> str:
+    """Record until `stop` is set or the time is over; what was recorded, in words.
+
+    A disk that fails ends the writing, is said once, and is counted; hearing goes on. Raises LinkError and
+    RecordingError where it cannot start, TandemError in the end where the recording is not whole or empty.
+    """
+    metadata = {
+        "robot": options.robot,
+        "topics": " ".join(options.name(topic) for topic in options.topics),
+        "payload": "msgpack, see common/codec.py",
+        "connect": " ".join([*options.link.connect, *options.link.listen]),
+    }
+    recorder = Recorder(options.out, metadata)
+    taken = Taken(monotonic_ns())
+    link: Link | None = None
+    try:
+        async with open_link(options.link, options.robot) as link:
+            for topic in options.topics:
+                link.subscribe(topic, partial(_take, recorder, taken, options.name(topic), topic.name))
+            await until_stopped(stop, _wait(options.seconds, lambda: _tell(recorder, taken, tell)))
+    finally:
+        await asyncio.to_thread(recorder.close)
+        overwritten = _overwritten(link)
+        write_figures({"recorded": dict(taken.counts), **recorder.summary(), "overwritten": overwritten})
+    _check(options, recorder, taken)
+    said = f"{options.out}: {taken.words(recorder, monotonic_ns()).strip()}"
+    if overwritten:
+        said += f"; {overwritten} came too fast to be taken one by one"
+    if COMMAND.name not in taken.counts:
+        said += "; no commands: connect to where the master listens too"
+    return said
+
+
+def _take(recorder: Recorder, taken: Taken, key: str, name: str, payload: bytes, arrived_ns: int) -> None:
+    taken.counts[name] = taken.counts.get(name, 0) + 1
+    if recorder.put(key, payload, arrived_ns):
+        taken.size += len(payload)
+
+
+async def _wait(seconds: float | None, each: Callable[[], None]) -> None:
+    loop = asyncio.get_running_loop()
+    end_s = None if seconds is None else loop.time() + seconds
+    while end_s is None or loop.time() < end_s:
+        each()
+        await asyncio.sleep(TELL_S if end_s is None else max(0.0, min(TELL_S, end_s - loop.time())))
+
+
+def _tell(recorder: Recorder, taken: Taken, tell: Callable[[str], None]) -> None:
+    tell(f"recording, {taken.words(recorder, monotonic_ns())} (Ctrl-C ends it)")
+
+
+def _overwritten(link: Link | None) -> int:
+    return 0 if link is None else sum(c["overwritten"] for c in link.counters().values())
+
+
+def _check(options: RecordOptions, recorder: Recorder, taken: Taken) -> None:
+    counters = recorder.counters
+    if counters.failed:
+        raise TandemError(
+            f"{options.out}: the recording ended early: {counters.failed}; {counters.written} messages are "
+            f"in it and can be read, {counters.refused + counters.lost} are not. Make room and record again"
+        )
+    if counters.refused + counters.lost:
+        raise TandemError(
+            f"{options.out}: the disk was too slow for {counters.refused + counters.lost} of {counters.put} "
+            "messages; they are missing"
+        )
+    if not taken.counts:
+        raise TandemError(
+            f"{options.out}: nothing was heard of {options.robot}: is it running, is that its name, and does "
+            f"somebody listen at {', '.join(options.link.connect) or 'no endpoint'}?"
+        )
