@@ -5,43 +5,16 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo
+from pydantic import ValidationError
 
-from common.endpoint import check_endpoint
 from common.errors import NOT_SET, ConfigError, ConfigMistake
+from common.link_config import LinkConfig
+from common.section import RelativePath, Section
 
+__all__ = ["LinkConfig", "Model", "RelativePath", "Section", "check_config", "load_config"]
 
-class Section(BaseModel):
-    """Base of every part of a configuration: frozen, strict, unknown keys are mistakes."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-    def mistakes(self) -> list[ConfigMistake]:
-        """What no single key can tell: contradictions between keys. Asked once all keys are well formed."""
-        return []
-
-
-Endpoint = Annotated[str, AfterValidator(check_endpoint)]
-
-
-class LinkConfig(Section):
-    """`[link]`: Zenoh endpoints, such as `tcp/192.168.7.2:7447`, `udp/…`, `ws/…`, `unixsock-stream/…`."""
-
-    listen: list[Endpoint] = []
-    """Where other sessions may connect to this one."""
-    connect: list[Endpoint] = []
-    """Which sessions to connect to; they may start later, or again."""
-
-
-def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
-    folder: Path = (info.context or {}).get("folder", Path())
-    return folder / path
-
-
-RelativePath = Annotated[Path, Field(strict=False), AfterValidator(_beside_the_file)]
-"""A path that is relative to the configuration file that names it."""
 
 Model = TypeVar("Model", bound=Section)
 

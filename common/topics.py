@@ -11,6 +11,8 @@ class Priority(StrEnum):
 
     REAL_TIME = "real_time"
     INTERACTIVE_HIGH = "interactive_high"
+    INTERACTIVE_LOW = "interactive_low"
+    DATA_HIGH = "data_high"
     DATA = "data"
     DATA_LOW = "data_low"
     BACKGROUND = "background"
@@ -37,6 +39,15 @@ class Topic:
         """The key of one robot."""
         return self.key.format(robot=robot)
 
+    def with_quality(self, reliable: bool | None, priority: Priority | None, express: bool | None) -> Topic:
+        """The same topic, travelling otherwise where a value is given."""
+        return replace(
+            self,
+            reliable=self.reliable if reliable is None else reliable,
+            priority=self.priority if priority is None else priority,
+            express=self.express if express is None else express,
+        )
+
 
 COMMAND = Topic("command", "tandem/{robot}/command", 12.5, 0.2, Priority.REAL_TIME, False, True, True)
 STATE = Topic("state", "tandem/{robot}/state", 50.0, 0.2, Priority.INTERACTIVE_HIGH, False, True, True)
@@ -48,6 +59,8 @@ VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUN
 TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
 
 TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, CLOCK, STATISTICS, ALIVE, VIDEO, TRUTH)}
+QUESTIONS = (CONTROL.name, CLOCK.name)
+"""Topics that are asked and answered; all others are published."""
 
 VIDEO_NAME = r"^[A-Za-z0-9_-]{1,32}$"
 """What a camera may be called."""

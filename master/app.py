@@ -123,6 +123,11 @@ class Master:
 
 async def run(config: MasterConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
     """Run a master until `stop` is set. Raises BusError or LinkError when it cannot start."""
+    await until_stopped(stop, _run(config, write_figures))
+    log.info("stopped")
+
+
+async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
     take_priority(config.process)  # first, so that every thread has it
     async with open_session(config.link) as session:
         master = Master(config, session)
@@ -131,7 +136,6 @@ async def run(config: MasterConfig, stop: asyncio.Event, write_figures: WriteFig
         log.info("%s: %d nodes polled, commands go to %s", robots, len(config.nodes), where)
         freeze_heap()  # now that all is built: a full collection took 80 ms
         try:
-            await until_stopped(stop, master.run())
+            await master.run()
         finally:
             write_figures(master.figures())
-    log.info("stopped")

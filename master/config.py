@@ -81,6 +81,7 @@ class MasterConfig(Section):
             *wiring_mistakes(self.nodes, self.capture.buses, "capture.buses"),
             *node_mistakes(self.nodes, skeleton),
             *self.estimation.mistakes_at(self.capture.rate_hz),
+            *self.link.mistakes(),
         ]
 
     def _robot_mistakes(self) -> list[ConfigMistake]:

@@ -147,6 +147,11 @@ class Slave:
 
 async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
     """Run a slave until `stop` is set; the servos are left holding. Raises LinkError or RobotError."""
+    await until_stopped(stop, _run(config, write_figures))
+    log.info("stopped; the servos hold")
+
+
+async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
     take_priority(config.process)  # first, so that every thread has it
     servos = open_servos(config.servos, config.skeleton, config.encoders)
     base = open_base(config.base)
@@ -162,11 +167,10 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
             # last: drives on a bus stop by themselves when they miss the loop's ticks
             servos.start()
             try:
-                await until_stopped(stop, slave.run())
+                await slave.run()
             finally:
                 write_figures(slave.figures())
     finally:
         servos.stop()
         if base is not None:
             base.stop()
-    log.info("stopped; the servos hold")

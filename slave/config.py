@@ -56,4 +56,5 @@ class SlaveConfig(Section):
             *self.encoders.mistakes_for(skeleton),
             *self.servos.mistakes_for(skeleton, self.encoders),
             *self.base.mistakes(),
+            *self.link.mistakes(),
         ]

@@ -5,19 +5,53 @@ from __future__ import annotations
 from typing import Any
 
 from common.config import LinkConfig
+from common.endpoint import for_zenoh
+from common.link.access import access_control
+from common.link_config import TlsConfig
+
+ROUTER_TIMEOUT_MS = 1000
+"""How long a client tries one router before it tries the next."""
 
 
-def zenoh_configuration(config: LinkConfig) -> dict[str, Any]:
-    """The configuration of a session that listens and connects only where it is told to."""
+def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, Any]:
+    """The configuration of a session that listens and connects only where it is told to.
+
+    `mode` in place of the configuration's own: `router`, which no master or slave is.
+    """
+    settings = _endpoints_and_timing(config, mode or config.mode)
+    if config.tls is not None:
+        settings["transport"]["link"] |= {"protocols": ["tls", "quic"], "tls": _tls(config.tls)}
+    if config.access is not None:
+        settings["access_control"] = access_control(config.access)
+    return settings
+
+
+def _tls(tls: TlsConfig) -> dict[str, Any]:
+    # the same block serves quic; both sides show a certificate, whoever connects
+    certificate, key = str(tls.certificate), str(tls.key)
     return {
-        "mode": "peer",
+        "root_ca_certificate": str(tls.ca),
+        "enable_mtls": True,
+        "verify_name_on_connect": True,
+        "close_link_on_expiration": True,
+        "listen_certificate": certificate,
+        "listen_private_key": key,
+        "connect_certificate": certificate,
+        "connect_private_key": key,
+    }
+
+
+def _endpoints_and_timing(config: LinkConfig, mode: str) -> dict[str, Any]:
+    return {
+        "mode": mode,
         # nothing is found by chance: endpoints are explicit
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         # told explicitly even where empty: by default a peer listens on every interface
-        "listen": {"endpoints": config.listen},
+        "listen": {"endpoints": [for_zenoh(end) for end in config.listen]},
         "connect": {
-            "endpoints": config.connect,
-            "timeout_ms": -1,
+            "endpoints": [for_zenoh(end) for end in config.connect],
+            # a client waits for its router itself, and tries each: see session
+            "timeout_ms": ROUTER_TIMEOUT_MS if mode == "client" else -1,
             "exit_on_failure": False,  # the other side may start later, or again
             "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
         },

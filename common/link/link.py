@@ -14,7 +14,7 @@ from common.clock import monotonic_ns
 from common.link.counters import TopicCounters
 from common.link.inbox import Inbox, wake
 from common.link.queries import Answerer, ask
-from common.link.waiting import wait_for_peer
+from common.link.waiting import count_peers, wait_for_peer
 from common.throttle import Throttle
 from common.topics import ALIVE, Topic
 
@@ -30,8 +30,16 @@ class Link:
     a late subscriber.
     """
 
-    def __init__(self, session: zenoh.Session, robot: str, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        robot: str,
+        loop: asyncio.AbstractEventLoop,
+        quality: Callable[[Topic], Topic] = lambda topic: topic,
+    ) -> None:
+        """`quality`: the topic as it shall travel on this link."""
         self.robot = robot
+        self._quality = quality
         self._session = session
         self._loop = loop
         self._counters: dict[str, TopicCounters] = {}
@@ -44,6 +52,7 @@ class Link:
         """A function that puts a payload on the topic. It never blocks and never raises: failures count."""
         if not topic.drop:
             raise ValueError(f"{topic.name} would block under congestion, and stall the loop")
+        topic = self._quality(topic)
         counters = self._count(topic)
         throttle = Throttle()
         publisher = self._session.declare_publisher(
@@ -84,7 +93,7 @@ class Link:
         An exception in the handler is counted, logged, and sent as an error's text to who asked.
         """
         key = topic.key_for(self.robot)
-        answerer = Answerer(key, handler, self._loop, self._count(topic))
+        answerer = Answerer(key, handler, self._loop, self._count(topic), self._quality(topic).express)
         self._receivers.append(answerer)
         self._held.append(
             self._session.declare_queryable(key, Callback(answerer.on_query, indirect=False), complete=True)
@@ -104,6 +113,7 @@ class Link:
 
     async def ask_stamped(self, topic: Topic, payload: bytes) -> tuple[bytes, int]:
         """As `ask`, with the answer's arrival in ns, stamped in Zenoh's thread."""
+        topic = self._quality(topic)
         return await ask(self._session, topic, topic.key_for(self.robot), payload, self._count(topic))
 
     def declare_alive(self, role: str) -> None:
@@ -144,7 +154,7 @@ class Link:
     @property
     def peers(self) -> int:
         """How many sessions this one is connected to now."""
-        return 0 if self._closed else len(self._session.info.peers_zid())
+        return 0 if self._closed else count_peers(self._session)
 
     def close(self) -> None:
         """Hear and answer nothing from now on. The session stays open for the other robots' links."""

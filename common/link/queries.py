@@ -33,7 +33,9 @@ class Answerer:
         handler: Callable[[bytes, int], bytes],
         loop: asyncio.AbstractEventLoop,
         counters: TopicCounters,
+        express: bool = True,
     ) -> None:
+        self._express = express
         self._key = key
         self._handler = handler
         self._loop = loop
@@ -82,7 +84,7 @@ class Answerer:
                 log.exception("handler of %s failed", self._key)
             query.reply_err(f"{type(error).__name__}: {error}")
             return
-        query.reply(self._key, reply, express=True)
+        query.reply(self._key, reply, express=self._express)
         self._counters.answered += 1
 
 

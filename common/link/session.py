@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 import re
 import threading
@@ -15,14 +14,15 @@ from zenoh.handlers import Callback
 
 from common.config import LinkConfig
 from common.errors import LinkError
-from common.link.configuration import zenoh_configuration
+from common.link.certificates import check_keys
 from common.link.inbox import wake
 from common.link.link import Link
-from common.topics import ALIVE
+from common.link.opening import open_zenoh
+from common.link.waiting import count_peers
+from common.topics import ALIVE, Topic
 
 CLOSE_TIMEOUT_S = 1.0
 _ROBOT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
-_RUST_PLACE = re.compile(r" at \S+\.rs:\d+\.?")
 
 log = logging.getLogger(__name__)
 
@@ -32,12 +32,9 @@ async def open_session(config: LinkConfig) -> AsyncIterator[Session]:
     """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later."""
     if not (config.listen or config.connect):
         raise LinkError("the link has no endpoint: set `listen` or `connect` under [link]")
-    try:
-        settings = zenoh.Config.from_json5(json.dumps(zenoh_configuration(config)))
-        opened = await asyncio.to_thread(zenoh.open, settings)
-    except zenoh.ZError as error:
-        raise LinkError(f"the link cannot be opened: {_RUST_PLACE.sub('', str(error))}") from None
-    session = Session(opened, asyncio.get_running_loop())
+    check_keys(config)
+    opened = await open_zenoh(config)
+    session = Session(opened, asyncio.get_running_loop(), config.quality)
     try:
         yield session
     finally:
@@ -61,7 +58,13 @@ def check_robot_name(robot: str) -> None:
 class Session:
     """One Zenoh session. `link(robot)` gives the topics of a robot; all links end with the session."""
 
-    def __init__(self, session: zenoh.Session, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        loop: asyncio.AbstractEventLoop,
+        quality: Callable[[Topic], Topic] = lambda topic: topic,
+    ) -> None:
+        self._quality = quality
         self._session = session
         self._loop = loop
         self._links: dict[str, Link] = {}
@@ -72,7 +75,7 @@ class Session:
         """The link of that robot, the same one each time. Raises LinkError for a name that is none."""
         check_robot_name(robot)
         if robot not in self._links:
-            self._links[robot] = Link(self._session, robot, self._loop)
+            self._links[robot] = Link(self._session, robot, self._loop, self._quality)
         return self._links[robot]
 
     def watch_robots(self, on_change: Callable[[str, bool], None]) -> None:
@@ -95,7 +98,7 @@ class Session:
     @property
     def peers(self) -> int:
         """How many sessions this one is connected to now."""
-        return 0 if self._closed else len(self._session.info.peers_zid())
+        return 0 if self._closed else count_peers(self._session)
 
     async def close(self, timeout_s: float = CLOSE_TIMEOUT_S) -> bool:
         """Close the session; False if it did not close in time, and was left to itself.

@@ -11,6 +11,11 @@ from common.errors import LinkTimeoutError
 from common.link.inbox import wake
 
 
+def count_peers(session: zenoh.Session) -> int:
+    """How many sessions this one is connected to now, routers among them."""
+    return len(session.info.peers_zid()) + len(session.info.routers_zid())
+
+
 async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: float) -> None:
     """Until another session is connected and, where a key is given, one that answers it.
 

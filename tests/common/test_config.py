@@ -58,8 +58,8 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
         ("robot = 'r'\nnodes = [{id = 4}, {id = 4}]", "nodes = [4, 4]: expected each id once"),
         (
             "robot = 'r'\n[link]\nconnect = ['tpc/1.2.3.4:7447']",
-            "link.connect.0 = 'tpc/1.2.3.4:7447': expected a protocol out of tcp, udp, tls, quic, ws, "
-            "unixsock-stream, such as tcp/192.168.7.2:7447",
+            "link.connect.0 = 'tpc/1.2.3.4:7447': expected a protocol out of tcp, udp, tls, quic, "
+            "quic-datagram, ws, unixsock-stream, such as tcp/192.168.7.2:7447",
         ),
     ],
 )

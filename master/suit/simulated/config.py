@@ -66,7 +66,7 @@ class SuitConfig(Section):
 
     def mistakes(self) -> list[ConfigMistake]:
         """Names that nothing has, ids used twice, quaternions that are no rotation."""
-        mistakes = wiring_mistakes(self.nodes, self.buses, "buses")
+        mistakes = wiring_mistakes(self.nodes, self.buses, "buses") + self.link.mistakes()
         for name, q in self.mounting.items():
             if not abs(math.hypot(*q) - 1.0) < 1e-3:
                 mistakes.append(ConfigMistake(f"mounting.{name}", q, "a quaternion (wxyz) of length 1"))

@@ -1,0 +1,109 @@
+"""`[link.access]` as Zenoh's access control: every message is refused but those that somebody may send. Pure.
+
+A rule's flow is seen from here: `ingress` comes from the subject, `egress` goes to it. Whoever may publish a
+key is also told who listens to it, or it would send nothing. Subjects are certificates' common names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from common.link_config import AccessConfig
+from common.roles import Role, common_name
+from common.topics import ALIVE, CLOCK, COMMAND, CONTROL, STATE, STATISTICS, TRUTH, VIDEO, Topic
+
+HEARD = (COMMAND, STATE, STATISTICS, TRUTH)
+"""What an observer of a robot hears; `viewers` and operators see the video too."""
+_WAYS = {
+    "publish": ((("put", "delete"), "ingress"), (("declare_subscriber",), "egress")),
+    "hear": ((("declare_subscriber",), "ingress"), (("put", "delete"), "egress")),
+    "ask": ((("query",), "ingress"), (("declare_queryable", "reply"), "egress")),
+    "answer": ((("declare_queryable", "reply"), "ingress"), (("query",), "egress")),
+    "live": ((("liveliness_token",), "ingress"),),
+    "watch": (
+        (("declare_liveliness_subscriber", "liveliness_query"), "ingress"),
+        (("liveliness_token",), "egress"),
+    ),
+    "watched": ((("declare_liveliness_subscriber", "liveliness_query"), "egress"),),
+}
+"""What somebody may do with a key, as Zenoh's messages and their direction."""
+_ALL = ("publish", "hear", "ask", "answer", "live", "watch", "watched")
+
+
+def access_control(access: AccessConfig) -> dict[str, Any]:
+    """Zenoh's `access_control`: rules, subjects and policies of everybody who is named."""
+    table = _Table()
+    for router in access.routers:
+        table.allow([common_name(Role.ROUTER, router)], _ALL, ["tandem/**"])
+    for robot in access.robots:
+        _robot(table, access, robot)
+    everyone = sorted(table.subjects)
+    # presence is no secret among those who have a certificate, nor is the way to stop a robot
+    table.allow(everyone, ("watch", "watched"), [_alive("*", "*")])
+    table.allow(everyone, ("ask",), [CONTROL.key_for("*")])
+    return table.zenoh()
+
+
+def _robot(table: _Table, access: AccessConfig, robot: str) -> None:
+    me = [common_name(Role.ROBOT, robot)]
+    operators = _named(Role.OPERATOR, access.operators, robot)
+    viewers = _named(Role.OBSERVER, access.viewers, robot)
+    observers = _named(Role.OBSERVER, access.observers, robot)
+    video = _key(VIDEO, robot).rpartition("/")[0] + "/*"
+    table.allow(me, ("publish",), [_key(STATE, robot), _key(STATISTICS, robot), video])
+    table.allow(me, ("hear",), [_key(COMMAND, robot)])
+    table.allow(me, ("answer",), [_key(CONTROL, robot), _key(CLOCK, robot)])
+    table.allow(me, ("live",), [_alive(robot, "slave")])
+    table.allow(operators, ("publish",), [_key(COMMAND, robot), _key(STATISTICS, robot), _key(TRUTH, robot)])
+    table.allow(operators, ("hear",), [*(_key(topic, robot) for topic in HEARD), video])
+    table.allow(operators, ("ask",), [_key(CLOCK, robot)])
+    table.allow(operators, ("live",), [_alive(robot, "master")])
+    table.allow([*observers, *viewers], ("hear",), [_key(topic, robot) for topic in HEARD])
+    table.allow(viewers, ("hear",), [video])
+
+
+def _named(role: Role, table: dict[str, list[str]], robot: str) -> list[str]:
+    return [common_name(role, name) for name, robots in table.items() if robot in robots]
+
+
+def _key(topic: Topic, robot: str) -> str:
+    return topic.key_for(robot)
+
+
+def _alive(robot: str, role: str) -> str:
+    return f"{ALIVE.key_for(robot)}/{role}"
+
+
+class _Table:
+    """Rules as they are allowed, each with those to whom it applies."""
+
+    def __init__(self) -> None:
+        self.subjects: set[str] = set()
+        self._rules: list[dict[str, Any]] = []
+        self._applies: list[list[str]] = []
+
+    def allow(self, names: Iterable[str], ways: Iterable[str], keys: list[str]) -> None:
+        names = list(names)
+        if not names:
+            return
+        self.subjects.update(names)
+        for way in ways:
+            for messages, flow in _WAYS[way]:
+                self._rules.append({
+                    "id": f"{len(self._rules)}-{way}-{flow}", "permission": "allow", "flows": [flow],
+                    "messages": list(messages), "key_exprs": keys,
+                })  # fmt: skip
+                self._applies.append(names)
+
+    def zenoh(self) -> dict[str, Any]:
+        return {
+            "enabled": True,
+            "default_permission": "deny",
+            "rules": self._rules,
+            "subjects": [{"id": name, "cert_common_names": [name]} for name in sorted(self.subjects)],
+            "policies": [
+                {"rules": [rule["id"]], "subjects": names}
+                for rule, names in zip(self._rules, self._applies, strict=True)
+            ],
+        }

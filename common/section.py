@@ -1,0 +1,29 @@
+"""What every part of a configuration is made of: a strict model, and paths beside their file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
+
+from common.errors import ConfigMistake
+
+
+class Section(BaseModel):
+    """Base of every part of a configuration: frozen, strict, unknown keys are mistakes."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """What no single key can tell: contradictions between keys. Asked once all keys are well formed."""
+        return []
+
+
+def _beside_the_file(path: Path, info: ValidationInfo) -> Path:
+    folder: Path = (info.context or {}).get("folder", Path())
+    return folder / path
+
+
+RelativePath = Annotated[Path, Field(strict=False), AfterValidator(_beside_the_file)]
+"""A path that is relative to the configuration file that names it."""
