@@ -154,6 +154,35 @@ def verdict_table(title: str, verdicts: Iterable[Verdict]) -> RenderableType:
     return table
 
 
+def ticks_text(ours: Mapping[str, Mapping[str, int]], host: Mapping[str, Any]) -> RenderableType:
+    """Ticks that our loops missed beside those of a loop that does nothing else, from a report's `host`."""
+    missed = ", ".join(f"{name} {_missed(ticks)}" for name, ticks in ours.items())
+    if not host:
+        return Text(f"ticks missed: {missed}; the host itself was not measured", "dim")
+    first = "" if host["priority"] else " (without real-time priority: beside our own load)"
+    return Text(
+        f"ticks missed: {missed}; by the host itself, of a bare loop{first}: {_missed(host['ticks'])}, "
+        f"still for {host['longest_ms']:.0f} ms at most, {host['steal_percent']:.1f} % of its time stolen",
+        "dim",
+    )
+
+
+def holds_text(holds: Iterable[Mapping[str, Any]]) -> RenderableType:
+    """Each time a robot held by itself and was engaged again, from a report's `holds`."""
+    lines = [
+        f"{row['robot']} held at {row['at_s']:.1f} s for "
+        f"{_number(row['lasted_s'], 1)} s: {row['reason']} (host stood still for {row['host_still_ms']} ms)"
+        for row in holds
+    ]
+    if not lines:
+        return Text("the robot never held by itself", "dim")
+    return Text("\n".join(lines), "yellow")
+
+
+def _missed(ticks: Mapping[str, int]) -> str:
+    return f"{ticks.get('missed', UNKNOWN)} of {ticks.get('expected', UNKNOWN)}"
+
+
 _BENCH_ROWS = (
     ("loop lateness, idle, µs", ("loop", "idle", "late_us")),
     ("loop lateness, busy core, µs", ("loop", "busy", "late_us")),

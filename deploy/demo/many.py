@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,15 +12,14 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from common.clock import monotonic_ns, to_ns
-from common.errors import LinkTimeoutError, TandemError
-from common.messages import Action
+from common.clock import monotonic_ns
+from common.errors import TandemError
 from deploy.demo.many_report import ManyReport, make_many_report, many_table
-from deploy.demo.run import ALIGN_S, HOLD_S, START_S, DemoOptions, check
-from deploy.rig.rig import Rig, at_most, open_rig
-
-AGREE_S = 10.0
-BECOMES = {Action.ENGAGE: ("align", "track"), Action.DISENGAGE: ("hold",)}
+from deploy.demo.report import Seen
+from deploy.demo.run import START_S, DemoOptions, check
+from deploy.demo.tend import Tending
+from deploy.rig.host import watch_host
+from deploy.rig.rig import Rig, open_rig
 
 
 async def show_many(
@@ -43,7 +41,7 @@ def _write(path: Path, result: ManyReport) -> None:
 
 
 async def run_many(options: DemoOptions, robots: int, stop: asyncio.Event, console: Console) -> ManyReport:
-    """Run it and judge it. Raises TandemError when a process fails or a robot never reaches `track`."""
+    """Run it and judge it. Raises TandemError when a process fails or does not become ready."""
     check(options)
     try:
         return await _story(options, robots, stop, console)
@@ -58,9 +56,10 @@ async def _story(options: DemoOptions, robots: int, stop: asyncio.Event, console
     # robots have hosts of their own; here, with priority, they would starve who watches them
     overrides["slave"].append("process.realtime_priority=0")
     rigging = open_rig(options.transport, overrides, options.profile, robots)
-    async with rigging as rig:
+    async with watch_host() as host, rigging as rig:
         with Live(console=console, refresh_per_second=4, transient=True) as live:
             look = _look(rig, stop, live)
+            tending = Tending(rig, host, stop, look, lambda line: console.print(line, style="yellow"))
             for name in (*rig.slaves, "suit"):
                 await rig.start(name)
             everyone = rig.observers.values()
@@ -68,34 +67,14 @@ async def _story(options: DemoOptions, robots: int, stop: asyncio.Event, console
             await rig.until(lambda: all(o.state for o in everyone), start_s, "word from every robot", look)
             await rig.start("master")
             await rig.until(lambda: all(o.ready for o in everyone), start_s, "readiness of every robot", look)
-            await engage(rig)
-            await rig.until(lambda: all(o.guard == "track" for o in everyone), ALIGN_S, "track of all", look)
-            await _watch(rig, options.seconds, stop, look)
-            for robot in rig.observers:
-                await _must(rig, Action.DISENGAGE, robot)
-            await rig.until(lambda: all(o.guard == "hold" for o in everyone), HOLD_S, "hold of all", look)
-        return make_many_report(options, rig, await rig.stop())
-
-
-async def engage(rig: Rig) -> None:
-    """Engage each robot. Raises TandemError with the robot's words where one refuses."""
-    for robot in rig.observers:
-        await _must(rig, Action.ENGAGE, robot)
-
-
-async def _must(rig: Rig, action: Action, robot: str) -> None:
-    """Ask until it is so: a machine that is short of cores may be late, and its guards refuse rightly."""
-    said = "no answer"
-    deadline_ns = monotonic_ns() + to_ns(AGREE_S)
-    while monotonic_ns() < deadline_ns:
-        with suppress(LinkTimeoutError):
-            reply = await rig.control(action, robot=robot)
-            # an answer that came too late may have been a yes
-            if reply.done or reply.guard in BECOMES[action]:
-                return
-            said = reply.text
-        await asyncio.sleep(0.25)
-    raise TandemError(f"{robot}: {action} was refused for {AGREE_S:g} s: {said}")
+            await tending.until_all_track()
+            for child in rig.children.values():
+                child.measure(first=True)
+            await tending.watch(options.seconds)
+            if not tending.problem:
+                await tending.let_go()
+        seen = Seen(tending.rows(), host.figures(monotonic_ns()), tending.problem)
+        return make_many_report(options, rig, await rig.stop(), seen)
 
 
 def _look(rig: Rig, stop: asyncio.Event, live: Live) -> Callable[[], None]:
@@ -109,16 +88,3 @@ def _look(rig: Rig, stop: asyncio.Event, live: Live) -> Callable[[], None]:
         live.update(Text(guards))
 
     return look
-
-
-async def _watch(rig: Rig, seconds: float, stop: asyncio.Event, look: Callable[[], None]) -> None:
-    for child in rig.children.values():
-        child.measure(first=True)
-    for observer in rig.observers.values():
-        observer.recording = True
-    until_ns = monotonic_ns() + to_ns(seconds)
-    while monotonic_ns() < until_ns:
-        look()
-        await at_most(stop.wait(), 0.25)
-    for observer in rig.observers.values():
-        observer.recording = False

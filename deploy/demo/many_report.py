@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from deploy.demo.report import Seen
 from deploy.judge import TruthSeries, motion
 from deploy.rig.observer import Observer
 from deploy.rig.rig import Rig
-from deploy.tables import UNKNOWN, plain_table
+from deploy.tables import UNKNOWN, holds_text, plain_table, ticks_text
 
 if TYPE_CHECKING:
     from deploy.demo.run import DemoOptions
@@ -27,7 +28,9 @@ class ManyReport:
     problems: list[str] = field(default_factory=list)
 
 
-def make_many_report(options: DemoOptions, rig: Rig, statuses: Mapping[str, int | None]) -> ManyReport:
+def make_many_report(
+    options: DemoOptions, rig: Rig, statuses: Mapping[str, int | None], seen: Seen
+) -> ManyReport:
     """Judge a finished run from what was observed and what the processes counted."""
     problems = [f"{name} ended with status {status}" for name, status in statuses.items() if status != 0]
     truth = rig.observer.trace.truth()
@@ -36,8 +39,10 @@ def make_many_report(options: DemoOptions, rig: Rig, statuses: Mapping[str, int 
         for slave, (robot, observer) in zip(rig.slaves, rig.observers.items(), strict=True)
     }
     for robot, one in robots.items():
-        if one["in_track"] < 1.0:
-            problems.append(f"{robot} was in track for {one['in_track']:.0%} of the time only")
+        if one["in_track"] == 0.0:
+            problems.append(f"{robot} never reached track")
+    if seen.problem:
+        problems.append(seen.problem)
     master = rig.children["master"]
     counted = master.figures()
     tree = {
@@ -50,6 +55,8 @@ def make_many_report(options: DemoOptions, rig: Rig, statuses: Mapping[str, int 
             "robots": counted.get("robots", {}),
         },
         "robots": robots,
+        "host": seen.host,
+        "holds": seen.holds,
         "cpu_percent": {name: round(child.cpu_percent, 1) for name, child in rig.children.items()},
         "exit_status": dict(statuses),
         "problems": problems,
@@ -62,8 +69,10 @@ def _robot(observer: Observer, child: Child, truth: TruthSeries) -> dict[str, An
     guard = counted.get("guard", {})
     moved = motion(truth, observer.trace.moved(), observer.trace.joint_names)
     tracked = [state.guard == "track" for state in observer.states]
+    # the way to the operator's posture is none of it
+    since = tracked[tracked.index(True) :] if any(tracked) else []
     return {
-        "in_track": sum(tracked) / len(tracked) if tracked else 0.0,
+        "in_track": sum(since) / len(since) if since else 0.0,
         "ticks": counted.get("ticks", {}),
         "received": guard.get("received", 0),
         "accepted": guard.get("accepted", 0),
@@ -96,10 +105,13 @@ def many_table(tree: Mapping[str, Any]) -> RenderableType:
     master, ticks = tree["master"], tree["master"]["ticks"]
     put_ms = _number(master["frames_in_to_put_ms"].get("p99"), 2)
     text = (
-        f"master: {ticks.get('missed', UNKNOWN)} of {ticks.get('expected', UNKNOWN)} ticks missed, "
-        f"{master['cpu_percent']:.0f} % of a core, last frame in → put p99 {put_ms} ms; times in ms, p99"
+        f"master: {master['cpu_percent']:.0f} % of a core, last frame in → put p99 {put_ms} ms; "
+        "times in ms, p99"
     )
-    return Group(table, Text(text, "dim"))
+    ours = {robot: one["ticks"] for robot, one in tree["robots"].items()}
+    slowest = max(ours, key=lambda robot: int(ours[robot].get("missed", 0)), default="")
+    loops = {"master": ticks, **({slowest: ours[slowest]} if slowest else {})}
+    return Group(table, Text(text, "dim"), ticks_text(loops, tree["host"]), holds_text(tree["holds"]))
 
 
 def _number(value: float | None, digits: int) -> str:

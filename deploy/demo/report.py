@@ -30,6 +30,18 @@ REPLAYED = (
 
 
 @dataclass(frozen=True, slots=True)
+class Seen:
+    """What the operator and the bare loops saw."""
+
+    holds: list[dict[str, Any]] = field(default_factory=list)
+    """Each time the robot held by itself, as `operator.Operator.row` tells it."""
+    host: dict[str, Any] = field(default_factory=dict)
+    """What the host itself missed; {} where it was not measured."""
+    problem: str = ""
+    """Why the operator gave up, empty where he did not."""
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """Judged figures, and the JSON tree made of them."""
 
@@ -44,9 +56,12 @@ class Report:
     """Why the run counts as failed, empty where it does not."""
 
 
-def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None]) -> Report:
+def make_report(
+    options: DemoOptions, rig: Rig, statuses: dict[str, int | None], seen: Seen | None = None
+) -> Report:
     """Judge a finished run from what was observed and what the processes counted."""
     observer, children = rig.observer, rig.children.values()
+    seen = seen or Seen()
     names = observer.trace.joint_names
     skeleton = load_skeleton(options.profile)
     truth, solved, moved = observer.trace.truth(), observer.trace.solved(), observer.trace.moved()
@@ -62,6 +77,8 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
     problems += [f"{role} left no figures" for role in ("master", "slave") if not figures.get(role)]
     if "track" not in observer.guards_seen:
         problems.append("the robot never reached track")
+    if seen.problem:
+        problems.append(seen.problem)
     tree = {
         "options": {
             "profile": options.profile,
@@ -74,6 +91,8 @@ def make_report(options: DemoOptions, rig: Rig, statuses: dict[str, int | None])
             "servos": options.servos,
         },
         "ticks": master.get("ticks", {}),
+        "host": seen.host,
+        "holds": seen.holds,
         "commands": _commands(of_robot, slave),
         "stages_ms": slave.get("stages_ms", {}),
         "frames_in_to_put_ms": master.get("frames_in_to_put_ms", {}),

@@ -12,26 +12,23 @@ from typing import Literal
 from rich.console import Console
 from rich.live import Live
 
-from common.clock import monotonic_ns, to_ns
+from common.clock import monotonic_ns
 from common.config import load_config
 from common.errors import TandemError
-from common.messages import Action
 from common.skeleton import load_skeleton
 from deploy.demo.mounted import mount
-from deploy.demo.report import Report, make_report
+from deploy.demo.report import Report, Seen, make_report
+from deploy.demo.tend import Tending
 from deploy.demo.view import draw
 from deploy.profiles import NURSING, example
-from deploy.rig.rig import Rig, at_most, open_rig
+from deploy.rig.host import Host, watch_host
+from deploy.rig.rig import Rig, open_rig
 from master.config import MasterConfig
 from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig
 
 START_S = 30.0
 """Processes up, filters settled, clock trusted, lease held."""
-ALIGN_S = 20.0
-HOLD_S = 5.0
-LOST_S = 1.0
-"""Out of `track` for longer, the demo has failed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +67,7 @@ class DemoOptions:
 
 
 async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
-    """Run it and judge it. Raises TandemError when a process fails or the robot never reaches `track`."""
+    """Run it and judge it. Raises TandemError when a process fails or does not become ready."""
     try:
         return await _story(options, stop, console)
     except TandemError:
@@ -95,10 +92,12 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
         if options.replay is not None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-mounting-"))
             overrides["master"] += await _mount(options, options.replay, Path(folder), console)
+        host = await stack.enter_async_context(watch_host())
         rig = await stack.enter_async_context(open_rig(options.transport, overrides, options.profile))
         observer = rig.observer
         with Live(console=console, refresh_per_second=4, transient=True) as live:
-            show = _Show(rig, stop, live)
+            show = _Show(rig, host, stop, live)
+            tending = Tending(rig, host, stop, show.look, lambda line: console.print(line, style="yellow"))
             if "drives" in rig.children:
                 await rig.start("drives")
                 await rig.logged("drives", "drives on", START_S)
@@ -108,14 +107,13 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
             await rig.until(lambda: observer.state is not None, START_S, "word from the robot", show.look)
             await rig.start("master")
             await rig.until(lambda: observer.ready, START_S, "readiness", show.look)
-            await _must(rig, Action.ENGAGE)
-            observer.recording = True
-            await rig.until(lambda: observer.guard == "track", ALIGN_S, "track", show.look)
-            await show.watch(options.seconds)
-            observer.recording = False
-            await _must(rig, Action.DISENGAGE)
-            await rig.until(lambda: observer.guard == "hold", HOLD_S, "hold after disengaging", show.look)
-        return make_report(options, rig, await rig.stop())
+            await tending.until_all_track()
+            show.begin()
+            await tending.watch(options.seconds)
+            if not tending.problem:
+                await tending.let_go()
+        seen = Seen(tending.rows(), host.figures(monotonic_ns()), tending.problem)
+        return make_report(options, rig, await rig.stop(), seen)
 
 
 async def _mount(options: DemoOptions, replay: Path, folder: Path, console: Console) -> list[str]:
@@ -130,11 +128,18 @@ async def _mount(options: DemoOptions, replay: Path, folder: Path, console: Cons
 class _Show:
     """Keeps an eye on the processes, the operator's Ctrl-C and the screen."""
 
-    def __init__(self, rig: Rig, stop: asyncio.Event, live: Live) -> None:
+    def __init__(self, rig: Rig, host: Host, stop: asyncio.Event, live: Live) -> None:
         self._rig = rig
+        self._host = host
         self._stop = stop
         self._live = live
         self._began_ns = 0
+
+    def begin(self) -> None:
+        """From now on usage is measured and time is shown."""
+        for child in self._rig.children.values():
+            child.measure(first=True)
+        self._began_ns = monotonic_ns()
 
     def look(self) -> None:
         """Fail early, measure, and draw."""
@@ -144,24 +149,4 @@ class _Show:
             child.check()
             child.measure()
         elapsed_s = (monotonic_ns() - self._began_ns) / 1e9 if self._began_ns else 0.0
-        self._live.update(draw(self._rig, elapsed_s))
-
-    async def watch(self, seconds: float) -> None:
-        """Let it run while it tracks. Raises TandemError when the robot leaves `track` for good."""
-        for child in self._rig.children.values():
-            child.measure(first=True)
-        self._began_ns = tracked_ns = monotonic_ns()
-        while monotonic_ns() - self._began_ns < to_ns(seconds):
-            self.look()
-            if self._rig.observer.guard == "track":
-                tracked_ns = monotonic_ns()
-            elif monotonic_ns() - tracked_ns > to_ns(LOST_S):
-                state = self._rig.observer.state
-                raise TandemError(f"the robot left track: {state.reason if state else 'not heard'}")
-            await at_most(self._stop.wait(), 0.25)
-
-
-async def _must(rig: Rig, action: Action) -> None:
-    reply = await rig.control(action)
-    if not reply.done:
-        raise TandemError(f"{action} was refused: {reply.text}")
+        self._live.update(draw(self._rig, self._host.missed, elapsed_s))

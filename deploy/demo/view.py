@@ -12,18 +12,20 @@ from deploy.rig.rig import Rig
 from deploy.tables import (
     Live,
     accuracy_table,
+    holds_text,
     latency_table,
     live_view,
     motion_table,
     strategies_table,
     synergy_table,
+    ticks_text,
     verdict_table,
     video_table,
 )
 from deploy.targets import BY_PROFILE, verdicts
 
 
-def draw(rig: Rig, elapsed_s: float) -> RenderableType:
+def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
     """The live view of a running rig."""
     observer = rig.observer
     master = observer.statistics.get("master", {})
@@ -44,6 +46,7 @@ def draw(rig: Rig, elapsed_s: float) -> RenderableType:
             joint_error_deg=_errors_deg(rig),
             drops={
                 "ticks missed": master.get("ticks", {}).get("missed", 0),
+                "by the host": host_missed,
                 **slave.get("guard", {}).get("dropped", {}),
             },
         )
@@ -68,6 +71,8 @@ def print_report(report: Report, console: Console) -> None:
         console.print(strategies_table(report.comparison.as_run, report.comparison.replayed))
     if tree["synergies"]:
         console.print(synergy_table(tree["synergies"]))
+    console.print(ticks_text({"master": tree["ticks"], "robot": tree["slave_ticks"]}, tree["host"]))
+    console.print(holds_text(tree["holds"]))
     shown = None if report.curves is None else in_terminal(report.curves)
     if shown is not None:
         console.print(shown)

@@ -11,12 +11,14 @@ from rich.console import Console
 
 from common.messages import RobotState
 from deploy.demo.many_report import ManyReport, make_many_report, many_table
+from deploy.demo.report import Seen
 from deploy.demo.run import DemoOptions
 from deploy.judge import Trace
 from deploy.rig.rig import Rig, robot_name, slave_name
 
 JOINTS = ("left_elbow_pitch",)
 ROBOTS = 8
+HELD = {"robot": "robot-3", "at_s": 2.0, "reason": "no encoder", "lasted_s": 1.0, "host_still_ms": 140}
 COUNTED: dict[str, Any] = {
     "ticks": {"expected": 4000, "missed": 3},
     "guard": {"received": 150, "accepted": 140, "dropped": {"lease": 10}},
@@ -30,14 +32,18 @@ def state(guard: str) -> RobotState:
     return RobotState("r", 1, 1, 1, guard, "", "nurse-1", valid, zeros, zeros, None, 0, 1)
 
 
-def report(lost_by: int = 0, ended: dict[str, int] | None = None) -> ManyReport:
-    """Of a run in which one robot was in `track` for half of the time only."""
+def report(lost_by: int = 0, ended: dict[str, int] | None = None, problem: str = "") -> ManyReport:
+    """Of a run in which robot 1 was engaged first, and one robot was in `track` for half of the time only."""
 
     def child(counted: dict[str, Any]) -> SimpleNamespace:
         return SimpleNamespace(figures=lambda: counted, cpu_percent=12.34, rss_mb=98.76)
 
     def observer(number: int) -> SimpleNamespace:
         guards = ["track"] * 100 if number != lost_by else ["track", "hold"] * 50
+        if number == -lost_by:
+            guards = ["hold"] * 100
+        if number == 1:
+            guards = ["hold"] * 50 + guards
         return SimpleNamespace(trace=Trace(JOINTS), states=[state(guard) for guard in guards])
 
     numbers = range(1, ROBOTS + 1)
@@ -48,7 +54,7 @@ def report(lost_by: int = 0, ended: dict[str, int] | None = None) -> ManyReport:
         slaves=slaves, observers=observers, observer=observers["robot-1"], children=children
     )
     statuses = dict.fromkeys(children, 0) | (ended or {})
-    return make_many_report(DemoOptions(), cast(Rig, rig), statuses)
+    return make_many_report(DemoOptions(), cast(Rig, rig), statuses, Seen([HELD], {}, problem))
 
 
 def test_each_robot_has_its_own_figures() -> None:
@@ -60,12 +66,20 @@ def test_each_robot_has_its_own_figures() -> None:
     assert made.tree["cpu_percent"]["slave-8"] == 12.3
 
 
-def test_a_robot_that_left_track_and_a_process_that_failed_are_named() -> None:
-    made = report(lost_by=3, ended={"slave-5": 1})
-    assert made.problems == [
-        "slave-5 ended with status 1",
-        "robot-3 was in track for 50% of the time only",
-    ]
+def test_a_process_that_failed_a_robot_that_never_tracked_and_why_it_was_given_up_are_named() -> None:
+    made = report(lost_by=3, ended={"slave-5": 1}, problem="robot-3 held 3 times within 20 s")
+    assert made.problems == ["slave-5 ended with status 1", "robot-3 held 3 times within 20 s"]
+    assert made.tree["robots"]["robot-3"]["in_track"] == 0.5
+    assert made.tree["holds"] == [HELD]
+
+
+def test_only_what_follows_the_first_tracking_counts_as_left() -> None:
+    robots = report().tree["robots"]
+    assert robots["robot-1"]["in_track"] == 1.0
+
+
+def test_a_robot_that_never_tracked_is_a_problem() -> None:
+    assert report(lost_by=-2).problems == ["robot-2 never reached track"]
 
 
 def test_the_table_has_a_row_each_and_fits() -> None:
@@ -73,6 +87,7 @@ def test_the_table_has_a_row_each_and_fits() -> None:
     Console(file=out, width=80).print(many_table(report(lost_by=3).tree))
     lines = out.getvalue().splitlines()
     assert max(map(len, lines)) <= 80
-    rows = {line.split()[0]: line.split()[1:] for line in lines if line.split()[:1] and "robot-" in line}
+    rows = {line.split()[0]: line.split()[1:] for line in lines if "robot-" in line and "%" in line}
     assert rows["robot-2"] == ["100%", "3", "4000", "12", "1.2", "30.5", "–", "–"]
     assert rows["robot-3"][0] == "50%"
+    assert "robot-3 held at 2.0 s for 1.0 s: no encoder" in out.getvalue()

@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from common.messages import Action
-from deploy.demo.report import Report, make_report
+from deploy.demo.report import Report, Seen, make_report
 from deploy.demo.run import DemoOptions
 from deploy.demo.view import print_report
 from deploy.judge import Trace
@@ -72,6 +72,8 @@ def text(report: Report) -> str:
 
 def test_a_good_run_has_no_problem_and_is_plain_json(report: Report) -> None:
     assert report.problems == []
+    assert "the robot never held by itself" in text(report)
+    assert "the host itself was not measured" in " ".join(text(report).split())
     assert json.loads(json.dumps(report.tree, allow_nan=False)) == report.tree
     predict = report.tree["motion_by_strategy"]["predict"]
     assert report.tree["motion_lag_ms"] == pytest.approx(predict["lag_ms"], abs=3.0)
@@ -109,12 +111,30 @@ def test_every_problem_is_named(tracked: VirtualRun) -> None:
     failed = rig(tracked, ["hold"])
     failed.observer.trace = Trace(tracked.trace.joint_names)
     cast(FakeChild, failed.children["slave"]).counted = {}
-    problems = make_report(DemoOptions(), failed, {**ENDED_WELL, "slave": -9}).problems
+    seen = Seen(problem="robot-1 held 3 times within 20 s")
+    problems = make_report(DemoOptions(), failed, {**ENDED_WELL, "slave": -9}, seen).problems
     assert problems == [
         "slave ended with status -9",
         "slave left no figures",
         "the robot never reached track",
+        "robot-1 held 3 times within 20 s",
     ]
+
+
+def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: VirtualRun) -> None:
+    host = {
+        "ticks": {"expected": 90, "missed": 40},
+        "longest_ms": 143.0,
+        "priority": True,
+        "steal_percent": 4.2,
+    }
+    row = {"robot": "robot-1", "at_s": 6.3, "reason": "no encoder", "lasted_s": 1.7, "host_still_ms": 143}
+    report = make_report(DemoOptions(), rig(tracked, ["track"]), ENDED_WELL, Seen([row], host))
+    assert (report.tree["holds"], report.tree["host"], report.problems) == ([row], host, [])
+    shown = " ".join(text(report).split())
+    assert "ticks missed: master 0 of 5, robot 0 of 5; by the host itself, of a bare loop: 40 of 90" in shown
+    assert "still for 143 ms at most, 4.2 % of its time stolen" in shown
+    assert "robot-1 held at 6.3 s for 1.7 s: no encoder (host stood still for 143 ms)" in shown
 
 
 def test_a_hand_s_report_has_its_five_joints_its_curves_and_paper_b_s_targets() -> None:

@@ -1,0 +1,63 @@
+"""A loop on each core that does nothing but tick, in a process of its own: what it misses, the host missed.
+
+`python -m deploy.rig.bare_loop` writes one JSON line when it starts and one for each time that it came late
+by a tick or more, and ends when its standard input does. At real-time priority, where the host permits it, it
+comes before all programs of ours: what it misses then is the host's alone.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+import time
+
+from common.clock import NS_PER_S, monotonic_ns
+from common.pacing import TickGrid
+
+PERIOD_NS = 5_000_000
+"""As the master's capture and the slave's loop."""
+PRIORITY = 90
+"""Above what `[process] realtime_priority` may ask for."""
+
+
+def main() -> None:
+    """Tick on every core until standard input ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for whoever started this one
+    first = _take_priority()
+    cores = sorted(os.sched_getaffinity(0))
+    origin_ns = monotonic_ns() + PERIOD_NS
+    _say({"cores": cores, "origin_ns": origin_ns, "priority": first})
+    for core in cores:
+        threading.Thread(target=_tick, args=(core, TickGrid(origin_ns, PERIOD_NS)), daemon=True).start()
+    sys.stdin.buffer.read()
+
+
+def _tick(core: int, grid: TickGrid) -> None:
+    os.sched_setaffinity(0, {core})
+    while True:
+        awaited_ns = grid.next_ns
+        time.sleep(max(0, awaited_ns - monotonic_ns()) / NS_PER_S)
+        now_ns = monotonic_ns()
+        due = grid.due(now_ns)
+        if due is not None and due.missed:
+            _say({"core": core, "from_ns": awaited_ns, "until_ns": now_ns, "missed": due.missed})
+
+
+def _take_priority() -> bool:
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except OSError:
+        return False
+    return True
+
+
+def _say(line: dict[str, object]) -> None:
+    sys.stdout.write(json.dumps(line) + "\n")  # one write: two threads' lines must not mix
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,66 @@
+"""What the bare loops tell of the host."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+
+import pytest
+
+from common.clock import NS_PER_MS, NS_PER_S, monotonic_ns
+from deploy.rig.bare_loop import PERIOD_NS
+from deploy.rig.host import Host, watch_host
+
+
+def told(*stalls: tuple[int, int, int]) -> Host:
+    """A host whose loops began at 1 s; `stalls` are of a core, from and until ms."""
+    host = Host()
+    host.hear(json.dumps({"cores": [0, 1], "origin_ns": NS_PER_S, "priority": True}))
+    for core, from_ms, until_ms in stalls:
+        span = {"from_ns": from_ms * NS_PER_MS, "until_ns": until_ms * NS_PER_MS}
+        host.hear(json.dumps({"core": core, "missed": (until_ms - from_ms) // 5, **span}))
+    return host
+
+
+@pytest.mark.parametrize(
+    ("since_ms", "until_ms", "still_ms"),
+    [
+        (1000, 3000, 300),
+        (1000, 2100, 100),
+        (2250, 3000, 50),
+        (2300, 3000, 0),
+        (1300, 2000, 0),
+        (1000, 1400, 40),
+    ],
+)
+def test_the_longest_of_any_core_counts_as_far_as_it_lies_within(
+    since_ms: int, until_ms: int, still_ms: int
+) -> None:
+    host = told((0, 1100, 1140), (1, 2000, 2300), (0, 1200, 1230))
+    assert host.stood_still_s(since_ms * NS_PER_MS, until_ms * NS_PER_MS) == pytest.approx(still_ms / 1e3)
+
+
+def test_figures_are_of_the_worst_core() -> None:
+    figures = told((0, 1100, 1140), (1, 2000, 2300), (0, 1200, 1230)).figures(3 * NS_PER_S)
+    assert figures["ticks"] == {"expected": 2 * NS_PER_S // PERIOD_NS, "missed": 60}
+    assert (figures["longest_ms"], figures["priority"]) == (300.0, True)
+
+
+def test_a_host_that_was_not_measured_excuses_nothing() -> None:
+    assert Host().figures(NS_PER_S) == {}
+    assert Host().stood_still_s(0, NS_PER_S) == 0.0
+
+
+@pytest.mark.hosts
+def test_real_loops_tick_on_every_core_and_end_with_the_block() -> None:
+    async def story() -> Host:
+        async with watch_host() as host:
+            assert host.began_ns
+            await asyncio.sleep(0.1)
+            assert host.figures(monotonic_ns())["ticks"]["expected"] > 0
+        return host
+
+    host = asyncio.run(story())
+    assert {stall.core for stall in host.stalls} <= os.sched_getaffinity(0)
+    assert all(stall.until_ns - stall.from_ns >= PERIOD_NS and stall.missed > 0 for stall in host.stalls)
