@@ -57,9 +57,10 @@ STATISTICS = Topic("statistics", "tandem/{robot}/statistics", 1.0, 5.0, Priority
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
 VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUND, False, True, False)
 TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
+FAULTS = Topic("faults", "tandem/{robot}/test/faults", 0.0, 1.0, Priority.DATA, True, True, False)
 
-TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, CLOCK, STATISTICS, ALIVE, VIDEO, TRUTH)}
-QUESTIONS = (CONTROL.name, CLOCK.name)
+TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, CLOCK, STATISTICS, ALIVE, VIDEO, TRUTH, FAULTS)}
+QUESTIONS = (CONTROL.name, CLOCK.name, FAULTS.name)
 """Topics that are asked and answered; all others are published."""
 
 VIDEO_NAME = r"^[A-Za-z0-9_-]{1,32}$"

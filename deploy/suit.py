@@ -1,19 +1,25 @@
-"""The simulated suit's process: answers on CAN, and tells the true joint angles to those who judge."""
+"""The simulated suit's process: answers on CAN, tells those who judge the truth, takes faults from them."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import tomllib
 from collections.abc import Callable
 from contextlib import AsyncExitStack
+from pathlib import Path
 
 from common.codec import encode
+from common.config import check_config
+from common.errors import ConfigError, ConfigMistake
 from common.launch import WriteFigures
-from common.link import open_link
+from common.link import Link, open_link
 from common.messages import Truth
-from common.topics import TRUTH
+from common.topics import FAULTS, TRUTH
 from master.suit.simulated.app import run as answer
 from master.suit.simulated.config import SuitConfig
+from master.suit.simulated.faults import FaultsConfig
+from master.suit.simulated.suit import SimulatedSuit
 
 log = logging.getLogger("tandem.suit")
 
@@ -21,11 +27,37 @@ log = logging.getLogger("tandem.suit")
 async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
     """Answer until `stop` is set. Without a link the truth is told to nobody."""
     async with AsyncExitStack() as stack:
+        link: Link | None = None
         tell: Callable[[Truth], None] | None = None
         if config.link.connect or config.link.listen:
             link = await stack.enter_async_context(open_link(config.link, config.robot))
             put = link.publish(TRUTH)
             tell = lambda truth: put(encode(truth))  # noqa: E731
+
+        def on_suit(suit: SimulatedSuit) -> None:
+            if link is not None:
+                link.answer(FAULTS, lambda told, _: _take(told, config, suit))
+
         buses = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in config.buses)
         log.info("answers every SYNC for %d nodes on %s", len(config.nodes), buses)
-        write_figures(await answer(config, stop, tell))
+        write_figures(await answer(config, stop, tell, on_suit))
+
+
+def _take(told: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:
+    suit.faults.config = told_faults(told, list(config.nodes))
+    log.info("faults from now on: %s", suit.faults.config.model_dump(exclude_defaults=True) or "none")
+    return b"done"
+
+
+def told_faults(told: bytes, nodes: list[str]) -> FaultsConfig:
+    """The faults that somebody who tests asks for, as in the file's `[faults]`. Raises ConfigError."""
+    where = Path("told faults")
+    try:
+        table = tomllib.loads(told.decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        mistake = ConfigMistake("faults", told[:80], f"valid TOML ({error})")
+        raise ConfigError(where, [mistake]) from None
+    faults = check_config(where, table, FaultsConfig)
+    if mistakes := faults.unknown_nodes(nodes):
+        raise ConfigError(where, mistakes)
+    return faults

@@ -1,4 +1,4 @@
-"""A process of the demo: started, measured, stopped by SIGTERM, its last words kept."""
+"""A process of a rig: started, measured, killed, started again, stopped by SIGTERM, its last words kept."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import signal
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,17 @@ from common.errors import TandemError
 
 STOP_S = 5.0
 """Grace between SIGTERM and SIGKILL: above the processes' own shutdown deadline."""
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What a process uses now."""
+
+    rss_mb: float
+    fds: int
+    threads: int
+    cpu_s: float
+    """User and system time since its start."""
 
 
 class Child:
@@ -39,23 +51,40 @@ class Child:
         self._cpu_from = (0.0, 0.0)
         self._cpu_to = (0.0, 0.0)
         self.rss_mb = 0.0
+        self.lifetime = 0
+        """How often it has been started."""
 
-    async def start(self, config: Path, overrides: Sequence[str]) -> None:
-        """Start it; its output goes to the log."""
-        arguments = [
-            *self._tandem,
-            self.role,
-            str(config),
-            "--figures",
-            str(self.figures_file),
-        ]
+    async def start(self, config: Path, overrides: Sequence[str], through: Sequence[str] = ()) -> None:
+        """Start it; its output goes to the log. `through`: a command that becomes it, such as `unshare`."""
+        arguments = [str(config), "--figures", str(self.figures_file)]
         for override in overrides:
             arguments += ["--set", override]
+        await self.run(arguments, through)
+
+    async def run(self, arguments: Sequence[str], through: Sequence[str] = ()) -> None:
+        """Start `tandem ROLE` with these arguments."""
+        self.lifetime += 1
         with self.log.open("ab") as log:
             self._process = await asyncio.create_subprocess_exec(
-                *arguments, stdin=asyncio.subprocess.DEVNULL, stdout=log, stderr=log
+                *through,
+                *self._tandem,
+                self.role,
+                *arguments,
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
             )
         self._usage = psutil.Process(self._process.pid)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has been started and has not ended."""
+        return self._process is not None and self._process.returncode is None
+
+    @property
+    def usage(self) -> Usage | None:
+        """What it uses now; None where it does not run."""
+        return usage(self._usage) if self._usage is not None and self.running else None
 
     def check(self) -> None:
         """Raise TandemError with the process's last words if it has ended."""
@@ -122,3 +151,18 @@ class Child:
         """The end of its log."""
         lines = self.said().strip().splitlines()
         return " | ".join(lines[-3:]) or "it said nothing"
+
+
+def usage(process: psutil.Process) -> Usage | None:
+    """What a process uses now; None where it has just ended."""
+    try:
+        with process.oneshot():
+            times = process.cpu_times()
+            return Usage(
+                process.memory_info().rss / 1e6,
+                process.num_fds(),
+                process.num_threads(),
+                times.user + times.system,
+            )
+    except psutil.Error:
+        return None

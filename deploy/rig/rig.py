@@ -11,7 +11,7 @@ from pathlib import Path
 from common.clock import monotonic_ns, to_ns
 from common.control import ask_control
 from common.errors import TandemError
-from common.link import Session, open_session
+from common.link import Link, Session, open_session
 from common.messages import Action, ControlReply, ControlRequest
 from common.skeleton import load_skeleton
 from common.topics import CONTROL
@@ -48,6 +48,8 @@ class Rig:
         profile: str = NURSING,
     ) -> None:
         self.skeleton = load_skeleton(profile)
+        self.folder = folder
+        """Where the processes' logs lie; it goes with the rig."""
         self._overrides = overrides
         self._endpoints = endpoints
         self._session = session
@@ -67,8 +69,20 @@ class Rig:
         """Of this run's CAN buses."""
         return self._endpoints.can_port
 
-    async def start(self, name: str) -> None:
-        """Start one process on the profile's example file, moved to this run's endpoints."""
+    @property
+    def endpoints(self) -> Endpoints:
+        """Who listens where in this run."""
+        return self._endpoints
+
+    def link(self, robot: str = ROBOT) -> Link:
+        """The link on which a robot is observed and asked."""
+        return self._session.link(robot)
+
+    async def start(self, name: str, through: Sequence[str] = ()) -> None:
+        """Start one process, or again, on the profile's example file, moved to this run's endpoints.
+
+        `through`: a command that becomes it, such as `unshare`.
+        """
         role = self.children[name].role
         theirs = dict.fromkeys((role, name))
         given = [override for each in theirs for override in self._overrides.get(each, ())]
@@ -76,7 +90,7 @@ class Rig:
         if DRIVES in self.children and role in ("slave", DRIVES):
             overrides += drive_buses(self._endpoints.can_port)
         file = example("slave" if role == DRIVES else role, self.skeleton.name)
-        await self.children[name].start(file, overrides)
+        await self.children[name].start(file, overrides, through)
 
     async def logged(self, name: str, text: str, timeout_s: float) -> None:
         """Wait until a process has logged something. Raises TandemError where it does not."""
@@ -91,7 +105,7 @@ class Rig:
         self, action: Action, operator: str = OPERATOR, key: str = "", robot: str = ROBOT
     ) -> ControlReply:
         """Ask a robot."""
-        link = self._session.link(robot)
+        link = self.link(robot)
         request = ControlRequest(robot, action, operator, key)
         return await ask_control(lambda payload: link.ask(CONTROL, payload), request)
 

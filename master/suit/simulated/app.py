@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import asdict
 
 import can
@@ -16,20 +17,24 @@ from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.echo import open_deaf_to_answers
 from master.suit.simulated.faults import Outgoing
 from master.suit.simulated.peer import NewestSync, PublishTruth, SuitPeer
-from master.suit.simulated.suit import build_suit
+from master.suit.simulated.suit import SimulatedSuit, build_suit
 
 
 async def run(
-    config: SuitConfig, stop: asyncio.Event, publish_truth: PublishTruth | None = None
+    config: SuitConfig,
+    stop: asyncio.Event,
+    publish_truth: PublishTruth | None = None,
+    on_suit: Callable[[SimulatedSuit], None] = lambda _: None,
 ) -> dict[str, object]:
     """Answer every SYNC until `stop` is set; returns what was counted.
 
-    `publish_truth` is called once a tick, after the answers have gone out. Raises ConfigError before
-    anything is opened, and BusError where a bus cannot be opened.
+    `publish_truth` is called once a tick, after the answers have gone out; `on_suit` once, with the suit
+    that will answer. Raises ConfigError before anything is opened, and BusError where a bus cannot be.
     """
     take_priority(config.process)
     protocol = SuitProtocol.load(config.dbc)
     suit = build_suit(config, protocol)
+    on_suit(suit)
     loop = asyncio.get_running_loop()
 
     def send(outgoing: Outgoing) -> None:

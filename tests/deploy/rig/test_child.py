@@ -124,6 +124,22 @@ def test_cpu_and_memory_are_those_of_the_measured_period(tmp_path: Path) -> None
     run(tmp_path, STAY, test)
 
 
+def test_one_that_was_killed_is_started_again_and_counts_its_lives(tmp_path: Path) -> None:
+    async def test(child: Child) -> None:
+        first = child.usage
+        assert first is not None
+        assert first.fds > 3
+        assert first.threads >= 1
+        await child.kill()
+        assert not child.running
+        assert child.usage is None
+        await child.start(Path("some.toml"), [], through=("env", "-i"))
+        assert child.running
+        assert child.lifetime == 2
+
+    run(tmp_path, STAY, test)
+
+
 def test_one_that_ends_while_it_is_measured_is_no_error(tmp_path: Path) -> None:
     async def test(child: Child) -> None:
         assert child._process is not None
