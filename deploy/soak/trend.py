@@ -3,9 +3,9 @@
 Series that a restart interrupts are judged as one, each stretch by its own pairs: the slope is the median
 over all pairs of points within a stretch (Sen 1968; for several stretches Hirsch, Slack and Smith 1982,
 "seasonal Kendall slope"). Its interval follows from the variance of Kendall's S, summed over the stretches
-and corrected for ties. Neighbouring points resemble each other (memory does not shrink and grow at random), which
-makes an interval look too narrow: the variance is widened by (1 + r) / (1 - r), r being the correlation of
-neighbours about the line.
+and corrected for ties. Neighbouring points resemble each other (memory does not shrink and grow at random),
+which makes an interval look too narrow: the variance is widened by (1 + r) / (1 - r), r being the
+correlation of neighbours about the line.
 """
 
 from __future__ import annotations
