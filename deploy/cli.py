@@ -20,6 +20,7 @@ from deploy.calibrate.commands import app as calibrate_app
 from deploy.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.drives import drives
 from deploy.faults.command import faults
+from deploy.keys.commands import app as keys_app
 from deploy.output import in_a_folder, write_json
 from deploy.record.command import record, recording
 from deploy.video import video
@@ -33,6 +34,7 @@ app = typer.Typer(
 )
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(accuracy_app, name="accuracy")
+app.add_typer(keys_app, name="keys")
 app.command("video")(video)
 app.command()(drives)
 app.command()(attitude)

@@ -1,0 +1,1 @@
+"""A private certificate authority, and a certificate for every host: `tandem keys`."""
