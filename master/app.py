@@ -10,11 +10,13 @@ from common.clock import monotonic_ns
 from common.latency import Durations, StageTimes
 from common.launch import WriteFigures
 from common.link import Session, open_session
+from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.realtime import take_priority
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from common.topics import STATISTICS
+from common.version import software
 from master.config import MasterConfig
 from master.pipeline import MasterPipeline, Solved
 from master.robot import CommandedRobot
@@ -26,8 +28,9 @@ log = logging.getLogger("tandem.master")
 class Master:
     """One operator's capture loop: each posture is solved once, and sent to every robot it commands."""
 
-    def __init__(self, config: MasterConfig, session: Session) -> None:
+    def __init__(self, config: MasterConfig, session: Session, notifier: Notifier | None = None) -> None:
         self._config = config
+        self._notifier = notifier or Notifier()
         self._pipeline = MasterPipeline(config, SuitProtocol.load(config.capture.dbc))
         self._stages = StageTimes("sampled→frames in", "frames in→solved", "solved→put")
         self._frames_in_to_put = Durations()
@@ -77,6 +80,7 @@ class Master:
                 bus.send(sync)
             if late is not None:
                 self._send(late)
+            self._notifier.beat(monotonic_ns())
 
     def _on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
         if self._pipeline.frame(bus, frame_id, data, now_ns):
@@ -106,9 +110,11 @@ class Master:
             shared = self._shared_figures()
             for robot in self._robots:
                 robot.tell(due.scheduled_ns, shared)
+            self._notifier.status("; ".join(robot.standing for robot in self._robots))
 
     def _shared_figures(self) -> dict[str, object]:
         return {
+            "software": software(),
             "ticks": {"expected": self._ticks_expected, "missed": self._ticks_missed},
             "stages_ms": self._stages.summary(),
             "frames_in_to_put_ms": self._frames_in_to_put.summary(),
@@ -128,9 +134,10 @@ async def run(config: MasterConfig, stop: asyncio.Event, write_figures: WriteFig
 
 
 async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
+    notifier = open_notifier()
     take_priority(config.process)  # first, so that every thread has it
     async with open_session(config.link) as session:
-        master = Master(config, session)
+        master = Master(config, session, notifier)
         where = ", ".join(config.link.connect or config.link.listen)
         robots = ", ".join(config.commanded)
         log.info("%s: %d nodes polled, commands go to %s", robots, len(config.nodes), where)
@@ -138,4 +145,5 @@ async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
         try:
             await master.run()
         finally:
+            notifier.stopping()
             write_figures(master.figures())

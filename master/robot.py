@@ -94,6 +94,14 @@ class CommandedRobot:
             except (LinkError, CodecError):
                 continue
 
+    @property
+    def standing(self) -> str:
+        """How this robot and the master stand, in words."""
+        state = self._watch.state
+        if state is None or self._watch.silent(monotonic_ns()):
+            return f"{self.name}: not heard"
+        return f"{self.name}: {state.guard if self._lease.token else self._lease.answer}"
+
     def figures(self) -> dict[str, object]:
         """Counters and percentiles of this robot alone."""
         return {

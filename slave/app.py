@@ -12,11 +12,13 @@ from common.codec import encode
 from common.launch import WriteFigures
 from common.link import Link, open_link
 from common.messages import Statistics
+from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.realtime import take_priority
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, video
+from common.version import software
 from slave.attitude.open import open_base
 from slave.attitude.sensor import BaseSensor
 from slave.camera.feed import CameraFeed, open_feed
@@ -34,12 +36,18 @@ class Slave:
     """One robot's servo loop and its conversation with the master."""
 
     def __init__(
-        self, config: SlaveConfig, link: Link, servos: Servos, base: BaseSensor | None = None
+        self,
+        config: SlaveConfig,
+        link: Link,
+        servos: Servos,
+        base: BaseSensor | None = None,
+        notifier: Notifier | None = None,
     ) -> None:
         self._config = config
         self._link = link
         self._servos = servos
         self._base = base
+        self._notifier = notifier or Notifier()
         self._pipeline = SlavePipeline(config)
         self._stopped = False
         self._ticks_expected = 0
@@ -87,6 +95,8 @@ class Slave:
             if guard.state != said:
                 said = guard.state
                 log.info("%s: %s: %s", self._config.robot, guard.state, guard.reason)
+                self._notifier.status(f"{guard.state}: {guard.reason}")
+            self._notifier.beat(monotonic_ns())  # last: a servo or sensor that hangs must be noticed too
 
     def _body(self) -> Body:
         if self._base is None:
@@ -119,6 +129,7 @@ class Slave:
         pipeline = self._pipeline
         offset = pipeline.clock.estimator.estimate(monotonic_ns())
         return {
+            "software": software(),
             "ticks": {"expected": self._ticks_expected, "missed": self._ticks_missed},
             "guard": {
                 "state": str(pipeline.guard.state),
@@ -152,6 +163,7 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
 
 
 async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
+    notifier = open_notifier()
     take_priority(config.process)  # first, so that every thread has it
     servos = open_servos(config.servos, config.skeleton, config.encoders)
     base = open_base(config.base)
@@ -159,7 +171,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
         if base is not None:
             base.start()
         async with open_link(config.link, config.robot) as link:
-            slave = Slave(config, link, servos, base)
+            slave = Slave(config, link, servos, base, notifier)
             where = ", ".join(config.link.listen or config.link.connect)
             log.info("%s: waits for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
@@ -169,6 +181,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
             try:
                 await slave.run()
             finally:
+                notifier.stopping()
                 write_figures(slave.figures())
     finally:
         servos.stop()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from common.config import LinkConfig
+from common.notify import Notifier
 from common.pacing import Due, TickGrid
 from common.topics import Topic
 from slave import app
@@ -53,3 +54,42 @@ def test_a_loop_that_always_misses_every_second_tick_still_tells_the_state(
     config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]))
     asyncio.run(app.Slave(config, link, servos)._drive())
     assert link.put == {"state": 40 // config.loop.state_every}
+
+
+class StuckServos(StillServos):
+    """The third reading never comes; here it raises, so that the test can go on."""
+
+    def __init__(self, beats: list[int]) -> None:
+        self.read_after: list[int] = []
+        self._beats = beats
+
+    def read(self) -> EncoderReading:
+        self.read_after.append(len(self._beats))
+        if len(self.read_after) == 3:
+            raise TimeoutError
+        return super().read()
+
+
+def test_the_watchdog_is_fed_by_the_servo_loop_itself_at_the_end_of_each_tick(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def some_ticks(grid: TickGrid) -> AsyncIterator[Due]:
+        for tick in range(1, 6):
+            yield Due(tick, grid.origin_ns, 0)
+
+    beats: list[int] = []
+
+    class Counting(Notifier):
+        def beat(self, now_ns: int) -> None:
+            beats.append(now_ns)
+
+    monkeypatch.setattr(app, "ticks", some_ticks)
+    link: Any = FakeLink()
+    stuck = StuckServos(beats)
+    servos: Any = stuck
+    config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]))
+    slave = app.Slave(config, link, servos, notifier=Counting())
+    with pytest.raises(TimeoutError):
+        asyncio.run(slave._drive())
+    assert stuck.read_after == [0, 1, 2]
+    assert len(beats) == 2  # the tick that hung did not count
