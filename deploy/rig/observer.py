@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from common.clock import to_ns, to_s
@@ -13,6 +14,8 @@ from common.messages import Command, RobotState, Statistics, Truth
 from common.skeleton import Skeleton
 from common.topics import COMMAND, STATE, STATISTICS, TRUTH
 from deploy.judge import Trace
+
+Heard = Command | RobotState | Statistics | Truth
 
 RATE_OVER_NS = 900_000_000
 """A rate is taken over at least this long: statistics come once a second, give or take a late tick."""
@@ -36,6 +39,8 @@ class Observer:
         """While recording."""
         self.video: dict[str, Any] = {}
         """What the robot last counted of its camera while recording; empty where it has none."""
+        self.listeners: list[Callable[[Heard], None]] = []
+        """Each is called with every message, whether recording or not."""
         self._news = asyncio.Event()
         self._marks: dict[str, tuple[int, int]] = {}
         self.rates_hz: dict[str, float] = {}
@@ -45,11 +50,13 @@ class Observer:
         link.subscribe(TRUTH, lambda payload, _: self._take(payload, Truth))
         link.subscribe(STATISTICS, lambda payload, _: self._take(payload, Statistics))
 
-    def _take(self, payload: bytes, kind: type[Command | RobotState | Statistics | Truth]) -> None:
+    def _take(self, payload: bytes, kind: type[Heard]) -> None:
         try:
             message = decode(payload, kind, self._joints)
         except CodecError:
             return
+        for listener in self.listeners:
+            listener(message)
         if isinstance(message, Statistics):
             self.statistics[message.role] = message.figures
             if self.recording and message.role == "slave":

@@ -1,0 +1,1 @@
+"""`tandem trial` answers which transport, over this network, suits this care task."""

@@ -1,0 +1,125 @@
+"""What is measured of a cell, as data: name, unit, digits, which way is better, and what it means."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+Values = Mapping[str, float | None]
+"""A cell's figures by name; None where it could not be measured."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One figure."""
+
+    name: str
+    title: str
+    unit: str
+    digits: int
+    """After the point: what a report prints, and what its JSON is rounded to."""
+    group: str
+    meaning: str
+    """The report's footnote."""
+
+
+LATENCY, MOTION, GUARD, OUTAGE, COST = "latency", "motion", "guard", "outage", "cost"
+
+FIGURES = (
+    Figure("one_way_p50_ms", "one-way p50", "ms", 1, LATENCY,
+           "put → received, of every command that arrived, by the measured clock offset"),
+    Figure("one_way_p99_ms", "one-way p99", "ms", 1, LATENCY, "the same, 99th percentile"),
+    Figure("one_way_bound_ms", "bound ±", "ms", 1, LATENCY,
+           "how wrong the clock offset can make a one-way figure at most: half the least round trip, "
+           "plus drift"),
+    Figure("true_one_way_p50_ms", "true p50", "ms", 1, LATENCY,
+           "one-way of accepted commands by the one clock that both namespaces share: a check of the "
+           "bound that two real hosts do not have"),
+    Figure("true_one_way_p99_ms", "true p99", "ms", 1, LATENCY, "the same, 99th percentile"),
+    Figure("round_trip_p50_ms", "round trip p50", "ms", 1, LATENCY,
+           "command put → its echo heard, on the master's clock, without the time the robot held it"),
+    Figure("round_trip_p99_ms", "round trip p99", "ms", 1, LATENCY, "the same, 99th percentile"),
+    Figure("age_p50_ms", "age p50", "ms", 1, LATENCY,
+           "age at the servo: the operator stood so → the setpoint that first uses it is written"),
+    Figure("age_p99_ms", "age p99", "ms", 1, LATENCY, "the same, 99th percentile"),
+    Figure("delivered", "delivered", "%", 1, LATENCY,
+           "commands that reached the robot, of those sent, by their numbers"),
+    Figure("accepted", "accepted", "%", 1, LATENCY,
+           "commands that the guard accepted, of those sent; the rest was lost, stale or overtaken"),
+    Figure("rmse_deg", "RMSE", "°", 2, MOTION,
+           "same-instant tracking error: encoders against the operator's true angles at the same moment, "
+           "over the joints that move: what the patient sees"),
+    Figure("rmse_over_hold", "RMSE / hold's", "", 3, MOTION,
+           "that error over the one plain hold makes of the very same commands, replayed with their "
+           "arrival times"),
+    Figure("lag_ms", "motion lag", "ms", 0, MOTION,
+           "the shift in time that makes robot and operator fit best; negative: the robot is early"),
+    Figure("aligned_rmse_deg", "aligned RMSE", "°", 2, MOTION,
+           "the error that is left when the lag is taken out"),
+    Figure("roughness", "roughness", "", 2, MOTION,
+           "RMS acceleration of the robot over the operator's; 1 is as smooth as the operator"),
+    Figure("eta_percent", "η", "%", 2, MOTION,
+           "the paper's dynamic error (Eq. 25) of the solved angles, the worse arm; the network has no "
+           "part in it"),
+    Figure("tracked", "tracked", "%", 1, GUARD, "share of the judged time in which the robot followed"),
+    Figure("holds", "holds", "", 0, GUARD,
+           "times that the guard left track during the judged time; the operator then engaged again"),
+    Figure("refused", "refused", "", 0, GUARD, "commands that arrived and were refused by a gate"),
+    Figure("clamps", "clamps", "", 0, GUARD,
+           "times that a joint was given less than was asked, by any limit"),
+    Figure("held_s", "cut → hold", "s", 2, OUTAGE,
+           "the link is cut → the robot holds, by itself; its time-out is 0.2 s without a command"),
+    Figure("flow_s", "flow after outage", "s", 2, OUTAGE,
+           "the link returns → the guard accepts the first command"),
+    Figure("stale_accepted", "stale accepted", "", 0, OUTAGE,
+           "commands accepted after the return that were older than the guard may take, by the shared "
+           "clock; none may be"),
+    Figure("stale_refused", "stale refused", "", 0, OUTAGE,
+           "commands that the guard refused for their age from the cut on"),
+    Figure("moved_alone", "moved alone", "", 0, OUTAGE,
+           "1 where the robot left hold before the operator's act; it must not"),
+    Figure("ready_s", "ready after outage", "s", 2, OUTAGE,
+           "the link returns → the operator holds the lease and may engage"),
+    Figure("track_again_s", "act → track", "s", 2, OUTAGE,
+           "the operator engages → the robot follows again"),
+    Figure("cpu_master", "CPU master", "%", 1, COST, "of one core, while judged"),
+    Figure("cpu_slave", "CPU slave", "%", 1, COST,
+           "of one core, while judged, the simulated robot included"),
+    Figure("cpu_router", "CPU router", "%", 1, COST, "of one core, where there is one"),
+    Figure("up_kb_s", "to robot", "kB/s", 2, COST,
+           "bytes on the wire per second, operator → robot, headers and acknowledgements included"),
+    Figure("down_kb_s", "from robot", "kB/s", 2, COST, "the same, robot → operator"),
+    Figure("ticks_missed", "ticks missed", "%", 2, COST,
+           "of the master's and slave's loops, the worse: of a machine that misses many, distrust every "
+           "figure"),
+)  # fmt: skip
+"""In the order in which a report has them."""
+
+BY_NAME = {figure.name: figure for figure in FIGURES}
+
+
+def rounded(values: Values) -> dict[str, float | None]:
+    """Every figure once, rounded as it is printed, so that reports of equal runs are equal files.
+
+    Raises KeyError for a name that is no figure's.
+    """
+    foreign = values.keys() - BY_NAME.keys()
+    if foreign:
+        raise KeyError(f"no figures: {', '.join(sorted(foreign))}")
+    return {f.name: _round(values.get(f.name), f.digits) for f in FIGURES}
+
+
+def printed(name: str, value: float | None, unit: bool = False) -> str:
+    """As people read it; a dash where it is not known."""
+    figure = BY_NAME[name]
+    if value is None:
+        return "–"
+    text = f"{value:.{figure.digits}f}".replace("-", "−")
+    if not unit or not figure.unit:
+        return text
+    return text + (figure.unit if figure.unit in "°%" else f" {figure.unit}")
+
+
+def _round(value: float | None, digits: int) -> float | None:
+    # `+ 0.0` makes of -0.0, which prints otherwise, 0.0
+    return None if value is None else round(value, digits) + 0.0

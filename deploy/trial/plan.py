@@ -1,0 +1,140 @@
+"""Which cells a trial has, in which order they run, and when a folder's cells may be gone on with. Pure."""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Self
+
+from common.errors import TandemError
+
+AXES = ("transports", "profiles", "strategies", "repeat")
+"""What may differ between the runs that fill one report: which cells there are, not how one is run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What is compared: a transport over a network's profile, with a tracking strategy."""
+
+    transport: str
+    profile: str
+    strategy: str
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return f"{self.transport}, {self.strategy}"
+
+
+@dataclass(frozen=True, slots=True)
+class CellKey:
+    """One run of a setup."""
+
+    setup: Setup
+    repetition: int
+    """From 1."""
+
+    @property
+    def slug(self) -> str:
+        """Its file's name."""
+        s = self.setup
+        words = (s.profile, s.transport, s.strategy, str(self.repetition))
+        return "-".join(re.sub(r"[^A-Za-z0-9_]+", "_", word) for word in words)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A whole trial, as the command line chose it."""
+
+    transports: tuple[str, ...]
+    profiles: tuple[str, ...]
+    """Of the network, by name or file."""
+    strategies: tuple[str, ...]
+    repeat: int
+    seconds: float
+    """Judged in each cell."""
+    outage_s: float
+    """Of the outage after it; 0: none."""
+    robot: str
+    """Its profile: nursing, hand, lower_limb."""
+    motion: str
+    seed: int
+    router: bool
+    """Whether the two sides meet at a router."""
+    max_age_s: float
+    """The guard's age limit; 0: as the network's profile needs it (`settings.py`)."""
+    hosts: str = "namespaces"
+    """`namespaces`, or the endpoint of the robot's host in a remote trial."""
+
+    def setups(self) -> list[Setup]:
+        """By profile, then transport, then strategy: the report's order."""
+        return [
+            Setup(transport, profile, strategy)
+            for profile in self.profiles
+            for transport in self.transports
+            for strategy in self.strategies
+        ]
+
+    def cells(self) -> list[CellKey]:
+        """In the order they run: every setup once before any twice, each time in another order.
+
+        So a machine that slows down as the trial goes on does not favour those that come first.
+        """
+        cells = []
+        for repetition in range(1, 1 + self.repeat):
+            turn = [CellKey(setup, repetition) for setup in self.setups()]
+            random.Random(f"{self.seed} {repetition}").shuffle(turn)
+            cells += turn
+        return cells
+
+    def seed_of(self, cell: CellKey) -> int:
+        """Of sensors and network: equal for all setups of a repetition, so that they compare in pairs."""
+        return 1000 * self.seed + cell.repetition
+
+    def tree(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {key: list(v) if isinstance(v, tuple) else v for key, v in asdict(self).items()}
+
+    @classmethod
+    def of_tree(cls, tree: dict[str, Any]) -> Self:
+        """Back from JSON. Raises TandemError where it is none."""
+        names = [field.name for field in fields(cls)]
+        if not isinstance(tree, dict) or set(tree) != set(names):
+            raise TandemError("the report folder's plan is of another version of tandem")
+        values: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in tree.items()}
+        return cls(**values)
+
+
+def check_continues(old: Plan, new: Plan) -> None:
+    """Whether cells of `old` may stand in a report of `new`. Raises TandemError with what differs."""
+    before, after = old.tree(), new.tree()
+    differs = [
+        f"{key.replace('_', ' ')} was {before[key]}, is {after[key]}"
+        for key in before
+        if key not in AXES and before[key] != after[key]
+    ]
+    if differs:
+        raise TandemError(
+            "the report folder holds cells of another plan: "
+            + "; ".join(differs)
+            + ". Give another --report folder, or the same options (transports, profiles, strategies and "
+            "--repeat may differ: only new cells are run)"
+        )
+
+
+def merged(old: Plan, new: Plan) -> Plan:
+    """The plan of a report that shows the cells of both. They must continue each other."""
+    check_continues(old, new)
+    return replace(
+        new,
+        transports=_union(old.transports, new.transports),
+        profiles=_union(old.profiles, new.profiles),
+        strategies=_union(old.strategies, new.strategies),
+        repeat=max(old.repeat, new.repeat),
+    )
+
+
+def _union(old: Iterable[str], new: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*old, *new)))

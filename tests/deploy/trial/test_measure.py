@@ -1,0 +1,273 @@
+"""Figures of a made-up run whose operator, link, clock, losses and outage are known to the nanosecond."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from common.config import LinkConfig
+from common.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics, Truth
+from common.quaternion import Array
+from common.skeleton import load_skeleton
+from deploy.trial.aftermath import aftermath
+from deploy.trial.measure import excerpt, measure, one_way_percentiles_ms
+from deploy.trial.recording import Course, Outage, Recording, counts, on_masters_clock
+from slave.config import SlaveConfig
+
+MS, S = 1_000_000, 1_000_000_000
+SKELETON = load_skeleton("nursing")
+CONFIG = SlaveConfig(robot="robot-1", link=LinkConfig())
+JOINT = SKELETON.joint_names.index("right_shoulder_pitch")
+REST_RAD = np.clip(0.0, SKELETON.lower_rad, SKELETON.upper_rad)
+VALID = np.ones(len(SKELETON.joints), np.bool_)
+SECONDS, TRANSIT_NS, LAG_NS = 12, 40 * MS, 60 * MS
+BEGIN_NS = 7 * S
+
+
+def posture(at_ns: int) -> Array:
+    position = REST_RAD.copy()
+    position[JOINT] = 0.5 * np.sin(2.0 * (at_ns - BEGIN_NS) / S)
+    return position
+
+
+def command(number: int) -> Command:
+    at_ns = BEGIN_NS + 80 * MS * number
+    stamps = CommandStamps(at_ns, at_ns + MS, at_ns + 2 * MS, at_ns + 3 * MS)
+    return Command(
+        "robot-1", 7, number, 16 * number, stamps, True, VALID, posture(at_ns), np.zeros(len(VALID))
+    )
+
+
+def echo(one: Command, transit_ns: int = TRANSIT_NS) -> CommandEcho:
+    received_ns = one.stamps.put_ns + transit_ns
+    return CommandEcho(
+        one.sequence, one.stamps.put_ns, received_ns, received_ns + MS, written_ns=received_ns + 5 * MS
+    )
+
+
+def state(sent_ns: int, newest: CommandEcho | None, guard: str = "track") -> RobotState:
+    position = posture(sent_ns - LAG_NS)
+    return RobotState(
+        "robot-1", sent_ns // MS, sent_ns, sent_ns, guard, "", "nurse-1", VALID, position, position, newest,
+        master_offset_ns=0, offset_bound_ns=8 * MS,
+    )  # fmt: skip
+
+
+def told(role: str, at_ns: int, **figures: object) -> Statistics:
+    given = {"ticks": {"expected": at_ns // (5 * MS), "missed": 0}, **figures}
+    return Statistics(role, at_ns, given)
+
+
+def slave_told(at_ns: int, arrived: int, lost: int, age: int = 0, p50: float = 40.0) -> Statistics:
+    return told(
+        "slave",
+        at_ns,
+        guard={"dropped": {"age": age} if age else {}, "losses": {}, "clamps": {}, "doubts": {}},
+        commands={"arrived": arrived, "lost": lost, "late": 0, "repeated": 0},
+        one_way_ms={"count": arrived, "p50": p50, "p99": p50 + 10},
+    )
+
+
+def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) -> Recording:
+    """Commands at 12.5 Hz, all accepted but the lost ones; states at 50 Hz; `guards` by number of state."""
+    commands = [command(n) for n in range(round(SECONDS * 12.5))]
+    echoes = [echo(c) for c in commands if c.sequence not in set(lost)]
+    states = []
+    for k in range(SECONDS * 50):
+        at_ns = BEGIN_NS + 20 * MS * k
+        newest = [e for e in echoes if e.received_ns < at_ns]
+        states.append(state(at_ns, newest[-1] if newest else None, (guards or {}).get(k, "track")))
+    truth = [
+        Truth(t, BEGIN_NS + 5 * MS * t, posture(BEGIN_NS + 5 * MS * t), np.zeros(len(VALID)))
+        for t in range(-200, SECONDS * 200)
+    ]
+    ends = (BEGIN_NS + S, BEGIN_NS + (SECONDS - 1) * S)
+    return Recording(
+        commands,
+        states,
+        truth,
+        [slave_told(ends[0], 12, 0), slave_told(ends[1], 132, 5, age=3),
+         *(told("master", at_ns, round_trip_ms={"p50": 81.0, "p99": 99.0}) for at_ns in ends)],
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def figures() -> dict[str, float | None]:
+    course = Course(
+        recording(), max_age_s=0.3, shared_clock=True, cpu_percent={"master": 20.0, "slave": 30.0},
+        up_bytes_s=9000.0, down_bytes_s=41_000.0,
+        after=after(0.6), outage=Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS),
+    )  # fmt: skip
+    return measure(course, CONFIG)
+
+
+def test_one_way_is_told_by_the_slave_and_checked_by_the_shared_clock(figures: dict[str, float]) -> None:
+    assert figures["one_way_p50_ms"] == 40.0
+    assert figures["one_way_bound_ms"] == 8.0
+    assert figures["true_one_way_p50_ms"] == pytest.approx(40.0)
+    assert figures["round_trip_p99_ms"] == 99.0
+    assert figures["age_p50_ms"] == pytest.approx(3 + 40 + 5)
+
+
+def test_without_a_shared_clock_nothing_is_called_true() -> None:
+    figures = measure(Course(recording(), max_age_s=0.3, shared_clock=False), CONFIG)
+    assert figures.get("true_one_way_p50_ms") is None
+    assert figures["one_way_p50_ms"] == 40.0
+
+
+def test_motion_is_judged_at_the_same_instant(figures: dict[str, float]) -> None:
+    assert figures["lag_ms"] == pytest.approx(60.0, abs=0.2)
+    # a sine of 0.5 rad at 2 rad/s, 60 ms late: the difference is 2·0.5·sin(0.06)·cos(…)
+    assert figures["rmse_deg"] == pytest.approx(np.degrees(np.sin(0.06)) / np.sqrt(2), rel=0.05)
+    assert figures["aligned_rmse_deg"] < 0.05
+    assert figures["roughness"] == pytest.approx(1.0, abs=0.05)
+    assert 0.0 < figures["rmse_over_hold"] < 1.0
+    assert figures["tracked"] == 100.0
+    assert figures["holds"] == 0.0
+
+
+def test_what_was_delivered_is_counted_between_the_slaves_words(figures: dict[str, float]) -> None:
+    assert figures["delivered"] == pytest.approx(100.0 * 120 / 125)
+    assert figures["refused"] == 3.0
+    assert figures["accepted"] == 100.0
+    assert figures["ticks_missed"] == 0.0
+
+
+def test_a_lost_command_is_not_accepted_and_one_under_way_is_not_lost() -> None:
+    figures = measure(Course(recording(lost=range(50, 65)), max_age_s=0.3, shared_clock=True), CONFIG)
+    # the last of 150 are still on their way when the recording ends
+    assert figures["accepted"] == pytest.approx(100.0 * (1 - 15 / 150), abs=0.5)
+
+
+def test_each_time_that_the_guard_leaves_track_counts_once() -> None:
+    guards = dict.fromkeys((*range(200, 220), *range(400, 410)), "hold") | dict.fromkeys(
+        range(410, 430), "align"
+    )
+    figures = measure(Course(recording(guards=guards), max_age_s=0.3, shared_clock=True), CONFIG)
+    assert figures["holds"] == 2.0
+    assert figures["tracked"] == pytest.approx(100.0 * (1 - 50 / 600))
+
+
+def test_cost_is_told_in_thousands_of_bytes(figures: dict[str, float]) -> None:
+    assert (figures["up_kb_s"], figures["down_kb_s"]) == (9.0, 41.0)
+    assert figures["flow_s"] == pytest.approx(0.6), "and the outage is judged with the rest"
+    assert (figures["cpu_master"], figures["cpu_slave"]) == (20.0, 30.0)
+
+
+def test_only_what_grew_in_the_judged_time_is_counted() -> None:
+    assert counts(recording()) == {"dropped": {"age": 3}}
+
+
+def test_percentiles_for_the_picture_and_the_excerpt_are_of_accepted_commands_and_one_joint() -> None:
+    percentiles = one_way_percentiles_ms(recording())
+    assert len(percentiles) == 101
+    assert percentiles[50] == pytest.approx(40.0)
+    found = excerpt(recording(), CONFIG)
+    assert found is not None
+    assert found.joint == "right_shoulder_pitch"
+    assert found.at_s[-1] == pytest.approx(6.0, abs=0.05)
+    assert max(found.operator_deg) == pytest.approx(np.degrees(0.5), abs=0.5)
+
+
+def test_nothing_heard_gives_no_figure_and_no_error() -> None:
+    figures = measure(Course(Recording([], [], [], []), max_age_s=0.3, shared_clock=True), CONFIG)
+    assert all(value is None for value in figures.values())
+    assert excerpt(Recording([], [], [], []), CONFIG) is None
+    assert one_way_percentiles_ms(Recording([], [], [], [])) == []
+
+
+CUT_NS, BACK_NS, ACT_NS = BEGIN_NS + S, BEGIN_NS + 3 * S, BEGIN_NS + 5 * S
+
+
+def after(
+    first_accepted_s: float, stale_age_ms: float | None = None, moves_at_s: float | None = None
+) -> Recording:
+    """Hold 0.2 s after the cut, commands from `first_accepted_s` on, engaged at ACT_NS, track 1.5 s later."""
+    commands = [command(n) for n in range(round(8 * 12.5))]
+    first_ns = BACK_NS + round(first_accepted_s * S)
+    echoes = [echo(c) for c in commands if c.stamps.put_ns + TRANSIT_NS + MS >= first_ns]
+    echoes[0] = replace(echoes[0], accepted_ns=first_ns)
+    if stale_age_ms is not None:
+        old = commands[5]
+        accepted_ns = BACK_NS + 300 * MS
+        assert accepted_ns - old.stamps.sampled_ns > 0
+        old_echo = replace(echo(old), accepted_ns=old.stamps.sampled_ns + round(stale_age_ms * MS))
+        moved = replace(old.stamps, sampled_ns=accepted_ns - round(stale_age_ms * MS))
+        commands[5] = replace(old, stamps=moved)
+        echoes.insert(0, replace(old_echo, accepted_ns=accepted_ns, received_ns=accepted_ns - MS))
+    states = []
+    for k in range(51, 8 * 50):
+        at_ns = BEGIN_NS + 20 * MS * k
+        newest = [e for e in echoes if e.accepted_ns < at_ns]
+        guard = "track" if at_ns < CUT_NS + 200 * MS or at_ns > ACT_NS + 1500 * MS else "hold"
+        if moves_at_s is not None and BACK_NS + round(moves_at_s * S) < at_ns < ACT_NS:
+            guard = "align"
+        states.append(state(at_ns, newest[-1] if newest else None, guard))
+    return Recording(
+        commands, states, [], [slave_told(CUT_NS, 0, 0), slave_told(BEGIN_NS + 7 * S, 0, 0, age=4)]
+    )
+
+
+def outage_figures(recorded: Recording, act_ns: int | None = ACT_NS) -> dict[str, float | None]:
+    return aftermath(recorded, Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, act_ns), max_age_s=0.3)
+
+
+def test_an_outage_is_told_from_the_links_return_to_the_operators_act() -> None:
+    figures = outage_figures(after(0.6))
+    assert figures["held_s"] == pytest.approx(0.2, abs=0.03)
+    assert figures["flow_s"] == pytest.approx(0.6)
+    assert figures["ready_s"] == pytest.approx(0.7)
+    assert figures["track_again_s"] == pytest.approx(1.5, abs=0.03)
+    assert figures["stale_accepted"] == 0.0
+    assert figures["stale_refused"] == 4.0
+    assert figures["moved_alone"] == 0.0
+
+
+@pytest.mark.parametrize(("age_ms", "stale"), [(299.0, 0.0), (301.0, 1.0)])
+def test_a_command_is_stale_where_it_is_older_than_the_guard_may_take(age_ms: float, stale: float) -> None:
+    assert outage_figures(after(0.6, stale_age_ms=age_ms))["stale_accepted"] == stale
+
+
+def test_a_robot_that_moves_before_the_operators_act_is_noticed() -> None:
+    assert outage_figures(after(0.6, moves_at_s=1.0))["moved_alone"] == 1.0
+
+
+def test_a_robot_that_never_comes_back_has_no_times() -> None:
+    silent = after(0.6)
+    silent = replace(silent, states=[replace(s, echo=None) for s in silent.states if s.sent_ns < ACT_NS])
+    figures = outage_figures(silent, act_ns=None)
+    assert figures["flow_s"] is None
+    assert figures["track_again_s"] is None
+
+
+def test_a_robot_that_held_already_when_the_link_was_cut_did_not_hold_for_it() -> None:
+    held = after(0.6)
+    held = replace(held, states=[replace(s, guard="hold") if s.sent_ns < ACT_NS else s for s in held.states])
+    assert (
+        outage_figures(replace(held, states=[s for s in held.states if s.sent_ns > CUT_NS]))["held_s"] is None
+    )
+
+
+def test_a_robot_that_is_not_heard_at_all_gives_no_error() -> None:
+    assert outage_figures(Recording([], [], [], []), act_ns=None)["flow_s"] is None
+
+
+def test_a_robots_own_clock_is_brought_onto_the_masters() -> None:
+    ahead_ns = -3 * S
+    there = [
+        replace(
+            s, sent_ns=s.sent_ns - ahead_ns, encoder_ns=s.encoder_ns - ahead_ns, master_offset_ns=ahead_ns,
+            echo=None if s.echo is None else replace(
+                s.echo, received_ns=s.echo.received_ns - ahead_ns, accepted_ns=s.echo.accepted_ns - ahead_ns,
+                written_ns=s.echo.written_ns - ahead_ns),
+        )
+        for s in recording().states
+    ]  # fmt: skip
+    here = on_masters_clock(there)
+    assert [s.encoder_ns for s in here] == [s.encoder_ns for s in recording().states]
+    assert [s.echo for s in here] == [s.echo for s in recording().states]
+    untrusted = [replace(s, offset_bound_ns=-1) for s in there]
+    assert on_masters_clock(untrusted) == [], "stamps that cannot be compared are not"
