@@ -15,7 +15,8 @@ from deploy.trial.spread import Row, Spread
 from deploy.trial.targets import Judged
 
 GROUPS = {
-    "latency": "Latency",
+    "latency": "One way",
+    "trip": "Round trip, age and delivery",
     "motion": "Motion",
     "guard": "Guard",
     "outage": "Outage",
@@ -106,12 +107,12 @@ def _cell(row: Row, name: str) -> str:
 
 
 def _range(row: Row, name: str) -> str:
-    """The repeats' range, empty where it says no more than the median."""
+    """The repeats' range, empty where it says no more than the median does."""
     spread: Spread | None = row.spreads.get(name)
     if spread is None or spread.count < 2:
         return ""
     low, high = printed(name, spread.low), printed(name, spread.high)
-    return low if low == high else f"{low} … {high}"
+    return "" if low == high else f"{low} … {high}"
 
 
 def _image(plot: Plot) -> str:

@@ -23,7 +23,7 @@ class Figure:
     """The report's footnote."""
 
 
-LATENCY, MOTION, GUARD, OUTAGE, COST = "latency", "motion", "guard", "outage", "cost"
+LATENCY, TRIP, MOTION, GUARD, OUTAGE, COST = "latency", "trip", "motion", "guard", "outage", "cost"
 
 FIGURES = (
     Figure("one_way_p50_ms", "one-way p50", "ms", 1, LATENCY,
@@ -36,15 +36,15 @@ FIGURES = (
            "one-way of accepted commands by the one clock that both namespaces share: a check of the "
            "bound that two real hosts do not have"),
     Figure("true_one_way_p99_ms", "true p99", "ms", 1, LATENCY, "the same, 99th percentile"),
-    Figure("round_trip_p50_ms", "round trip p50", "ms", 1, LATENCY,
+    Figure("round_trip_p50_ms", "round trip p50", "ms", 1, TRIP,
            "command put → its echo heard, on the master's clock, without the time the robot held it"),
-    Figure("round_trip_p99_ms", "round trip p99", "ms", 1, LATENCY, "the same, 99th percentile"),
-    Figure("age_p50_ms", "age p50", "ms", 1, LATENCY,
+    Figure("round_trip_p99_ms", "round trip p99", "ms", 1, TRIP, "the same, 99th percentile"),
+    Figure("age_p50_ms", "age p50", "ms", 1, TRIP,
            "age at the servo: the operator stood so → the setpoint that first uses it is written"),
-    Figure("age_p99_ms", "age p99", "ms", 1, LATENCY, "the same, 99th percentile"),
-    Figure("delivered", "delivered", "%", 1, LATENCY,
+    Figure("age_p99_ms", "age p99", "ms", 1, TRIP, "the same, 99th percentile"),
+    Figure("delivered", "delivered", "%", 1, TRIP,
            "commands that reached the robot, of those sent, by their numbers"),
-    Figure("accepted", "accepted", "%", 1, LATENCY,
+    Figure("accepted", "accepted", "%", 1, TRIP,
            "commands that the guard accepted, of those sent; the rest was lost, stale or overtaken"),
     Figure("rmse_deg", "RMSE", "°", 2, MOTION,
            "same-instant tracking error: encoders against the operator's true angles at the same moment, "

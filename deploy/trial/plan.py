@@ -25,7 +25,7 @@ class Setup:
     @property
     def name(self) -> str:
         """In words."""
-        return f"{self.transport}, {self.strategy}"
+        return f"{self.transport} with {self.strategy}"
 
 
 @dataclass(frozen=True, slots=True)

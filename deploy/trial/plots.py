@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's, which people with colour-blindness tell apart."""
+BAR, HIGH, INK = "#9fb3c8", "#cf1124", "#102a43"
 MARKS = "osD^vPX*"
 STYLE = {
     "font.family": "sans-serif",
@@ -84,7 +85,7 @@ def _per_setup(
             values = [value for cell in row.done if (value := cell.values.get(name)) is not None]
             axes.plot([x] * len(values), values, "o", color=colour, markersize=4, zorder=3)
         if line is not None:
-            axes.axhline(line, color="#cf1124", linestyle="--", linewidth=1)
+            axes.axhline(line, color=HIGH, linestyle="--", linewidth=1)
         axes.set_ylabel(f"{figure.title}, {figure.unit}" if figure.unit else figure.title)
         axes.set_ylim(bottom=0)
         axes.grid(axis="x", visible=False)
@@ -112,7 +113,7 @@ def _trade(rows: Sequence[Row]) -> Plot | None:
                 marker=MARKS[profiles.index(row.setup.profile) % len(MARKS)],
                 markersize=6, linewidth=0.8, alpha=0.85,
             )  # fmt: skip
-        axes.axvline(3.0, color="#cf1124", linestyle="--", linewidth=1)
+        axes.axvline(3.0, color=HIGH, linestyle="--", linewidth=1)
         axes.set_xlabel("roughness: RMS acceleration, robot over operator")
         axes.set_ylabel("RMSE at the same instant, °")
         axes.set_ylim(bottom=0)
@@ -128,41 +129,45 @@ def _trade(rows: Sequence[Row]) -> Plot | None:
 
 
 def _latency(rows: Sequence[Row]) -> Plot | None:
-    """One-way as measured with its bound, beside the true one."""
+    """One-way as measured with its bound, beside the true one; each network on its own scale."""
     shown = [row for row in rows if row.median("one_way_p50_ms") is not None]
     if not shown:
         return None
+    profiles = _names(row.setup.profile for row in shown)
+    groups = [[row for row in shown if row.setup.profile == profile] for profile in profiles]
 
-    def draw(axes: Axes) -> None:
-        places = _places(axes, shown)
-        for row, x in zip(shown, places, strict=True):
-            p50, p99 = row.spreads["one_way_p50_ms"].median, row.median("one_way_p99_ms")
-            bound = row.median("one_way_bound_ms") or 0.0
-            axes.bar(x, p50, width=0.7, color="#9fb3c8", yerr=bound, ecolor="#52606d", capsize=2, linewidth=0)
-            if p99 is not None:
-                axes.plot(x, p99, "_", color="#cf1124", markersize=9, markeredgewidth=1.6)
-            true = row.median("true_one_way_p50_ms")
-            if true is not None:
-                axes.plot(x, true, "o", color="#102a43", markersize=4)
-        axes.set_ylabel("one way, ms")
-        axes.set_ylim(bottom=0)
-        axes.grid(axis="x", visible=False)
-        for style, words in (
-            ({"color": "#9fb3c8", "linewidth": 6}, "p50 by the measured offset, with its bound"),
-            ({"color": "#cf1124", "marker": "_", "linestyle": ""}, "p99"),
-            (
-                {"color": "#102a43", "marker": "o", "linestyle": "", "markersize": 4},
-                "true p50 (shared clock)",
-            ),
-        ):
-            axes.plot([], [], label=words, **style)
-        axes.legend(fontsize=8, loc="upper left")
+    def draw_all(picture: Picture) -> None:
+        sizes = [len(group) + 1.5 for group in groups]
+        grid = picture.subplots(1, len(groups), squeeze=False, width_ratios=sizes)[0]
+        for group, axes in zip(groups, grid, strict=True):
+            for row, x in zip(group, _places(axes, group), strict=True):
+                _one_way(axes, row, x)
+            axes.set_ylim(bottom=0)
+            axes.grid(axis="x", visible=False)
+        grid[0].set_ylabel("one way, ms")
+        grid[0].bar(0, 0, color=BAR, label="p50 by the measured offset; whisker: its bound")
+        grid[0].plot([], [], "_", color=HIGH, markeredgewidth=1.6, label="p99")
+        grid[0].plot([], [], "o", color=INK, markersize=4, label="true p50, by the shared clock")
+        picture.legend(loc="outside lower left", ncols=3, fontsize=8)
 
+    size = (max(6.5, 1.0 + 0.32 * len(shown) + 0.55 * len(groups)), 3.3)
     return Plot(
         "One-way latency of commands",
-        "Where the dot lies within the whisker, the bound held.",
-        _svg(draw, width=max(6.5, 1.5 + 0.32 * len(shown))),
+        "Where the dot lies within the whisker, the bound held. Each network has its own scale.",
+        _render(draw_all, size),
     )
+
+
+def _one_way(axes: Axes, row: Row, x: float) -> None:
+    p50, bound = row.spreads["one_way_p50_ms"].median, row.median("one_way_bound_ms") or 0.0
+    # a way is never shorter than nothing, whatever the bound
+    below_above = [[min(bound, p50)], [bound]]
+    axes.bar(x, p50, width=0.7, color=BAR, yerr=below_above, ecolor="#52606d", capsize=2, linewidth=0)
+    p99, true = row.median("one_way_p99_ms"), row.median("true_one_way_p50_ms")
+    if p99 is not None:
+        axes.plot(x, p99, "_", color=HIGH, markersize=9, markeredgewidth=1.6)
+    if true is not None:
+        axes.plot(x, true, "o", color=INK, markersize=4)
 
 
 def _motion(rows: Sequence[Row]) -> Plot | None:
@@ -185,17 +190,15 @@ def _motion(rows: Sequence[Row]) -> Plot | None:
                 if excerpt is None:
                     axes.axis("off")
                     continue
-                axes.plot(
-                    excerpt.at_s, excerpt.operator_deg, color="#7b8794", linewidth=1.4, label="operator"
-                )
+                axes.plot(excerpt.at_s, excerpt.operator_deg, color=INK, linewidth=1.0, label="operator")
                 axes.plot(excerpt.at_s, excerpt.robot_deg, color=COLOURS[j % len(COLOURS)], linewidth=1.2,
-                          label="robot")  # fmt: skip
+                          label="robot (coloured by strategy)")  # fmt: skip
                 axes.set_title(f"{profile}, {setup.transport}, {strategy}", fontsize=8.5, loc="left")
                 if j == 0:
                     axes.set_ylabel(f"{excerpt.joint.replace('_', ' ')}, °")
                 if i == len(profiles) - 1:
                     axes.set_xlabel("time, s")
-                axes.legend(fontsize=7, loc="upper right")
+        picture.legend(*grid[0][0].get_legend_handles_labels(), loc="outside lower left", ncols=2, fontsize=8)
 
     size = (3.1 * len(strategies) + 0.4, 1.9 * len(profiles) + 0.4)
     return Plot(

@@ -11,6 +11,9 @@ from deploy.trial.plan import Setup
 from deploy.trial.spread import Row, Spread, spread
 from deploy.trial.tasks import Criterion, Task
 
+MOST_NAMED = 3
+"""Setups in one sentence."""
+
 
 @dataclass(frozen=True, slots=True)
 class Ranked:
@@ -61,7 +64,7 @@ class Ranking:
             return "no setup is fit"
         words = f"{best.setup.name}: {best.score.median:.0f} of 100 ({best.figures})"
         if best.costs:
-            words += f"; what it lacks most is {best.costs}"
+            words += f", loses most by {best.costs}"
         if self.ties:
             words += f". These repeats do not tell it from {_listed([t.setup.name for t in self.ties])}"
         if best.score.count < 2:
@@ -119,4 +122,6 @@ def _order(ranked: Ranked) -> tuple[bool, float]:
 
 
 def _listed(names: Sequence[str]) -> str:
+    if len(names) > MOST_NAMED:
+        return f"{', '.join(names[:MOST_NAMED])} and {len(names) - MOST_NAMED} more"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

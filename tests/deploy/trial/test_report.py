@@ -66,7 +66,7 @@ def test_every_setup_and_every_measured_figure_stands_in_the_page(whole: Path) -
     page = re.sub(r"<[^>]+>", " ", (whole / HTML).read_text("utf-8"))
     for words in (
         "same-instant tracking error",
-        "tcp, predict over 4g",
+        "tcp with predict over 4g",
         "Reaching and handing over",
         "bound ±",
     ):
