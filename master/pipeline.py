@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from common.can.frame import Frame
+from common.clock import to_s
 from common.messages import Command, CommandStamps, Mask
 from common.quaternion import Array
 from common.skeleton import Skeleton
@@ -81,10 +82,11 @@ class MasterPipeline:
         """Take the tick's answers through the filters; the joint angles if this tick decides."""
         self._window_open = False
         sweep = self.poll.close_window(now_ns)
-        for bridge in bridged(self._last_sweep, sweep):
-            self.estimator.update(bridge)
+        sweeps = [*bridged(self._last_sweep, sweep), sweep]
+        dt_s = _spacing_s(self._last_sweep, sweep, len(sweeps))
+        for each in sweeps:
+            self.estimator.update(each, dt_s)
         self._last_sweep = sweep
-        self.estimator.update(sweep)
         # a deciding tick that was missed is made up for by the next, or a command would fall out
         period = sweep.tick // self._decimation
         if period == self._decided_period:
@@ -117,6 +119,17 @@ def bridged(last: Sweep | None, now: Sweep) -> list[Sweep]:
         return []
     gap = now.tick - last.tick
     return [_between(last, now, i / gap) for i in range(1, gap)]
+
+
+def _spacing_s(last: Sweep | None, now: Sweep, steps: int) -> float | None:
+    """Time from one of the sweeps to the next, so many `steps` from `last` to `now`; None: the nominal one.
+
+    A SYNC that goes out late is sampled late, and an operator who turns at 400°/s has turned 0.4° in a
+    millisecond. Beyond what is bridged nobody knows how far.
+    """
+    if last is None or now.tick - last.tick != steps:
+        return None
+    return to_s(now.sampled_ns - last.sampled_ns) / steps
 
 
 def _between(last: Sweep, now: Sweep, share: float) -> Sweep:

@@ -200,8 +200,8 @@ class Estimator:
         # the filters hold each reading for the period before it, which leads by half of it on average
         self._advance_s = self._lowpass.delays_s[GYR] - 0.5 / rate_hz
 
-    def update(self, readings: Readings) -> None:
-        """Take one tick."""
+    def update(self, readings: Readings, dt_s: float | None = None) -> None:
+        """Take one tick; `dt_s` is the time since the one before, None for the nominal period."""
         samples = self._samples
         samples[ACC], samples[GYR], samples[MAG] = readings.acc_m_s2, readings.gyr_rad_s, readings.mag_ut
         was_valid = self._liveness.settled
@@ -215,7 +215,7 @@ class Estimator:
             self._bank.restart(changes.came)
         filtered = self._lowpass.update(apply(self._affine, samples))
         self._gyr_rad_s = filtered[GYR]
-        self._bank.update(filtered[GYR], filtered[ACC], filtered[MAG])
+        self._bank.update(filtered[GYR], filtered[ACC], filtered[MAG], dt_s)
         if changes.settled.any():
             self._find(changes.settled, np.isfinite(filtered[MAG, :, 0]))
         if not self._stance.known.all():
