@@ -23,6 +23,7 @@ from deploy.faults.command import faults
 from deploy.keys.commands import app as keys_app
 from deploy.output import in_a_folder, write_json
 from deploy.record.command import record, recording
+from deploy.router.command import router
 from deploy.video import video
 
 app = typer.Typer(
@@ -39,6 +40,7 @@ app.command("video")(video)
 app.command()(drives)
 app.command()(attitude)
 app.command()(faults)
+app.command()(router)
 app.command()(record)
 app.command()(recording)
 _debug = False

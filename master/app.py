@@ -10,6 +10,7 @@ from common.clock import monotonic_ns
 from common.latency import Durations, StageTimes
 from common.launch import WriteFigures
 from common.link import Session, open_session
+from common.link.audit import Audit
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.realtime import take_priority
@@ -136,7 +137,9 @@ async def run(config: MasterConfig, stop: asyncio.Event, write_figures: WriteFig
 async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
     notifier = open_notifier()
     take_priority(config.process)  # first, so that every thread has it
+    audit = Audit(config.link)
     async with open_session(config.link) as session:
+        audit.attach(session)
         master = Master(config, session, notifier)
         where = ", ".join(config.link.connect or config.link.listen)
         robots = ", ".join(config.commanded)
@@ -146,4 +149,4 @@ async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
             await master.run()
         finally:
             notifier.stopping()
-            write_figures(master.figures())
+            write_figures({**master.figures(), "access": audit.figures()})

@@ -10,7 +10,8 @@ from contextlib import nullcontext
 from common.clock import monotonic_ns, to_ms
 from common.codec import encode
 from common.launch import WriteFigures
-from common.link import Link, open_link
+from common.link import Link, open_session
+from common.link.audit import Audit
 from common.messages import Statistics
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
@@ -170,8 +171,10 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
     try:
         if base is not None:
             base.start()
-        async with open_link(config.link, config.robot) as link:
-            slave = Slave(config, link, servos, base, notifier)
+        audit = Audit(config.link)
+        async with open_session(config.link) as session:
+            audit.attach(session)
+            slave = Slave(config, session.link(config.robot), servos, base, notifier)
             where = ", ".join(config.link.listen or config.link.connect)
             log.info("%s: waits for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
@@ -182,7 +185,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
                 await slave.run()
             finally:
                 notifier.stopping()
-                write_figures(slave.figures())
+                write_figures({**slave.figures(), "access": audit.figures()})
     finally:
         servos.stop()
         if base is not None:

@@ -38,11 +38,19 @@ def access_control(access: AccessConfig) -> dict[str, Any]:
         table.allow([common_name(Role.ROUTER, router)], _ALL, ["tandem/**"])
     for robot in access.robots:
         _robot(table, access, robot)
-    everyone = sorted(table.subjects)
+    everyone = sorted(named(access))
     # presence is no secret among those who have a certificate, nor is the way to stop a robot
     table.allow(everyone, ("watch", "watched"), [_alive("*", "*")])
     table.allow(everyone, ("ask",), [CONTROL.key_for("*")])
     return table.zenoh()
+
+
+def named(access: AccessConfig) -> set[str]:
+    """The common names of everybody who may do anything."""
+    people = [(Role.OPERATOR, access.operators), (Role.OBSERVER, access.observers | access.viewers)]
+    of_people = {common_name(role, name) for role, table in people for name in table}
+    robots = {common_name(Role.ROBOT, robot) for robot in access.robots}
+    return of_people | robots | {common_name(Role.ROUTER, router) for router in access.routers}
 
 
 def _robot(table: _Table, access: AccessConfig, robot: str) -> None:

@@ -20,12 +20,12 @@ _NO_ROUTER = "Unable to connect to any of"
 log = logging.getLogger(__name__)
 
 
-async def open_zenoh(config: LinkConfig) -> zenoh.Session:
+async def open_zenoh(config: LinkConfig, mode: str = "") -> zenoh.Session:
     """The session. As a client it waits for its router, however long. Raises LinkError."""
     turn = 0
     while True:
         try:
-            return await _open_off_the_loop(_in_turn(config, turn))
+            return await _open_off_the_loop(_in_turn(config, turn), mode)
         except zenoh.ZError as error:
             if config.mode != "client" or _NO_ROUTER not in str(error):
                 raise LinkError(f"the link cannot be opened: {_RUST_PLACE.sub('', str(error))}") from None
@@ -43,8 +43,8 @@ def _in_turn(config: LinkConfig, turn: int) -> LinkConfig:
     return config.model_copy(update={"connect": [*config.connect[first:], *config.connect[:first]]})
 
 
-async def _open_off_the_loop(config: LinkConfig) -> zenoh.Session:
-    settings = zenoh.Config.from_json5(json.dumps(zenoh_configuration(config)))
+async def _open_off_the_loop(config: LinkConfig, mode: str) -> zenoh.Session:
+    settings = zenoh.Config.from_json5(json.dumps(zenoh_configuration(config, mode)))
     opening = asyncio.ensure_future(asyncio.to_thread(zenoh.open, settings))
     try:
         return await asyncio.shield(opening)

@@ -28,12 +28,15 @@ log = logging.getLogger(__name__)
 
 
 @asynccontextmanager
-async def open_session(config: LinkConfig) -> AsyncIterator[Session]:
-    """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later."""
+async def open_session(config: LinkConfig, mode: str = "") -> AsyncIterator[Session]:
+    """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later.
+
+    `mode`: `router`, in place of the configuration's own.
+    """
     if not (config.listen or config.connect):
         raise LinkError("the link has no endpoint: set `listen` or `connect` under [link]")
     check_keys(config)
-    opened = await open_zenoh(config)
+    opened = await open_zenoh(config, mode)
     session = Session(opened, asyncio.get_running_loop(), config.quality)
     try:
         yield session
@@ -93,6 +96,23 @@ class Session:
             self._session.liveliness().declare_subscriber(
                 f"{ALIVE.key_for('*')}/slave", Callback(on_sample, indirect=False), history=True
             )
+        )
+
+    def watch_peers(self, on_change: Callable[[str, str, bool], None]) -> None:
+        """Call `on_change(session_id, name, connected)` on the loop, for those already there at once.
+
+        `name` is the common name of the certificate; empty where the transport has none.
+        """
+        names: dict[str, str] = {}
+
+        def on_event(event: zenoh.LinkEvent) -> None:
+            session_id, here = str(event.link.zid), event.kind == zenoh.SampleKind.PUT
+            if here:
+                names[session_id] = event.link.auth_identifier or ""
+            wake(self._loop, on_change, session_id, names.get(session_id, ""), here)
+
+        self._held.append(
+            self._session.info.declare_link_events_listener(Callback(on_event, indirect=False), history=True)
         )
 
     @property

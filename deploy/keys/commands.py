@@ -61,8 +61,7 @@ def make(
 
     To renew one, move the old files away and make it again: the names in [link.access] stay the same.
 
-    Examples: `tandem keys make keys robot:robot-1 --host 192.168.7.2 --host robot-1.local`,
-    `tandem keys make keys operator:nurse-1 --days 90`
+    Example: `tandem keys make keys robot:robot-1 --host 192.168.7.2 --host robot-1.local`
     """
     role, name = _role_and_name(who)
     try:

@@ -70,7 +70,9 @@ def test_what_the_repeats_do_not_tell_apart_is_said() -> None:
         udp, {"roughness": 1.8}, {"roughness": 2.2}
     )
     plan = replace(PLAN, profiles=("lan",), strategies=("predict",), repeat=2)
-    assert "do not tell it from udp with predict" in rank(TASK["hold-a-hand"], "lan", rows(plan, close)).verdict
+    assert (
+        "do not tell it from udp with predict" in rank(TASK["hold-a-hand"], "lan", rows(plan, close)).verdict
+    )
     assert "do not tell" not in rank(TASK["hold-a-hand"], "lan", rows(plan, apart)).verdict
 
 

@@ -1,0 +1,54 @@
+"""Who is connected, by certificate, and who was refused: logged, and counted for reports."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+
+from common.config import LinkConfig
+from common.link.access import named
+from common.link.listening import hear_refusals
+from common.link.refusals import Refusals
+from common.link.session import Session
+
+log = logging.getLogger("tandem.access")
+
+
+class Audit:
+    """Make it before the session opens, and `attach` it after. Without [link.tls] it hears nothing."""
+
+    def __init__(self, link: LinkConfig) -> None:
+        self._refusals: Refusals | None = hear_refusals() if link.tls else None
+        self._known = named(link.access) if link.access else None
+        self._here: Counter[str] = Counter()
+        self._connections: Counter[str] = Counter()
+        if self._refusals is not None and self._known is None:
+            log.warning("no [link.access]: anyone with a certificate of this authority may command the robot")
+
+    def attach(self, session: Session) -> None:
+        """Hear of everybody who is connected, and who comes and goes."""
+        if self._refusals is not None:
+            session.watch_peers(self._on_change)
+
+    def _on_change(self, session_id: str, who: str, here: bool) -> None:
+        if self._refusals is not None and who:
+            self._refusals.learn(session_id, who)
+        who = who or f"session {session_id}"
+        self._here[who] += 1 if here else -1
+        self._connections[who] += here
+        if self._here[who] <= 0:
+            del self._here[who]
+        if not here:
+            log.info("%s has gone", who)
+        elif self._known is not None and who not in self._known:
+            log.warning("%s connected: [link.access] does not name it, so it may do nothing", who)
+        else:
+            log.info("%s connected", who)
+
+    def figures(self) -> dict[str, object]:
+        """For reports."""
+        return {
+            "connected": dict(self._here),
+            "connections": dict(self._connections),
+            "refused": self._refusals.figures() if self._refusals else {},
+        }

@@ -1,0 +1,109 @@
+"""Who was refused, and why, from what Zenoh logs: it tells it nowhere else. Pure.
+
+A handshake is refused with a reason, before anybody's name is known. A message is refused by the access
+control, which names the certificate the first time and the session's id from then on; that it was dropped
+is said by the thread's next line.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+
+from common.clock import to_ns
+from common.throttle import Throttle
+
+REPEAT_S = 10.0
+"""What keeps being refused is said once in so long."""
+MAX_KINDS = 256
+"""Different refusals that are told apart; what comes beyond is counted together."""
+FILTER = "error,zenoh_link_tls=warn,zenoh_link_commons=warn,zenoh::net::routing::interceptor=trace"
+"""What Zenoh must log for it."""
+
+_HANDSHAKE = (
+    re.compile(r"zenoh_link_tls::unicast: (?P<why>.+?)\.? Hint: "),
+    re.compile(r'QUIC acceptor failed: .*?reason: "(?P<why>[^"]+)"'),
+)
+_NUMBERS = re.compile(r": verification time .*")
+_THREAD = re.compile(r"ThreadId\(\d+\)")
+_NAMED = re.compile(r"(?P<zid>[0-9a-f]+) on \S*?CertCommonName\((?P<name>[^)]*)\)")
+_UNAUTHORIZED = re.compile(
+    r"(?P<zid>[0-9a-f]+)(?: on \S+)? is unauthorized to (?P<what>.+?) \(ingress\) on (?P<key>\S+)"
+)
+_DROPPED = "Msg intercepted!"
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """One attempt."""
+
+    who: str
+    """A common name, or a session's id; empty where the handshake failed, and nobody has proved anything."""
+    what: str
+    key: str
+
+    def __str__(self) -> str:
+        if not self.who:
+            return f"a connection was refused: {self.what}"
+        return f"{self.who} was refused: {self.what} {self.key}"
+
+
+class Refusals:
+    """Counts refusals; `feed` takes Zenoh's log and returns what is worth telling a person."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[Refusal] = Counter()
+        self.more = 0
+        """Refusals beyond MAX_KINDS different ones."""
+        self.names: dict[str, str] = {}
+        """Common name by session, of whoever is connected; Zenoh's log does not name a stranger."""
+        self._pending: dict[str, Refusal] = {}
+        self._throttles: dict[Refusal, Throttle] = {}
+
+    def feed(self, line: str, now_ns: int) -> str | None:
+        """Take one line without colours; words for a person's log, at most every REPEAT_S for each kind."""
+        refusal = self._read(line)
+        if refusal is None:
+            return None
+        if refusal not in self.counts and len(self.counts) >= MAX_KINDS:
+            self.more += 1
+            return None
+        self.counts[refusal] += 1
+        throttle = self._throttles.setdefault(refusal, Throttle(to_ns(REPEAT_S)))
+        return f"{refusal} ({self.counts[refusal]} so far)" if throttle.passes(now_ns) else None
+
+    def _read(self, line: str) -> Refusal | None:
+        for pattern in _HANDSHAKE:
+            if found := pattern.search(line):
+                return Refusal("", _NUMBERS.sub("", found["why"]), "")
+        thread = _THREAD.search(line)
+        if thread is None:
+            return None
+        if _DROPPED in line:
+            return self._pending.pop(thread[0], None)
+        if named := _NAMED.search(line):
+            self.learn(named["zid"], named["name"])
+        self._pending.pop(thread[0], None)
+        if found := _UNAUTHORIZED.search(line):
+            who = self.names.get(found["zid"], found["zid"])
+            self._pending[thread[0]] = Refusal(who, found["what"], found["key"])
+        return None
+
+    def learn(self, session: str, name: str) -> None:
+        """Whose session this is."""
+        if len(self.names) >= MAX_KINDS:
+            self.names.pop(next(iter(self.names)))
+        self.names[session] = name
+
+    def figures(self) -> dict[str, object]:
+        """For reports: handshakes by reason, messages by certificate, kind and key, and how many in all."""
+        handshakes = {r.what: n for r, n in list(self.counts.items()) if not r.who}
+        messages: dict[str, dict[str, int]] = {}
+        for refusal, count in list(self.counts.items()):
+            if refusal.who:
+                kinds = messages.setdefault(self.names.get(refusal.who, refusal.who), {})
+                kind = f"{refusal.what} {refusal.key}"
+                kinds[kind] = kinds.get(kind, 0) + count
+        total = self.counts.total() + self.more
+        return {"total": total, "handshakes": handshakes, "messages": messages}

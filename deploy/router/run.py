@@ -1,0 +1,45 @@
+"""Routes until stopped; who comes and goes is logged by certificate, and what is refused is counted."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from typing import Any
+
+from common.launch import WriteFigures
+from common.link.audit import Audit
+from common.link.configuration import zenoh_configuration
+from common.link.session import open_session
+from deploy.router.config import RouterConfig
+
+log = logging.getLogger("tandem.router")
+
+
+def zenohd_configuration(config: RouterConfig) -> dict[str, Any]:
+    """What `zenohd --config` reads: the same endpoints, keys and rules, without this process around them."""
+    return zenoh_configuration(config.link, "router")
+
+
+def zenohd_text(config: RouterConfig) -> str:
+    """The same as a file."""
+    head = (
+        f"// Made by `tandem router --zenohd` for {config.name}; change the TOML and make it again.\n"
+        "// Rules are by certificates' common names: see docs/security.md.\n"
+    )
+    return head + json.dumps(zenohd_configuration(config), indent=2) + "\n"
+
+
+async def run(config: RouterConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+    """Route until `stop` is set. Raises LinkError where it cannot listen."""
+    if config.link.tls is None:
+        log.warning("no [link.tls]: anyone who reaches this router may command every robot at it")
+    audit = Audit(config.link)
+    async with open_session(config.link, "router") as session:
+        audit.attach(session)
+        log.info("%s: routes at %s", config.name, ", ".join(config.link.listen))
+        try:
+            await stop.wait()
+        finally:
+            write_figures(audit.figures())
+    log.info("stopped")

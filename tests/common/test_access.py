@@ -1,0 +1,74 @@
+"""The rules that Zenoh is given: read back as "may this name do this with this key", in either direction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import zenoh
+
+from common.link.access import access_control, named
+from common.link_config import AccessConfig
+
+ACCESS = AccessConfig(
+    operators={"anna": ["r1", "r2"], "ben": ["r2"]},
+    observers={"screen": ["r1"]},
+    viewers={"chief": ["r1"]},
+    routers=["hub"],
+)
+RULES = access_control(ACCESS)
+
+
+def may(who: str, message: str, key: str, flow: str = "ingress", table: dict[str, Any] = RULES) -> bool:
+    """As Zenoh decides: a rule's key must include the message's."""
+    mine = {rule for policy in table["policies"] if who in policy["subjects"] for rule in policy["rules"]}
+    return any(
+        rule["id"] in mine and message in rule["messages"] and flow in rule["flows"]
+        and any(zenoh.KeyExpr(each).includes(zenoh.KeyExpr(key)) for each in rule["key_exprs"])
+        for rule in table["rules"]
+    )  # fmt: skip
+
+
+COMMANDS = {("operator:anna", "r1"), ("operator:anna", "r2"), ("operator:ben", "r2"), ("router:hub", "r1")}
+EVERYBODY = sorted(named(ACCESS))
+
+
+def test_everybody_is_known_by_role_and_name() -> None:
+    assert EVERYBODY == [
+        "observer:chief", "observer:screen", "operator:anna", "operator:ben", "robot:r1", "robot:r2",
+        "router:hub",
+    ]  # fmt: skip
+    assert RULES["default_permission"] == "deny"
+    assert RULES["enabled"]
+
+
+@pytest.mark.parametrize("robot", ["r1", "r2"])
+@pytest.mark.parametrize("who", [*EVERYBODY, "observer:nobody", "operator:r1", "robot:anna"])
+def test_the_table(who: str, robot: str) -> None:
+    key = f"tandem/{robot}"
+    router = who == "router:hub"
+    operator = who in {"operator:anna"} | ({"operator:ben"} if robot == "r2" else set())
+    observer = robot == "r1" and who in {"observer:screen", "observer:chief"}
+    viewer = robot == "r1" and who == "observer:chief"
+    itself = who == f"robot:{robot}"
+    assert may(who, "put", f"{key}/command") == (operator or router)
+    assert may(who, "put", f"{key}/state") == (itself or router)
+    assert may(who, "put", f"{key}/video/head") == (itself or router)
+    assert may(who, "declare_subscriber", f"{key}/video/head") == (operator or viewer or router)
+    assert may(who, "put", f"{key}/video/head", "egress") == (operator or viewer or router)
+    assert may(who, "declare_subscriber", f"{key}/state") == (operator or observer or router)
+    assert may(who, "declare_subscriber", f"{key}/command") == (operator or observer or itself or router)
+    assert may(who, "declare_queryable", f"{key}/control") == (itself or router)
+    assert may(who, "query", f"{key}/clock") == (operator or router)
+    assert may(who, "query", f"{key}/control") == (who in EVERYBODY), "anyone who is named may stop a robot"
+    assert may(who, "liveliness_token", f"{key}/alive/slave") == (itself or router)
+    assert may(who, "liveliness_token", f"{key}/alive/master") == (operator or router)
+    assert may(who, "declare_liveliness_subscriber", "tandem/*/alive/slave") == (who in EVERYBODY)
+    assert not may(who, "declare_subscriber", "tandem/**") or router
+    assert not may(who, "put", f"{key}/control") or router
+
+
+def test_an_empty_table_lets_nobody_do_anything() -> None:
+    table = access_control(AccessConfig())
+    assert table["rules"] == table["policies"] == table["subjects"] == []
+    assert table["default_permission"] == "deny"
