@@ -13,11 +13,10 @@ from typing import Any
 
 from common.clock import to_ns, to_s
 from common.messages import RobotState
+from deploy.rig.host import STILL_S
 
 HOLDS, HOLDS_WITHIN_S = 3, 20.0
 BACK_S = 20.0
-STILL_S = 0.05
-"""Half of the shortest time-out by which a guard holds: the encoders', 0.1 s."""
 WINDOW_S = 0.5
 JUDGED_AFTER_S = 1.0
 

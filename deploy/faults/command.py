@@ -31,7 +31,8 @@ def faults(
     Example: `tandem faults "link" --report faults.json`
     """
     from deploy.faults.document import matrix, tree, within_page
-    from deploy.faults.processes import PROCESS_FAULTS, run_process_trial
+    from deploy.faults.processes import PROCESS_FAULTS
+    from deploy.faults.processes import tried as tried_in_processes
     from deploy.faults.table import FAULTS
     from deploy.faults.trial import run_trial
     from deploy.faults.view import print_matrix
@@ -49,7 +50,7 @@ def faults(
 
     def tried(fault: Fault) -> Outcome:
         if fault.name in processes:
-            return asyncio.run(run_process_trial(processes[fault.name]))
+            return asyncio.run(tried_in_processes(processes[fault.name]))
         return run_trial(fault)
 
     console = Console()

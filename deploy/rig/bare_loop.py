@@ -1,8 +1,9 @@
 """A loop on each core that does nothing but tick, in a process of its own: what it misses, the host missed.
 
-`python -m deploy.rig.bare_loop` writes one JSON line when it starts and one for each time that it came late
-by a tick or more, and ends when its standard input does. At real-time priority, where the host permits it, it
-comes before all programs of ours: what it misses then is the host's alone.
+`python -m deploy.rig.bare_loop` writes one JSON line when it starts, one for each time that it came late by
+a tick or more, and one a core four times a second; it ends when its standard input does. At real-time
+priority, where the host permits it, it comes before all programs of ours: what it misses then is the host's
+alone.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from common.pacing import TickGrid
 
 PERIOD_NS = 5_000_000
 """As the master's capture and the slave's loop."""
+WORD_TICKS = 50
+"""After so many ticks a loop says that it still ticks, so that silence is not taken for time kept."""
 PRIORITY = 90
 """Above what `[process] realtime_priority` may ask for."""
 
@@ -42,7 +45,7 @@ def _tick(core: int, grid: TickGrid) -> None:
         time.sleep(max(0, awaited_ns - monotonic_ns()) / NS_PER_S)
         now_ns = monotonic_ns()
         due = grid.due(now_ns)
-        if due is not None and due.missed:
+        if due is not None and (due.missed or due.tick % WORD_TICKS == 0):
             _say({"core": core, "from_ns": awaited_ns, "until_ns": now_ns, "missed": due.missed})
 
 

@@ -12,12 +12,15 @@ from typing import Any
 
 import psutil
 
-from common.clock import to_s
+from common.clock import monotonic_ns, to_s
 from deploy.rig.bare_loop import PERIOD_NS
 
 START_S = 10.0
 """A host on which a bare loop does not start within this long is not measured."""
 STOP_S = 1.0
+STILL_S = 0.05
+"""A host that stood still for so long may have made a guard hold: half of the shortest time-out by which one
+does, the encoders' 0.1 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,8 @@ class Host:
     """What the bare loops have told so far. Where they do not run, nothing is known and nothing excused."""
 
     stalls: list[Stall] = field(default_factory=list)
+    known_ns: dict[int, int] = field(default_factory=dict)
+    """Up to when each core has told."""
     began_ns: int = 0
     """When the loops began to tick; 0 where they did not."""
     priority: bool = False
@@ -43,18 +48,51 @@ class Host:
     cpu_s: tuple[float, float] = (0.0, 0.0)
     """When they began, of all cores: time that the machine beneath took, and all time."""
 
+    _word: asyncio.Event = field(default_factory=asyncio.Event)
+
     def hear(self, line: str) -> None:
         """Take one line of the loops' output."""
+        self._word.set()
         told: dict[str, Any] = json.loads(line)
         if "origin_ns" in told:
             self.began_ns, self.priority, self.cpu_s = told["origin_ns"], told["priority"], _cpu_s()
-        else:
-            self.stalls.append(Stall(**told))
+            self.known_ns = dict.fromkeys(told["cores"], self.began_ns)
+            return
+        stall = Stall(**told)
+        self.known_ns[stall.core] = stall.until_ns
+        if stall.missed:
+            self.stalls.append(stall)
+
+    def end(self) -> None:
+        """Nothing more will be told: nobody waits for a word."""
+        self.known_ns.clear()
+        self._word.set()
 
     def stood_still_s(self, since_ns: int, until_ns: int) -> float:
         """The longest that any one core stood still without a break, as far as it lies between the two."""
         spans = (min(s.until_ns, until_ns) - max(s.from_ns, since_ns) for s in reversed(self.stalls))
         return to_s(max(0, max(spans, default=0)))
+
+    def lost_s(self, since_ns: int, until_ns: int) -> float:
+        """For how long in all, between the two, some core stood still: what else happened may be so late."""
+        lost_ns, reached_ns = 0, since_ns
+        for stall in sorted(self.stalls, key=lambda stall: stall.from_ns):
+            end_ns = min(stall.until_ns, until_ns)
+            lost_ns += max(0, end_ns - max(stall.from_ns, reached_ns))
+            reached_ns = max(reached_ns, end_ns)
+        return to_s(lost_ns)
+
+    async def known(self, until_ns: int) -> None:
+        """Wait until every core has told up to then; where nothing is measured, not at all."""
+        while min(self.known_ns.values(), default=until_ns) < until_ns:
+            self._word.clear()
+            await self._word.wait()
+
+    async def spoilt(self, since_ns: int) -> bool:
+        """Whether, from then to now, the host stood still for long enough to make a guard hold."""
+        now_ns = monotonic_ns()
+        await self.known(now_ns)
+        return self.stood_still_s(since_ns, now_ns) >= STILL_S
 
     @property
     def missed(self) -> int:
@@ -102,6 +140,7 @@ async def watch_host() -> AsyncIterator[Host]:
         while line := await stdout.readline():
             host.hear(line.decode())
             begun.set()
+        host.end()
         begun.set()
 
     listening = asyncio.ensure_future(listen())

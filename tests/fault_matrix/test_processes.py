@@ -6,12 +6,12 @@ import asyncio
 
 import pytest
 
-from deploy.faults.processes import PROCESS_FAULTS, ProcessFault, run_process_trial
+from deploy.faults.processes import PROCESS_FAULTS, ProcessFault, tried
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
 
 
 @pytest.mark.parametrize("fault", PROCESS_FAULTS, ids=lambda fault: fault.row.name)
 def test_the_robot_stands_whatever_program_dies(fault: ProcessFault) -> None:
-    outcome = asyncio.run(run_process_trial(fault))
+    outcome = asyncio.run(tried(fault))
     assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,12 @@ import psutil
 import pytest
 
 from common.clock import to_ns
-from common.messages import Action
+from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
+from deploy.rig.tracking import until_tracking
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 SEEN_S = 1.0
 """How long the robot is watched after the kill."""
 
@@ -30,16 +32,16 @@ def ages(video: dict[str, Any]) -> int:
     return count
 
 
-def test_a_camera_killed_while_the_robot_tracks_is_a_word_in_the_state_and_nothing_else() -> None:
-    async def story() -> None:
+def test_a_camera_killed_while_the_robot_tracks_is_a_word_in_the_state_and_nothing_else(
+    on_this_host: OnThisHost,
+) -> None:
+    async def story(host: Host) -> None:
         async with open_rig(overrides={"slave": ['camera.source="robot"']}) as rig:
             observer = rig.observer
             for role in ROLES:
                 await rig.start(role)
-            await rig.until(lambda: observer.ready, 30.0, "readiness")
-            reply = await rig.control(Action.ENGAGE)
-            assert reply.done, reply.text
-            await rig.until(lambda: observer.guard == "track", 20.0, "track")
+            await rig.until(lambda: observer.ready, 60.0, "readiness")
+            await until_tracking(rig)
             assert observer.state is not None
             if "no OpenGL" in observer.state.faults.get("camera", ""):
                 pytest.skip(observer.state.faults["camera"])
@@ -61,4 +63,4 @@ def test_a_camera_killed_while_the_robot_tracks_is_a_word_in_the_state_and_nothi
             assert {s.guard for s in observer.states if s.sent_ns >= killed_ns} == {"track"}
             await rig.until(lambda: "camera" not in observer.state.faults, 20.0, "the camera again")  # type: ignore[union-attr]
 
-    asyncio.run(story())
+    on_this_host(story)

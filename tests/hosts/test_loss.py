@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import asyncio
 import signal
+from collections.abc import Awaitable, Callable
 
 import numpy as np
 import pytest
 
 from common.clock import to_ns
-from common.messages import Action, RobotState
+from common.messages import RobotState
+from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
+from deploy.rig.tracking import until_tracking
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 COMMAND_TIMEOUT_S = 0.2
 STATE_PERIOD_S = 0.02
@@ -20,21 +23,15 @@ BRAKE_S = 0.35
 """From the fastest joint speed to standstill, and the servo's own settling."""
 
 
-async def engaged(rig: Rig) -> None:
-    reply = await rig.control(Action.ENGAGE)
-    assert reply.done, reply.text
-    await rig.until(lambda: rig.observer.guard == "track", 20.0, "track")
-
-
 async def tracking(rig: Rig) -> None:
     for role in ROLES:
         await rig.start(role)
-    await rig.until(lambda: rig.observer.ready, 30.0, "readiness")
-    await engaged(rig)
+    await rig.until(lambda: rig.observer.ready, 60.0, "readiness")
+    await until_tracking(rig)
 
 
-def test_killed_master_leaves_the_robot_holding_until_engaged_anew() -> None:
-    async def story() -> None:
+def test_killed_master_leaves_the_robot_holding_until_engaged_anew(on_this_host: OnThisHost) -> None:
+    async def story(host: Host) -> None:
         async with open_rig() as rig:
             observer = rig.observer
             await tracking(rig)
@@ -46,11 +43,15 @@ def test_killed_master_leaves_the_robot_holding_until_engaged_anew() -> None:
             # both stamps are the robot's own clock: no other clock decides how long it took
             assert held.echo is not None
             waited_s = (held.sent_ns - held.echo.received_ns) / 1e9
-            assert waited_s < COMMAND_TIMEOUT_S + 2 * STATE_PERIOD_S
+            await host.known(held.sent_ns)
+            host_s = host.lost_s(held.echo.received_ns, held.sent_ns)
+            assert waited_s < COMMAND_TIMEOUT_S + 2 * STATE_PERIOD_S + host_s
             assert "no command" in held.reason
 
-            still_from_ns = held.sent_ns + to_ns(BRAKE_S)
-            await rig.until(lambda: observer.sent_ns > still_from_ns + to_ns(0.5), 5.0, "more states")
+            braked_ns = held.sent_ns + to_ns(BRAKE_S)
+            await rig.until(lambda: observer.sent_ns > braked_ns + to_ns(1.0), 5.0, "more states")
+            await host.known(braked_ns)
+            still_from_ns = braked_ns + to_ns(host.lost_s(held.sent_ns, braked_ns))
             assert spread_rad([s for s in observer.states if s.sent_ns > still_from_ns]) < np.radians(0.3)
 
             await rig.start("master")
@@ -60,13 +61,13 @@ def test_killed_master_leaves_the_robot_holding_until_engaged_anew() -> None:
             after = [s for s in observer.states if s.sent_ns > resumed_ns]
             assert {s.guard for s in after} == {"hold"}
             assert spread_rad(after) < np.radians(0.3)
-            await engaged(rig)
+            await until_tracking(rig)
 
-    asyncio.run(story())
+    on_this_host(story)
 
 
-def test_killed_slave_is_told_by_the_master_and_resumes_only_when_engaged() -> None:
-    async def story() -> None:
+def test_killed_slave_is_told_by_the_master_and_resumes_only_when_engaged(on_this_host: OnThisHost) -> None:
+    async def story(host: Host) -> None:
         async with open_rig() as rig:
             observer = rig.observer
             await tracking(rig)
@@ -81,14 +82,14 @@ def test_killed_slave_is_told_by_the_master_and_resumes_only_when_engaged() -> N
             observer.recording = True
             await rig.until(lambda: observer.sent_ns > resumed_ns + to_ns(1.0), 5.0, "a second of states")
             assert {s.guard for s in observer.states} == {"hold"}
-            await engaged(rig)
+            await until_tracking(rig)
 
-    asyncio.run(story())
+    on_this_host(story)
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_each_process_stops_cleanly(stop: signal.Signals) -> None:
-    async def story() -> None:
+def test_each_process_stops_cleanly(on_this_host: OnThisHost, stop: signal.Signals) -> None:
+    async def story(host: Host) -> None:
         async with open_rig() as rig:
             await tracking(rig)
             statuses = {role: await rig.children[role].stop(stop) for role in ("master", "suit", "slave")}
@@ -97,7 +98,7 @@ def test_each_process_stops_cleanly(stop: signal.Signals) -> None:
             }
             assert rig.children["slave"].figures()["guard"]["accepted"] > 0
 
-    asyncio.run(story())
+    on_this_host(story)
 
 
 def spread_rad(states: list[RobotState]) -> float:

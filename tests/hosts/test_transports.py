@@ -2,40 +2,40 @@
 
 from __future__ import annotations
 
-import asyncio
 import socket
+from collections.abc import Awaitable, Callable
 
 import pytest
 
-from common.messages import Action
 from common.skeleton import load_skeleton
 from deploy.rig.endpoints import TRANSPORTS
+from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
+from deploy.rig.tracking import until_tracking
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 
 async def tracks(rig: Rig) -> None:
     for role in ROLES:
         await rig.start(role)
-    await rig.until(lambda: rig.observer.ready, 30.0, "readiness")
-    reply = await rig.control(Action.ENGAGE)
-    assert reply.done, reply.text
-    await rig.until(lambda: rig.observer.guard == "track", 20.0, "track")
+    await rig.until(lambda: rig.observer.ready, 60.0, "readiness")
+    await until_tracking(rig)
 
 
 @pytest.mark.parametrize("transport", [t for t in TRANSPORTS if t != "tcp"])
-def test_the_robot_tracks_over(transport: str) -> None:
-    async def story() -> None:
+def test_the_robot_tracks_over(on_this_host: OnThisHost, transport: str) -> None:
+    async def story(host: Host) -> None:
         async with open_rig(transport) as rig:
             await tracks(rig)
             assert rig.observer.state is not None
             assert rig.observer.state.offset_bound_ns > 0
 
-    asyncio.run(story())
+    on_this_host(story)
 
 
-def test_body_nodes_on_classic_can_and_gloves_on_fd() -> None:
+def test_body_nodes_on_classic_can_and_gloves_on_fd(on_this_host: OnThisHost) -> None:
     def bus(name: str, fd: bool) -> str:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind(("127.0.0.1", 0))
@@ -50,7 +50,7 @@ def test_body_nodes_on_classic_can_and_gloves_on_fd() -> None:
     nodes = [f'nodes.{name}.bus="body"' for name in body]
     overrides = {"master": [f"capture.buses={buses}", *nodes], "suit": [f"buses={buses}", *nodes]}
 
-    async def story() -> None:
+    async def story(host: Host) -> None:
         async with open_rig(overrides=overrides) as rig:
             await tracks(rig)
             statuses = await rig.stop()
@@ -60,4 +60,4 @@ def test_body_nodes_on_classic_can_and_gloves_on_fd() -> None:
             assert counts["body"]["received"] > 8 * 3 * 200
             assert counts["suit"]["received"] > 28 * 200
 
-    asyncio.run(story())
+    on_this_host(story)

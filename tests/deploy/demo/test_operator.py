@@ -7,7 +7,8 @@ import pytest
 
 from common.clock import to_ns
 from common.messages import RobotState
-from deploy.demo.operator import BACK_S, HOLDS_WITHIN_S, JUDGED_AFTER_S, STILL_S, HostStill, Operator
+from deploy.demo.operator import BACK_S, HOLDS_WITHIN_S, JUDGED_AFTER_S, HostStill, Operator
+from deploy.rig.host import STILL_S
 
 LATE_S = JUDGED_AFTER_S + 0.1
 

@@ -47,6 +47,24 @@ def test_figures_are_of_the_worst_core() -> None:
     assert (figures["longest_ms"], figures["priority"]) == (300.0, True)
 
 
+@pytest.mark.parametrize(
+    ("since_ms", "until_ms", "lost_ms"),
+    [(1000, 3000, 370), (1120, 1210, 30), (2250, 3000, 50), (1300, 2000, 0)],
+)
+def test_time_lost_is_that_in_which_any_core_stood_still_counted_once(
+    since_ms: int, until_ms: int, lost_ms: int
+) -> None:
+    host = told((0, 1100, 1140), (1, 2000, 2300), (0, 1200, 1230), (0, 2100, 2200), (1, 1110, 1130))
+    assert host.lost_s(since_ms * NS_PER_MS, until_ms * NS_PER_MS) == pytest.approx(lost_ms / 1e3)
+
+
+def test_a_loop_s_word_that_it_ticks_is_no_stall() -> None:
+    host = told((0, 1100, 1140))
+    host.hear(json.dumps({"core": 1, "from_ns": 7, "until_ns": 8 * NS_PER_S, "missed": 0}))
+    assert [stall.core for stall in host.stalls] == [0]
+    assert host.known_ns == {0: 1140 * NS_PER_MS, 1: 8 * NS_PER_S}
+
+
 def test_a_host_that_was_not_measured_excuses_nothing() -> None:
     assert Host().figures(NS_PER_S) == {}
     assert Host().stood_still_s(0, NS_PER_S) == 0.0
@@ -57,7 +75,7 @@ def test_real_loops_tick_on_every_core_and_end_with_the_block() -> None:
     async def story() -> Host:
         async with watch_host() as host:
             assert host.began_ns
-            await asyncio.sleep(0.1)
+            await host.known(host.began_ns + 2 * PERIOD_NS)
             assert host.figures(monotonic_ns())["ticks"]["expected"] > 0
         return host
 

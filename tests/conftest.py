@@ -1,0 +1,47 @@
+"""What tests of real processes share: a trial that the host itself spoilt is tried again, and no other."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from common.clock import monotonic_ns
+from common.errors import TandemError
+from deploy.rig.host import Host, watch_host
+
+TRIES = 4
+
+Story = Callable[[Host], Awaitable[None]]
+
+
+@pytest.fixture
+def on_this_host() -> Callable[[Story], None]:
+    """Runs a story of real processes beside a loop that does nothing but tick.
+
+    Where it fails and the host itself stood still meanwhile, nothing was shown, and it is tried again, up to
+    TRIES times in all; where it fails on a host that kept its time, or in the last try, it has failed.
+    """
+
+    def run(story: Story) -> None:
+        for left in reversed(range(TRIES)):
+            spoilt = asyncio.run(_spoilt(story, last=not left))
+            if not spoilt:
+                return
+            print(f"the host stood still, tried again: {spoilt}")  # noqa: T201
+
+    return run
+
+
+async def _spoilt(story: Story, last: bool) -> str:
+    """Why the trial failed where the host is to blame, empty where it went well; else what it raised."""
+    async with watch_host() as host:
+        began_ns = monotonic_ns()
+        try:
+            await story(host)
+        except (AssertionError, TandemError) as error:
+            if last or not await host.spoilt(began_ns):
+                raise
+            return str(error) or repr(error)
+        return ""
