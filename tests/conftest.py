@@ -1,15 +1,23 @@
-"""What tests of real processes share: a trial that the host itself spoilt is tried again, and no other."""
+"""What tests share: no example has a deadline, and a trial that the host itself spoilt is tried again."""
 
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Awaitable, Callable
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from common.clock import monotonic_ns
 from common.errors import TandemError
 from deploy.rig.host import Host, watch_host
+
+# how long an example takes is the machine's affair; and a change is judged by the same examples each time
+settings.register_profile(
+    "tandem", deadline=None, derandomize="CI" in os.environ, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("tandem")
 
 TRIES = 4
 

@@ -54,4 +54,6 @@ def test_no_time_out_counts_by_the_wall_clock() -> None:
     sources = [p for folder in ("common", "master", "slave") for p in (ROOT / folder).rglob("*.py")]
     assert len(sources) > 50
     users = {p.relative_to(ROOT).as_posix() for p in sources if reads.search(p.read_text("utf-8"))}
-    assert {u for u in users if not u.startswith("common/recording/")} == set()
+    # a certificate is valid from one date to another: read once, before anything is opened
+    allowed = {"common/link/certificates.py"}
+    assert {u for u in users - allowed if not u.startswith("common/recording/")} == set()
