@@ -17,7 +17,8 @@ from deploy.calibrate.options import AsJson, OutFolder, RecordingFile, ReportFil
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from master.calibrate.mounting import JointMotion, Mounting
+    from master.calibrate.joint_motion import JointMotion
+    from master.calibrate.mounting import Mounting
 
 
 _TIMES = re.compile(r"([0-9]+(?:\.[0-9]*)?):([0-9]+(?:\.[0-9]*)?)")

@@ -10,7 +10,7 @@ from vqf import offlineVQF
 
 from common.quaternion import Array, normalise, to_matrix
 from master.calibrate.hinge import PoorMotionError
-from master.calibrate.joint_fit import Moving, Rows
+from master.calibrate.joint_residuals import Moving, Rows
 from master.calibrate.recording import NodeRecording
 
 _SMOOTH_HZ = 10.0

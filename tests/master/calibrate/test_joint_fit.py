@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from common.quaternion import Array
-from master.calibrate import joint_fit
-from master.calibrate.joint_fit import Moving, Unknowns, fit_joint
+from master.calibrate.joint_fit import fit_joint
+from master.calibrate.joint_residuals import JointProblem, Moving, Unknowns, step
 
 Y, Z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 KINDS = {"hinge": [Y], "two axes": [-Y, Z], "ball": None}
@@ -35,12 +35,12 @@ def test_the_jacobian_is_that_of_finite_differences(kind: str, seed: int) -> Non
     here = Unknowns(
         None if zero is None else (axes[0], axes[1]), random.uniform(-3, 3), random.normal(size=6)
     )
-    problem = joint_fit._Problem(some(2 * seed), some(2 * seed + 1), zero, stood=True)
+    problem = JointProblem(some(2 * seed), some(2 * seed + 1), zero, stood=True)
     _, jacobian = problem.linearise(here)
     for k in range(jacobian.shape[1]):
         x = np.zeros(jacobian.shape[1])
         x[k] = 1e-6
-        ends = [problem.linearise(joint_fit._step(here, s * x))[0] for s in (1.0, -1.0)]
+        ends = [problem.linearise(step(here, s * x))[0] for s in (1.0, -1.0)]
         np.testing.assert_allclose(jacobian[:, k], (ends[0] - ends[1]) / 2e-6, rtol=1e-4, atol=1e-4)
 
 

@@ -17,7 +17,8 @@ from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.full_body import RECORDED_AS
 from master.calibrate.hinge import PoorMotionError
 from master.calibrate.hinge_pair import find_hinge_pair
-from master.calibrate.mounting import Mounting, find_mounting, posture, zero_axes
+from master.calibrate.joint_motion import zero_axes
+from master.calibrate.mounting import Mounting, find_mounting, posture
 from master.calibrate.mounting_files import calibrated, write_mounting
 from master.calibrate.oriented import orient
 from master.calibrate.recording import NodeRecording, load_recordings
