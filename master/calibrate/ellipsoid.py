@@ -174,7 +174,9 @@ def _refined(first: tuple[Array, Array], m: Array) -> tuple[Array, Array]:
         change += np.triu(change, 1).T
         shape, centre = shape + change, centre + step[6:]
         if not np.linalg.eigvalsh(shape)[0] > 0.0:
-            raise NoEllipsoidError("the fit runs away: the readings cover too little of the sphere")
+            raise NoEllipsoidError(
+                "the fit runs away: the readings cover too little of the sphere, or lie on none"
+            )
         if np.abs(step).max() < 1e-10:
             break
     return shape, centre

@@ -30,6 +30,8 @@ GOOD_COVERAGE = 0.8
 MOST_AMPLIFICATION = 1.0
 MOST_SPREAD = 0.1
 """Of the calibrated strength over itself; beyond it the field is not one field."""
+_FIELD_UT = (10.0, 200.0)
+"""The earth's field is 22 to 67 µT; a room's iron makes no more of it than this. Gauss and mG lie outside."""
 _FEWEST_SAMPLES = 100
 _BLOCK_S = 2.0
 """Neighbouring samples are alike: what is held out are blocks of this length."""
@@ -125,6 +127,11 @@ def calibrate_magnetic(recording: NodeRecording, accelerometer: Array | None = N
         raise RecordingError(
             f"the calibrated field varies by {100 * spread:.0f} %: it was disturbed; go away from iron, "
             "motors and magnets, and record again"
+        )
+    if not _FIELD_UT[0] < fit.field_ut < _FIELD_UT[1]:
+        raise RecordingError(
+            f"the field is {fit.field_ut:.3g} µT strong, and the earth's is 22 to 67 µT; are the readings in µT? "
+            "1 gauss is 100 µT"
         )
     notes = () if seen >= GOOD_COVERAGE else (f"{100 * seen:.0f} % of the sphere seen; more makes it surer",)
     alignment, words = _align(recording, recording.mag_ut, fit, accelerometer)

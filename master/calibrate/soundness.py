@@ -54,9 +54,7 @@ def check_inertial(recording: NodeRecording, level: Array, fast: float) -> None:
         max(_CLIPPED_RUN, round(_CLIPPED_S * recording.rate_hz)),
         "turn the node more slowly, and record again",
     )
-    # noise moves a sound accelerometer all the time; a perfect one, as in a simulation, has none to tell by
-    noise = np.nanmedian(np.abs(np.diff(recording.acc_m_s2[~turning], axis=0)), axis=0)
-    if np.median(noise) > 0.0:
+    if _noisy(recording.acc_m_s2, ~turning):
         check_clipped(
             "accelerometer",
             recording.acc_m_s2,
@@ -64,6 +62,18 @@ def check_inertial(recording: NodeRecording, level: Array, fast: float) -> None:
             max(_CLIPPED_RUN, round(0.5 * recording.rate_hz)),
             "set a larger range, or replace the node",
         )
+
+
+def _noisy(samples: Array, watched: Mask) -> bool:
+    """Whether noise moves most axes of readings (T, 3) all the time, away from the ends of their range.
+
+    A perfect sensor, as in a simulation, stands still at rest, and then nothing tells that it is clipped.
+    """
+    inside = (samples < np.nanmax(samples, axis=0)) & (samples > np.nanmin(samples, axis=0))
+    both = inside[1:] & inside[:-1] & (watched[1:] & watched[:-1])[:, None]
+    moved = np.where(both, np.abs(np.diff(samples, axis=0)), np.nan)
+    axes = [column[np.isfinite(column)] for column in moved.T]
+    return float(np.median([np.median(axis) if len(axis) else 0.0 for axis in axes])) > 0.0
 
 
 def _longest_run(flags: Mask) -> int:

@@ -110,6 +110,11 @@ def clipped_acc(r: NodeRecording) -> NodeRecording:
     return NodeRecording("unit", r.rate_hz, np.clip(r.acc_m_s2, -6.0, 6.0), r.gyr_rad_s)
 
 
+def mostly_clipped_acc(r: NodeRecording) -> NodeRecording:
+    """At rest too: in most attitudes some axis stands still at the end of its range."""
+    return NodeRecording("unit", r.rate_hz, np.clip(r.acc_m_s2, -4.0, 4.0), r.gyr_rad_s)
+
+
 def constant(r: NodeRecording) -> NodeRecording:
     acc = r.acc_m_s2.copy()
     acc[:, 1] = 3.0
@@ -151,6 +156,7 @@ def few(r: NodeRecording) -> NodeRecording:
     [
         (clipped_gyro, r"gyroscope is clipped on [xyz]: .*turn the node more slowly"),
         (clipped_acc, r"accelerometer is clipped on [xyz]: "),
+        (mostly_clipped_acc, r"accelerometer is clipped on [xyz]: "),
         (constant, r"accelerometer reads the same all along on y"),
         (gaps, r"20 % of the gyroscope's readings are missing"),
         (other_rate, r"gravity turns 0.5 times .* is the rate of the recording right"),

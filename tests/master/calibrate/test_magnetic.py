@@ -116,11 +116,22 @@ def disturbed(mag: Array) -> Array:
         (gaps, "25 % of the magnetometer's readings are missing"),
         (disturbed, "it was disturbed"),
         (lambda mag: mag[:60], "too few"),
+        (lambda mag: 0.01 * mag, r"0\.49 µT strong, .* are the readings in µT"),
+        (lambda mag: 10.0 * mag, r"are the readings in µT\? 1 gauss is 100 µT"),
     ],
 )
 def test_what_cannot_be_calibrated_from_is_refused(spoil, message: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(RecordingError, match=message):
         calibrate_magnetic(recorded(spoil(free_rotation())))
+
+
+@pytest.mark.parametrize("limit_ut", [10.0, 200.0])
+def test_the_weakest_and_strongest_field_that_a_room_can_have(limit_ut: float) -> None:
+    beyond = 0.98 if limit_ut < 50.0 else 1.02
+    there = free_rotation() * (limit_ut / FIELD_UT)
+    calibrate_magnetic(recorded(there / beyond))
+    with pytest.raises(RecordingError, match="are the readings in µT"):
+        calibrate_magnetic(recorded(there * beyond))
 
 
 def test_a_node_without_a_magnetometer_is_refused() -> None:

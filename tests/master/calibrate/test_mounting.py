@@ -143,6 +143,20 @@ def test_the_arms_work_with_sensors_askew_and_no_magnetometer(
             assert error < (1.0 if "elbow" in joint else 2.0), (joint, error)
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_an_elbow_whose_bending_does_not_tell_the_sign_goes_by_the_other_one(
+    upper_body: Worn, side: str
+) -> None:
+    """One that could bend either way stays within its limits whatever the sign of its axis."""
+    at = f"{side}_elbow_pitch"
+    joints = [
+        replace(j, lower_rad=-3.0, upper_rad=3.0) if j.name == at else j for j in upper_body.skeleton.joints
+    ]
+    either_way = Skeleton("either way", upper_body.skeleton.segments, tuple(joints))
+    errors = errors_deg(upper_body, find_mounting(upper_body.nodes, either_way))
+    assert max(errors.values()) < 2.0, errors
+
+
 @pytest.mark.parametrize("which", ["upper_body", "legs"])
 def test_axes_are_within_two_degrees_of_the_truth(which: str, request: pytest.FixtureRequest) -> None:
     worn: Worn = request.getfixturevalue(which)

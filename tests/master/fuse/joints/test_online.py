@@ -23,6 +23,9 @@ CREEPING = {"local": [{"nodes": LIMBS, "from_s": 4.0, "ramp_s": 12.0, "turn_deg"
 RAIL = {"dipole": [{"position_m": [0.6, 0.0, 0.7], "moment_a_m2": [0.0, 20.0, 0.0]}]}
 """There from the beginning; a stance tells the headings with which to begin."""
 
+BENT = from_axis_angle([0.0, -1.0, 0.0], np.radians(80.0))
+"""A forearm before the upper arm that hangs: its floating axis stands upright."""
+
 
 def of_all(names: list[str], skeleton: Skeleton) -> Array:
     return np.isin(skeleton.segment_names, names)
@@ -95,24 +98,46 @@ def test_a_wrong_heading_is_found_by_a_bent_elbow(arms: Skeleton) -> None:
     """Both arms held ahead, elbows bent: the forearms' floating axes stand upright."""
     online = OnlineHeadings(OnlineConfig(), arms, 200.0)
     nodes, field = np.ones(5, dtype=np.bool_), np.full((5, 3), np.nan)
-    bent = from_axis_angle([0.0, -1.0, 0.0], np.radians(80.0))
-    truth = np.stack([IDENTITY, IDENTITY, bent, IDENTITY, bent])
+    truth = np.stack([IDENTITY, IDENTITY, BENT, IDENTITY, BENT])
     wrong = multiply(heading_turn(np.radians([0.0, 0.0, 8.0, 0.0, -8.0])), truth)
     for _ in range(500):
         online.correct(wrong, field, np.tile(IDENTITY, (5, 1)), nodes)
     q = multiply(online.turn, wrong)
     for upper, fore in ((1, 2), (3, 4)):
-        between = angle_between(multiply(q[upper], bent), q[fore])
+        between = angle_between(multiply(q[upper], BENT), q[fore])
         assert np.degrees(between) < 0.2
 
 
-def test_a_node_that_is_not_usable_neither_corrects_nor_is_corrected(arms: Skeleton) -> None:
+@pytest.mark.parametrize("left_usable", [True, False])
+def test_a_node_that_is_not_usable_neither_corrects_nor_is_corrected(
+    arms: Skeleton, left_usable: bool
+) -> None:
     online = OnlineHeadings(OnlineConfig(), arms, 200.0)
-    usable = of_all(["chest", "left_upper_arm", "right_upper_arm", "right_forearm"], arms)
-    q = multiply(heading_turn(np.radians([0.0, 0.0, 8.0, 0.0, 0.0])), np.tile(IDENTITY, (5, 1)))
+    others = ["chest", "left_upper_arm", "right_upper_arm", "right_forearm"]
+    usable = of_all([*others, "left_forearm"] if left_usable else others, arms)
+    # elbows bent, as above: a heading shows
+    q = np.stack([IDENTITY, IDENTITY, BENT, IDENTITY, BENT])
+    q = multiply(heading_turn(np.radians([0.0, 0.0, 8.0, 0.0, 0.0])), q)
     for _ in range(50):
         online.correct(q, np.full((5, 3), np.nan), np.tile(IDENTITY, (5, 1)), usable)
-    np.testing.assert_allclose(online.turn, np.tile(IDENTITY, (5, 1)), atol=1e-12)
+    turned = angle_between(online.turn, np.tile(IDENTITY, (5, 1)))
+    assert turned[[0, 3, 4]].max() < 1e-7
+    assert (turned[1:3] > 0.01).all() if left_usable else turned[1:3].max() < 1e-7
+
+
+def test_an_error_that_no_heading_explains_counts_hardly_more_than_a_small_one(arms: Skeleton) -> None:
+    """Of headings known to 2° from a stance, one cannot be 60° off: then the mounting is wrong."""
+    found_rad = []
+    for off_deg in (6.0, 60.0):
+        online = OnlineHeadings(OnlineConfig(), arms, 200.0)
+        nodes, mounting = np.ones(5, dtype=np.bool_), np.tile(IDENTITY, (5, 1))
+        online.stand(nodes, np.zeros(5), mounting, np.full((5, 3), np.nan))
+        q = np.stack([IDENTITY, IDENTITY, BENT, IDENTITY, BENT])
+        q = multiply(heading_turn(np.radians([0.0, 0.0, off_deg, 0.0, 0.0])), q)
+        online.correct(q, np.full((5, 3), np.nan), mounting, nodes)
+        found_rad.append(angle_between(online.turn, mounting)[2])
+    assert found_rad[0] > 1e-4
+    assert found_rad[1] < 3.0 * found_rad[0]
 
 
 def test_a_node_that_returns_begins_with_the_heading_it_had_or_its_magnetometer_s(arms: Skeleton) -> None:
