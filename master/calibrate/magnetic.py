@@ -130,8 +130,8 @@ def calibrate_magnetic(recording: NodeRecording, accelerometer: Array | None = N
         )
     if not _FIELD_UT[0] < fit.field_ut < _FIELD_UT[1]:
         raise RecordingError(
-            f"the field is {fit.field_ut:.3g} µT strong, and the earth's is 22 to 67 µT; are the readings in µT? "
-            "1 gauss is 100 µT"
+            f"the field is {fit.field_ut:.3g} µT strong, and the earth's is 22 to 67 µT; "
+            "are the readings in µT? 1 gauss is 100 µT"
         )
     notes = () if seen >= GOOD_COVERAGE else (f"{100 * seen:.0f} % of the sphere seen; more makes it surer",)
     alignment, words = _align(recording, recording.mag_ut, fit, accelerometer)
