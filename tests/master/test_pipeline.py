@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from common.clock import NS_PER_MS, NS_PER_S
 from common.config import load_config
+from common.messages import Mask
 from master.config import MasterConfig
-from master.pipeline import CommandWriter, MasterPipeline, Solved
+from master.pipeline import MOST_BRIDGED, CommandWriter, MasterPipeline, Solved, bridged
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.motion import load_motion
@@ -87,18 +90,44 @@ def test_a_lost_node_takes_just_the_joints_that_need_it() -> None:
 
 def test_a_sync_that_goes_out_late_turns_no_finger_too_far() -> None:
     """The stall of a busy host: what is sampled a millisecond late has turned on by 0.4° at 400°/s."""
+    random = np.random.default_rng(5)
+    late_ns = np.round(np.minimum(random.exponential(1.0, 2000), 4.0) * NS_PER_MS).astype(int)
+    assert worst_finger_deg(late_ns, np.zeros(2000, dtype=np.bool_)) < 0.2
+
+
+def test_missed_ticks_turn_no_finger_too_short() -> None:
+    missed = np.random.default_rng(6).random(2000) < 0.2
+    assert worst_finger_deg(np.zeros(2000, dtype=int), missed) < 0.3
+
+
+def worst_finger_deg(late_ns: NDArray[np.int_], missed: Mask) -> float:
+    """The largest error of a hand that grasps, when SYNCs go out late or not at all; calm for 300 ticks."""
     bench = Bench('grade="ideal"', 'motion="grasp"', examples=EXAMPLES / "hand")
-    random, errors_rad = np.random.default_rng(5), []
     motion = load_motion("grasp", bench.pipeline.skeleton)
-    first_ns = NS_PER_S + PERIOD_NS
-    for tick in range(2000):
-        bench.late_ns = 0 if tick < 300 else round(min(random.exponential(1.0), 4.0) * NS_PER_MS)
+    first_ns, errors_rad = NS_PER_S + PERIOD_NS, []
+    for tick in range(len(late_ns)):
+        if missed[tick] and tick > 300:
+            bench.tick += 1
+            continue
+        bench.late_ns = int(late_ns[tick]) if tick > 300 else 0
         for solved in bench.run(1):
             true_rad, _, _ = motion.state(1e-9 * (solved.sampled_ns - first_ns))
             if solved.valid.all():
                 errors_rad.append(solved.position_rad - true_rad)
     assert len(errors_rad) > 80
-    assert math.degrees(np.abs(errors_rad).max()) < 0.2
+    return math.degrees(np.abs(errors_rad).max())
+
+
+@pytest.mark.parametrize(
+    ("gap", "between"), [(1, 0), (2, 1), (MOST_BRIDGED + 1, MOST_BRIDGED), (MOST_BRIDGED + 2, 0)]
+)
+def test_a_short_gap_is_bridged_evenly_and_a_long_one_not(settled: Bench, gap: int, between: int) -> None:
+    last = settled.pipeline.poll.close_window(0)
+    later = replace(last, tick=last.tick + gap, gyr_rad_s=last.gyr_rad_s + 1.0)
+    found = bridged(last, later)
+    assert len(found) == between
+    for step, sweep in enumerate(found, start=1):
+        np.testing.assert_allclose(sweep.gyr_rad_s, last.gyr_rad_s + step / gap)
 
 
 def test_a_failed_bus_means_no_valid_joint_but_commands_go_on(settled: Bench) -> None:

@@ -46,6 +46,14 @@ def test_the_spread_held_out_is_that_of_the_noise(seed: int) -> None:
     assert "calibrate imu first" in note
 
 
+def test_what_is_held_out_was_not_fitted_to() -> None:
+    """With a field that differs from place to place every fit is a compromise, and the next place off it."""
+    truth = free_rotation(60.0)
+    room = np.array([1.0 + 0.02 * np.sin(k) for k in range(6)]).repeat(len(truth) // 6)[:, None]
+    found = calibrate_magnetic(recorded(as_delivered(truth * room, 3)))
+    assert found.hold_out_spread_ut > 1.03 * found.spread_after_ut
+
+
 def test_directions_come_out_as_they_should() -> None:
     truth = free_rotation()
     raw = as_delivered(truth, 0)
