@@ -24,6 +24,7 @@ from deploy.keys.commands import app as keys_app
 from deploy.output import in_a_folder, write_json
 from deploy.record.command import record, recording
 from deploy.router.command import router
+from deploy.soak.command import soak
 from deploy.video import video
 
 app = typer.Typer(
@@ -43,6 +44,7 @@ app.command()(faults)
 app.command()(router)
 app.command()(record)
 app.command()(recording)
+app.command()(soak)
 _debug = False
 
 

@@ -1,0 +1,220 @@
+"""What a soak is judged by: each function takes what was seen and gives its verdicts. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from common.messages import Mask
+from deploy.soak.events import Event, of_kind
+from deploy.soak.explain import Explained, unexplained_lefts
+from deploy.soak.samples import Samples
+from deploy.soak.verdict import Status, Verdict, at_most
+from deploy.soak.windows import explained as in_windows
+
+HOLD_S = 0.2 + 0.08
+"""The guard's time-out for commands, two states of 20 ms, and 40 ms for who watches."""
+STANDS_S = 0.21 + 0.3 + 0.04
+"""As in the fault matrix, from the last state before the fault."""
+STRAYS_DEG = 0.9
+"""Above what a robot that stands is shaken by; see deploy/soak/motion.py."""
+AGE_MS = 300.0
+"""`guard.max_age_s`: an accepted command is younger."""
+MISSED_SHARE = 0.1
+"""Percent of the ticks."""
+TRACK_S = 15.0
+"""`guard.align_timeout_s`."""
+RECORDER_LOSES_S = 1.0
+COUNTED = {"lost": "lost", "late": "out of order", "repeated": "twice", "refused": "refused by the guard"}
+"""Columns of what may befall a command, and in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """All that a soak left behind."""
+
+    events: Sequence[Event]
+    samples: Samples
+    explained: Explained
+
+    @property
+    def quiet(self) -> Mask:
+        """(N,) samples that no fault, start or stall of the host explains."""
+        return ~in_windows(self.samples.at_s, self.explained.all)
+
+    def sum(self, column: str, of: Mask | None = None) -> float:
+        """A counter's additions over all samples, or some."""
+        values = self.samples[column]
+        return float(np.nansum(values if of is None else values[of]))
+
+    @property
+    def recovered(self) -> list[Mapping[str, Any]]:
+        """What is told of each fault once it is over."""
+        return [e.what for e in of_kind(self.events, "recovered") if e.what.get("fault")]
+
+    @property
+    def options(self) -> Mapping[str, Any]:
+        """What the soak was asked for; empty where it did not begin."""
+        begun = of_kind(self.events, "begin")
+        return begun[0].what if begun else {}
+
+
+def commands(seen: Seen) -> list[Verdict]:
+    """Lost, late, twice, refused; each outside of the windows that explain it, and none acted on too late."""
+    quiet = seen.quiet
+    sent = seen.sum("sent", quiet)
+    verdicts = []
+    for column, name in COUNTED.items():
+        figure = seen.sum(column, quiet) if sent else None
+        note = f"{seen.sum(column):.0f} in all, {sent:.0f} sent outside of faults"
+        if column == "lost":
+            note += f"; {seen.sum('overwritten'):.0f} waited too long in the slave itself"
+        verdicts.append(at_most("commands", f"{name}, unexplained", figure, 0.0, note=note))
+    ages = seen.samples["age_max_ms"]
+    oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
+    verdicts.append(at_most("commands", "oldest that was acted on", oldest, AGE_MS, "ms", "put → accepted"))
+    return verdicts
+
+
+def guard(seen: Seen) -> list[Verdict]:
+    """It holds on every fault that asks for it, stands, and never moves by itself."""
+    done = seen.recovered
+    must = [what for what in done if what["holds"] and what["heard"]]
+    idle = [what for what in done if not what["holds"] and what.get("held_s") is not None]
+    lefts = unexplained_lefts(seen.events, seen.explained)
+    engaged = sum(bool(e.what.get("done")) for e in of_kind(seen.events, "engage"))
+    moved = sum(
+        e.what.get("to") in ("align", "track") and e.what.get("from") not in ("align", "track")
+        for e in of_kind(seen.events, "guard")
+    )
+    strayed = seen.samples["strayed_deg"]
+    return [
+        _worst("guard", "holds on a fault, the slowest", must, "held_s", HOLD_S, "s"),
+        _worst("guard", "stands after a fault, the slowest", must, "stands_s", STANDS_S, "s"),
+        at_most("guard", "holds that nothing explains", float(len(lefts)), 0.0, note=_reasons(lefts)),
+        at_most(
+            "guard", "holds on a fault that asks for none", float(len(idle)), 0.0,
+            note=", ".join(sorted({what["fault"] for what in idle})),
+        ),
+        at_most(
+            "guard", "began to move without being engaged", float(max(0, moved - engaged)), 0.0,
+            note=f"engaged {engaged} times, began to move {moved} times",
+        ),
+        at_most(
+            "guard", "moved while it held",
+            None if np.isnan(strayed).all() else float(np.nanmax(strayed)), STRAYS_DEG, "°",
+            "farthest joint, 0.7 s after it held and later",
+        ),
+    ]  # fmt: skip
+
+
+def recovery(seen: Seen) -> list[Verdict]:
+    """How soon commands flow and the robot follows again, after each kind of fault."""
+    done = seen.recovered
+    begun = len(of_kind(seen.events, "fault"))
+    lost = [what for what in done if not what["done"]]
+    failed = [f"{what['fault']}: {what['failed']}" for what in done if what.get("failed")]
+    unfinished = begun - len(done) and " (one under way when the soak ended)"
+    verdicts = [
+        at_most(
+            "recovery", "faults after which it did not follow again", float(len(lost)) if done else None, 0.0,
+            note=f"of {len(done)}{unfinished or ''}" if begun else "there was no fault",
+        ),
+        at_most(
+            "recovery", "faults that could not be brought about", float(len(failed)), 0.0,
+            note="; ".join(failed[:3]),
+        ),
+    ]  # fmt: skip
+    limits = {what["fault"]: what["flow_limit_s"] for what in done if what["flow_limit_s"] is not None}
+    for fault, limit in sorted(limits.items()):
+        like = [what for what in done if what["fault"] == fault]
+        verdicts.append(_worst("recovery", f"commands flow again after {fault}", like, "flow_s", limit, "s"))
+    again = [what for what in done if what.get("track_s") is not None]
+    verdicts.append(_worst("recovery", "follows again once engaged", again, "track_s", TRACK_S, "s"))
+    return verdicts
+
+
+def loops(seen: Seen) -> list[Verdict]:
+    """Ticks that were missed while neither a fault nor the host can be blamed; links lost likewise."""
+    quiet = seen.quiet & ~(np.nan_to_num(seen.samples["host_still_ms"]) > 0.0)
+    verdicts = []
+    for name in ("master", "slave"):
+        ticks, missed = seen.sum(f"{name}_ticks", quiet), seen.sum(f"{name}_missed", quiet)
+        verdicts.append(
+            at_most(
+                "loops", f"ticks the {name} missed, unexplained", 100.0 * missed / ticks if ticks else None,
+                MISSED_SHARE, "%",
+                f"{missed:.0f} of {ticks:.0f}; {seen.sum(f'{name}_missed'):.0f} in all",
+            )
+        )  # fmt: skip
+    lost, words = seen.sum("times_lost", seen.quiet), f"{seen.sum('times_lost'):.0f} in all"
+    verdicts.append(
+        at_most(
+            "loops",
+            "times the master lost the robot, unexplained",
+            lost,
+            0.0,
+            note=f"{seen.sum('times_lost'):.0f} in all",
+        )
+    )
+    ends = of_kind(seen.events, "ended")
+    words = "; ".join(f"{e.what['process']}: {e.what['words']}" for e in ends[:2])
+    verdicts.append(at_most("loops", "processes that ended by themselves", float(len(ends)), 0.0, note=words))
+    return verdicts
+
+
+def recordings(seen: Seen) -> list[Verdict]:
+    """What the recorder's files hold after it was killed, and after its disk was full."""
+    told = [e.what for e in of_kind(seen.events, "recording")]
+    killed = [what for what in told if what["after"] == "kill"]
+    full = [what for what in told if what["after"] == "disk full"]
+    if not told:
+        return []
+    unreadable = [what for what in told if not what["readable"]]
+    verdicts = [
+        at_most(
+            "recorder", "recordings that cannot be read", float(len(unreadable)), 0.0,
+            note=f"of {len(told)}" + "".join(f"; {what['why_not']}" for what in unreadable[:1]),
+        )
+    ]  # fmt: skip
+    if killed:
+        verdicts.append(
+            _worst("recorder", "lost when it was killed", killed, "lost_s", RECORDER_LOSES_S, "s")
+        )
+    if full:
+        wrong = [what for what in full if not what["lived"] or what["said"] != 1]
+        verdicts.append(
+            at_most(
+                "recorder", "full disks that it did not live through, saying so once", float(len(wrong)), 0.0,
+                note=f"of {len(full)}",
+            )
+        )  # fmt: skip
+    return verdicts
+
+
+def _worst(
+    group: str, name: str, done: Sequence[Mapping[str, Any]], key: str, limit: float, unit: str
+) -> Verdict:
+    """The largest figure. One that is missing fails: what should have come did not."""
+    if not done:
+        return Verdict(group, name, Status.NOT_JUDGED, None, limit, unit, "no such fault")
+    missing = [what["fault"] for what in done if what.get(key) is None and "fault" in what]
+    if missing:
+        return Verdict(group, name, Status.FAIL, None, limit, unit, f"never after: {', '.join(missing)}")
+    worst = max(done, key=lambda what: what[key])
+    values = sorted(what[key] for what in done)
+    note = f"of {len(done)}, median {values[len(values) // 2]:.3g}"
+    if "fault" in worst:
+        note += f"; {worst['fault']}"
+    return at_most(group, name, float(worst[key]), limit, unit, note)
+
+
+def _reasons(lefts: Sequence[Event]) -> str:
+    return "; ".join(f"{e.at_s:.0f} s: {e.what.get('guard')}: {e.what.get('reason')}" for e in lefts[:3])
+
+
+CRITERIA: Sequence[Callable[[Seen], list[Verdict]]] = (commands, guard, recovery, loops, recordings)
+"""In the order of the report; growth and drift are in deploy/soak/growth.py."""

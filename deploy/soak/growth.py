@@ -1,0 +1,123 @@
+"""What must not grow over hours: latency, memory, descriptors, threads; life by life. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from common.messages import Mask
+from common.quaternion import Array
+from deploy.soak.criteria import Seen
+from deploy.soak.trend import Slope, in_bins, slope
+from deploy.soak.verdict import Status, Verdict, at_most, not_above
+
+WARM_UP_S = 120.0
+"""A process takes what it needs for good in its first minutes; only after that growth means anything."""
+SHORTEST_S = 300.0
+"""Of what is left of the longest life: less says nothing of a slope."""
+BINS = 400
+"""At most, over a whole soak; a bin holds its median."""
+NARROWEST_S = 5.0
+RSS_MB_H = 0.5
+"""Counts as nothing: 4 MB in 8 h. Resident memory comes in pages and in steps."""
+DRIFT_MS_H = 0.05
+"""Counts as nothing: 0.4 ms in 8 h."""
+ENDS_S = 10.0
+"""Over which a life's begin and end are taken."""
+MORE = 3.0
+"""Descriptors or threads above those after the warm-up: a question under way may hold a few."""
+
+
+def drift(seen: Seen) -> list[Verdict]:
+    """Latency over time, outside of what is explained; each pair of lives of master and slave by itself."""
+    lives = _lives(seen, "master") * 1000 + _lives(seen, "slave")
+    return [
+        _not_above(seen, "latency", f"{name} drifts", column, lives, seen.quiet, DRIFT_MS_H, "ms/h")
+        for name, column in (
+            ("one way, median", "one_way_p50_ms"), ("round trip, mean", "round_trip_ms"),
+            ("sampled → encoder moved, mean", "end_to_end_ms"),
+        )
+    ]  # fmt: skip
+
+
+def memory(seen: Seen) -> list[Verdict]:
+    """Resident memory of each process."""
+    everything = np.ones(len(seen.samples), np.bool_)
+    return [
+        _not_above(
+            seen, "memory", f"{name}'s memory grows", f"{name}_rss_mb", _lives(seen, name), everything,
+            RSS_MB_H, "MB/h",
+        )
+        for name in seen.samples.processes
+    ]  # fmt: skip
+
+
+def handles(seen: Seen) -> list[Verdict]:
+    """File descriptors and threads at the end of each life against those after its warm-up."""
+    return [
+        _more(seen, f"{name}'s {words} grow", f"{name}_{column}", _lives(seen, name))
+        for name in seen.samples.processes
+        for column, words in (("fds", "descriptors"), ("threads", "threads"))
+    ]
+
+
+GROWTH = (drift, memory, handles)
+
+
+def stretches(
+    at_s: Array, values: Array, lives: Array, use: Mask, width_s: float
+) -> list[tuple[Array, Array]]:
+    """A series (N,) life by life: without each one's warm-up, in bins; times in hours."""
+    out = []
+    for life in np.unique(lives[np.isfinite(lives)]):
+        mine = lives == life
+        warm = mine & use & (at_s >= at_s[mine][0] + WARM_UP_S)
+        if warm.any():
+            middles_s, medians = in_bins(at_s[warm], values[warm], width_s)
+            if len(middles_s):
+                out.append((middles_s / 3600.0, medians))
+    return out
+
+
+def _lives(seen: Seen, name: str) -> Array:
+    """(N,) number of the life, NaN where it does not run."""
+    return seen.samples[f"{name}_life"]
+
+
+def _slope(seen: Seen, column: str, lives: Array, use: Mask) -> tuple[Slope | None, float]:
+    """The slope per hour, and how long the longest life was after its warm-up, s."""
+    at_s = seen.samples.at_s
+    width_s = max(NARROWEST_S, float(at_s[-1] - at_s[0]) / BINS) if len(at_s) else NARROWEST_S
+    series = stretches(at_s, seen.samples[column], lives, use, width_s)
+    longest_s = max((3600.0 * float(np.ptp(x)) for x, _ in series), default=0.0)
+    return (slope(series) if longest_s >= SHORTEST_S else None), longest_s
+
+
+def _not_above(
+    seen: Seen, group: str, name: str, column: str, lives: Array, use: Mask, limit: float, unit: str
+) -> Verdict:
+    found, longest_s = _slope(seen, column, lives, use)
+    too_short = (
+        f"too short: {longest_s:.0f} s of one life after {WARM_UP_S:.0f} s of warm-up, "
+        f"at least {SHORTEST_S:.0f} s are needed"
+    )
+    return not_above(group, name, found, limit, unit, "", too_short)
+
+
+def _more(seen: Seen, name: str, column: str, lives: Array) -> Verdict:
+    """The most that any life had more in its end than after its warm-up."""
+    at_s, values = seen.samples.at_s, seen.samples[column]
+    gains = []
+    for life in np.unique(lives[np.isfinite(lives)]):
+        mine = (lives == life) & np.isfinite(values)
+        if not mine.any():
+            continue
+        warm_s, last_s = at_s[mine][0] + WARM_UP_S, at_s[mine][-1]
+        if last_s - warm_s >= WARM_UP_S:
+            first = values[mine & (at_s >= warm_s) & (at_s <= warm_s + ENDS_S)]
+            last = values[mine & (at_s >= last_s - ENDS_S)]
+            gains.append((float(np.median(last) - np.median(first)), float(np.median(first))))
+    if not gains:
+        words = f"too short: no life of {2.0 * WARM_UP_S:.0f} s"
+        return Verdict("handles", name, Status.NOT_JUDGED, None, MORE, "", words)
+    gained, first_had = max(gains)
+    return at_most("handles", name, gained, MORE, note=f"from {first_had:.0f}")

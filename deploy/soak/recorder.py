@@ -1,0 +1,126 @@
+"""The recorder's process within a soak: a new file each time, looked at once it is closed."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from common.clock import monotonic_ns, to_s
+from deploy.rig.child import Child
+
+NAME = "recorder"
+FULL_BYTES = 160 * 1024
+"""A disk of this size is full after a few seconds."""
+ENDS_HERE = "the recording ends here"
+"""What the recorder logs, once, when its disk fails."""
+
+
+class Recorder:
+    """Starts and ends `tandem record` of one robot. Files lie in `folder` and are deleted when looked at."""
+
+    def __init__(self, child: Child, folder: Path, connect: Sequence[str], robot: str) -> None:
+        self.child = child
+        self._folder = folder
+        self._arguments = [*(a for each in connect for a in ("--connect", each)), "--robot", robot]
+        self._number = 0
+        self._said_before = 0
+        self.file = folder / "none.mcap"
+        self.disk = _SmallDisk(folder / "full")
+
+    async def start(self, through: Sequence[str] = (), folder: Path | None = None) -> None:
+        """Record into a new file."""
+        self._number += 1
+        self._said_before = len(self.child.said()) if self.child.log.exists() else 0
+        self.file = (folder or self._folder) / f"recording-{self._number}.mcap"
+        await self.child.run([*self._arguments, "--out", str(self.file)], through)
+
+    async def start_on_small_disk(self) -> str:
+        """Record onto a disk that will be full soon; how it was made so."""
+        where, through, how = await self.disk.make()
+        await self.start(through, where)
+        return how
+
+    def complaints(self) -> int:
+        """How often this process said that its disk failed."""
+        return self.child.said()[self._said_before :].count(ENDS_HERE)
+
+    async def look(self, ended_ns: int | None = None) -> Mapping[str, Any]:
+        """What is in the file of a process that has ended, then delete it. `ended_ns`: when it was killed."""
+        contents = await _contents(self.file)
+        size_mb = self.file.stat().st_size / 1e6 if self.file.exists() else 0.0
+        self.file.unlink(missing_ok=True)
+        topics = contents.get("topics", {})
+        last_ns = max((topic["last_ns"] for topic in topics.values()), default=None)
+        lost_s = None if ended_ns is None or last_ns is None else max(0.0, to_s(ended_ns - last_ns))
+        return {
+            "readable": bool(topics),
+            "messages": sum(topic["count"] for topic in topics.values()),
+            "size_mb": round(size_mb, 3),
+            "cut": contents.get("cut", ""),
+            "lost_s": None if lost_s is None else round(lost_s, 3),
+            "why_not": contents.get("error", ""),
+        }
+
+    async def kill(self) -> int:
+        """End it without a warning; when, by this host's clock."""
+        at_ns = monotonic_ns()
+        await self.child.kill()
+        return at_ns
+
+
+class _SmallDisk:
+    """A file system of its own where the host permits it, else a limit on the size of the process's files."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._mounted = False
+
+    async def make(self) -> tuple[Path, tuple[str, ...], str]:
+        """Where to write, what to run the process through, and in words what it is."""
+        self._folder.mkdir(exist_ok=True)
+        size = f"size={FULL_BYTES // 1024}k"
+        if await _succeeds("mount", "-t", "tmpfs", "-o", size, "tmpfs", str(self._folder)):
+            self._mounted = True
+            return self._folder, (), f"a file system of {FULL_BYTES // 1024} KiB"
+        if shutil.which("prlimit"):
+            limit = ("prlimit", f"--fsize={FULL_BYTES}", "--")
+            return self._folder, limit, f"a limit of {FULL_BYTES // 1024} KiB a file (nothing may be mounted)"
+        return self._folder, (), ""
+
+    async def remove(self) -> None:
+        """May be called at any time."""
+        if self._mounted:
+            self._mounted = not await _succeeds("umount", str(self._folder))
+        with suppress(OSError):
+            self._folder.rmdir()
+
+
+async def _contents(file: Path) -> Mapping[str, Any]:
+    """Looked at in a process of its own: a long recording must cost the soak neither memory nor time."""
+    process = await asyncio.create_subprocess_exec(
+        *(("nice", "-n", "15") if shutil.which("nice") else ()),
+        sys.executable, "-m", "deploy", "recording", str(file), "--json",
+        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    out, err = await process.communicate()
+    try:
+        contents: Mapping[str, Any] = json.loads(out)
+    except ValueError:
+        return {"error": err.decode("utf-8", "replace").strip()}
+    return contents
+
+
+async def _succeeds(*command: str) -> bool:
+    if not shutil.which(command[0]):
+        return False
+    process = await asyncio.create_subprocess_exec(
+        *command, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.DEVNULL,
+    )  # fmt: skip
+    return await process.wait() == 0

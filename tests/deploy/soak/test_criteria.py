@@ -1,0 +1,184 @@
+"""Each criterion at its boundary: what a fault explains does not count, what nothing explains does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from deploy.soak.criteria import AGE_MS, CRITERIA, HOLD_S, STANDS_S, STRAYS_DEG, TRACK_S
+from deploy.soak.events import Event
+from deploy.soak.verdict import Status, Verdict
+from deploy.soak.windows import AFTER_S
+
+from .conftest import RECOVERED, STORY, Make
+
+
+def judged(seen: Any) -> dict[str, Verdict]:
+    verdicts = [verdict for criterion in CRITERIA for verdict in criterion(seen)]
+    return {f"{v.group}: {v.name}": v for v in verdicts}
+
+
+def failing(seen: Any) -> set[str]:
+    return {name for name, verdict in judged(seen).items() if verdict.status is Status.FAIL}
+
+
+def at(second: float, value: float = 1.0) -> Any:
+    """A column that is `value` in the row of that second, and 0 elsewhere."""
+    return lambda at_s: np.where(at_s == second, value, 0.0)
+
+
+def retold(**changes: Any) -> tuple[Event, ...]:
+    return tuple(replace(e, what={**RECOVERED, **changes}) if e.kind == "recovered" else e for e in STORY)
+
+
+def without(events: Sequence[Event], kind: str, index: int = 0) -> tuple[Event, ...]:
+    found = [event for event in events if event.kind == kind][index]
+    return tuple(event for event in events if event is not found)
+
+
+def test_a_soak_in_which_nothing_went_wrong_fails_nothing(make: Make) -> None:
+    assert failing(make()) == set()
+
+
+@pytest.mark.parametrize(
+    ("column", "name"),
+    [
+        ("lost", "commands: lost, unexplained"),
+        ("late", "commands: out of order, unexplained"),
+        ("repeated", "commands: twice, unexplained"),
+        ("refused", "commands: refused by the guard, unexplained"),
+        ("times_lost", "loops: times the master lost the robot, unexplained"),
+    ],
+)
+def test_one_that_nothing_explains_fails_and_the_same_in_a_fault_does_not(
+    make: Make, column: str, name: str
+) -> None:
+    assert failing(make(**{column: at(50)})) == {name}
+    assert failing(make(**{column: at(103)})) == set()
+    assert failing(make(**{column: at(109.0 + int(AFTER_S))})) == set()
+    assert failing(make(**{column: at(109.0 + int(AFTER_S) + 1)})) == {name}
+
+
+def test_a_stall_of_the_host_explains_too_if_it_is_long_enough(make: Make) -> None:
+    def still(ms: float) -> tuple[Event, ...]:
+        return (*STORY, Event(50.0, "still", {"from_s": 49.3, "still_ms": ms}))
+
+    assert failing(make(events=still(50.0), lost=at(50))) == set()
+    assert failing(make(events=still(49.0), lost=at(50))) == {"commands: lost, unexplained"}
+
+
+def test_a_command_that_was_acted_on_too_late_fails_whenever_it_was(make: Make) -> None:
+    assert failing(make(age_max_ms=at(103, AGE_MS))) == set()
+    assert failing(make(age_max_ms=at(103, AGE_MS + 1.0))) == {"commands: oldest that was acted on"}
+
+
+@pytest.mark.parametrize(
+    ("key", "limit", "name"),
+    [
+        ("held_s", HOLD_S, "guard: holds on a fault, the slowest"),
+        ("stands_s", STANDS_S, "guard: stands after a fault, the slowest"),
+        ("flow_s", 15.0, "recovery: commands flow again after master-kill"),
+        ("track_s", TRACK_S, "recovery: follows again once engaged"),
+    ],
+)
+def test_times_after_a_fault_are_judged_at_their_limits(
+    make: Make, key: str, limit: float, name: str
+) -> None:
+    assert failing(make(events=retold(**{key: limit}))) == set()
+    assert failing(make(events=retold(**{key: limit + 0.001}))) == {name}
+
+
+@pytest.mark.parametrize("key", ["held_s", "stands_s", "flow_s"])
+def test_what_should_have_come_and_did_not_fails(make: Make, key: str) -> None:
+    assert len(failing(make(events=retold(**{key: None})))) == 1
+
+
+def test_a_robot_that_never_came_back_fails(make: Make) -> None:
+    assert failing(make(events=retold(done=False))) == {
+        "recovery: faults after which it did not follow again"
+    }
+
+
+def test_a_fault_that_could_not_be_brought_about_fails(make: Make) -> None:
+    seen = make(events=retold(failed="the suit does not take its faults"))
+    assert failing(seen) == {"recovery: faults that could not be brought about"}
+
+
+def test_a_move_without_an_engagement_fails(make: Make) -> None:
+    assert failing(make(events=without(STORY, "engage", 1))) == {"guard: began to move without being engaged"}
+    refused = tuple(replace(e, what={"done": False}) if e.at_s == 106.0 else e for e in STORY)
+    assert failing(make(events=refused)) == {"guard: began to move without being engaged"}
+
+
+def test_a_joint_that_moves_while_the_robot_holds_fails(make: Make) -> None:
+    assert failing(make(strayed_deg=at(103, STRAYS_DEG))) == set()
+    assert failing(make(strayed_deg=at(103, STRAYS_DEG + 0.1))) == {"guard: moved while it held"}
+
+
+def test_a_hold_between_faults_fails_unless_the_host_stood_still(make: Make) -> None:
+    left = (*STORY, Event(200.0, "left", {"guard": "hold", "reason": "no command"}))
+    left = (*left, Event(203.0, "recovered", {"fault": "", "done": True}))
+    assert failing(make(events=left)) == {"guard: holds that nothing explains"}
+    still = Event(199.9, "still", {"from_s": 199.6, "still_ms": 250.0})
+    assert failing(make(events=(*left, still))) == set()
+
+
+def test_a_hold_on_a_fault_that_asks_for_none_fails(make: Make) -> None:
+    seen = make(events=retold(holds=False, held_s=0.2))
+    assert failing(seen) == {"guard: holds on a fault that asks for none"}
+
+
+def test_missed_ticks_are_judged_by_their_share_without_those_of_the_host(make: Make) -> None:
+    # 491 rows outside of windows, 200 ticks each: 98 is just below one in a thousand
+    name = "loops: ticks the master missed, unexplained"
+    ticks = judged(make())[name]
+    assert ticks.figure == 0.0
+    assert failing(make(master_missed=at(50, 50.0))) == set()
+    assert failing(make(master_missed=at(50, 500.0))) == {name}
+    assert failing(make(master_missed=at(50, 500.0), host_still_ms=at(50, 12.0))) == set()
+    assert failing(make(master_missed=at(103, 500.0))) == set()
+
+
+def test_a_process_that_ends_by_itself_fails(make: Make) -> None:
+    ended = (*STORY, Event(300.0, "ended", {"process": "suit", "words": "a bug"}))
+    assert failing(make(events=ended)) == {"loops: processes that ended by themselves"}
+
+
+@pytest.mark.parametrize(
+    ("what", "wrong"),
+    [
+        ({"after": "kill", "readable": True, "lost_s": 1.0}, set()),
+        ({"after": "kill", "readable": True, "lost_s": 1.01}, {"recorder: lost when it was killed"}),
+        (
+            {"after": "stop", "readable": False, "why_not": "no MCAP"},
+            {"recorder: recordings that cannot be read"},
+        ),
+        ({"after": "disk full", "readable": True, "lived": True, "said": 1}, set()),
+        (
+            {"after": "disk full", "readable": True, "lived": False, "said": 1},
+            {"recorder: full disks that it did not live through, saying so once"},
+        ),
+        (
+            {"after": "disk full", "readable": True, "lived": True, "said": 2},
+            {"recorder: full disks that it did not live through, saying so once"},
+        ),
+    ],
+)
+def test_recordings(make: Make, what: dict[str, Any], wrong: set[str]) -> None:
+    assert failing(make(events=(*STORY, Event(150.0, "recording", what)))) == wrong
+
+
+def test_without_faults_and_commands_nothing_is_claimed(make: Make) -> None:
+    seen = make(events=STORY[:6], sent=0.0)
+    verdicts = judged(seen)
+    assert verdicts["commands: lost, unexplained"].status is Status.NOT_JUDGED
+    assert verdicts["guard: holds on a fault, the slowest"].status is Status.NOT_JUDGED
+    assert not [v for v in verdicts.values() if v.status is Status.FAIL]
+
+
+def test_a_soak_that_was_killed_in_its_start_is_judged_too(make: Make) -> None:
+    assert judged(make(events=STORY[:1], seconds=2))
