@@ -15,8 +15,8 @@ from common.clock import monotonic_ns, to_s
 from deploy.rig.child import Child
 
 NAME = "recorder"
-FULL_BYTES = 160 * 1024
-"""A disk of this size is full after a few seconds."""
+FULL_BYTES = 40 * 1024
+"""A disk of this size is full after about 4 s: commands, states and statistics are 10 kB/s, compressed."""
 ENDS_HERE = "the recording ends here"
 """What the recorder logs, once, when its disk fails."""
 

@@ -68,12 +68,16 @@ def _line(event: Event) -> Text:
 
 
 def verdicts_table(verdicts: Sequence[Verdict]) -> RenderableType:
-    """One row a criterion, by group."""
+    """One row a criterion, by group; then those that were not judged, reason by reason."""
     table = plain_table("criterion", "figure", "at most", "", "")
     table.columns[-1].justify = "left"
     table.columns[-1].no_wrap = False
     group = ""
+    unjudged: dict[str, list[str]] = {}
     for verdict in verdicts:
+        if verdict.status is Status.NOT_JUDGED:
+            unjudged.setdefault(verdict.note, []).append(verdict.name)
+            continue
         if verdict.group != group:
             group = verdict.group
             table.add_section()
@@ -84,7 +88,14 @@ def verdicts_table(verdicts: Sequence[Verdict]) -> RenderableType:
             Text(str(verdict.status), STYLES[verdict.status]),
             Text(verdict.note, "dim"),
         )
-    return table
+    style = STYLES[Status.NOT_JUDGED]
+    return Group(table, *(_unjudged(why, names, style) for why, names in unjudged.items()))
+
+
+def _unjudged(why: str, names: Sequence[str], style: str) -> Text:
+    return Text.assemble(
+        ("not judged: ", style), "; ".join(names), (f" ({why or 'nothing was measured'})", "dim")
+    )
 
 
 def number(value: float | None, unit: str = "") -> str:

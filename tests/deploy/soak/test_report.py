@@ -62,7 +62,8 @@ def test_the_table_has_a_row_a_criterion(tmp_path: Path) -> None:
     console = Console(width=200, record=True)
     with console.capture() as shown:
         console.print(verdicts_table(result.verdicts))
-    assert all(verdict.name[:20] in shown.get() for verdict in result.verdicts)
+    words = " ".join(shown.get().split())
+    assert all(verdict.name in words for verdict in result.verdicts)
 
 
 @pytest.mark.parametrize("count", [10, 1500, 1501, 30_000])

@@ -1,0 +1,98 @@
+"""A short soak with real processes and real faults: it comes back from each, and says so in its files."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from deploy.soak.events import of_kind, read_events
+
+pytestmark = pytest.mark.hosts
+
+SOAK = [sys.executable, "-m", "deploy", "soak"]
+
+
+def criteria(folder: Path) -> dict[str, dict[str, Any]]:
+    tree = json.loads((folder / "report.json").read_text())
+    return {f"{c['group']}: {c['name']}": c for c in tree["criteria"]}
+
+
+@pytest.mark.timeout(300)
+def test_it_comes_back_from_each_fault_and_judges_itself(tmp_path: Path) -> None:
+    report = tmp_path / "report"
+    faults = "master-kill,suit-kill,recorder-kill,disk-full,node-loss"
+    options = ["--duration", "60s", "--every", "7", "--faults", faults, "--report", str(report)]
+    ended = subprocess.run([*SOAK, *options], capture_output=True, text=True, timeout=280, check=False)
+    said = ended.stdout + ended.stderr
+    events = read_events(report)
+    brought = {event.what["fault"] for event in of_kind(events, "fault")}
+    assert brought == set(faults.split(",")), said
+    judged = criteria(report)
+    # how soon and how many ticks is this machine's affair today; that it came back, and of whose will, is not
+    for name in (
+        "recovery: faults after which it did not follow again",
+        "recovery: faults that could not be brought about",
+        "guard: began to move without being engaged",
+        "guard: moved while it held",
+        "recorder: recordings that cannot be read",
+        "recorder: full disks that it did not live through, saying so once",
+        "loops: processes that ended by themselves",
+    ):
+        assert judged[name]["status"] == "pass", (judged[name], said)
+    assert judged["memory: master's memory grows"]["status"] == "not judged"
+    assert {path.name for path in report.iterdir()} >= {
+        "report.json", "report.html", "soak.png", "events.jsonl", "samples.csv", "master.log", "recorder.log",
+    }  # fmt: skip
+    assert ended.returncode == any(c["status"] == "fail" for c in judged.values()), said
+
+
+def test_interrupted_it_still_writes_its_report_and_leaves_nobody_behind(tmp_path: Path) -> None:
+    report = tmp_path / "report"
+    options = ["--duration", "1h", "--faults", "none", "--report", str(report)]
+    soak = subprocess.Popen(
+        [*SOAK, *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
+    try:
+        followed(report, soak)
+        os.killpg(soak.pid, signal.SIGINT)  # as a Ctrl-C in a terminal does
+        said, _ = soak.communicate(timeout=60)
+    finally:
+        soak.kill()
+        soak.communicate()
+    assert "interrupted" in said
+    assert json.loads((report / "report.json").read_text())["ended"] == "interrupted"
+    assert (report / "soak.png").stat().st_size > 1000
+    with pytest.raises(ProcessLookupError):
+        os.killpg(soak.pid, 0)
+
+
+def test_killed_it_is_judged_from_what_it_left(tmp_path: Path) -> None:
+    report = tmp_path / "report"
+    options = ["--duration", "1h", "--faults", "none", "--report", str(report)]
+    soak = subprocess.Popen([*SOAK, *options], stdout=subprocess.DEVNULL, start_new_session=True)
+    try:
+        followed(report, soak)
+    finally:
+        os.killpg(soak.pid, signal.SIGKILL)
+        soak.communicate()
+    judged = subprocess.run([*SOAK, "--judge", str(report)], capture_output=True, text=True, check=False)
+    assert "it was killed" in judged.stdout, judged.stderr
+    assert json.loads((report / "report.json").read_text())["samples"] >= 1
+
+
+def followed(report: Path, soak: subprocess.Popen[str]) -> None:
+    """Until the robot follows and a sample of it has been written."""
+    events, samples = report / "events.jsonl", report / "samples.csv"
+    while soak.poll() is None:
+        if events.exists() and '"event": "follows"' in events.read_text() and "track" in samples.read_text():
+            return
+        with pytest.raises(subprocess.TimeoutExpired):
+            soak.wait(0.1)
+    raise AssertionError(soak.stdout.read() if soak.stdout else "it ended")
