@@ -18,6 +18,7 @@ from deploy.accuracy.commands import app as accuracy_app
 from deploy.attitude.command import attitude
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.control.commands import COMMANDS as OPERATORS_ACTS
+from deploy.doctor.command import doctor
 from deploy.drives import drives
 from deploy.faults.command import faults
 from deploy.keys.commands import app as keys_app
@@ -42,6 +43,7 @@ app.command()(drives)
 app.command()(attitude)
 app.command()(faults)
 app.command()(router)
+app.command()(doctor)
 app.command()(record)
 app.command()(recording)
 app.command()(soak)

@@ -1,0 +1,49 @@
+"""What one check found: how it stands, in words, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Verdict(StrEnum):
+    """How a check ended."""
+
+    OK = "ok"
+    WARN = "warn"
+    """It will run, but worse than it could, or not for ever."""
+    FAIL = "fail"
+    """It will not run, or a robot would refuse it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One row of the report."""
+
+    check: str
+    verdict: Verdict
+    found: str
+    advice: str = ""
+    """What to do; empty where there is nothing to do."""
+
+
+def ok(check: str, found: str, advice: str = "") -> Finding:
+    """All is well; the advice is for those who want it better."""
+    return Finding(check, Verdict.OK, found, advice)
+
+
+def warn(check: str, found: str, advice: str) -> Finding:
+    """Not as it should be."""
+    return Finding(check, Verdict.WARN, found, advice)
+
+
+def fail(check: str, found: str, advice: str) -> Finding:
+    """It must be mended first."""
+    return Finding(check, Verdict.FAIL, found, advice)
+
+
+def worst(findings: Sequence[Finding]) -> Verdict:
+    """Of all findings; ok where there is none."""
+    order = list(Verdict)
+    return max((finding.verdict for finding in findings), key=order.index, default=Verdict.OK)

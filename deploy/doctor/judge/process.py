@@ -1,0 +1,56 @@
+"""Whether the process may have the priority that its file asks for, and build networks for trials. Pure."""
+
+from __future__ import annotations
+
+from deploy.doctor.finding import Finding, ok, warn
+from deploy.doctor.read.process import CAP_NET_ADMIN, CAP_SYS_NICE, ProcessFacts
+
+ENOUGH_SHARE = 0.9
+"""Linux leaves 5 % of each second to others by default."""
+
+
+def judge_realtime(priority: int, facts: ProcessFacts) -> Finding:
+    """`priority`: of [process]; 0 where none is asked for."""
+    check = "real-time priority"
+    if not priority:
+        return ok(check, "not asked for", "[process] realtime_priority = 20 spares ticks beside other load")
+    permitted = facts.may(CAP_SYS_NICE) or facts.realtime_limit >= priority
+    if not permitted:
+        return warn(
+            check,
+            f"priority {priority} would be refused here (limit {facts.realtime_limit:g}, no CAP_SYS_NICE)",
+            "the units permit it (LimitRTPRIO); for a person's shell, in /etc/security/limits.d/tandem.conf: "
+            f"`tandem - rtprio {priority}`",
+        )
+    if facts.realtime_share < ENOUGH_SHARE:
+        return warn(
+            check,
+            f"real-time threads are stopped after {100 * facts.realtime_share:.0f} % of each second",
+            "sysctl kernel.sched_rt_runtime_us=950000",
+        )
+    why = "CAP_SYS_NICE" if facts.may(CAP_SYS_NICE) else f"limit {facts.realtime_limit:g}"
+    return ok(check, f"priority {priority} is permitted ({why})")
+
+
+def judge_memory_lock(facts: ProcessFacts, swap_bytes: int) -> Finding:
+    """Whether a page of the loop may be on a disk when it is needed. tandem locks none itself."""
+    check = "memory stays in memory"
+    if not swap_bytes:
+        return ok(check, "no swap")
+    limit = "unlimited" if facts.memlock_limit == float("inf") else f"{facts.memlock_limit / 1024:.0f} kB"
+    return warn(
+        check,
+        f"{swap_bytes / 2**30:.1f} GB of swap; may lock {limit}, which tandem does not use",
+        "the units keep it out of swap (MemorySwapMax=0); run by hand: `swapoff -a`",
+    )
+
+
+def judge_networks(facts: ProcessFacts) -> Finding:
+    """Whether `tandem trial` can make hosts and links of its own."""
+    check = "emulated networks"
+    missing = [] if facts.may(CAP_NET_ADMIN) else ["CAP_NET_ADMIN"]
+    missing += [] if facts.tun else ["/dev/net/tun"]
+    if not missing:
+        return ok(check, "namespaces and links can be made")
+    advice = "as root: `modprobe tun`, then run trials as root or with CAP_NET_ADMIN; a robot needs neither"
+    return warn(check, f"trials cannot make them: no {' and no '.join(missing)}", advice)
