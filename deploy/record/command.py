@@ -16,9 +16,15 @@ from deploy.output import in_a_folder, write_json
 
 
 def record(
-    connect: Annotated[list[str], typer.Option(help="An endpoint; may be given several times.")],
     robot: Annotated[str, typer.Option(help="The robot's name.")],
     out: Annotated[Path, typer.Option(help="New .mcap file.", dir_okay=False, callback=in_a_folder)],
+    connect: Annotated[
+        list[str] | None, typer.Option(help="An endpoint; may be given several times.")
+    ] = None,
+    link: Annotated[
+        Path | None,
+        typer.Option(help="Or a TOML file whose [link] says where, and with which keys.", dir_okay=False),
+    ] = None,
     video: Annotated[list[str] | None, typer.Option(help="Also the pictures of this camera: `head`.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Stop by itself.", min=0.1)] = None,
     figures: Annotated[
@@ -33,14 +39,12 @@ def record(
 
     Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
     """
-    from deploy.control.reach import reach
-    from deploy.record.record import RecordOptions
+    from deploy.record.record import RecordOptions, link_of
     from deploy.record.record import record as record_until
 
     if out.suffix.lower() != ".mcap":
         raise TandemError(f"{out}: expected a name that ends in .mcap")
-    where = reach(connect, [robot])
-    options = RecordOptions(where.link, robot, out, tuple(video or ()), seconds)
+    options = RecordOptions(link_of(connect or (), link), robot, out, tuple(video or ()), seconds)
     console = Console(stderr=True)
 
     async def work(stop: asyncio.Event) -> None:

@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 from common.clock import monotonic_ns, to_s
-from common.config import LinkConfig
+from common.config import LinkConfig, Section, load_config
 from common.errors import TandemError
 from common.launch import WriteFigures
 from common.link import Link, open_link
 from common.recording import Recorder
 from common.runtime import until_stopped
 from common.topics import COMMAND, STATE, STATISTICS, Topic, video
+from deploy.control.reach import reach
 
 LIVE = (COMMAND, STATE, STATISTICS)
 """What is always recorded."""
 TELL_S = 0.5
+
+
+class ObserverConfig(Section):
+    """The TOML file of one who only looks on."""
+
+    link: LinkConfig
+
+
+def link_of(connect: Sequence[str], file: Path | None) -> LinkConfig:
+    """Where to listen in: the endpoints, or the file's `[link]`. Raises ConfigError, TandemError."""
+    if file is not None:
+        return load_config(file, ObserverConfig).link
+    return reach(connect, None).link
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,8 +28,7 @@ class Motion:
         self._rows: deque[tuple[int, Array, Array]] = deque(maxlen=KEPT)
         self._held_ns: int | None = None
         self._rest_rad: Array | None = None
-        self.strayed_rad = 0.0
-        """While it held, since the last look (`take_strayed`)."""
+        self._strayed_rad: float | None = None
 
     def see(self, state: RobotState) -> None:
         """Take a state. One that is older than the last is of another process: its robot stands elsewhere."""
@@ -45,17 +44,18 @@ class Motion:
             return
         if self._rest_rad is None:
             self._rest_rad = state.position_rad
-        self.strayed_rad = max(self.strayed_rad, float(np.abs(state.position_rad - self._rest_rad).max()))
+        strayed_rad = float(np.abs(state.position_rad - self._rest_rad).max())
+        self._strayed_rad = max(self._strayed_rad or 0.0, strayed_rad)
 
     def forget(self) -> None:
         """The process has ended: what comes next is another robot's."""
         self._rows.clear()
         self._held_ns = self._rest_rad = None
 
-    def take_strayed(self) -> float:
-        """How far it went while it was to stand, rad; counted anew from now."""
-        strayed, self.strayed_rad = self.strayed_rad, 0.0
-        return strayed
+    def take_strayed(self) -> float | None:
+        """How far it went while it was to stand, rad, since the last call; None: it was not to stand."""
+        strayed_rad, self._strayed_rad = self._strayed_rad, None
+        return strayed_rad
 
     def newest_ns(self) -> int:
         """The robot's clock when it sent the newest state; 0 before any."""

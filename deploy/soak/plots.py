@@ -16,6 +16,8 @@ from deploy.soak.samples import Samples
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+GAP_S = 4.0
+"""A curve is not drawn through a longer silence."""
 POINTS = 1500
 """At most, of a curve: longer ones are drawn as medians, and the largest of each bin above them."""
 COLOURS = {
@@ -62,12 +64,20 @@ def draw(seen: Seen) -> bytes:
     return image.getvalue()
 
 
-def decimated(at: Array, values: Array, points: int = POINTS) -> tuple[Array, Array, Array]:
-    """Bins' middles, medians and maxima of a series (N,) without NaN; the series itself where it is short."""
+def with_gaps(at: Array, values: Array, gap: float) -> tuple[Array, Array]:
+    """A series (N,) without its missing values, but for one NaN where more than `gap` is missing."""
     good = np.isfinite(values)
     at, values = at[good], values[good]
+    breaks = np.flatnonzero(np.diff(at) > gap) + 1
+    return np.insert(at, breaks, at[breaks - 1]), np.insert(values, breaks, np.nan)
+
+
+def decimated(at: Array, values: Array, points: int = POINTS) -> tuple[Array, Array, Array]:
+    """Bins' middles, medians and maxima of a series (N,), NaN left out; itself where it is short."""
     if len(at) <= points:
         return at, values, values
+    good = np.isfinite(values)
+    at, values = at[good], values[good]
     edges = np.linspace(0, len(at), points + 1).astype(int)
     bins = list(pairwise(edges))
     middles = np.array([at[i:j].mean() for i, j in bins])
@@ -81,7 +91,7 @@ def _latency(panel: Axes, samples: Samples, unit_s: float) -> None:
         ("round_trip_ms", "round trip, mean", "tab:green"),
         ("end_to_end_ms", "sampled → encoder moved, mean", "tab:orange"),
     ):
-        at, medians, most = decimated(samples.at_s / unit_s, samples[column])
+        at, medians, most = decimated(*with_gaps(samples.at_s / unit_s, samples[column], GAP_S / unit_s))
         panel.plot(at, medians, color=colour, linewidth=0.9, label=words)
         if most is not medians:
             panel.plot(at, most, color=colour, linewidth=0.4, alpha=0.4)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from common.clock import monotonic_ns, to_s
+from common.config import LinkConfig
 from deploy.rig.child import Child
 
 NAME = "recorder"
@@ -24,10 +25,13 @@ ENDS_HERE = "the recording ends here"
 class Recorder:
     """Starts and ends `tandem record` of one robot. Files lie in `folder` and are deleted when looked at."""
 
-    def __init__(self, child: Child, folder: Path, connect: Sequence[str], robot: str) -> None:
+    def __init__(self, child: Child, folder: Path, link: LinkConfig, robot: str) -> None:
+        """`link`: where the commands and the states are heard."""
         self.child = child
         self._folder = folder
-        self._arguments = [*(a for each in connect for a in ("--connect", each)), "--robot", robot]
+        self._link = folder / f"{NAME}.toml"
+        self._link.write_text(_toml(link), "utf-8")
+        self._arguments = ["--link", str(self._link), "--robot", robot]
         self._number = 0
         self._said_before = 0
         self.file = folder / "none.mcap"
@@ -72,6 +76,13 @@ class Recorder:
         at_ns = monotonic_ns()
         await self.child.kill()
         return at_ns
+
+
+def _toml(link: LinkConfig) -> str:
+    import tomlkit
+
+    tree = link.model_dump(mode="json", exclude_defaults=True, exclude={"listen"})
+    return tomlkit.dumps({"link": tree})
 
 
 class _SmallDisk:

@@ -192,7 +192,7 @@ class Soak:
             used_here = usage(self._self)
             row |= _columns(SOAK, 1, used_here) if used_here else {}
             strayed_rad = self._stage.watch.motion.take_strayed()
-            if strayed_rad > 0.0:
+            if strayed_rad is not None:
                 row["strayed_deg"] = math.degrees(strayed_rad)
             self._log.sample(row)
             await self._look_after_processes()

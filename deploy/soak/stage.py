@@ -26,7 +26,7 @@ class Stage:
         self.meant: set[str] = set()
         """Processes that nobody has ended."""
         child = Child("record", rig.folder, name=recording.NAME)
-        self.recorder = Recorder(child, rig.folder, rig.endpoints.observing.connect, ROBOT)
+        self.recorder = Recorder(child, rig.folder, rig.endpoints.observing, ROBOT)
         self.children: dict[str, Child] = {**rig.children, recording.NAME: child}
 
     @property

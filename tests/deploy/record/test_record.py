@@ -13,13 +13,13 @@ import uvloop
 from typer.testing import CliRunner
 
 from common.config import LinkConfig
-from common.errors import RecordingError, TandemError
+from common.errors import ConfigError, RecordingError, TandemError
 from common.link import open_link
 from common.recording import Recorder, read_recording
 from common.topics import COMMAND, STATE, STATISTICS, video
 from deploy import cli
 from deploy.record.contents import survey
-from deploy.record.record import RecordOptions, record
+from deploy.record.record import RecordOptions, link_of, record
 
 ROBOT = "robot-1"
 
@@ -37,6 +37,19 @@ def free_endpoint() -> str:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def test_where_to_listen_in_is_said_by_endpoints_or_by_a_file(tmp_path: Path) -> None:
+    assert link_of(["tcp/127.0.0.1:1"], None).connect == ["tcp/127.0.0.1:1"]
+    file = tmp_path / "observer.toml"
+    file.write_text('[link]\nmode = "client"\nconnect = ["tcp/127.0.0.1:2"]\n')
+    link = link_of([], file)
+    assert (link.mode, link.connect) == ("client", ["tcp/127.0.0.1:2"])
+    with pytest.raises(TandemError, match="where is the robot"):
+        link_of([], None)
+    file.write_text("[link]\nspeed = 3\n")
+    with pytest.raises(ConfigError, match=r"observer\.toml: link\.speed = 3: expected no such key"):
+        link_of([], file)
 
 
 def test_every_topic_is_recorded_as_it_came_until_stopped(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from deploy.soak.events import Event, EventFile
 from deploy.soak.judge import Judged, judge
-from deploy.soak.plots import decimated
+from deploy.soak.plots import decimated, with_gaps
 from deploy.soak.report import write_report
 from deploy.soak.samples import SampleFile
 from deploy.soak.view import verdicts_table
@@ -73,3 +73,9 @@ def test_long_curves_keep_their_peaks(count: int) -> None:
     at, medians, most = decimated(np.arange(count, dtype=float), values)
     assert len(at) == len(medians) == min(count, 1500)
     assert most.max() == 50.0
+
+
+def test_a_curve_is_broken_where_nothing_was_measured() -> None:
+    at, values = with_gaps(np.array([0.0, 1.0, 2.0, 9.0, 10.0]), np.array([5.0, np.nan, 6.0, 7.0, 8.0]), 4.0)
+    assert at.tolist() == [0.0, 2.0, 2.0, 9.0, 10.0]
+    np.testing.assert_array_equal(values, [5.0, 6.0, np.nan, 7.0, 8.0])

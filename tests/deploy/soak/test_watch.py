@@ -178,3 +178,7 @@ def test_another_process_s_robot_stands_elsewhere_and_that_is_no_motion() -> Non
     before = at_50_hz(2.0, "hold", lambda t: 1.0, from_s=100.0)
     after = at_50_hz(2.0, "hold", lambda t: 0.0)
     assert motion(*before, *after).take_strayed() == 0.0
+
+
+def test_of_a_robot_that_follows_nothing_is_said() -> None:
+    assert motion(*at_50_hz(2.0, "track", lambda t: t)).take_strayed() is None
