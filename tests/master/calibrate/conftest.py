@@ -1,9 +1,7 @@
 """A calibration session as a perfect node would read it, and what imperfect sensors make of it."""
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -54,11 +52,3 @@ def make(
 @pytest.fixture(scope="session")
 def session() -> MakeSession:
     return make
-
-
-@pytest.fixture(scope="session")
-def recordings_folder() -> Path:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    return Path(folder)

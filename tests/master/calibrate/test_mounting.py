@@ -1,7 +1,7 @@
 """Mounting: simulated persons with sensors askew, and a real one; no magnetometer anywhere."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -278,30 +278,14 @@ def test_raw_counts_need_a_calibration_first(upper_body: Worn, tmp_path: Path) -
         calibrated(counts, tmp_path)
 
 
-POSSIBLE_DEG = {
-    "neck_yaw": (-80, 80),
-    "neck_pitch": (-60, 60),
-    "waist_pitch": (-20, 90),
-    "shoulder_pitch": (-60, 180),
-    "shoulder_roll": (-20, 120),
-    "shoulder_yaw": (-90, 90),
-    "elbow_pitch": (-17, 150),
-    "elbow_roll": (-100, 100),
-    "wrist_yaw": (-60, 60),
-    "hip_flexion": (-30, 125),
-    "hip_abduction": (-30, 50),
-    "hip_rotation": (-50, 50),
-    "knee_flexion": (-12, 150),
-    "ankle_flexion": (-55, 40),
-}
-FASTEST_DEG_S = 900.0
-"""A step's swing bends a knee at up to 700°/s; a thigh's skin at heel strike turns its unit faster still."""
-SKIN_DEG_S = 1500.0
-
-
 @pytest.mark.recordings
 @pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
-def test_a_real_person_moves_as_people_can(profile: str, recordings_folder: Path) -> None:
+def test_a_real_person_moves_as_people_can(
+    profile: str,
+    recordings_folder: Path,
+    possible_deg: Mapping[str, tuple[float, float]],
+    fastest_deg_s: Mapping[str, float],
+) -> None:
     skeleton = load_skeleton(profile)
     there = load_recordings(recordings_folder / "human_full_body.npz")
     nodes = {n: there[RECORDED_AS[n]] for n in skeleton.segment_names if n in RECORDED_AS}
@@ -310,13 +294,13 @@ def test_a_real_person_moves_as_people_can(profile: str, recordings_folder: Path
     angles = solved_deg(nodes, skeleton, found, 2)
     for j, name in enumerate(skeleton.joint_names):
         kind = name.removeprefix("left_").removeprefix("right_")
-        if kind not in POSSIBLE_DEG:
+        if kind not in possible_deg:
             continue
-        low, high = POSSIBLE_DEG[kind]
+        low, high = possible_deg[kind]
         assert low < angles[:, j].min(), name
         assert angles[:, j].max() < high, name
         fastest = np.max(np.abs(np.diff(angles[:, j]))) * 50.0
-        assert fastest < (SKIN_DEG_S if kind == "hip_rotation" else FASTEST_DEG_S), (name, fastest)
+        assert fastest < fastest_deg_s[kind], (name, fastest)
         if kind in ("elbow_pitch", "knee_flexion"):
             # bends one way only, and far
             assert np.quantile(angles[:, j], 0.99) > 60.0, name
