@@ -130,7 +130,9 @@ def suit(config: ConfigFile, set_: Overrides = None, figures: Figures = None) ->
 def demo(
     seconds: Annotated[float, typer.Option(help="How long to follow the operator.", min=3.0)] = 20.0,
     report: ReportFile = None,
-    transport: Annotated[str, typer.Option(help="tcp, udp, ws or unixsock-stream.")] = "tcp",
+    transport: Annotated[
+        str, typer.Option(help="tcp, udp, tls, quic, quic-datagram, ws or unixsock-stream.")
+    ] = "tcp",
     replay: Annotated[
         Path | None, typer.Option(help="A person's recording (.npz) instead of a simulated one.", exists=True)
     ] = None,

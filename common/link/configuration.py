@@ -20,8 +20,10 @@ def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, Any]:
     """
     settings = _endpoints_and_timing(config, mode or config.mode)
     if config.tls is not None:
-        settings["transport"]["link"] |= {"protocols": ["tls", "quic"], "tls": _tls(config.tls)}
+        settings["transport"]["link"]["tls"] = _tls(config.tls)
     if config.access is not None:
+        # elsewhere nobody proves who he is
+        settings["transport"]["link"]["protocols"] = ["tls", "quic"]
         settings["access_control"] = access_control(config.access)
     return settings
 

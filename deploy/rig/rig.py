@@ -13,15 +13,20 @@ from common.control import ask_control
 from common.errors import TandemError
 from common.link import Link, Session, open_session
 from common.messages import Action, ControlReply, ControlRequest
+from common.roles import Role
 from common.skeleton import load_skeleton
 from common.topics import CONTROL
 from deploy.profiles import NURSING, example
 from deploy.rig.child import Child
 from deploy.rig.endpoints import Endpoints, local_endpoints
+from deploy.rig.keys import MASTER, tls_override
+from deploy.rig.keys import ROUTER as ROUTER_NAME
 from deploy.rig.observer import Observer
 
 ROBOT, OPERATOR = "robot-1", "nurse-1"
 ROLES = ("slave", "suit", "master")
+ROUTER = "router"
+"""The role of the router, of a run whose processes reach each other through one."""
 DRIVES = "drives"
 """The role of the simulated drives, of a run whose overrides name them."""
 
@@ -62,6 +67,7 @@ class Rig:
         self.slaves = tuple(map(slave_name, numbers))
         children = [Child("slave", folder, name=name) for name in self.slaves]
         others = [*ROLES[1:], *([DRIVES] if DRIVES in overrides else [])]
+        others += [ROUTER] if endpoints.router else []
         self.children = {child.name: child for child in (*children, *(Child(r, folder) for r in others))}
 
     @property
@@ -89,7 +95,7 @@ class Rig:
         overrides = [*_local(name, self.slaves, self._endpoints), *given]
         if DRIVES in self.children and role in ("slave", DRIVES):
             overrides += drive_buses(self._endpoints.can_port)
-        file = example("slave" if role == DRIVES else role, self.skeleton.name)
+        file = example("slave" if role == DRIVES else role, NURSING if role == ROUTER else self.skeleton.name)
         await self.children[name].start(file, overrides, through)
 
     async def logged(self, name: str, text: str, timeout_s: float) -> None:
@@ -126,7 +132,7 @@ class Rig:
 
     async def stop(self) -> dict[str, int | None]:
         """Stop all, the master first, so that the robot shows that it holds by itself; exit statuses."""
-        last = [DRIVES] if DRIVES in self.children else []
+        last = [name for name in (DRIVES, ROUTER) if name in self.children]
         return {name: await self.children[name].stop() for name in ("master", "suit", *self.slaves, *last)}
 
 
@@ -136,19 +142,23 @@ async def open_rig(
     overrides: Mapping[str, Sequence[str]] | None = None,
     profile: str = NURSING,
     robots: int = 1,
+    routed: bool = False,
 ) -> AsyncIterator[Rig]:
     """Open a rig on free local endpoints; nothing is started yet, everything is stopped at the end.
 
+    `routed`: through a router, which is started at once. A secure transport gets keys of its own.
     `overrides` are by role, and where there are several robots by the process's name too.
     Raises ConfigError for a transport or a profile that there is not.
     """
     load_skeleton(profile)
     async with AsyncExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-")))
-        endpoints = local_endpoints(transport, folder, robots)
+        endpoints = local_endpoints(transport, folder, robots, routed)
         session = await stack.enter_async_context(open_session(endpoints.observing))
         rig = Rig(folder, endpoints, overrides or {}, session, profile)
         stack.push_async_callback(rig.stop)
+        if routed:
+            await rig.start(ROUTER)
         yield rig
 
 
@@ -174,15 +184,33 @@ def _local(name: str, slaves: Sequence[str], endpoints: Endpoints) -> list[str]:
     bus_options = f"{{ port = {endpoints.can_port}, hop_limit = 0 }}"
     if name in slaves:
         number = slaves.index(name)
-        listen = f'link.listen=["{endpoints.robots[number]}"]'
-        return [f'robot="{robot_name(1 + number)}"', listen, 'camera.source="off"']
+        robot = robot_name(1 + number)
+        link = _link(endpoints, Role.ROBOT, robot, listen=[endpoints.robots[number]])
+        return [f'robot="{robot}"', *link, 'camera.source="off"']
+    if name == ROUTER:
+        return _link(endpoints, Role.ROUTER, ROUTER_NAME, listen=[endpoints.router], through="")
     if name == DRIVES:
         return []
     if name == "master":
         return [
             f"robots={[robot_name(1 + i) for i in range(len(slaves))]}",
-            f"link.connect={list(endpoints.robots)}",
-            f'link.listen=["{endpoints.master}"]',
+            *_link(endpoints, Role.OPERATOR, MASTER, [endpoints.master], endpoints.robots),
             f"capture.buses.0.options={bus_options}",
         ]
     return [f'link.connect=["{endpoints.observer}"]', f"buses.0.options={bus_options}"]
+
+
+def _link(
+    endpoints: Endpoints,
+    role: Role,
+    name: str,
+    listen: Sequence[str],
+    connect: Sequence[str] = (),
+    through: str | None = None,
+) -> list[str]:
+    """One party's [link]: its own door and whom it calls, or the router in place of both."""
+    router = endpoints.router if through is None else through
+    keys = [tls_override(endpoints.keys, role, name)] if endpoints.keys else []
+    if router:
+        return ['link.mode="client"', "link.listen=[]", f'link.connect=["{router}"]', *keys]
+    return [f"link.listen={list(listen)}", f"link.connect={list(connect)}", *keys]

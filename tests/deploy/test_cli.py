@@ -78,7 +78,7 @@ def test_every_command_s_help_has_an_example_that_it_would_take(command: str) ->
         ),
         (
             "demo --transport carrier-pigeon",
-            ["--transport = 'carrier-pigeon': expected one of tcp, udp, ws, unixsock-stream"],
+            ["--transport = 'carrier-pigeon': expected one of tcp, udp, tls, quic, quic-datagram, ws, "],
         ),
         (
             "demo --profile octopus",

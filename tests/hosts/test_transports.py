@@ -7,10 +7,11 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
+from common.endpoint import SECURE, TRANSPORTS
 from common.skeleton import load_skeleton
-from deploy.rig.endpoints import TRANSPORTS
 from deploy.rig.host import Host
-from deploy.rig.rig import ROLES, Rig, open_rig
+from deploy.rig.keys import MASTER, access_override
+from deploy.rig.rig import ROBOT, ROLES, Rig, open_rig
 from deploy.rig.tracking import until_tracking
 
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
@@ -24,13 +25,23 @@ async def tracks(rig: Rig) -> None:
     await until_tracking(rig)
 
 
-@pytest.mark.parametrize("transport", [t for t in TRANSPORTS if t != "tcp"])
-def test_the_robot_tracks_over(on_this_host: OnThisHost, transport: str) -> None:
+@pytest.mark.parametrize("routed", [False, True], ids=["direct", "routed"])
+@pytest.mark.parametrize("transport", TRANSPORTS)
+def test_the_robot_tracks_over(on_this_host: OnThisHost, transport: str, routed: bool) -> None:
     async def story(host: Host) -> None:
-        async with open_rig(transport) as rig:
+        access = [access_override([ROBOT])] if transport in SECURE else []
+        rules = dict.fromkeys(("slave", "master", "router"), access)
+        async with open_rig(transport, rules, routed=routed) as rig:
             await tracks(rig)
             assert rig.observer.state is not None
             assert rig.observer.state.offset_bound_ns > 0
+            statuses = await rig.stop()
+            assert set(statuses.values()) == {0}
+            figures = {name: child.figures() for name, child in rig.children.items()}
+        guard = figures["router"] if routed else figures["slave"]["access"]
+        if transport in SECURE:
+            assert guard["connections"][f"operator:{MASTER}"] >= 1
+            assert guard["refused"]["handshakes"] == {}
 
     on_this_host(story)
 

@@ -1,0 +1,51 @@
+"""Keys for one run over a secure transport: an authority as short-lived as the run, and certificates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from common.link_config import TlsConfig
+from common.roles import Role
+from deploy.keys.folder import AUTHORITY, stem, write_pair
+from deploy.keys.make import new_authority, new_identity
+
+VALID = timedelta(days=7)
+"""Longer than any soak."""
+MASTER, OBSERVER, ROUTER = "nurse-1", "rig", "router-1"
+
+
+def make_keys(folder: Path, endpoints: Iterable[str], robots: Sequence[str]) -> Path:
+    """Write them all to a folder of their own, good for the endpoints' addresses; returns that folder."""
+    keys = folder / "keys"
+    now = datetime.now(UTC)
+    authority = new_authority("rig", now, VALID)
+    write_pair(keys, AUTHORITY, authority)
+    hosts = sorted({each.partition("/")[2].rpartition(":")[0] for each in endpoints})
+    people = [(Role.ROBOT, robot) for robot in robots]
+    people += [(Role.OPERATOR, MASTER), (Role.OBSERVER, OBSERVER), (Role.ROUTER, ROUTER)]
+    for role, name in people:
+        write_pair(keys, stem(role, name), new_identity(authority, role, name, hosts, now, VALID))
+    return keys
+
+
+def tls_of(keys: Path, role: Role, name: str) -> TlsConfig:
+    """One party's `[link.tls]`."""
+    own = stem(role, name)
+    return TlsConfig(ca=keys / f"{AUTHORITY}.pem", certificate=keys / f"{own}.pem", key=keys / f"{own}.key")
+
+
+def tls_override(keys: Path, role: Role, name: str) -> str:
+    """The same for `--set`."""
+    tls = tls_of(keys, role, name)
+    return f'link.tls={{ ca = "{tls.ca}", certificate = "{tls.certificate}", key = "{tls.key}" }}'
+
+
+def access_override(robots: Sequence[str]) -> str:
+    """`[link.access]` of such a run, for `--set`: the operator commands, the observer sees."""
+    named = "[" + ", ".join(f'"{robot}"' for robot in robots) + "]"
+    return (
+        f'link.access={{ operators = {{ "{MASTER}" = {named} }}, viewers = {{ "{OBSERVER}" = {named} }}, '
+        f'routers = ["{ROUTER}"] }}'
+    )
