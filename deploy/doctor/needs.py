@@ -13,6 +13,7 @@ from common.can.config import BusConfig
 from common.config import LinkConfig, load_config
 from common.errors import TandemError
 from common.roles import Role, common_name
+from deploy.router.config import RouterConfig
 from master.config import MasterConfig
 from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig
@@ -58,12 +59,14 @@ class Needs:
 
 
 def needs_of(path: Path, overrides: Sequence[str] = ()) -> Needs:
-    """From a master's, slave's or suit's file, told apart by its keys. Raises ConfigError."""
+    """From a master's, slave's, suit's or router's file, told apart by its keys. Raises ConfigError."""
     keys = _keys(path)
     if "capture" in keys or "operator" in keys:
         return _of_master(load_config(path, MasterConfig, overrides))
     if "buses" in keys or "motion" in keys:
         return _of_suit(load_config(path, SuitConfig, overrides))
+    if keys <= set(RouterConfig.model_fields):
+        return _of_router(load_config(path, RouterConfig, overrides))
     return _of_slave(load_config(path, SlaveConfig, overrides))
 
 
@@ -108,3 +111,7 @@ def _of_slave(config: SlaveConfig) -> Needs:
 
 def _of_suit(config: SuitConfig) -> Needs:
     return Needs(role="suit", buses=tuple(map(BusNeed, config.buses)))
+
+
+def _of_router(config: RouterConfig) -> Needs:
+    return Needs(role="router", link=config.link, certified_as=common_name(Role.ROUTER, config.name))

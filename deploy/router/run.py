@@ -7,10 +7,15 @@ import json
 import logging
 from typing import Any
 
+from common.clock import NS_PER_S, monotonic_ns
 from common.launch import WriteFigures
 from common.link.audit import Audit
 from common.link.configuration import zenoh_configuration
-from common.link.session import open_session
+from common.link.session import Session, open_session
+from common.notify import Notifier, open_notifier
+from common.pacing import TickGrid
+from common.runtime import until_stopped
+from common.ticker import ticks
 from deploy.router.config import RouterConfig
 
 log = logging.getLogger("tandem.router")
@@ -34,12 +39,22 @@ async def run(config: RouterConfig, stop: asyncio.Event, write_figures: WriteFig
     """Route until `stop` is set. Raises LinkError where it cannot listen."""
     if config.link.tls is None:
         log.warning("no [link.tls]: anyone who reaches this router may command every robot at it")
+    notifier = open_notifier()
     audit = Audit(config.link)
     async with open_session(config.link, "router") as session:
         audit.attach(session)
         log.info("%s: routes at %s", config.name, ", ".join(config.link.listen))
         try:
-            await stop.wait()
+            await until_stopped(stop, tend(session, notifier))
         finally:
+            notifier.stopping()
             write_figures(audit.figures())
     log.info("stopped")
+
+
+async def tend(session: Session, notifier: Notifier) -> None:
+    """Tell the service manager that Zenoh itself still answers: it routes in threads of its own."""
+    async for _ in ticks(TickGrid(monotonic_ns(), NS_PER_S)):
+        connected = session.peers  # were Zenoh hung this would not return, and nobody would beat
+        notifier.status(f"{connected} connected")
+        notifier.beat(monotonic_ns())

@@ -91,3 +91,9 @@ def test_the_exit_status_is_1_only_where_something_fails(
     else:
         # whatever else ails this machine is not of this test
         assert (left.value.code == 0) == (tree["verdict"] != "fail")
+
+
+def test_a_router_s_file_is_known_by_having_nothing_else() -> None:
+    needs = needs_of(EXAMPLES / "router.toml")
+    assert (needs.role, needs.certified_as) == ("router", "router:router-1")
+    assert needs.link.listen == ["tcp/0.0.0.0:7448"]
