@@ -23,6 +23,7 @@ from deploy.drives import drives
 from deploy.faults.command import faults
 from deploy.keys.commands import app as keys_app
 from deploy.output import in_a_folder, write_json
+from deploy.panels import arrange
 from deploy.record.command import record, recording
 from deploy.router.command import router
 from deploy.soak.command import soak
@@ -213,6 +214,7 @@ def bench(
 
 for _act in OPERATORS_ACTS:
     app.command()(_act)
+arrange(app)
 
 
 def _write_figures(path: Path | None) -> Any:

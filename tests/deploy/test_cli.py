@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from common.errors import TandemError
 from deploy import cli
 from deploy.demo import run as demo_run
+from deploy.panels import PANELS
 
 EXAMPLES = Path(cli.__file__).parent / "examples"
 COMMANDS = sorted(str(command.name or command.callback.__name__) for command in cli.app.registered_commands)  # type: ignore[union-attr]
@@ -50,6 +51,16 @@ def test_alone_it_prints_its_help() -> None:
         help_text = shown(*arguments)
         assert "Start with tandem demo" in help_text
         assert all(f" {command} " in help_text for command in COMMANDS)
+
+
+def test_every_command_stands_under_a_heading_once() -> None:
+    groups = [str(group.name) for group in cli.app.registered_groups]
+    placed = [name for names in PANELS.values() for name in names]
+    assert len(placed) == len(set(placed))
+    assert {*COMMANDS, *groups} <= set(placed)  # a new command: give it a place in deploy/panels.py
+    help_text = CliRunner().invoke(cli.app, ["--help"], terminal_width=100, env={"NO_COLOR": "1"}).output
+    headings = re.findall(r"╭─ ([A-Z][a-z ]+?) ─", help_text)
+    assert [heading for heading in headings if heading != "Options"] == list(PANELS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

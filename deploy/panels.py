@@ -1,0 +1,27 @@
+"""Under which heading of `tandem --help` each command stands, so that a stranger finds it."""
+
+from __future__ import annotations
+
+import typer
+
+PANELS = {
+    "Run": ("demo", "master", "slave", "suit", "router", "drives"),
+    "People": ("engage", "disengage", "estop", "reset", "status", "attitude", "video"),
+    "Set up": ("doctor", "calibrate", "keys", "record", "recording"),
+    "Judge": ("trial", "soak", "faults", "bench", "accuracy", "network"),
+}
+"""In the order of the help."""
+_PANEL = {name: panel for panel, names in PANELS.items() for name in names}
+
+
+def arrange(app: typer.Typer) -> None:
+    """Put every command that the table names under its heading, in the table's order; others stay last."""
+    order = list(_PANEL)
+    for command in app.registered_commands:
+        command.name = command.name or getattr(command.callback, "__name__", "")
+        if command.name in _PANEL:
+            command.rich_help_panel = _PANEL[command.name]
+    for group in app.registered_groups:
+        if group.name in _PANEL:
+            group.rich_help_panel = _PANEL[group.name]
+    app.registered_commands.sort(key=lambda c: order.index(c.name) if c.name in _PANEL else len(order))
