@@ -56,6 +56,10 @@ class LinkTimeoutError(LinkError, TimeoutError):
     """A peer that did not answer in time."""
 
 
+class NetworkError(TandemError):
+    """Hosts on one machine, or the emulated link between them, that cannot be set up."""
+
+
 class RecordingError(TandemError):
     """A recording that cannot be written or used; the text says what is wrong with it and what to do."""
 

@@ -87,7 +87,12 @@ def stays_on_host(config: BusConfig) -> bool:
 
 def _keep_on_host(wire: socket.socket, group: str) -> None:
     membership = socket.inet_aton(group) + socket.inet_aton(_LOOPBACK)
-    wire.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+    try:
+        wire.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+    except OSError as error:
+        # python-can has joined where the route leads: on a host whose multicast stays on loopback, there
+        if error.errno != errno.EADDRINUSE:
+            raise
     wire.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(_LOOPBACK))
     try:
         # the port is bound on every interface: without this, another host could send frames to it

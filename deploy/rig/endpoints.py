@@ -1,4 +1,4 @@
-"""Local Zenoh endpoints and a CAN port that nobody else on this machine uses."""
+"""Zenoh endpoints and a CAN port that nobody else uses: on this machine, or on two emulated hosts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from common.config import LinkConfig
 from common.endpoint import SECURE, TRANSPORTS
 from common.errors import ConfigError, ConfigMistake
 from common.roles import Role
+from deploy.network import Network
 from deploy.rig.keys import OBSERVER, make_keys, tls_of
+
+PORT, MANAGEMENT_PORT, CAN_PORT = 7447, 7547, 43113
+"""On emulated hosts, whose addresses nobody else has: of the router and the robots on the link, of everything
+on the management network, of the suit's bus."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,13 +31,20 @@ class Endpoints:
     """Where the router listens through which all goes; empty where they reach each other directly."""
     keys: Path | None = None
     """The folder of their certificates, where the transport needs some."""
+    watched: tuple[str, ...] = ()
+    """Where each robot, or the router, listens for the observer; empty: where it does for the others."""
 
     @property
     def observing(self) -> LinkConfig:
         """The observer's link: commands from the master, states from each robot, truth at its own door."""
-        connect = [self.router] if self.router else [*self.robots, self.master]
+        everybody = (self.router,) if self.router else self.robots
+        connect = [*(self.watched or everybody), *([] if self.router else [self.master])]
         tls = tls_of(self.keys, Role.OBSERVER, OBSERVER) if self.keys else None
         return LinkConfig(listen=[self.observer], connect=connect, tls=tls)
+
+    def listening(self, number: int) -> list[str]:
+        """Where the first, second … robot (0, 1 …) listens."""
+        return [self.robots[number], *self.watched[number : number + 1]]
 
 
 def local_endpoints(transport: str, folder: Path, robots: int = 1, routed: bool = False) -> Endpoints:
@@ -59,6 +71,37 @@ def keys_for(transport: str, folder: Path, endpoints: list[str], robots: int) ->
     """The folder of keys for these endpoints, made now; None for a transport that needs none."""
     names = [f"robot-{1 + number}" for number in range(robots)]
     return make_keys(folder, endpoints, names) if transport in SECURE else None
+
+
+def network_endpoints(
+    transport: str, network: Network, folder: Path, robots: int = 1, routed: bool = False
+) -> Endpoints:
+    """Endpoints on two hosts: what master and robots say to each other, and only that, crosses the link.
+
+    Observer, truth and acts go over the management network. A router stands on the operator's host: then what
+    the observer hears and asks of the robots crosses the link too, as clients have no other door. Raises
+    ConfigError for a transport that does not reach another host.
+    """
+    known = [each for each in TRANSPORTS if each != "unixsock-stream"]
+    if transport not in known:
+        files = "; a Unix socket is a file of one host" if transport == "unixsock-stream" else ""
+        expected = f"one of {', '.join(known)}{files}"
+        raise ConfigError("network", [ConfigMistake("transport", transport, expected)])
+    operator, robot = network.operator, network.robot
+    clean = "tls" if transport in SECURE else "tcp"
+    each = [f"{transport}/{robot.address}:{PORT + 1 + number}" for number in range(robots)]
+    master = f"{clean}/{operator.management}:{MANAGEMENT_PORT}"
+    router = f"{transport}/{operator.address}:{PORT}"
+    doors = [f"{clean}/{robot.management}:{MANAGEMENT_PORT + 1 + number}" for number in range(robots)]
+    return Endpoints(
+        robots=tuple(each),
+        master=master,
+        observer=f"tcp/{operator.caller}:{MANAGEMENT_PORT}",
+        can_port=CAN_PORT,
+        router=router if routed else "",
+        keys=keys_for(transport, folder, [router, master, *each, *doors], robots),
+        watched=(f"{clean}/{operator.management}:{PORT}",) if routed else tuple(doors),
+    )
 
 
 def _free_ports(transport: str, count: int) -> list[int]:

@@ -41,6 +41,8 @@ class Observer:
         """What the robot last counted of its camera while recording; empty where it has none."""
         self.listeners: list[Callable[[Heard], None]] = []
         """Each is called with every message, whether recording or not."""
+        self._known_from = -1
+        """Number of the command since which every joint was known; -1: one is not."""
         self._news = asyncio.Event()
         self._marks: dict[str, tuple[int, int]] = {}
         self.rates_hz: dict[str, float] = {}
@@ -67,6 +69,10 @@ class Observer:
             return
         if isinstance(message, Command):
             self.command = message
+            if not message.valid.all():
+                self._known_from = -1
+            elif self._known_from < 0 or message.sequence < self._known_from:
+                self._known_from = message.sequence
             self._rate("commands", message.sequence, message.stamps.put_ns)
         elif isinstance(message, RobotState):
             self.state = message
@@ -113,7 +119,9 @@ class Observer:
         if command is None or state is None or state.echo is None or state.guard != "hold":
             return False
         taken_ns = state.sent_ns - state.echo.received_ns
-        return bool(command.valid.all()) and taken_ns < to_ns(2.0 / COMMAND.rate_hz)
+        # the robot has it later than this observer, who may be nearer to the master
+        known = 0 <= self._known_from <= state.echo.sequence
+        return known and taken_ns < to_ns(2.0 / COMMAND.rate_hz)
 
     def waiting_for(self) -> str:
         """What is missing until `ready`, in words."""

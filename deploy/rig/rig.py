@@ -16,9 +16,10 @@ from common.messages import Action, ControlReply, ControlRequest
 from common.roles import Role
 from common.skeleton import load_skeleton
 from common.topics import CONTROL
+from deploy.network import Network
 from deploy.profiles import NURSING, example
 from deploy.rig.child import Child
-from deploy.rig.endpoints import Endpoints, local_endpoints
+from deploy.rig.endpoints import Endpoints, local_endpoints, network_endpoints
 from deploy.rig.keys import MASTER, tls_override
 from deploy.rig.keys import ROUTER as ROUTER_NAME
 from deploy.rig.observer import Observer
@@ -51,7 +52,10 @@ class Rig:
         overrides: Mapping[str, Sequence[str]],
         session: Session,
         profile: str = NURSING,
+        network: Network | None = None,
     ) -> None:
+        self.network = network
+        """The hosts on which the processes run; None: this machine itself."""
         self.skeleton = load_skeleton(profile)
         self.folder = folder
         """Where the processes' logs lie; it goes with the rig."""
@@ -96,7 +100,14 @@ class Rig:
         if DRIVES in self.children and role in ("slave", DRIVES):
             overrides += drive_buses(self._endpoints.can_port)
         file = example("slave" if role == DRIVES else role, NURSING if role == ROUTER else self.skeleton.name)
-        await self.children[name].start(file, overrides, through)
+        await self.children[name].start(file, overrides, [*self._host(role), *through])
+
+    def _host(self, role: str) -> list[str]:
+        """The command by which a process of that role runs on its host."""
+        if self.network is None:
+            return []
+        host = self.network.robot if role in ("slave", DRIVES) else self.network.operator
+        return host.command(())
 
     async def logged(self, name: str, text: str, timeout_s: float) -> None:
         """Wait until a process has logged something. Raises TandemError where it does not."""
@@ -143,19 +154,25 @@ async def open_rig(
     profile: str = NURSING,
     robots: int = 1,
     routed: bool = False,
+    network: Network | None = None,
 ) -> AsyncIterator[Rig]:
     """Open a rig on free local endpoints; nothing is started yet, everything is stopped at the end.
 
     `routed`: through a router, which is started at once. A secure transport gets keys of its own.
+    With a `network` suit, master and router run on the operator's host and the slaves on the robot's, and
+    only what these say to each other crosses the emulated link.
     `overrides` are by role, and where there are several robots by the process's name too.
     Raises ConfigError for a transport or a profile that there is not.
     """
     load_skeleton(profile)
     async with AsyncExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-")))
-        endpoints = local_endpoints(transport, folder, robots, routed)
+        if network is None:
+            endpoints = local_endpoints(transport, folder, robots, routed)
+        else:
+            endpoints = network_endpoints(transport, network, folder, robots, routed)
         session = await stack.enter_async_context(open_session(endpoints.observing))
-        rig = Rig(folder, endpoints, overrides or {}, session, profile)
+        rig = Rig(folder, endpoints, overrides or {}, session, profile, network)
         stack.push_async_callback(rig.stop)
         if routed:
             await rig.start(ROUTER)
@@ -185,10 +202,11 @@ def _local(name: str, slaves: Sequence[str], endpoints: Endpoints) -> list[str]:
     if name in slaves:
         number = slaves.index(name)
         robot = robot_name(1 + number)
-        link = _link(endpoints, Role.ROBOT, robot, listen=[endpoints.robots[number]])
+        link = _link(endpoints, Role.ROBOT, robot, listen=endpoints.listening(number))
         return [f'robot="{robot}"', *link, 'camera.source="off"']
     if name == ROUTER:
-        return _link(endpoints, Role.ROUTER, ROUTER_NAME, listen=[endpoints.router], through="")
+        listen = [endpoints.router, *endpoints.watched]
+        return _link(endpoints, Role.ROUTER, ROUTER_NAME, listen, through="")
     if name == DRIVES:
         return []
     if name == "master":

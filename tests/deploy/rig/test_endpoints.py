@@ -1,14 +1,18 @@
 from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
+from cryptography.x509 import IPAddress, SubjectAlternativeName, load_pem_x509_certificate
 
 from common.config import LinkConfig
 from common.endpoint import SECURE
 from common.errors import ConfigError
 from common.link.certificates import check_tls
 from common.link_config import TlsConfig
-from deploy.rig.endpoints import TRANSPORTS, Endpoints, local_endpoints
+from deploy.network import Host, Network
+from deploy.rig.endpoints import TRANSPORTS, Endpoints, local_endpoints, network_endpoints
 
 
 def fields(endpoints: Endpoints) -> list[str]:
@@ -75,3 +79,41 @@ def test_through_a_router_the_observer_asks_only_there(tmp_path: Path) -> None:
     endpoints = local_endpoints("udp", tmp_path, routed=True)
     assert endpoints.router.startswith("udp/127.0.0.1:")
     assert endpoints.observing.connect == [endpoints.router]
+
+
+HOSTS = cast(
+    Network,
+    SimpleNamespace(
+        operator=Host("operator", "o", "198.18.0.1", "198.19.1.2", "198.19.1.1"),
+        robot=Host("robot", "r", "198.18.0.2", "198.19.1.6", "198.19.1.5"),
+    ),
+)
+
+
+def test_on_two_hosts_the_robot_is_on_the_link_and_the_observer_is_not(tmp_path: Path) -> None:
+    endpoints = network_endpoints("udp", HOSTS, tmp_path, robots=2)
+    assert endpoints.robots == ("udp/198.18.0.2:7448", "udp/198.18.0.2:7449")
+    assert endpoints.listening(1) == ["udp/198.18.0.2:7449", "tcp/198.19.1.6:7549"]
+    watching = [*endpoints.observing.connect, *endpoints.observing.listen]
+    assert len(watching) == 4
+    assert all(endpoint.startswith("tcp/198.19.1.") for endpoint in watching)
+
+
+def test_on_two_hosts_keys_are_good_for_every_address(tmp_path: Path) -> None:
+    endpoints = network_endpoints("quic", HOSTS, tmp_path)
+    assert endpoints.observing.connect == ["tls/198.19.1.6:7548", "tls/198.19.1.2:7547"]
+    assert endpoints.keys is not None
+    robot = load_pem_x509_certificate((endpoints.keys / "robot-robot-1.pem").read_bytes())
+    names = robot.extensions.get_extension_for_class(SubjectAlternativeName).value
+    assert {"198.18.0.2", "198.19.1.6"} <= set(map(str, names.get_values_for_type(IPAddress)))
+
+
+def test_on_two_hosts_the_router_is_the_operator_s(tmp_path: Path) -> None:
+    endpoints = network_endpoints("tcp", HOSTS, tmp_path, routed=True)
+    assert endpoints.router == "tcp/198.18.0.1:7447"
+    assert endpoints.observing.connect == ["tcp/198.19.1.2:7447"]
+
+
+def test_a_unix_socket_reaches_no_other_host(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"transport = 'unixsock-stream': expected one of tcp.*file of one"):
+        network_endpoints("unixsock-stream", HOSTS, tmp_path)

@@ -1,0 +1,150 @@
+"""An operator's host and a robot's host on this machine, and the emulated link between them."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import AsyncIterator, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from common.errors import NetworkError
+from deploy.network.emulation import Emulation, LinkCounters
+from deploy.network.janitor import Janitor
+from deploy.network.namespaces import (
+    HOSTS,
+    Run,
+    free_slot,
+    link_addresses,
+    make_host,
+    new_run,
+    remove_dead,
+    why_not,
+)
+from deploy.network.profile import Outage, Profile, load_profile
+from deploy.network.tun import Forwarder
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """One of the two."""
+
+    name: str
+    namespace: str
+    address: str
+    """On the emulated link."""
+    management: str
+    """On a clean veth to the caller's namespace: for observers."""
+    caller: str
+    """The caller's own address on that veth."""
+
+    def command(self, argv: Sequence[str]) -> list[str]:
+        """`argv` as it runs within this host."""
+        return [shutil.which("ip") or "ip", "netns", "exec", self.namespace, *argv]
+
+
+class Network:
+    """The two hosts, and the link as it is now. `set`, `cut` and `counters` block for some 0.2 ms."""
+
+    def __init__(self, hosts: Sequence[Host], emulation: Emulation, profile: Profile) -> None:
+        self.operator, self.robot = hosts
+        self.profile = profile
+        self._emulation = emulation
+        self._cut = False
+        self._outages = 0
+        self._script: asyncio.Task[None] | None = None
+        self._follow(profile)
+
+    @property
+    def backend(self) -> str:
+        """What emulates the link: `forwarder`, `netem`."""
+        return self._emulation.name
+
+    def set(self, profile: Profile | str | Path) -> None:
+        """Change the link to another profile; its scripted outages count from now."""
+        profile = profile if isinstance(profile, Profile) else load_profile(profile)
+        self._emulation.set(profile)
+        self.profile = profile
+        self._follow(profile)
+
+    def cut(self) -> None:
+        """Let nothing pass, either way, until `restore`."""
+        self._cut = True
+        self._apply()
+
+    def restore(self) -> None:
+        """End of `cut`; outages that are under way go on."""
+        self._cut = False
+        self._apply()
+
+    async def outage(self, seconds: float) -> None:
+        """Let nothing pass for some time; returns when the link is back."""
+        self._outages += 1
+        try:
+            self._apply()
+            await asyncio.sleep(seconds)
+        finally:
+            self._outages -= 1
+            self._apply()
+
+    def counters(self) -> LinkCounters:
+        """Packets and bytes each way since the network was opened, and what was dropped by cause."""
+        return self._emulation.counters()
+
+    def _apply(self) -> None:
+        self._emulation.cut(self._cut or self._outages > 0)
+
+    def _follow(self, profile: Profile) -> None:
+        if self._script is not None:
+            self._script.cancel()
+        self._script = asyncio.create_task(self._play(profile.outages)) if profile.outages else None
+
+    async def _play(self, outages: Sequence[Outage]) -> None:
+        clock = asyncio.get_running_loop().time
+        begun = clock()
+        for outage in outages:
+            await asyncio.sleep(begun + outage.at_s - clock())
+            await self.outage(begun + outage.at_s + outage.for_s - clock())
+
+    async def end_script(self) -> None:
+        """No scripted outage happens any more."""
+        if self._script is not None:
+            self._script.cancel()
+            with suppress(asyncio.CancelledError, NetworkError):
+                await self._script
+
+
+@asynccontextmanager
+async def open_network(profile: Profile | str | Path = "lan", *, seed: int = 1) -> AsyncIterator[Network]:
+    """Make two hosts and a link between them; all is removed at the end, even if this process is killed.
+
+    A profile is given by name, by path, or as such. Raises ConfigError for a profile that there is not, and
+    NetworkError where this process may not make hosts.
+    """
+    profile = profile if isinstance(profile, Profile) else load_profile(profile)
+    reason = why_not()
+    if reason is not None:
+        raise NetworkError(reason)
+    run = new_run()
+    async with AsyncExitStack() as stack:
+        janitor = Janitor(run)
+        stack.push_async_callback(asyncio.to_thread, janitor.remove)
+        hosts = await asyncio.to_thread(_make_hosts, run)
+        forwarder = await asyncio.to_thread(Forwarder, run, profile, seed)
+        stack.callback(forwarder.close)
+        network = Network(hosts, forwarder, profile)
+        stack.push_async_callback(network.end_script)
+        yield network
+
+
+def _make_hosts(run: Run) -> list[Host]:
+    remove_dead()
+    slot = free_slot()
+    hosts = []
+    for name, (namespace, address, _), caller, management in zip(
+        HOSTS, link_addresses(run), slot[::2], slot[1::2], strict=True
+    ):
+        make_host(run, name, management, caller)
+        hosts.append(Host(name, namespace, address, management, caller))
+    return hosts

@@ -1,0 +1,99 @@
+"""`python -m deploy.network.probe`: one end of a measurement, run within a host.
+
+Sends numbered, stamped packets at a steady rate and notes those of the other end. The hosts are on one
+machine, so one clock stamps both ends: the one-way times are exact, whatever the two sides may know.
+"""
+
+from __future__ import annotations
+
+import json
+import select
+import socket
+import struct
+import sys
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from common.clock import NS_PER_S, to_ns, to_s, wall_ns
+from common.realtime import ProcessConfig, take_priority
+
+PORT = 7450
+STAMP = struct.Struct("!Iq")
+"""Number and time of sending, of the clock by which the kernel stamps arrivals."""
+IP_UDP_BYTES = 28
+PRIORITY = 40
+"""Below the forwarder: a probe that hurries must not hold up what it measures."""
+_SO_TIMESTAMPNS = 35
+_TIMESPEC = struct.Struct("qq")
+_BUFFER = 8_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What one end does."""
+
+    here: str
+    """Address to send from, as `there` to send to."""
+    there: str
+    rate_hz: float
+    packets: int
+    """How many to send; then it listens for `linger_s` more."""
+    size: int
+    """Of the IP packet, bytes."""
+    start_ns: int
+    """When to begin."""
+    linger_s: float
+
+    def arguments(self) -> list[str]:
+        """For the command line."""
+        return [json.dumps(asdict(self))]
+
+
+def run(plan: Plan) -> dict[str, Any]:
+    """`sent`: times of sending by number, and `arrivals`: number, time of sending and of arrival; ns."""
+    end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+    end.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+    end.bind((plan.here, PORT))
+    end.setblocking(False)
+    padding = bytes(plan.size - IP_UDP_BYTES - STAMP.size)
+    period_ns = NS_PER_S / plan.rate_hz
+    arrivals: list[tuple[int, int, int]] = []
+    refused, number = 0, 0
+    until_ns = plan.start_ns + round(plan.packets * period_ns) + to_ns(plan.linger_s)
+    while (now_ns := wall_ns()) < until_ns:
+        next_ns = plan.start_ns + round(number * period_ns)
+        if number < plan.packets and now_ns >= next_ns:
+            try:
+                end.sendto(STAMP.pack(number, wall_ns()) + padding, (plan.there, PORT))
+            except OSError:  # the queue of the interface is full
+                refused += 1
+            number += 1
+            continue
+        wait_ns = (next_ns if number < plan.packets else until_ns) - now_ns
+        if select.select([end], [], [], to_s(max(wait_ns, 0)))[0]:
+            arrivals.extend(_arrived(end))
+    return {"sent": number - refused, "arrivals": arrivals}
+
+
+def _arrived(end: socket.socket) -> list[tuple[int, int, int]]:
+    """Stamped by the kernel: it is not late when this process is."""
+    payload, extra, _, _ = end.recvmsg(2048, socket.CMSG_SPACE(_TIMESPEC.size))
+    if len(payload) < STAMP.size:
+        return []
+    number, sent_ns = STAMP.unpack_from(payload)
+    seconds, nanoseconds = _TIMESPEC.unpack(extra[0][2])
+    return [(number, sent_ns, seconds * NS_PER_S + nanoseconds)]
+
+
+def main() -> None:
+    """Argument: the plan as JSON. Prints what was seen, as JSON."""
+    plan = Plan(**json.loads(sys.argv[1]))
+    take_priority(ProcessConfig(realtime_priority=PRIORITY))
+    time.sleep(max(to_s(plan.start_ns - wall_ns()) - 0.01, 0.0))
+    json.dump(run(plan), sys.stdout)
+
+
+if __name__ == "__main__":
+    main()
