@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -66,17 +67,28 @@ def commands(seen: Seen) -> list[Verdict]:
     """Lost, late, twice, refused; each outside of the windows that explain it, and none acted on too late."""
     quiet = seen.quiet
     sent = seen.sum("sent", quiet)
+    network = seen.options.get("network") or {}
     verdicts = []
     for column, name in COUNTED.items():
         figure = seen.sum(column, quiet) if sent else None
         note = f"{seen.sum(column):.0f} in all, {sent:.0f} sent outside of faults"
         if column == "lost":
             note += f"; {seen.sum('overwritten'):.0f} waited too long in the slave itself"
-        verdicts.append(at_most("commands", f"{name}, unexplained", figure, 0.0, note=note))
+        allowed = chance(sent, network.get(column, 0.0), network.get("burst_packets") or 1.0)
+        verdicts.append(at_most("commands", f"{name}, unexplained", figure, allowed, note=note))
     ages = seen.samples["age_max_ms"]
     oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
     verdicts.append(at_most("commands", "oldest that was acted on", oldest, AGE_MS, "ms", "put → accepted"))
     return verdicts
+
+
+def chance(sent: float, percent: float, together: float = 1.0) -> float:
+    """How many of those sent a network may lose, turn or double: four deviations above the mean.
+
+    `together`: how many it takes at a time. 0 where it takes none.
+    """
+    mean = sent * percent / 100.0
+    return float(math.ceil(mean + 4.0 * math.sqrt(mean * together))) if mean > 0.0 else 0.0
 
 
 def guard(seen: Seen) -> list[Verdict]:
@@ -91,9 +103,10 @@ def guard(seen: Seen) -> list[Verdict]:
         for e in of_kind(seen.events, "guard")
     )
     strayed = seen.samples["strayed_deg"]
+    way_s = (seen.options.get("network") or {}).get("way_s", 0.0)
     return [
-        _worst("guard", "holds on a fault, the slowest", must, "held_s", HOLD_S, "s"),
-        _worst("guard", "stands after a fault, the slowest", must, "stands_s", STANDS_S, "s"),
+        _worst("guard", "holds on a fault, the slowest", must, "held_s", HOLD_S + way_s, "s"),
+        _worst("guard", "stands after a fault, the slowest", must, "stands_s", STANDS_S + way_s, "s"),
         at_most("guard", "holds that nothing explains", float(len(lefts)), 0.0, note=_reasons(lefts)),
         at_most(
             "guard", "holds on a fault that asks for none", float(len(idle)), 0.0,

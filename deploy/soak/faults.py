@@ -15,6 +15,8 @@ from deploy.soak.stage import Stage
 
 STEPS_S = (60, 3_600, 86_400, 2_592_000)
 """By how much a clock may be stepped: a minute, an hour, a day, a month."""
+ROUTER = "router"
+"""The process that all passes through, in a rig that has one."""
 FILLS_S = 8.0
 """A small disk is full by then."""
 
@@ -110,6 +112,24 @@ async def _free_disk(case: Case) -> None:
     await stage.start(recording.NAME)
 
 
+async def _cut(case: Case) -> None:
+    if case.stage.network is not None:
+        case.stage.network.cut()
+
+
+async def _restore(case: Case) -> None:
+    if case.stage.network is not None:
+        case.stage.network.restore()
+
+
+async def _has_network(stage: Stage) -> str:
+    return "" if stage.network is not None else "needs a network between two hosts: --profile"
+
+
+async def _has_router(stage: Stage) -> str:
+    return "" if ROUTER in stage.children else "there is no router in between: --router"
+
+
 async def _can_step(_: Stage) -> str:
     return await clock_step.why_not()
 
@@ -147,6 +167,15 @@ FAULTS: Mapping[str, Fault] = {
         ),
         _stepped("master", lives=True),
         _stepped("slave", lives=False),
+        Fault(
+            "outage", "nothing passes between the two hosts for some seconds", _cut, _restore, (3.0, 7.0),
+            holds=True, flow_s=LINK_S, needs=_has_network,
+        ),
+        Fault(
+            "router-restart", "the router is killed (kill -9) and started again",
+            partial(_kill, ROUTER), partial(_start, ROUTER),
+            ends_process=True, holds=True, lives=False, flow_s=RESTART_S, needs=_has_router,
+        ),
         Fault("node-loss", "one of the suit's nodes falls silent", _lose_node, _find_node, (2.0, 6.0)),
         Fault(
             "disk-full", "the recorder's disk fills up", _fill_disk, _free_disk,

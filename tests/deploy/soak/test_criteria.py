@@ -63,6 +63,21 @@ def test_one_that_nothing_explains_fails_and_the_same_in_a_fault_does_not(
     assert failing(make(**{column: at(109.0 + int(AFTER_S) + 1)})) == {name}
 
 
+def test_a_network_that_loses_some_by_its_nature_is_allowed_for(make: Make) -> None:
+    network = {"lost": 1.0, "late": 0.0, "repeated": 0.0, "burst_packets": 2.0, "way_s": 0.1}
+    begun = Event(0.0, "begin", {"network": network})
+    # 1 % of what was sent outside of faults, and four deviations of pairs
+    seen = make(events=(begun, *STORY[1:]))
+    lost, sent = judged(seen)["commands: lost, unexplained"], 12.5 * seen.quiet.sum()
+    assert lost.limit == np.ceil(0.01 * sent + 4.0 * np.sqrt(0.01 * sent * 2.0))
+    assert failing(make(events=(begun, *STORY[1:]), lost=at(50, lost.limit))) == set()
+    assert failing(make(events=(begun, *STORY[1:]), lost=at(50, lost.limit + 1))) == {
+        "commands: lost, unexplained"
+    }
+    held = judged(make(events=(begun, *STORY[1:])))["guard: holds on a fault, the slowest"]
+    assert held.limit == HOLD_S + 0.1
+
+
 def test_a_stall_of_the_host_explains_too_if_it_is_long_enough(make: Make) -> None:
     def still(ms: float) -> tuple[Event, ...]:
         return (*STORY, Event(50.0, "still", {"from_s": 49.3, "still_ms": ms}))
