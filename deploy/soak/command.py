@@ -26,7 +26,8 @@ REPORT_S = 60.0
 
 def soak(
     duration: Annotated[str, typer.Option(help="How long the robot is to follow: 8h, 30m, 90s.")] = "10m",
-    transport: Annotated[str, typer.Option(help="tcp, udp, ws or unixsock-stream.")] = "tcp",
+    transport: Annotated[str, typer.Option(help="tcp udp tls quic quic-datagram ws unixsock-stream")] = "tcp",
+    router: Annotated[bool, typer.Option("--router", help="Master and robot meet at a router.")] = False,
     faults: Annotated[
         str, typer.Option(help="all, none, or names with commas; `--faults help` lists them.")
     ] = "all",
@@ -63,7 +64,7 @@ def soak(
         _tell(judge_folder(judge), judge, console)
         return
     options = SoakOptions(
-        seconds(duration), transport, faults=tuple(chosen(faults)), every_s=every, seed=seed
+        seconds(duration), transport, router=router, faults=tuple(chosen(faults)), every_s=every, seed=seed
     )
     with tempfile.TemporaryDirectory(prefix="tandem-soak-") as temporary:
         from deploy.soak.run import folder_for
@@ -101,22 +102,22 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
 
     async with AsyncExitStack() as stack:
         host = await stack.enter_async_context(watch_host())
-        rig = await stack.enter_async_context(open_rig(options.transport))
+        rig = await stack.enter_async_context(open_rig(options.transport, routed=options.router))
         log: SoakLog | None = None
         watch = Watch(rig.skeleton, lambda kind, what: log.tell(kind, what) if log else None)
         stage = Stage(rig, watch, lambda kind, what: log.tell(kind, what) if log else None)
         log = SoakLog(folder, [*stage.names, SOAK])
         stack.callback(log.close)
         watch.listen(rig.link())
-        how = "interrupted"
+        how, error = "interrupted", False
         live = stack.enter_context(Live(console=console, refresh_per_second=2, transient=True))
         try:
             await until_stopped(stop, Soak(options, stage, log, host, live).run())
             how = "interrupted" if stop.is_set() else "it ran its time"
-        except TandemError as error:
-            how = str(error)
+        except TandemError as wrong:
+            how, error = str(wrong), True
         finally:
-            log.tell("end", {"how": how, "status": await stage.close()})
+            log.tell("end", {"how": how, "error": error, "status": await stage.close()})
             for child in stage.children.values():
                 if child.log.exists():
                     shutil.copy(child.log, folder / child.log.name)

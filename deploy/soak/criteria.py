@@ -179,6 +179,20 @@ def loops(seen: Seen) -> list[Verdict]:
     return verdicts
 
 
+def ending(seen: Seen) -> list[Verdict]:
+    """It did what it was to do, and every process ended when it was asked to."""
+    ends = [e.what for e in of_kind(seen.events, "end")]
+    if not ends:
+        return [Verdict("soak", "ended by an error", Status.NOT_JUDGED, None, 0.0, note="it was killed")]
+    unclean = {name: status for name, status in ends[-1]["status"].items() if status not in (0, None)}
+    words = ", ".join(f"{name}: {status}" for name, status in unclean.items())
+    note = ends[-1]["how"]
+    return [
+        at_most("soak", "ended by an error", float(ends[-1]["error"]), 0.0, note=note),
+        at_most("soak", "processes that did not end in order", float(len(unclean)), 0.0, note=words),
+    ]
+
+
 def recordings(seen: Seen) -> list[Verdict]:
     """What the recorder's files hold after it was killed, and after its disk was full."""
     told = [e.what for e in of_kind(seen.events, "recording")]
@@ -229,5 +243,5 @@ def _reasons(lefts: Sequence[Event]) -> str:
     return "; ".join(f"{e.at_s:.0f} s: {e.what.get('guard')}: {e.what.get('reason')}" for e in lefts[:3])
 
 
-CRITERIA: Sequence[Callable[[Seen], list[Verdict]]] = (commands, guard, recovery, loops, recordings)
+CRITERIA: Sequence[Callable[[Seen], list[Verdict]]] = (ending, commands, guard, recovery, loops, recordings)
 """In the order of the report; growth and drift are in deploy/soak/growth.py."""

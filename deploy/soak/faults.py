@@ -9,14 +9,13 @@ from functools import partial
 from typing import Any
 
 from common.errors import ConfigError, ConfigMistake
+from deploy.rig.rig import ROUTER
 from deploy.soak import clock_step
 from deploy.soak import recorder as recording
 from deploy.soak.stage import Stage
 
 STEPS_S = (60, 3_600, 86_400, 2_592_000)
 """By how much a clock may be stepped: a minute, an hour, a day, a month."""
-ROUTER = "router"
-"""The process that all passes through, in a rig that has one."""
 FILLS_S = 8.0
 """A small disk is full by then."""
 

@@ -21,6 +21,8 @@ class SoakOptions:
     transport: str = "tcp"
     profile: str | None = None
     """Of the network between two namespaces; None: local endpoints."""
+    router: bool = False
+    """Whether master and robot meet at a router."""
     faults: tuple[str, ...] = ()
     every_s: float | None = None
     """Mean time between faults; None: by duration and kinds."""

@@ -34,11 +34,11 @@ class Stage:
         self.network = network
         self.watch = watch
         self.tell = tell
-        self.meant: set[str] = set()
-        """Processes that nobody has ended."""
         child = Child("record", rig.folder, name=recording.NAME)
         self.recorder = Recorder(child, rig.folder, rig.endpoints.observing, ROBOT)
         self.children: dict[str, Child] = {**rig.children, recording.NAME: child}
+        self.meant = {name for name, child in self.children.items() if child.running}
+        """Processes that nobody has ended; a router runs already."""
 
     @property
     def names(self) -> list[str]:

@@ -187,6 +187,21 @@ def test_recordings(make: Make, what: dict[str, Any], wrong: set[str]) -> None:
     assert failing(make(events=(*STORY, Event(150.0, "recording", what)))) == wrong
 
 
+@pytest.mark.parametrize(
+    ("what", "wrong"),
+    [
+        ({"how": "it ran its time", "error": False, "status": {"master": 0, "recorder": None}}, set()),
+        ({"how": "the robot never followed", "error": True, "status": {}}, {"soak: ended by an error"}),
+        (
+            {"how": "interrupted", "error": False, "status": {"slave": 70}},
+            {"soak: processes that did not end in order"},
+        ),
+    ],
+)
+def test_how_it_ended(make: Make, what: dict[str, Any], wrong: set[str]) -> None:
+    assert failing(make(events=(*STORY, Event(599.0, "end", what)))) == wrong
+
+
 def test_without_faults_and_commands_nothing_is_claimed(make: Make) -> None:
     seen = make(events=STORY[:6], sent=0.0)
     verdicts = judged(seen)

@@ -38,4 +38,4 @@ def test_what_comes_after_a_robot_left_off_has_a_reason_that_it_left_has_none() 
 
 
 def test_what_the_processes_say_while_they_are_stopped_counts_for_nothing() -> None:
-    assert explanation((*STORY, Event(300.0, "end", {}))).why(301.0) == "end"
+    assert explanation((*STORY, Event(300.0, "end"))).why(301.0) == "end"

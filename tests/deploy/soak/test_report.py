@@ -36,7 +36,10 @@ def judged(folder: Path, *more: Event) -> Judged:
 
 
 def test_the_json_says_all(tmp_path: Path) -> None:
-    write_report(judged(tmp_path, Event(199.0, "end", {"how": "it ran its time"})), tmp_path)
+    write_report(
+        judged(tmp_path, Event(199.0, "end", {"how": "it ran its time", "error": False, "status": {}})),
+        tmp_path,
+    )
     tree = json.loads((tmp_path / "report.json").read_text())
     assert tree["verdict"] == "fail"
     assert tree["ended"] == "it ran its time"
