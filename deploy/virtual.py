@@ -20,6 +20,7 @@ from common.offset import MasterExchange
 from deploy.judge import Trace
 from deploy.profiles import NURSING, example
 from deploy.troubles import Troubles, Way
+from deploy.virtual_link import VirtualLink
 from master.config import MasterConfig
 from master.lease import LeaseKeeper
 from master.pipeline import CommandWriter, MasterPipeline, Solved
@@ -50,6 +51,11 @@ class World:
     """The slave's clock minus the master's at the start."""
     slave_drift_ppm: float = 20.0
     one_way_ns: int = 2 * NS_PER_MS
+    jitter_ns: int = 0
+    """Standard deviation of the way's time."""
+    loss: float = 0.0
+    """Share of the messages that never arrive."""
+    link_seed: int = 1
     profile: str = NURSING
     motion: Motion | None = None
     """Of the operator, instead of the one that the suit's file names."""
@@ -63,6 +69,7 @@ class VirtualRun:
     def __init__(self, world: World) -> None:
         self._world = world
         self.troubles = Troubles()
+        self._link = VirtualLink(world.one_way_ns, world.jitter_ns, world.loss, world.link_seed)
         self.master_config = _load(MasterConfig, "master", world)
         self.robot = self.master_config.commanded[0]
         self.slave_config = _load(SlaveConfig, "slave", world)
@@ -167,7 +174,9 @@ class VirtualRun:
 
     def _carry(self, way: Way, payload: bytes, arrive: Callable[[bytes], None], after_ns: int = 0) -> None:
         for later_ns, arrived in self.troubles.carry(way, payload):
-            self._at(self.now_ns + after_ns + self._world.one_way_ns + later_ns, partial(arrive, arrived))
+            arrival_ns = self._link.arrival_ns(way, self.now_ns + after_ns)
+            if arrival_ns is not None:
+                self._at(arrival_ns + later_ns, partial(arrive, arrived))
 
     def _drive(self) -> None:
         now_ns = self.slave_ns

@@ -22,13 +22,13 @@ class TrackConfig(Section):
 
     strategy: Literal["hold", "interpolate", "predict"] = "predict"
     """`hold`: the newest sample. `interpolate`: smooth, one period late. `predict`: extrapolated to now."""
-    blend_s: float = Field(default=0.08, gt=0.0, le=1.0)
+    blend_s: float = Field(default=0.06, gt=0.0, le=1.0)
     """Time over which a difference between the old course and a new sample's is worked off."""
     servo_lag_s: float = Field(default=SERVO_LAG_S, ge=0.0, le=0.5)
     """`predict`: how far the servos lag behind a ramp, without their bus; aimed ahead by as much."""
-    max_horizon_s: float = Field(default=0.3, gt=0.0, le=2.0)
-    """`predict`: age of a sample, servo lag included, at which it moves nothing any more; it coasts to rest
-    from half of it. Wants to be twice the age at which samples are usually replaced."""
+    max_horizon_s: float = Field(default=0.5, gt=0.0, le=2.0)
+    """`predict`: age of a sample, servo lag included, at which it moves nothing any more. The horizon itself
+    follows the measured delay and jitter; this is the most that it may become, coasting to rest included."""
     jitter_margin_s: float = Field(default=0.01, ge=0.0, le=0.5)
     """`interpolate`: how much later than usual a sample may arrive and still find the robot moving."""
 

@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.quaternion import Array
+from slave.track.estimate import relaxed
 from slave.track.predict import Predict
 
 MS = 1_000_000
@@ -43,27 +44,35 @@ def test_a_reset_forgets_the_difference_being_worked_off() -> None:
 
 
 @pytest.mark.parametrize("speed", [-2.0, 0.0, 1.5])
-def test_constant_velocity_is_met_exactly_servo_lag_included(speed: float) -> None:
+def test_constant_velocity_is_followed_to_now_and_ahead_by_the_servo_lag_but_for_what_may_not_last(
+    speed: float,
+) -> None:
     tracker = fresh()
     for k in range(10):
         feed(tracker, k, speed * PERIOD * k / 1e3, speed)
         for ms in np.arange(PERIOD * k + TRANSIT, PERIOD * (k + 1) + TRANSIT, 5.0).tolist():
             position, velocity = course(tracker, ms)
-            assert position == pytest.approx(speed * (ms / 1e3 + LAG_S), abs=1e-12)
-            assert velocity == pytest.approx(speed, abs=1e-12)
+            ahead_s = (ms - PERIOD * k) / 1e3 + LAG_S
+            lead = float(position[0]) - speed * PERIOD * k / 1e3
+            assert 0.75 * abs(speed) * ahead_s <= abs(lead) + 1e-9
+            assert abs(lead) <= abs(speed) * ahead_s + 1e-9
+            assert 0.75 * abs(speed) <= abs(float(velocity[0])) + 1e-9
 
 
-def test_an_acceleration_that_lasts_is_followed_better_than_by_velocity_alone() -> None:
-    tracker, acceleration = fresh(), 5.0
-    for k in range(12):
-        t = PERIOD * k / 1e3
-        feed(tracker, k, 0.5 * acceleration * t**2, acceleration * t)
-    at_s = (12 * PERIOD + TRANSIT - 1) / 1e3
-    position, _ = course(tracker, at_s * 1e3)
-    ahead_s = at_s + LAG_S
-    error = abs(float(position[0]) - 0.5 * acceleration * ahead_s**2)
-    by_velocity_alone = 0.5 * acceleration * (ahead_s - 11 * PERIOD / 1e3) ** 2
-    assert error < 0.4 * by_velocity_alone
+def test_a_reach_is_followed_better_than_by_velocity_alone() -> None:
+    tracker = fresh()
+    reach_s, by = 1.0, 1.0
+    errors, plain = [], []
+    for k in range(13):
+        x = PERIOD * k / 1e3 / reach_s
+        p, v = (by * x**3 * (10 + x * (6 * x - 15)), 30 * by * (x * (1 - x)) ** 2) if x < 1 else (by, 0.0)
+        feed(tracker, k, p, v)
+        for ms in range(PERIOD * k + TRANSIT, PERIOD * (k + 1) + TRANSIT, 5):
+            y = min((ms / 1e3 + LAG_S) / reach_s, 1.0)
+            true = by * y**3 * (10 + y * (6 * y - 15))
+            errors.append(float(course(tracker, ms)[0][0]) - true)
+            plain.append(p + v * ((ms - PERIOD * k) / 1e3 + LAG_S) - true)
+    assert np.std(errors) < 0.9 * np.std(plain)
 
 
 jumps = st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(-4.0, 4.0)), min_size=2, max_size=8)
@@ -103,8 +112,17 @@ def test_without_samples_it_is_at_rest_from_the_horizon_on_and_not_before() -> N
     stood, velocity = course(tracker, rest_ms)
     assert velocity == pytest.approx(0.0, abs=1e-9)
     # full rate for half of the horizon, then the mean of a smooth descent
-    assert stood == pytest.approx(2.0 * 0.75 * HORIZON_S)
+    assert stood == pytest.approx(2.0 * relaxed(0.75 * HORIZON_S)[0, 1])
     assert course(tracker, 60_000.0)[0] == pytest.approx(stood)
+
+
+@pytest.mark.parametrize("transit", [2, 30, 80, 150])
+def test_the_horizon_follows_the_link_up_to_the_ceiling(transit: int) -> None:
+    tracker = Predict(BLEND_S, LAG_S, 0.4)
+    for k in range(40):
+        feed(tracker, k, 0.01 * k, 0.125, transit)
+    usual_s = max((PERIOD + transit) / 1e3 + LAG_S, 0.15)
+    assert tracker.horizon_s == pytest.approx(min(usual_s, 0.25), abs=0.002)
 
 
 def test_after_a_silence_past_the_horizon_the_estimate_starts_afresh_but_the_robot_does_not_jump() -> None:
@@ -135,7 +153,7 @@ def test_without_velocities_it_goes_by_the_positions() -> None:
         feed(tracker, k, 1.0 * PERIOD * k / 1e3, 0.0)
     # steady motion is then met once the velocity is known from two samples and has been blended in
     position, velocity = course(tracker, 8 * PERIOD + TRANSIT - 1)
-    assert velocity == pytest.approx(1.0, rel=0.05)
+    assert velocity == pytest.approx(0.8, abs=0.1)
     assert position == pytest.approx((8 * PERIOD + TRANSIT - 1) / 1e3 + LAG_S, rel=0.05)
 
 

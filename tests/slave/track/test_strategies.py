@@ -33,7 +33,7 @@ def judged(runs: dict[Strategy, Run]) -> dict[Strategy, Figures]:
 
 def test_predict_is_early_enough_near_enough_and_smooth_enough(judged: dict[Strategy, Figures]) -> None:
     predict = judged["predict"]
-    assert abs(predict.lag_ms) <= 10.0
+    assert abs(predict.lag_ms) <= 15.0
     assert predict.rmse_deg <= 0.25 * judged["hold"].rmse_deg
     assert predict.roughness <= 2.2
 
@@ -84,16 +84,19 @@ def test_predict_aims_ahead_by_the_bus_of_the_drives_too() -> None:
     servos = ServosConfig.model_validate({"backend": "canopen", "canopen": {"sync_hz": 50}})
     assert servos.bus_lag_s == pytest.approx(0.03)
     assert ServosConfig().bus_lag_s == 0.0
-    still, ahead = (make_tracker(TrackConfig(), lag_s) for lag_s in (0.0, servos.bus_lag_s))
+    still, early = (make_tracker(TrackConfig(), lag_s) for lag_s in (0.0, servos.bus_lag_s))
     rate = np.array([1.0, -0.5])
     for k in range(20):
         now_ns = k * 80_000_000
-        for tracker in (still, ahead):
+        for tracker in (still, early):
             tracker.accept(now_ns, now_ns, 0.08 * k * rate, rate)
-    targets = [tracker.target(now_ns) for tracker in (still, ahead)]
+    targets = [tracker.target(now_ns) for tracker in (still, early)]
     assert targets[0] is not None
     assert targets[1] is not None
-    np.testing.assert_allclose(targets[1].position_rad - targets[0].position_rad, 0.03 * rate, atol=2e-3)
+    ahead = (targets[1].position_rad - targets[0].position_rad) / rate
+    # the farther ahead, the less of the velocity is believed to last
+    assert (ahead <= 0.03).all()
+    assert (ahead >= 0.75 * 0.03).all()
 
 
 def test_a_strategy_that_does_not_exist_is_refused() -> None:
