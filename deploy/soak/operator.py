@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from common.clock import monotonic_ns, to_ns, to_s
+from common.clock import Clock, monotonic_ns, to_ns, to_s
 from common.errors import CodecError, LinkError
 from common.messages import Action
 from deploy.soak.stage import Stage
 
+Sleep = Callable[[float], Awaitable[None]]
 LOOK_S = 0.02
 SETTLE_S = 0.3
 """After an answer, until states tell of it."""
@@ -42,14 +44,16 @@ class Recovery:
 class Operator:
     """Engages where the robot waits for it; never sooner, never by itself."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: Stage, clock: Clock = monotonic_ns, sleep: Sleep = asyncio.sleep) -> None:
         self._stage = stage
         self._watch = stage.watch
+        self._clock = clock
+        self._sleep = sleep
 
     @property
     def follows(self) -> bool:
         """Whether all is well: the robot tracks, commands flow, and every joint is known."""
-        now_ns = monotonic_ns()
+        now_ns = self._clock()
         watch = self._watch
         return watch.guard(now_ns) == "track" and watch.flows(now_ns) and watch.known()
 
@@ -57,8 +61,8 @@ class Operator:
         """Wait, and engage, until the robot follows again. `undone_ns`: when the fault was undone."""
         recovery = Recovery()
         engaged_ns = 0
-        while monotonic_ns() - undone_ns < to_ns(GIVE_UP_S):
-            now_ns = monotonic_ns()
+        while self._clock() - undone_ns < to_ns(GIVE_UP_S):
+            now_ns = self._clock()
             if recovery.flow_s is None and self._watch.flows(now_ns, undone_ns):
                 recovery.flow_s = to_s(self._watch.accepted_ns - undone_ns)
             if recovery.flow_s is not None and self.follows:
@@ -68,9 +72,9 @@ class Operator:
             if self._watch.guard(now_ns) == "hold" and self._stage.rig.observer.ready:
                 recovery.ready_s = to_s(now_ns - undone_ns) if recovery.ready_s is None else recovery.ready_s
                 if await self._engage(recovery):
-                    engaged_ns = monotonic_ns()
-                await asyncio.sleep(SETTLE_S)
-            await asyncio.sleep(LOOK_S)
+                    engaged_ns = self._clock()
+                await self._sleep(SETTLE_S)
+            await self._sleep(LOOK_S)
         return recovery
 
     async def _engage(self, recovery: Recovery) -> bool:

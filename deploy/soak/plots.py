@@ -109,6 +109,7 @@ def _wrong(panel: Axes, samples: Samples, unit_s: float) -> None:
         if some.any():
             panel.plot(samples.at_s[some] / unit_s, samples[column][some], marker, label=words, alpha=0.8)
     panel.set_yscale("log")
+    panel.set_ylim(bottom=0.5)
     panel.set_ylabel("in a second")
 
 

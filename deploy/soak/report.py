@@ -20,7 +20,7 @@ body { font: 15px/1.45 system-ui, sans-serif; max-width: 75rem; margin: 2rem aut
 table { border-collapse: collapse; margin: 1rem 0 }
 td, th { padding: .25rem .7rem; text-align: left; vertical-align: top }
 tr { border-bottom: 1px solid #ddd }
-td.n { text-align: right; white-space: nowrap }
+td.n { text-align: right; white-space: nowrap } td.pass, td.fail, td.not { white-space: nowrap }
 .note { color: #666; font-size: 13px }
 .pass { color: #18794e } .fail { color: #c0392b; font-weight: bold } .not { color: #9a6700 }
 img { max-width: 100% }
