@@ -7,9 +7,19 @@ from dataclasses import replace
 
 from common.codec import decode, encode
 from common.messages import Action, ControlReply, ControlRequest
+from common.topics import CONTROL, STOP, Topic
 
 CHALLENGED = frozenset({Action.ENGAGE, Action.RESET})
 """Requests that must not take effect late. To stop, claim, release or ask is harmless at any time."""
+
+
+OPEN = frozenset({Action.ESTOP, Action.STATUS})
+"""Requests that anybody may make who has a certificate; all others are for the robot's operators."""
+
+
+def topic_for(action: Action) -> Topic:
+    """Where a request goes: what everybody may ask has a key of its own, as access control goes by keys."""
+    return STOP if action in OPEN else CONTROL
 
 
 async def ask_control(ask: Callable[[bytes], Awaitable[bytes]], request: ControlRequest) -> ControlReply:

@@ -52,6 +52,9 @@ class Topic:
 COMMAND = Topic("command", "tandem/{robot}/command", 12.5, 0.2, Priority.REAL_TIME, False, True, True)
 STATE = Topic("state", "tandem/{robot}/state", 50.0, 0.2, Priority.INTERACTIVE_HIGH, False, True, True)
 CONTROL = Topic("control", "tandem/{robot}/control", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
+STOP = Topic("stop", "tandem/{robot}/stop", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
+"""As CONTROL, but for whoever may only stop the robot or ask how it is: a key of its own, so that access
+control, which does not look into messages, can leave it to everybody."""
 CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 0.5, Priority.REAL_TIME, True, True, True)
 STATISTICS = Topic("statistics", "tandem/{robot}/statistics", 1.0, 5.0, Priority.DATA_LOW, False, True, False)
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
@@ -59,8 +62,8 @@ VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUN
 TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
 FAULTS = Topic("faults", "tandem/{robot}/test/faults", 0.0, 1.0, Priority.DATA, True, True, False)
 
-TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, CLOCK, STATISTICS, ALIVE, VIDEO, TRUTH, FAULTS)}
-QUESTIONS = (CONTROL.name, CLOCK.name, FAULTS.name)
+TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, STOP, CLOCK, STATISTICS, ALIVE, VIDEO, TRUTH, FAULTS)}
+QUESTIONS = (CONTROL.name, STOP.name, CLOCK.name, FAULTS.name)
 """Topics that are asked and answered; all others are published."""
 
 VIDEO_NAME = r"^[A-Za-z0-9_-]{1,32}$"

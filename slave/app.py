@@ -18,7 +18,7 @@ from common.pacing import TickGrid
 from common.realtime import take_priority
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
-from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, video
+from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, STOP, video
 from common.version import software
 from slave.attitude.open import open_base
 from slave.attitude.sensor import BaseSensor
@@ -61,6 +61,7 @@ class Slave:
             self._pipeline.on_accepted = self._camera.on_command
         link.subscribe(COMMAND, self._on_command)
         link.answer(CONTROL, self._on_control)
+        link.answer(STOP, self._on_stop)
         link.answer(CLOCK, self._on_clock)
 
     async def run(self) -> None:
@@ -117,6 +118,9 @@ class Slave:
 
     def _on_control(self, payload: bytes, _: int) -> bytes:
         return self._pipeline.on_control(payload, monotonic_ns())
+
+    def _on_stop(self, payload: bytes, _: int) -> bytes:
+        return self._pipeline.on_stop(payload, monotonic_ns())
 
     def _on_clock(self, payload: bytes, received_ns: int) -> bytes:
         return self._pipeline.on_clock(payload, received_ns, monotonic_ns())

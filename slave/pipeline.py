@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from common.codec import decode, encode
+from common.control import OPEN
 from common.errors import CodecError
 from common.latency import Durations
 from common.lease import lease_id
@@ -87,13 +88,22 @@ class SlavePipeline:
             if self.on_accepted is not None:
                 self.on_accepted(command, now_ns, offset)
 
-    def on_control(self, payload: bytes, now_ns: int) -> bytes:
+    def on_stop(self, payload: bytes, now_ns: int) -> bytes:
+        """Answer whoever may only stop the robot, or ask how it is; never with silence."""
+        return self.on_control(payload, now_ns, OPEN)
+
+    def on_control(
+        self, payload: bytes, now_ns: int, allowed: frozenset[Action] = frozenset(Action)
+    ) -> bytes:
         """Answer a request of a person or a master; never with silence."""
         try:
             request = decode(payload, ControlRequest)
         except CodecError as error:
             self._count("control")
             return encode(ControlReply(False, self.guard.state, f"not understood: {error}"))
+        if request.action not in allowed:
+            text = f"{request.action} is for the robot's operators: ask it where they do"
+            return encode(ControlReply(False, self.guard.state, text))
         reply = self.guard.on_control(request, now_ns)
         if request.action is Action.CLAIM and reply.done:
             self.clock.follow(request.clock)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass
 
-from common.control import ask_control
+from common.control import ask_control, topic_for
 from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link import Link, open_session
 from common.messages import Action, ControlRequest
-from common.topics import CONTROL
 from deploy.control.reach import Reach
 
 _NOT_THERE = "does not answer at {at}: is `tandem slave` running, with that robot name, and listening there?"
@@ -42,15 +41,16 @@ async def ask_robots(where: Reach, action: Action, key: str = "") -> list[Answer
 
 async def ask(link: Link, where: Reach, action: Action, key: str = "") -> Answer:
     """One robot's answer, or that there was none. It never raises for a robot that is not there."""
+    topic = topic_for(action)
     try:
-        await link.connected(CONTROL)
+        await link.connected(topic)
     except LinkTimeoutError:
         return Answer(link.robot, False, _NOT_THERE.format(at=", ".join(where.link.connect)))
     try:
         request = ControlRequest(link.robot, action, where.operator, key)
-        reply = await ask_control(lambda payload: link.ask(CONTROL, payload), request)
+        reply = await ask_control(lambda payload: link.ask(topic, payload), request)
     except LinkTimeoutError:
-        return Answer(link.robot, False, _LATE.format(s=CONTROL.timeout_s))
+        return Answer(link.robot, False, _LATE.format(s=topic.timeout_s))
     except (LinkError, CodecError) as error:
         return Answer(link.robot, False, str(error))
     return Answer(link.robot, reply.done, reply.text, reply.guard)

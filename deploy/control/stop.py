@@ -13,7 +13,7 @@ from common.codec import decode, encode
 from common.errors import CodecError, LinkError
 from common.link import Session, open_session
 from common.messages import Action, ControlReply, ControlRequest
-from common.topics import CONTROL
+from common.topics import STOP
 from deploy.control.ask import Answer
 from deploy.control.reach import Reach
 
@@ -124,7 +124,7 @@ class _Stopping:
     async def _stop(self, robot: str) -> Answer:
         link = self._session.link(robot)
         request = ControlRequest(robot, Action.ESTOP, self._operator)
-        reply = await repeat_until_stopped(lambda p: link.ask(CONTROL, p), request, self._within_s)
+        reply = await repeat_until_stopped(lambda p: link.ask(STOP, p), request, self._within_s)
         if reply is None:
             text = f"NOT STOPPED by this: no answer within {self._within_s:g} s. Stop it at the robot itself"
             answer = Answer(robot, False, text)

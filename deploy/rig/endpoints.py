@@ -12,7 +12,7 @@ from common.endpoint import SECURE, TRANSPORTS
 from common.errors import ConfigError, ConfigMistake
 from common.roles import Role
 from deploy.network import Network
-from deploy.rig.keys import OBSERVER, make_keys, tls_of
+from deploy.rig.keys import MASTER, make_keys, tls_of
 
 PORT, MANAGEMENT_PORT, CAN_PORT = 7447, 7547, 43113
 """On emulated hosts, whose addresses nobody else has: of the router and the robots on the link, of everything
@@ -39,7 +39,7 @@ class Endpoints:
         """The observer's link: commands from the master, states from each robot, truth at its own door."""
         everybody = (self.router,) if self.router else self.robots
         connect = [*(self.watched or everybody), *([] if self.router else [self.master])]
-        tls = tls_of(self.keys, Role.OBSERVER, OBSERVER) if self.keys else None
+        tls = tls_of(self.keys, Role.OPERATOR, MASTER) if self.keys else None
         return LinkConfig(listen=[self.observer], connect=connect, tls=tls)
 
     def listening(self, number: int) -> list[str]:

@@ -13,7 +13,8 @@ from deploy.keys.make import new_authority, new_identity
 
 VALID = timedelta(days=7)
 """Longer than any soak."""
-MASTER, OBSERVER, ROUTER = "nurse-1", "rig", "router-1"
+MASTER, ROUTER = "nurse-1", "router-1"
+"""Who watches a run also engages it: with the operator's certificate."""
 
 
 def make_keys(folder: Path, endpoints: Iterable[str], robots: Sequence[str]) -> Path:
@@ -24,7 +25,7 @@ def make_keys(folder: Path, endpoints: Iterable[str], robots: Sequence[str]) -> 
     write_pair(keys, AUTHORITY, authority)
     hosts = sorted({each.partition("/")[2].rpartition(":")[0] for each in endpoints})
     people = [(Role.ROBOT, robot) for robot in robots]
-    people += [(Role.OPERATOR, MASTER), (Role.OBSERVER, OBSERVER), (Role.ROUTER, ROUTER)]
+    people += [(Role.OPERATOR, MASTER), (Role.ROUTER, ROUTER)]
     for role, name in people:
         write_pair(keys, stem(role, name), new_identity(authority, role, name, hosts, now, VALID))
     return keys
@@ -43,9 +44,6 @@ def tls_override(keys: Path, role: Role, name: str) -> str:
 
 
 def access_override(robots: Sequence[str]) -> str:
-    """`[link.access]` of such a run, for `--set`: the operator commands, the observer sees."""
+    """`[link.access]` of such a run, for `--set`: the operator commands and sees."""
     named = "[" + ", ".join(f'"{robot}"' for robot in robots) + "]"
-    return (
-        f'link.access={{ operators = {{ "{MASTER}" = {named} }}, viewers = {{ "{OBSERVER}" = {named} }}, '
-        f'routers = ["{ROUTER}"] }}'
-    )
+    return f'link.access={{ operators = {{ "{MASTER}" = {named} }}, routers = ["{ROUTER}"] }}'

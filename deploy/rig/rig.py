@@ -9,13 +9,12 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 from common.clock import monotonic_ns, to_ns
-from common.control import ask_control
+from common.control import ask_control, topic_for
 from common.errors import TandemError
 from common.link import Link, Session, open_session
 from common.messages import Action, ControlReply, ControlRequest
 from common.roles import Role
 from common.skeleton import load_skeleton
-from common.topics import CONTROL
 from deploy.network import Network
 from deploy.profiles import NURSING, example
 from deploy.rig.child import Child
@@ -124,7 +123,7 @@ class Rig:
         """Ask a robot."""
         link = self.link(robot)
         request = ControlRequest(robot, action, operator, key)
-        return await ask_control(lambda payload: link.ask(CONTROL, payload), request)
+        return await ask_control(lambda payload: link.ask(topic_for(action), payload), request)
 
     async def until(
         self,

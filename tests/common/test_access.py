@@ -60,7 +60,9 @@ def test_the_table(who: str, robot: str) -> None:
     assert may(who, "declare_subscriber", f"{key}/command") == (operator or observer or itself or router)
     assert may(who, "declare_queryable", f"{key}/control") == (itself or router)
     assert may(who, "query", f"{key}/clock") == (operator or router)
-    assert may(who, "query", f"{key}/control") == (who in EVERYBODY), "anyone who is named may stop a robot"
+    assert may(who, "query", f"{key}/control") == (operator or router)
+    assert may(who, "query", f"{key}/stop") == (who in EVERYBODY), "anyone who is named may stop a robot"
+    assert may(who, "declare_queryable", f"{key}/stop") == (itself or router)
     assert may(who, "liveliness_token", f"{key}/alive/slave") == (itself or router)
     assert may(who, "liveliness_token", f"{key}/alive/master") == (operator or router)
     assert may(who, "declare_liveliness_subscriber", "tandem/*/alive/slave") == (who in EVERYBODY)

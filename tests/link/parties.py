@@ -20,7 +20,7 @@ from common.config import LinkConfig
 from common.link.configuration import zenoh_configuration
 from common.link_config import TlsConfig
 from common.roles import Role
-from common.topics import COMMAND, STATE, VIDEO
+from common.topics import COMMAND, STATE, VIDEO, Topic
 from deploy.keys.folder import stem, write_pair
 from deploy.keys.make import Pair, new_authority, new_identity
 
@@ -161,6 +161,11 @@ class Party:
 
     def _on_state(self, _: zenoh.Sample) -> None:
         self.states += 1
+
+    def answered(self, topic: Topic) -> bool:
+        """Whether a question to the robot is answered."""
+        replies = self.session.get(topic.key_for(ROBOT), payload=b"", timeout=topic.timeout_s)
+        return any(reply.ok is not None for reply in replies)
 
     def command(self) -> None:
         self.session.put(

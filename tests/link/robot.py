@@ -14,7 +14,7 @@ from common.errors import ConfigMistake
 from common.link import open_session
 from common.link.audit import Audit
 from common.runtime import run
-from common.topics import COMMAND, CONTROL, STATE, VIDEO
+from common.topics import COMMAND, CONTROL, STATE, STOP, VIDEO
 
 
 class RobotFile(Section):
@@ -35,6 +35,7 @@ async def robot(stop: asyncio.Event) -> None:
         state, video = link.publish(STATE), link.publish(VIDEO)
         link.subscribe(COMMAND, lambda payload, _: heard.update([payload.decode()]))
         link.answer(CONTROL, lambda payload, _: payload)
+        link.answer(STOP, lambda payload, _: payload)
         link.declare_alive("slave")
         logging.getLogger("robot").info("here")
         while not stop.is_set():

@@ -16,6 +16,7 @@ import pytest
 
 from common.config import LinkConfig
 from common.endpoint import SECURE
+from common.topics import CONTROL, STOP
 from tests.link.parties import (
     ROBOT,
     Party,
@@ -105,6 +106,11 @@ def test_nobody_does_what_he_may_not(transport: str, routed: bool, keys: Path, t
             may_see = {"anna", "chief"}
             assert {party.name for party in everybody if party.seen} == may_see
             assert {party.name for party in everybody if party.states} == {*may_see, "screen"}
+            assert {p.name for p in inside.values() if await asyncio.to_thread(p.answered, CONTROL)} == {
+                "anna"
+            }
+            stopping = {p.name for p in inside.values() if await asyncio.to_thread(p.answered, STOP)}
+            assert stopping == set(inside) - {"stranger"}
             for who, why in REFUSED_AT_THE_DOOR.items():
                 await reached(lambda why=why: guard.said(why), guard, f"the refusal of {who}")
                 assert not outside[who].session.info.peers_zid()

@@ -74,3 +74,19 @@ def test_the_state_names_a_joint_whose_encoder_is_not_believed(pipeline: SlavePi
     pipeline.guard._plausible.words["neck_yaw"] = "the encoder jumps"
     state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
     assert state.faults["neck_yaw"] == "the encoder jumps"
+
+
+def test_where_anybody_may_ask_the_robot_is_stopped_and_told_of_but_not_engaged(
+    pipeline: SlavePipeline,
+) -> None:
+    def ask(action: Action) -> ControlReply:
+        request = ControlRequest("robot-1", action, "ben", key="k", challenge=1)
+        return decode(pipeline.on_stop(encode(request), NS_PER_S), ControlReply)
+
+    for action in set(Action) - {Action.ESTOP, Action.STATUS}:
+        reply = ask(action)
+        assert (reply.done, reply.guard) == (False, "boot")
+        assert reply.text == f"{action} is for the robot's operators: ask it where they do"
+    assert not pipeline.guard.lease.held_by("ben")
+    assert ask(Action.STATUS).done
+    assert ask(Action.ESTOP).guard == "estop"

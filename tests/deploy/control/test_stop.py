@@ -14,12 +14,12 @@ from common.config import LinkConfig
 from common.errors import LinkError, LinkTimeoutError
 from common.link import open_link
 from common.messages import Action, ControlReply, ControlRequest
-from common.topics import CONTROL
+from common.topics import STOP
 from deploy.control.ask import Answer
 from deploy.control.reach import Reach
 from deploy.control.stop import repeat_until_stopped, stop_robots
 
-STOP = ControlRequest("robot-1", Action.ESTOP, "anna")
+REQUEST = ControlRequest("robot-1", Action.ESTOP, "anna")
 ACKNOWLEDGED = ControlReply(True, "estop", "stopped")
 
 
@@ -31,7 +31,7 @@ class Road:
         self.asked = 0
 
     async def ask(self, payload: bytes) -> bytes:
-        assert decode(payload, ControlRequest) == STOP
+        assert decode(payload, ControlRequest) == REQUEST
         self.asked += 1
         if not self.lost:
             return encode(ACKNOWLEDGED)
@@ -65,7 +65,7 @@ def test_it_is_repeated_until_the_robot_says_that_it_is_stopped(
     lost: list[Exception | str | ControlReply],
 ) -> None:
     road = Road(*lost)
-    reply = asyncio.run(repeat_until_stopped(road.ask, STOP, within_s=20.0, repeat_s=0.01))
+    reply = asyncio.run(repeat_until_stopped(road.ask, REQUEST, within_s=20.0, repeat_s=0.01))
     assert reply == ACKNOWLEDGED
     assert road.asked == len(lost) + 1
 
@@ -73,7 +73,7 @@ def test_it_is_repeated_until_the_robot_says_that_it_is_stopped(
 @pytest.mark.parametrize("trouble", ["hangs", LinkError("nobody")])
 def test_it_ends_when_nobody_ever_answers(trouble: Exception | str) -> None:
     road = Road(*[trouble] * 10_000)
-    assert asyncio.run(repeat_until_stopped(road.ask, STOP, within_s=0.1, repeat_s=0.01)) is None
+    assert asyncio.run(repeat_until_stopped(road.ask, REQUEST, within_s=0.1, repeat_s=0.01)) is None
     assert 2 <= road.asked <= 11
 
 
@@ -87,7 +87,7 @@ def test_a_late_acknowledgement_of_an_early_question_counts() -> None:
             return encode(ACKNOWLEDGED)
 
     road = Slow()
-    assert asyncio.run(repeat_until_stopped(road.ask, STOP, within_s=20.0, repeat_s=0.01)) == ACKNOWLEDGED
+    assert asyncio.run(repeat_until_stopped(road.ask, REQUEST, within_s=20.0, repeat_s=0.01)) == ACKNOWLEDGED
     assert road.asked >= 3
 
 
@@ -111,7 +111,7 @@ async def robots(**at: str) -> AsyncIterator[dict[str, list[str]]]:
                 asked[name].append(f"{request.action} by {request.operator}")
                 return encode(ACKNOWLEDGED)
 
-            link.answer(CONTROL, answer)
+            link.answer(STOP, answer)
             link.declare_alive("slave")
         yield asked
 

@@ -16,7 +16,7 @@ from common.link import Link, open_session
 from common.link_config import AccessConfig, TlsConfig
 from common.messages import ClockQuery, ClockReply, ControlReply, Statistics
 from common.roles import Role
-from common.topics import CLOCK, CONTROL, STATISTICS
+from common.topics import CLOCK, STATISTICS, STOP
 from common.version import software
 from deploy.doctor.examine import others
 from deploy.doctor.finding import Finding, Verdict
@@ -183,7 +183,7 @@ def a_robot_answers(link: Link, software_: dict[str, object]) -> None:
         query = decode(payload, ClockQuery)
         return encode(ClockReply(query.asked_ns, received_ns, monotonic_ns()))
 
-    link.answer(CONTROL, lambda *_: encode(ControlReply(True, "hold", "not engaged")))
+    link.answer(STOP, lambda *_: encode(ControlReply(True, "hold", "not engaged")))
     link.answer(CLOCK, clock)
     put = link.publish(STATISTICS)
 

@@ -68,7 +68,7 @@ def test_a_secure_transport_has_keys_for_everybody_and_no_other_has_any(
         assert endpoints.observing.tls is None
         return
     assert endpoints.keys is not None
-    stems = ("robot-robot-1", "robot-robot-2", "operator-nurse-1", "observer-rig", "router-router-1")
+    stems = ("robot-robot-1", "robot-robot-2", "operator-nurse-1", "router-router-1")
     for stem in stems:
         own = (endpoints.keys / f"{stem}.pem", endpoints.keys / f"{stem}.key")
         check_tls(TlsConfig(ca=endpoints.keys / "ca.pem", certificate=own[0], key=own[1]), datetime.now(UTC))
