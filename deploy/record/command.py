@@ -26,6 +26,9 @@ def record(
         typer.Option(help="Or a TOML file whose [link] says where, and with which keys.", dir_okay=False),
     ] = None,
     video: Annotated[list[str] | None, typer.Option(help="Also the pictures of this camera: `head`.")] = None,
+    minutes_per_file: Annotated[
+        float, typer.Option(help="Then a new file begins, FILE-2.mcap and so on; 0: never.", min=0.0)
+    ] = 60.0,
     seconds: Annotated[float | None, typer.Option(help="Stop by itself.", min=0.1)] = None,
     figures: Annotated[
         Path | None,
@@ -44,7 +47,8 @@ def record(
 
     if out.suffix.lower() != ".mcap":
         raise TandemError(f"{out}: expected a name that ends in .mcap")
-    options = RecordOptions(link_of(connect or (), link), robot, out, tuple(video or ()), seconds)
+    each_s = 60.0 * minutes_per_file if minutes_per_file else None
+    options = RecordOptions(link_of(connect or (), link), robot, out, tuple(video or ()), seconds, each_s)
     console = Console(stderr=True)
 
     async def work(stop: asyncio.Event) -> None:

@@ -13,10 +13,10 @@ from common.config import LinkConfig, Section, load_config
 from common.errors import TandemError
 from common.launch import WriteFigures
 from common.link import Link, open_link
-from common.recording import Recorder
 from common.runtime import until_stopped
 from common.topics import COMMAND, STATE, STATISTICS, Topic, video
 from deploy.control.reach import reach
+from deploy.record.tape import Tape
 
 LIVE = (COMMAND, STATE, STATISTICS)
 """What is always recorded."""
@@ -45,6 +45,8 @@ class RecordOptions:
     out: Path
     cameras: tuple[str, ...] = ()
     seconds: float | None = None
+    each_s: float | None = None
+    """How long one file lasts; None: there is one."""
 
     @property
     def topics(self) -> tuple[Topic, ...]:
@@ -65,12 +67,12 @@ class Taken:
     size: int = 0
     """Bytes handed to the recording."""
 
-    def words(self, recorder: Recorder, now_ns: int) -> str:
+    def words(self, tape: Tape, now_ns: int) -> str:
         """One line for people."""
         elapsed_s = max(1e-3, to_s(now_ns - self.since_ns))
         rates = ", ".join(f"{name} {count / elapsed_s:.1f} Hz" for name, count in self.counts.items())
         line = f"{elapsed_s:6.1f} s: {rates or 'nothing is heard yet'}, {self.size / 1e6:.1f} MB"
-        return f"{line}; NOT WRITTEN: {recorder.counters.failed}" if recorder.counters.failed else line
+        return f"{line}; NOT WRITTEN: {tape.failed}" if tape.failed else line
 
 
 async def record(
@@ -90,20 +92,20 @@ async def record(
         "payload": "msgpack, see common/codec.py",
         "connect": " ".join([*options.link.connect, *options.link.listen]),
     }
-    recorder = Recorder(options.out, metadata)
+    tape = Tape(options.out, metadata, options.each_s)
     taken = Taken(monotonic_ns())
     link: Link | None = None
     try:
         async with open_link(options.link, options.robot) as link:
             for topic in options.topics:
-                link.subscribe(topic, partial(_take, recorder, taken, options.name(topic), topic.name))
-            await until_stopped(stop, _wait(options.seconds, lambda: _tell(recorder, taken, tell)))
+                link.subscribe(topic, partial(_take, tape, taken, options.name(topic), topic.name))
+            await until_stopped(stop, _wait(options.seconds, tape, lambda: _tell(tape, taken, tell)))
     finally:
-        await asyncio.to_thread(recorder.close)
+        await tape.close()
         overwritten = _overwritten(link)
-        write_figures({"recorded": dict(taken.counts), **recorder.summary(), "overwritten": overwritten})
-    _check(options, recorder, taken)
-    said = f"{options.out}: {taken.words(recorder, monotonic_ns()).strip()}"
+        write_figures({"recorded": dict(taken.counts), **tape.summary(), "overwritten": overwritten})
+    _check(options, tape, taken)
+    said = f"{options.out}: {taken.words(tape, monotonic_ns()).strip()}"
     if overwritten:
         said += f"; {overwritten} came too fast to be taken one by one"
     if COMMAND.name not in taken.counts:
@@ -111,30 +113,31 @@ async def record(
     return said
 
 
-def _take(recorder: Recorder, taken: Taken, key: str, name: str, payload: bytes, arrived_ns: int) -> None:
+def _take(tape: Tape, taken: Taken, key: str, name: str, payload: bytes, arrived_ns: int) -> None:
     taken.counts[name] = taken.counts.get(name, 0) + 1
-    if recorder.put(key, payload, arrived_ns):
+    if tape.put(key, payload, arrived_ns):
         taken.size += len(payload)
 
 
-async def _wait(seconds: float | None, each: Callable[[], None]) -> None:
+async def _wait(seconds: float | None, tape: Tape, each: Callable[[], None]) -> None:
     loop = asyncio.get_running_loop()
     end_s = None if seconds is None else loop.time() + seconds
     while end_s is None or loop.time() < end_s:
         each()
+        await tape.turn()
         await asyncio.sleep(TELL_S if end_s is None else max(0.0, min(TELL_S, end_s - loop.time())))
 
 
-def _tell(recorder: Recorder, taken: Taken, tell: Callable[[str], None]) -> None:
-    tell(f"recording, {taken.words(recorder, monotonic_ns())} (Ctrl-C ends it)")
+def _tell(tape: Tape, taken: Taken, tell: Callable[[str], None]) -> None:
+    tell(f"recording, {taken.words(tape, monotonic_ns())} (Ctrl-C ends it)")
 
 
 def _overwritten(link: Link | None) -> int:
     return 0 if link is None else sum(c["overwritten"] for c in link.counters().values())
 
 
-def _check(options: RecordOptions, recorder: Recorder, taken: Taken) -> None:
-    counters = recorder.counters
+def _check(options: RecordOptions, tape: Tape, taken: Taken) -> None:
+    counters = tape.counters()
     if counters.failed:
         raise TandemError(
             f"{options.out}: the recording ended early: {counters.failed}; {counters.written} messages are "

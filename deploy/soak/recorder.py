@@ -31,7 +31,7 @@ class Recorder:
         self._folder = folder
         self._link = folder / f"{NAME}.toml"
         self._link.write_text(_toml(link), "utf-8")
-        self._arguments = ["--link", str(self._link), "--robot", robot]
+        self._arguments = ["--link", str(self._link), "--robot", robot, "--minutes-per-file", "1"]
         self._number = 0
         self._said_before = 0
         self.file = folder / "none.mcap"
@@ -41,7 +41,7 @@ class Recorder:
         """Record into a new file."""
         self._number += 1
         self._said_before = len(self.child.said()) if self.child.log.exists() else 0
-        self.file = (folder or self._folder) / f"recording-{self._number}.mcap"
+        self.file = (folder or self._folder) / f"recording-{self._number:04}.mcap"
         await self.child.run([*self._arguments, "--out", str(self.file)], through)
 
     async def start_on_small_disk(self) -> str:
@@ -55,10 +55,14 @@ class Recorder:
         return self.child.said()[self._said_before :].count(ENDS_HERE)
 
     async def look(self, ended_ns: int | None = None) -> Mapping[str, Any]:
-        """What is in the file of a process that has ended, then delete it. `ended_ns`: when it was killed."""
-        contents = await _contents(self.file)
-        size_mb = self.file.stat().st_size / 1e6 if self.file.exists() else 0.0
-        self.file.unlink(missing_ok=True)
+        """What is in the last file of a process that has ended; then delete them. `ended_ns`: when it died."""
+        files = sorted(
+            self.file.parent.glob(f"{self.file.stem}*.mcap"), key=lambda file: file.stat().st_mtime
+        )
+        contents = await _contents(files[-1] if files else self.file)
+        size_mb = sum(file.stat().st_size for file in files) / 1e6
+        for file in files:
+            file.unlink()
         topics = contents.get("topics", {})
         last_ns = max((topic["last_ns"] for topic in topics.values()), default=None)
         lost_s = None if ended_ns is None or last_ns is None else max(0.0, to_s(ended_ns - last_ns))

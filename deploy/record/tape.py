@@ -1,0 +1,89 @@
+"""A recording that is file after file, so that hours of it cost no more memory, or damage, than one file."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+from common.clock import Clock, monotonic_ns, to_ns
+from common.errors import RecordingError
+from common.recording import Recorder, RecorderCounters
+
+log = logging.getLogger("tandem.record")
+
+
+class Tape:
+    """Writes to `out`, then to files named after it.
+
+    An MCAP writer keeps its index in memory until it closes: 0.7 kB for each half second, 5 MB an hour.
+    """
+
+    def __init__(
+        self, out: Path, metadata: Mapping[str, str], each_s: float | None, clock: Clock = monotonic_ns
+    ) -> None:
+        """`each_s`: how long a file lasts; None: one for all. Raises RecordingError."""
+        self._out = out
+        self._metadata = metadata
+        self._each_s = each_s
+        self._clock = clock
+        self._closed = RecorderCounters()
+        self._refused = 0
+        self._recorder: Recorder | None = Recorder(out, metadata)
+        self._begun_ns = clock()
+        self.files = [out]
+        """One name an hour, or so."""
+
+    @property
+    def failed(self) -> str:
+        """Why nothing is written any more; empty while all is well."""
+        return self._recorder.counters.failed if self._recorder else self._closed.failed
+
+    def put(self, topic: str, payload: bytes, monotonic_ns: int) -> bool:
+        """Hand a message over; False where it was dropped, which is counted."""
+        if self._recorder is None:
+            self._refused += 1
+            return False
+        return self._recorder.put(topic, payload, monotonic_ns)
+
+    async def turn(self) -> None:
+        """Begin the next file if it is time. One that cannot begin ends the recording, which is said once."""
+        recorder, each_s = self._recorder, self._each_s
+        if recorder is None or each_s is None or recorder.counters.failed:
+            return
+        if self._clock() - self._begun_ns < to_ns(each_s):
+            return
+        path = self._out.with_name(f"{self._out.stem}-{1 + len(self.files)}{self._out.suffix}")
+        try:
+            self._recorder = Recorder(path, {**self._metadata, "continues": self.files[-1].name})
+        except RecordingError as error:
+            log.error("%s; the recording ends here; the rest goes on", error)
+            self._recorder, self._closed.failed = None, str(error)
+        else:
+            self.files.append(path)
+        self._begun_ns = self._clock()
+        await self._end(recorder)
+
+    async def close(self) -> None:
+        """Write what waits, and close the last file."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            await self._end(recorder)
+
+    async def _end(self, recorder: Recorder) -> None:
+        await asyncio.to_thread(recorder.close)
+        all_, one = self._closed, recorder.counters
+        for name in ("put", "written", "refused", "lost"):
+            setattr(all_, name, getattr(all_, name) + getattr(one, name))
+        all_.failed = all_.failed or one.failed
+
+    def counters(self) -> RecorderCounters:
+        """Of all files that are closed."""
+        put, refused = self._closed.put + self._refused, self._closed.refused + self._refused
+        return RecorderCounters(put, self._closed.written, refused, self._closed.lost, self._closed.failed)
+
+    def summary(self) -> dict[str, object]:
+        """The counters as plain values."""
+        return {"files": [path.name for path in self.files], **asdict(self.counters())}
