@@ -55,7 +55,7 @@ class Recorder:
         return self.child.said()[self._said_before :].count(ENDS_HERE)
 
     async def look(self, ended_ns: int | None = None) -> Mapping[str, Any]:
-        """What is in the last file of a process that has ended; then delete them. `ended_ns`: when it died."""
+        """What is in the last file of a process that has ended; all are deleted. `ended_ns`: when it died."""
         files = sorted(
             self.file.parent.glob(f"{self.file.stem}*.mcap"), key=lambda file: file.stat().st_mtime
         )
