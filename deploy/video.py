@@ -13,12 +13,13 @@ from rich.live import Live
 from rich.text import Text
 
 from common.clock import monotonic_ns, to_s
-from common.config import LinkConfig
 from common.errors import LinkTimeoutError, TandemError
 from common.link import open_link
 from common.runtime import run as run_until_stopped
 from common.topics import video as video_topic
 from common.video import VideoFrame
+from deploy.control.certificate import Certificate
+from deploy.control.reach import reach
 from master.video import VideoWatch
 
 NOTHING_S = 5.0
@@ -27,6 +28,7 @@ NOTHING_S = 5.0
 def video(
     connect: Annotated[list[str], typer.Option(help="The robot's endpoint.")],
     robot: Annotated[str, typer.Option(help="The robot's name.")],
+    certificate: Certificate = None,
     camera: Annotated[str, typer.Option(help="The camera's name.")] = "head",
     save: Annotated[
         Path | None, typer.Option(help="Keep every picture in this folder, as NUMBER.jpg.", file_okay=False)
@@ -44,7 +46,7 @@ def video(
 
     async def tell(stop: asyncio.Event) -> None:
         seen = _Seen(save)
-        async with open_link(LinkConfig(connect=connect), robot) as link:
+        async with open_link(reach(connect, [robot], certificate=certificate).link, robot) as link:
             try:
                 await link.connected()
             except LinkTimeoutError:

@@ -12,6 +12,7 @@ from common.messages import Action, ControlRequest
 from deploy.control.reach import Reach
 
 _NOT_THERE = "does not answer at {at}: is `tandem slave` running, with that robot name, and listening there?"
+_OR_NOT_ALLOWED = " And may your certificate ask it? Its log says who was refused"
 _LATE = "is there, but gave no answer in {s:g} s: what it did is not known, `tandem status` tells"
 
 
@@ -45,7 +46,8 @@ async def ask(link: Link, where: Reach, action: Action, key: str = "") -> Answer
     try:
         await link.connected(topic)
     except LinkTimeoutError:
-        return Answer(link.robot, False, _NOT_THERE.format(at=", ".join(where.link.connect)))
+        text = _NOT_THERE.format(at=", ".join(where.link.connect))
+        return Answer(link.robot, False, text + (_OR_NOT_ALLOWED if where.link.tls else ""))
     try:
         request = ControlRequest(link.robot, action, where.operator, key)
         reply = await ask_control(lambda payload: link.ask(topic, payload), request)

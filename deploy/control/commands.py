@@ -14,6 +14,7 @@ from rich.console import Console
 from common.errors import TandemError
 from common.messages import Action
 from common.runtime import run as run_until_stopped
+from deploy.control.certificate import Certificate
 from deploy.control.reach import Reach, reach
 
 Connect = Annotated[list[str] | None, typer.Option(help="A robot's endpoint; may be given several times.")]
@@ -28,23 +29,31 @@ MasterFile = Annotated[
 
 
 def engage(
-    connect: Connect = None, robot: Robot = None, operator: Operator = "", master: MasterFile = None
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
 ) -> None:
     """Let robots follow: each moves slowly to the operator's posture, then tracks.
 
     Example: `tandem engage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
     """
-    _act(Action.ENGAGE, _holder(connect, robot, operator, master))
+    _act(Action.ENGAGE, _holder(connect, robot, operator, master, certificate))
 
 
 def disengage(
-    connect: Connect = None, robot: Robot = None, operator: Operator = "", master: MasterFile = None
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
 ) -> None:
     """Let robots hold where they are.
 
     Example: `tandem disengage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
     """
-    _act(Action.DISENGAGE, _holder(connect, robot, operator, master))
+    _act(Action.DISENGAGE, _holder(connect, robot, operator, master, certificate))
 
 
 def estop(
@@ -55,6 +64,7 @@ def estop(
     ] = False,
     operator: Operator = "",
     master: MasterFile = None,
+    certificate: Certificate = None,
 ) -> None:
     """Stop robots now. Anyone may. It is repeated until each has acknowledged it; a reset ends it.
 
@@ -62,7 +72,7 @@ def estop(
     """
     from deploy.control.stop import stop_robots
 
-    where = reach(connect, robot, operator, master)
+    where = reach(connect, robot, operator, master, certificate)
     if not (all_ or where.robots):
         raise TandemError("which robot? Name it by --robot, or stop every one by --all")
 
@@ -82,18 +92,20 @@ def reset(
     robot: Robot = None,
     operator: Operator = "",
     master: MasterFile = None,
+    certificate: Certificate = None,
 ) -> None:
     """Leave an emergency stop: the robot then holds, it does not move.
 
     Example: `tandem reset --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
     """
-    _act(Action.RESET, _named(reach(connect, robot, operator, master)), key)
+    _act(Action.RESET, _named(reach(connect, robot, operator, master, certificate)), key)
 
 
 def status(
     connect: Connect = None,
     robot: Robot = None,
     master: MasterFile = None,
+    certificate: Certificate = None,
     as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
 ) -> None:
     """Ask robots what they do: guard, why, who commands, faults, base, offset, latency.
@@ -102,7 +114,7 @@ def status(
     """
     from deploy.control.status import ask_status, status_table
 
-    where = _named(reach(connect, robot, master=master))
+    where = _named(reach(connect, robot, master=master, certificate=certificate))
 
     async def tell() -> None:
         robots = await ask_status(where)
@@ -145,9 +157,13 @@ def _named(where: Reach) -> Reach:
 
 
 def _holder(
-    connect: Sequence[str] | None, robot: Sequence[str] | None, operator: str, master: Path | None
+    connect: Sequence[str] | None,
+    robot: Sequence[str] | None,
+    operator: str,
+    master: Path | None,
+    certificate: Path | None,
 ) -> Reach:
-    where = _named(reach(connect, robot, operator, master))
+    where = _named(reach(connect, robot, operator, master, certificate))
     if not where.operator:
         raise TandemError("who are you? Give your name by --operator, or the master's file by --master")
     return where

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.config import LinkConfig, check_config, load_config
+from common.endpoint import SECURE, transport_of
 from common.errors import TandemError
+from deploy.control.certificate import tls_beside
+from deploy.keys import AUTHORITY
 from master.config import MasterConfig
 
 
@@ -26,9 +29,11 @@ def reach(
     robots: Sequence[str] | None,
     operator: str = "",
     master: Path | None = None,
+    certificate: Path | None = None,
 ) -> Reach:
     """What the command line says; what it leaves out comes from the master's file, where one is named.
 
+    Keys, access through a router and quality of service are the file's; a `certificate` is a person's own.
     Raises ConfigError for a file or an endpoint that is none, TandemError where no endpoint is known.
     """
     file = None if master is None else load_config(master, MasterConfig)
@@ -37,6 +42,19 @@ def reach(
         raise TandemError(
             "where is the robot? Name its endpoint by --connect, or the master's file by --master"
         )
-    link = check_config(Path("command line"), {"connect": endpoints}, LinkConfig)
+    if file is None and certificate is None and any(transport_of(each) in SECURE for each in endpoints):
+        raise TandemError(
+            f"{', '.join(endpoints)}: who are you there? Name your certificate by --certificate (its .key "
+            f"and {AUTHORITY}.pem beside it; `tandem keys` makes them), or the master's file by --master"
+        )
+    link = _link_of(file, endpoints, certificate)
     named = dict.fromkeys(robots or (file.commanded if file else ()))
     return Reach(link, tuple(named), operator or (file.operator.name if file else ""))
+
+
+def _link_of(file: MasterConfig | None, endpoints: list[str], certificate: Path | None) -> LinkConfig:
+    asked = {"connect": endpoints, **tls_beside(certificate)}
+    if file is not None:
+        # who only asks stands behind no door, and lets nobody in: the rules are for the others' doors
+        asked = {**file.link.model_dump(exclude={"listen", "access"}), **asked}
+    return check_config(Path("command line"), asked, LinkConfig)

@@ -13,7 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from common.roles import Role, role_of
-from deploy.keys.folder import AUTHORITY, KeysError, Shown, read_authority, shown, stem, write_pair
+from deploy.keys import AUTHORITY
+from deploy.keys.folder import KeysError, Shown, read_authority, shown, stem, write_pair
 from deploy.keys.make import new_authority, new_identity
 
 app = typer.Typer(

@@ -21,9 +21,8 @@ from cryptography.x509.oid import NameOID
 from common.errors import LinkError, TandemError
 from common.link.certificates import read_certificate
 from common.roles import Role
+from deploy.keys import AUTHORITY
 from deploy.keys.make import Pair
-
-AUTHORITY = "ca"
 
 
 class KeysError(TandemError):

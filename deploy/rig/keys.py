@@ -8,7 +8,8 @@ from pathlib import Path
 
 from common.link_config import TlsConfig
 from common.roles import Role
-from deploy.keys.folder import AUTHORITY, stem, write_pair
+from deploy.keys import AUTHORITY
+from deploy.keys.folder import stem, write_pair
 from deploy.keys.make import new_authority, new_identity
 
 VALID = timedelta(days=7)
