@@ -13,7 +13,15 @@ EXPERIMENTS = (
         (
             "Over the fast periods of both arms. Against the truth at the same instant; the paper shifts its "
             "solved angles by one step of 80 ms before it compares.",
+            "Each node by itself: η is what the units' own errors leave, three to ten times those of a fresh "
+            "calibration, and in one arm of ten they happen to add up. The two below take them off.",
         ),
+    ),
+    Experiment(
+        "A-suit",
+        "the same, with the joints' constraints and a stance of 2 s",
+        telerobot.as_a_suit,
+        ("How the units sit is known, as `tandem calibrate mount` finds it. constraints = online.",),
     ),
     Experiment(
         "A-raw",

@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Sequence
+from datetime import date
 from pathlib import Path
 
+from common.calibration import Made
+from common.quaternion import IDENTITY
 from common.skeleton import load_skeleton
 from deploy.accuracy.papers.figures import Figure
 from deploy.accuracy.papers.units import SESSION, calibrate
@@ -14,6 +17,7 @@ from deploy.judge import Accuracy, accuracy
 from deploy.judge.accuracy import SIDES
 from deploy.judge.paper import ETA_PERCENT, TABLE_1
 from deploy.virtual import VirtualRun, World
+from master.calibrate.node_file import write_calibration
 from master.suit.simulated.imperfections import Imperfections
 from master.suit.simulated.tray import TrayConfig
 
@@ -33,6 +37,20 @@ def whole_way(
     run = VirtualRun(World(overrides={"suit": [f"seed={seed}", *suit], "master": list(master)}))
     run.run(seconds)
     return judge(accuracy(run.trace.truth(), run.trace.solved(), run.trace.joint_names))
+
+
+def as_a_suit(seed: int, seconds: float = SECONDS) -> list[Figure]:
+    """The same with what only a suit knows: how its units sit, a stance first, what elbows cannot do.
+
+    The mounting is as `tandem calibrate mount` leaves it, here of units that sit straight.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "straight.toml"
+        made = Made(date=date.today(), recording="none: straight by construction", unit="rad")
+        write_calibration(file, {"mounting": (IDENTITY, made)})
+        master = [f"estimation.stance_s={STANCE_S}", 'estimation.constraints="online"']
+        master += [f"nodes.{name}.calibration={json.dumps(str(file))}" for name in ARMS]
+        return whole_way(seed, seconds, (), master)
 
 
 def own_calibration(seed: int, seconds: float = SECONDS, session: TrayConfig = SESSION) -> list[Figure]:

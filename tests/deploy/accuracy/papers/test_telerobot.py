@@ -19,6 +19,18 @@ def test_units_as_delivered_reach_table_1_and_eta_once_calibrated() -> None:
     assert eta.met, eta.values
 
 
+def test_what_only_a_suit_knows_brings_eta_below_its_target() -> None:
+    """Of the arms of this seed one is the worst of ten where each node goes by itself."""
+    alone, suit = (
+        {row.name: row for row in gather({1: run(1, 16.5)})}["η (Eq. 25)"]
+        for run in (telerobot.whole_way, telerobot.as_a_suit)
+    )
+    assert suit.met, suit.values
+    assert suit.worst is not None
+    assert alone.worst is not None
+    assert suit.worst < 0.8 * alone.worst
+
+
 def test_a_run_too_short_to_judge_misses_its_targets() -> None:
     rows = gather({1: telerobot.whole_way(1, seconds=1.0)})
     assert all(row.met is False for row in rows if row.target is not None)
