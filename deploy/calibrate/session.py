@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -126,7 +126,18 @@ def tell_machines(figures: dict[str, Any], path: Path | None, *, to_stdout: bool
         Console().print(text, highlight=False, soft_wrap=True, markup=False)
 
 
+def by_words(said: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """Of (node, words): each words' nodes, so that what is true of a whole suit is said once."""
+    nodes: dict[str, list[str]] = {}
+    for name, words in said:
+        nodes.setdefault(words, []).append(name)
+    return nodes
+
+
 def refuse(session: Session[Result], recording: Path) -> None:
-    """Raises TandemError, a line a refused node; after what was found has been written."""
-    if session.refused:
-        raise TandemError("\n".join(f"{recording}: {name}: {why}" for name, why in session.refused.items()))
+    """Raises TandemError, a line a reason with the nodes it holds for; after what was found has been written."""
+    nodes = by_words(session.refused.items())
+    if nodes:
+        raise TandemError(
+            "\n".join(f"{recording}: {', '.join(names)}: {why}" for why, names in nodes.items())
+        )

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common.quaternion import Array
-from deploy.calibrate.session import Found
+from deploy.calibrate.session import Found, by_words
 from master.calibrate.inertial import InertialCalibration
 from master.calibrate.magnetic import MagneticCalibration
 
@@ -59,10 +59,10 @@ def magnetic_table(found: Mapping[str, MagneticCalibration]) -> Table:
 
 
 def notes(found: Mapping[str, Found], written: Mapping[str, Path], console: Console) -> None:
-    """What a person should know of each node, and where its file is."""
-    for name, node in found.items():
-        for note in node.notes:
-            console.print(Text(f"{name}: {note}", "yellow"))
+    """What a person should know of the nodes, and where their files are."""
+    for note, names in by_words((name, note) for name, node in found.items() for note in node.notes).items():
+        console.print(Text(f"{', '.join(names)}: {note}", "yellow"))
+    for name in found:
         console.print(Text(f"written: {written[name]}", "dim"), soft_wrap=True)
 
 

@@ -105,6 +105,7 @@ Line = Callable[[Path], str]
         (lambda suit: f"calibrate imu {suit} --node tail", r"has no node tail; it has head, hip"),
         (lambda suit: f"calibrate imu {suit}.npz", "no such file"),
         (lambda suit: f"calibrate mag {suit} --node head", "no magnetometer"),
+        (lambda suit: f"calibrate mag {suit}", "head, hip: there are no magnetometer readings"),
         (lambda suit: f"calibrate mag {suit} --out {suit}", "cannot be made"),
     ],
 )
