@@ -135,7 +135,7 @@ def by_words(said: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
 
 
 def refuse(session: Session[Result], recording: Path) -> None:
-    """Raises TandemError, a line a reason with the nodes it holds for; after what was found has been written."""
+    """Raises TandemError, a line a reason with its nodes; after what was found has been written."""
     nodes = by_words(session.refused.items())
     if nodes:
         raise TandemError(
