@@ -73,7 +73,6 @@ def test_a_person_at_the_operator_s_host_has_the_file_s_keys_and_not_its_door() 
     where = reach(None, None, master=SITE / "operator.toml")
     assert where.link.tls is not None
     assert where.link.tls.certificate == SITE / "keys" / "operator-nurse-1.pem"
-    assert where.link.access is not None
     assert where.link.listen == []
     assert (where.robots, where.operator) == (("robot-1",), "nurse-1")
     elsewhere = reach(["tls/10.0.0.9:7447"], None, master=SITE / "operator.toml")

@@ -52,7 +52,7 @@ async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) ->
 
     It only asks: it claims nothing, and listens at no endpoint, so a running master is not disturbed.
     """
-    where = Reach(link.model_copy(update={"listen": []}), tuple(robots), operator)
+    where = Reach(link.model_copy(update={"listen": [], "access": None}), tuple(robots), operator)
     async with open_session(where.link) as session:
         return await asyncio.gather(*(_read(session.link(robot), where) for robot in robots))
 
