@@ -24,6 +24,7 @@ FILTER = "error,zenoh_link_tls=warn,zenoh_link_commons=warn,zenoh::net::routing:
 _HANDSHAKE = (
     re.compile(r"zenoh_link_tls::unicast: (?P<why>.+?)\.? Hint: "),
     re.compile(r'QUIC acceptor failed: .*?reason: "(?P<why>[^"]+)"'),
+    re.compile(r"expiration: Closing \w+ link .+? : (?P<why>remote certificate chain expired)"),
 )
 _NUMBERS = re.compile(r": verification time .*")
 _THREAD = re.compile(r"ThreadId\(\d+\)")

@@ -62,6 +62,10 @@ def test_refused_handshakes_are_told_by_their_reason_alone() -> None:
     tls = "WARN acc-0 ThreadId(05) zenoh_link_tls::unicast: {}. Hint: increase the system open file limit."
     quic = 'WARN acc-0 ThreadId(05) x: QUIC acceptor failed: TransportError(Error {{ reason: "{}" }}) at a.rs'
     expired = "invalid peer certificate: certificate expired: verification time {} (UNIX), but it"
+    ended = "WARN acc-0 ThreadId(6) x::tls::expiration: Closing {} link 1.2.3.4:5 => 1.2.3.4:6 : {}"
+    gone = "remote certificate chain expired"
+    refusals = fed(ended.format("TLS", gone), ended.format("QUIC", gone))
+    assert refusals.figures()["handshakes"] == {gone: 2}
     refusals = fed(
         tls.format(expired.format(1)), tls.format(expired.format(2)), quic.format("peer sent no certificates")
     )
