@@ -22,6 +22,7 @@ from deploy.doctor.command import doctor
 from deploy.drives import drives
 from deploy.faults.command import faults
 from deploy.keys.commands import app as keys_app
+from deploy.network.command import app as network_app
 from deploy.output import in_a_folder, write_json
 from deploy.panels import arrange
 from deploy.record.command import record, recording
@@ -39,6 +40,7 @@ app = typer.Typer(
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(accuracy_app, name="accuracy")
 app.add_typer(keys_app, name="keys")
+app.add_typer(network_app, name="network")
 app.command("video")(video)
 app.command()(drives)
 app.command()(attitude)

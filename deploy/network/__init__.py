@@ -1,6 +1,6 @@
 """Hosts on one machine, and a link between them that behaves as a real network does."""
 
-from deploy.network.network import Host as Host
+from deploy.network.host import Host as Host
 from deploy.network.network import Network as Network
 from deploy.network.network import open_network as open_network
 from deploy.network.profile import Profile as Profile

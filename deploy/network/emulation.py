@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
+from common.latency import Summary
 from deploy.network.profile import Profile
 from deploy.network.scheduler import Counters, PacketScheduler
 
@@ -38,6 +39,12 @@ class Emulation(Protocol):
 
     def counters(self) -> LinkCounters:
         """Raises NetworkError."""
+
+    def planned(self) -> Mapping[str, Summary]:
+        """How long packets take by what was drawn, each way since the start; empty where it is not told."""
+
+    def close(self) -> None:
+        """End it; nothing passes any more."""
 
 
 class EmulatedLink:

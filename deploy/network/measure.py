@@ -1,114 +1,113 @@
-"""What the link does, measured from both ends, beside what its profile says."""
+"""Measures an emulated link from both ends: first at a steady rate, then with more than it takes."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+import asyncio
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from common.clock import NS_PER_MS
+from common.clock import to_ns, wall_ns
 from common.errors import NetworkError
-from deploy.network.loss import gilbert_elliott
-from deploy.network.profile import Way
+from common.latency import Summary
+from deploy.network.emulation import DIRECTIONS, Emulation
+from deploy.network.figures import Measured, WayMeasured, judge, rate_mbit
+from deploy.network.host import Host
+from deploy.network.probe import Plan
+from deploy.network.profile import Profile, Way
 
 RATE_HZ = 200.0
-SMALL = 128
-"""Bytes of an IP packet: about a command's."""
+SMALL, FULL = 128, 1400
+"""Bytes of an IP packet: about a command's, and of one that fills a link."""
 START_S = 1.0
 """Until both ends run."""
-GRACE_S = 30.0
-DELAY_MS, LOSS_POINTS = 1.0, 0.5
-"""How near the link must be to its profile."""
-SIGMAS = 3.0
+LINGER_S = 0.5
+"""Beyond the link's own delay and queue."""
+FLOOD_S, FLOOD_OVER = 1.5, 1.3
+"""How long more than the link's rate is sent, and how much more."""
+MOST_MBIT = 35.0
+"""A faster link is not filled: the probe in Python would be what is measured."""
 
 
-@dataclass(frozen=True, slots=True)
-class WayMeasured:
-    """One direction; delays in ms, the rest in percent of the packets sent."""
-
-    sent: int
-    received: int
-    mean_ms: float
-    p50_ms: float
-    p99_ms: float
-    jitter_ms: float
-    """Standard deviation."""
-    loss_percent: float
-    reordered_percent: float
-    """Arrived after one that was sent later."""
-    duplicate_percent: float
-    expected_ms: float
-    """The profile's delay, and the packet's own time on a link of its rate."""
-    expected_loss_percent: float
-    delay_bound_ms: float
-    """How far the mean of so long a measurement may be off by chance, three sigma."""
-    loss_bound_percent: float
-    rate_mbit: float | None = None
-    """What came through when more was sent; None where that was not tried."""
-
-    @property
-    def delay_off_ms(self) -> float:
-        """From the profile."""
-        return self.mean_ms - self.expected_ms
-
-    @property
-    def loss_off_percent(self) -> float:
-        """From the profile, in points."""
-        return self.loss_percent - self.expected_loss_percent
-
-    @property
-    def delay_kept(self) -> bool:
-        """Within a millisecond, but for what chance may do."""
-        return abs(self.delay_off_ms) <= DELAY_MS + self.delay_bound_ms
-
-    @property
-    def loss_kept(self) -> bool:
-        """Within half a point, but for what chance may do."""
-        return abs(self.loss_off_percent) <= LOSS_POINTS + self.loss_bound_percent
-
-    def tree(self) -> dict[str, Any]:
-        """For JSON."""
-        offs = {"delay_off_ms": self.delay_off_ms, "loss_off_percent": self.loss_off_percent}
-        return {**asdict(self), **offs, "delay_kept": self.delay_kept, "loss_kept": self.loss_kept}
+async def measure(
+    hosts: Sequence[Host], profile: Profile, emulation: Emulation, seconds: float, rate_hz: float
+) -> Measured:
+    """Of both directions, for some seconds. Raises NetworkError where nothing arrives."""
+    ways = (profile.ways.to_robot, profile.ways.to_operator)
+    before = emulation.planned()
+    count = round(seconds * rate_hz)
+    ends = await _run(hosts, ways, (rate_hz, rate_hz), (count, count), SMALL)
+    after = emulation.planned()
+    judged = []
+    for number, (way, name) in enumerate(zip(ways, DIRECTIONS, strict=True)):
+        sent, arrivals = ends[number]["sent"], ends[1 - number]["arrivals"]
+        judged.append(judge(way, sent, arrivals, SMALL, seconds, _mean_ms(before, after, name)))
+    to_robot, to_operator = await _fill(hosts, ways, judged)
+    return Measured(profile.name, emulation.name, to_robot, to_operator)
 
 
-def judge(way: Way, sent: int, arrivals: Sequence[Sequence[int]], size: int, seconds: float) -> WayMeasured:
-    """From what one end sent and the other noted: number, sent, received. NetworkError where that is none."""
-    if not arrivals:
-        raise NetworkError(f"none of {sent} packets came through the emulated link")
-    table = np.array(arrivals, np.int64)
-    number, first = np.unique(table[:, 0], return_index=True)
-    delay_ms = (table[first, 2] - table[first, 1]) / NS_PER_MS
-    in_order = np.maximum.accumulate(table[:, 0]) <= table[:, 0]
-    loss = gilbert_elliott(way)
-    serial_ms = 0.0 if way.rate_mbit is None else size * 8e-3 / way.rate_mbit
-    # those held back for reordering are late by intent
-    held_ms = way.reorder_percent / 100.0 * way.reorder_ms
-    return WayMeasured(
-        sent=sent,
-        received=len(number),
-        mean_ms=float(delay_ms.mean()),
-        p50_ms=float(np.percentile(delay_ms, 50)),
-        p99_ms=float(np.percentile(delay_ms, 99)),
-        jitter_ms=float(delay_ms.std()),
-        loss_percent=100.0 * (1.0 - len(number) / sent),
-        reordered_percent=100.0 * float((~in_order[first]).sum()) / sent,
-        duplicate_percent=100.0 * (len(table) - len(number)) / sent,
-        expected_ms=way.delay_ms + serial_ms + held_ms,
-        expected_loss_percent=way.loss_percent,
-        delay_bound_ms=delay_bound_ms(way, seconds),
-        loss_bound_percent=100.0 * loss.bound(sent, SIGMAS),
+async def _fill(
+    hosts: Sequence[Host], ways: Sequence[Way], judged: Sequence[WayMeasured]
+) -> list[WayMeasured]:
+    """With the rate that came through when more was sent, where the link is slow enough to be filled."""
+    limits = [way.rate_mbit if way.rate_mbit and way.rate_mbit <= MOST_MBIT else 0.0 for way in ways]
+    if not any(limits):
+        return list(judged)
+    # packets a second; an end that has nothing to fill sends one packet
+    rates = [FLOOD_OVER * limit * 1e6 / (8 * FULL) or 1.0 for limit in limits]
+    counts = [round(FLOOD_S * rate) if limit else 1 for rate, limit in zip(rates, limits, strict=True)]
+    ends = await _run(hosts, ways, rates, counts, FULL)
+    filled = []
+    for number, (way, limit, one) in enumerate(zip(ways, limits, judged, strict=True)):
+        if limit:
+            came = rate_mbit(ends[1 - number]["arrivals"], FULL)
+            # what is lost has had its time on the link; what comes twice had it once
+            share = (1.0 - way.loss_percent / 100.0) * (1.0 + way.duplicate_percent / 100.0)
+            one = replace(one, rate_mbit=came, expected_rate_mbit=limit * share)
+        filled.append(one)
+    return filled
+
+
+async def _run(
+    hosts: Sequence[Host], ways: Sequence[Way], rates_hz: Sequence[float], counts: Sequence[int], size: int
+) -> list[dict[str, Any]]:
+    start_ns = wall_ns() + to_ns(START_S)
+    last_s = max(count / rate for count, rate in zip(counts, rates_hz, strict=True))
+    travel_ms = max(way.delay_ms + 6.0 * way.jitter_ms + way.reorder_ms + way.queue_ms for way in ways)
+    plans = [
+        Plan(here.address, there.address, rate, count, size, start_ns, last_s + travel_ms / 1e3 + LINGER_S)
+        for here, there, rate, count in zip(hosts, hosts[::-1], rates_hz, counts, strict=True)
+    ]
+    return await asyncio.gather(*(_probe(host, plan) for host, plan in zip(hosts, plans, strict=True)))
+
+
+async def _probe(host: Host, plan: Plan) -> dict[str, Any]:
+    process = await asyncio.create_subprocess_exec(
+        *host.command([sys.executable, "-m", "deploy.network.probe", *plan.arguments()]),
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
     )
+    try:
+        said, failed = await process.communicate()
+    except asyncio.CancelledError:
+        process.kill()
+        await process.wait()
+        raise
+    if process.returncode:
+        words = failed.decode(errors="replace").strip().splitlines()[-1:]
+        raise NetworkError(f"the probe on the {host.name}'s host ended: {' '.join(words)}")
+    noted: dict[str, Any] = json.loads(said)
+    return noted
 
 
-def delay_bound_ms(way: Way, seconds: float) -> float:
-    """The mean of a process with memory varies as that of seconds / (2 × memory) independent draws."""
-    if not way.jitter_ms:
-        return 0.0
-    from deploy.network.delay import MEMORY
-
-    draws = max(seconds / (2.0 * MEMORY * way.jitter_ms / 1e3), 1.0)
-    return float(SIGMAS * way.jitter_ms / math.sqrt(draws))
+def _mean_ms(before: Mapping[str, Summary], after: Mapping[str, Summary], way: str) -> float | None:
+    """Of the packets between the two; None where the emulation does not tell."""
+    if way not in after:
+        return None
+    was, now = before[way], after[way]
+    count = now["count"] - was["count"]
+    total = now["count"] * now.get("mean", 0.0) - was["count"] * was.get("mean", 0.0)
+    return total / count if count else None

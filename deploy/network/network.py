@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
 from collections.abc import AsyncIterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from common.errors import NetworkError
 from deploy.network.emulation import Emulation, LinkCounters
+from deploy.network.figures import Measured
+from deploy.network.host import Host
 from deploy.network.janitor import Janitor
+from deploy.network.measure import RATE_HZ, measure
 from deploy.network.namespaces import (
     HOSTS,
     Run,
@@ -22,26 +24,11 @@ from deploy.network.namespaces import (
     remove_dead,
     why_not,
 )
+from deploy.network.netem import Netem, faithful, has_netem
 from deploy.network.profile import Outage, Profile, load_profile
 from deploy.network.tun import Forwarder
 
-
-@dataclass(frozen=True, slots=True)
-class Host:
-    """One of the two."""
-
-    name: str
-    namespace: str
-    address: str
-    """On the emulated link."""
-    management: str
-    """On a clean veth to the caller's namespace: for observers."""
-    caller: str
-    """The caller's own address on that veth."""
-
-    def command(self, argv: Sequence[str]) -> list[str]:
-        """`argv` as it runs within this host."""
-        return [shutil.which("ip") or "ip", "netns", "exec", self.namespace, *argv]
+Backend = Literal["auto", "forwarder", "netem"]
 
 
 class Network:
@@ -92,6 +79,10 @@ class Network:
         """Packets and bytes each way since the network was opened, and what was dropped by cause."""
         return self._emulation.counters()
 
+    async def measure(self, seconds: float = 10.0, rate_hz: float = RATE_HZ) -> Measured:
+        """Send packets both ways, and judge what arrives beside the profile. Raises NetworkError."""
+        return await measure((self.operator, self.robot), self.profile, self._emulation, seconds, rate_hz)
+
     def _apply(self) -> None:
         self._emulation.cut(self._cut or self._outages > 0)
 
@@ -116,11 +107,14 @@ class Network:
 
 
 @asynccontextmanager
-async def open_network(profile: Profile | str | Path = "lan", *, seed: int = 1) -> AsyncIterator[Network]:
+async def open_network(
+    profile: Profile | str | Path = "lan", *, seed: int = 1, backend: Backend = "auto"
+) -> AsyncIterator[Network]:
     """Make two hosts and a link between them; all is removed at the end, even if this process is killed.
 
-    A profile is given by name, by path, or as such. Raises ConfigError for a profile that there is not, and
-    NetworkError where this process may not make hosts.
+    A profile is given by name, by path, or as such. `auto` takes the kernel's netem where there is one and
+    the profile has nothing that it does otherwise (`netem.py`), else the forwarder. Raises ConfigError for a
+    profile that there is not, and NetworkError where this process may not make hosts.
     """
     profile = profile if isinstance(profile, Profile) else load_profile(profile)
     reason = why_not()
@@ -131,11 +125,17 @@ async def open_network(profile: Profile | str | Path = "lan", *, seed: int = 1) 
         janitor = Janitor(run)
         stack.push_async_callback(asyncio.to_thread, janitor.remove)
         hosts = await asyncio.to_thread(_make_hosts, run)
-        forwarder = await asyncio.to_thread(Forwarder, run, profile, seed)
-        stack.callback(forwarder.close)
-        network = Network(hosts, forwarder, profile)
+        emulation = await asyncio.to_thread(_emulate, run, profile, seed, backend)
+        stack.callback(emulation.close)
+        network = Network(hosts, emulation, profile)
         stack.push_async_callback(network.end_script)
         yield network
+
+
+def _emulate(run: Run, profile: Profile, seed: int, backend: Backend) -> Emulation:
+    if backend == "netem" or (backend == "auto" and faithful(profile) and has_netem(run)):
+        return Netem(run, profile)
+    return Forwarder(run, profile, seed)
 
 
 def _make_hosts(run: Run) -> list[Host]:

@@ -12,6 +12,7 @@ import socket
 import struct
 import sys
 import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -24,7 +25,7 @@ STAMP = struct.Struct("!Iq")
 IP_UDP_BYTES = 28
 PRIORITY = 40
 """Below the forwarder: a probe that hurries must not hold up what it measures."""
-_SO_TIMESTAMPNS = 35
+_SO_TIMESTAMPNS, _SO_RCVBUFFORCE = 35, 33
 _TIMESPEC = struct.Struct("qq")
 _BUFFER = 8_000_000
 
@@ -38,12 +39,13 @@ class Plan:
     there: str
     rate_hz: float
     packets: int
-    """How many to send; then it listens for `linger_s` more."""
+    """How many to send."""
     size: int
     """Of the IP packet, bytes."""
     start_ns: int
     """When to begin."""
-    linger_s: float
+    listen_s: float
+    """How long to listen, from then."""
 
     def arguments(self) -> list[str]:
         """For the command line."""
@@ -53,7 +55,8 @@ class Plan:
 def run(plan: Plan) -> dict[str, Any]:
     """`sent`: times of sending by number, and `arrivals`: number, time of sending and of arrival; ns."""
     end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+    with suppress(OSError):  # beyond the host's limit for everybody, where permitted
+        end.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _BUFFER)
     end.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
     end.bind((plan.here, PORT))
     end.setblocking(False)
@@ -61,7 +64,7 @@ def run(plan: Plan) -> dict[str, Any]:
     period_ns = NS_PER_S / plan.rate_hz
     arrivals: list[tuple[int, int, int]] = []
     refused, number = 0, 0
-    until_ns = plan.start_ns + round(plan.packets * period_ns) + to_ns(plan.linger_s)
+    until_ns = plan.start_ns + to_ns(plan.listen_s)
     while (now_ns := wall_ns()) < until_ns:
         next_ns = plan.start_ns + round(number * period_ns)
         if number < plan.packets and now_ns >= next_ns:

@@ -1,0 +1,151 @@
+"""The same profiles by the kernel's own emulation: `tc netem` at each end of a veth.
+
+It draws every packet's delay by itself. A rate makes it keep their order, so that with jitter those behind
+wait for the slowest ahead, and the mean grows with the packet rate; what is reordered is not held back but
+sent at once. Profiles without either are the same here and there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+from common.errors import NetworkError
+from deploy.network.emulation import LinkCounters
+from deploy.network.loss import gilbert_elliott
+from deploy.network.namespaces import LINK, Run, ip, link_addresses
+from deploy.network.profile import PACKET_BITS, Profile, Way
+from deploy.network.scheduler import OUTAGE, Counters
+
+UNLIMITED_MBIT = 10_000.0
+"""A link without a rate gets one: only then netem keeps the order."""
+MOST_PACKETS = 10_000
+NETEM = "netem"
+"""The kernel counts what it drops together: by chance and by a full queue."""
+
+
+def faithful(profile: Profile) -> bool:
+    """Whether netem does all of the profile as the profile means it."""
+    ways = (profile.ways.to_robot, profile.ways.to_operator)
+    return not any(way.jitter_ms or way.reorder_percent for way in ways)
+
+
+def has_netem(run: Run) -> bool:
+    """Whether this kernel has it; tried on a host's loopback."""
+    host = next(link_addresses(run))[0]
+    try:
+        ip("-n", host, "qdisc", "add", "dev", "lo", "root", "netem", tool="tc")
+        ip("-n", host, "qdisc", "delete", "dev", "lo", "root", tool="tc")
+    except NetworkError:
+        return False
+    return True
+
+
+def netem_arguments(way: Way) -> list[str]:
+    """What `tc qdisc … netem` is told for one direction."""
+    rate = way.rate_mbit or UNLIMITED_MBIT
+    under_way = (way.delay_ms + 4.0 * way.jitter_ms) * rate * 1e3 / PACKET_BITS
+    waiting = way.queue_bytes * 8 / PACKET_BITS if way.rate_mbit else MOST_PACKETS
+    arguments = ["limit", str(min(max(round(under_way + waiting), 1), 10 * MOST_PACKETS))]
+    arguments += ["delay", f"{way.delay_ms:g}ms"]
+    if way.jitter_ms:
+        arguments += [f"{way.jitter_ms:g}ms", "distribution", "normal"]
+    if way.loss_percent:
+        arguments += _loss(way)
+    if way.duplicate_percent:
+        arguments += ["duplicate", f"{way.duplicate_percent:g}%"]
+    if way.reorder_percent:
+        arguments += ["reorder", f"{way.reorder_percent:g}%"]
+    return [*arguments, "rate", f"{rate:g}mbit"]
+
+
+def _loss(way: Way) -> list[str]:
+    if way.burst_packets is None:
+        return ["loss", "random", f"{way.loss_percent:g}%"]
+    model = gilbert_elliott(way)
+    chances = (model.to_bad, model.to_good, model.lost_in_bad, model.lost_in_good)
+    return ["loss", "gemodel", *(f"{100.0 * chance:.6g}%" for chance in chances)]
+
+
+class Netem:
+    """An emulation by the kernel. What it does blocks for as long as `tc` runs, some 5 ms."""
+
+    name = "netem"
+
+    def __init__(self, run: Run, profile: Profile) -> None:
+        """Raises NetworkError where this kernel has no netem."""
+        self._run = run
+        self._profile = profile
+        self._cut = False
+        self._handle = 1
+        self._before = {host: Counters(dropped={}) for host, _, _ in link_addresses(run)}
+        (ours, _, _), (theirs, _, _) = link_addresses(run)
+        # the pair is made in its place: no name of it is ever in the caller's namespace
+        ip("-n", ours, "link", "add", LINK, "type", "veth", "peer", "name", LINK, "netns", theirs)
+        for host, address, peer in link_addresses(run):
+            ip("-n", host, "link", "set", LINK, "addrgenmode", "none")
+            ip("-n", host, "address", "add", address, "peer", peer, "dev", LINK)
+            ip("-n", host, "link", "set", LINK, "up")
+        self._apply(new=True)
+
+    def set(self, profile: Profile) -> None:
+        """Behave so from now on; what is under way arrives as it would have."""
+        self._profile = profile
+        self._apply(new=False)
+
+    def cut(self, cut: bool) -> None:
+        """Let nothing pass, or let it pass again; what is under way is lost."""
+        if cut == self._cut:
+            return
+        self._keep_counters()
+        self._cut = cut
+        self._apply(new=True)
+
+    def counters(self) -> LinkCounters:
+        """What the kernel counted so far."""
+        to_robot, to_operator = (self._sum(host, self._now(host)) for host, _, _ in link_addresses(self._run))
+        return LinkCounters(to_robot, to_operator)
+
+    def planned(self) -> dict[str, dict[str, float]]:
+        """The kernel does not tell what it draws."""
+        return {}
+
+    def close(self) -> None:
+        """It ends with its hosts."""
+
+    def _apply(self, new: bool) -> None:
+        # another handle is another qdisc: what waited in the old one is dropped with it
+        self._handle += new
+        for host, way in self._ways():
+            what = ["loss", "100%"] if self._cut else netem_arguments(way)
+            handle = ["root", "handle", f"{self._handle}:"]
+            ip("-n", host, "qdisc", "replace", "dev", LINK, *handle, "netem", *what, tool="tc")
+
+    def _ways(self) -> Iterator[tuple[str, Way]]:
+        ways = self._profile.ways
+        hosts = [host for host, _, _ in link_addresses(self._run)]
+        return zip(hosts, (ways.to_robot, ways.to_operator), strict=True)
+
+    def _keep_counters(self) -> None:
+        for host in self._before:
+            now = self._now(host)
+            self._before[host] = self._sum(host, now)
+
+    def _now(self, host: str) -> Counters:
+        told = json.loads(ip("-n", host, "-s", "-j", "qdisc", "show", "dev", LINK, tool="tc"))
+        (qdisc,) = [each for each in told if each["kind"] == "netem"]
+        sent, dropped = qdisc["packets"], qdisc["drops"]
+        why = OUTAGE if self._cut else NETEM
+        taken = sent + dropped + qdisc.get("qlen", 0)
+        return Counters(taken, qdisc["bytes"], sent, qdisc["bytes"], dropped={why: dropped})
+
+    def _sum(self, host: str, now: Counters) -> Counters:
+        before = self._before[host]
+        causes = {*before.dropped, *now.dropped}
+        return Counters(
+            before.packets + now.packets,
+            before.bytes + now.bytes,
+            before.delivered + now.delivered,
+            before.delivered_bytes + now.delivered_bytes,
+            dropped={why: before.dropped.get(why, 0) + now.dropped.get(why, 0) for why in sorted(causes)},
+        )
