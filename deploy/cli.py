@@ -28,6 +28,7 @@ from deploy.panels import arrange
 from deploy.record.command import record, recording
 from deploy.router.command import router
 from deploy.soak.command import soak
+from deploy.trial.command import app as trial_app
 from deploy.video import video
 
 app = typer.Typer(
@@ -41,6 +42,7 @@ app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(accuracy_app, name="accuracy")
 app.add_typer(keys_app, name="keys")
 app.add_typer(network_app, name="network")
+app.add_typer(trial_app, name="trial")
 app.command("video")(video)
 app.command()(drives)
 app.command()(attitude)

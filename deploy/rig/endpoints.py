@@ -104,6 +104,11 @@ def network_endpoints(
     )
 
 
+def free_port(kind: str) -> int:
+    """A port that nobody listens at now; `kind` is tcp or udp."""
+    return _free_ports(kind, 1)[0]
+
+
 def _free_ports(transport: str, count: int) -> list[int]:
     kind = socket.SOCK_DGRAM if transport in ("udp", "quic", "quic-datagram") else socket.SOCK_STREAM
     with ExitStack() as held:  # all at once, so that they differ

@@ -18,6 +18,7 @@ from deploy.judge import MovedSeries, TruthSeries, accuracy, motion
 from deploy.judge.motion import at_shift
 from deploy.trial.aftermath import aftermath
 from deploy.trial.cell import Excerpt
+from deploy.trial.figures import BY_NAME
 from deploy.trial.recording import Course, Recording, counts, echoes, latest_bound_ns, within
 from slave.config import SlaveConfig
 
@@ -25,15 +26,17 @@ EXCERPT_S = 6.0
 
 
 def measure(course: Course, config: SlaveConfig) -> dict[str, float | None]:
-    """Every figure that this cell could measure."""
+    """Every figure; None for what this cell could not measure."""
     judged = course.judged
-    figures: dict[str, float | None] = {}
+    figures: dict[str, float | None] = dict.fromkeys(BY_NAME)
     figures |= _latency(judged, course.shared_clock)
     figures |= _motion(judged, config)
     figures |= _guard(judged)
     if course.after is not None and course.outage is not None:
         figures |= aftermath(course.after, course.outage, course.max_age_s)
-    figures |= {f"cpu_{name}": value for name, value in course.cpu_percent.items()}
+    figures |= {
+        f"cpu_{name}": value for name, value in course.cpu_percent.items() if f"cpu_{name}" in BY_NAME
+    }
     figures["up_kb_s"] = _kilo(course.up_bytes_s)
     figures["down_kb_s"] = _kilo(course.down_bytes_s)
     figures["ticks_missed"] = _missed_percent(judged)

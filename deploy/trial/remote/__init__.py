@@ -1,0 +1,1 @@
+"""A trial on two hosts that are really separate: `tandem trial serve` there, `tandem trial --remote` here."""
