@@ -27,6 +27,10 @@ REPORT_S = 60.0
 def soak(
     duration: Annotated[str, typer.Option(help="How long the robot is to follow: 8h, 30m, 90s.")] = "10m",
     transport: Annotated[str, typer.Option(help="tcp udp tls quic quic-datagram ws unixsock-stream")] = "tcp",
+    profile: Annotated[
+        str | None,
+        typer.Option(help="Two hosts made here, and a network between them: 4g, wifi …, or a file."),
+    ] = None,
     router: Annotated[bool, typer.Option("--router", help="Master and robot meet at a router.")] = False,
     faults: Annotated[
         str, typer.Option(help="all, none, or names with commas; `--faults help` lists them.")
@@ -64,7 +68,7 @@ def soak(
         _tell(judge_folder(judge), judge, console)
         return
     options = SoakOptions(
-        seconds(duration), transport, router=router, faults=tuple(chosen(faults)), every_s=every, seed=seed
+        seconds(duration), transport, profile, router, faults=tuple(chosen(faults)), every_s=every, seed=seed
     )
     with tempfile.TemporaryDirectory(prefix="tandem-soak-") as temporary:
         from deploy.soak.run import folder_for
@@ -93,6 +97,7 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
     """Run it; whatever happens, its files are whole and say how it ended."""
     from rich.live import Live
 
+    from deploy.network import open_network
     from deploy.rig.host import watch_host
     from deploy.rig.rig import open_rig
     from deploy.soak.log import SoakLog
@@ -102,7 +107,11 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
 
     async with AsyncExitStack() as stack:
         host = await stack.enter_async_context(watch_host())
-        rig = await stack.enter_async_context(open_rig(options.transport, routed=options.router))
+        network = None
+        if options.profile is not None:
+            network = await stack.enter_async_context(open_network(options.profile, seed=options.seed))
+        rigging = open_rig(options.transport, routed=options.router, network=network)
+        rig = await stack.enter_async_context(rigging)
         log: SoakLog | None = None
         watch = Watch(rig.skeleton, lambda kind, what: log.tell(kind, what) if log else None)
         stage = Stage(rig, watch, lambda kind, what: log.tell(kind, what) if log else None)

@@ -96,7 +96,7 @@ def guard(seen: Seen) -> list[Verdict]:
     done = seen.recovered
     must = [what for what in done if what["holds"] and what["heard"]]
     idle = [what for what in done if not what["holds"] and what.get("held_s") is not None]
-    lefts = unexplained_lefts(seen.events, seen.explained)
+    lefts = unexplained_lefts(seen.events, seen.samples, seen.explained)
     engaged = sum(bool(e.what.get("done")) for e in of_kind(seen.events, "engage"))
     moved = sum(
         e.what.get("to") in ("align", "track") and e.what.get("from") not in ("align", "track")

@@ -6,12 +6,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from deploy.soak.events import Event, of_kind
+from deploy.soak.samples import Samples
 from deploy.soak.windows import Window, reason
 
 HOST_STILL_MS = 50.0
 """Half of the guard's shortest time-out (its encoders', 0.1 s): a shorter stall explains no hold."""
-TICK_MS = 5.0
+LOST_PACKETS, LOST_WITHIN_S = 3, 1.5
+"""A robot that misses three commands holds; a network that lost as many packets then explains it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,19 +25,21 @@ class Explained:
     faults: tuple[Window, ...]
     stalls: tuple[Window, ...]
     """Of HOST_STILL_MS or longer."""
+    network: tuple[Window, ...] = ()
+    """Seconds in which nothing passed, as its profile says."""
 
     @property
     def all(self) -> tuple[Window, ...]:
-        """Both."""
-        return (*self.faults, *self.stalls)
+        """All of them."""
+        return (*self.faults, *self.stalls, *self.network)
 
     def why(self, at_s: float) -> str:
         """The reason of something that was seen then; empty where it has none."""
         return reason(at_s, self.all)
 
 
-def explanation(events: Sequence[Event]) -> Explained:
-    """Read the windows off the events. What begins and never ends lasts to the end."""
+def explanation(events: Sequence[Event], samples: Samples) -> Explained:
+    """Read the windows off a soak's files. What begins and never ends lasts to the end."""
     faults = [Window(0.0, _first(events, "follows"), "start")]
     for fault in of_kind(events, "fault"):
         number = fault.what.get("number")
@@ -50,13 +56,22 @@ def explanation(events: Sequence[Event]) -> Explained:
         ends = [e.at_s for e in of_kind(events, "recovered") if e.at_s > left.at_s]
         faults.append(Window(left.at_s, ends[0] if ends else math.inf, "after it left off"))
     last = [Window(e.at_s, math.inf, "end") for e in of_kind(events, "end")]
-    return Explained((*own, *faults[len(own) :], *last), tuple(stalls))
+    out_s = samples.at_s[np.nan_to_num(samples["link_out"]) > 0.0]
+    network = tuple(Window(at_s - 1.0, at_s, "the network let nothing pass") for at_s in out_s.tolist())
+    return Explained((*own, *faults[len(own) :], *last), tuple(stalls), network)
 
 
-def unexplained_lefts(events: Sequence[Event], explained: Explained) -> list[Event]:
-    """When the robot left off without a fault, and the host had not stood still."""
+def unexplained_lefts(events: Sequence[Event], samples: Samples, explained: Explained) -> list[Event]:
+    """When the robot left off, and neither fault, host nor network accounts for it."""
     lefts = of_kind(events, "left")
-    return [e for e in lefts if not any(w.includes(e.at_s) for w in explained.stalls)]
+    spans = (*explained.stalls, *explained.network)
+    lost = np.nan_to_num(samples["link_lost"])
+    return [
+        left
+        for left in lefts
+        if not any(window.includes(left.at_s) for window in spans)
+        and lost[np.abs(samples.at_s - left.at_s + 0.5) <= LOST_WITHIN_S].sum() < LOST_PACKETS
+    ]
 
 
 def _first(events: Sequence[Event], kind: str) -> float:

@@ -112,17 +112,17 @@ async def _free_disk(case: Case) -> None:
 
 
 async def _cut(case: Case) -> None:
-    if case.stage.network is not None:
-        case.stage.network.cut()
+    if case.stage.rig.network is not None:
+        case.stage.rig.network.cut()
 
 
 async def _restore(case: Case) -> None:
-    if case.stage.network is not None:
-        case.stage.network.restore()
+    if case.stage.rig.network is not None:
+        case.stage.rig.network.restore()
 
 
 async def _has_network(stage: Stage) -> str:
-    return "" if stage.network is not None else "needs a network between two hosts: --profile"
+    return "" if stage.rig.network is not None else "needs a network between two hosts: --profile"
 
 
 async def _has_router(stage: Stage) -> str:

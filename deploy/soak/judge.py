@@ -50,6 +50,6 @@ class Judged:
 def judge(folder: Path) -> Judged:
     """Read a soak's files and judge it. Raises TandemError where there are none."""
     events, samples = read_events(folder), read_samples(folder)
-    seen = Seen(events, samples, explanation(events))
+    seen = Seen(events, samples, explanation(events, samples))
     verdicts = [verdict for criterion in (*CRITERIA, *GROWTH) for verdict in criterion(seen)]
     return Judged(seen, verdicts)

@@ -101,7 +101,8 @@ def _latency(panel: Axes, samples: Samples, unit_s: float) -> None:
 
 def _wrong(panel: Axes, samples: Samples, unit_s: float) -> None:
     for column, words, marker in (
-        ("lost", "commands lost", "x"), ("late", "out of order", "+"), ("refused", "refused", "1"),
+        ("lost", "commands lost", "x"), ("late", "out of order", "+"),
+        ("link_lost", "packets lost by the network", "2"), ("refused", "refused", "1"),
         ("master_missed", "ticks missed, master", "."), ("slave_missed", "ticks missed, slave", "."),
         ("host_still_ms", "host stood still, ms", "|"),
     ):  # fmt: skip

@@ -23,6 +23,7 @@ from deploy.rig.child import usage
 from deploy.rig.host import Host
 from deploy.soak import recorder as recording
 from deploy.soak.faults import FAULTS, Case, Fault, possible
+from deploy.soak.link import LinkLosses, nature
 from deploy.soak.log import SoakLog
 from deploy.soak.operator import Operator
 from deploy.soak.options import SoakOptions
@@ -65,6 +66,7 @@ class Soak:
         self._operator = Operator(stage)
         self._ends: dict[str, int] = {}
         self._self = psutil.Process()
+        self._losses = LinkLosses(stage.rig.network)
         self.progress = Progress(options.duration_s)
 
     async def run(self) -> None:
@@ -84,9 +86,9 @@ class Soak:
     async def _story(self) -> None:
         kinds, left_out = await possible(self._options.faults, self._stage)
         every_s = self._options.every_s or distance_s(self._options.duration_s, len(kinds))
-        self._log.tell(
-            "begin", {**self._options.tree(), "every_s": every_s, "faults": kinds, "left_out": left_out}
-        )
+        network = self._stage.rig.network
+        begun = {**self._options.tree(), "every_s": every_s, "faults": kinds, "left_out": left_out}
+        self._log.tell("begin", begun | ({"network": nature(network.profile)} if network else {}))
         await self._start()
         enders = [name for name in kinds if FAULTS[name].ends_process]
         planned = schedule(self._options.duration_s, kinds, enders, every_s, self._options.seed)
@@ -186,7 +188,7 @@ class Soak:
     async def _sample(self) -> None:
         async for _ in ticks(TickGrid(monotonic_ns() + to_ns(1.0), to_ns(1.0))):
             row = self._stage.watch.row()
-            row["host_still_ms"] = self._stalls()
+            row |= {"host_still_ms": self._stalls(), **self._losses.row()}
             for name, (life, used) in self._stage.usage().items():
                 row |= _columns(name, life, used)
             used_here = usage(self._self)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from common.clock import monotonic_ns
 from common.errors import LinkError, TandemError
@@ -16,22 +16,11 @@ from deploy.soak.recorder import Recorder
 from deploy.soak.watch import Tell, Watch
 
 
-class Cuttable(Protocol):
-    """A network between the two hosts."""
-
-    def cut(self) -> None:
-        """Let nothing pass."""
-
-    def restore(self) -> None:
-        """Let it pass again."""
-
-
 class Stage:
     """The processes by name, and which of them are meant to run."""
 
-    def __init__(self, rig: Rig, watch: Watch, tell: Tell, network: Cuttable | None = None) -> None:
+    def __init__(self, rig: Rig, watch: Watch, tell: Tell) -> None:
         self.rig = rig
-        self.network = network
         self.watch = watch
         self.tell = tell
         child = Child("record", rig.folder, name=recording.NAME)

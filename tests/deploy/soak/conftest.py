@@ -55,6 +55,7 @@ def make() -> Make:
         usual |= {f"{name}_{what}": 20.0 for name in PROCESSES for what in ("rss_mb", "fds", "threads")}
         for name, value in {**usual, **columns}.items():
             table[name] = np.broadcast_to(value(at_s) if callable(value) else value, seconds).astype(float)
-        return Seen(events, Samples(table), explanation(events))
+        samples = Samples(table)
+        return Seen(events, samples, explanation(events, samples))
 
     return made

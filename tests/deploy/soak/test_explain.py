@@ -3,39 +3,65 @@
 from __future__ import annotations
 
 import math
+from typing import Any
+
+import numpy as np
 
 from deploy.soak.events import Event
-from deploy.soak.explain import explanation, unexplained_lefts
+from deploy.soak.explain import LOST_PACKETS, Explained, explanation, unexplained_lefts
 
-from .conftest import STORY
+from .conftest import STORY, Make
+
+
+def explained(make: Make, *events: Event) -> Explained:
+    return explanation(events, make().samples)
 
 
 def fault(at_s: float, number: int) -> Event:
     return Event(at_s, "fault", {"fault": "suit-kill", "number": number})
 
 
-def test_a_fault_s_window_ends_with_its_own_recovery() -> None:
+def test_a_fault_s_window_ends_with_its_own_recovery(make: Make) -> None:
     events = (
         Event(5.0, "follows"), fault(10.0, 0), Event(14.0, "recovered", {"number": 0}), fault(30.0, 1),
         Event(39.0, "recovered", {"number": 1}),
     )  # fmt: skip
-    windows = [(w.from_s, w.until_s, w.why) for w in explanation(events).faults]
+    windows = [(w.from_s, w.until_s, w.why) for w in explained(make, *events).faults]
     assert windows == [(0.0, 5.0, "start"), (10.0, 14.0, "suit-kill"), (30.0, 39.0, "suit-kill")]
 
 
-def test_what_never_ended_lasts() -> None:
-    assert explanation(()).faults[0].until_s == math.inf
-    assert explanation((Event(5.0, "follows"), fault(10.0, 0))).why(1e6) == "suit-kill"
+def test_what_never_ended_lasts(make: Make) -> None:
+    assert explained(make).faults[0].until_s == math.inf
+    assert explained(make, Event(5.0, "follows"), fault(10.0, 0)).why(1e6) == "suit-kill"
 
 
-def test_what_comes_after_a_robot_left_off_has_a_reason_that_it_left_has_none() -> None:
+def test_what_comes_after_a_robot_left_off_has_a_reason_that_it_left_has_none(make: Make) -> None:
     left = Event(50.0, "left", {"guard": "hold"})
     events = (*STORY[:6], left, Event(53.0, "recovered", {"fault": "", "number": -1}))
-    explained = explanation(events)
-    assert explained.why(52.0) == "after it left off"
-    assert explained.why(60.0) == ""
-    assert unexplained_lefts(events, explained) == [left]
+    found = explained(make, *events)
+    assert found.why(52.0) == "after it left off"
+    assert found.why(60.0) == ""
+    assert unexplained_lefts(events, make().samples, found) == [left]
 
 
-def test_what_the_processes_say_while_they_are_stopped_counts_for_nothing() -> None:
-    assert explanation((*STORY, Event(300.0, "end"))).why(301.0) == "end"
+def test_what_the_processes_say_while_they_are_stopped_counts_for_nothing(make: Make) -> None:
+    assert explained(make, *STORY, Event(300.0, "end")).why(301.0) == "end"
+
+
+def test_a_network_that_lost_enough_explains_a_hold_and_one_that_let_nothing_pass_all(make: Make) -> None:
+    events = (*STORY[:6], Event(50.0, "left", {"guard": "hold"}))
+
+    def lefts(**columns: Any) -> list[Event]:
+        samples = make(**columns).samples
+        return unexplained_lefts(events, samples, explanation(events, samples))
+
+    assert len(lefts(link_lost=at(50, LOST_PACKETS - 1))) == 1
+    assert lefts(link_lost=at(50, LOST_PACKETS)) == []
+    assert len(lefts(link_lost=at(60, LOST_PACKETS))) == 1
+    assert lefts(link_out=at(50, 1)) == []
+    windows = explanation(events, make(link_out=at(70, 2)).samples).network
+    assert [(w.from_s, w.until_s) for w in windows] == [(69.0, 70.0)]
+
+
+def at(second: float, value: float) -> Any:
+    return lambda at_s: np.where(at_s == second, value, 0.0)
