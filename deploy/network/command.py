@@ -39,7 +39,7 @@ def list_profiles(
     for profile in chosen:
         console.print(f"[bold]{profile.name}[/bold]: {profile.about}", highlight=False)
         if profiles:
-            console.print(profile.source.strip(), style="dim", highlight=False)
+            console.print(" ".join(profile.source.split()), style="dim", highlight=False)
             outages = ", ".join(f"{outage.for_s:g} s at {outage.at_s:g} s" for outage in profile.outages)
             console.print(f"outages: {outages or 'none'}", style="dim", highlight=False)
 

@@ -21,8 +21,8 @@ from deploy.network.profile import Profile, Way
 RATE_HZ = 200.0
 SMALL, FULL = 128, 1400
 """Bytes of an IP packet: about a command's, and of one that fills a link."""
-START_S = 1.0
-"""Until both ends run."""
+START_S = 0.05
+"""From the word to both ends until they begin."""
 LINGER_S = 0.5
 """Beyond the link's own delay and queue."""
 FLOOD_S, FLOOD_OVER = 1.5, 1.3
@@ -73,29 +73,39 @@ async def _fill(
 async def _run(
     hosts: Sequence[Host], ways: Sequence[Way], rates_hz: Sequence[float], counts: Sequence[int], size: int
 ) -> list[dict[str, Any]]:
-    start_ns = wall_ns() + to_ns(START_S)
     last_s = max(count / rate for count, rate in zip(counts, rates_hz, strict=True))
     travel_ms = max(way.delay_ms + 6.0 * way.jitter_ms + way.reorder_ms + way.queue_ms for way in ways)
     plans = [
-        Plan(here.address, there.address, rate, count, size, start_ns, last_s + travel_ms / 1e3 + LINGER_S)
+        Plan(here.address, there.address, rate, count, size, last_s + travel_ms / 1e3 + LINGER_S)
         for here, there, rate, count in zip(hosts, hosts[::-1], rates_hz, counts, strict=True)
     ]
-    return await asyncio.gather(*(_probe(host, plan) for host, plan in zip(hosts, plans, strict=True)))
+    probes: list[asyncio.subprocess.Process] = []
+    try:
+        for host, plan in zip(hosts, plans, strict=True):
+            probes.append(await _start(host, plan))
+        for probe in probes:
+            assert probe.stdout is not None
+            await probe.stdout.readline()  # "ready", or nothing: then it tells why at its end
+        word = f"{wall_ns() + to_ns(START_S)}\n".encode()
+        return await asyncio.gather(*(_noted(host, p, word) for host, p in zip(hosts, probes, strict=True)))
+    finally:
+        for probe in probes:
+            if probe.returncode is None:
+                probe.kill()
+                await probe.wait()
 
 
-async def _probe(host: Host, plan: Plan) -> dict[str, Any]:
-    process = await asyncio.create_subprocess_exec(
+async def _start(host: Host, plan: Plan) -> asyncio.subprocess.Process:
+    return await asyncio.create_subprocess_exec(
         *host.command([sys.executable, "-m", "deploy.network.probe", *plan.arguments()]),
-        stdin=asyncio.subprocess.DEVNULL,
+        stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
     )
-    try:
-        said, failed = await process.communicate()
-    except asyncio.CancelledError:
-        process.kill()
-        await process.wait()
-        raise
+
+
+async def _noted(host: Host, process: asyncio.subprocess.Process, word: bytes) -> dict[str, Any]:
+    said, failed = await process.communicate(word)
     if process.returncode:
         words = failed.decode(errors="replace").strip().splitlines()[-1:]
         raise NetworkError(f"the probe on the {host.name}'s host ended: {' '.join(words)}")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
-from typing import Literal
+from typing import Literal, ParamSpec, TypeVar
 
 from common.errors import NetworkError
 from deploy.network.emulation import Emulation, LinkCounters
@@ -28,6 +28,8 @@ from deploy.network.netem import Netem, faithful, has_netem
 from deploy.network.profile import Outage, Profile, load_profile
 from deploy.network.tun import Forwarder
 
+Args = ParamSpec("Args")
+Result = TypeVar("Result")
 Backend = Literal["auto", "forwarder", "netem"]
 
 
@@ -124,12 +126,22 @@ async def open_network(
     async with AsyncExitStack() as stack:
         janitor = Janitor(run)
         stack.push_async_callback(asyncio.to_thread, janitor.remove)
-        hosts = await asyncio.to_thread(_make_hosts, run)
-        emulation = await asyncio.to_thread(_emulate, run, profile, seed, backend)
+        hosts = await _whole(_make_hosts, run)
+        emulation = await _whole(_emulate, run, profile, seed, backend)
         stack.callback(emulation.close)
         network = Network(hosts, emulation, profile)
         stack.push_async_callback(network.end_script)
         yield network
+
+
+async def _whole(function: Callable[Args, Result], *args: Args.args, **named: Args.kwargs) -> Result:
+    """Run it in a thread. Cancelled, it is still waited for: the janitor comes after it, not before."""
+    task = asyncio.ensure_future(asyncio.to_thread(function, *args, **named))
+    try:
+        return await asyncio.shield(task)
+    except asyncio.CancelledError:
+        await asyncio.wait({task})
+        raise
 
 
 def _emulate(run: Run, profile: Profile, seed: int, backend: Backend) -> Emulation:

@@ -11,7 +11,6 @@ import select
 import socket
 import struct
 import sys
-import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -42,31 +41,34 @@ class Plan:
     """How many to send."""
     size: int
     """Of the IP packet, bytes."""
-    start_ns: int
-    """When to begin."""
     listen_s: float
-    """How long to listen, from then."""
+    """How long to listen, from the start."""
 
     def arguments(self) -> list[str]:
         """For the command line."""
         return [json.dumps(asdict(self))]
 
 
-def run(plan: Plan) -> dict[str, Any]:
-    """`sent`: times of sending by number, and `arrivals`: number, time of sending and of arrival; ns."""
+def open_end(plan: Plan) -> socket.socket:
+    """The socket: it hears from now on, and the kernel stamps what it hears."""
     end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     with suppress(OSError):  # beyond the host's limit for everybody, where permitted
         end.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _BUFFER)
     end.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
     end.bind((plan.here, PORT))
     end.setblocking(False)
+    return end
+
+
+def run(plan: Plan, end: socket.socket, start_ns: int) -> dict[str, Any]:
+    """`sent`: how many were, and `arrivals`: number, time of sending and of arrival, ns."""
     padding = bytes(plan.size - IP_UDP_BYTES - STAMP.size)
     period_ns = NS_PER_S / plan.rate_hz
     arrivals: list[tuple[int, int, int]] = []
     refused, number = 0, 0
-    until_ns = plan.start_ns + to_ns(plan.listen_s)
+    until_ns = start_ns + to_ns(plan.listen_s)
     while (now_ns := wall_ns()) < until_ns:
-        next_ns = plan.start_ns + round(number * period_ns)
+        next_ns = start_ns + round(number * period_ns)
         if number < plan.packets and now_ns >= next_ns:
             try:
                 end.sendto(STAMP.pack(number, wall_ns()) + padding, (plan.there, PORT))
@@ -91,11 +93,15 @@ def _arrived(end: socket.socket) -> list[tuple[int, int, int]]:
 
 
 def main() -> None:
-    """Argument: the plan as JSON. Prints what was seen, as JSON."""
+    """Argument: the plan as JSON. Says `ready`, reads when to start (ns), prints what was seen as JSON."""
     plan = Plan(**json.loads(sys.argv[1]))
     take_priority(ProcessConfig(realtime_priority=PRIORITY))
-    time.sleep(max(to_s(plan.start_ns - wall_ns()) - 0.01, 0.0))
-    json.dump(run(plan), sys.stdout)
+    end = open_end(plan)
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
+    start = sys.stdin.readline()
+    if start:  # else the parent has given up
+        json.dump(run(plan, end, int(start)), sys.stdout)
 
 
 if __name__ == "__main__":

@@ -14,10 +14,12 @@ from deploy.tables import UNKNOWN, plain_table
 
 def profiles_table(profiles: Iterable[Profile]) -> Table:
     """One row a direction where the two differ, else one for both."""
-    table = plain_table("profile", "way", "delay ms", "jitter", "loss %", "burst", "Mbit/s", "queue ms")
+    table = plain_table("profile", "to", "delay", "jitter", "loss %", "burst", "Mbit/s", "queue")
+    table.columns[0].no_wrap = True
+    table.caption = "delay, jitter and queue in ms; burst in packets, – where each is lost by itself"
     for profile in profiles:
         ways = profile.ways
-        rows = {"→ robot": ways.to_robot, "→ operator": ways.to_operator}
+        rows = {"robot": ways.to_robot, "operator": ways.to_operator}
         if ways.to_robot == ways.to_operator:
             rows = {"both": ways.to_robot}
         for number, (arrow, way) in enumerate(rows.items()):
