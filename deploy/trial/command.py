@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from common.errors import TandemError
+from common.errors import NetworkError, TandemError
 from common.runtime import run as run_until_stopped
 
 if TYPE_CHECKING:
@@ -90,8 +90,14 @@ def trial(
         max_age_s=max_age, hosts=remote or "namespaces",
     )  # fmt: skip
     if remote is None:
+        from deploy.network.namespaces import why_not
         from deploy.trial.stage import run_cell
 
+        reason = why_not()
+        if reason is not None:
+            raise NetworkError(
+                f"{reason}; with the robot on another host, no such rights are needed: --remote"
+            )
         _run(plan, report, tasks, run_cell)
     else:
         _run_remote(plan, report, tasks, link)

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from common.endpoint import TRANSPORTS
-from common.errors import ConfigError, TandemError
+from common.errors import ConfigError, NetworkError, TandemError
 from deploy.cli import app
 from deploy.network import Profile, Way, load_profile, profile_names
 from deploy.trial.choice import choose
@@ -93,6 +93,16 @@ def test_a_mistake_is_told_before_anything_is_started(tmp_path: Path) -> None:
     weights.write_text("tasks = []", "utf-8")
     _, error = tandem("--tasks", str(weights), "--report", str(tmp_path / "r"))
     assert isinstance(error, ConfigError)
+    assert not (tmp_path / "r").exists()
+
+
+def test_who_may_not_make_hosts_is_told_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("deploy.network.namespaces.why_not", lambda: "needs root")
+    _, error = tandem("--report", str(tmp_path / "r"))
+    assert isinstance(error, NetworkError)
+    assert "--remote" in str(error)
     assert not (tmp_path / "r").exists()
 
 
