@@ -200,6 +200,10 @@ _BENCH_ROWS = (
     ("one way, tandem, µs", ("link", "one_way_us", "tandem")),
     ("one way, bare Zenoh, µs", ("link", "one_way_us", "zenoh")),
     ("one way, bare UDP, µs", ("link", "one_way_us", "udp")),
+    *(
+        (f"one way over {name}, µs", ("transports", "one_way_us", name))
+        for name in ("bare zenoh", "tcp", "udp", "tls", "quic", "quic-datagram", "ws", "unixsock-stream")
+    ),
     ("MuJoCo step, µs", ("robot", "step_us")),
 )
 

@@ -81,6 +81,8 @@ BENCH = (
     Target("solve 25 joints", ("pipeline", "solve_us", "median"), 150.0, "µs"),
     Target("encode + decode a command", ("pipeline", "codec_us", "median"), 15.0, "µs"),
     Target("put → received / bare Zenoh", ("link", "over_bare_zenoh"), 1.5),
+    Target("the same over tcp, p99", ("transports", "tcp_p99_over_bare_zenoh"), 2.0),
+    Target("tls, quic, quic-datagram / tcp, the worst", ("transports", "worst_secure_over_tcp"), 2.0),
     Target("master, of one core", ("core_percent", "master_36_nodes"), 35.0, "%"),
 )
 """What a report of `tandem bench` is held against."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
 
@@ -31,7 +31,7 @@ from common.pacing import TickGrid
 from common.runtime import freeze_heap
 from common.ticker import ticks
 from common.topics import COMMAND, STATE
-from deploy.bench.measure import spread_us
+from deploy.bench.measure import Figures, spread_us
 from deploy.bench.pipeline import example_command
 from deploy.bench.worker import beside, in_worker
 
@@ -55,9 +55,9 @@ def link(seconds: float) -> dict[str, Any]:
         one_way_us = in_worker("link:ping", seconds, ports=ports)
     return {
         "one_way_us": one_way_us,
-        "over_bare_zenoh": _ratio(one_way_us, "tandem", "zenoh"),
-        "over_bare_udp": _ratio(one_way_us, "tandem", "udp"),
-        "bare_zenoh_over_bare_udp": _ratio(one_way_us, "zenoh", "udp"),
+        "over_bare_zenoh": ratio(one_way_us, "tandem", "zenoh"),
+        "over_bare_udp": ratio(one_way_us, "tandem", "udp"),
+        "bare_zenoh_over_bare_udp": ratio(one_way_us, "zenoh", "udp"),
     }
 
 
@@ -72,86 +72,108 @@ def echo(ports: list[int]) -> None:
 
 
 async def _ping(seconds: float, ports: list[int]) -> dict[str, Any]:
-    payload = encode(example_command())
-    arrived: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-
-    def on_echo(arrived_ns: int) -> None:
-        if not arrived.done():
-            arrived.set_result(arrived_ns)
-
     async with AsyncExitStack() as stack:
-        openers = (_ping_link, _ping_zenoh, _ping_udp)
-        pings = [
-            await stack.enter_async_context(opener(port, on_echo))
-            for opener, port in zip(openers, ports, strict=True)
-        ]
+        stagger = Stagger()
+        tandem, bare, udp = ports
+        doors = (
+            ping_link(LinkConfig(connect=[_endpoint(tandem)]), stagger.on_echo),
+            ping_zenoh(LinkConfig(connect=[_endpoint(bare)]), stagger.on_echo),
+            _ping_udp(udp, stagger.on_echo),
+        )
+        for name, door in zip(DOORS, doors, strict=True):
+            stagger.doors[name] = await stack.enter_async_context(door)
+        return await stagger.measure(seconds)
 
-        async def round_trip_ns(send: Ping) -> int | None:
-            nonlocal arrived
-            arrived = asyncio.get_running_loop().create_future()
-            put_ns = monotonic_ns()
-            send(payload)
-            try:
-                return await asyncio.wait_for(arrived, TIMEOUT_S) - put_ns
-            except TimeoutError:
-                return None
 
-        await _until_all_answer(pings, round_trip_ns)
+class Stagger:
+    """Takes the time of several doors in one run: each in turn, each at the rate of the commands."""
+
+    def __init__(self) -> None:
+        self.doors: dict[str, Ping] = {}
+        self._payload = encode(example_command())
+        self._arrived: asyncio.Future[int] | None = None
+
+    def on_echo(self, arrived_ns: int) -> None:
+        """What was sent last is back."""
+        if self._arrived is not None and not self._arrived.done():
+            self._arrived.set_result(arrived_ns)
+
+    async def measure(self, seconds: float) -> dict[str, Figures]:
+        """µs one way by door: half of each round trip. Raises LinkError for a door that gives no echo."""
+        await self._until_all_answer()
         freeze_heap()
-        trips: dict[str, list[float]] = {door: [] for door in DOORS}
-        # each door in turn, each at the rate of the commands
-        step_ns = to_ns(1.0 / (COMMAND.rate_hz * len(DOORS)))
+        names = list(self.doors)
+        trips: dict[str, list[float]] = {name: [] for name in names}
+        step_ns = to_ns(1.0 / (COMMAND.rate_hz * len(names)))
         begin_ns = monotonic_ns() + step_ns
         async for due in ticks(TickGrid(begin_ns, step_ns)):
             if due.scheduled_ns - begin_ns >= to_ns(seconds):
                 break
-            place = due.tick % len(DOORS)
-            trip_ns = await round_trip_ns(pings[place])
+            name = names[due.tick % len(names)]
+            trip_ns = await self._round_trip_ns(self.doors[name])
             if trip_ns is not None:
-                trips[DOORS[place]].append(trip_ns / 2)
-    return {door: spread_us(halves[WARM_UP:]) for door, halves in trips.items()}
+                trips[name].append(trip_ns / 2)
+        return {name: spread_us(halves[WARM_UP:]) for name, halves in trips.items()}
 
+    async def _round_trip_ns(self, send: Ping) -> int | None:
+        self._arrived = asyncio.get_running_loop().create_future()
+        put_ns = monotonic_ns()
+        send(self._payload)
+        try:
+            return await asyncio.wait_for(self._arrived, TIMEOUT_S) - put_ns
+        except TimeoutError:
+            return None
 
-async def _until_all_answer(
-    pings: list[Ping], round_trip_ns: Callable[[Ping], Awaitable[int | None]]
-) -> None:
-    deadline_ns = monotonic_ns() + to_ns(CONNECT_S)
-    for door, send in zip(DOORS, pings, strict=True):
-        while await round_trip_ns(send) is None:
-            if monotonic_ns() > deadline_ns:
-                raise LinkError(f"{door}: no echo within {CONNECT_S:g} s")
+    async def _until_all_answer(self) -> None:
+        deadline_ns = monotonic_ns() + to_ns(CONNECT_S)
+        for name, send in self.doors.items():
+            while await self._round_trip_ns(send) is None:
+                if monotonic_ns() > deadline_ns:
+                    raise LinkError(f"{name}: no echo within {CONNECT_S:g} s")
 
 
 async def _echo(ports: list[int]) -> None:
     async with AsyncExitStack() as stack:
-        link = await stack.enter_async_context(open_link(LinkConfig(listen=[_endpoint(ports[0])]), ROBOT))
-        back = link.publish(STATE)
-        link.subscribe(COMMAND, lambda payload, _: back(payload))
-
-        session = _open_zenoh(LinkConfig(listen=[_endpoint(ports[1])]))
-        put = _publisher(session, BACK)
-
-        def on_sample(sample: zenoh.Sample) -> None:
-            put(sample.payload.to_bytes())
-
+        await echo_link(stack, LinkConfig(listen=[_endpoint(ports[0])]))
+        bare = echo_zenoh(LinkConfig(listen=[_endpoint(ports[1])]))
         udp = asyncio.get_running_loop().create_datagram_endpoint(
             _UdpEcho, local_addr=("127.0.0.1", ports[2])
         )
         # both held: they end with their last reference
-        held = session.declare_subscriber(THERE, Callback(on_sample, indirect=False)), await udp
+        held = bare, await udp
         await asyncio.Event().wait()
         del held
 
 
+async def echo_link(stack: AsyncExitStack, config: LinkConfig) -> None:
+    """Return what comes through tandem's own link, until the stack closes."""
+    link = await stack.enter_async_context(open_link(config, ROBOT))
+    back = link.publish(STATE)
+    link.subscribe(COMMAND, lambda payload, _: back(payload))
+
+
+def echo_zenoh(config: LinkConfig) -> object:
+    """Return what comes through bare Zenoh, as long as the result is held."""
+    session = _open_zenoh(config)
+    put = _publisher(session, BACK)
+
+    def on_sample(sample: zenoh.Sample) -> None:
+        put(sample.payload.to_bytes())
+
+    return session, session.declare_subscriber(THERE, Callback(on_sample, indirect=False))
+
+
 @asynccontextmanager
-async def _ping_link(port: int, on_echo: OnEcho) -> AsyncIterator[Ping]:
-    async with open_link(LinkConfig(connect=[_endpoint(port)]), ROBOT) as link:
+async def ping_link(config: LinkConfig, on_echo: OnEcho) -> AsyncIterator[Ping]:
+    """Send through tandem's own link."""
+    async with open_link(config, ROBOT) as link:
         link.subscribe(STATE, lambda _, arrived_ns: on_echo(arrived_ns))
         yield link.publish(COMMAND)
 
 
 @asynccontextmanager
-async def _ping_zenoh(port: int, on_echo: OnEcho) -> AsyncIterator[Ping]:
+async def ping_zenoh(config: LinkConfig, on_echo: OnEcho) -> AsyncIterator[Ping]:
+    """Send through bare Zenoh."""
     loop = asyncio.get_running_loop()
 
     def on_sample(sample: zenoh.Sample) -> None:
@@ -159,7 +181,7 @@ async def _ping_zenoh(port: int, on_echo: OnEcho) -> AsyncIterator[Ping]:
         sample.payload.to_bytes()
         loop.call_soon_threadsafe(on_echo, arrived_ns)
 
-    session = await asyncio.to_thread(_open_zenoh, LinkConfig(connect=[_endpoint(port)]))
+    session = await asyncio.to_thread(_open_zenoh, config)
     held = session.declare_subscriber(BACK, Callback(on_sample, indirect=False))
     yield _publisher(session, THERE)
     # the session is not closed: that can hang on a peer that is gone, and the worker ends without it
@@ -224,6 +246,7 @@ def _free_ports(count: int) -> list[int]:
     return ports
 
 
-def _ratio(figures: dict[str, Any], above: str, below: str) -> float | None:
-    one, other = figures[above].get("median"), figures[below].get("median")
+def ratio(figures: dict[str, Any], above: str, below: str, of: str = "median") -> float | None:
+    """One door's figure over another's; None where either is missing."""
+    one, other = figures[above].get(of), figures[below].get(of)
     return round(one / other, 3) if one is not None and other else None

@@ -17,6 +17,7 @@ from deploy.bench.capture import capture
 from deploy.bench.link import link
 from deploy.bench.loop import RATE_HZ, loop
 from deploy.bench.measure import total
+from deploy.bench.transports import transports
 from deploy.bench.worker import BenchError, in_worker
 from deploy.tables import bench_table, verdict_table
 from deploy.targets import BENCH, verdicts
@@ -41,7 +42,8 @@ BENCHES = (
         "capture, 8 classic nodes", ("capture", "nodes_8_classic"), 3.0, lambda s: capture(s, 8, fd=False)
     ),
     _Bench("the master's steps", ("pipeline",), 10.0, lambda s: in_worker("pipeline:pipeline", s)),
-    _Bench("link beside Zenoh and UDP", ("link",), 15.0, link),
+    _Bench("link beside Zenoh and UDP", ("link",), 12.0, link),
+    _Bench("link over each transport", ("transports",), 12.0, transports),
     _Bench("robot", ("robot",), 2.0, lambda s: in_worker("robot:robot", s)),
 )
 

@@ -3,7 +3,7 @@ import logging
 import socket
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,8 @@ from common.errors import LinkError, LinkTimeoutError
 from common.link import Link, Session, open_link, open_session
 from common.link.counters import TopicCounters
 from common.link.queries import MAX_WAITING, Answerer
-from common.topics import CLOCK, COMMAND, CONTROL, STATE
+from common.link_config import TopicConfig
+from common.topics import CLOCK, COMMAND, CONTROL, STATE, Priority
 
 ROBOT = "robot-1"
 DEADLINE_S = 10.0
@@ -104,7 +105,17 @@ def test_payloads_and_answers_pass_over_each_protocol(protocol: str, tmp_path: P
     run(test)
 
 
-def test_the_quality_of_service_is_that_of_the_table() -> None:
+FILE_S_OWN = {"command": TopicConfig(priority=Priority.DATA_LOW, express=False)}
+
+
+@pytest.mark.parametrize(
+    ("topics", "priority", "express"),
+    [({}, zenoh.Priority.REAL_TIME, True), (FILE_S_OWN, zenoh.Priority.DATA_LOW, False)],
+    ids=["table", "file"],
+)
+def test_the_quality_of_service_is_that_of_the_table_or_the_file(
+    topics: dict[str, TopicConfig], priority: zenoh.Priority, express: bool
+) -> None:
     async def test() -> None:
         endpoint = free_endpoint()
         samples: list[zenoh.Sample] = []
@@ -112,16 +123,16 @@ def test_the_quality_of_service_is_that_of_the_table() -> None:
         settings.insert_json5("scouting/multicast/enabled", "false")
         with zenoh.open(settings) as raw:
             raw.declare_subscriber(f"tandem/{ROBOT}/*", Callback(samples.append, indirect=False))
-            async with open_link(LinkConfig(connect=[endpoint]), ROBOT) as link:
+            async with open_link(LinkConfig(connect=[endpoint], topics=topics), ROBOT) as link:
                 command, state = link.publish(COMMAND), link.publish(STATE)
                 await until(
                     lambda: len({str(s.key_expr) for s in samples}) == 2, lambda: (command(b"c"), state(b"s"))
                 )
         by_key = {str(s.key_expr): s for s in samples}
         sample = by_key[f"tandem/{ROBOT}/command"]
-        assert sample.priority == zenoh.Priority.REAL_TIME
+        assert sample.priority == priority
         assert sample.congestion_control == zenoh.CongestionControl.DROP
-        assert sample.express
+        assert sample.express == express
         assert by_key[f"tandem/{ROBOT}/state"].priority == zenoh.Priority.INTERACTIVE_HIGH
 
     run(test)
@@ -455,5 +466,55 @@ def test_one_session_serves_many_robots_and_keeps_them_apart() -> None:
             await heard_through(links["robot-1"].publish(COMMAND), heard["robot-1"], b"again for 1")
         assert set(heard["robot-2"].payloads) == {b"for 2"}
         assert seen == [("robot-1", True), ("robot-2", True), ("robot-2", False)]
+
+    run(test)
+
+
+def test_a_client_waits_for_its_router_and_tries_each_in_turn(caplog: pytest.LogCaptureFixture) -> None:
+    async def test() -> None:
+        dead, late = free_endpoint(), free_endpoint()
+        config = LinkConfig(mode="client", connect=[dead, late])
+        async with AsyncExitStack() as stack:
+            opening = asyncio.create_task(stack.enter_async_context(open_link(config, ROBOT)))
+            await until(lambda: "no router answers" in caplog.text)
+            assert not opening.done()
+            router = await stack.enter_async_context(open_session(LinkConfig(listen=[late]), "router"))
+            link = await opening
+            await until(lambda: router.peers == link.peers == 1)
+
+    run(test)
+
+
+def test_a_client_that_gives_up_waiting_leaves_nothing_behind(caplog: pytest.LogCaptureFixture) -> None:
+    async def test() -> None:
+        config = LinkConfig(mode="client", connect=[free_endpoint()])
+        opening = asyncio.create_task(open_link(config, ROBOT).__aenter__())
+        await until(lambda: "no router answers" in caplog.text)
+        opening.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await opening
+
+    run(test)
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_two_clients_meet_through_a_router(protocol: str, tmp_path: Path) -> None:
+    async def test() -> None:
+        endpoint = free_endpoint(protocol, tmp_path)
+        through = LinkConfig(mode="client", connect=[endpoint])
+        async with (
+            open_session(LinkConfig(listen=[endpoint]), "router"),
+            open_link(through, ROBOT) as slave,
+            open_link(through, ROBOT) as master,
+        ):
+            heard, alive = Heard(), dict[str, bool]()
+            slave.subscribe(COMMAND, heard)
+            slave.answer(CLOCK, lambda payload, _: payload)
+            slave.declare_alive("slave")
+            master.watch_alive(lambda role, here: alive.update({role: here}))
+            await heard_through(master.publish(COMMAND), heard, b"command")
+            await master.connected(CLOCK)
+            assert await master.ask(CLOCK, b"hello") == b"hello"
+            await until(lambda: alive == {"slave": True})
 
     run(test)

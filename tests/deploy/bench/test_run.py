@@ -71,6 +71,8 @@ def test_a_bench_that_fails_leaves_its_reason_and_the_others_their_figures(
         "solve 25 joints": True,
         "encode + decode a command": True,
         "put → received / bare Zenoh": True,
+        "the same over tcp, p99": None,
+        "tls, quic, quic-datagram / tcp, the worst": None,
         "master, of one core": None,
     }
     assert isinstance(console.file, io.StringIO)
