@@ -12,6 +12,7 @@ from common.messages import Action
 from deploy.network import Network, load_profile, open_network
 from deploy.profiles import example
 from deploy.rig.rig import ROUTER, Rig, open_rig
+from deploy.trial.attention import Attention
 from deploy.trial.cell import Cell, Status
 from deploy.trial.judge import judged
 from deploy.trial.plan import CellKey, Plan
@@ -135,26 +136,19 @@ class _Story:
 
     async def _follow(self, began_ns: int, until_ns: int) -> None:
         """Let it run; where the robot holds, the operator engages again as soon as that is possible."""
-        observer, held = self._rig.observer, False
+        observer, attention = self._rig.observer, Attention(self._remarks)
         while monotonic_ns() < until_ns:
             self._look()
-            state = observer.state
-            if observer.guard == "hold" and not held and state is not None:
-                held = True
-                self._remark(began_ns, f"the robot held: {state.reason}")
-            elif observer.guard in ("align", "track"):
-                held = False
-            if observer.guard == "hold" and observer.ready:
-                await self._engage_again(began_ns)
+            at_s = to_s(monotonic_ns() - began_ns)
+            reason = observer.state.reason if observer.state is not None else ""
+            if attention.look(at_s, observer.guard, reason, observer.ready):
+                refusal = ""
+                try:
+                    await self._engage()
+                except TandemError as error:
+                    refusal = str(error)
+                attention.acted(at_s, refusal)
             await asyncio.sleep(LOOK_S)
-
-    async def _engage_again(self, began_ns: int) -> None:
-        try:
-            await self._engage()
-        except TandemError as error:
-            self._remark(began_ns, str(error))
-        else:
-            self._remark(began_ns, "the operator engaged again")
 
     async def _outage(self) -> tuple[Recording, Outage]:
         rig, observer = self._rig, self._rig.observer
@@ -185,9 +179,6 @@ class _Story:
                 raise TandemError(f"engage was refused: {reply.text}")
             self._look()
             await asyncio.sleep(LOOK_S)
-
-    def _remark(self, began_ns: int, words: str) -> None:
-        self._remarks.append(f"at {to_s(monotonic_ns() - began_ns):.1f} s {words}")
 
     def _look(self) -> None:
         """Fail early. Raises TandemError."""

@@ -13,13 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.network.namespaces import why_not
-
-pytestmark = [
-    pytest.mark.hosts,
-    pytest.mark.timeout(300),
-    pytest.mark.skipif(why_not() is not None, reason=str(why_not())),
-]
+pytestmark = pytest.mark.timeout(300)
 TRIAL = (sys.executable, "-m", "deploy", "trial")
 PLAN = ("--transports", "tcp,unixsock-stream", "--profiles", "4g", "--strategies", "predict", "--repeat", "1",
         "--seconds", "4", "--outage", "1")  # fmt: skip

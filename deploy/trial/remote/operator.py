@@ -21,6 +21,7 @@ from common.skeleton import Skeleton, load_skeleton
 from deploy.profiles import example
 from deploy.rig.endpoints import Endpoints, free_port
 from deploy.rig.rig import OPERATOR, ROBOT, Rig
+from deploy.trial.attention import Attention
 from deploy.trial.cell import Cell, Status
 from deploy.trial.judge import judged
 from deploy.trial.plan import CellKey, Plan
@@ -166,30 +167,27 @@ async def _play(
 
 async def _follow(plan: Plan, partner: Partner, rig: Rig, recorder: Recorder) -> list[str]:
     """Let it run; where the robot holds, the operator engages again as soon as that is possible."""
-    remarks: list[str] = []
+    attention = Attention()
     await partner.do(talk.Record())
     recorder.take()
     for child in rig.children.values():
         child.measure(first=True)
-    began_ns, held = monotonic_ns(), False
-    while to_s(monotonic_ns() - began_ns) < plan.seconds:
+    began_ns = monotonic_ns()
+    while (at_s := to_s(monotonic_ns() - began_ns)) < plan.seconds:
         for name in ("suit", "master"):
             rig.children[name].check()
         answer = await partner.look()
         if answer.fault:
             raise TandemError(f"the robot's host: {answer.fault}")
-        at = f"at {to_s(monotonic_ns() - began_ns):.1f} s"
-        if answer.guard == "hold" and not held:
-            remarks.append(f"{at} the robot held: {answer.reason}")
-        held = answer.guard == "hold"
-        if answer.taking:
+        if attention.look(at_s, answer.guard, answer.reason, answer.taking):
+            refusal = ""
             try:
                 await _engage(partner)
-                remarks.append(f"{at} the operator engaged again")
             except TandemError as error:
-                remarks.append(f"{at} {error}")
+                refusal = str(error)
+            attention.acted(at_s, refusal)
         await asyncio.sleep(LOOK_S)
-    return remarks
+    return attention.remarks
 
 
 async def _engage(partner: Partner) -> None:
