@@ -189,15 +189,17 @@ def test_a_loop_that_hangs_falls_silent_and_its_stack_is_in_the_log(tmp_path: Pa
         from common.runtime import run
         from common.ticker import ticks
 
-        def a_servo_that_never_answers():
+        def a_servo_that_never_answers(notifier):
+            notifier.status("hangs")  # from within: who hears it finds this on the stack
             threading.Event().wait()
 
         async def main(stop):
             notifier = open_notifier()
-            async for due in ticks(TickGrid(monotonic_ns(), 5_000_000)):
-                if due.tick > 40:
-                    notifier.status("hangs")
-                    a_servo_that_never_answers()
+            turns = 0
+            async for _ in ticks(TickGrid(monotonic_ns(), 5_000_000)):
+                turns += 1
+                if turns > 40:
+                    a_servo_that_never_answers(notifier)
                 notifier.beat(monotonic_ns())
 
         run(main)
