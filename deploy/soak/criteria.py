@@ -56,6 +56,16 @@ class Seen:
         """What is told of each fault once it is over."""
         return [e.what for e in of_kind(self.events, "recovered") if e.what.get("fault")]
 
+    def own(self, faults: Sequence[Mapping[str, Any]], key: str) -> list[Mapping[str, Any]]:
+        """The faults with a time that began with them, less what the host stood still in it."""
+        own: list[Mapping[str, Any]] = []
+        for what in faults:
+            took_s, begun_s = what.get(key), what["begun_s"]
+            if took_s is not None:
+                took_s = round(took_s - self.explained.still_s(begun_s, begun_s + took_s), 3)
+            own.append({**what, key: took_s})
+        return own
+
     @property
     def options(self) -> Mapping[str, Any]:
         """What the soak was asked for; empty where it did not begin."""
@@ -95,6 +105,7 @@ def guard(seen: Seen) -> list[Verdict]:
     """It holds on every fault that asks for it, stands, and never moves by itself."""
     done = seen.recovered
     must = [what for what in done if what["holds"] and what["heard"]]
+    held, stood = seen.own(must, "held_s"), seen.own(must, "stands_s")
     idle = [what for what in done if not what["holds"] and what.get("held_s") is not None]
     lefts = unexplained_lefts(seen.events, seen.samples, seen.explained)
     engaged = sum(bool(e.what.get("done")) for e in of_kind(seen.events, "engage"))
@@ -105,8 +116,8 @@ def guard(seen: Seen) -> list[Verdict]:
     strayed = seen.samples["strayed_deg"]
     way_s = (seen.options.get("network") or {}).get("way_s", 0.0)
     return [
-        _worst("guard", "holds on a fault, the slowest", must, "held_s", HOLD_S + way_s, "s"),
-        _worst("guard", "stands after a fault, the slowest", must, "stands_s", STANDS_S + way_s, "s"),
+        _worst("guard", "holds on a fault, the slowest", held, "held_s", HOLD_S + way_s, "s"),
+        _worst("guard", "stands after a fault, the slowest", stood, "stands_s", STANDS_S + way_s, "s"),
         at_most("guard", "holds that nothing explains", float(len(lefts)), 0.0, note=_reasons(lefts)),
         at_most(
             "guard", "holds on a fault that asks for none", float(len(idle)), 0.0,

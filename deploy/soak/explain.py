@@ -33,6 +33,11 @@ class Explained:
         """All of them."""
         return (*self.faults, *self.stalls, *self.network)
 
+    def still_s(self, from_s: float, until_s: float) -> float:
+        """The longest of the host's stalls within a span, as far as it lies there."""
+        spans = (min(w.until_s, until_s) - max(w.from_s, from_s) for w in self.stalls)
+        return max(0.0, max(spans, default=0.0))
+
     def why(self, at_s: float) -> str:
         """The reason of something that was seen then; empty where it has none."""
         return reason(at_s, self.all)

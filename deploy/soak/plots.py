@@ -89,6 +89,7 @@ def _latency(panel: Axes, samples: Samples, unit_s: float) -> None:
     for column, words, colour in (
         ("one_way_p50_ms", "one way, median of a second", "tab:blue"),
         ("round_trip_ms", "round trip, mean", "tab:green"),
+        ("written_p50_ms", "put → servo written, median of a second", "tab:purple"),
         ("end_to_end_ms", "sampled → encoder moved, mean", "tab:orange"),
     ):
         at, medians, most = decimated(*with_gaps(samples.at_s / unit_s, samples[column], GAP_S / unit_s))

@@ -160,6 +160,7 @@ class Soak:
         case = Case(self._stage, random.Random(f"{self._options.seed} {number}"), {}, {})
         lasts_s = case.draw.uniform(*fault.lasts_s)
         figures: dict[str, Any] = {"fault": fault.name, "number": number, **fault.asks}
+        figures["begun_s"] = round(log.now_s, 3)
         log.tell("fault", {**figures, "lasts_s": round(lasts_s, 3)})
         begun_ns = monotonic_ns()
         robot_ns = watch.motion.newest_ns() + begun_ns - watch.state_ns

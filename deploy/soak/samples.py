@@ -16,7 +16,7 @@ from common.quaternion import Array
 from deploy.output import writing
 
 SEEN = (
-    "one_way_n", "one_way_p50_ms", "one_way_max_ms", "offset_bound_ms", "age_max_ms",
+    "one_way_n", "one_way_p50_ms", "one_way_max_ms", "written_p50_ms", "offset_bound_ms", "age_max_ms",
     "round_trip_n", "round_trip_ms", "end_to_end_n", "end_to_end_ms",
     "sent", "arrived", "lost", "late", "repeated", "overwritten", "refused",
     "master_ticks", "master_missed", "slave_ticks", "slave_missed",

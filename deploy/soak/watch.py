@@ -45,7 +45,9 @@ class Watch:
         self.aligns = 0
         """Times that the guard was seen to begin to move."""
         self._echoed: tuple[int, int] = (0, 0)
+        self._written: tuple[int, int] = (0, 0)
         self._one_way_ms: list[float] = []
+        self._written_ms: list[float] = []
         self._age_max_ms = float("nan")
         self._row: dict[str, float] = {}
         self._invalid = -1
@@ -92,12 +94,19 @@ class Watch:
 
     def _on_echo(self, state: RobotState, arrived_ns: int) -> None:
         echo = state.echo
-        if echo is None or (echo.sequence, echo.put_ns) == self._echoed:
+        if echo is None:
             return
-        self._echoed = (echo.sequence, echo.put_ns)
+        this, trusted = (echo.sequence, echo.put_ns), state.offset_bound_ns >= 0
+        put_ns = echo.put_ns - state.master_offset_ns
+        # a state may tell that it was accepted, and only the next that it was written
+        if trusted and echo.written_ns and this != self._written:
+            self._written = this
+            self._written_ms.append(to_ms(echo.written_ns - put_ns))
+        if this == self._echoed:
+            return
+        self._echoed = this
         self.accepted_ns = arrived_ns
-        if state.offset_bound_ns >= 0:
-            put_ns = echo.put_ns - state.master_offset_ns
+        if trusted:
             self._one_way_ms.append(to_ms(echo.received_ns - put_ns))
             self._age_max_ms = np.fmax(self._age_max_ms, to_ms(echo.accepted_ns - put_ns))
             self._row["offset_bound_ms"] = to_ms(state.offset_bound_ns)
@@ -164,7 +173,10 @@ class Watch:
             row["one_way_p50_ms"] = float(np.median(self._one_way_ms))
             row["one_way_max_ms"] = max(self._one_way_ms)
             row["age_max_ms"] = float(self._age_max_ms)
-        self._row, self._one_way_ms, self._age_max_ms = {}, [], float("nan")
+        if self._written_ms:
+            row["written_p50_ms"] = float(np.median(self._written_ms))
+        self._row, self._one_way_ms, self._written_ms = {}, [], []
+        self._age_max_ms = float("nan")
         return row
 
     # the moment

@@ -18,7 +18,7 @@ PROCESSES = ["master", "slave", "recorder", "soak"]
 Make = Callable[..., Seen]
 
 FAULT = {
-    "fault": "master-kill", "number": 0, "holds": True, "heard": True, "flow_limit_s": 15.0,
+    "fault": "master-kill", "number": 0, "holds": True, "heard": True, "begun_s": 100.0, "flow_limit_s": 15.0,
 }  # fmt: skip
 RECOVERED = {
     **FAULT, "held_s": 0.22, "stands_s": 0.4, "done": True, "flow_s": 4.0, "ready_s": 4.1, "track_s": 3.0,

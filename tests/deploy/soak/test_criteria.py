@@ -107,6 +107,14 @@ def test_times_after_a_fault_are_judged_at_their_limits(
     assert failing(make(events=retold(**{key: limit + 0.001}))) == {name}
 
 
+def test_a_stall_of_the_host_is_taken_off_what_the_robot_took(make: Make) -> None:
+    slow = retold(held_s=HOLD_S + 0.1)
+    inside = Event(101.0, "still", {"from_s": 100.1, "still_ms": 120.0})
+    before = Event(99.0, "still", {"from_s": 99.0, "still_ms": 120.0})
+    assert failing(make(events=(*slow, inside))) == set()
+    assert failing(make(events=(*slow, before))) == {"guard: holds on a fault, the slowest"}
+
+
 @pytest.mark.parametrize("key", ["held_s", "stands_s", "flow_s"])
 def test_what_should_have_come_and_did_not_fails(make: Make, key: str) -> None:
     assert len(failing(make(events=retold(**{key: None})))) == 1

@@ -64,6 +64,17 @@ def test_each_command_s_way_is_counted_once_and_by_the_offset(heard: Heard) -> N
     assert heard.watch.row()["one_way_n"] == 0.0
 
 
+def test_the_way_to_the_servo_is_counted_once_it_is_written(heard: Heard) -> None:
+    accepted = echo(1, NS_PER_S, 2 * NS_PER_MS)
+    written = replace(accepted, written_ns=NS_PER_S + 5 * NS_PER_MS)
+    heard.state(echo=accepted)
+    assert "written_p50_ms" not in heard.watch.row()
+    for _ in range(2):
+        heard.state(echo=written)
+    row = heard.watch.row()
+    assert (row["written_p50_ms"], row["one_way_n"]) == (5.0, 0.0)
+
+
 def test_an_offset_that_is_not_trusted_measures_nothing(heard: Heard) -> None:
     heard.state(echo=echo(1, NS_PER_S, NS_PER_MS), offset_bound_ns=-1)
     assert heard.watch.row()["one_way_n"] == 0.0
