@@ -13,6 +13,7 @@ from typing import Any
 
 from common.clock import monotonic_ns, to_s
 from common.config import LinkConfig
+from common.errors import TandemError
 from deploy.rig.child import Child
 
 NAME = "recorder"
@@ -35,7 +36,7 @@ class Recorder:
         self._number = 0
         self._said_before = 0
         self.file = folder / "none.mcap"
-        self.disk = _SmallDisk(folder / "full")
+        self.disk = SmallDisk(folder / "full")
 
     async def start(self, through: Sequence[str] = (), folder: Path | None = None) -> None:
         """Record into a new file."""
@@ -89,7 +90,7 @@ def _toml(link: LinkConfig) -> str:
     return tomlkit.dumps({"link": tree})
 
 
-class _SmallDisk:
+class SmallDisk:
     """A file system of its own where the host permits it, else a limit on the size of the process's files."""
 
     def __init__(self, folder: Path) -> None:
@@ -97,7 +98,7 @@ class _SmallDisk:
         self._mounted = False
 
     async def make(self) -> tuple[Path, tuple[str, ...], str]:
-        """Where to write, what to run the process through, and in words what it is."""
+        """Where to write, what to run the process through, and in words what it is. Raises TandemError."""
         self._folder.mkdir(exist_ok=True)
         size = f"size={FULL_BYTES // 1024}k"
         if await _succeeds("mount", "-t", "tmpfs", "-o", size, "tmpfs", str(self._folder)):
@@ -106,7 +107,7 @@ class _SmallDisk:
         if shutil.which("prlimit"):
             limit = ("prlimit", f"--fsize={FULL_BYTES}", "--")
             return self._folder, limit, f"a limit of {FULL_BYTES // 1024} KiB a file (nothing may be mounted)"
-        return self._folder, (), ""
+        raise TandemError("a disk cannot be filled here: nothing may be mounted, and there is no `prlimit`")
 
     async def remove(self) -> None:
         """May be called at any time."""
