@@ -17,6 +17,7 @@ from common.runtime import run as run_until_stopped
 from common.runtime import until_stopped
 
 if TYPE_CHECKING:
+    from deploy.soak.events import Event
     from deploy.soak.judge import Judged
     from deploy.soak.options import SoakOptions
 
@@ -93,6 +94,14 @@ def _tell(judged: Judged, folder: Path | None, console: Console) -> None:
         raise TandemError("the soak failed: " + "; ".join(f"{v.group}: {v.name}" for v in wrong))
 
 
+def _say(event: Event, console: Console) -> None:
+    """In a log file, where no table is redrawn, each fault and what came of it is a line."""
+    from deploy.soak.view import HIDDEN, line
+
+    if not console.is_terminal and event.kind not in HIDDEN:
+        console.print(line(event))
+
+
 async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console: Console) -> None:
     """Run it; whatever happens, its files are whole and say how it ended."""
     from rich.live import Live
@@ -115,7 +124,7 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
         log: SoakLog | None = None
         watch = Watch(rig.skeleton, lambda kind, what: log.tell(kind, what) if log else None)
         stage = Stage(rig, watch, lambda kind, what: log.tell(kind, what) if log else None)
-        log = SoakLog(folder, [*stage.names, SOAK])
+        log = SoakLog(folder, [*stage.names, SOAK], on_event=lambda event: _say(event, console))
         stack.callback(log.close)
         watch.listen(rig.link())
         how, error = "interrupted", False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,15 @@ SHOWN = 8
 class SoakLog:
     """Writes as it goes, and keeps nothing but the newest few events."""
 
-    def __init__(self, folder: Path, processes: Iterable[str], clock: Clock = monotonic_ns) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        processes: Iterable[str],
+        clock: Clock = monotonic_ns,
+        on_event: Callable[[Event], None] = lambda _: None,
+    ) -> None:
         self._clock = clock
+        self._on_event = on_event
         self._begun_ns = clock()
         self._events = EventFile(folder)
         self._samples = SampleFile(folder, processes)
@@ -42,6 +49,7 @@ class SoakLog:
         self._events.add(event)
         self.newest.append(event)
         self.counts[kind] = self.counts.get(kind, 0) + 1
+        self._on_event(event)
 
     def sample(self, row: Mapping[str, float | str]) -> None:
         """The figures of the last second."""

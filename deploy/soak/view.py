@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from deploy.soak.stage import Stage
 
 STYLES = {Status.PASS: "green", Status.FAIL: "bold red", Status.NOT_JUDGED: "yellow"}
-_HIDDEN = ("begin", "started", "guard", "lease", "joints", "undone", "still")
+HIDDEN = ("begin", "started", "guard", "lease", "joints", "undone", "still")
 """Events that say little to who watches."""
 
 
@@ -39,7 +39,7 @@ def draw(progress: Progress, stage: Stage, log: SoakLog, row: Mapping[str, float
     for name in [*stage.names, "soak"]:
         figures = [_figure(row, f"{name}_{what}") for what in ("life", "rss_mb", "fds", "threads")]
         table.add_row(name, *figures)
-    newest = [_line(event) for event in log.newest if event.kind not in _HIDDEN]
+    newest = [line(event) for event in log.newest if event.kind not in HIDDEN]
     return Group(_bar(progress, log.now_s), head, table, *newest[-4:])
 
 
@@ -60,7 +60,8 @@ def _bar(progress: Progress, now_s: float) -> RenderableType:
     return line
 
 
-def _line(event: Event) -> Text:
+def line(event: Event) -> Text:
+    """One event, as a line."""
     what = ", ".join(
         f"{key} {value}" for key, value in event.what.items() if value not in (None, "", False, True)
     )
