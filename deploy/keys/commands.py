@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -13,9 +13,10 @@ from rich.table import Table
 from rich.text import Text
 
 from common.roles import Role, role_of
-from deploy.keys import AUTHORITY
-from deploy.keys.folder import KeysError, Shown, read_authority, shown, stem, write_pair
-from deploy.keys.make import new_authority, new_identity
+from deploy.keys import AUTHORITY, KeysError
+
+if TYPE_CHECKING:
+    from deploy.keys.folder import Shown
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -37,6 +38,10 @@ def authority(
 
     Example: `tandem keys authority keys --name "Clinic North"`
     """
+    # cryptography takes a tenth of a second to load, for which an e-stop must not wait
+    from deploy.keys.folder import write_pair
+    from deploy.keys.make import new_authority
+
     if not 1 <= len(name) <= 64:
         raise KeysError(f"--name {name!r}: expected 1 to 64 characters")
     made = new_authority(name, datetime.now(UTC), timedelta(days=days))
@@ -64,6 +69,9 @@ def make(
 
     Example: `tandem keys make keys robot:robot-1 --host 192.168.7.2 --host robot-1.local`
     """
+    from deploy.keys.folder import read_authority, stem, write_pair
+    from deploy.keys.make import new_identity
+
     role, name = _role_and_name(who)
     try:
         made = new_identity(
@@ -93,6 +101,8 @@ def show(
 
     Example: `tandem keys show keys`
     """
+    from deploy.keys.folder import shown
+
     now = datetime.now(UTC)
     found = list(shown(paths))
     if as_json:

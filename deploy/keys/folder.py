@@ -18,15 +18,11 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import NameOID
 
-from common.errors import LinkError, TandemError
+from common.errors import LinkError
 from common.link.certificates import read_certificate
 from common.roles import Role
-from deploy.keys import AUTHORITY
+from deploy.keys import AUTHORITY, KeysError
 from deploy.keys.make import Pair
-
-
-class KeysError(TandemError):
-    """Keys that cannot be made, written or read."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,8 @@ from common.link.certificates import check_tls
 from common.link_config import TlsConfig
 from common.roles import Role
 from deploy.cli import app
-from deploy.keys.folder import KeysError, read_authority, shown, stem, write_pair
+from deploy.keys import KeysError
+from deploy.keys.folder import read_authority, shown, stem, write_pair
 from deploy.keys.make import CLOCKS_APART, Pair, new_authority, new_identity
 
 NOW = datetime(2030, 1, 1, tzinfo=UTC)
