@@ -15,6 +15,7 @@ import uvloop
 
 from common.config import LinkConfig
 from common.endpoint import SECURE, TRANSPORTS
+from common.link.listening import hear_refusals
 from common.link_config import AccessConfig
 from common.roles import Role
 from deploy.bench.link import ROBOT, Stagger, echo_link, echo_zenoh, ping_link, ping_zenoh, ratio
@@ -32,6 +33,7 @@ def transports(seconds: float) -> dict[str, Any]:
         folder = Path(name)
         ends = {BARE: local_endpoints("tcp", folder).robots[0]}
         for transport in TRANSPORTS:
+            (folder / transport).mkdir()
             ends[transport] = local_endpoints(transport, folder / transport).robots[0]
         make_keys(folder, ends.values(), [ROBOT])
         with beside("transports:echo", ends=ends, keys=str(folder / "keys")):
@@ -49,11 +51,13 @@ def transports(seconds: float) -> dict[str, Any]:
 
 def ping(seconds: float, ends: dict[str, str], keys: str) -> dict[str, Any]:
     """The side that asks and takes the time."""
+    hear_refusals()  # as the services do
     return uvloop.run(_ping(seconds, ends, Path(keys)))
 
 
 def echo(ends: dict[str, str], keys: str) -> None:
     """The side that returns whatever comes, until killed."""
+    hear_refusals()
     uvloop.run(_echo(ends, Path(keys)))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from common.endpoint import SECURE, transport_of
 from common.link_config import TlsConfig
 from common.roles import Role
 from deploy.keys import AUTHORITY
@@ -24,7 +25,8 @@ def make_keys(folder: Path, endpoints: Iterable[str], robots: Sequence[str]) -> 
     now = datetime.now(UTC)
     authority = new_authority("rig", now, VALID)
     write_pair(keys, AUTHORITY, authority)
-    hosts = sorted({each.partition("/")[2].rpartition(":")[0] for each in endpoints})
+    secure = [each for each in endpoints if transport_of(each) in SECURE]
+    hosts = sorted({each.partition("/")[2].rpartition(":")[0] for each in secure})
     people = [(Role.ROBOT, robot) for robot in robots]
     people += [(Role.OPERATOR, MASTER), (Role.ROUTER, ROUTER)]
     for role, name in people:

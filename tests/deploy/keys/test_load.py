@@ -5,6 +5,6 @@ import sys
 
 
 def test_the_command_line_starts_without_cryptography() -> None:
-    program = "import sys, deploy.cli; print([name for name in sys.modules if name.startswith('cryptography')])"
+    program = "import sys, deploy.cli; print([m for m in sys.modules if m.startswith('cryptography')])"
     said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
