@@ -18,7 +18,9 @@ class Audit:
     """Make it before the session opens, and `attach` it after. Without [link.tls] it hears nothing."""
 
     def __init__(self, link: LinkConfig) -> None:
-        self._refusals: Refusals | None = hear_refusals() if link.tls else None
+        # who only connects lets nobody in: it need not pay for hearing of each message
+        guards = bool(link.listen)
+        self._refusals: Refusals | None = hear_refusals(messages=guards) if link.tls else None
         self._known = named(link.access) if link.access else None
         self._here: Counter[str] = Counter()
         self._connections: Counter[str] = Counter()

@@ -18,8 +18,10 @@ REPEAT_S = 10.0
 """What keeps being refused is said once in so long."""
 MAX_KINDS = 256
 """Different refusals that are told apart; what comes beyond is counted together."""
-FILTER = "error,zenoh_link_tls=warn,zenoh_link_commons=warn,zenoh::net::routing::interceptor=trace"
-"""What Zenoh must log for it."""
+HANDSHAKES = "error,zenoh_link_tls=warn,zenoh_link_commons=warn"
+"""What Zenoh must log to tell refused handshakes."""
+MESSAGES = f"{HANDSHAKES},zenoh::net::routing::interceptor=trace"
+"""And to tell refused messages too: a line for each that passes, some 20 µs on its way."""
 
 _HANDSHAKE = (
     re.compile(r"zenoh_link_tls::unicast: (?P<why>.+?)\.? Hint: "),
