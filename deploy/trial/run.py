@@ -14,7 +14,7 @@ from deploy.trial.cell import Cell, Status
 from deploy.trial.figures import BY_NAME, printed
 from deploy.trial.folder import Folder
 from deploy.trial.plan import CellKey, Plan
-from deploy.trial.progress import Progress, draw
+from deploy.trial.progress import Progress, clock, draw
 
 Tell = Callable[[str], None]
 RunCell = Callable[[Plan, CellKey, asyncio.Event, Tell], Awaitable[Cell]]
@@ -33,6 +33,9 @@ async def run_trial(
     folder.begin(plan)
     todo = missing(plan, folder)
     progress = Progress(plan, len(todo), skipped=len(plan.cells()) - len(todo))
+    if todo:
+        about = clock(progress.left_s(monotonic_ns()))
+        console.print(f"{len(todo)} of {len(plan.cells())} cells to run, about {about}", highlight=False)
     with Live(
         console=console, refresh_per_second=4, transient=True,
         get_renderable=lambda: draw(progress, monotonic_ns()),

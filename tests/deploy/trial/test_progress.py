@@ -89,6 +89,7 @@ def test_a_cell_that_fails_stops_nothing_and_is_tried_again_next_time(tmp_path: 
     assert progress.done == len(ran) == 8
     assert progress.failed == 1
     assert "so it was" in said
+    assert "8 of 8 cells to run, about 6:56" in said
     _, again, _ = run(plan, folder, {})
     assert again == [ran[1]]
 
