@@ -13,6 +13,10 @@ BRAKED_S = 0.3
 AT_ONCE_S = 0.01
 """The next step but one."""
 ENGAGE = "Remove the cause, then engage; the robot goes slowly to the operator's posture."
+SWITCH_ON = (
+    "Remove the cause. Drives that stopped by themselves are switched on by an emergency stop and its reset "
+    "with the key, or by starting the robot's program anew; then engage."
+)
 NOTHING = "Nothing."
 
 LINK = (
@@ -201,7 +205,7 @@ ROBOT = (
         "No reading comes from the drives, and no setpoint gets to them.",
         Reaction.HOLDS,
         "The drives hold their last setpoint, and stop by themselves when they miss the robot's heartbeat.",
-        ENGAGE,
+        SWITCH_ON,
         body.drive_bus_off,
         reacts_s=0.11, stands_s=0.11 + BRAKED_S, held_by=frozenset({"encoder"}),
     ),
@@ -210,7 +214,7 @@ ROBOT = (
         "The drive of a moving joint reports over-current and stands still.",
         Reaction.HOLDS,
         "Brakes all joints and stands; names the joint and what its drive says.",
-        ENGAGE,
+        SWITCH_ON,
         body.drive_fault,
         reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by=frozenset({"drive"}),
     ),
