@@ -99,7 +99,7 @@ def _say(event: Event, console: Console) -> None:
     from deploy.soak.view import HIDDEN, line
 
     if not console.is_terminal and event.kind not in HIDDEN:
-        console.print(line(event))
+        console.print(line(event), soft_wrap=True)
 
 
 async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console: Console) -> None:

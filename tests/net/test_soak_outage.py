@@ -1,0 +1,33 @@
+"""A soak between two hosts whose link goes away: the robot holds, and moves again only once it is engaged."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from deploy.soak.events import of_kind, read_events
+
+
+@pytest.mark.timeout(200)
+def test_an_outage_stops_the_robot_and_its_end_starts_the_commands_only(tmp_path: Path) -> None:
+    report = tmp_path / "report"
+    options = ["--duration", "40s", "--every", "12", "--faults", "outage", "--profile", "4g"]
+    soak = [sys.executable, "-m", "deploy", "soak", *options, "--report", str(report)]
+    ended = subprocess.run(soak, capture_output=True, text=True, timeout=180, check=False)
+    said = ended.stdout + ended.stderr
+    outages = [event.what for event in of_kind(read_events(report), "recovered") if event.what["fault"]]
+    assert outages, said
+    for outage in outages:
+        assert outage["done"], said
+        assert outage["held_s"] is not None, said
+        assert outage["engaged"] >= 1, said
+    judged = {c["name"]: c for c in json.loads((report / "report.json").read_text())["criteria"]}
+    assert judged["began to move without being engaged"]["status"] == "pass", said
+    assert judged["moved while it held"]["status"] == "pass", said
+    # nothing old is acted on: what was under way when the link went away is refused, or young enough
+    assert judged["oldest that was acted on"]["status"] == "pass", said
+    assert max(event.at_s for event in read_events(report)) < 120.0
