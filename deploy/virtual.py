@@ -18,6 +18,8 @@ from common.control import CHALLENGED
 from common.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState
 from common.offset import MasterExchange
 from deploy.judge import Trace
+from deploy.network.profile import Profile
+from deploy.network.profile import Way as Direction
 from deploy.profiles import NURSING, example
 from deploy.troubles import Troubles, Way
 from deploy.virtual_link import VirtualLink
@@ -51,11 +53,10 @@ class World:
     """The slave's clock minus the master's at the start."""
     slave_drift_ppm: float = 20.0
     one_way_ns: int = 2 * NS_PER_MS
-    jitter_ns: int = 0
-    """Standard deviation of the way's time."""
-    loss: float = 0.0
-    """Share of the messages that never arrive."""
-    link_seed: int = 1
+    """Of a link that neither loses nor delays anything more; used where there is no `network`."""
+    network: Profile | None = None
+    """How the link behaves, as over an emulated network. Its outages are not played."""
+    network_seed: int = 1
     profile: str = NURSING
     motion: Motion | None = None
     """Of the operator, instead of the one that the suit's file names."""
@@ -69,7 +70,8 @@ class VirtualRun:
     def __init__(self, world: World) -> None:
         self._world = world
         self.troubles = Troubles()
-        self._link = VirtualLink(world.one_way_ns, world.jitter_ns, world.loss, world.link_seed)
+        network = world.network or Profile(both=Direction(delay_ms=world.one_way_ns / NS_PER_MS))
+        self.link = VirtualLink(network, world.network_seed, self._at)
         self.master_config = _load(MasterConfig, "master", world)
         self.robot = self.master_config.commanded[0]
         self.slave_config = _load(SlaveConfig, "slave", world)
@@ -173,10 +175,17 @@ class VirtualRun:
         self.slave.on_command(payload, self.slave_ns, self.slave_ns)
 
     def _carry(self, way: Way, payload: bytes, arrive: Callable[[bytes], None], after_ns: int = 0) -> None:
-        for later_ns, arrived in self.troubles.carry(way, payload):
-            arrival_ns = self._link.arrival_ns(way, self.now_ns + after_ns)
-            if arrival_ns is not None:
-                self._at(arrival_ns + later_ns, partial(arrive, arrived))
+        for later_ns, carried in self.troubles.carry(way, payload):
+            arrived = partial(arrive, carried)
+            if later_ns:
+                arrived = partial(self._after, later_ns, arrived)
+            self._at(self.now_ns + after_ns, partial(self._send, way, len(carried), arrived))
+
+    def _send(self, way: Way, size: int, arrived: Callable[[], None]) -> None:
+        self.link.send(way, self.now_ns, size, arrived)
+
+    def _after(self, later_ns: int, event: Callable[[], None]) -> None:
+        self._at(self.now_ns + later_ns, event)
 
     def _drive(self) -> None:
         now_ns = self.slave_ns

@@ -1,42 +1,50 @@
-"""The link of the virtual world: delay, jitter and loss, each flow in its own order."""
+"""The link of the virtual world: the same packets' fates as over an emulated network, without the packets."""
 
 from __future__ import annotations
 
-import math
-import random
+from collections.abc import Callable
 
+from deploy.network.profile import Profile
+from deploy.network.scheduler import PacketScheduler
 from deploy.troubles import Way
 
-_SKEW = 0.8
-"""Of the logarithm: queues make a few packets much later than most. The least delay lies 1.1 jitters below
-the mean."""
+TO_ROBOT = (Way.COMMAND, Way.QUERY)
+At = Callable[[int, Callable[[], None]], None]
+"""Lets something happen at a time, ns."""
 
 
 class VirtualLink:
-    """Says when a message that is sent now arrives, if it does.
+    """Carries each message when the profile says so, if it does; each is one packet of its own size."""
 
-    The delay of each message is drawn anew from a shifted log-normal distribution of mean `delay_ns` and
-    standard deviation `jitter_ns`: harder than a real link, whose delay wanders. What would overtake an
-    earlier message of its flow arrives with it, as over TCP or one QUIC stream.
-    """
+    def __init__(self, profile: Profile, seed: int, at: At) -> None:
+        """`at` is how the world is told of what happens later."""
+        ways = profile.ways
+        self._to_robot: PacketScheduler[Callable[[], None]] = PacketScheduler(ways.to_robot, 2 * seed)
+        self._to_operator: PacketScheduler[Callable[[], None]] = PacketScheduler(
+            ways.to_operator, 2 * seed + 1
+        )
+        self._at = at
 
-    def __init__(self, delay_ns: int, jitter_ns: int = 0, loss: float = 0.0, seed: int = 1) -> None:
-        self._delay_ns = delay_ns
-        self._loss = loss
-        self._random = random.Random(seed)
-        mean = math.exp(0.5 * _SKEW**2)
-        self._scale_ns = jitter_ns / (mean * math.sqrt(math.expm1(_SKEW**2)))
-        self._floor_ns = delay_ns - self._scale_ns * mean
-        self._newest_ns: dict[Way, int] = {}
+    def set(self, profile: Profile, now_ns: int) -> None:
+        """From now on behave so; what is under way arrives as it would have."""
+        ways = profile.ways
+        self._to_robot.set(ways.to_robot, now_ns)
+        self._to_operator.set(ways.to_operator, now_ns)
 
-    def arrival_ns(self, way: Way, sent_ns: int) -> int | None:
-        """When a message arrives that is sent at `sent_ns`; None where it is lost."""
-        if self._loss and self._random.random() < self._loss:
-            return None
-        delay_ns = self._delay_ns
-        if self._scale_ns:
-            drawn_ns = self._floor_ns + self._scale_ns * math.exp(self._random.gauss(0.0, _SKEW))
-            delay_ns = max(round(drawn_ns), 0)
-        arrival_ns = max(sent_ns + delay_ns, self._newest_ns.get(way, 0))
-        self._newest_ns[way] = arrival_ns
-        return arrival_ns
+    def send(self, way: Way, now_ns: int, size: int, arrive: Callable[[], None]) -> None:
+        """Take a message of `size` bytes; `arrive` is called when it does."""
+        direction = self._to_robot if way in TO_ROBOT else self._to_operator
+        direction.push(now_ns, arrive, size)
+        self._await(direction)
+
+    def _await(self, direction: PacketScheduler[Callable[[], None]]) -> None:
+        due_ns = direction.next_ns
+        if due_ns is not None:
+            self._at(due_ns, lambda: self._deliver(direction, due_ns))
+
+    def _deliver(self, direction: PacketScheduler[Callable[[], None]], now_ns: int) -> None:
+        arrived = direction.due(now_ns)
+        for arrive in arrived:
+            arrive()
+        if arrived:
+            self._await(direction)

@@ -10,6 +10,11 @@ from common.quaternion import Array
 Course = Array
 """(2, J): position, rad, and velocity, rad/s, of a motion at one instant."""
 
+_LARGE_RAD = 0.25
+"""A difference larger than this, as after a loss, takes longer in proportion: no joint is rushed by it."""
+_LONGEST = 5.0
+"""At most so many times as long."""
+
 
 class Blend:
     """The difference old minus new course at a change, led to zero by a cubic within `duration_s`.
@@ -19,7 +24,7 @@ class Blend:
     """
 
     def __init__(self, duration_s: float) -> None:
-        self._duration_s = duration_s
+        self._duration_s = self._total_s = duration_s
         self._began_ns = 0
         self._difference: Course | None = None
 
@@ -31,12 +36,14 @@ class Blend:
         """The course changes from `old`, which holds what was left until now, to `new`."""
         self._began_ns = now_ns
         self._difference = old - new
+        largest = float(np.abs(self._difference[0]).max())
+        self._total_s = self._duration_s * min(max(largest / _LARGE_RAD, 1.0), _LONGEST)
 
     def applied(self, now_ns: int, course: Course) -> Course:
         """The new course with what is left of the difference."""
         if self._difference is None:
             return course
-        total_s = self._duration_s
+        total_s = self._total_s
         x = to_s(now_ns - self._began_ns) / total_s
         if x >= 1.0:
             self._difference = None

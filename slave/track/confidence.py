@@ -58,7 +58,8 @@ class Confidence:
             self._past.append(estimate)
 
     @property
-    def share(self) -> Array | float:
-        """(J,)."""
+    def share(self) -> Array:
+        """(J,); one for all before anything is proved."""
         d = _DOUBT_RAD**2
-        return np.clip((self._agreed + d) / (self._foretold + d), 0.0, 1.0)
+        out: Array = np.minimum(np.maximum((self._agreed + d) / (self._foretold + d), 0.0), 1.0)
+        return out

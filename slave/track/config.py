@@ -29,8 +29,9 @@ class TrackConfig(Section):
     max_horizon_s: float = Field(default=0.5, gt=0.0, le=2.0)
     """`predict`: age of a sample, servo lag included, at which it moves nothing any more. The horizon itself
     follows the measured delay and jitter; this is the most that it may become, coasting to rest included."""
-    jitter_margin_s: float = Field(default=0.01, ge=0.0, le=0.5)
-    """`interpolate`: how much later than usual a sample may arrive and still find the robot moving."""
+    jitter_margin_s: float = Field(default=0.005, ge=0.0, le=0.5)
+    """`interpolate`: how much later than usual a sample may arrive at least and still find the robot moving;
+    with more jitter than this the margin is the jitter, as measured."""
 
 
 def make_tracker(config: TrackConfig, bus_lag_s: float = 0.0) -> Tracker:

@@ -9,14 +9,13 @@ import numpy as np
 from common.clock import to_ns, to_s
 from common.quaternion import Array
 from slave.track.blend import Blend, Course, coast
+from slave.track.lateness import Lateness
 from slave.track.tracker import Target
 
 _KEPT = 4
 """Segments remembered. The newest is played, or an older one where a slow link has suddenly become fast."""
-_DELAY_GAIN = 0.1
-"""Share of a new measurement of the delay that is believed: ten periods or so to follow a change."""
-_MOST_GROWTH = 1.5
-"""A sample later than this many delays is one that followed a lost one: it counts as just so late."""
+_GAIN = 0.03
+"""Share of a new measurement of the delay that is believed. Slow: a delay that changes is itself a motion."""
 _RUN_OUT_S = 0.08
 """With no sample ahead the motion slows to rest within this time."""
 
@@ -36,7 +35,9 @@ class Interpolate:
 
     Between two samples runs the cubic with their positions and velocities (Hermite), at the time
     `now - delay`. A segment may be played once its end has arrived: one period and one transit after
-    its start. That is measured as arrival minus the capture of the sample before, smoothed.
+    its start. That is measured as arrival minus the capture of the sample before; the delay is its mean and
+    its mean deviation, as for voice (Ramjee, Kurose, Towsley and Schulzrinne, INFOCOM 1994, with 1 deviation
+    in place of 4: what comes later is bridged by coasting, not lost), and at least the margin.
     """
 
     def __init__(self, blend_s: float, jitter_margin_s: float) -> None:
@@ -45,18 +46,18 @@ class Interpolate:
         self._newest_ns = 0
         self._newest: Course | None = None
         self._segments: list[_Segment] = []
-        self._wait_s: float | None = None
+        self._lateness = Lateness(_GAIN, _GAIN)
 
     @property
     def delay_s(self) -> float:
         """How late the samples are played, from their capture on."""
-        return (self._wait_s or 0.0) + self._margin_s
+        return (self._lateness.mean_s or 0.0) + max(self._margin_s, self._lateness.spread_s)
 
     def reset(self) -> None:
         """Forget every sample, and how long they took."""
         self._newest = None
         self._segments = []
-        self._wait_s = None
+        self._lateness.reset()
         self._blend.reset()
 
     def accept(self, sampled_ns: int, now_ns: int, position_rad: Array, velocity_rad_s: Array) -> None:
@@ -67,7 +68,7 @@ class Interpolate:
         sample = np.stack([position_rad, velocity_rad_s])
         if before is not None:
             old = self._blend.applied(now_ns, self._course(before, now_ns))
-            self._measure(to_s(now_ns - before_ns))
+            self._lateness.note(to_s(now_ns - before_ns))
             segment = _Segment(before_ns, sampled_ns, np.concatenate([before, sample]))
             self._segments = [*self._segments, segment][-_KEPT:]
         self._newest, self._newest_ns = sample, sampled_ns
@@ -80,12 +81,6 @@ class Interpolate:
             return None
         course = self._blend.applied(now_ns, self._course(self._newest, now_ns))
         return Target(course[0], course[1])
-
-    def _measure(self, wait_s: float) -> None:
-        if self._wait_s is None:
-            self._wait_s = wait_s
-        else:
-            self._wait_s += _DELAY_GAIN * (min(wait_s, _MOST_GROWTH * self._wait_s) - self._wait_s)
 
     def _course(self, newest: Course, now_ns: int) -> Course:
         play_ns = now_ns - to_ns(self.delay_s)

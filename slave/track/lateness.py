@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-_MEAN_GAIN = 0.125
-_SPREAD_GAIN = 0.25
 _SPREADS = 4.0
 _LOST = 2.0
 """An age of more than this many usual ones tells of a loss: it counts as just so much."""
@@ -13,10 +11,13 @@ class Lateness:
     """Age that the newest sample reaches before the next one replaces it: a transit and a period.
 
     Mean and mean deviation follow each measurement m as a TCP sender's round trip time does (Jacobson and
-    Karels 1988; RFC 6298):  d += ¼ (|m - mean| - d),  mean += ⅛ (m - mean);  late is  mean + 4 d.
+    Karels 1988; RFC 6298, with its gains as the defaults):
+
+        d += g_d (|m - mean| - d),   mean += g (m - mean),   late = mean + 4 d
     """
 
-    def __init__(self) -> None:
+    def __init__(self, mean_gain: float = 0.125, spread_gain: float = 0.25) -> None:
+        self._mean_gain, self._spread_gain = mean_gain, spread_gain
         self.mean_s: float | None = None
         """None before the second sample."""
         self.spread_s = 0.0
@@ -33,8 +34,8 @@ class Lateness:
             self.mean_s = age_s
             return
         surprise_s = min(age_s, _LOST * self.mean_s) - self.mean_s
-        self.spread_s += _SPREAD_GAIN * (abs(surprise_s) - self.spread_s)
-        self.mean_s += _MEAN_GAIN * surprise_s
+        self.spread_s += self._spread_gain * (abs(surprise_s) - self.spread_s)
+        self.mean_s += self._mean_gain * surprise_s
 
     @property
     def late_s(self) -> float:

@@ -16,6 +16,9 @@ _LEAST_FULL_S = 0.15
 """Followed at full rate up to this age at least, servo lag included; while nothing is measured up to this."""
 _BRAKE_S = 0.15
 """Beyond the horizon it slows to rest within this time."""
+_FARTHEST_RAD = 0.4
+"""No joint is foretold to go farther than this within the horizon, whatever its velocity: within the guard's
+`jump_window_rad`, beyond which all joints come back slowly."""
 
 
 class Predict:
@@ -82,6 +85,8 @@ class Predict:
         self._confidence.note(estimate)
         self._believed = estimate.motion.copy()
         self._believed[1:] *= self._confidence.share
+        foretold = np.abs(relaxed(self.horizon_s)[0, 1:] @ self._believed[1:])
+        self._believed[1:] *= _FARTHEST_RAD / np.maximum(foretold, _FARTHEST_RAD)
 
     def _course(self, estimate: Estimate, now_ns: int) -> Course:
         age_s = to_s(now_ns - estimate.sampled_ns) + self._servo_lag_s

@@ -7,38 +7,17 @@ import pytest
 
 from common.codec import encode
 from common.messages import Action
-from deploy.judge import Motion, accuracy, motion
+from deploy.following import engaged, follow
+from deploy.judge import Motion, accuracy
 from deploy.judge.paper import ETA_PERCENT, TABLE_1
 from deploy.virtual import VirtualRun, World
 
 
-def engaged(world: World) -> VirtualRun:
-    run = VirtualRun(world)
-    run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
-    run.run(1.0)
-    reply = run.ask(Action.ENGAGE)
-    assert reply.done, reply.text
-    run.run(15.0, until=lambda: run.slave.guard.state == "track")
-    assert run.slave.guard.state == "track", run.slave.guard.reason
-    return run
-
-
-def moved(strategy: str, seconds: float) -> Motion:
-    run = engaged(World(overrides={"slave": [f'track.strategy="{strategy}"']}))
-    run.run(seconds)
-    assert not run.slave.guard.counters.doubts
-    judged = motion(run.trace.truth(), on_masters_clock(run), run.trace.joint_names)
-    assert judged is not None
-    return judged
-
-
-def on_masters_clock(run: VirtualRun):
-    """The encoders' stamps on the suit's clock, which is the master's."""
-    for state in run.states:
-        run.trace.add(state)
-    series = run.trace.moved()
-    offset_ns = run.slave_ns - run.now_ns
-    return type(series)(series.encoder_ns - offset_ns, series.position_rad, series.valid, series.tracking)
+def judged_motion(strategy: str, seconds: float) -> Motion:
+    done = follow(World(), strategy, seconds)
+    assert not done.run.slave.guard.counters.doubts
+    assert done.motion is not None
+    return done.motion
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +75,7 @@ def test_the_setpoint_never_breaks_a_limit(minute: VirtualRun) -> None:
 
 
 def test_prediction_shows_the_patient_a_third_of_holds_error() -> None:
-    hold, predict = moved("hold", 20.0), moved("predict", 20.0)
+    hold, predict = judged_motion("hold", 20.0), judged_motion("predict", 20.0)
     assert predict.rmse_deg <= hold.rmse_deg / 3
     assert predict.lag_ms is not None
     assert abs(predict.lag_ms) <= 25

@@ -9,16 +9,36 @@ MS = 1_000_000
 finite = st.floats(-3.0, 3.0)
 
 
-@given(finite, finite, finite, finite)
+small = st.floats(-0.24, 0.24)
+
+
+@given(small, finite, finite, finite)
 def test_a_change_begins_on_the_old_course_and_ends_on_the_new(
     e: float, r: float, p: float, v: float
 ) -> None:
     blend = Blend(0.08)
-    old, new = np.array([[e], [r]]), np.array([[p], [v]])
+    old, new = np.array([[p + e], [v + r]]), np.array([[p], [v]])
     blend.begin(0, old, new)
     np.testing.assert_allclose(blend.applied(0, new), old, atol=1e-12)
     np.testing.assert_allclose(blend.applied(80 * MS - 1, new), new, atol=1e-5)
     assert blend.applied(80 * MS, new) is new
+
+
+@pytest.mark.parametrize(
+    ("error_rad", "times"), [(0.25, 1.0), (0.5, 2.0), (-0.75, 3.0), (1.25, 5.0), (2.0, 5.0)]
+)
+def test_a_large_difference_takes_longer_in_proportion_up_to_five_times(
+    error_rad: float, times: float
+) -> None:
+    blend, new = Blend(0.08), np.zeros((2, 1))
+    old = np.array([[error_rad], [0.0]])
+    blend.begin(0, old, new)
+    end_ns = round(80 * MS * times)
+    assert abs(blend.applied(end_ns - MS, new)[0, 0]) > 0.0
+    assert blend.applied(end_ns, new) is new
+    blend.begin(0, old, new)
+    fastest = max(abs(blend.applied(k * MS, new)[1, 0]) for k in range(end_ns // MS))
+    assert fastest <= 1.5 * max(0.25, abs(error_rad) / 5) / 0.08 + 1e-9
 
 
 def test_the_velocity_is_the_slope_of_the_position() -> None:

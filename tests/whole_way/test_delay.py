@@ -1,0 +1,96 @@
+"""Over slow networks the robot follows the nurse's now: the whole way on the virtual clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+
+from deploy.following import SLOW, engaged, follow, moved
+from deploy.judge import Motion, motion
+from deploy.network.profile import Profile, Way, load_profile
+from deploy.virtual import VirtualRun, World
+
+ROUND_S = 16.0
+"""Of the operator's motion."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    hold: Motion
+    predict: Motion
+
+    @property
+    def share(self) -> float:
+        return self.predict.rmse_deg / self.hold.rmse_deg
+
+
+@cache
+def pair(profile: str, seed: int) -> Pair:
+    world = World(network=load_profile(profile), network_seed=seed)
+    hold, predict = (follow(world, strategy, ROUND_S).motion for strategy in ("hold", "predict"))
+    assert hold is not None
+    assert predict is not None
+    return Pair(hold, predict)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("profile", "most"), [("4g", 0.4), ("intercontinental", 0.5)])
+def test_the_patient_sees_the_nurses_now(profile: str, most: float, seed: int) -> None:
+    judged = pair(profile, seed)
+    assert judged.share <= most
+    assert judged.predict.roughness is not None
+    assert judged.predict.roughness <= 3.0
+    assert judged.predict.lag_ms is not None
+    assert judged.hold.lag_ms is not None
+    assert abs(judged.predict.lag_ms) <= 0.5 * judged.hold.lag_ms
+
+
+def test_120_ms_with_jitter_and_loss_still_halves_the_error() -> None:
+    far = Profile(both=Way(delay_ms=120.0, jitter_ms=8.0, loss_percent=0.5))
+    world = World(network=far, network_seed=1)
+    hold, predict = (follow(world, strategy, ROUND_S).motion for strategy in ("hold", "predict"))
+    assert hold is not None
+    assert predict is not None
+    assert predict.rmse_deg <= 0.5 * hold.rmse_deg
+    assert predict.roughness is not None
+    assert predict.roughness <= 3.0
+
+
+def plain(delay_ms: float) -> Profile:
+    return Profile(both=Way(delay_ms=delay_ms))
+
+
+@pytest.fixture(scope="module")
+def there_and_back() -> VirtualRun:
+    """30 ms one way, then 150 ms for 8 s, then 30 ms."""
+    run = engaged(World(network=plain(30.0), overrides={"slave": list(SLOW)}))
+    for delay_ms, seconds in ((30.0, 8.0), (150.0, 8.0), (30.0, 8.0)):
+        run.link.set(plain(delay_ms), run.now_ns)
+        run.run(seconds)
+    return run
+
+
+def test_a_delay_that_jumps_and_comes_back_neither_stops_nor_shakes_the_robot(
+    there_and_back: VirtualRun,
+) -> None:
+    run = there_and_back
+    assert run.slave.guard.state == "track", run.slave.guard.reason
+    assert not run.slave.guard.counters.losses
+    assert not run.slave.guard.counters.doubts
+    judged = motion(run.trace.truth(), moved(run), run.trace.joint_names)
+    assert judged is not None
+    assert judged.roughness is not None
+    assert judged.roughness <= 3.0
+
+
+def test_nor_does_it_take_a_setpoint_past_a_limit(there_and_back: VirtualRun) -> None:
+    skeleton = there_and_back.slave_config.skeleton
+    tracked = [s for s in there_and_back.states if s.guard == "track"]
+    setpoints = np.array([s.setpoint_rad for s in tracked])
+    rates = np.abs(np.diff(setpoints, axis=0)) / 0.02
+    assert (rates <= skeleton.max_velocity_rad_s * 1.02 + 1e-3).all()
+    assert (setpoints <= skeleton.upper_rad + 1e-6).all()
+    assert (setpoints >= skeleton.lower_rad - 1e-6).all()
