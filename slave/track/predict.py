@@ -16,7 +16,7 @@ _LEAST_FULL_S = 0.15
 """Followed at full rate up to this age at least, servo lag included; while nothing is measured up to this."""
 _BRAKE_S = 0.15
 """Beyond the horizon it slows to rest within this time."""
-_FARTHEST_RAD = 0.4
+_FARTHEST_RAD = 0.6
 """No joint is foretold to go farther than this within the horizon, whatever its velocity: within the guard's
 `jump_window_rad`, beyond which all joints come back slowly."""
 
