@@ -65,7 +65,7 @@ def plain(delay_ms: float) -> Profile:
 
 @pytest.fixture(scope="module")
 def there_and_back() -> VirtualRun:
-    """30 ms one way, 150 ms for 8 s, then 30 ms. The jump itself is a silence of 200 ms, as two losses are."""
+    """30 ms one way, 150 ms for 8 s, then 30 ms. The jump itself is a silence of 200 ms."""
     slave = [*SLOW, "guard.command_timeout_s=0.4"]
     run = engaged(World(network=plain(30.0), overrides={"slave": slave}))
     for delay_ms, seconds in ((30.0, 8.0), (150.0, 8.0), (30.0, 8.0)):
