@@ -1,0 +1,102 @@
+"""docs/deployment.md done by a machine: keys, a robot's and an operator's host, doctor, engage, stop."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import shutil
+import sys
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common.roles import Role
+from deploy import cli
+from deploy.keys.folder import stem, write_pair
+from deploy.keys.make import new_authority, new_identity
+from deploy.network.namespaces import why_not
+from deploy.network.network import Host, open_network
+from deploy.rig.child import Child
+
+pytestmark = pytest.mark.hosts
+
+DEPLOY = Path(cli.__file__).parent
+TANDEM = [sys.executable, "-m", "deploy"]
+BUS = 'interface="udp_multicast"', 'channel="239.74.163.2"', "options={ port = 43119, hop_limit = 0 }"
+
+
+def a_site(folder: Path, robot_at: str) -> None:
+    """The files of `deploy/examples/site`, with the robot's true address, and the keys that they name."""
+    for file in (DEPLOY / "examples" / "site").glob("*.toml"):
+        (folder / file.name).write_text(file.read_text("utf-8").replace("192.168.7.2", robot_at), "utf-8")
+    shutil.copy(DEPLOY / "suit.dbc", folder)
+    now, valid, keys = datetime.now(UTC), timedelta(days=365), folder / "keys"
+    keys.mkdir()
+    authority = new_authority("test", now, valid)
+    write_pair(keys, "ca", authority)
+    for role, name, hosts in ((Role.ROBOT, "robot-1", [robot_at]), (Role.OPERATOR, "nurse-1", [])):
+        write_pair(keys, stem(role, name), new_identity(authority, role, name, hosts, now, valid))
+
+
+async def tandem(host: Host, *arguments: str) -> tuple[int | None, str]:
+    """Type a command at a host; its status and what it printed."""
+    process = await asyncio.create_subprocess_exec(
+        *host.command([*TANDEM, *arguments]), stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
+    )
+    said, _ = await process.communicate()
+    return process.returncode, said.decode()
+
+
+async def until(reached: Callable[[Any], bool], host: Host, operator: Path) -> Any:
+    """Ask for the robot's status until it is as wanted."""
+    for _ in range(30):
+        _, said = await tandem(host, "status", "--master", str(operator), "--json")
+        status = json.loads(said[: said.rindex("}") + 1])["robot-1"]
+        if reached(status):
+            return status
+    raise AssertionError(f"not reached: {status}")
+
+
+def test_from_keys_to_a_robot_that_follows_in_two_hosts(tmp_path: Path) -> None:
+    reason = why_not()
+    if reason is not None:
+        pytest.skip(reason)
+
+    async def story() -> None:
+        async with open_network("lan") as network:
+            a_site(tmp_path, network.robot.address)
+            operator, overrides = tmp_path / "operator.toml", [f"capture.buses.0.{key}" for key in BUS]
+            at_robot = Child("slave", tmp_path, network.robot.command(TANDEM))
+            at_operator = [
+                Child(role, tmp_path, network.operator.command(TANDEM)) for role in ("suit", "master")
+            ]
+            suit, master = at_operator
+            try:
+                await at_robot.start(tmp_path / "robot.toml", ['camera.source="off"'])
+                await suit.start(
+                    DEPLOY / "examples" / "suit.toml", ["link.connect=[]", *(f"buses.0.{key}" for key in BUS)]
+                )
+                await master.start(operator, overrides)
+                await until(lambda s: s["operator"] == "nurse-1", network.operator, operator)
+
+                overriding = [part for override in overrides for part in ("--set", override)]
+                status, said = await tandem(
+                    network.operator, "doctor", str(operator), "--json", *overriding
+                )  # fmt: skip
+                assert status == 0, said
+                checks = {check["check"]: check for check in json.loads(said)["checks"]}
+                for check in ("certificate's name", "certificate's time", "robot-1", "robot-1: versions"):
+                    assert checks[check]["verdict"] == "ok", checks[check]
+                assert "offset" in checks["robot-1: clock"]["found"]
+
+                status, said = await tandem(network.operator, "engage", "--master", str(operator))
+                assert status == 0, said
+                await until(lambda s: s["guard"] == "track", network.operator, operator)
+            finally:
+                statuses = [await child.stop() for child in (master, suit, at_robot)]
+        assert statuses == [0, 0, 0], at_robot.last_words()
+
+    asyncio.run(story())
