@@ -24,6 +24,8 @@ LOSS_PERCENT = 2.0
 SLOW = ("guard.max_age_s=0.5",)
 """Half a round trip and the bound of the clocks' offset, which is as much, must fit into it."""
 SETTLE_S = 15.0
+PATIENCE_S = 6
+"""Over a slow link it takes some seconds until the clocks' offset is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +42,12 @@ def engaged(world: World) -> VirtualRun:
     run.run(
         10.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease)
     )
-    run.run(1.0)
-    reply = run.ask(Action.ENGAGE)
-    if not reply.done:
+    for _ in range(PATIENCE_S):
+        run.run(1.0)
+        reply = run.ask(Action.ENGAGE)
+        if reply.done:
+            break
+    else:
         raise RuntimeError(reply.text)
     run.run(SETTLE_S, until=lambda: run.slave.guard.state == "track")
     if run.slave.guard.state != "track":
