@@ -99,9 +99,9 @@ def _tell(measured: list[Measured], seconds: float, console: Console) -> None:
     console.print(measured_table(measured))
     by = ", ".join(sorted({each.backend for each in measured}))
     console.print(
-        f"{seconds:g} s at 200 packets/s each way, by the {by}. ±: what chance may do to so short a "
-        f"measurement (three sigma). Red: beyond that, more than {DELAY_MS:g} ms of delay, {LOSS_POINTS:g} "
-        f"points of loss or {RATE_SHARE:.0%} of the rate off.",
+        f"{seconds:g} s at 200 packets/s each way, by the {by}. Red: more than {DELAY_MS:g} ms of delay or "
+        f"{LOSS_POINTS:g} points of loss from what was drawn by chance, or that beyond ± of the profile, or "
+        f"{RATE_SHARE:.0%} of the rate off.",
         style="dim",
         highlight=False,
     )

@@ -43,6 +43,8 @@ class WayMeasured:
     loss_bound_percent: float
     planned_ms: float | None = None
     """Mean of what the emulation drew for these very packets; None where it does not tell."""
+    planned_loss_percent: float | None = None
+    """What the emulation drew to be lost, likewise."""
     rate_mbit: float | None = None
     """What came through when more was sent; None where that was not tried."""
     expected_rate_mbit: float | None = None
@@ -71,8 +73,11 @@ class WayMeasured:
 
     @property
     def loss_kept(self) -> bool:
-        """Within half a point, but for what chance may do."""
-        return abs(self.loss_off_percent) <= LOSS_POINTS + self.loss_bound_percent
+        """Within half a point of what was drawn, which is the profile's but for what chance may do."""
+        if self.planned_loss_percent is None:
+            return abs(self.loss_off_percent) <= LOSS_POINTS + self.loss_bound_percent
+        drawn = abs(self.planned_loss_percent - self.expected_loss_percent) <= self.loss_bound_percent + 1e-9
+        return drawn and abs(self.loss_percent - self.planned_loss_percent) <= LOSS_POINTS
 
     @property
     def rate_kept(self) -> bool:
@@ -119,6 +124,7 @@ def judge(
     size: int,
     seconds: float,
     planned_ms: float | None = None,
+    planned_loss_percent: float | None = None,
 ) -> WayMeasured:
     """From what one end sent and the other noted: number, sent, received. NetworkError where that is none."""
     if not arrivals:
@@ -146,6 +152,7 @@ def judge(
         delay_bound_ms=delay_bound_ms(way, seconds),
         loss_bound_percent=100.0 * loss.bound(sent, SIGMAS),
         planned_ms=None if planned_ms is None else planned_ms + held_ms,
+        planned_loss_percent=planned_loss_percent,
     )
 
 

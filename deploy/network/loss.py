@@ -33,13 +33,23 @@ class GilbertElliott:
         """How far the measured share of so many packets may be from the mean, by chance.
 
         The variance of a mean of correlated draws: their own, and twice the sum of their covariances, which
-        decay by the factor 1 - to_bad - to_good a packet.
+        decay by the factor 1 - to_bad - to_good a packet. That is for many bursts; where there are few, one
+        long burst decides: as long a one as chance makes as seldom is added.
         """
         memory = 1.0 - self.to_bad - self.to_good
         bad = self.share_bad
         between = (self.lost_in_bad - self.lost_in_good) ** 2 * bad * (1.0 - bad)
         variance = self.mean * (1.0 - self.mean) + 2.0 * between * memory / (1.0 - memory)
-        return sigmas * math.sqrt(max(variance, 0.0) / packets) if packets else 1.0
+        if not packets:
+            return 1.0
+        by_variance = sigmas * math.sqrt(max(variance, 0.0) / packets)
+        return min(by_variance + self._longest(math.erfc(sigmas / math.sqrt(2.0))) / packets, 1.0)
+
+    def _longest(self, seldom: float) -> float:
+        """Losses of a burst that is longer only with that probability; 0 where there are no bursts."""
+        if self.lost_in_bad == self.lost_in_good or self.to_good >= 1.0:
+            return 0.0
+        return self.lost_in_bad * math.log(seldom) / math.log(1.0 - self.to_good)
 
 
 def gilbert_elliott(way: Way) -> GilbertElliott:

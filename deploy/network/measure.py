@@ -17,6 +17,7 @@ from deploy.network.figures import Measured, WayMeasured, judge, rate_mbit
 from deploy.network.host import Host
 from deploy.network.probe import Plan
 from deploy.network.profile import Profile, Way
+from deploy.network.scheduler import LOSS, Counters
 
 RATE_HZ = 200.0
 SMALL, FULL = 128, 1400
@@ -36,14 +37,15 @@ async def measure(
 ) -> Measured:
     """Of both directions, for some seconds. Raises NetworkError where nothing arrives."""
     ways = (profile.ways.to_robot, profile.ways.to_operator)
-    before = emulation.planned()
+    before, counted = emulation.planned(), emulation.counters()
     count = round(seconds * rate_hz)
     ends = await _run(hosts, ways, (rate_hz, rate_hz), (count, count), SMALL)
-    after = emulation.planned()
+    after, now = emulation.planned(), emulation.counters()
     judged = []
     for number, (way, name) in enumerate(zip(ways, DIRECTIONS, strict=True)):
         sent, arrivals = ends[number]["sent"], ends[1 - number]["arrivals"]
-        judged.append(judge(way, sent, arrivals, SMALL, seconds, _mean_ms(before, after, name)))
+        drawn = (_mean_ms(before, after, name), _loss_percent(getattr(counted, name), getattr(now, name)))
+        judged.append(judge(way, sent, arrivals, SMALL, seconds, *drawn))
     to_robot, to_operator = await _fill(hosts, ways, judged)
     return Measured(profile.name, emulation.name, to_robot, to_operator)
 
@@ -111,6 +113,14 @@ async def _noted(host: Host, process: asyncio.subprocess.Process, word: bytes) -
         raise NetworkError(f"the probe on the {host.name}'s host ended: {' '.join(words)}")
     noted: dict[str, Any] = json.loads(said)
     return noted
+
+
+def _loss_percent(before: Counters, after: Counters) -> float | None:
+    """Of the packets between the two; None where what is lost by chance is not counted by itself."""
+    packets = after.packets - before.packets
+    if LOSS not in after.dropped or not packets:
+        return None
+    return 100.0 * (after.dropped[LOSS] - before.dropped.get(LOSS, 0)) / packets
 
 
 def _mean_ms(before: Mapping[str, Summary], after: Mapping[str, Summary], way: str) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -33,26 +34,30 @@ def _cells(way: Way) -> list[str]:
     return [UNKNOWN if figure is None else f"{figure:g}" for figure in (*figures, queue)]
 
 
-def measured_table(measured: Iterable[Measured]) -> Table:
-    """Measured beside the profile, a row a direction."""
-    table = plain_table(
-        "profile", "delay ms", "mean", "p50", "p99", "jitter", "loss %", "of ±", "ro/dup %", "Mbit/s"
-    )
+def measured_table(measured: Iterable[Measured]) -> RenderableType:
+    """Measured beside the profile: a row a direction."""
+    table = plain_table("way", "delay", "mean", "p50", "p99", "jitter", "lost", "of", "re/du", "Mbit")
+    table.columns[0].no_wrap = True
+    names = []
     for each in measured:
-        for arrow, way in (("→ robot", each.to_robot), ("→ operator", each.to_operator)):
-            table.add_row(f"{each.profile} {arrow}", *_measured_cells(way))
-    return table
+        names.append(each.profile)
+        for end, way in (("→", each.to_robot), ("←", each.to_operator)):
+            table.add_row(f"{len(names)} {end}", *_measured_cells(way), end_section=end == "←")
+    key = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1))
+    return Group(
+        table, f"{key}; → to the robot. ms, and % lost, reordered/duplicated; ±: by chance, three sigma"
+    )
 
 
 def _measured_cells(way: WayMeasured) -> list[str | Text]:
-    loss = f"{way.expected_loss_percent:.1f} ± {way.loss_bound_percent:.1f}"
-    rate = UNKNOWN if way.rate_mbit is None else f"{way.rate_mbit:.2f}"
+    loss = f"{way.expected_loss_percent:.1f}±{way.loss_bound_percent:.1f}"
+    rate = UNKNOWN if way.rate_mbit is None else f"{way.rate_mbit:.1f}"
     return [
-        f"{way.expected_ms:.1f} ± {way.delay_bound_ms:.1f}",
+        f"{way.expected_ms:.1f}±{way.delay_bound_ms:.1f}",
         _judged(f"{way.mean_ms:.2f}", way.delay_kept),
-        f"{way.p50_ms:.2f}",
-        f"{way.p99_ms:.2f}",
-        f"{way.jitter_ms:.2f}",
+        f"{way.p50_ms:.1f}",
+        f"{way.p99_ms:.1f}",
+        f"{way.jitter_ms:.1f}",
         _judged(f"{way.loss_percent:.2f}", way.loss_kept),
         loss,
         f"{way.reordered_percent:.1f}/{way.duplicate_percent:.1f}",
