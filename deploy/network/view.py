@@ -36,7 +36,7 @@ def _cells(way: Way) -> list[str]:
 
 def measured_table(measured: Iterable[Measured]) -> RenderableType:
     """Measured beside the profile: a row a direction."""
-    table = plain_table("way", "delay", "mean", "p50", "p99", "jitter", "lost", "of", "re/du", "Mbit")
+    table = plain_table("way", "delay", "mean", "p50", "p99", "jit", "lost", "of", "re/du", "Mbit")
     table.columns[0].no_wrap = True
     names = []
     for each in measured:
