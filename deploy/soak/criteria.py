@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -77,28 +76,17 @@ def commands(seen: Seen) -> list[Verdict]:
     """Lost, late, twice, refused; each outside of the windows that explain it, and none acted on too late."""
     quiet = seen.quiet
     sent = seen.sum("sent", quiet)
-    network = seen.options.get("network") or {}
     verdicts = []
     for column, name in COUNTED.items():
         figure = seen.sum(column, quiet) if sent else None
-        note = f"{seen.sum(column):.0f} in all, {sent:.0f} sent outside of faults"
+        note = f"{seen.sum(column):.0f} in all, {sent:.0f} sent outside of what explains"
         if column == "lost":
             note += f"; {seen.sum('overwritten'):.0f} waited too long in the slave itself"
-        allowed = chance(sent, network.get(column, 0.0), network.get("burst_packets") or 1.0)
-        verdicts.append(at_most("commands", f"{name}, unexplained", figure, allowed, note=note))
+        verdicts.append(at_most("commands", f"{name}, unexplained", figure, 0.0, note=note))
     ages = seen.samples["age_max_ms"]
     oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
     verdicts.append(at_most("commands", "oldest that was acted on", oldest, AGE_MS, "ms", "put → accepted"))
     return verdicts
-
-
-def chance(sent: float, percent: float, together: float = 1.0) -> float:
-    """How many of those sent a network may lose, turn or double: four deviations above the mean.
-
-    `together`: how many it takes at a time. 0 where it takes none.
-    """
-    mean = sent * percent / 100.0
-    return float(math.ceil(mean + 4.0 * math.sqrt(mean * together))) if mean > 0.0 else 0.0
 
 
 def guard(seen: Seen) -> list[Verdict]:
@@ -106,8 +94,14 @@ def guard(seen: Seen) -> list[Verdict]:
     done = seen.recovered
     must = [what for what in done if what["holds"] and what["heard"]]
     held, stood = seen.own(must, "held_s"), seen.own(must, "stands_s")
-    idle = [what for what in done if not what["holds"] and what.get("held_s") is not None]
-    lefts = unexplained_lefts(seen.events, seen.samples, seen.explained)
+    idle = [
+        what
+        for what in done
+        if not what["holds"]
+        and what.get("held_s") is not None
+        and not seen.explained.accounts_for_hold(what["begun_s"] + what["held_s"])
+    ]
+    lefts = unexplained_lefts(seen.events, seen.explained)
     engaged = sum(bool(e.what.get("done")) for e in of_kind(seen.events, "engage"))
     moved = sum(
         e.what.get("to") in ("align", "track") and e.what.get("from") not in ("align", "track")

@@ -14,19 +14,23 @@ from deploy.soak.windows import Window, reason
 
 HOST_STILL_MS = 50.0
 """Half of the guard's shortest time-out (its encoders', 0.1 s): a shorter stall explains no hold."""
-LOST_PACKETS, LOST_WITHIN_S = 3, 1.5
-"""A robot that misses three commands holds; a network that lost as many packets then explains it."""
+LOST_WITHIN_S = 1.5
+LOST_PACKETS = {"udp": 3, "quic-datagram": 3}
+"""So many packets lost just before explain a hold. It takes three missed commands; on a stream, as all other
+transports are, one packet holds up those behind it until it is sent again, 0.2 s later or more (TCP's RTO)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """Spans with a reason: starts and faults until the robot follows again, and the host's own stalls."""
+    """Spans with a reason: faults until the robot follows again, the host's stalls, the network's losses."""
 
     faults: tuple[Window, ...]
     stalls: tuple[Window, ...]
     """Of HOST_STILL_MS or longer."""
-    network: tuple[Window, ...] = ()
-    """Seconds in which nothing passed, as its profile says."""
+    network: tuple[Window, ...]
+    """Seconds in which it lost packets, turned or doubled them, or let nothing pass."""
+    lossy_s: tuple[float, ...]
+    """Middles of seconds in which it lost enough for a hold."""
 
     @property
     def all(self) -> tuple[Window, ...]:
@@ -37,6 +41,12 @@ class Explained:
         """The longest of the host's stalls within a span, as far as it lies there."""
         spans = (min(w.until_s, until_s) - max(w.from_s, from_s) for w in self.stalls)
         return max(0.0, max(spans, default=0.0))
+
+    def accounts_for_hold(self, at_s: float) -> bool:
+        """Whether the host stood still, or the network lost enough, right before the robot held."""
+        return any(window.includes(at_s) for window in self.stalls) or any(
+            abs(lossy_s - at_s) <= LOST_WITHIN_S for lossy_s in self.lossy_s
+        )
 
     def why(self, at_s: float) -> str:
         """The reason of something that was seen then; empty where it has none."""
@@ -61,22 +71,23 @@ def explanation(events: Sequence[Event], samples: Samples) -> Explained:
         ends = [e.at_s for e in of_kind(events, "recovered") if e.at_s > left.at_s]
         faults.append(Window(left.at_s, ends[0] if ends else math.inf, "after it left off"))
     last = [Window(e.at_s, math.inf, "end") for e in of_kind(events, "end")]
-    out_s = samples.at_s[np.nan_to_num(samples["link_out"]) > 0.0]
-    network = tuple(Window(at_s - 1.0, at_s, "the network let nothing pass") for at_s in out_s.tolist())
-    return Explained((*own, *faults[len(own) :], *last), tuple(stalls), network)
+    return Explained((*own, *faults[len(own) :], *last), tuple(stalls), *_network(events, samples))
 
 
-def unexplained_lefts(events: Sequence[Event], samples: Samples, explained: Explained) -> list[Event]:
+def _network(events: Sequence[Event], samples: Samples) -> tuple[tuple[Window, ...], tuple[float, ...]]:
+    lost, out, odd = (np.nan_to_num(samples[f"link_{what}"]) for what in ("lost", "out", "odd"))
+    at_s, gone = samples.at_s, lost + out
+    windows = [Window(end_s - 1.0, end_s, "the network") for end_s in at_s[gone + odd > 0.0].tolist()]
+    begun = of_kind(events, "begin")
+    enough = LOST_PACKETS.get(str(begun[0].what.get("transport")) if begun else "", 1)
+    padded = np.pad(gone, 1)
+    near = padded[:-2] + gone + padded[2:]
+    return tuple(windows), tuple((at_s[(near >= enough) & (gone > 0.0)] - 0.5).tolist())
+
+
+def unexplained_lefts(events: Sequence[Event], explained: Explained) -> list[Event]:
     """When the robot left off, and neither fault, host nor network accounts for it."""
-    lefts = of_kind(events, "left")
-    spans = (*explained.stalls, *explained.network)
-    lost = np.nan_to_num(samples["link_lost"])
-    return [
-        left
-        for left in lefts
-        if not any(window.includes(left.at_s) for window in spans)
-        and lost[np.abs(samples.at_s - left.at_s + 0.5) <= LOST_WITHIN_S].sum() < LOST_PACKETS
-    ]
+    return [left for left in of_kind(events, "left") if not explained.accounts_for_hold(left.at_s)]
 
 
 def _first(events: Sequence[Event], kind: str) -> float:

@@ -10,32 +10,27 @@ from deploy.soak.counts import Additions
 
 
 def nature(profile: Profile) -> dict[str, Any]:
-    """Percent of the packets to the robot that are lost, late, come twice; and how long one takes at most."""
+    """Its name, and how long a packet to the robot takes at most, but for queues."""
     way = profile.ways.to_robot
-    return {
-        "name": profile.name,
-        "lost": way.loss_percent,
-        "late": way.reorder_percent,
-        "repeated": way.duplicate_percent,
-        "burst_packets": way.burst_packets or 1.0,
-        "way_s": (way.delay_ms + 4.0 * way.jitter_ms) / 1e3,
-    }
+    return {"name": profile.name, "way_s": (way.delay_ms + 4.0 * way.jitter_ms) / 1e3}
 
 
 class LinkLosses:
-    """Packets to the robot that the network dropped, second by second."""
+    """What the network did to packets to the robot, second by second."""
 
     def __init__(self, network: Network | None) -> None:
         self._network = network
         self._added = Additions()
 
     def row(self) -> dict[str, float]:
-        """`link_lost` by chance or for want of room, `link_out` as nothing passed; {} without a network."""
+        """`link_lost`: by chance or want of room; `link_out`: nothing passed; `link_odd`: turned, doubled."""
         if self._network is None:
             return {}
-        dropped = self._network.counters().to_robot.dropped
-        out = dropped.get(OUTAGE, 0)
-        return {
-            "link_lost": self._added.take("lost", sum(dropped.values()) - out),
-            "link_out": self._added.take("out", out),
+        counters = self._network.counters().to_robot
+        out = counters.dropped.get(OUTAGE, 0)
+        totals = {
+            "link_lost": sum(counters.dropped.values()) - out,
+            "link_out": out,
+            "link_odd": counters.reordered + counters.duplicated,
         }
+        return {name: self._added.take(name, total) for name, total in totals.items()}

@@ -6,9 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 
 from deploy.soak.events import Event
-from deploy.soak.explain import LOST_PACKETS, Explained, explanation, unexplained_lefts
+from deploy.soak.explain import Explained, explanation, unexplained_lefts
 
 from .conftest import STORY, Make
 
@@ -41,25 +42,31 @@ def test_what_comes_after_a_robot_left_off_has_a_reason_that_it_left_has_none(ma
     found = explained(make, *events)
     assert found.why(52.0) == "after it left off"
     assert found.why(60.0) == ""
-    assert unexplained_lefts(events, make().samples, found) == [left]
+    assert unexplained_lefts(events, found) == [left]
 
 
 def test_what_the_processes_say_while_they_are_stopped_counts_for_nothing(make: Make) -> None:
     assert explained(make, *STORY, Event(300.0, "end")).why(301.0) == "end"
 
 
-def test_a_network_that_lost_enough_explains_a_hold_and_one_that_let_nothing_pass_all(make: Make) -> None:
-    events = (*STORY[:6], Event(50.0, "left", {"guard": "hold"}))
+@pytest.mark.parametrize(("transport", "enough"), [("tcp", 1), ("tls", 1), ("udp", 3), ("quic-datagram", 3)])
+def test_a_network_that_lost_enough_explains_a_hold(make: Make, transport: str, enough: int) -> None:
+    begun = Event(0.0, "begin", {"transport": transport})
+    events = (begun, *STORY[1:6], Event(50.0, "left", {"guard": "hold"}))
 
     def lefts(**columns: Any) -> list[Event]:
         samples = make(**columns).samples
-        return unexplained_lefts(events, samples, explanation(events, samples))
+        return unexplained_lefts(events, explanation(events, samples))
 
-    assert len(lefts(link_lost=at(50, LOST_PACKETS - 1))) == 1
-    assert lefts(link_lost=at(50, LOST_PACKETS)) == []
-    assert len(lefts(link_lost=at(60, LOST_PACKETS))) == 1
-    assert lefts(link_out=at(50, 1)) == []
-    windows = explanation(events, make(link_out=at(70, 2)).samples).network
+    assert len(lefts(link_lost=at(50, enough - 1))) == 1
+    assert lefts(link_lost=at(50, enough)) == []
+    assert len(lefts(link_lost=at(60, enough))) == 1
+    assert lefts(link_out=at(50, enough)) == []
+    assert len(lefts(link_odd=at(50, 9))) == 1
+
+
+def test_the_network_s_windows_are_the_seconds_in_which_it_did_something(make: Make) -> None:
+    windows = explanation(STORY, make(link_out=at(70, 2)).samples).network
     assert [(w.from_s, w.until_s) for w in windows] == [(69.0, 70.0)]
 
 
