@@ -17,7 +17,7 @@ HOST_STILL_MS = 50.0
 LOST_WITHIN_S = 1.5
 LOST_PACKETS = {"udp": 3, "quic-datagram": 3}
 """So many packets lost just before explain a hold. It takes three missed commands; on a stream, as all other
-transports are, one packet holds up those behind it until it is sent again, 0.2 s later or more (TCP's RTO)."""
+transports are, one packet holds up those behind it until it is sent again, 0.2 s later or more (RTO)."""
 
 
 @dataclass(frozen=True, slots=True)
