@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
 from deploy.tables import plain_table
@@ -11,26 +14,16 @@ from deploy.trial.report import Findings
 from deploy.trial.spread import Row
 from deploy.trial.targets import Judged
 
-SHOWN = (
-    "one_way_p50_ms",
-    "one_way_bound_ms",
-    "accepted",
-    "rmse_deg",
-    "rmse_over_hold",
-    "roughness",
-    "flow_s",
-)
+SHOWN = ("one_way_p50_ms", "one_way_bound_ms", "rmse_deg", "rmse_over_hold", "roughness", "flow_s")
 
 
 def print_findings(findings: Findings, console: Console) -> None:
     """Medians, then what was to be reached, then what suits which task."""
-    heads = [f"{BY_NAME[n].title}{', ' + BY_NAME[n].unit if BY_NAME[n].unit else ''}" for n in SHOWN]
-    table = plain_table("network, transport, strategy", *heads)
-    for column in table.columns[1:]:
-        column.no_wrap = False
+    console.print(_table(findings.rows))
     for row in findings.rows:
-        table.add_row(f"{row.setup.profile}, {row.setup.name}", *_cells(row))
-    console.print(table)
+        if not row.done:
+            why = "; ".join(row.why_not) or "not run yet"
+            console.print(Text.assemble((f"{row.setup.profile}, {row.setup.name}: ", "dim"), (why, "yellow")))
     for judged in findings.judged:
         console.print(_target(judged))
     profile = ""
@@ -41,10 +34,24 @@ def print_findings(findings: Findings, console: Console) -> None:
         console.print(Text.assemble((f"{ranking.task.title}: ", "cyan"), ranking.verdict, "."))
 
 
-def _cells(row: Row) -> list[Text]:
-    if not row.done:
-        return [Text("; ".join(row.why_not) or "not run yet", "yellow", overflow="fold")]
-    return [Text(printed(name, row.median(name))) for name in SHOWN]
+def _table(rows: Iterable[Row]) -> Table:
+    """A section a network; at home in 80 columns."""
+    heads = [f"{BY_NAME[n].title}{', ' + BY_NAME[n].unit if BY_NAME[n].unit else ''}" for n in SHOWN]
+    table = plain_table("", *heads)
+    table.columns[0].no_wrap = True
+    for column in table.columns[1:]:
+        column.no_wrap = False
+    profile = ""
+    for row in rows:
+        if row.setup.profile != profile:
+            profile = row.setup.profile
+            table.add_section()
+            table.add_row(Text(profile, "bold"))
+        table.add_row(
+            f"  {row.setup.transport} {row.setup.strategy}",
+            *(printed(name, row.median(name)) for name in SHOWN),
+        )
+    return table
 
 
 def _target(judged: Judged) -> Text:
