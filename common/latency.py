@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 from hdrh.histogram import HdrHistogram
 
 from common.clock import NS_PER_MS
-from common.offset import Offset
+
+if TYPE_CHECKING:  # a histogram needs none of the messages that it comes with
+    from common.offset import Offset
 
 STAGES = (
     "sampled→frames in",

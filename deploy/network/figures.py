@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from statistics import fmean, median, pstdev
 from typing import Any
-
-import numpy as np
 
 from common.clock import NS_PER_MS
 from common.errors import NetworkError
@@ -129,24 +128,29 @@ def judge(
     """From what one end sent and the other noted: number, sent, received. NetworkError where that is none."""
     if not arrivals:
         raise NetworkError(f"none of {sent} packets came through the emulated link")
-    table = np.array(arrivals, np.int64)
-    number, first = np.unique(table[:, 0], return_index=True)
-    delay_ms = (table[first, 2] - table[first, 1]) / NS_PER_MS
-    in_order = np.maximum.accumulate(table[:, 0]) <= table[:, 0]
+    delay_ms: list[float] = []
+    seen: set[int] = set()
+    newest, passed = -1, 0
+    for number, sent_ns, received_ns in arrivals:
+        if number not in seen:
+            seen.add(number)
+            delay_ms.append((received_ns - sent_ns) / NS_PER_MS)
+            passed += number < newest
+        newest = max(newest, number)
     loss = gilbert_elliott(way)
     serial_ms = 0.0 if way.rate_mbit is None else size * 8e-3 / way.rate_mbit
     # those held back for reordering are late by intent, and no part of what was planned in order
     held_ms = way.reorder_percent / 100.0 * way.reorder_ms
     return WayMeasured(
         sent=sent,
-        received=len(number),
-        mean_ms=float(delay_ms.mean()),
-        p50_ms=float(np.percentile(delay_ms, 50)),
-        p99_ms=float(np.percentile(delay_ms, 99)),
-        jitter_ms=float(delay_ms.std()),
-        loss_percent=100.0 * (1.0 - len(number) / sent),
-        reordered_percent=100.0 * float((~in_order[first]).sum()) / sent,
-        duplicate_percent=100.0 * (len(table) - len(number)) / sent,
+        received=len(seen),
+        mean_ms=fmean(delay_ms),
+        p50_ms=median(delay_ms),
+        p99_ms=sorted(delay_ms)[math.ceil(0.99 * len(delay_ms)) - 1],
+        jitter_ms=pstdev(delay_ms),
+        loss_percent=100.0 * (1.0 - len(seen) / sent),
+        reordered_percent=100.0 * passed / sent,
+        duplicate_percent=100.0 * (len(arrivals) - len(seen)) / sent,
         expected_ms=way.delay_ms + serial_ms + held_ms,
         expected_loss_percent=way.loss_percent,
         delay_bound_ms=delay_bound_ms(way, seconds),
