@@ -14,6 +14,7 @@ from typing import Any
 import psutil
 
 from common.errors import TandemError
+from deploy.rig.spawn import Spawned
 
 STOP_S = 5.0
 """Grace between SIGTERM and SIGKILL: above the processes' own shutdown deadline."""
@@ -46,7 +47,7 @@ class Child:
         self._tandem = tandem
         self.log = folder / f"{self.name}.log"
         self.figures_file = folder / f"{self.name}.figures.json"
-        self._process: asyncio.subprocess.Process | None = None
+        self._process: Spawned | None = None
         self._usage: psutil.Process | None = None
         self._cpu_from = (0.0, 0.0)
         self._cpu_to = (0.0, 0.0)
@@ -65,15 +66,7 @@ class Child:
         """Start `tandem ROLE` with these arguments."""
         self.lifetime += 1
         with self.log.open("ab") as log:
-            self._process = await asyncio.create_subprocess_exec(
-                *through,
-                *self._tandem,
-                self.role,
-                *arguments,
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-            )
+            self._process = Spawned([*through, *self._tandem, self.role, *arguments], log)
         self._usage = psutil.Process(self._process.pid)
 
     @property

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 
 from common.clock import NS_PER_S, monotonic_ns
+from deploy.rig.spawn import finished
 
 PROBE_S = 86_400
 
@@ -19,16 +19,12 @@ async def why_not() -> str:
     """Empty where this host can step a process's clock; else the reason, in words."""
     look = "import time; print(time.monotonic_ns())"
     try:
-        process = await asyncio.create_subprocess_exec(
-            *through(PROBE_S), sys.executable, "-c", look,
-            stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-        )  # fmt: skip
+        status, out, err = await finished([*through(PROBE_S), sys.executable, "-c", look])
     except OSError as error:
         return f"a clock is stepped by `unshare --time`: {error.strerror}"
-    out, err = await process.communicate()
-    if process.returncode != 0:
+    if status != 0:
         said = err.decode("utf-8", "replace").strip().splitlines()
-        return f"`unshare --time` is refused: {said[-1] if said else process.returncode}"
+        return f"`unshare --time` is refused: {said[-1] if said else status}"
     if int(out) - monotonic_ns() < PROBE_S * NS_PER_S // 2:
         return "`unshare --time` leaves the clock as it is: the kernel is older than 6.0"
     return ""

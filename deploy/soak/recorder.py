@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import shutil
 import sys
@@ -15,6 +14,7 @@ from common.clock import monotonic_ns, to_s
 from common.config import LinkConfig
 from common.errors import TandemError
 from deploy.rig.child import Child
+from deploy.rig.spawn import finished
 
 NAME = "recorder"
 FULL_BYTES = 40 * 1024
@@ -119,12 +119,8 @@ class SmallDisk:
 
 async def _contents(file: Path) -> Mapping[str, Any]:
     """Looked at in a process of its own: a long recording must cost the soak neither memory nor time."""
-    process = await asyncio.create_subprocess_exec(
-        *(("nice", "-n", "15") if shutil.which("nice") else ()),
-        sys.executable, "-m", "deploy", "recording", str(file), "--json",
-        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-    )  # fmt: skip
-    out, err = await process.communicate()
+    nice = ("nice", "-n", "15") if shutil.which("nice") else ()
+    _, out, err = await finished([*nice, sys.executable, "-m", "deploy", "recording", str(file), "--json"])
     try:
         contents: Mapping[str, Any] = json.loads(out)
     except ValueError:
@@ -133,10 +129,4 @@ async def _contents(file: Path) -> Mapping[str, Any]:
 
 
 async def _succeeds(*command: str) -> bool:
-    if not shutil.which(command[0]):
-        return False
-    process = await asyncio.create_subprocess_exec(
-        *command, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL,
-        stderr=asyncio.subprocess.DEVNULL,
-    )  # fmt: skip
-    return await process.wait() == 0
+    return shutil.which(command[0]) is not None and (await finished(command))[0] == 0

@@ -1,0 +1,72 @@
+"""Starts processes from a loop beside which Zenoh's threads run.
+
+Not by the loop's own `create_subprocess_exec`: under uvloop the copy of this process, before it becomes the
+other program, runs Python's own after-fork work, and waits there for ever for a lock that some other thread
+held at that moment; the loop waits for the copy. Beside a flood of messages that took fewer than 100 starts.
+`subprocess` does nothing in between (vfork, exec).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+from collections.abc import Sequence
+from typing import IO
+
+
+class Spawned:
+    """A process that was started, and what became of it."""
+
+    def __init__(self, argv: Sequence[str], output: IO[bytes]) -> None:
+        """Start it, with nothing to read; what it says goes to a file. Raises OSError."""
+        self._process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=output, stderr=output)
+        self.pid = self._process.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """How it ended; None while it runs."""
+        return self._process.poll()
+
+    def kill(self) -> None:
+        """End it without a warning."""
+        self._process.kill()
+
+    def send_signal(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    async def wait(self) -> int:
+        """Until it has ended; its status."""
+        if self._process.poll() is None:
+            await _gone(self.pid)
+        return self._process.wait()
+
+
+async def finished(argv: Sequence[str]) -> tuple[int, bytes, bytes]:
+    """Run a short command to its end: status, output, errors. Raises OSError where there is none such."""
+
+    def run() -> subprocess.CompletedProcess[bytes]:
+        return subprocess.run(argv, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+
+    done = await asyncio.to_thread(run)
+    return done.returncode, done.stdout, done.stderr
+
+
+async def _gone(pid: int) -> None:
+    """Until a child has ended; it is not reaped. The kernel tells, no thread waits."""
+    loop = asyncio.get_running_loop()
+    descriptor = os.pidfd_open(pid)
+    ended: asyncio.Future[None] = loop.create_future()
+    loop.add_reader(descriptor, _settle, ended)
+    try:
+        await ended
+    finally:
+        loop.remove_reader(descriptor)
+        os.close(descriptor)
+
+
+def _settle(ended: asyncio.Future[None]) -> None:
+    if not ended.done():
+        ended.set_result(None)
