@@ -191,11 +191,12 @@ SUIT = (
     Fault(
         "CAN bus of the suit off",
         "The bus between the suit and the master fails.",
-        Reaction.HOLDS_JOINTS,
-        "Holds every joint, and stays engaged: when the bus is back they come back slowly by themselves.",
-        "Mend the bus; disengage first if the robot must not move then.",
+        Reaction.HOLDS,
+        "Brakes and stands. When the bus is back it still stands.",
+        ENGAGE,
         body.suit_bus_off,
-        ends=State.TRACK, stands_s=0.08 + BRAKED_S,
+        # the joints brake with the first command in which none is valid; the robot holds by the time-out
+        reacts_s=NOTICED_S, stands_s=0.08 + BRAKED_S, held_by=frozenset({"valid"}),
     ),
 )  # fmt: skip
 

@@ -87,6 +87,7 @@ class Guard:
         self._seated = False
         self._stepped_ns: int | None = None
         self._command_ns: int | None = None
+        self._somebody_ns: int | None = None
         self._refusal = ""
         self._newest_sequence = -1
         self._valid: Mask = np.zeros(len(names), np.bool_)
@@ -136,6 +137,8 @@ class Guard:
         self.lease.renew(received_ns)
         self._newest_sequence = command.sequence
         self._command_ns = received_ns
+        if command.valid.any():
+            self._somebody_ns = received_ns
         self._refusal = ""
         self._valid = command.valid.copy()
         self._tracker.accept(
@@ -237,9 +240,10 @@ class Guard:
     # the rest is the guard's own
 
     def _signs(self, now_ns: int) -> Signs:
+        somebody_ns = now_ns if self._valid.any() else self._somebody_ns
         return Signs(
-            now_ns, self.lease.token != 0, self._command_ns, self._command_timeout_ns, self._refusal,
-            self._encoders, self._plausible.too_many(), self._body,
+            now_ns, self.lease.token != 0, self._command_ns, somebody_ns, self._command_timeout_ns,
+            self._refusal, self._encoders, self._plausible.too_many(), self._body,
         )  # fmt: skip
 
     def _doubt(self, now_ns: int, position_rad: Array, encoder_valid: Mask, encoder_ns: int) -> None:

@@ -57,6 +57,8 @@ class Signs:
     leased: bool
     command_ns: int | None
     """Arrival of the last accepted command, None where there was none since the last loss."""
+    somebody_ns: int | None
+    """Now where the newest accepted command has a valid joint, else arrival of the last one that had."""
     command_timeout_ns: int
     refusal: str
     """Why the last command since then was refused, empty where none was."""
@@ -89,6 +91,15 @@ def _command(signs: Signs) -> str | None:
     return f"no command for {to_s(age_ns):.2f} s{why}"
 
 
+def _valid(signs: Signs) -> str | None:
+    if signs.somebody_ns is None:
+        return "no joint has been valid yet"
+    age_ns = abs(signs.now_ns - signs.somebody_ns)
+    if age_ns <= signs.command_timeout_ns:
+        return None
+    return f"no joint has been valid for {to_s(age_ns):.2f} s: is the operator's suit heard?"
+
+
 def _encoder(signs: Signs) -> str | None:
     return signs.encoders.silence(signs.now_ns)
 
@@ -105,7 +116,12 @@ def _base(signs: Signs) -> str | None:
     return signs.body.base
 
 
-ARRIVAL_WATCHES: tuple[Watch, ...] = (Watch("command", _command), Watch("lease", _lease))
+ARRIVAL_WATCHES: tuple[Watch, ...] = (
+    Watch("command", _command),
+    Watch("lease", _lease),
+    # commands without one valid joint come from nobody: a suit that is heard again must not move the robot
+    Watch("valid", _valid),
+)
 """Looked at in every step, and before a command is judged: what comes after a gap must not hide the gap."""
 BODY_WATCHES: tuple[Watch, ...] = (
     Watch("encoder", _encoder),

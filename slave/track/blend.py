@@ -11,22 +11,26 @@ Course = Array
 """(2, J): position, rad, and velocity, rad/s, of a motion at one instant."""
 
 _LARGE_RAD = 0.25
-"""A difference larger than this, as after a loss, takes longer in proportion: no joint is rushed by it."""
-_LONGEST = 5.0
-"""At most so many times as long."""
+"""A joint's difference larger than this, as after a loss, takes longer in proportion: nothing rushes it."""
+_JUMP_RAD = 0.7
+"""A difference larger than this is no correction. It is worked off as soon as a small one, so that the guard
+behind sees it (its `jump_window_rad`) and leads the robot there slowly: spread out it would go unnoticed."""
 
 
 class Blend:
     """The difference old minus new course at a change, led to zero by a cubic within `duration_s`.
 
     With x = t / T, error e and its rate r at the change, the cubic of Hermite's that ends at rest on
-    zero is  e (1 - 3x² + 2x³) + r T (x - 2x² + x³). So position and velocity stay continuous.
+    zero is  e (1 - 3x² + 2x³) + r T (x - 2x² + x³). So position and velocity stay continuous. T is each
+    joint's own: no joint waits for another's correction.
     """
 
     def __init__(self, duration_s: float) -> None:
-        self._duration_s = self._total_s = duration_s
+        self._duration_s = duration_s
         self._began_ns = 0
         self._difference: Course | None = None
+        self._total_s: Array = np.zeros(0)
+        self._longest_s = 0.0
 
     def reset(self) -> None:
         """Nothing is left to work off."""
@@ -36,25 +40,25 @@ class Blend:
         """The course changes from `old`, which holds what was left until now, to `new`."""
         self._began_ns = now_ns
         self._difference = old - new
-        largest = float(np.abs(self._difference[0]).max())
-        self._total_s = self._duration_s * min(max(largest / _LARGE_RAD, 1.0), _LONGEST)
+        far = np.abs(self._difference[0])
+        times = np.where(far > _JUMP_RAD, 1.0, np.maximum(far / _LARGE_RAD, 1.0))
+        self._total_s = self._duration_s * times
+        self._longest_s = float(self._total_s.max())
 
     def applied(self, now_ns: int, course: Course) -> Course:
         """The new course with what is left of the difference."""
         if self._difference is None:
             return course
-        total_s = self._total_s
-        x = to_s(now_ns - self._began_ns) / total_s
-        if x >= 1.0:
+        elapsed_s = to_s(now_ns - self._began_ns)
+        if elapsed_s >= self._longest_s:
             self._difference = None
             return course
-        weights = np.array(
-            [
-                [1.0 + x * x * (2.0 * x - 3.0), total_s * x * (1.0 - x) ** 2],
-                [6.0 * x * (x - 1.0) / total_s, 1.0 + x * (3.0 * x - 4.0)],
-            ]
-        )
-        out: Course = course + weights @ self._difference
+        total_s, (error, rate) = self._total_s, self._difference
+        x = np.minimum(elapsed_s / total_s, 1.0)
+        left = 1.0 - x
+        out: Course = course.copy()
+        out[0] += error * (1.0 + x * x * (2.0 * x - 3.0)) + rate * (total_s * x * left * left)
+        out[1] += error * (6.0 * x * (x - 1.0) / total_s) + rate * (1.0 + x * (3.0 * x - 4.0))
         return out
 
 

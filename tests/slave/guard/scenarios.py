@@ -92,6 +92,15 @@ def lease_lapses_first(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.HOLD
 
 
+@about("watch valid")
+def nobody_in_the_suit(make_rig: MakeRig) -> None:
+    """Commands go on, but no joint in them is valid; then the suit is heard again."""
+    rig = make_rig().to_track()
+    rig.run(0.4, valid=np.zeros(rig.joints, np.bool_))
+    rig.run(0.4)
+    assert rig.guard.state is State.HOLD
+
+
 @about("watch encoder", "EncoderLife.silence")
 def encoder_lost(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()

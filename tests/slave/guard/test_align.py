@@ -225,11 +225,12 @@ def test_flickering_validity_never_makes_a_joint_lurch(rig: Any) -> None:
     assert rig.measured[6] == pytest.approx(rig.target[6])
 
 
-def test_all_nodes_lost_holds_every_joint_but_the_stream_keeps_the_state(rig: Any) -> None:
+def test_all_nodes_lost_stops_every_joint_before_the_robot_holds(rig: Any) -> None:
     rig.to_track()
-    rig.target = rig.target + 0.3
-    rig.run(1.0, valid=np.zeros(rig.joints, np.bool_))
+    rig.run(0.1, valid=np.zeros(rig.joints, np.bool_))
     assert rig.guard.state is State.TRACK
+    rig.run(0.2, valid=np.zeros(rig.joints, np.bool_))
+    assert rig.guard.state is State.HOLD
     assert rig.guard._limiter.at_rest
 
 

@@ -60,6 +60,42 @@ def test_a_lease_that_lapses_holds_by_itself(make_rig: MakeRig) -> None:
     assert rig.guard.counters.losses == {"lease": 1}
 
 
+@pytest.mark.parametrize("state", MOVING)
+def test_commands_may_be_without_a_valid_joint_up_to_the_time_out_and_no_longer(
+    rig: Any, state: State
+) -> None:
+    rig.to(state)
+    assert rig.send().accepted
+    nobody = np.zeros(rig.joints, np.bool_)
+    for _ in range(2):
+        for _ in range(20):
+            rig.step()
+        assert rig.send(valid=nobody).accepted
+    assert rig.guard.state is not State.HOLD
+    rig.step(1)
+    assert rig.guard.state is State.HOLD
+    assert rig.guard.reason.startswith("no joint has been valid for 0.20 s")
+    assert rig.guard.counters.losses == {"valid": 1}
+    rig.run(0.3)
+    assert rig.guard.state is State.HOLD  # heard again is not engaged
+    rig.engage()
+
+
+def test_one_valid_joint_is_somebody(rig: Any) -> None:
+    rig.to_track()
+    one = np.zeros(rig.joints, np.bool_)
+    one[3] = True
+    rig.run(0.5, valid=one)
+    assert rig.guard.state is State.TRACK
+
+
+def test_without_its_watch_a_suit_that_is_heard_again_would_move_the_robot(make_rig: MakeRig) -> None:
+    rig = make_rig(arrival_watches=without("valid")).to_track()
+    rig.run(5.0, valid=np.zeros(rig.joints, np.bool_))
+    rig.run(0.1)
+    assert rig.guard.state is State.TRACK
+
+
 def test_every_joint_stops_when_commands_stop(rig: Any) -> None:
     """A watchdog that covers half the robot would leave the other half under way."""
     rig.to_track()
