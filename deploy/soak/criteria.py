@@ -56,12 +56,13 @@ class Seen:
         return [e.what for e in of_kind(self.events, "recovered") if e.what.get("fault")]
 
     def own(self, faults: Sequence[Mapping[str, Any]], key: str) -> list[Mapping[str, Any]]:
-        """The faults with a time that began with them, less what the host stood still in it."""
+        """The faults with a time that began with them, or the master's sight of them, less stalls."""
         own: list[Mapping[str, Any]] = []
         for what in faults:
             took_s, begun_s = what.get(key), what["begun_s"]
             if took_s is not None:
-                took_s = round(took_s - self.explained.still_s(begun_s, begun_s + took_s), 3)
+                still_s = self.explained.still_s(begun_s, begun_s + took_s)
+                took_s = round(took_s - still_s - what.get("notices_s", 0.0), 3)
             own.append({**what, key: took_s})
         return own
 

@@ -55,6 +55,8 @@ class Fault:
     """The robot must hold, and not move until it is engaged anew."""
     lives: bool = True
     """The robot goes on to be heard, so that its reaction can be seen."""
+    notices_s: float = 0.0
+    """How long the master needs to see it, and the robot to be told: its own times count from then."""
     flow_s: float | None = None
     """Once it is undone, commands must flow again within this; None: they never stop."""
     needs: Callable[[Stage], Awaitable[str]] = _needs_nothing
@@ -63,7 +65,10 @@ class Fault:
     @property
     def asks(self) -> dict[str, Any]:
         """What it asks of the robot, for its events: they are judged by what stands there."""
-        return {"holds": self.holds, "heard": self.lives, "flow_limit_s": self.flow_s}
+        return {
+            "holds": self.holds, "heard": self.lives, "notices_s": self.notices_s,
+            "flow_limit_s": self.flow_s,
+        }  # fmt: skip
 
 
 async def _kill(name: str, case: Case) -> None:
@@ -135,14 +140,17 @@ async def _can_step(_: Stage) -> str:
 
 RESTART_S = 15.0
 """A process that was killed is back by then: it starts, its clock and lease are settled, filters too."""
+SUIT_LOST_S = 0.1
+"""`capture.lost_after` at `capture.rate_hz`: until then the master takes a node for one that is late."""
 LINK_S = 1.5
 """An outage's own target (issue 5): commands flow again so soon after the link is back."""
 
 
-def _killed(name: str, words: str, holds: bool, lives: bool, flow_s: float | None) -> Fault:
+def _killed(name: str, lives: bool, flow_s: float | None, notices_s: float = 0.0) -> Fault:
     return Fault(
-        f"{name}-kill", words, partial(_kill, name), partial(_start, name),
-        ends_process=True, holds=holds, lives=lives, flow_s=flow_s,
+        f"{name}-kill", f"the {name} is killed (kill -9) and started again",
+        partial(_kill, name), partial(_start, name),
+        ends_process=True, holds=True, lives=lives, notices_s=notices_s, flow_s=flow_s,
     )  # fmt: skip
 
 
@@ -157,9 +165,10 @@ def _stepped(name: str, lives: bool) -> Fault:
 FAULTS: Mapping[str, Fault] = {
     fault.name: fault
     for fault in (
-        _killed("master", "the master is killed (kill -9) and started again", True, True, RESTART_S),
-        _killed("slave", "the slave is killed (kill -9) and started again", True, False, RESTART_S),
-        _killed("suit", "the suit is killed (kill -9) and started again", False, True, None),
+        _killed("master", lives=True, flow_s=RESTART_S),
+        _killed("slave", lives=False, flow_s=RESTART_S),
+        # commands go on, but with no valid joint they are nobody's
+        _killed("suit", lives=True, flow_s=None, notices_s=SUIT_LOST_S),
         Fault(
             "recorder-kill", "the recorder is killed (kill -9) and started again",
             partial(_kill, recording.NAME), _restart_recorder, ends_process=True,

@@ -9,10 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.config import load_config
+from deploy.profiles import example
 from deploy.soak.criteria import AGE_MS, CRITERIA, HOLD_S, STANDS_S, STRAYS_DEG, TRACK_S
 from deploy.soak.events import Event
+from deploy.soak.faults import FAULTS, SUIT_LOST_S
 from deploy.soak.verdict import Status, Verdict
 from deploy.soak.windows import AFTER_S
+from master.config import MasterConfig
 
 from .conftest import RECOVERED, STORY, Make
 
@@ -117,6 +121,21 @@ def test_a_stall_of_the_host_is_taken_off_what_the_robot_took(make: Make) -> Non
     before = Event(99.0, "still", {"from_s": 99.0, "still_ms": 120.0})
     assert failing(make(events=(*slow, inside))) == set()
     assert failing(make(events=(*slow, before))) == {"guard: holds on a fault, the slowest"}
+
+
+def test_what_the_master_needs_to_see_a_fault_is_no_time_of_the_robot(make: Make) -> None:
+    def suit_kill(held_s: float) -> tuple[Event, ...]:
+        return retold(held_s=held_s, **FAULTS["suit-kill"].asks | {"flow_limit_s": 15.0})
+
+    assert failing(make(events=suit_kill(SUIT_LOST_S + HOLD_S))) == set()
+    assert failing(make(events=suit_kill(SUIT_LOST_S + HOLD_S + 0.001))) == {
+        "guard: holds on a fault, the slowest"
+    }
+
+
+def test_a_suit_that_is_taken_for_lost_sooner_or_later_is_allowed_for() -> None:
+    capture = load_config(example("master"), MasterConfig).capture
+    assert capture.lost_after / capture.rate_hz == pytest.approx(SUIT_LOST_S)
 
 
 @pytest.mark.parametrize("key", ["held_s", "stands_s", "flow_s"])
