@@ -17,9 +17,11 @@ from deploy.network.namespaces import LINK, Run, ip, link_addresses
 from deploy.network.profile import PACKET_BITS, Profile, Way
 from deploy.network.scheduler import OUTAGE, Counters
 
-UNLIMITED_MBIT = 10_000.0
-"""A link without a rate gets one: only then netem keeps the order."""
+ORDER_MBIT = 10_000.0
+"""Only with a rate netem keeps the order; the link's own rate and its queue in bytes are a child's."""
 MOST_PACKETS = 10_000
+BURST_S = 0.001
+"""A kernel's timers are not finer than this: so much may pass at once."""
 NETEM = "netem"
 """The kernel counts what it drops together: by chance and by a full queue."""
 
@@ -42,12 +44,9 @@ def has_netem(run: Run) -> bool:
 
 
 def netem_arguments(way: Way) -> list[str]:
-    """What `tc qdisc … netem` is told for one direction."""
-    rate = way.rate_mbit or UNLIMITED_MBIT
-    under_way = (way.delay_ms + 4.0 * way.jitter_ms) * rate * 1e3 / PACKET_BITS
-    waiting = way.queue_bytes * 8 / PACKET_BITS if way.rate_mbit else MOST_PACKETS
-    arguments = ["limit", str(min(max(round(under_way + waiting), 1), 10 * MOST_PACKETS))]
-    arguments += ["delay", f"{way.delay_ms:g}ms"]
+    """What `tc qdisc … netem` is told for one direction: all but the rate."""
+    # its limit is in packets, whatever their size: no bound for a queue, so none of this link's
+    arguments = ["limit", str(MOST_PACKETS), "delay", f"{way.delay_ms:g}ms"]
     if way.jitter_ms:
         arguments += [f"{way.jitter_ms:g}ms", "distribution", "normal"]
     if way.loss_percent:
@@ -56,7 +55,15 @@ def netem_arguments(way: Way) -> list[str]:
         arguments += ["duplicate", f"{way.duplicate_percent:g}%"]
     if way.reorder_percent:
         arguments += ["reorder", f"{way.reorder_percent:g}%"]
-    return [*arguments, "rate", f"{rate:g}mbit"]
+    return [*arguments, "rate", f"{ORDER_MBIT:g}mbit"]
+
+
+def child_arguments(way: Way) -> list[str]:
+    """The queue behind: a token bucket where the link has a rate, bounded in bytes."""
+    if way.rate_mbit is None:
+        return ["pfifo", "limit", str(MOST_PACKETS)]
+    burst = round(max(2 * PACKET_BITS, way.rate_mbit * 1e6 * BURST_S) / 8)
+    return ["tbf", "rate", f"{way.rate_mbit:g}mbit", "burst", str(burst), "limit", str(way.queue_bytes)]
 
 
 def _loss(way: Way) -> list[str]:
@@ -118,8 +125,10 @@ class Netem:
         self._handle += new
         for host, way in self._ways():
             what = ["loss", "100%"] if self._cut else netem_arguments(way)
-            handle = ["root", "handle", f"{self._handle}:"]
+            handle = ["root", "handle", f"{self._handle:x}:"]
             ip("-n", host, "qdisc", "replace", "dev", LINK, *handle, "netem", *what, tool="tc")
+            child = ["parent", f"{self._handle:x}:1"]
+            ip("-n", host, "qdisc", "replace", "dev", LINK, *child, *child_arguments(way), tool="tc")
 
     def _ways(self) -> Iterator[tuple[str, Way]]:
         ways = self._profile.ways

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from deploy.network.emulation import TO_OPERATOR, TO_ROBOT, EmulatedLink
-from deploy.network.netem import faithful, netem_arguments
+from deploy.network.netem import child_arguments, faithful, netem_arguments
 from deploy.network.profile import Profile, Way, load_profile, profile_names
 
 MS = 1_000_000
@@ -46,18 +46,21 @@ def test_netem_is_told_every_profile(name: str) -> None:
     for way in (ways.to_robot, ways.to_operator):
         words = " ".join(netem_arguments(way))
         assert f"delay {way.delay_ms:g}ms" in words
-        assert f"rate {way.rate_mbit:g}mbit" in words
+        assert f"rate {way.rate_mbit:g}mbit" in " ".join(child_arguments(way))
         assert ("distribution normal" in words) == bool(way.jitter_ms)
 
 
 def test_netem_s_words() -> None:
     way = Way(delay_ms=20.0, loss_percent=2.0, burst_packets=4.0, rate_mbit=12.0, queue_ms=10.0)
-    # in packets of 1500 bytes: 20 under way, 10 waiting; p = r × 0.02 / 0.98
-    assert netem_arguments(way) == [
-        "limit", "30", "delay", "20ms", "loss", "gemodel", "0.510204%", "25%", "100%", "0%", "rate", "12mbit",
-    ]  # fmt: skip
+    # p = r × 0.02 / 0.98
+    assert " ".join(netem_arguments(way)) == (
+        "limit 10000 delay 20ms loss gemodel 0.510204% 25% 100% 0% rate 10000mbit"
+    )
     random = netem_arguments(Way(loss_percent=2.0, duplicate_percent=1.0))
     assert random[4:] == ["loss", "random", "2%", "duplicate", "1%", "rate", "10000mbit"]
+    # bytes: two packets at once, 10 ms at 12 Mbit/s waiting
+    assert child_arguments(way) == ["tbf", "rate", "12mbit", "burst", "3000", "limit", "15000"]
+    assert child_arguments(Way()) == ["pfifo", "limit", "10000"]
 
 
 def test_only_what_netem_does_as_meant_is_left_to_it() -> None:
