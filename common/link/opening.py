@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import math
 import re
 
 import zenoh
@@ -20,17 +21,20 @@ _NO_ROUTER = "Unable to connect to any of"
 log = logging.getLogger(__name__)
 
 
-async def open_zenoh(config: LinkConfig, mode: str = "") -> zenoh.Session:
-    """The session. As a client it waits for its router, however long. Raises LinkError."""
-    turn = 0
+async def open_zenoh(config: LinkConfig, mode: str = "", within_s: float = math.inf) -> zenoh.Session:
+    """The session. As a client it waits `within_s` for its router. Raises LinkError."""
+    turn, until_s = 0, asyncio.get_running_loop().time() + within_s
     while True:
         try:
             return await _open_off_the_loop(_in_turn(config, turn), mode)
         except zenoh.ZError as error:
             if config.mode != "client" or _NO_ROUTER not in str(error):
                 raise LinkError(f"the link cannot be opened: {_RUST_PLACE.sub('', str(error))}") from None
+        routers = ", ".join(config.connect)
+        if asyncio.get_running_loop().time() >= until_s:
+            raise LinkError(f"no router answered at {routers} within {within_s:g} s")
         if turn == 0:
-            log.warning("no router answers at %s: tried until one does", ", ".join(config.connect))
+            log.warning("no router answers at %s: tried until one does", routers)
         turn += 1
         await asyncio.sleep(RETRY_S)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import re
 import threading
 from collections.abc import AsyncIterator, Callable
@@ -28,15 +29,18 @@ log = logging.getLogger(__name__)
 
 
 @asynccontextmanager
-async def open_session(config: LinkConfig, mode: str = "") -> AsyncIterator[Session]:
+async def open_session(
+    config: LinkConfig, mode: str = "", router_within_s: float = math.inf
+) -> AsyncIterator[Session]:
     """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later.
 
-    `mode`: `router`, in place of the configuration's own.
+    `mode`: `router`, in place of the configuration's own. `router_within_s`: how long a client waits for its
+    router; a robot waits for ever, a person who asks does not.
     """
     if not (config.listen or config.connect):
         raise LinkError("the link has no endpoint: set `listen` or `connect` under [link]")
     check_keys(config)
-    opened = await open_zenoh(config, mode)
+    opened = await open_zenoh(config, mode, router_within_s)
     session = Session(opened, asyncio.get_running_loop(), config.quality)
     try:
         yield session

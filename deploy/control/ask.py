@@ -9,7 +9,7 @@ from common.control import ask_control, topic_for
 from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link import Link, open_session
 from common.messages import Action, ControlRequest
-from deploy.control.reach import Reach
+from deploy.control.reach import ROUTER_S, Reach
 
 _NOT_THERE = "does not answer at {at}: is `tandem slave` running, with that robot name, and listening there?"
 _OR_NOT_ALLOWED = " And may your certificate ask it? Its log says who was refused"
@@ -35,7 +35,7 @@ class Answer:
 
 async def ask_robots(where: Reach, action: Action, key: str = "") -> list[Answer]:
     """The answers, in the robots' order. Raises LinkError where the link cannot be opened at all."""
-    async with open_session(where.link) as session:
+    async with open_session(where.link, router_within_s=ROUTER_S) as session:
         links = [session.link(robot) for robot in where.robots]
         return await asyncio.gather(*(ask(link, where, action, key) for link in links))
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from common.errors import TandemError
+from common.errors import LinkError, TandemError
 from common.messages import Action
 from common.runtime import run as run_until_stopped
 from deploy.control.certificate import Certificate
@@ -78,7 +78,10 @@ def estop(
 
     async def tell() -> None:
         console = Console()
-        said = await stop_robots(where, all_, lambda answer: console.print(answer.line, highlight=False))
+        try:
+            said = await stop_robots(where, all_, lambda answer: console.print(answer.line, highlight=False))
+        except LinkError as error:
+            raise TandemError(f"NOBODY IS STOPPED BY THIS: {error}. Stop it at the robot itself") from None
         failed = [answer for answer in said if not answer.done]
         if failed:
             raise TandemError("NOT EVERY ROBOT IS STOPPED: " + "; ".join(answer.line for answer in failed))

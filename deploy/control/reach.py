@@ -13,6 +13,9 @@ from deploy.control.certificate import tls_beside
 from deploy.keys import AUTHORITY
 from master.config import MasterConfig
 
+ROUTER_S = 5.0
+"""How long a person's question waits for a router that does not answer."""
+
 
 @dataclass(frozen=True, slots=True)
 class Reach:

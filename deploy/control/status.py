@@ -22,7 +22,7 @@ from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.topics import STATE, STATISTICS
 from deploy.control.ask import Answer, ask
-from deploy.control.reach import Reach
+from deploy.control.reach import ROUTER_S, Reach
 from deploy.tables import GUARD_STYLE, UNKNOWN, plain_table
 
 LISTEN_S = 1.5
@@ -47,7 +47,7 @@ class Heard:
 
 async def ask_status(where: Reach, listen_s: float = LISTEN_S) -> dict[str, dict[str, Any]]:
     """Each robot's status as plain values. Raises LinkError where the link cannot be opened at all."""
-    async with open_session(where.link) as session:
+    async with open_session(where.link, router_within_s=ROUTER_S) as session:
         links = [session.link(robot) for robot in where.robots]
         each = await asyncio.gather(*(_status(link, where, listen_s) for link in links))
     return {answer.robot: as_tree(answer, heard) for answer, heard in each}

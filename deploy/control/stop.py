@@ -81,18 +81,21 @@ async def stop_robots(
     `tell` hears each answer as soon as it is known. An endpoint where no robot showed itself is an answer
     that is not done. Raises LinkError where the link cannot be opened at all.
     """
-    async with open_session(where.link) as session:
+    endpoints = where.link.connect
+    # through routers one that answers is all: it leads to every robot
+    doors = 1 if where.link.mode == "client" else len(endpoints)
+    async with open_session(where.link, router_within_s=within_s) as session:
         stopping = _Stopping(session, where.operator, tell, within_s)
         for robot in where.robots:
             stopping.stop(robot)
         if everyone:
             session.watch_robots(lambda robot, alive: stopping.stop(robot) if alive else None)
-            await _until_all_showed(session, len(where.link.connect), within_s)
+            await _until_all_showed(session, doors, within_s)
         answers = await stopping.answers()
-        missing = len(where.link.connect) - session.peers
+        missing = doors - session.peers
         if everyone and missing > 0:
-            many = f"{missing} of {len(where.link.connect)} endpoints"
-            text = f"NOT REACHED: {many} ({', '.join(where.link.connect)}); whoever is there is not stopped"
+            many = f"{missing} of {doors} endpoints"
+            text = f"NOT REACHED: {many} ({', '.join(endpoints)}); whoever is there is not stopped"
             answers.append(Answer("", False, text))
             tell(answers[-1])
         elif everyone and not answers:

@@ -497,6 +497,16 @@ def test_a_client_that_gives_up_waiting_leaves_nothing_behind(caplog: pytest.Log
     run(test)
 
 
+def test_who_only_asks_does_not_wait_for_a_router_for_ever() -> None:
+    async def test() -> None:
+        dead = free_endpoint()
+        with pytest.raises(LinkError, match=f"no router answered at {dead} within 0.2 s"):
+            async with open_session(LinkConfig(mode="client", connect=[dead]), router_within_s=0.2):
+                raise AssertionError("there is no router")
+
+    run(test)
+
+
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_two_clients_meet_through_a_router(protocol: str, tmp_path: Path) -> None:
     async def test() -> None:

@@ -18,7 +18,7 @@ from common.messages import Action, ClockReply
 from common.offset import MasterExchange
 from common.topics import CLOCK
 from deploy.control.ask import ask
-from deploy.control.reach import Reach
+from deploy.control.reach import ROUTER_S, Reach
 from deploy.control.status import listen
 
 EXCHANGES = 20
@@ -53,7 +53,7 @@ async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) ->
     It only asks: it claims nothing, and listens at no endpoint, so a running master is not disturbed.
     """
     where = Reach(link.model_copy(update={"listen": [], "access": None}), tuple(robots), operator)
-    async with open_session(where.link) as session:
+    async with open_session(where.link, router_within_s=ROUTER_S) as session:
         return await asyncio.gather(*(_read(session.link(robot), where) for robot in robots))
 
 

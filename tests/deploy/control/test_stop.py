@@ -12,7 +12,7 @@ import pytest
 from common.codec import decode, encode
 from common.config import LinkConfig
 from common.errors import LinkError, LinkTimeoutError
-from common.link import open_link
+from common.link import open_link, open_session
 from common.messages import Action, ControlReply, ControlRequest
 from common.topics import STOP
 from deploy.control.ask import Answer
@@ -159,3 +159,24 @@ def test_all_that_reaches_no_robot_says_so() -> None:
     answers, _ = stop({"a": endpoint()}, {}, (), everyone=True)
     assert [answer.done for answer in answers] == [False]
     assert "NOT REACHED" in answers[0].text
+
+
+def test_through_routers_one_that_answers_is_enough_and_none_is_an_error_in_time() -> None:
+    dead, router = endpoint(), endpoint()
+
+    async def story() -> list[Answer]:
+        def through(*routers: str) -> LinkConfig:
+            return LinkConfig(mode="client", connect=list(routers))
+
+        with pytest.raises(LinkError, match=f"no router answered at {dead}"):
+            await stop_robots(Reach(through(dead), ("a",), "anna"), False, within_s=0.2)
+        async with (
+            open_session(LinkConfig(listen=[router]), "router"),
+            open_link(through(router), "a") as robot,
+        ):
+            robot.answer(STOP, lambda _payload, _ns: encode(ACKNOWLEDGED))
+            robot.declare_alive("slave")
+            return await stop_robots(Reach(through(dead, router), (), "anna"), True, within_s=5.0)
+
+    answers = asyncio.run(story())
+    assert [(answer.robot, answer.done) for answer in answers] == [("a", True)]
