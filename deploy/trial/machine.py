@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from math import isinf
 from typing import Any
 
 from deploy.trial.cell import Cell
@@ -87,7 +88,7 @@ def _target(judged: Judged) -> dict[str, Any]:
     return {
         "what": judged.words,
         "at_most": judged.limit.at_most,
-        "worst": None if judged.worst is None else round(judged.worst, 3),
+        "worst": None if judged.worst is None or isinf(judged.worst) else round(judged.worst, 3),
         "met": judged.met,
         "missed_by": [f"{s.profile}/{s.transport}/{s.strategy}" for s in judged.missed],
     }

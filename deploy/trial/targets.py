@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from deploy.trial.figures import BY_NAME
+from deploy.trial.cell import Cell
+from deploy.trial.figures import BY_NAME, FIGURES, OUTAGE
 from deploy.trial.plan import Setup
 from deploy.trial.spread import Row
 
@@ -40,7 +43,7 @@ class Judged:
 
     limit: Limit
     worst: float | None
-    """None where nothing was measured."""
+    """None where nothing was measured; infinite where what should have come never did."""
     worst_setup: Setup | None
     missed: Sequence[Setup]
     asked: int
@@ -50,6 +53,13 @@ class Judged:
     def met(self) -> bool | None:
         """None where there is nothing to judge."""
         return None if self.worst is None else not self.missed
+
+    @property
+    def measured(self) -> str:
+        """The worst, as people read it."""
+        if self.worst is None or math.isinf(self.worst):
+            return "never"
+        return f"{self.worst:.3g} {BY_NAME[self.limit.figure].unit}".rstrip()
 
     @property
     def words(self) -> str:
@@ -66,14 +76,27 @@ def judge(rows: Sequence[Row], limits: Sequence[Limit] = LIMITS) -> list[Judged]
 
 def _judge(limit: Limit, rows: Sequence[Row]) -> Judged | None:
     found = [
-        (spread.high if limit.each else spread.median, row.setup)
+        (max(values) if limit.each else statistics.median(values), row.setup)
         for row in rows
         if limit.strategy in (None, row.setup.strategy)
         and limit.profile in (None, row.setup.profile)
-        and (spread := row.spreads.get(limit.figure)) is not None
+        and (values := [_value(limit, cell) for cell in row.done if _is_asked(limit, cell)])
     ]
     if not found:
         return None
     worst, setup = max(found, key=lambda item: item[0])
     missed = [s for value, s in found if value > limit.at_most]
     return Judged(limit, worst, setup, missed, len(found))
+
+
+def _is_asked(limit: Limit, cell: Cell) -> bool:
+    """Whether the cell should have the figure: those of an outage only where one was made."""
+    if BY_NAME[limit.figure].group != OUTAGE:
+        return True
+    return any(cell.values.get(figure.name) is not None for figure in FIGURES if figure.group == OUTAGE)
+
+
+def _value(limit: Limit, cell: Cell) -> float:
+    """A figure that should be there and is not misses every limit: commands that never flowed again."""
+    value = cell.values.get(limit.figure)
+    return math.inf if value is None else value

@@ -55,8 +55,7 @@ def _table(rows: Iterable[Row]) -> Table:
 
 
 def _target(judged: Judged) -> Text:
-    unit = BY_NAME[judged.limit.figure].unit
-    words = f"{judged.words}: {judged.worst:.3g} {unit}".rstrip() + f", at most {judged.limit.at_most:g}"
+    words = f"{judged.words}: {judged.measured}, at most {judged.limit.at_most:g}"
     if judged.met:
         return Text.assemble(("met     ", "green"), words)
     setups = ", ".join(f"{s.profile} {s.name}" for s in judged.missed[:4])

@@ -123,6 +123,22 @@ def test_a_limit_of_each_repeat_is_missed_by_one() -> None:
     assert judged.met is False
 
 
+def test_commands_that_never_flow_again_miss_the_limit_and_no_outage_asks_for_none() -> None:
+    setup, limits = Setup("tcp", "4g", "predict"), [Limit("flow_s", 1.5)]
+    back, never = {"flow_s": 0.5, "moved_alone": 0.0}, {"flow_s": None, "moved_alone": 0.0}
+    [once] = judge(rows(PLAN, with_values(setup, back, never, back)), limits)
+    [mostly] = judge(rows(PLAN, with_values(setup, never, back, never)), limits)
+    assert (once.met, once.measured) == (True, "0.5 s")
+    assert (mostly.met, mostly.measured) == (False, "never")
+    assert judge(rows(PLAN, with_values(setup, {"rmse_deg": 1.0}, {"rmse_deg": 1.0})), limits) == []
+
+
+def test_a_robot_that_never_followed_does_not_keep_a_limit_of_how_it_followed() -> None:
+    repeats = with_values(Setup("tcp", "4g", "predict"), {"tracked": 0.0}, {"tracked": 0.0})
+    [judged] = judge(rows(PLAN, repeats), [Limit("roughness", 3.0, "predict", "4g")])
+    assert judged.met is False
+
+
 def test_a_limit_of_another_network_is_not_asked() -> None:
     repeats = with_values(Setup("tcp", "lan", "predict"), {"rmse_over_hold": 0.9})
     assert judge(rows(PLAN, repeats), [Limit("rmse_over_hold", 0.4, "predict", "4g")]) == []

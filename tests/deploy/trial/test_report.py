@@ -8,6 +8,7 @@ import html.parser
 import io
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -131,6 +132,15 @@ def test_words_from_a_robot_are_text_and_never_markup(tmp_path: Path) -> None:
     page = (reported(tmp_path, [foul]).path / HTML).read_text("utf-8")
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
+
+
+def test_what_never_came_is_told_in_the_verdict(tmp_path: Path) -> None:
+    never = [replace(one, values={**one.values, "flow_s": None}) for one in cells()]
+    folder = reported(tmp_path, never).path
+    assert "never" in (folder / HTML).read_text("utf-8").partition("What suits which care task")[0]
+    targets = json.loads((folder / JSON).read_text("utf-8"))["compared"]["targets"]
+    [flow] = [target for target in targets if target["what"] == "flow after outage"]
+    assert (flow["worst"], flow["met"], len(flow["missed_by"])) == (None, False, 8)
 
 
 def test_a_busy_machine_is_told_on_top(tmp_path: Path) -> None:
