@@ -61,6 +61,12 @@ class RobotHost:
         self._options = options
         self._folder = folder
         self._config = load_config(options.config, SlaveConfig)
+        if self._config.link.access is not None:
+            # its rules know neither these questions nor transports on which nobody proves who he is
+            raise TandemError(
+                f"{options.config}: a trial cannot be served under [link.access]: give it a copy of the file "
+                "without, on a network that you trust"
+            )
         self._running: AsyncExitStack | None = None
         self._child: Child | None = None
         self._link: Link | None = None
@@ -201,7 +207,7 @@ class RobotHost:
         return talk.Answer(
             taken=not refusal,
             busy=self._task is not None and not self._task.done(),
-            fault=refusal or self._fault or self._died(),
+            fault=refusal or self._take_fault() or self._died(),
             port=self._options.port if child is not None else 0,
             guard=state.guard if state is not None else "",
             reason=state.reason if state is not None else "",
@@ -209,6 +215,13 @@ class RobotHost:
             total=len(self._kept.states),
             cpu_percent=child.cpu_percent if child is not None else 0.0,
         )
+
+    def _take_fault(self) -> str:
+        """Why what was asked for last did not come about; said once, when it is over."""
+        if self._task is not None and not self._task.done():
+            return ""
+        fault, self._fault = self._fault, ""
+        return fault
 
     def _died(self) -> str:
         try:

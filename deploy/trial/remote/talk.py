@@ -88,7 +88,7 @@ class Answer(Section):
     busy: bool = False
     """Something that was asked for is still under way."""
     fault: str = ""
-    """Why what was asked for last did not come about."""
+    """Why what was asked for last did not come about, told once; or why the slave is gone."""
     port: int = 0
     """Where the slave listens; 0 while there is none."""
     guard: str = ""

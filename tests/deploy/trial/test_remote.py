@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.codec import MAX_PAYLOAD
-from common.errors import CodecError
+from common.errors import CodecError, TandemError
 from deploy.profiles import example
 from deploy.trial.remote import talk
 from deploy.trial.remote.operator import robots_host
@@ -113,6 +113,29 @@ def test_looking_and_paging_are_always_answered(tmp_path: Path) -> None:
     answer = asked(tmp_path, payload=b"garbage")
     assert not answer.taken
     assert "not understood" in answer.fault
+
+
+def test_an_act_that_failed_is_told_once_and_is_no_fault_of_what_comes_after(tmp_path: Path) -> None:
+    async def refused() -> None:
+        raise TandemError("engage was refused: still braking")
+
+    async def story() -> list[str]:
+        host = RobotHost(ServeOptions(example("slave"), "tcp/127.0.0.1:1"), tmp_path)
+        host._begin(refused())
+        answers = []
+        for _ in range(3):
+            answers.append(talk.read_answer(host.on_question(talk.pack(talk.Look()), 0)))
+            await asyncio.sleep(0)
+        assert [answer.busy for answer in answers] == [True, False, False]
+        return [answer.fault for answer in answers]
+
+    assert asyncio.run(story()) == ["", "engage was refused: still braking", ""]
+
+
+def test_a_robot_with_access_rules_serves_no_trial(tmp_path: Path) -> None:
+    site = example("slave").parent / "site" / "robot.toml"
+    with pytest.raises(TandemError, match=r"robot\.toml.*under \[link\.access\]"):
+        RobotHost(ServeOptions(site, "tls/127.0.0.1:1"), tmp_path)
 
 
 @pytest.mark.parametrize(
