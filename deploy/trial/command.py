@@ -25,6 +25,8 @@ Tasks = Annotated[
         help="What each care task needs (TOML), instead of the project's.", exists=True, dir_okay=False
     ),
 ]
+SHORTEST_OUTAGE_S = 1.0
+"""A robot need not hold for a shorter one, so that nothing could be said of how it came back."""
 STOP_S = 30.0
 """From a Ctrl-C until the cell's processes and hosts are gone."""
 
@@ -42,7 +44,10 @@ def trial(
     repeat: Annotated[int, typer.Option(help="How often each setup is run.", min=1, max=100)] = 3,
     seconds: Annotated[float, typer.Option(help="Judged in each cell.", min=3.0, max=3600.0)] = 20.0,
     outage: Annotated[
-        float, typer.Option(help="Seconds without a link, after the judged time; 0: none.", min=0.0, max=60.0)
+        float,
+        typer.Option(
+            help="Seconds without a link, after the judged time, at least 1; 0: none.", min=0.0, max=60.0
+        ),
     ] = 2.0,
     motion: Annotated[str, typer.Option(help="The simulated operator's: bottle, sweep.")] = "bottle",
     seed: Annotated[int, typer.Option(help="Of sensors' errors, network and order.")] = 1,
@@ -82,6 +87,8 @@ def trial(
     from deploy.trial.choice import choose
     from deploy.trial.plan import Plan
 
+    if 0.0 < outage < SHORTEST_OUTAGE_S:
+        raise TandemError(f"--outage {outage:g}: expected 0, or {SHORTEST_OUTAGE_S:g} s or longer")
     networks = (profiles,) if remote else choose("--profiles", profiles)
     plan = Plan(
         transports=choose("--transports", transports), profiles=networks,

@@ -89,6 +89,9 @@ def test_help_says_what_it_does_with_an_example() -> None:
 def test_a_mistake_is_told_before_anything_is_started(tmp_path: Path) -> None:
     _, error = tandem("--transports", "smoke", "--report", str(tmp_path / "r"))
     assert isinstance(error, ConfigError)
+    _, error = tandem("--outage", "0.9", "--report", str(tmp_path / "r"))
+    assert isinstance(error, TandemError)
+    assert "--outage 0.9: expected 0, or 1 s or longer" in str(error)
     weights = tmp_path / "tasks.toml"
     weights.write_text("tasks = []", "utf-8")
     _, error = tandem("--tasks", str(weights), "--report", str(tmp_path / "r"))
