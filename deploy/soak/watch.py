@@ -18,8 +18,8 @@ from deploy.soak.counts import Additions, within
 from deploy.soak.motion import Motion
 
 FRESH_NS = to_ns(2.0 / COMMAND.rate_hz)
-NUMBERED = ("arrived", "lost", "late", "repeated")
-"""What the slave counts of commands by their numbers."""
+NUMBERED = ("arrived", "late", "repeated")
+"""What the slave counts of commands by their numbers, beside those that are lost."""
 Tell = Callable[[str, Mapping[str, Any]], None]
 """Takes an event's kind and what there is to say of it."""
 
@@ -134,15 +134,20 @@ class Watch:
 
     def _on_slave(self, figures: Mapping[str, Any]) -> None:
         dropped = figures.get("guard", {}).get("dropped", {})
-        counters = {name: within(figures, "commands", name) for name in NUMBERED}
-        counters |= {
+        counters = {
+            # one that comes after all is late and not lost any more: only the two together never shrink
+            "missing": within(figures, "commands", "lost") + within(figures, "commands", "late"),
+            **{name: within(figures, "commands", name) for name in NUMBERED},
             "overwritten": within(figures, "link", "command", "overwritten"),
             "slave_ticks": within(figures, "ticks", "expected"),
             "slave_missed": within(figures, "ticks", "missed"),
             # while nobody holds the lease every command is refused, and nothing is wrong with that
             "refused": sum(count for gate, count in dropped.items() if gate != "lease"),
         }
-        self._count("slave", counters)
+        added = {name: self._added["slave"].take(name, value) for name, value in counters.items()}
+        added["lost"] = added.pop("missing") - added["late"]
+        for name, count in added.items():
+            self._add(name, count)
         self._mean("slave", "end_to_end", figures.get("end_to_end_ms", {}))
 
     def restarted(self, role: str) -> None:

@@ -125,6 +125,16 @@ def test_counters_are_what_came_since_and_begin_anew_with_a_process(heard: Heard
     assert (row["lost"], row["slave_ticks"], row["slave_missed"]) == (5.0, 1000.0, 4.0)
 
 
+def test_a_command_that_comes_after_all_is_not_lost_and_loses_no_others(heard: Heard) -> None:
+    """What was lost shrinks then: that is no new process, whose whole count would be new."""
+    commands = {"arrived": 100, "lost": 40, "late": 0, "repeated": 0}
+    heard.statistics("slave", commands=commands)
+    assert heard.watch.row()["lost"] == 40.0
+    heard.statistics("slave", commands={**commands, "arrived": 101, "lost": 39, "late": 1})
+    row = heard.watch.row()
+    assert (row["lost"], row["late"], row["arrived"]) == (-1.0, 1.0, 1.0)
+
+
 def test_commands_without_a_lease_are_no_refusals(heard: Heard) -> None:
     heard.statistics("slave", guard={"dropped": {"lease": 30, "age": 2, "clock": 1}})
     assert heard.watch.row()["refused"] == 3.0
