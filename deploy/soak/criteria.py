@@ -27,6 +27,8 @@ MISSED_SHARE = 0.1
 """Percent of the ticks."""
 TRACK_S = 15.0
 """`guard.align_timeout_s`."""
+MOVES_WITHIN_S, ANSWERED_WITHIN_S = 2.0, 1.0
+"""A robot that is engaged is seen to move so soon; and so late, after it is seen to, comes its answer."""
 RECORDER_LOSES_S = 1.0
 COUNTED = {"lost": "lost", "late": "out of order", "repeated": "twice", "refused": "refused by the guard"}
 """Columns of what may befall a command, and in words."""
@@ -76,11 +78,11 @@ class Seen:
 def commands(seen: Seen) -> list[Verdict]:
     """Lost, late, twice, refused; each outside of the windows that explain it, and none acted on too late."""
     quiet = seen.quiet
-    sent = seen.sum("sent", quiet)
+    sent, all_ = seen.sum("sent", quiet), seen.sum("sent")
     verdicts = []
     for column, name in COUNTED.items():
         figure = seen.sum(column, quiet) if sent else None
-        note = f"{seen.sum(column):.0f} in all, {sent:.0f} sent outside of what explains"
+        note = f"{seen.sum(column):.0f} in all; {sent:.0f} of {all_:.0f} were sent outside of what explains"
         if column == "lost":
             note += f"; {seen.sum('overwritten'):.0f} waited too long in the slave itself"
         verdicts.append(at_most("commands", f"{name}, unexplained", figure, 0.0, note=note))
@@ -103,11 +105,12 @@ def guard(seen: Seen) -> list[Verdict]:
         and not seen.explained.accounts_for_hold(what["begun_s"] + what["held_s"])
     ]
     lefts = unexplained_lefts(seen.events, seen.explained)
-    engaged = sum(bool(e.what.get("done")) for e in of_kind(seen.events, "engage"))
-    moved = sum(
-        e.what.get("to") in ("align", "track") and e.what.get("from") not in ("align", "track")
+    engaged_s = [e.at_s for e in of_kind(seen.events, "engage") if e.what.get("done")]
+    moved_s = [
+        e.at_s
         for e in of_kind(seen.events, "guard")
-    )
+        if e.what.get("to") in ("align", "track") and e.what.get("from") not in ("align", "track")
+    ]
     strayed = seen.samples["strayed_deg"]
     way_s = (seen.options.get("network") or {}).get("way_s", 0.0)
     return [
@@ -119,8 +122,8 @@ def guard(seen: Seen) -> list[Verdict]:
             note=", ".join(sorted({what["fault"] for what in idle})),
         ),
         at_most(
-            "guard", "began to move without being engaged", float(max(0, moved - engaged)), 0.0,
-            note=f"engaged {engaged} times, began to move {moved} times",
+            "guard", "began to move without being engaged", float(_unasked(moved_s, engaged_s)), 0.0,
+            note=f"engaged {len(engaged_s)} times, began to move {len(moved_s)} times",
         ),
         at_most(
             "guard", "moved while it held",
@@ -243,6 +246,18 @@ def _worst(
     if "fault" in worst:
         note += f"; {worst['fault']}"
     return at_most(group, name, float(worst[key]), limit, unit, note)
+
+
+def _unasked(moved_s: Sequence[float], engaged_s: Sequence[float]) -> int:
+    """Moves without an engagement of their own. One that led to none serves for no later move."""
+    left, unasked = list(engaged_s), 0
+    for at_s in moved_s:
+        own = next((t for t in left if at_s - MOVES_WITHIN_S <= t <= at_s + ANSWERED_WITHIN_S), None)
+        if own is None:
+            unasked += 1
+        else:
+            left.remove(own)
+    return unasked
 
 
 def _reasons(lefts: Sequence[Event]) -> str:

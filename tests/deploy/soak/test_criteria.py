@@ -160,6 +160,22 @@ def test_a_move_without_an_engagement_fails(make: Make) -> None:
     assert failing(make(events=refused)) == {"guard: began to move without being engaged"}
 
 
+def test_an_engagement_that_led_to_nothing_excuses_no_later_move(make: Make) -> None:
+    def moved(engaged_s: float) -> set[str]:
+        engaged = Event(engaged_s, "engage", {"done": True})
+        return failing(make(events=(*STORY, engaged, Event(300.0, "guard", {"from": "hold", "to": "align"}))))
+
+    wrong = {"guard: began to move without being engaged"}
+    assert moved(297.9) == wrong
+    assert moved(298.0) == moved(301.0) == set()
+    assert moved(301.1) == wrong
+
+
+def test_how_much_of_all_is_explained_stands_beside_the_figure(make: Make) -> None:
+    note = judged(make(lost=at(103)))["commands: lost, unexplained"].note
+    assert note.startswith("1 in all; 7262 of 7500 were sent outside of what explains")
+
+
 def test_a_joint_that_moves_while_the_robot_holds_fails(make: Make) -> None:
     assert failing(make(strayed_deg=at(103, STRAYS_DEG))) == set()
     assert failing(make(strayed_deg=at(103, STRAYS_DEG + 0.1))) == {"guard: moved while it held"}
