@@ -107,13 +107,20 @@ class Session:
 
         `name` is the common name of the certificate; empty where the transport has none.
         """
-        names: dict[str, str] = {}
+        names: dict[str, list[str]] = {}
+        """Of each session that is connected, once a link: as it goes it is not told any more."""
 
         def on_event(event: zenoh.LinkEvent) -> None:
             session_id, here = str(event.link.zid), event.kind == zenoh.SampleKind.PUT
             if here:
-                names[session_id] = event.link.auth_identifier or ""
-            wake(self._loop, on_change, session_id, names.get(session_id, ""), here)
+                name = event.link.auth_identifier or ""
+                names.setdefault(session_id, []).append(name)
+            else:
+                links = names.get(session_id, [""])
+                name = links.pop()
+                if not links:
+                    names.pop(session_id, None)
+            wake(self._loop, on_change, session_id, name, here)
 
         self._held.append(
             self._session.info.declare_link_events_listener(Callback(on_event, indirect=False), history=True)

@@ -5,6 +5,7 @@ import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -528,3 +529,40 @@ def test_two_clients_meet_through_a_router(protocol: str, tmp_path: Path) -> Non
             await until(lambda: alive == {"slave": True})
 
     run(test)
+
+
+class Links:
+    """Stands for Zenoh's session as far as it tells of links."""
+
+    def __init__(self) -> None:
+        self.info = self
+
+    def declare_link_events_listener(self, handler: Any, history: bool) -> object:
+        self.handler = handler
+        return history
+
+    def tell(self, session_id: str, here: bool, name: str | None = None) -> None:
+        kind = zenoh.SampleKind.PUT if here else zenoh.SampleKind.DELETE
+        self.handler(SimpleNamespace(kind=kind, link=SimpleNamespace(zid=session_id, auth_identifier=name)))
+
+
+def test_who_goes_is_named_as_he_came_and_forgotten_then() -> None:
+    heard: list[tuple[str, str, bool]] = []
+
+    async def test() -> None:
+        links = Links()
+        session = Session(links, asyncio.get_running_loop())  # type: ignore[arg-type]
+        session.watch_peers(lambda *change: heard.append(change))
+        links.tell("a", True, "operator:anna")
+        links.tell("a", True, "operator:anna")  # a second link, as quic-datagram may have
+        links.tell("b", True)
+        for session_id in ("a", "b", "a", "a"):
+            links.tell(session_id, False)
+        await until(lambda: len(heard) == 7)
+
+    run(test)
+    anna = "operator:anna"
+    assert heard == [
+        ("a", anna, True), ("a", anna, True), ("b", "", True),
+        ("a", anna, False), ("b", "", False), ("a", anna, False), ("a", "", False),
+    ]  # fmt: skip
