@@ -30,7 +30,7 @@ class Lateness:
     def note(self, age_s: float) -> None:
         """Take the age of the sample that is being replaced."""
         age_s = max(age_s, 0.0)
-        if self.mean_s is None:
+        if not self.mean_s:  # none, or one of 0, of which twice is no more: clocks that were not yet known
             self.mean_s = age_s
             return
         surprise_s = min(age_s, _LOST * self.mean_s) - self.mean_s

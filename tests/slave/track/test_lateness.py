@@ -38,6 +38,13 @@ def test_the_age_after_a_long_silence_counts_as_twice_the_usual_one() -> None:
     assert silent.spread_s == twice.spread_s
 
 
+def test_a_first_age_of_nothing_is_no_measure_of_the_others() -> None:
+    lateness = Lateness()
+    for age_s in [-0.01, *[0.2] * 40]:
+        lateness.note(age_s)
+    assert lateness.mean_s == pytest.approx(0.2)
+
+
 @given(st.lists(st.floats(-1.0, 100.0), min_size=1, max_size=50))
 def test_whatever_comes_it_stays_between_what_was_seen(ages_s: list[float]) -> None:
     lateness = Lateness()
