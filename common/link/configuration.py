@@ -30,9 +30,10 @@ def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, Any]:
 
 def _tls(tls: TlsConfig) -> dict[str, Any]:
     # the same block serves quic; both sides show a certificate, whoever connects
-    certificate, key = str(tls.certificate), str(tls.key)
+    # absolute: a zenohd that reads them from a file of its own runs elsewhere
+    ca, certificate, key = (str(path.absolute()) for path in (tls.ca, tls.certificate, tls.key))
     return {
-        "root_ca_certificate": str(tls.ca),
+        "root_ca_certificate": ca,
         "enable_mtls": True,
         "verify_name_on_connect": True,
         "close_link_on_expiration": True,

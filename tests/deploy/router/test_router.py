@@ -70,6 +70,17 @@ def test_zenohd_gets_the_same_endpoints_keys_and_rules(tmp_path: Path) -> None:
     assert tls["listen_private_key"] == str(tmp_path / "router.key")
 
 
+def test_zenohd_finds_the_keys_wherever_it_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(tmp_path, SECURED)
+    monkeypatch.chdir(tmp_path)
+    [file] = Path().glob("*.toml")
+    assert CliRunner().invoke(app, ["router", str(file), "--zenohd", "zenohd.json5"]).exit_code == 0
+    settings = zenoh.Config.from_json5(Path("zenohd.json5").read_text("utf-8"))
+    assert json.loads(settings.get_json("transport/link/tls"))["listen_private_key"] == str(
+        tmp_path / "router.key"
+    )
+
+
 def test_without_rules_none_are_made_up(tmp_path: Path) -> None:
     config = load_config(written(tmp_path, '[link]\nlisten = ["tcp/127.0.0.1:1"]'), RouterConfig)
     settings = zenohd_configuration(config)
