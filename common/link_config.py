@@ -12,7 +12,8 @@ from common.section import RelativePath, Section
 from common.topics import QUESTIONS, TOPICS, Priority, Topic
 
 Endpoint = Annotated[str, AfterValidator(check_endpoint)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,47}$")]
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,47}$"
+Name = Annotated[str, Field(pattern=NAME)]
 """Of a robot, a person or a router, as in its certificate. 48 characters, so that a role fits before it."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from common.link_config import NAME
 from common.roles import Role, role_of
 from deploy.keys import AUTHORITY, KeysError
 
@@ -25,6 +27,7 @@ app = typer.Typer(
     "First `tandem keys authority keys`, then one `tandem keys make keys ROLE:NAME` a host.",
 )
 SOON_DAYS = 30
+MOST_DAYS = 36_500.0
 Folder = Annotated[Path, typer.Argument(help="Where the authority's files lie.", file_okay=False)]
 
 
@@ -32,7 +35,7 @@ Folder = Annotated[Path, typer.Argument(help="Where the authority's files lie.",
 def authority(
     folder: Folder,
     name: Annotated[str, typer.Option(help="Whose authority it is.")] = "tandem",
-    days: Annotated[float, typer.Option(help="Until it expires.", min=1.0)] = 3650.0,
+    days: Annotated[float, typer.Option(help="Until it expires.", min=1.0, max=MOST_DAYS)] = 3650.0,
 ) -> None:
     """Make a private authority: ca.pem goes to every host, ca.key stays here, offline.
 
@@ -61,7 +64,7 @@ def make(
         list[str] | None,
         typer.Option(help="Address or name under which others connect to it; may be given several times."),
     ] = None,
-    days: Annotated[float, typer.Option(help="Until it expires.", min=0.001)] = 365.0,
+    days: Annotated[float, typer.Option(help="Until it expires.", min=0.001, max=MOST_DAYS)] = 365.0,
 ) -> None:
     """Make a certificate and its key, of the folder's authority. It never overwrites one.
 
@@ -119,8 +122,10 @@ def _role_and_name(who: str) -> tuple[Role, str]:
     except ValueError:
         roles = ", ".join(f"{role}:NAME" for role in Role)
         raise KeysError(f"{who!r}: expected one of {roles}") from None
-    if not 1 <= len(name) <= 48 or not name.replace("_", "a").replace("-", "a").replace(".", "a").isalnum():
-        raise KeysError(f"{who!r}: expected a name of at most 48 letters, digits, '_', '.' and '-'")
+    if not re.fullmatch(NAME, name):  # else [link.access] could not name it
+        raise KeysError(
+            f"{who!r}: expected a name of at most 48 letters and digits, after the first '_', '.' and '-' too"
+        )
     return role, name
 
 

@@ -111,6 +111,8 @@ def test_the_commands_make_what_a_host_needs(tmp_path: Path) -> None:
         (("make", "KEYS", "nurse:anna"), "expected one of operator:NAME, robot:NAME"),
         (("make", "KEYS", "operator:a/b"), "expected a name of at most 48 letters"),
         (("make", "KEYS", "operator:" + "a" * 49), "expected a name of at most 48 letters"),
+        (("make", "KEYS", "operator:zoë"), "expected a name of at most 48 letters"),
+        (("make", "KEYS", "operator:.anna"), "expected a name of at most 48 letters"),
         (("authority", "KEYS", "--name", ""), "expected 1 to 64 characters"),
     ],
 )
