@@ -22,7 +22,7 @@ STANDS_S = 0.21 + 0.3 + 0.04
 STRAYS_DEG = 0.9
 """Above what a robot that stands is shaken by; see deploy/soak/motion.py."""
 AGE_MS = 300.0
-"""`guard.max_age_s`: an accepted command is younger."""
+"""`guard.max_age_s`, where no network needs a longer one: an accepted command is younger."""
 MISSED_SHARE = 0.1
 """Percent of the ticks."""
 TRACK_S = 15.0
@@ -74,6 +74,12 @@ class Seen:
         begun = of_kind(self.events, "begin")
         return begun[0].what if begun else {}
 
+    @property
+    def network(self) -> Mapping[str, Any]:
+        """What the network between two hosts does by its nature; empty where there is none."""
+        found: Mapping[str, Any] = self.options.get("network") or {}
+        return found
+
 
 def commands(seen: Seen) -> list[Verdict]:
     """Lost, late, twice, refused; each outside of the windows that explain it, and none acted on too late."""
@@ -88,7 +94,8 @@ def commands(seen: Seen) -> list[Verdict]:
         verdicts.append(at_most("commands", f"{name}, unexplained", figure, 0.0, note=note))
     ages = seen.samples["age_max_ms"]
     oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
-    verdicts.append(at_most("commands", "oldest that was acted on", oldest, AGE_MS, "ms", "put → accepted"))
+    most_ms = 1e3 * seen.network.get("max_age_s", AGE_MS / 1e3)
+    verdicts.append(at_most("commands", "oldest that was acted on", oldest, most_ms, "ms", "put → accepted"))
     return verdicts
 
 
@@ -112,7 +119,7 @@ def guard(seen: Seen) -> list[Verdict]:
         if e.what.get("to") in ("align", "track") and e.what.get("from") not in ("align", "track")
     ]
     strayed = seen.samples["strayed_deg"]
-    way_s = (seen.options.get("network") or {}).get("way_s", 0.0)
+    way_s = seen.network.get("way_s", 0.0)
     return [
         _worst("guard", "holds on a fault, the slowest", held, "held_s", HOLD_S + way_s, "s"),
         _worst("guard", "stands after a fault, the slowest", stood, "stands_s", STANDS_S + way_s, "s"),

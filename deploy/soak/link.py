@@ -7,12 +7,17 @@ from typing import Any
 from deploy.network import Network, Profile
 from deploy.network.scheduler import OUTAGE
 from deploy.soak.counts import Additions
+from deploy.trial.settings import needed_age_s
 
 
 def nature(profile: Profile) -> dict[str, Any]:
-    """Its name, and how long a packet to the robot takes at most, but for queues."""
+    """Its name, how long a packet to the robot takes at most, but for queues, and the guard's age limit."""
     way = profile.ways.to_robot
-    return {"name": profile.name, "way_s": (way.delay_ms + 4.0 * way.jitter_ms) / 1e3}
+    return {
+        "name": profile.name,
+        "way_s": (way.delay_ms + 4.0 * way.jitter_ms) / 1e3,
+        "max_age_s": needed_age_s(profile),
+    }
 
 
 class LinkLosses:

@@ -16,13 +16,16 @@ WANDERS = 4.0
 
 
 def max_age_s(plan: Plan, profile: Profile) -> float:
-    """The guard's age limit: as asked for, or the default where commands can keep it, or what they need.
+    """The guard's age limit: as asked for, or what the network needs."""
+    return plan.max_age_s or needed_age_s(profile)
+
+
+def needed_age_s(profile: Profile) -> float:
+    """The guard's age limit: the default where commands can keep it, or what they need.
 
     The guard adds the offset's bound, half the least round trip, to a command's age. Over a long line that
     alone is beyond the default, and a robot that takes no command would tell nothing about the line.
     """
-    if plan.max_age_s:
-        return plan.max_age_s
     to_robot, to_operator = profile.ways.to_robot, profile.ways.to_operator
     bound_ms = 0.5 * (to_robot.delay_ms + to_operator.delay_ms)
     needed_s = 1e-3 * (to_robot.delay_ms + bound_ms + WANDERS * to_robot.jitter_ms) + MARGIN_S

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from common.config import load_config
+from deploy.network import load_profile
 from deploy.profiles import example
 from deploy.soak.criteria import AGE_MS, CRITERIA, HOLD_S, STANDS_S, STRAYS_DEG, TRACK_S
 from deploy.soak.events import Event
 from deploy.soak.faults import FAULTS, SUIT_LOST_S
+from deploy.soak.link import nature
 from deploy.soak.verdict import Status, Verdict
 from deploy.soak.windows import AFTER_S
 from master.config import MasterConfig
@@ -97,6 +99,16 @@ def test_a_stall_of_the_host_explains_too_if_it_is_long_enough(make: Make) -> No
 def test_a_command_that_was_acted_on_too_late_fails_whenever_it_was(make: Make) -> None:
     assert failing(make(age_max_ms=at(103, AGE_MS))) == set()
     assert failing(make(age_max_ms=at(103, AGE_MS + 1.0))) == {"commands: oldest that was acted on"}
+
+
+def test_over_a_long_line_commands_may_be_as_old_as_its_guard_permits(make: Make) -> None:
+    network = nature(load_profile("geo-satellite"))
+    assert network["max_age_s"] > 0.5
+    far = (Event(0.0, "begin", {"network": network}), *STORY[1:])
+    name = "commands: oldest that was acted on"
+    assert failing(make(events=far, age_max_ms=at(50, 1e3 * network["max_age_s"]))) == set()
+    assert failing(make(events=far, age_max_ms=at(50, 1e3 * network["max_age_s"] + 1.0))) == {name}
+    assert nature(load_profile("4g"))["max_age_s"] == AGE_MS / 1e3
 
 
 @pytest.mark.parametrize(
