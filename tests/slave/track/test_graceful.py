@@ -180,6 +180,3 @@ def test_whatever_a_link_does_the_target_is_finite_and_continuous(
         if before is not None:
             np.testing.assert_allclose(after.position_rad, before.position_rad, atol=1e-9)
             np.testing.assert_allclose(after.velocity_rad_s, before.velocity_rad_s, atol=1e-7)
-        # however fast: never told to go farther from where the operator was seen than the guard bridges
-        far = tracker.target(to_ns(arrives_s + 1.0))
-        assert far is not None
