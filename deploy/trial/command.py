@@ -186,6 +186,8 @@ def _run(plan: Plan, path: Path, tasks: Path | None, run_cell: RunCell) -> None:
     if progress is not None and progress.done < progress.total:
         left = progress.total - progress.done
         raise TandemError(f"interrupted with {left} cells to go: the same command goes on with them")
+    if progress is not None and progress.failed:
+        raise TandemError(f"{progress.failed} cells failed: the same command tries them again")
 
 
 def _finish(path: Path, tasks: Path | None, console: Console) -> None:

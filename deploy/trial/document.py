@@ -61,6 +61,7 @@ def as_html(
         judged=judged,
         plots=plots,
         incomplete=None if finished >= expected else f"{finished} of {expected} cells are there",
+        failed=sum(len(row.failed) for row in rows),
         not_run=[row for row in rows if row.why_not],
         remarks=[(cell.key, remark) for row in rows for cell in row.cells for remark in cell.remarks],
         settings=_settings(rows),

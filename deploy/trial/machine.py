@@ -57,6 +57,7 @@ def _path(row: Row) -> str:
 def _setup(row: Row) -> dict[str, Any]:
     return {
         "repeats_done": len(row.done),
+        "repeats_failed": len(row.failed),
         "why_not": row.why_not,
         "figures": {name: _spread(name, spread) for name, spread in row.spreads.items()},
         "remarks": [f"repeat {c.key.repetition}: {remark}" for c in row.cells for remark in c.remarks],
@@ -90,5 +91,6 @@ def _target(judged: Judged) -> dict[str, Any]:
         "at_most": judged.limit.at_most,
         "worst": None if judged.worst is None or isinf(judged.worst) else round(judged.worst, 3),
         "met": judged.met,
+        "failed": judged.failed,
         "missed_by": [f"{s.profile}/{s.transport}/{s.strategy}" for s in judged.missed],
     }

@@ -36,7 +36,7 @@ def find(folder: Folder, tasks: Path = TASKS) -> Findings:
     """Read and judge the cells. Raises TandemError where there is no trial, ConfigError for the tasks."""
     plan = folder.plan()
     found = rows(plan, folder.cells().values())
-    return Findings(plan, found, rankings(load_tasks(tasks), found), judge(found))
+    return Findings(plan, found, rankings(load_tasks(tasks), found), judge(found, outage=plan.outage_s > 0.0))
 
 
 def write(folder: Folder, tasks: Path = TASKS) -> Findings:

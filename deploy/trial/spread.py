@@ -41,6 +41,11 @@ class Row:
         return [cell for cell in self.cells if cell.status is Status.DONE]
 
     @property
+    def failed(self) -> Sequence[Cell]:
+        """Those that were run and came to nothing."""
+        return [cell for cell in self.cells if cell.status is Status.FAILED]
+
+    @property
     def why_not(self) -> list[str]:
         """Why repeats are missing, each reason once."""
         return list(dict.fromkeys(cell.why for cell in self.cells if cell.status is not Status.DONE))

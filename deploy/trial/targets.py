@@ -43,21 +43,25 @@ class Judged:
 
     limit: Limit
     worst: float | None
-    """None where nothing was measured; infinite where what should have come never did."""
+    """None where every repeat failed; infinite where what should have come never did."""
     worst_setup: Setup | None
     missed: Sequence[Setup]
     asked: int
     """Of how many setups."""
+    failed: int = 0
+    """Repeats that were run and came to nothing: what they would have shown is not known."""
 
     @property
-    def met(self) -> bool | None:
-        """None where there is nothing to judge."""
-        return None if self.worst is None else not self.missed
+    def met(self) -> bool:
+        """Whether every setup kept it, and every repeat that was asked told of it."""
+        return not self.missed and not self.failed
 
     @property
     def measured(self) -> str:
         """The worst, as people read it."""
-        if self.worst is None or math.isinf(self.worst):
+        if self.worst is None:
+            return "nothing"
+        if math.isinf(self.worst):
             return "never"
         return f"{self.worst:.3g} {BY_NAME[self.limit.figure].unit}".rstrip()
 
@@ -69,24 +73,29 @@ class Judged:
         return f"{BY_NAME[self.limit.figure].title}{who}"
 
 
-def judge(rows: Sequence[Row], limits: Sequence[Limit] = LIMITS) -> list[Judged]:
-    """Those that this trial has setups for."""
-    return [judged for limit in limits if (judged := _judge(limit, rows)) is not None]
+def judge(rows: Sequence[Row], limits: Sequence[Limit] = LIMITS, outage: bool = True) -> list[Judged]:
+    """Those that this trial has setups for; `outage` where each cell was to have one."""
+    asked = [limit for limit in limits if outage or BY_NAME[limit.figure].group != OUTAGE]
+    return [judged for limit in asked if (judged := _judge(limit, rows)) is not None]
 
 
 def _judge(limit: Limit, rows: Sequence[Row]) -> Judged | None:
+    asked = [
+        row
+        for row in rows
+        if limit.strategy in (None, row.setup.strategy) and limit.profile in (None, row.setup.profile)
+    ]
     found = [
         (max(values) if limit.each else statistics.median(values), row.setup)
-        for row in rows
-        if limit.strategy in (None, row.setup.strategy)
-        and limit.profile in (None, row.setup.profile)
-        and (values := [_value(limit, cell) for cell in row.done if _is_asked(limit, cell)])
+        for row in asked
+        if (values := [_value(limit, cell) for cell in row.done if _is_asked(limit, cell)])
     ]
+    failed = sum(len(row.failed) for row in asked)
     if not found:
-        return None
+        return Judged(limit, None, None, (), 0, failed) if failed else None
     worst, setup = max(found, key=lambda item: item[0])
     missed = [s for value, s in found if value > limit.at_most]
-    return Judged(limit, worst, setup, missed, len(found))
+    return Judged(limit, worst, setup, missed, len(found), failed)
 
 
 def _is_asked(limit: Limit, cell: Cell) -> bool:

@@ -24,6 +24,9 @@ def print_findings(findings: Findings, console: Console) -> None:
         if not row.done:
             why = "; ".join(row.why_not) or "not run yet"
             console.print(Text.assemble((f"{row.setup.profile}, {row.setup.name}: ", "dim"), (why, "yellow")))
+    failed = sum(len(row.failed) for row in findings.rows)
+    if failed:
+        console.print(Text(f"{failed} failed: run, and came to nothing", "bold red"))
     for judged in findings.judged:
         console.print(_target(judged))
     profile = ""
@@ -58,5 +61,6 @@ def _target(judged: Judged) -> Text:
     words = f"{judged.words}: {judged.measured}, at most {judged.limit.at_most:g}"
     if judged.met:
         return Text.assemble(("met     ", "green"), words)
-    setups = ", ".join(f"{s.profile} {s.name}" for s in judged.missed[:4])
-    return Text.assemble(("missed  ", "bold red"), words, (f"  ({setups})", "dim"))
+    reasons = [f"{s.profile} {s.name}" for s in judged.missed[:4]]
+    reasons += [f"{judged.failed} failed"] if judged.failed else []
+    return Text.assemble(("missed  ", "bold red"), words, (f"  ({', '.join(reasons)})", "dim"))

@@ -133,6 +133,22 @@ def test_commands_that_never_flow_again_miss_the_limit_and_no_outage_asks_for_no
     assert judge(rows(PLAN, with_values(setup, {"rmse_deg": 1.0}, {"rmse_deg": 1.0})), limits) == []
 
 
+def test_a_repeat_that_failed_meets_no_target_it_was_asked_of() -> None:
+    setup, good = Setup("tcp", "4g", "predict"), {"roughness": 1.0, "flow_s": 0.5}
+    failed = [Cell(CellKey(setup, n), Status.FAILED, "the robot is not heard") for n in (2, 3)]
+    limits = [Limit("roughness", 3.0, "predict"), Limit("flow_s", 1.5), Limit("roughness", 3.0, "hold")]
+    some = judge(rows(PLAN, with_values(setup, good) + failed), limits)
+    assert [(j.met, j.failed, j.measured) for j in some] == [(False, 2, "1"), (False, 2, "0.5 s")]
+    none = judge(rows(PLAN, failed), limits)
+    assert [(j.met, j.failed, j.measured) for j in none] == [(False, 2, "nothing"), (False, 2, "nothing")]
+    without_outage = judge(rows(PLAN, failed), limits, outage=False)
+    assert [j.limit for j in without_outage] == limits[:1], (
+        "an outage's target is not asked of a trial without"
+    )
+    impossible = [Cell(CellKey(setup, 1), Status.IMPOSSIBLE, "does not cross hosts")]
+    assert judge(rows(PLAN, impossible), limits) == []
+
+
 def test_a_robot_that_never_followed_does_not_keep_a_limit_of_how_it_followed() -> None:
     repeats = with_values(Setup("tcp", "4g", "predict"), {"tracked": 0.0}, {"tracked": 0.0})
     [judged] = judge(rows(PLAN, repeats), [Limit("roughness", 3.0, "predict", "4g")])

@@ -143,6 +143,16 @@ def test_what_never_came_is_told_in_the_verdict(tmp_path: Path) -> None:
     assert (flow["worst"], flow["met"], len(flow["missed_by"])) == (None, False, 8)
 
 
+def test_cells_that_failed_are_told_in_the_verdict(tmp_path: Path) -> None:
+    first, *others = cells()
+    folder = reported(tmp_path, [Cell(first.key, Status.FAILED, "the robot is not heard"), *others]).path
+    verdict = (folder / HTML).read_text("utf-8").partition("What suits which care task")[0]
+    assert "1 failed" in verdict
+    compared = json.loads((folder / JSON).read_text("utf-8"))["compared"]
+    [flow] = [target for target in compared["targets"] if target["what"] == "flow after outage"]
+    assert (flow["met"], flow["failed"], flow["missed_by"]) == (False, 1, [])
+
+
 def test_a_busy_machine_is_told_on_top(tmp_path: Path) -> None:
     one = cell(PLAN.cells()[0])
     busy = Cell(one.key, one.status, values={**one.values, "ticks_missed": 7.25})

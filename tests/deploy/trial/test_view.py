@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from deploy.trial.cell import Cell, Status
 from deploy.trial.folder import Folder
 from deploy.trial.report import find
 from deploy.trial.view import print_findings
@@ -30,3 +31,16 @@ def test_setups_stand_whole_in_80_columns_under_their_network(tmp_path: Path) ->
     assert "lan, ws with hold: not run yet" in lines
     assert any(line.startswith("met     flow after outage") for line in lines)
     assert any(line.startswith("Holding a hand: ") for line in lines)
+
+
+def test_cells_that_failed_are_told_with_the_targets(tmp_path: Path) -> None:
+    folder, (first, *others) = Folder(tmp_path), cells()
+    folder.begin(PLAN)
+    for one in (Cell(first.key, Status.FAILED, "the robot is not heard"), *others):
+        folder.keep(one)
+    out = io.StringIO()
+    print_findings(find(folder), Console(file=out, width=120))
+    assert "1 failed: run, and came to nothing" in out.getvalue()
+    [flow] = [line for line in out.getvalue().splitlines() if "flow after outage: " in line]
+    assert flow.startswith("missed")
+    assert "(1 failed)" in flow
