@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from common.clock import NS_PER_S, to_ns
-from deploy.trial.recording import Outage, Recording, counts, echoes
+from common.clock import NS_PER_MS, NS_PER_S, to_ns
+from deploy.trial.recording import Outage, Recording, counts, echoes, within
 
 MOVING = ("align", "track")
 LEFT_S = 0.5
 """After the cut for longer than this, a robot that still moves has not noticed: its time-out is 0.2 s."""
+
+TELLS_NS = 20 * NS_PER_MS
+"""The slave counts for its statistics at most so long after the time they bear."""
 
 
 def aftermath(after: Recording, outage: Outage, max_age_s: float) -> dict[str, float | None]:
@@ -32,9 +35,41 @@ def aftermath(after: Recording, outage: Outage, max_age_s: float) -> dict[str, f
     return {
         "held_s": None if held_ns is None else (held_ns - outage.cut_ns) / NS_PER_S,
         "flow_s": None if flow_ns is None else (flow_ns - outage.back_ns) / NS_PER_S,
-        "stale_accepted": float(stale),
+        "stale_accepted": float(stale + _stale_unseen(after, outage, max_age_s)),
         "stale_refused": float(refused.get("age", 0)),
         "moved_alone": float(alone),
         "ready_s": None if outage.ready_ns is None else (outage.ready_ns - outage.back_ns) / NS_PER_S,
         "track_again_s": (again_ns[0] - act_ns) / NS_PER_S if again_ns and act_ns is not None else None,
     }
+
+
+def _stale_unseen(after: Recording, outage: Outage, max_age_s: float) -> int:
+    """How many that no state echoed were accepted stale, at the least.
+
+    Of a burst between two states only the last is echoed. That there were others the slave's counter tells,
+    not which: they are taken to be the freshest that they can have been, accepted as early as they can.
+    """
+    unseen = _accepted_unseen(after)
+    sampled_ns = {c.sequence: c.stamps.sampled_ns for c in after.commands}
+    newest, before_ns = min(sampled_ns, default=0) - 1, outage.back_ns
+    youngest_ns: list[int] = []
+    for state in sorted(after.states, key=lambda s: s.sent_ns):
+        if state.echo is not None:
+            if state.echo.accepted_ns > outage.back_ns:
+                between = range(newest + 1, state.echo.sequence)
+                youngest_ns += [before_ns - sampled_ns[n] for n in between if n in sampled_ns]
+            newest = state.echo.sequence
+        before_ns = max(state.sent_ns, outage.back_ns)
+    return sum(age_ns > to_ns(max_age_s) for age_ns in sorted(youngest_ns)[:unseen])
+
+
+def _accepted_unseen(after: Recording) -> int:
+    """Accepted by the slave's counter and echoed by no state, between its first word and its last."""
+    told = [s for s in within(after.told, "slave") if "accepted" in s.figures.get("guard", {})]
+    if len(told) < 2:
+        return 0
+    first, last = told[0], told[-1]
+    accepted = last.figures["guard"]["accepted"] - first.figures["guard"]["accepted"]
+    found = echoes(after.states).values()
+    seen = sum(first.sent_ns < e.accepted_ns <= last.sent_ns + TELLS_NS for e in found)
+    return max(0, accepted - seen)
