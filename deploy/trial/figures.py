@@ -27,7 +27,8 @@ LATENCY, TRIP, MOTION, GUARD, OUTAGE, COST = "latency", "trip", "motion", "guard
 
 FIGURES = (
     Figure("one_way_p50_ms", "one-way p50", "ms", 1, LATENCY,
-           "put → received, of every command that arrived, by the measured clock offset"),
+           "put → received of accepted commands of the judged time, by the clock offset that was measured "
+           "then"),
     Figure("one_way_p99_ms", "one-way p99", "ms", 1, LATENCY, "the same, 99th percentile"),
     Figure("one_way_bound_ms", "bound ±", "ms", 1, LATENCY,
            "how wrong the clock offset can make a one-way figure at most: half the least round trip, "
@@ -37,7 +38,8 @@ FIGURES = (
            "bound that two real hosts do not have"),
     Figure("true_one_way_p99_ms", "true p99", "ms", 1, LATENCY, "the same, 99th percentile"),
     Figure("round_trip_p50_ms", "round trip p50", "ms", 1, TRIP,
-           "command put → its echo heard, on the master's clock, without the time the robot held it"),
+           "command put → its echo heard, on the master's clock, without the time the robot held it; since "
+           "the master's start, so that what it took to start up and align is in it too"),
     Figure("round_trip_p99_ms", "round trip p99", "ms", 1, TRIP, "the same, 99th percentile"),
     Figure("age_p50_ms", "age p50", "ms", 1, TRIP,
            "age at the servo: the operator stood so → the setpoint that first uses it is written"),
@@ -73,7 +75,8 @@ FIGURES = (
            "the link returns → the guard accepts the first command"),
     Figure("stale_accepted", "stale accepted", "", 0, OUTAGE,
            "commands accepted after the return that were older than the guard may take, by the shared "
-           "clock; none may be"),
+           "clock; none may be. Of several between two states (20 ms) only the last is seen: of the others "
+           "as many count as the robot's own counter proves"),
     Figure("stale_refused", "stale refused", "", 0, OUTAGE,
            "commands that the guard refused for their age from the cut on"),
     Figure("moved_alone", "moved alone", "", 0, OUTAGE,

@@ -72,8 +72,7 @@ def excerpt(judged: Recording, config: SlaveConfig) -> Excerpt | None:
 
 
 def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
-    slave, master = _last(judged, "slave"), _last(judged, "master")
-    one_way, round_trip = slave.get("one_way_ms", {}), master.get("round_trip_ms", {})
+    round_trip = _last(judged, "master").get("round_trip_ms", {})
     sampled_ns = {c.sequence: c.stamps.sampled_ns for c in judged.commands}
     ages = [
         (e.written_ns - sampled_ns[n]) / NS_PER_MS
@@ -82,8 +81,7 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
     ]
     bound_ns = latest_bound_ns(judged.states)
     return {
-        "one_way_p50_ms": one_way.get("p50"),
-        "one_way_p99_ms": one_way.get("p99"),
+        **_percentiles("one_way", _measured_one_ways_ms(judged, shared_clock)),
         "one_way_bound_ms": None if bound_ns is None else bound_ns / NS_PER_MS,
         "round_trip_p50_ms": round_trip.get("p50"),
         "round_trip_p99_ms": round_trip.get("p99"),
@@ -92,6 +90,20 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
         "delivered": _delivered_percent(judged),
         "accepted": _accepted_percent(judged),
     }
+
+
+def _measured_one_ways_ms(judged: Recording, shared_clock: bool) -> list[float]:
+    """Put → received by the offset that the robot had measured when it told of the command."""
+    if not shared_clock:  # the stamps were brought onto the master's clock by just that
+        return _transits_ms(judged)
+    sent = {c.sequence for c in judged.commands}
+    one_way_ns = {
+        s.echo.sequence: s.echo.received_ns + s.master_offset_ns - s.echo.put_ns
+        for s in judged.states
+        if s.echo is not None and s.echo.sequence in sent and s.offset_bound_ns >= 0
+    }
+    # an offset that is off can make it negative; the slave, too, counts that as nothing
+    return [max(0, ns) / NS_PER_MS for ns in one_way_ns.values()]
 
 
 def _transits_ms(judged: Recording) -> list[float]:
