@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from common.clock import to_s
@@ -16,9 +18,11 @@ _LEAST_FULL_S = 0.15
 """Followed at full rate up to this age at least, servo lag included; while nothing is measured up to this."""
 _BRAKE_S = 0.15
 """Beyond the horizon it slows to rest within this time."""
-_FARTHEST_RAD = 0.6
-"""No joint is foretold to go farther than this within the horizon, whatever its velocity: within the guard's
+_FARTHEST_RAD = 0.68
+"""No joint is foretold to go farther than this, coasting included, whatever its velocity: within the guard's
 `jump_window_rad`, beyond which all joints come back slowly."""
+_LOOKED_AT = (0.25, 0.5, 0.75, 1.0)
+"""Parts of the longest way at which that is asked: one that turns back is farthest before its end."""
 
 
 class Predict:
@@ -85,13 +89,19 @@ class Predict:
         self._confidence.note(estimate)
         self._believed = estimate.motion.copy()
         self._believed[1:] *= self._confidence.share
-        foretold = np.abs(relaxed(self.horizon_s)[0, 1:] @ self._believed[1:])
+        span_s, _ = self._coasted(math.inf)
+        ways = np.stack([relaxed(part * span_s)[0, 1:] for part in _LOOKED_AT])
+        foretold = np.abs(ways @ self._believed[1:]).max(axis=0)
         self._believed[1:] *= _FARTHEST_RAD / np.maximum(foretold, _FARTHEST_RAD)
 
     def _course(self, estimate: Estimate, now_ns: int) -> Course:
         age_s = to_s(now_ns - estimate.sampled_ns) + self._servo_lag_s
-        full_s = self.horizon_s
-        span_s, rate = coast(age_s, full_s, min(full_s + _BRAKE_S, self._max_horizon_s))
+        span_s, rate = self._coasted(age_s)
         course: Course = relaxed(max(span_s, 0.0))[:2] @ self._believed
         course[1] *= rate
         return course
+
+    def _coasted(self, age_s: float) -> tuple[float, float]:
+        """How far an estimate of that age is carried on, s, and at which share of its rate."""
+        full_s = self.horizon_s
+        return coast(age_s, full_s, min(full_s + _BRAKE_S, self._max_horizon_s))

@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.quaternion import Array
-from slave.track.estimate import relaxed
+from slave.guard import GuardConfig
+from slave.track.estimate import Estimate, relaxed
 from slave.track.predict import Predict
 
 MS = 1_000_000
@@ -114,6 +115,19 @@ def test_without_samples_it_is_at_rest_from_the_horizon_on_and_not_before() -> N
     # full rate for half of the horizon, then the mean of a smooth descent
     assert stood == pytest.approx(2.0 * relaxed(0.75 * HORIZON_S)[0, 1])
     assert course(tracker, 60_000.0)[0] == pytest.approx(stood)
+
+
+@settings(deadline=None)
+@given(st.floats(-60.0, 60.0), st.floats(-800.0, 800.0), st.sampled_from([0.3, 0.5, 1.0]))
+def test_no_joint_is_foretold_farther_than_the_guard_takes_for_a_jump(
+    velocity: float, acceleration: float, horizon_s: float
+) -> None:
+    """Coasting included, and also where velocity and acceleration cancel at the end."""
+    tracker = Predict(BLEND_S, LAG_S, horizon_s)
+    motion = np.array([[1.0], [velocity], [acceleration]])
+    tracker._believe(Estimate(0, motion, np.eye(3)))
+    farthest = max(abs(float(course(tracker, ms)[0][0]) - 1.0) for ms in range(0, 1200, 10))
+    assert farthest <= GuardConfig().jump_window_rad
 
 
 @pytest.mark.parametrize("transit", [2, 30, 80, 150])
