@@ -10,9 +10,9 @@ import numpy as np
 
 from common.messages import Mask
 from deploy.soak.events import Event, of_kind
-from deploy.soak.explain import Explained, unexplained_lefts
+from deploy.soak.explain import LOST_PACKETS, Explained, unexplained_lefts
 from deploy.soak.samples import Samples
-from deploy.soak.verdict import Status, Verdict, at_most
+from deploy.soak.verdict import Status, Verdict, at_most, of_enough
 from deploy.soak.windows import explained as in_windows
 
 HOLD_S = 0.2 + 0.08
@@ -29,6 +29,7 @@ TRACK_S = 15.0
 """`guard.align_timeout_s`."""
 MOVES_WITHIN_S, ANSWERED_WITHIN_S = 2.0, 1.0
 """A robot that is engaged is seen to move so soon; and so late, after it is seen to, comes its answer."""
+DATAGRAMS = frozenset(LOST_PACKETS)
 RECORDER_LOSES_S = 1.0
 COUNTED = {"lost": "lost", "late": "out of order", "repeated": "twice", "refused": "refused by the guard"}
 """Columns of what may befall a command, and in words."""
@@ -46,6 +47,12 @@ class Seen:
     def quiet(self) -> Mask:
         """(N,) samples that no fault, start or stall of the host explains."""
         return ~in_windows(self.samples.at_s, self.explained.all)
+
+    @property
+    def network_alone(self) -> Mask:
+        """(N,) samples that the network explains, and neither fault, start nor stall."""
+        at_s, found = self.samples.at_s, self.explained
+        return in_windows(at_s, found.network) & ~in_windows(at_s, (*found.faults, *found.stalls))
 
     def sum(self, column: str, of: Mask | None = None) -> float:
         """A counter's additions over all samples, or some."""
@@ -83,20 +90,38 @@ class Seen:
 
 def commands(seen: Seen) -> list[Verdict]:
     """Lost, late, twice, refused; each outside of the windows that explain it, and none acted on too late."""
-    quiet = seen.quiet
-    sent, all_ = seen.sum("sent", quiet), seen.sum("sent")
+    all_ = seen.sum("sent")
     verdicts = []
     for column, name in COUNTED.items():
-        figure = seen.sum(column, quiet) if sent else None
+        # a lost datagram is one command, and the network tells how many it lost
+        counted = column == "lost" and seen.options.get("transport") in DATAGRAMS
+        judged = seen.quiet | (seen.network_alone if counted else False)
+        sent = seen.sum("sent", judged)
+        figure = seen.sum(column, seen.quiet) + (beyond_the_network(seen) if counted else 0.0)
         note = f"{seen.sum(column):.0f} in all; {sent:.0f} of {all_:.0f} were sent outside of what explains"
         if column == "lost":
             note += f"; {seen.sum('overwritten'):.0f} waited too long in the slave itself"
-        verdicts.append(at_most("commands", f"{name}, unexplained", figure, 0.0, note=note))
+        verdict = at_most("commands", f"{name}, unexplained", figure if sent else None, 0.0, note=note)
+        verdicts.append(of_enough(verdict, sent / all_ if all_ else 0.0))
     ages = seen.samples["age_max_ms"]
     oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
     most_ms = 1e3 * seen.network.get("max_age_s", AGE_MS / 1e3)
     verdicts.append(at_most("commands", "oldest that was acted on", oldest, most_ms, "ms", "put → accepted"))
     return verdicts
+
+
+def beyond_the_network(seen: Seen) -> float:
+    """Commands lost in each stretch of lossy seconds beyond its lost packets, but for faults and stalls."""
+    at_s = seen.samples.at_s
+    lost, gone = (np.nan_to_num(seen.samples[name]) for name in ("lost", "link_lost"))
+    gone = gone + np.nan_to_num(seen.samples["link_out"])
+    lossy = in_windows(at_s, seen.explained.network)
+    stretch = np.cumsum(np.diff(lossy, prepend=False))  # odd within one, even between two
+    beyond = 0.0
+    for number in np.unique(stretch[lossy]):
+        here = stretch == number
+        beyond += max(0.0, float(lost[here & seen.network_alone].sum() - gone[here].sum()))
+    return beyond
 
 
 def guard(seen: Seen) -> list[Verdict]:
@@ -123,7 +148,10 @@ def guard(seen: Seen) -> list[Verdict]:
     return [
         _worst("guard", "holds on a fault, the slowest", held, "held_s", HOLD_S + way_s, "s"),
         _worst("guard", "stands after a fault, the slowest", stood, "stands_s", STANDS_S + way_s, "s"),
-        at_most("guard", "holds that nothing explains", float(len(lefts)), 0.0, note=_reasons(lefts)),
+        of_enough(
+            at_most("guard", "holds that nothing explains", float(len(lefts)), 0.0, note=_reasons(lefts)),
+            _share(~seen.explained.accounted(seen.samples.at_s)),
+        ),
         at_most(
             "guard", "holds on a fault that asks for none", float(len(idle)), 0.0,
             note=", ".join(sorted({what["fault"] for what in idle})),
@@ -193,6 +221,10 @@ def loops(seen: Seen) -> list[Verdict]:
     words = "; ".join(f"{e.what['process']}: {e.what['words']}" for e in ends[:2])
     verdicts.append(at_most("loops", "processes that ended by themselves", float(len(ends)), 0.0, note=words))
     return verdicts
+
+
+def _share(of: Mask) -> float:
+    return float(np.mean(of)) if len(of) else 1.0
 
 
 def ending(seen: Seen) -> list[Verdict]:

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.messages import Mask
+from common.quaternion import Array
 from deploy.soak.events import Event, of_kind
 from deploy.soak.samples import Samples
-from deploy.soak.windows import Window, reason
+from deploy.soak.windows import Window, explained, reason
 
 HOST_STILL_MS = 50.0
 """Half of the guard's shortest time-out (its encoders', 0.1 s): a shorter stall explains no hold."""
@@ -47,6 +49,17 @@ class Explained:
         return any(window.includes(at_s) for window in self.stalls) or any(
             abs(lossy_s - at_s) <= LOST_WITHIN_S for lossy_s in self.lossy_s
         )
+
+    def accounted(self, at_s: Array) -> Mask:
+        """(N,) times at which a hold would be put down to the host or the network."""
+        near = np.zeros(len(at_s), np.bool_)
+        if self.lossy_s:
+            middles_s = np.sort(np.asarray(self.lossy_s))
+            next_ = np.searchsorted(middles_s, at_s)
+            before_s = at_s - middles_s[np.maximum(next_ - 1, 0)]
+            after_s = middles_s[np.minimum(next_, len(middles_s) - 1)] - at_s
+            near = np.minimum(np.abs(before_s), np.abs(after_s)) <= LOST_WITHIN_S
+        return near | explained(at_s, self.stalls)
 
     def why(self, at_s: float) -> str:
         """The reason of something that was seen then; empty where it has none."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from deploy.soak.trend import Slope
+
+LEAST_SHARE = 0.2
+"""Where less than this is left unexplained, that nothing went wrong in it says little."""
 
 
 class Status(StrEnum):
@@ -42,6 +45,15 @@ def at_most(
     if figure is None:
         return Verdict(group, name, Status.NOT_JUDGED, None, limit, unit, note)
     return Verdict(group, name, Status.PASS if figure <= limit else Status.FAIL, figure, limit, unit, note)
+
+
+def of_enough(verdict: Verdict, share: float) -> Verdict:
+    """Not judged instead of passed, where too small a `share` of what there was could have failed."""
+    if verdict.status is not Status.PASS or share >= LEAST_SHARE:
+        return verdict
+    words = f"only {100.0 * share:.0f} % of it was outside of what explains"
+    note = f"{words}; {verdict.note}" if verdict.note else words
+    return replace(verdict, status=Status.NOT_JUDGED, note=note)
 
 
 def not_above(

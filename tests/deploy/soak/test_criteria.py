@@ -16,7 +16,7 @@ from deploy.soak.criteria import AGE_MS, CRITERIA, HOLD_S, STANDS_S, STRAYS_DEG,
 from deploy.soak.events import Event
 from deploy.soak.faults import FAULTS, SUIT_LOST_S
 from deploy.soak.link import nature
-from deploy.soak.verdict import Status, Verdict
+from deploy.soak.verdict import Status, Verdict, at_most, of_enough
 from deploy.soak.windows import AFTER_S
 from master.config import MasterConfig
 
@@ -73,6 +73,43 @@ def test_a_network_that_lost_packets_explains_what_was_lost_then(make: Make) -> 
     for what in ("link_lost", "link_out", "link_odd"):
         assert failing(make(lost=at(51), **{what: at(50)})) == set()
         assert failing(make(lost=at(60), **{what: at(50)})) == {"commands: lost, unexplained"}
+
+
+@pytest.mark.parametrize(("packets", "lost", "fails"), [(1, 1, False), (1, 2, True), (3, 3, False)])
+def test_a_datagram_that_the_network_lost_explains_one_command(
+    make: Make, packets: int, lost: int, fails: bool
+) -> None:
+    def failing_over(transport: str) -> set[str]:
+        events = (replace(STORY[0], what={"transport": transport}), *STORY[1:])
+        # long before, and again in a fault, it lost many: those are of other stretches, or of the fault
+        gone = lambda at_s: np.select([at_s == 50, at_s == 30], [packets, 40], 0.0)  # noqa: E731
+        gone_of = lambda at_s: np.select([at_s == 51, at_s == 103], [lost, 50], 0.0)  # noqa: E731
+        return failing(make(events=events, link_lost=gone, lost=gone_of))
+
+    assert failing_over("udp") == ({"commands: lost, unexplained"} if fails else set())
+    assert failing_over("tcp") == set()
+
+
+@pytest.mark.parametrize(("every_s", "judges"), [(6, True), (5, False)])
+def test_where_little_is_left_unexplained_that_nothing_was_lost_is_no_pass(
+    make: Make, every_s: int, judges: bool
+) -> None:
+    def status(name: str, **columns: Any) -> Status:
+        return judged(make(**columns))[name].status
+
+    lossy = lambda at_s: np.where(at_s % every_s == 0, 1.0, 0.0)  # noqa: E731
+    as_judged = Status.PASS if judges else Status.NOT_JUDGED
+    assert status("commands: out of order, unexplained", link_lost=lossy) is as_judged
+    every_second = status("guard: holds that nothing explains", link_lost=1.0)
+    assert (every_second, status("guard: holds that nothing explains")) == (Status.NOT_JUDGED, Status.PASS)
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.2, Status.PASS), (0.199, Status.NOT_JUDGED)])
+def test_a_fifth_left_unexplained_is_enough_to_pass_and_none_is_needed_to_fail(
+    share: float, status: Status
+) -> None:
+    assert of_enough(at_most("commands", "lost", 0.0, 0.0), share).status is status
+    assert of_enough(at_most("commands", "lost", 1.0, 0.0), share).status is Status.FAIL
 
 
 def test_a_network_s_delay_is_allowed_for(make: Make) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from deploy.soak.events import Event
 from deploy.soak.explain import Explained, explanation, unexplained_lefts
+from deploy.soak.windows import Window
 
 from .conftest import STORY, Make
 
@@ -63,6 +64,13 @@ def test_a_network_that_lost_enough_explains_a_hold(make: Make, transport: str, 
     assert len(lefts(link_lost=at(60, enough))) == 1
     assert lefts(link_out=at(50, enough)) == []
     assert len(lefts(link_odd=at(50, 9))) == 1
+
+
+@pytest.mark.parametrize("lossy_s", [(), (20.0,), (7.5, 30.5, 9.0)])
+def test_times_are_accounted_for_as_single_holds_are(lossy_s: tuple[float, ...]) -> None:
+    found = Explained((), (Window(50.0, 50.2, "the host stood still"),), (), lossy_s)
+    at_s = np.arange(0.0, 60.0, 0.25)
+    assert found.accounted(at_s).tolist() == [found.accounts_for_hold(float(s)) for s in at_s]
 
 
 def test_the_network_s_windows_are_the_seconds_in_which_it_did_something(make: Make) -> None:
