@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from common.errors import ConfigError, ConfigMistake
+from common.errors import ConfigError, ConfigMistake, TandemError
 from deploy.rig.rig import ROUTER
 from deploy.soak import clock_step
 from deploy.soak import recorder as recording
@@ -103,13 +103,21 @@ async def _fill_disk(case: Case) -> None:
     stage = case.stage
     await stage.stop(recording.NAME)
     await stage.look_at_recording("stop")
-    case.told["disk"] = await stage.recorder.start_on_small_disk()
+    try:
+        case.told["disk"] = await stage.recorder.start_on_small_disk()
+    except TandemError:  # the fault does not come about; the recorder goes on as before it
+        await stage.recorder.disk.remove()
+        await stage.start(recording.NAME)
+        raise
+    case.kept["life"] = stage.recorder.child.lifetime
     stage.meant.add(recording.NAME)
 
 
 async def _free_disk(case: Case) -> None:
     stage = case.stage
-    lived, said = stage.recorder.child.running, stage.recorder.complaints()
+    child, said = stage.recorder.child, stage.recorder.complaints()
+    # one that ended is started again by whoever looks after the processes: that one met no full disk
+    lived = child.running and child.lifetime == case.kept["life"]
     status = await stage.stop(recording.NAME)
     await stage.look_at_recording("disk full", lived=lived, said=said, status=status)
     await stage.recorder.disk.remove()
