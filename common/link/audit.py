@@ -35,6 +35,8 @@ class Audit:
     def _on_change(self, session_id: str, who: str, here: bool) -> None:
         if self._refusals is not None and who:
             self._refusals.learn(session_id, who)
+            if not here:
+                self._refusals.went(session_id)
         who = who or f"session {session_id}"
         self._here[who] += 1 if here else -1
         self._connections[who] += here

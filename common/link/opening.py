@@ -7,6 +7,7 @@ import json
 import logging
 import math
 import re
+import threading
 
 import zenoh
 
@@ -59,4 +60,12 @@ async def _open_off_the_loop(config: LinkConfig, mode: str) -> zenoh.Session:
 
 def _close_unwanted(opening: asyncio.Future[zenoh.Session]) -> None:
     if not opening.cancelled() and opening.exception() is None:
-        opening.result().close()  # type: ignore[no-untyped-call]  # untyped in zenoh
+        # this is called on the loop, and to close can take ten seconds
+        threading.Thread(target=_close, args=(opening.result(),), name="link-close", daemon=True).start()
+
+
+def _close(session: zenoh.Session) -> None:
+    try:
+        session.close()  # type: ignore[no-untyped-call]  # untyped in zenoh
+    except Exception as error:  # nobody wants it any more
+        log.debug("close: %s", error)

@@ -60,7 +60,9 @@ class Refusals:
         self.more = 0
         """Refusals beyond MAX_KINDS different ones."""
         self.names: dict[str, str] = {}
-        """Common name by session, of whoever is connected; Zenoh's log does not name a stranger."""
+        """Common name by session, of who is connected or was; Zenoh's log does not name a stranger."""
+        self._gone: dict[str, None] = {}
+        """Of those, who is not connected any more, in the order in which they went."""
         self._pending: dict[str, Refusal] = {}
         self._throttles: dict[Refusal, Throttle] = {}
 
@@ -94,10 +96,18 @@ class Refusals:
         return None
 
     def learn(self, session: str, name: str) -> None:
-        """Whose session this is."""
-        if len(self.names) >= MAX_KINDS:
-            self.names.pop(next(iter(self.names)))
+        """Whose session this is. Too many are forgotten, first of all those that went first."""
+        self._gone.pop(session, None)
+        if session not in self.names and len(self.names) >= MAX_KINDS:
+            forgotten = next(iter(self._gone), None) or next(iter(self.names))
+            self._gone.pop(forgotten, None)
+            self.names.pop(forgotten, None)
         self.names[session] = name
+
+    def went(self, session: str) -> None:
+        """It is not connected any more; what it did may still be told under its name."""
+        if session in self.names:
+            self._gone[session] = None
 
     def figures(self) -> dict[str, object]:
         """For reports: handshakes by reason, messages by certificate, kind and key, and how many in all."""

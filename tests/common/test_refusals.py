@@ -98,5 +98,36 @@ def test_a_flood_of_different_refusals_costs_no_memory() -> None:
     assert refusals.figures()["total"] == MAX_KINDS + 5
 
 
+def test_who_is_still_connected_is_remembered_however_many_came_and_went() -> None:
+    refusals = Refusals()
+    refusals.learn(ZID, "operator:anna")
+    for n in range(2 * MAX_KINDS):
+        refusals.learn(f"{n:032x}", "observer:ward")
+        refusals.went(f"{n:032x}")
+    assert refusals.names[ZID] == "operator:anna"
+    assert len(refusals.names) == MAX_KINDS
+    assert f"{0:032x}" not in refusals.names
+    assert f"{2 * MAX_KINDS - 1:032x}" in refusals.names, "what the last one did may yet be told"
+
+
+def test_who_went_and_is_back_is_forgotten_no_sooner_than_others() -> None:
+    refusals = Refusals()
+    for session in (ZID, "b" * 32):
+        refusals.learn(session, "operator:anna")
+        refusals.went(session)
+    refusals.learn(ZID, "operator:anna")
+    for n in range(MAX_KINDS - 1):
+        refusals.learn(f"{n:032x}", "observer:ward")
+    assert ZID in refusals.names
+    assert "b" * 32 not in refusals.names
+
+
+def test_a_name_that_is_known_forgets_nobody() -> None:
+    refusals = Refusals()
+    for n in (*range(MAX_KINDS), *range(MAX_KINDS)):
+        refusals.learn(f"{n:032x}", "observer:ward")
+    assert len(refusals.names) == MAX_KINDS
+
+
 def test_anything_else_is_let_be() -> None:
     assert fed("", "ThreadId(1)", "error", dropped(1), "\xff" * 1000).counts.total() == 0
