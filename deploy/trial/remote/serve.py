@@ -138,6 +138,8 @@ class RobotHost:
     def _why_not(self, start: talk.Start) -> str:
         if start.transport not in TRANSPORTS:
             return f"transport {start.transport!r}: expected one of {', '.join(TRANSPORTS)}"
+        if start.transport == "unixsock-stream":  # whose address would be a path of this host
+            return f"transport {start.transport!r} does not leave this host"
         if start.strategy not in strategies():
             return f"strategy {start.strategy!r}: expected one of {', '.join(strategies())}"
         if not 0.0 < start.max_age_s <= self._options.max_age_s:
@@ -153,6 +155,9 @@ class RobotHost:
                 await work
             except TandemError as error:
                 self._fault = str(error)
+            except Exception as error:  # the operator's host must not take it for done
+                log.exception("what was asked for did not come about")
+                self._fault = f"the robot's host failed: {str(error) or type(error).__name__}"
 
         self._fault = ""
         self._task = asyncio.create_task(attempt())

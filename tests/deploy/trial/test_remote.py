@@ -87,6 +87,7 @@ def asked(tmp_path: Path, *requests: talk.Request, payload: bytes | None = None)
     ("change", "words"),
     [
         ({"transport": "carrier-pigeon"}, "expected one of tcp"),
+        ({"transport": "unixsock-stream"}, "does not leave this host"),
         ({"strategy": "guess"}, "expected one of"),
         ({"max_age_s": 0.51}, "allows up to 0.5 s"),
         ({"max_age_s": 0.0}, "allows up to 0.5 s"),
@@ -115,9 +116,19 @@ def test_looking_and_paging_are_always_answered(tmp_path: Path) -> None:
     assert "not understood" in answer.fault
 
 
-def test_an_act_that_failed_is_told_once_and_is_no_fault_of_what_comes_after(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (TandemError("engage was refused: still braking"), "engage was refused: still braking"),
+        (OSError(24, "Too many open files"), "the robot's host failed: [Errno 24] Too many open files"),
+        (AssertionError(), "the robot's host failed: AssertionError"),
+    ],
+)
+def test_an_act_that_failed_is_told_once_and_is_no_fault_of_what_comes_after(
+    tmp_path: Path, error: Exception, words: str
+) -> None:
     async def refused() -> None:
-        raise TandemError("engage was refused: still braking")
+        raise error
 
     async def story() -> list[str]:
         host = RobotHost(ServeOptions(example("slave"), "tcp/127.0.0.1:1"), tmp_path)
@@ -129,7 +140,7 @@ def test_an_act_that_failed_is_told_once_and_is_no_fault_of_what_comes_after(tmp
         assert [answer.busy for answer in answers] == [True, False, False]
         return [answer.fault for answer in answers]
 
-    assert asyncio.run(story()) == ["", "engage was refused: still braking", ""]
+    assert asyncio.run(story()) == ["", words, ""]
 
 
 def test_a_robot_with_access_rules_serves_no_trial(tmp_path: Path) -> None:
