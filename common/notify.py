@@ -18,6 +18,8 @@ from common.clock import NS_PER_MS
 SOCKET, WATCHDOG, WATCHDOG_PID = "NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"
 PINGS_A_PERIOD = 4
 """So many within the time after which the manager takes the loop for hung."""
+STARTS_WITHIN_S = 30
+"""Asked for with each word that the process still waits: the time to its next word, or to readiness."""
 _RETRY_NS = 50 * NS_PER_MS
 _NEVER_NS = 1 << 63
 _MOST_TEXT = 256
@@ -52,10 +54,13 @@ class Notifier:
 
     def status(self, text: str) -> None:
         """What the process does, in words: what `systemctl status` shows."""
-        # one line: a name that somebody chose must not be taken for a message of ours
-        line = " ".join("".join(c if c.isprintable() else " " for c in text).split())[:_MOST_TEXT]
+        line = _one_line(text)
         if line != self._said and self._tell(f"STATUS={line}"):
             self._said = line
+
+    def waits(self, text: str) -> None:
+        """Not ready yet, through no fault of its own: why, and the manager's start time-out begins anew."""
+        self._tell(f"STATUS={_one_line(text)}\nEXTEND_TIMEOUT_USEC={STARTS_WITHIN_S * 1_000_000}")
 
     def stopping(self) -> None:
         """The process has begun to end; the loop need not beat any more."""
@@ -68,6 +73,11 @@ class Notifier:
         sent = self._send(message.encode("utf-8", "replace"))
         self.unsent += not sent
         return sent
+
+
+def _one_line(text: str) -> str:
+    """A name that somebody chose must not be taken for a message of ours."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:_MOST_TEXT]
 
 
 def open_notifier(environment: MutableMapping[str, str] = os.environ) -> Notifier:

@@ -138,7 +138,7 @@ async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
     notifier = open_notifier()
     take_priority(config.process)  # first, so that every thread has it
     audit = Audit(config.link)
-    async with open_session(config.link) as session:
+    async with open_session(config.link, waits=notifier.waits) as session:
         audit.attach(session)
         master = Master(config, session, notifier)
         where = ", ".join(config.link.connect or config.link.listen)

@@ -176,7 +176,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
         if base is not None:
             base.start()
         audit = Audit(config.link)
-        async with open_session(config.link) as session:
+        async with open_session(config.link, waits=notifier.waits) as session:
             audit.attach(session)
             slave = Slave(config, session.link(config.robot), servos, base, notifier)
             where = ", ".join(config.link.listen or config.link.connect)

@@ -8,6 +8,7 @@ import logging
 import math
 import re
 import threading
+from collections.abc import Callable
 
 import zenoh
 
@@ -22,8 +23,13 @@ _NO_ROUTER = "Unable to connect to any of"
 log = logging.getLogger(__name__)
 
 
-async def open_zenoh(config: LinkConfig, mode: str = "", within_s: float = math.inf) -> zenoh.Session:
-    """The session. As a client it waits `within_s` for its router. Raises LinkError."""
+async def open_zenoh(
+    config: LinkConfig,
+    mode: str = "",
+    within_s: float = math.inf,
+    waits: Callable[[str], None] = lambda _: None,
+) -> zenoh.Session:
+    """The session. As a client it waits `within_s` for its router, and says so. Raises LinkError."""
     turn, until_s = 0, asyncio.get_running_loop().time() + within_s
     while True:
         try:
@@ -34,6 +40,7 @@ async def open_zenoh(config: LinkConfig, mode: str = "", within_s: float = math.
         routers = ", ".join(config.connect)
         if asyncio.get_running_loop().time() >= until_s:
             raise LinkError(f"no router answered at {routers} within {within_s:g} s")
+        waits(f"waits for a router at {routers}")
         if turn == 0:
             log.warning("no router answers at %s: tried until one does", routers)
         turn += 1

@@ -30,17 +30,20 @@ log = logging.getLogger(__name__)
 
 @asynccontextmanager
 async def open_session(
-    config: LinkConfig, mode: str = "", router_within_s: float = math.inf
+    config: LinkConfig,
+    mode: str = "",
+    router_within_s: float = math.inf,
+    waits: Callable[[str], None] = lambda _: None,
 ) -> AsyncIterator[Session]:
     """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later.
 
     `mode`: `router`, in place of the configuration's own. `router_within_s`: how long a client waits for its
-    router; a robot waits for ever, a person who asks does not.
+    router; a robot waits for ever, a person who asks does not. `waits` is told now and then that it does.
     """
     if not (config.listen or config.connect):
         raise LinkError("the link has no endpoint: set `listen` or `connect` under [link]")
     check_keys(config)
-    opened = await open_zenoh(config, mode, router_within_s)
+    opened = await open_zenoh(config, mode, router_within_s, waits)
     session = Session(opened, asyncio.get_running_loop(), config.quality)
     try:
         yield session

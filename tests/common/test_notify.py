@@ -171,6 +171,16 @@ def test_the_same_status_is_said_once() -> None:
     assert messages == ["STATUS=hold", "STATUS=track", "STATUS=hold"]
 
 
+def test_who_waits_for_another_has_its_start_time_out_extended_each_time() -> None:
+    notifier, messages = told()
+    for _ in range(2):
+        notifier.waits("waits for a router at tls/a:1\nREADY=1")
+    words = "STATUS=waits for a router at tls/a:1 READY=1\nEXTEND_TIMEOUT_USEC=30000000"
+    assert messages == [words, words]
+    notifier.beat(0)
+    assert messages[-1] == "READY=1\nWATCHDOG=1", "to wait is not to be ready"
+
+
 def test_after_stopping_the_loop_is_not_watched_any_more() -> None:
     notifier, messages = told()
     notifier.beat(0)
