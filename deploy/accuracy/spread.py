@@ -57,12 +57,12 @@ def run_each(
             for future in done:
                 yield open_.pop(future), future.result()
     except BaseException:  # Ctrl-C too: nobody wants to wait for what runs
-        pool.shutdown(wait=False, cancel_futures=True)
         for child in set(multiprocessing.active_children()) - others:
             child.terminate()
         raise
     finally:
-        pool.shutdown()
+        # waits until the pool's own thread has seen every process end
+        pool.shutdown(cancel_futures=True)
 
 
 _counter: Any = None

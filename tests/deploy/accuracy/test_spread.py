@@ -18,14 +18,6 @@ def square(item: int, tell: Callable[[int], object]) -> int:
     return item * item
 
 
-def nobody_lives_on() -> None:
-    """One that the pool's own thread is reaping just now is still listed, but dead."""
-    children = multiprocessing.active_children()
-    for child in children:
-        child.join(10.0)
-    assert [child for child in children if child.is_alive()] == []
-
-
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_every_item_comes_back_and_all_is_told(jobs: int) -> None:
     heard: list[int] = []
@@ -37,11 +29,11 @@ def test_every_item_comes_back_and_all_is_told(jobs: int) -> None:
 def test_an_error_passes_through_and_ends_the_rest() -> None:
     with pytest.raises(TandemError, match="-1 has no root"):
         list(run_each(square, [-1, *range(50)], 2))
-    nobody_lives_on()
+    assert multiprocessing.active_children() == []
 
 
 def test_who_stops_listening_ends_the_rest() -> None:
     running = run_each(square, range(50), 2)
     next(running)
     running.close()  # type: ignore[attr-defined]  # a generator
-    nobody_lives_on()
+    assert multiprocessing.active_children() == []
