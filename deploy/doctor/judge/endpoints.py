@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from common.endpoint import transport_of
 from deploy.doctor.finding import Finding, fail, ok, warn
 from deploy.doctor.read.endpoints import Answer, EndpointFacts
 
@@ -12,7 +13,10 @@ def judge_endpoint(facts: EndpointFacts) -> Finding:
     """One that this host connects to, or listens at."""
     match facts.answer:
         case Answer.ACCEPTS:
-            return ok(f"connect {facts.endpoint}", "somebody listens there")
+            found = "somebody listens there"
+            if transport_of(facts.endpoint) == "tls":  # the knock ended before a handshake
+                found += ", and counts this knock as a refused handshake"
+            return ok(f"connect {facts.endpoint}", found)
         case Answer.UNASKED:
             return ok(f"connect {facts.endpoint}", "cannot be knocked at; the robot's own row tells")
         case Answer.REFUSED:
