@@ -1,4 +1,8 @@
-"""A lease's public name: states tell whose lease it is without giving away the token that commands need."""
+"""A lease's short name, for states: a digest of the token that commands bear.
+
+It keeps the token from who hears states alone. Who hears commands has it: what protects the robot from them
+is `[link.access]`, by which only its operators may publish commands.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from hashlib import blake2s
 def lease_id(token: int) -> int:
     """32 bits of a digest of a lease's token (0 to 2⁶³ - 1); 0 where there is no lease.
 
-    Two leases share an id once in 2³² times; the token cannot be had from it.
+    Two leases share an id once in 2³² times; the token cannot be computed from it.
     """
     if not token:
         return 0
