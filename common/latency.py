@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -25,6 +26,8 @@ STAGES = (
 """Between neighbouring stamps of a Passage. Only `put→received` crosses from one clock to the other."""
 _LONGEST_US = 60_000_000
 _DIGITS = 3
+MOST_RECENT = 256
+"""Statistics tell what came in a second: a dozen, and more only where a link lets go what it held back."""
 
 Summary = dict[str, float]
 """`count`, and `mean`, `p50`, `p99`, `max` in ms."""
@@ -72,7 +75,26 @@ class Durations:
         }
 
 
-class RoundTrip(Durations):
+class Told(Durations):
+    """Durations that are also told one by one, so that who listens can judge a stretch of time of its own."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._recent_us: deque[int] = deque(maxlen=MOST_RECENT)
+
+    def record(self, duration_ns: int) -> None:
+        """Take one duration."""
+        super().record(duration_ns)
+        self._recent_us.append(max(0, round(duration_ns / 1000)))
+
+    def take_recent(self) -> list[int]:
+        """Those since the last call in µs, the newest MOST_RECENT of them."""
+        recent_us = list(self._recent_us)
+        self._recent_us.clear()
+        return recent_us
+
+
+class RoundTrip(Told):
     """Time out and back on one host's clock, without the time the other side held it."""
 
 

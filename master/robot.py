@@ -58,7 +58,9 @@ class CommandedRobot:
 
     def tell(self, now_ns: int, shared: Mapping[str, object]) -> None:
         """Publish what the master counted, and what of it is this robot's own."""
-        self._put_statistics(encode(Statistics("master", now_ns, {**shared, **self.figures()})))
+        recent_us = self._watch.round_trip.take_recent()
+        figures = {**shared, **self.figures(), "round_trip_recent_us": recent_us}
+        self._put_statistics(encode(Statistics("master", now_ns, figures)))
 
     def _on_state(self, payload: bytes, arrived_ns: int) -> None:
         try:

@@ -127,7 +127,8 @@ class Slave:
 
     async def _tell(self) -> None:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
-            self._put_statistics(encode(Statistics("slave", due.scheduled_ns, self.figures())))
+            figures = {**self.figures(), "one_way_recent_us": self._pipeline.one_way.take_recent()}
+            self._put_statistics(encode(Statistics("slave", due.scheduled_ns, figures)))
 
     def figures(self) -> dict[str, object]:
         """Counters and percentiles for tables and reports."""

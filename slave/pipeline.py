@@ -12,7 +12,7 @@ import numpy as np
 from common.codec import decode, encode
 from common.control import OPEN
 from common.errors import CodecError
-from common.latency import Durations
+from common.latency import Told
 from common.lease import lease_id
 from common.messages import (
     Action,
@@ -53,7 +53,7 @@ class SlavePipeline:
         )
         self.clock = SlaveExchange()
         self.journeys = Journeys()
-        self.one_way = Durations()
+        self.one_way = Told()
         """From put to received, of every command of the lease's holder while the offset was trusted."""
         self.arrivals = Arrivals()
         """Of the commands of the lease's holder, by their numbers."""

@@ -27,8 +27,8 @@ LATENCY, TRIP, MOTION, GUARD, OUTAGE, COST = "latency", "trip", "motion", "guard
 
 FIGURES = (
     Figure("one_way_p50_ms", "one-way p50", "ms", 1, LATENCY,
-           "put → received of accepted commands of the judged time, by the clock offset that was measured "
-           "then"),
+           "put → received, of every command that arrived in the judged time, by the clock offset that was "
+           "measured then"),
     Figure("one_way_p99_ms", "one-way p99", "ms", 1, LATENCY, "the same, 99th percentile"),
     Figure("one_way_bound_ms", "bound ±", "ms", 1, LATENCY,
            "how wrong the clock offset can make a one-way figure at most: half the least round trip, "
@@ -38,8 +38,8 @@ FIGURES = (
            "bound that two real hosts do not have"),
     Figure("true_one_way_p99_ms", "true p99", "ms", 1, LATENCY, "the same, 99th percentile"),
     Figure("round_trip_p50_ms", "round trip p50", "ms", 1, TRIP,
-           "command put → its echo heard, on the master's clock, without the time the robot held it; since "
-           "the master's start, so that what it took to start up and align is in it too"),
+           "command put → its echo heard, in the judged time, on the master's clock, without the time the "
+           "robot held it"),
     Figure("round_trip_p99_ms", "round trip p99", "ms", 1, TRIP, "the same, 99th percentile"),
     Figure("age_p50_ms", "age p50", "ms", 1, TRIP,
            "age at the servo: the operator stood so → the setpoint that first uses it is written"),

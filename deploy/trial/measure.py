@@ -72,7 +72,6 @@ def excerpt(judged: Recording, config: SlaveConfig) -> Excerpt | None:
 
 
 def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
-    round_trip = _last(judged, "master").get("round_trip_ms", {})
     sampled_ns = {c.sequence: c.stamps.sampled_ns for c in judged.commands}
     ages = [
         (e.written_ns - sampled_ns[n]) / NS_PER_MS
@@ -81,10 +80,9 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
     ]
     bound_ns = latest_bound_ns(judged.states)
     return {
-        **_percentiles("one_way", _measured_one_ways_ms(judged, shared_clock)),
+        **_percentiles("one_way", _told_ms(judged, "slave", "one_way_recent_us")),
         "one_way_bound_ms": None if bound_ns is None else bound_ns / NS_PER_MS,
-        "round_trip_p50_ms": round_trip.get("p50"),
-        "round_trip_p99_ms": round_trip.get("p99"),
+        **_percentiles("round_trip", _told_ms(judged, "master", "round_trip_recent_us")),
         **_percentiles("age", ages),
         **(_percentiles("true_one_way", _transits_ms(judged)) if shared_clock else {}),
         "delivered": _delivered_percent(judged),
@@ -92,18 +90,9 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
     }
 
 
-def _measured_one_ways_ms(judged: Recording, shared_clock: bool) -> list[float]:
-    """Put → received by the offset that the robot had measured when it told of the command."""
-    if not shared_clock:  # the stamps were brought onto the master's clock by just that
-        return _transits_ms(judged)
-    sent = {c.sequence for c in judged.commands}
-    one_way_ns = {
-        s.echo.sequence: s.echo.received_ns + s.master_offset_ns - s.echo.put_ns
-        for s in judged.states
-        if s.echo is not None and s.echo.sequence in sent and s.offset_bound_ns >= 0
-    }
-    # an offset that is off can make it negative; the slave, too, counts that as nothing
-    return [max(0, ns) / NS_PER_MS for ns in one_way_ns.values()]
+def _told_ms(judged: Recording, role: str, name: str) -> list[float]:
+    """What a process told one by one between its first word and its last."""
+    return [us / 1000.0 for word in within(judged.told, role)[1:] for us in _recent_us(word.figures, name)]
 
 
 def _transits_ms(judged: Recording) -> list[float]:
@@ -206,9 +195,9 @@ def _arrivals(figures: Mapping[str, Any]) -> dict[str, int]:
     return arrivals
 
 
-def _last(judged: Recording, role: str) -> Mapping[str, Any]:
-    told = within(judged.told, role)
-    return told[-1].figures if told else {}
+def _recent_us(figures: Mapping[str, Any], name: str) -> Sequence[int]:
+    recent_us: Sequence[int] = figures.get(name, ())
+    return recent_us
 
 
 def _kilo(value: float | None) -> float | None:

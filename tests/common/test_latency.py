@@ -5,7 +5,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.clock import NS_PER_MS
-from common.latency import STAGES, Durations, LatencyBudget, Passage, RoundTrip, StageTimes
+from common.latency import (
+    MOST_RECENT,
+    STAGES,
+    Durations,
+    LatencyBudget,
+    Passage,
+    RoundTrip,
+    StageTimes,
+    Told,
+)
 from common.offset import Offset
 
 stamps = st.lists(st.integers(0, 100 * NS_PER_MS), min_size=8, max_size=8)
@@ -106,3 +115,19 @@ def test_stages_take_one_duration_each() -> None:
     stages.record(NS_PER_MS, 2 * NS_PER_MS)
     assert stages.total()["mean"] == 3.0
     assert stages.summary()["two"]["mean"] == 2.0
+
+
+def test_durations_are_told_one_by_one_and_once_each() -> None:
+    told = Told()
+    for duration_ns in (1_500_000, -7, 999):
+        told.record(duration_ns)
+    assert told.take_recent() == [1500, 0, 1]
+    assert told.take_recent() == []
+    assert (told.count, told.clamped) == (3, 1), "and stay in the whole"
+
+
+def test_of_many_the_newest_are_told() -> None:
+    told = Told()
+    for n in range(MOST_RECENT + 3):
+        told.record(1000 * n)
+    assert told.take_recent() == list(range(3, MOST_RECENT + 3))

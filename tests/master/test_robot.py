@@ -24,6 +24,7 @@ from common.messages import (
     ControlReply,
     ControlRequest,
     RobotState,
+    Statistics,
 )
 from common.topics import CLOCK, CONTROL, STATE, Topic
 from master.app import Master
@@ -168,3 +169,13 @@ def test_a_state_that_is_garbage_is_counted_at_its_robot() -> None:
     figures: Any = robot.figures()
     assert figures["robot"]["undecodable"] == 2
     assert figures["robot"]["silent"] is True
+
+
+def test_each_round_trip_is_told_once() -> None:
+    link: Any = FakeLink()
+    robot = CommandedRobot("a", "nurse-1", JOINTS, link)
+    robot._watch.round_trip.record(2_000_000)
+    robot.tell(1, {})
+    robot.tell(2, {})
+    told = [decode(payload, Statistics).figures["round_trip_recent_us"] for payload in link.put["statistics"]]
+    assert told == [(2000,), ()]

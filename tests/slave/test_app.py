@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.codec import decode
 from common.config import LinkConfig
+from common.messages import Statistics
 from common.notify import Notifier
 from common.pacing import Due, TickGrid
 from common.topics import Topic
@@ -54,6 +56,35 @@ def test_a_loop_that_always_misses_every_second_tick_still_tells_the_state(
     config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]))
     asyncio.run(app.Slave(config, link, servos)._drive())
     assert link.put == {"state": 40 // config.loop.state_every}
+
+
+def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    words: list[Any] = []
+
+    class Keeping(FakeLink):
+        def publish(self, topic: Topic) -> Callable[[bytes], None]:
+            return lambda payload: words.append(decode(payload, Statistics).figures["one_way_recent_us"])
+
+        def counters(self) -> dict[str, object]:
+            return {}
+
+    class Plain(StillServos):
+        def figures(self) -> dict[str, object]:
+            return {}
+
+    async def two_seconds(grid: TickGrid) -> AsyncIterator[Due]:
+        for tick in range(2):
+            yield Due(tick, grid.origin_ns, 0)
+
+    monkeypatch.setattr(app, "ticks", two_seconds)
+    link: Any = Keeping()
+    servos: Any = Plain()
+    slave = app.Slave(
+        SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"])), link, servos
+    )
+    slave._pipeline.one_way.record(3_000_000)
+    asyncio.run(slave._tell())
+    assert words == [(3000,), ()]
 
 
 class StuckServos(StillServos):
