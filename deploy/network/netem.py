@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 
 from common.errors import NetworkError
 from deploy.network.emulation import LinkCounters
@@ -85,7 +86,9 @@ class Netem:
         self._profile = profile
         self._cut = False
         self._handle = 1
-        self._before = {host: Counters(dropped={}) for host, _, _ in link_addresses(run)}
+        self._totals = {host: Counters(dropped={}) for host, _, _ in link_addresses(run)}
+        self._seen = dict.fromkeys(self._totals, (0, 0, 0))
+        """Packets, bytes and drops that the kernel's own counters showed last."""
         (ours, _, _), (theirs, _, _) = link_addresses(run)
         # the pair is made in its place: no name of it is ever in the caller's namespace
         ip("-n", ours, "link", "add", LINK, "type", "veth", "peer", "name", LINK, "netns", theirs)
@@ -93,24 +96,34 @@ class Netem:
             ip("-n", host, "link", "set", LINK, "addrgenmode", "none")
             ip("-n", host, "address", "add", address, "peer", peer, "dev", LINK)
             ip("-n", host, "link", "set", LINK, "up")
-        self._apply(new=True)
+        self._apply()
 
     def set(self, profile: Profile) -> None:
         """Behave so from now on; what is under way arrives as it would have."""
         self._profile = profile
-        self._apply(new=False)
+        self._apply()
 
     def cut(self, cut: bool) -> None:
         """Let nothing pass, or let it pass again; what is under way is lost."""
         if cut == self._cut:
             return
-        self._keep_counters()
+        self._count()
         self._cut = cut
-        self._apply(new=True)
+        self._apply()
+        if cut:
+            # another handle is another qdisc: what is under way goes with the old one, which lets no more in
+            for host in self._totals:
+                waiting, total = self._count_one(host), self._totals[host]
+                total.packets += waiting
+                total.dropped[OUTAGE] = total.dropped.get(OUTAGE, 0) + waiting
+                self._seen[host] = (0, 0, 0)
+            self._handle += 1
+            self._apply()
 
     def counters(self) -> LinkCounters:
         """What the kernel counted so far."""
-        to_robot, to_operator = (self._sum(host, self._now(host)) for host, _, _ in link_addresses(self._run))
+        self._count()
+        to_robot, to_operator = (replace(one, dropped=dict(one.dropped)) for one in self._totals.values())
         return LinkCounters(to_robot, to_operator)
 
     def planned(self) -> dict[str, dict[str, float]]:
@@ -120,9 +133,7 @@ class Netem:
     def close(self) -> None:
         """It ends with its hosts."""
 
-    def _apply(self, new: bool) -> None:
-        # another handle is another qdisc: what waited in the old one is dropped with it
-        self._handle += new
+    def _apply(self) -> None:
         for host, way in self._ways():
             what = ["loss", "100%"] if self._cut else netem_arguments(way)
             handle = ["root", "handle", f"{self._handle:x}:"]
@@ -135,26 +146,21 @@ class Netem:
         hosts = [host for host, _, _ in link_addresses(self._run)]
         return zip(hosts, (ways.to_robot, ways.to_operator), strict=True)
 
-    def _keep_counters(self) -> None:
-        for host in self._before:
-            now = self._now(host)
-            self._before[host] = self._sum(host, now)
+    def _count(self) -> None:
+        for host in self._totals:
+            self._count_one(host)
 
-    def _now(self, host: str) -> Counters:
+    def _count_one(self, host: str) -> int:
+        """Add what has happened since it was last asked; returns how many packets are under way."""
         told = json.loads(ip("-n", host, "-s", "-j", "qdisc", "show", "dev", LINK, tool="tc"))
         (qdisc,) = [each for each in told if each["kind"] == "netem"]
-        sent, dropped = qdisc["packets"], qdisc["drops"]
-        why = OUTAGE if self._cut else NETEM
-        taken = sent + dropped + qdisc.get("qlen", 0)
-        return Counters(taken, qdisc["bytes"], sent, qdisc["bytes"], dropped={why: dropped})
-
-    def _sum(self, host: str, now: Counters) -> Counters:
-        before = self._before[host]
-        causes = {*before.dropped, *now.dropped}
-        return Counters(
-            before.packets + now.packets,
-            before.bytes + now.bytes,
-            before.delivered + now.delivered,
-            before.delivered_bytes + now.delivered_bytes,
-            dropped={why: before.dropped.get(why, 0) + now.dropped.get(why, 0) for why in sorted(causes)},
-        )
+        now = (qdisc["packets"], qdisc["bytes"], qdisc["drops"])
+        sent, size, dropped = (new - old for new, old in zip(now, self._seen[host], strict=True))
+        self._seen[host] = now
+        total, why = self._totals[host], OUTAGE if self._cut else NETEM
+        total.packets += sent + dropped
+        total.bytes += size
+        total.delivered += sent
+        total.delivered_bytes += size
+        total.dropped[why] = total.dropped.get(why, 0) + dropped
+        return int(qdisc.get("qlen", 0))
