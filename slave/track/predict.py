@@ -10,7 +10,7 @@ from common.clock import to_s
 from common.quaternion import Array
 from slave.track.blend import Blend, Course, coast
 from slave.track.confidence import Confidence
-from slave.track.estimate import Estimate, corrected, first, relaxed
+from slave.track.estimate import Estimate, corrected, farthest, first, relaxed
 from slave.track.lateness import Lateness
 from slave.track.tracker import Target
 
@@ -21,8 +21,6 @@ _BRAKE_S = 0.15
 _FARTHEST_RAD = 0.68
 """No joint is foretold to go farther than this, coasting included, whatever its velocity: within the guard's
 `jump_window_rad`, beyond which all joints come back slowly."""
-_LOOKED_AT = (0.25, 0.5, 0.75, 1.0)
-"""Parts of the longest way at which that is asked: one that turns back is farthest before its end."""
 
 
 class Predict:
@@ -90,8 +88,7 @@ class Predict:
         self._believed = estimate.motion.copy()
         self._believed[1:] *= self._confidence.share
         span_s, _ = self._coasted(math.inf)
-        ways = np.stack([relaxed(part * span_s)[0, 1:] for part in _LOOKED_AT])
-        foretold = np.abs(ways @ self._believed[1:]).max(axis=0)
+        foretold = farthest(self._believed, span_s)
         self._believed[1:] *= _FARTHEST_RAD / np.maximum(foretold, _FARTHEST_RAD)
 
     def _course(self, estimate: Estimate, now_ns: int) -> Course:
