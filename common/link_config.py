@@ -78,6 +78,9 @@ class LinkConfig(Section):
     """Which sessions to connect to; they may start later, or again."""
     mode: Literal["peer", "client"] = "peer"
     """`peer`: directly to each other. `client`: through the routers at `connect`, the first that answers."""
+    open_timeout_s: float = Field(default=1.0, ge=0.1, le=30.0)
+    """How long opening a connection may take: some six round trips of the line. Over one that is slower no
+    connection ever comes about; much longer than needed, it delays the return after an outage."""
     tls: TlsConfig | None = None
     access: AccessConfig | None = None
     topics: dict[str, TopicConfig] = Field(default_factory=dict)

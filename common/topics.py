@@ -55,7 +55,7 @@ CONTROL = Topic("control", "tandem/{robot}/control", 0.0, 1.0, Priority.REAL_TIM
 STOP = Topic("stop", "tandem/{robot}/stop", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
 """As CONTROL, but for whoever may only stop the robot or ask how it is: a key of its own, so that access
 control, which does not look into messages, can leave it to everybody."""
-CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 0.5, Priority.REAL_TIME, True, True, True)
+CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 1.0, Priority.REAL_TIME, True, True, True)
 STATISTICS = Topic("statistics", "tandem/{robot}/statistics", 1.0, 5.0, Priority.DATA_LOW, False, True, False)
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
 VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUND, False, True, False)

@@ -9,9 +9,6 @@ from common.endpoint import for_zenoh
 from common.link.access import access_control
 from common.link_config import TlsConfig
 
-ROUTER_TIMEOUT_MS = 1000
-"""How long a client tries one router before it tries the next."""
-
 
 def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, Any]:
     """The configuration of a session that listens and connects only where it is told to.
@@ -45,6 +42,7 @@ def _tls(tls: TlsConfig) -> dict[str, Any]:
 
 
 def _endpoints_and_timing(config: LinkConfig, mode: str) -> dict[str, Any]:
+    open_ms = round(1e3 * config.open_timeout_s)
     return {
         "mode": mode,
         # nothing is found by chance: endpoints are explicit
@@ -54,15 +52,16 @@ def _endpoints_and_timing(config: LinkConfig, mode: str) -> dict[str, Any]:
         "connect": {
             "endpoints": [for_zenoh(end) for end in config.connect],
             # a client waits for its router itself, and tries each: see session
-            "timeout_ms": ROUTER_TIMEOUT_MS if mode == "client" else -1,
+            "timeout_ms": open_ms if mode == "client" else -1,
             "exit_on_failure": False,  # the other side may start later, or again
-            "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
+            # an attempt that an outage swallowed lasts open_timeout_s; the next must not wait long as well
+            "retry": {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5},
         },
         "open": {"return_conditions": {"connect_scouted": False}},  # else open() waits 0.5 s for a peer
         "timestamping": {"enabled": False},
         "transport": {
             # a black hole is noticed within a second, and no old message is delivered after it
-            "unicast": {"open_timeout": 1000, "accept_timeout": 1000},
+            "unicast": {"open_timeout": open_ms, "accept_timeout": open_ms},
             "link": {"tx": {"lease": 1000, "keep_alive": 4}},
             # else payloads of 3 kB and more pass between processes of one host beside the link under test
             "shared_memory": {"enabled": False},

@@ -113,7 +113,7 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
     from deploy.soak.run import SOAK, Soak
     from deploy.soak.stage import Stage
     from deploy.soak.watch import Watch
-    from deploy.trial.settings import needed_age_s
+    from deploy.trial.settings import needed_age_s, open_timeout_s
 
     async with AsyncExitStack() as stack:
         host = await stack.enter_async_context(watch_host())
@@ -121,8 +121,12 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
         if options.profile is not None:
             network = await stack.enter_async_context(open_network(options.profile, seed=options.seed))
         # over a long line a robot with the default limit would take no command at all
-        slave = [f"guard.max_age_s={needed_age_s(network.profile)}"] if network else []
-        rigging = open_rig(options.transport, {"slave": slave}, routed=options.router, network=network)
+        slave, master = [], []
+        if network is not None:
+            master = [f"link.open_timeout_s={open_timeout_s(network.profile)}"]
+            slave = [*master, f"guard.max_age_s={needed_age_s(network.profile)}"]
+        overrides = {"slave": slave, "master": master}
+        rigging = open_rig(options.transport, overrides, routed=options.router, network=network)
         rig = await stack.enter_async_context(rigging)
         log: SoakLog | None = None
         watch = Watch(rig.skeleton, lambda kind, what: log.tell(kind, what) if log else None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from common.config import LinkConfig
 from deploy.network import Profile
 from deploy.trial.plan import Plan, Setup
 from slave.guard.config import GuardConfig
@@ -33,6 +34,13 @@ def needed_age_s(profile: Profile) -> float:
     if needed_s <= default_s:
         return default_s
     return round(STEP_S * math.ceil(needed_s / STEP_S - 1e-9), 3)
+
+
+def open_timeout_s(profile: Profile) -> float:
+    """`[link] open_timeout_s`: the default where that is six round trips, or what six round trips take."""
+    needed_s = 6e-3 * (profile.ways.to_robot.delay_ms + profile.ways.to_operator.delay_ms)
+    default_s = LinkConfig().open_timeout_s
+    return default_s if needed_s <= default_s else math.ceil(2.0 * needed_s) / 2.0
 
 
 def why_impossible(setup: Setup) -> str | None:

@@ -18,7 +18,7 @@ from deploy.trial.judge import judged
 from deploy.trial.plan import CellKey, Plan
 from deploy.trial.recorder import Recorder
 from deploy.trial.recording import Course, Outage, Recording
-from deploy.trial.settings import max_age_s, why_impossible
+from deploy.trial.settings import max_age_s, open_timeout_s, why_impossible
 from slave.config import SlaveConfig
 
 START_S = 30.0
@@ -41,7 +41,8 @@ async def run_cell(plan: Plan, key: CellKey, stop: asyncio.Event, tell: Callable
         return Cell(key, Status.IMPOSSIBLE, reason)
     profile = load_profile(key.setup.profile)
     age_s = max_age_s(plan, profile)
-    overrides = _overrides(plan, key, age_s)
+    opening = f"link.open_timeout_s={open_timeout_s(profile)}"
+    overrides = _overrides(plan, key, age_s, opening)
     config = load_config(example("slave", plan.robot), SlaveConfig, overrides["slave"])
     settings = {"guard.max_age_s": f"{age_s:g}"}
     try:
@@ -61,12 +62,12 @@ async def run_cell(plan: Plan, key: CellKey, stop: asyncio.Event, tell: Callable
     return await asyncio.to_thread(judged, key, course, config, settings, ended)
 
 
-def _overrides(plan: Plan, key: CellKey, age_s: float) -> dict[str, list[str]]:
+def _overrides(plan: Plan, key: CellKey, age_s: float, opening: str) -> dict[str, list[str]]:
     return {
         "suit": [f"seed={plan.seed_of(key)}", f'motion="{plan.motion}"'],
         # the simulated operator begins in the zero pose: zeroed there, as the paper's reference was
-        "master": ["estimation.stance_s=1.0"],
-        "slave": [f'track.strategy="{key.setup.strategy}"', f"guard.max_age_s={age_s}"],
+        "master": ["estimation.stance_s=1.0", opening],
+        "slave": [f'track.strategy="{key.setup.strategy}"', f"guard.max_age_s={age_s}", opening],
     }
 
 

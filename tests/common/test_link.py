@@ -315,9 +315,9 @@ def test_a_question_that_is_not_answered_times_out() -> None:
             async with open_link(LinkConfig(connect=[endpoint]), ROBOT) as link:
                 await link.connected(CLOCK)
                 begun_ns = monotonic_ns()
-                with pytest.raises(LinkTimeoutError, match=r"no answer within 0\.5 s"):
+                with pytest.raises(LinkTimeoutError, match=r"no answer within 1 s"):
                     await link.ask(CLOCK, b"")
-                assert monotonic_ns() - begun_ns >= 0.4e9
+                assert monotonic_ns() - begun_ns >= 0.9e9
                 assert link.counters()["clock"]["timeouts"] == 1
         for query in kept:
             query.drop()  # type: ignore[no-untyped-call]
