@@ -16,7 +16,7 @@ import pytest
 pytestmark = pytest.mark.timeout(300)
 TRIAL = (sys.executable, "-m", "deploy", "trial")
 PLAN = ("--transports", "tcp,unixsock-stream", "--profiles", "4g", "--strategies", "predict", "--repeat", "1",
-        "--seconds", "4", "--outage", "1")  # fmt: skip
+        "--seconds", "8", "--outage", "1")  # fmt: skip
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
