@@ -61,7 +61,7 @@ async def until(reached: Callable[[Any], bool], host: Host, operator: Path) -> A
 
 
 async def follow(host: Host, operator: Path) -> None:
-    """Engage until it tracks: a host that stands still for a moment makes a robot refuse, or hold, rightly."""
+    """Engage until it tracks: where the host stands still, a robot rightly refuses or holds."""
     said = ""
     for _ in range(10):
         status = await until(lambda s: s["guard"] in ("hold", "track"), host, operator)
