@@ -60,9 +60,10 @@ def test_starts_beside_a_flood_of_messages_never_hang(tmp_path: Path) -> None:
             await heard.wait()
             before = count
             with (tmp_path / "log").open("wb") as log:
-                for _ in range(STARTS):
+                starts = 0
+                while starts < STARTS or count == before:  # beside messages, or it shows nothing
                     assert await Spawned(["true"], log).wait() == 0
-            assert count > before
+                    starts += 1
 
     flood = subprocess.Popen([sys.executable, "-c", FLOOD, endpoint])
     try:
