@@ -41,7 +41,6 @@ uvloop.run(main())
 """
 
 
-@pytest.mark.timeout(240)  # it hangs or it does not: how long 150 starts take is the machine's
 def test_starts_beside_a_flood_of_messages_never_hang(tmp_path: Path) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -55,7 +54,7 @@ def test_starts_beside_a_flood_of_messages_never_hang(tmp_path: Path) -> None:
             count += 1
             heard.set()
 
-        async with asyncio.timeout(200), open_link(LinkConfig(listen=[endpoint]), "robot-1") as link:
+        async with asyncio.timeout(60), open_link(LinkConfig(listen=[endpoint]), "robot-1") as link:
             link.subscribe(STATE, on_state)
             await heard.wait()
             before = count
