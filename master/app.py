@@ -13,7 +13,7 @@ from common.link import Session, open_session
 from common.link.audit import Audit
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
-from common.realtime import take_priority
+from common.realtime import enter_real_time
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from common.topics import STATISTICS
@@ -136,7 +136,7 @@ async def run(config: MasterConfig, stop: asyncio.Event, write_figures: WriteFig
 
 async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
     notifier = open_notifier()
-    take_priority(config.process)  # first, so that every thread has it
+    enter_real_time(config.process.realtime_priority)  # first, so that every thread has it
     audit = Audit(config.link)
     async with open_session(config.link, waits=notifier.waits) as session:
         audit.attach(session)

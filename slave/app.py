@@ -15,7 +15,7 @@ from common.link.audit import Audit
 from common.messages import Statistics
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
-from common.realtime import take_priority
+from common.realtime import enter_real_time
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, STOP, video
@@ -170,9 +170,10 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
 
 async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
     notifier = open_notifier()
-    take_priority(config.process)  # first, so that every thread has it
     servos = open_servos(config.servos, config.skeleton, config.encoders)
     base = open_base(config.base)
+    # after a simulator has been built, which takes long; before any thread starts, so that each has it
+    enter_real_time(config.process.realtime_priority)
     try:
         if base is not None:
             base.start()

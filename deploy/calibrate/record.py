@@ -41,14 +41,14 @@ async def _record(
     import numpy as np
 
     from common.errors import TandemError
-    from common.realtime import take_priority
+    from common.realtime import enter_real_time
     from common.runtime import until_stopped
     from deploy.calibrate import capture as shared
     from master.suit.poll import Sweep
 
     if out.suffix.lower() != ".mcap":
         raise TandemError(f"{out}: expected a name that ends in .mcap")
-    take_priority(config.process)
+    enter_real_time(config.process.realtime_priority)
     nodes = shared.names(config)
     answered = np.zeros(len(nodes), dtype=np.int64)
     ticks = 0

@@ -55,7 +55,7 @@ def host(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
     return [
         *judge_machine(machine),
         judge_realtime(needs.realtime_priority, process),
-        judge_memory_lock(process, machine.swap_bytes),
+        judge_memory_lock(needs.realtime_priority, process, machine.swap_bytes),
         *judge_receive_buffer(needs.buses, machine),
         judge_clock(clock_is_synchronised()),
         judge_disk(str(options.recordings.absolute()), free_bytes(options.recordings)),

@@ -15,7 +15,7 @@ import sys
 from contextlib import suppress
 
 from common.clock import monotonic_ns, to_s
-from common.realtime import ProcessConfig, take_priority
+from common.realtime import enter_real_time
 from deploy.network.emulation import TO_OPERATOR, TO_ROBOT, EmulatedLink
 from deploy.network.profile import Profile
 
@@ -59,7 +59,7 @@ def main() -> None:
     """Arguments: the three file descriptors and a seed; the first request sets the profile."""
     operator, robot, control_fd, seed = map(int, sys.argv[1:])
     control = socket.socket(fileno=control_fd)
-    take_priority(ProcessConfig(realtime_priority=PRIORITY))
+    enter_real_time(PRIORITY)
     gc.disable()  # nothing here makes cycles
     carry(EmulatedLink(Profile(), seed, monotonic_ns()), operator, robot, control)
 

@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from common.clock import NS_PER_S, to_ns, to_s, wall_ns
-from common.realtime import ProcessConfig, take_priority
+from common.realtime import enter_real_time
 
 PORT = 7450
 STAMP = struct.Struct("!Iq")
@@ -95,7 +95,7 @@ def _arrived(end: socket.socket) -> list[tuple[int, int, int]]:
 def main() -> None:
     """Argument: the plan as JSON. Says `ready`, reads when to start (ns), prints what was seen as JSON."""
     plan = Plan(**json.loads(sys.argv[1]))
-    take_priority(ProcessConfig(realtime_priority=PRIORITY))
+    enter_real_time(PRIORITY)
     end = open_end(plan)
     sys.stdout.write("ready\n")
     sys.stdout.flush()

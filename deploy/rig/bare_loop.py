@@ -17,6 +17,7 @@ import time
 
 from common.clock import NS_PER_S, monotonic_ns
 from common.pacing import TickGrid
+from common.realtime import enter_real_time
 
 PERIOD_NS = 5_000_000
 """As the master's capture and the slave's loop."""
@@ -29,7 +30,7 @@ PRIORITY = 90
 def main() -> None:
     """Tick on every core until standard input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for whoever started this one
-    first = _take_priority()
+    first = enter_real_time(PRIORITY)
     cores = sorted(os.sched_getaffinity(0))
     origin_ns = monotonic_ns() + PERIOD_NS
     _say({"cores": cores, "origin_ns": origin_ns, "priority": first})
@@ -47,14 +48,6 @@ def _tick(core: int, grid: TickGrid) -> None:
         due = grid.due(now_ns)
         if due is not None and (due.missed or due.tick % WORD_TICKS == 0):
             _say({"core": core, "from_ns": awaited_ns, "until_ns": now_ns, "missed": due.missed})
-
-
-def _take_priority() -> bool:
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except OSError:
-        return False
-    return True
 
 
 def _say(line: dict[str, object]) -> None:

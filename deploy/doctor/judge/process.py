@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from deploy.doctor.finding import Finding, ok, warn
-from deploy.doctor.read.process import CAP_NET_ADMIN, CAP_SYS_NICE, ProcessFacts
+from deploy.doctor.read.process import CAP_IPC_LOCK, CAP_NET_ADMIN, CAP_SYS_NICE, ProcessFacts
 
 ENOUGH_SHARE = 0.9
 """Linux leaves 5 % of each second to others by default."""
@@ -32,15 +32,24 @@ def judge_realtime(priority: int, facts: ProcessFacts) -> Finding:
     return ok(check, f"priority {priority} is permitted ({why})")
 
 
-def judge_memory_lock(facts: ProcessFacts, swap_bytes: int) -> Finding:
-    """Whether a page of the loop may be on a disk when it is needed. tandem locks none itself."""
+def judge_memory_lock(priority: int, facts: ProcessFacts, swap_bytes: int) -> Finding:
+    """Whether a page that the loop needs may have to be read from a disk. With a priority it is locked."""
     check = "memory stays in memory"
+    unlimited = facts.memlock_limit == float("inf")
+    if priority and (unlimited or facts.may(CAP_IPC_LOCK)):
+        return ok(check, f"may be locked ({'no limit' if unlimited else 'CAP_IPC_LOCK'})")
+    if priority:
+        return warn(
+            check,
+            f"may not be locked here (limit {facts.memlock_limit / 1024:.0f} kB, no CAP_IPC_LOCK)",
+            "the units permit it (LimitMEMLOCK); for a person's shell, in "
+            "/etc/security/limits.d/tandem.conf: `tandem - memlock unlimited`",
+        )
     if not swap_bytes:
         return ok(check, "no swap")
-    limit = "unlimited" if facts.memlock_limit == float("inf") else f"{facts.memlock_limit / 1024:.0f} kB"
     return warn(
         check,
-        f"{swap_bytes / 2**30:.1f} GB of swap; may lock {limit}, which tandem does not use",
+        f"{swap_bytes / 2**30:.1f} GB of swap; without [process] realtime_priority nothing is locked",
         "the units keep it out of swap (MemorySwapMax=0); run by hand: `swapoff -a`",
     )
 

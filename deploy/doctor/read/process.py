@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from deploy.doctor.read.tree import Tree
 
-CAP_NET_ADMIN, CAP_SYS_NICE = 12, 23
+CAP_NET_ADMIN, CAP_IPC_LOCK, CAP_SYS_NICE = 12, 14, 23
 """Bits of the effective set (linux/capability.h)."""
 
 
@@ -18,7 +18,7 @@ class ProcessFacts:
     realtime_limit: float
     """Largest real-time priority that it may take without a capability (RLIMIT_RTPRIO)."""
     memlock_limit: float
-    """Bytes that it may keep from being swapped out."""
+    """Bytes that it may keep in memory."""
     capabilities: int
     """The effective set."""
     realtime_share: float

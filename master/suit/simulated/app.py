@@ -11,7 +11,7 @@ import can
 from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.clock import to_s
-from common.realtime import take_priority
+from common.realtime import enter_real_time
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.echo import open_deaf_to_answers
@@ -31,10 +31,10 @@ async def run(
     `publish_truth` is called once a tick, after the answers have gone out; `on_suit` once, with the suit
     that will answer. Raises ConfigError before anything is opened, and BusError where a bus cannot be.
     """
-    take_priority(config.process)
     protocol = SuitProtocol.load(config.dbc)
     suit = build_suit(config, protocol)
     on_suit(suit)
+    enter_real_time(config.process.realtime_priority)
     loop = asyncio.get_running_loop()
 
     def send(outgoing: Outgoing) -> None:

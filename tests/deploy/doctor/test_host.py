@@ -184,17 +184,22 @@ def test_throttled_real_time_threads_are_told(host: Host) -> None:
         assert judge_realtime(20, read_process(host.tree)).verdict is verdict
 
 
-def test_swap_is_told_with_what_may_be_locked(host: Host) -> None:
+def test_swap_is_told_where_nothing_is_locked(host: Host) -> None:
     facts = read_process(host.process(memlock=65536).tree)
-    assert judge_memory_lock(facts, 0).verdict is Verdict.OK
-    finding = judge_memory_lock(facts, 2 << 30)
-    assert (finding.verdict, "2.0 GB" in finding.found, "64 kB" in finding.found) == (
-        Verdict.WARN,
-        True,
-        True,
-    )
+    assert judge_memory_lock(0, facts, 0).verdict is Verdict.OK
+    finding = judge_memory_lock(0, facts, 2 << 30)
+    assert (finding.verdict, "2.0 GB" in finding.found) == (Verdict.WARN, True)
+
+
+def test_with_a_priority_memory_needs_to_be_lockable_whole(host: Host) -> None:
+    facts = read_process(host.process(memlock=65536).tree)
+    finding = judge_memory_lock(20, facts, 0)
+    assert (finding.verdict, "64 kB" in finding.found) == (Verdict.WARN, True)
+    assert "LimitMEMLOCK" in finding.advice
     unlimited = read_process(host.process(memlock="unlimited").tree)
-    assert "unlimited" in judge_memory_lock(unlimited, 1).found
+    assert judge_memory_lock(20, unlimited, 1).verdict is Verdict.OK
+    capable = read_process(host.process(memlock=65536, capabilities=1 << 14).tree)
+    assert judge_memory_lock(20, capable, 1).verdict is Verdict.OK
 
 
 def test_trials_need_a_capability_and_a_device(host: Host) -> None:

@@ -15,7 +15,7 @@ from common.can.deaf import open_deaf_to
 from common.can.frame import Frame
 from common.clock import monotonic_ns
 from common.pacing import TickGrid
-from common.realtime import take_priority
+from common.realtime import enter_real_time
 from common.runtime import freeze_heap, until_stopped
 from common.ticker import ticks
 from slave.config import SlaveConfig
@@ -36,7 +36,6 @@ async def run(config: SlaveConfig, stop: asyncio.Event, faults: Sequence[Planned
 
     Raises BusError where a bus cannot be opened.
     """
-    take_priority(config.process)
     canopen = config.servos.canopen
     buses: dict[str, CanBus] = {}
 
@@ -45,6 +44,7 @@ async def run(config: SlaveConfig, stop: asyncio.Event, faults: Sequence[Planned
             buses[bus].send(Frame(frame_id, data, False))
 
     peer = DrivePeer(canopen, config.skeleton, config.encoders, send, monotonic_ns(), faults)
+    enter_real_time(config.process.realtime_priority)
 
     async def move() -> None:
         async for _ in ticks(TickGrid(monotonic_ns(), CYCLE_NS)):
