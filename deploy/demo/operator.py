@@ -2,7 +2,7 @@
 
 The rule: the demo fails when a robot has held HOLDS times within HOLDS_WITHIN_S, or is not back in `track`
 BACK_S after it left. A hold that the host itself explains is printed like any other, but does not count to
-the first: in the WINDOW_S before it a bare loop saw a core stand still for STILL_S or longer.
+the first: in the WINDOW_S before it bare loops saw a core stand still for STILL_S or longer, in all.
 """
 
 from __future__ import annotations
@@ -13,15 +13,14 @@ from typing import Any
 
 from common.clock import to_ns, to_s
 from common.messages import RobotState
-from deploy.rig.host import STILL_S
+from deploy.rig.host import STILL_S, WINDOW_S
 
 HOLDS, HOLDS_WITHIN_S = 3, 20.0
 BACK_S = 20.0
-WINDOW_S = 0.5
 JUDGED_AFTER_S = 1.0
 
 HostStill = Callable[[int, int], float]
-"""The longest that the host stood still between two times of its clock, s."""
+"""For how long the host stood still between two times of its clock, s."""
 
 
 @dataclass(slots=True)

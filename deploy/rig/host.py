@@ -12,15 +12,17 @@ from typing import Any
 
 import psutil
 
-from common.clock import monotonic_ns, to_s
+from common.clock import monotonic_ns, to_ns, to_s
 from deploy.rig.bare_loop import PERIOD_NS
 
 START_S = 10.0
 """A host on which a bare loop does not start within this long is not measured."""
 STOP_S = 1.0
 STILL_S = 0.05
-"""A host that stood still for so long may have made a guard hold: half of the shortest time-out by which one
-does, the encoders' 0.1 s."""
+"""A host that stood still for so long within WINDOW_S may have made a guard hold: half of the shortest
+time-out by which one does, the encoders' 0.1 s. In one go or in pieces: what waited has to be made up for
+in between, by every process at once."""
+WINDOW_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,12 @@ class Host:
         """Whether, from then to now, the host stood still for long enough to make a guard hold."""
         now_ns = monotonic_ns()
         await self.known(now_ns)
-        return self.stood_still_s(since_ns, now_ns) >= STILL_S
+        within = [stall.until_ns for stall in self.stalls if stall.until_ns >= since_ns]
+        return any(self.explains(min(until_ns, now_ns), since_ns) for until_ns in within)
+
+    def explains(self, at_ns: int, since_ns: int = 0) -> bool:
+        """Whether it stood still for long enough, just before, to have made a guard hold at that time."""
+        return self.lost_s(max(since_ns, at_ns - to_ns(WINDOW_S)), at_ns) >= STILL_S
 
     @property
     def missed(self) -> int:

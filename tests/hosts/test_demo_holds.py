@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+from collections.abc import Awaitable, Callable
 
 import pytest
 
@@ -12,7 +13,8 @@ from deploy.demo.tend import Tending
 from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 
 async def tended(rig: Rig, said: list[str]) -> Tending:
@@ -26,11 +28,11 @@ async def tended(rig: Rig, said: list[str]) -> Tending:
 
 
 def test_a_robot_that_held_is_engaged_again_by_an_act_and_the_hold_is_told(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, on_this_host: OnThisHost
 ) -> None:
     monkeypatch.setattr(rule, "HOLDS", 100)  # however often this host stands still
 
-    async def story() -> None:
+    async def story(_: Host) -> None:
         said: list[str] = []
         async with open_rig() as rig:
             tending = await tended(rig, said)
@@ -49,17 +51,20 @@ def test_a_robot_that_held_is_engaged_again_by_an_act_and_the_hold_is_told(
             await tending.let_go()
             assert rig.observer.guard == "hold"
 
-    asyncio.run(story())
+    on_this_host(story)
 
 
-def test_a_robot_whose_master_is_gone_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def story() -> None:
+def test_a_robot_whose_master_is_gone_is_given_up(
+    monkeypatch: pytest.MonkeyPatch, on_this_host: OnThisHost
+) -> None:
+    async def story(_: Host) -> None:
         async with open_rig() as rig:
             tending = await tended(rig, [])
-            monkeypatch.setattr(rule, "BACK_S", 3.0)
-            await rig.children["master"].kill()
-            await tending.watch(0.5)
+            with monkeypatch.context() as patched:
+                patched.setattr(rule, "BACK_S", 3.0)
+                await rig.children["master"].kill()
+                await tending.watch(0.5)
             assert "did not track for 3 s: hold (" in tending.problem
             assert tending.rows()[-1]["lasted_s"] is None
 
-    asyncio.run(story())
+    on_this_host(story)

@@ -8,11 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from common.clock import to_ns
 from common.messages import Action, RobotState
 from common.quaternion import Array
-from deploy.demo.operator import WINDOW_S
-from deploy.rig.host import STILL_S, Host
+from deploy.rig.host import Host
 from deploy.rig.rig import Rig, open_rig
 from deploy.rig.tracking import until_tracking
 
@@ -50,8 +48,7 @@ async def ready(rig: Rig) -> None:
 def unexplained(states: list[RobotState], host: Host) -> list[str]:
     """Why the robot held each time that the host had not stood still just before."""
     held = [b for a, b in pairwise(states) if (a.guard, b.guard) in (("track", "hold"), ("align", "hold"))]
-    window_ns = to_ns(WINDOW_S)
-    return [s.reason for s in held if host.stood_still_s(s.sent_ns - window_ns, s.sent_ns) < STILL_S]
+    return [s.reason for s in held if not host.explains(s.sent_ns)]
 
 
 def states(rig: Rig) -> dict[str, RobotState]:

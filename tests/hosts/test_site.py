@@ -6,7 +6,8 @@ import asyncio
 import json
 import shutil
 import sys
-from collections.abc import Callable
+import tempfile
+from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,12 @@ from deploy.keys.make import new_authority, new_identity
 from deploy.network.namespaces import why_not
 from deploy.network.network import Host, open_network
 from deploy.rig.child import Child
+from deploy.rig.host import Host as ThisHost
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.timeout(600)]
+OnThisHost = Callable[[Callable[[ThisHost], Awaitable[None]]], None]
+
+ALIGN_S, LOOK_S = 30.0, 0.1
 
 DEPLOY = Path(cli.__file__).parent
 TANDEM = [sys.executable, "-m", "deploy"]
@@ -60,33 +65,40 @@ async def until(reached: Callable[[Any], bool], host: Host, operator: Path) -> A
     raise AssertionError(f"not reached: {status}")
 
 
-async def follow(host: Host, operator: Path) -> None:
-    """Engage until it tracks: where the host stands still, a robot rightly refuses or holds."""
+async def follow(host: Host, operator: Path, robot: Child) -> None:
+    """Engage, and let it align undisturbed until it tracks: each command typed takes a core for a while."""
     said = ""
-    for _ in range(10):
-        status = await until(lambda s: s["guard"] in ("hold", "track"), host, operator)
-        if status["guard"] == "track":
-            return
+    for _ in range(3):
+        before = len(robot.said())
         _, said = await tandem(host, "engage", "--master", str(operator))
-    raise AssertionError(f"never tracked: {said}")
+        for _ in range(round(ALIGN_S / LOOK_S)):
+            if ": track: " in robot.said()[before:]:
+                status = await until(lambda s: s["guard"] in ("hold", "track"), host, operator)
+                assert status["guard"] == "track", status
+                return
+            if ": hold: " in robot.said()[before:]:
+                break
+            await asyncio.sleep(LOOK_S)
+    raise AssertionError(f"never tracked: {said}; {robot.last_words()}")
 
 
-def test_from_keys_to_a_robot_that_follows_in_two_hosts(tmp_path: Path) -> None:
+def test_from_keys_to_a_robot_that_follows_in_two_hosts(tmp_path: Path, on_this_host: OnThisHost) -> None:
     reason = why_not()
     if reason is not None:
         pytest.skip(reason)
 
-    async def story() -> None:
+    async def story(_: ThisHost) -> None:
+        folder = Path(tempfile.mkdtemp(dir=tmp_path))  # of this try
         async with open_network("lan") as network:
-            a_site(tmp_path, network.robot.address)
-            operator, overrides = tmp_path / "operator.toml", [f"capture.buses.0.{key}" for key in BUS]
-            at_robot = Child("slave", tmp_path, network.robot.command(TANDEM))
+            a_site(folder, network.robot.address)
+            operator, overrides = folder / "operator.toml", [f"capture.buses.0.{key}" for key in BUS]
+            at_robot = Child("slave", folder, network.robot.command(TANDEM))
             at_operator = [
-                Child(role, tmp_path, network.operator.command(TANDEM)) for role in ("suit", "master")
+                Child(role, folder, network.operator.command(TANDEM)) for role in ("suit", "master")
             ]
             suit, master = at_operator
             try:
-                await at_robot.start(tmp_path / "robot.toml", ['camera.source="off"'])
+                await at_robot.start(folder / "robot.toml", ['camera.source="off"'])
                 await suit.start(
                     DEPLOY / "examples" / "suit.toml", ["link.connect=[]", *(f"buses.0.{key}" for key in BUS)]
                 )
@@ -103,9 +115,9 @@ def test_from_keys_to_a_robot_that_follows_in_two_hosts(tmp_path: Path) -> None:
                     assert checks[check]["verdict"] == "ok", checks[check]
                 assert "offset" in checks["robot-1: clock"]["found"]
 
-                await follow(network.operator, operator)
+                await follow(network.operator, operator, at_robot)
             finally:
                 statuses = [await child.stop() for child in (master, suit, at_robot)]
         assert statuses == [0, 0, 0], at_robot.last_words()
 
-    asyncio.run(story())
+    on_this_host(story)

@@ -5,19 +5,24 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
 
 from deploy.rig.endpoints import free_port
+from deploy.rig.host import Host
 from deploy.trial.cell import Status
 from deploy.trial.plan import CellKey, Plan, Setup
 from deploy.trial.remote.operator import run_remote_cell
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 
-def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(tmp_path: Path) -> None:
+def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(
+    tmp_path: Path, on_this_host: OnThisHost
+) -> None:
     setup = Setup("udp", "loopback", "predict")
     endpoint = f"tcp/127.0.0.1:{free_port('tcp')}"
     plan = Plan(
@@ -25,7 +30,7 @@ def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(tmp_path: P
         outage_s=0.0, robot="nursing", motion="sweep", seed=1, router=False, max_age_s=0.3, hosts=endpoint,
     )  # fmt: skip
 
-    async def story() -> None:
+    async def story(_: Host) -> None:
         with (tmp_path / "serve.log").open("wb") as log:
             server = await asyncio.create_subprocess_exec(
                 sys.executable, "-m", "deploy", "trial", "serve", "--listen", endpoint,
@@ -53,4 +58,4 @@ def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(tmp_path: P
             server.send_signal(signal.SIGTERM)
             assert await server.wait() == 0, (tmp_path / "serve.log").read_text("utf-8")
 
-    asyncio.run(story())
+    on_this_host(story)

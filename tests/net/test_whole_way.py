@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
+from collections.abc import Awaitable, Callable
 
 import pytest
 
 from common.clock import monotonic_ns, to_ns, to_s
 from deploy.network import Network, load_profile, open_network
+from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
 from deploy.rig.tracking import until_tracking
 from slave.guard.config import GuardConfig
+
+OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 OUTAGE_S = 5.0
 BACK_S = 1.5
@@ -18,9 +21,9 @@ BACK_S = 1.5
 HOLD_S = 1.0
 
 
-@pytest.mark.timeout(120)
-def test_the_robot_holds_in_an_outage_and_moves_again_only_when_engaged() -> None:
-    async def story() -> None:
+@pytest.mark.timeout(400)
+def test_the_robot_holds_in_an_outage_and_moves_again_only_when_engaged(on_this_host: OnThisHost) -> None:
+    async def story(_: Host) -> None:
         async with open_network(load_profile("4g")) as network, open_rig("tcp", network=network) as rig:
             await tracks(rig)
             one_way = rig.observer.statistics["slave"]["one_way_ms"]
@@ -31,7 +34,7 @@ def test_the_robot_holds_in_an_outage_and_moves_again_only_when_engaged() -> Non
             statuses = await rig.stop()
             assert set(statuses.values()) == {0}
 
-    asyncio.run(story())
+    on_this_host(story)
 
 
 async def tracks(rig: Rig) -> None:

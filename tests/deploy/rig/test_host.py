@@ -58,6 +58,22 @@ def test_time_lost_is_that_in_which_any_core_stood_still_counted_once(
     assert host.lost_s(since_ms * NS_PER_MS, until_ms * NS_PER_MS) == pytest.approx(lost_ms / 1e3)
 
 
+@pytest.mark.parametrize(
+    ("at_ms", "explained"),
+    [
+        (1040, False),  # 40 ms until then
+        (1050, True),
+        (1499, True),
+        (1510, False),  # 40 of the 50 ms lie within the last half second
+        (3050, True),  # pieces, on different cores, that only together are enough
+        (3049, False),
+    ],
+)
+def test_a_hold_is_explained_by_what_was_lost_just_before(at_ms: int, explained: bool) -> None:
+    host = told((0, 1000, 1050), (1, 2700, 2720), (0, 2710, 2730), (1, 3030, 3100))
+    assert host.explains(at_ms * NS_PER_MS) is explained
+
+
 def test_a_loop_s_word_that_it_ticks_is_no_stall() -> None:
     host = told((0, 1100, 1140))
     host.hear(json.dumps({"core": 1, "from_ns": 7, "until_ns": 8 * NS_PER_S, "missed": 0}))
