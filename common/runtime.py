@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import os
 import signal
 import sys
@@ -14,6 +13,8 @@ from types import FrameType
 from typing import Any
 
 import uvloop
+
+from common.heap import freeze_heap, use_one_arena
 
 SHUTDOWN_S = 3.0
 EXIT_HUNG = 70
@@ -31,6 +32,7 @@ def run(main: Callable[[asyncio.Event], Awaitable[None]], shutdown_s: float = SH
     """
     shutdown = _Shutdown(shutdown_s)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    use_one_arena()
     freeze_heap()
     handlers = {number: signal.signal(number, shutdown.on_signal) for number in _SIGNALS}
     try:
@@ -53,15 +55,6 @@ async def until_stopped(stop: asyncio.Event, work: Coroutine[Any, Any, None]) ->
     stopping.cancel()
     with suppress(asyncio.CancelledError):
         await running
-
-
-def freeze_heap() -> None:
-    """Take what lives now out of garbage collection: a full one took 80 ms with a large heap.
-
-    `run` does it once all is imported; call it again after a start that builds much.
-    """
-    gc.collect()
-    gc.freeze()
 
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)

@@ -7,6 +7,7 @@ import logging
 
 from common.can.bus import CanBus
 from common.clock import monotonic_ns
+from common.heap import freeze_heap, reserve_heap
 from common.latency import Durations, StageTimes
 from common.launch import WriteFigures
 from common.link import Session, open_session
@@ -14,7 +15,7 @@ from common.link.audit import Audit
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.realtime import enter_real_time
-from common.runtime import freeze_heap, until_stopped
+from common.runtime import until_stopped
 from common.ticker import ticks
 from common.topics import STATISTICS
 from common.version import software
@@ -145,6 +146,7 @@ async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
         robots = ", ".join(config.commanded)
         log.info("%s: %d nodes polled, commands go to %s", robots, len(config.nodes), where)
         freeze_heap()  # now that all is built: a full collection took 80 ms
+        reserve_heap()
         try:
             await master.run()
         finally:

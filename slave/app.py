@@ -9,6 +9,7 @@ from contextlib import nullcontext
 
 from common.clock import monotonic_ns, to_ms
 from common.codec import encode
+from common.heap import freeze_heap, reserve_heap
 from common.launch import WriteFigures
 from common.link import Link, open_session
 from common.link.audit import Audit
@@ -16,7 +17,7 @@ from common.messages import Statistics
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.realtime import enter_real_time
-from common.runtime import freeze_heap, until_stopped
+from common.runtime import until_stopped
 from common.ticker import ticks
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, STOP, video
 from common.version import software
@@ -185,6 +186,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
             log.info("%s: waits for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
             freeze_heap()
+            reserve_heap()
             # last: drives on a bus stop by themselves when they miss the loop's ticks
             servos.start()
             try:

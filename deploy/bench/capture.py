@@ -13,8 +13,8 @@ from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.clock import monotonic_ns, to_ns
 from common.errors import BusError
+from common.heap import freeze_heap
 from common.pacing import TickGrid
-from common.runtime import freeze_heap
 from common.ticker import ticks
 from deploy.bench.measure import spread, spread_us
 from deploy.bench.pipeline import BUS, LOST_AFTER, RATE_HZ, answers, nodes

@@ -25,10 +25,10 @@ from common.clock import monotonic_ns, to_ns
 from common.codec import encode
 from common.config import LinkConfig
 from common.errors import LinkError
+from common.heap import freeze_heap
 from common.link import open_link
 from common.link.configuration import zenoh_configuration
 from common.pacing import TickGrid
-from common.runtime import freeze_heap
 from common.ticker import ticks
 from common.topics import COMMAND, STATE
 from deploy.bench.measure import Figures, spread_us

@@ -7,8 +7,8 @@ from typing import Any
 import uvloop
 
 from common.clock import monotonic_ns, to_ns
+from common.heap import freeze_heap
 from common.pacing import TickGrid
-from common.runtime import freeze_heap
 from common.ticker import ticks
 from deploy.bench.measure import spread_us
 from deploy.bench.worker import beside, in_worker

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from common.runtime import freeze_heap
+from common.heap import freeze_heap
 
 Figures = dict[str, float]
 """`min`, `median`, `p99`, `max` and `count`."""

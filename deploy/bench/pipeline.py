@@ -10,9 +10,9 @@ import numpy as np
 
 from common.can.frame import Frame
 from common.codec import decode, encode
+from common.heap import freeze_heap
 from common.messages import Command, CommandStamps
 from common.quaternion import Array
-from common.runtime import freeze_heap
 from common.skeleton import load_skeleton
 from deploy.bench.measure import spread_us, time_calls
 from master.fuse.estimator import EstimationConfig, Estimator

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from common.runtime import freeze_heap
+from common.heap import freeze_heap
 from common.skeleton import load_skeleton
 from deploy.bench.measure import time_calls
 from slave.servos.model import STEP_S

@@ -15,9 +15,9 @@ from rich.live import Live
 
 from common.clock import monotonic_ns, to_ns, to_s
 from common.errors import TandemError
+from common.heap import freeze_heap, reserve_heap
 from common.messages import Action
 from common.pacing import TickGrid
-from common.runtime import freeze_heap
 from common.ticker import ticks
 from deploy.rig.child import usage
 from deploy.rig.host import Host
@@ -97,6 +97,7 @@ class Soak:
         self.progress.busy = ""
         self._log.tell("follows", {"planned": len(planned)})
         freeze_heap()
+        reserve_heap()
         for number, one in enumerate(planned):
             await self._tend(began_s + one.at_s)
             self.progress.next = number + 1

@@ -14,9 +14,10 @@ from common.can.config import BusConfig
 from common.can.deaf import open_deaf_to
 from common.can.frame import Frame
 from common.clock import monotonic_ns
+from common.heap import freeze_heap
 from common.pacing import TickGrid
 from common.realtime import enter_real_time
-from common.runtime import freeze_heap, until_stopped
+from common.runtime import until_stopped
 from common.ticker import ticks
 from slave.config import SlaveConfig
 from slave.servos.canopen.pdo import TPDO1
