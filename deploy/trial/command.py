@@ -97,15 +97,7 @@ def trial(
         max_age_s=max_age, hosts=remote or "namespaces",
     )  # fmt: skip
     if remote is None:
-        from deploy.network.namespaces import why_not
-        from deploy.trial.stage import run_cell
-
-        reason = why_not()
-        if reason is not None:
-            raise NetworkError(
-                f"{reason}; with the robot on another host, no such rights are needed: --remote"
-            )
-        _run(plan, report, tasks, run_cell)
+        _run_here(plan, report, tasks)
     else:
         _run_remote(plan, report, tasks, link)
 
@@ -151,6 +143,16 @@ def report(
     Example: `tandem trial report trial --tasks my-tasks.toml`
     """
     _finish(folder, tasks, Console())
+
+
+def _run_here(plan: Plan, path: Path, tasks: Path | None) -> None:
+    from deploy.network.namespaces import why_not
+    from deploy.trial.stage import run_cell
+
+    reason = why_not()
+    if reason is not None:
+        raise NetworkError(f"{reason}; with the robot on another host, no such rights are needed: --remote")
+    _run(plan, path, tasks, run_cell)
 
 
 def _run_remote(plan: Plan, path: Path, tasks: Path | None, link: Path | None) -> None:
