@@ -7,6 +7,7 @@ import numpy as np
 from common.messages import Mask
 from common.quaternion import Array
 from deploy.soak.criteria import Seen
+from deploy.soak.events import of_kind
 from deploy.soak.trend import Slope, in_bins, slope
 from deploy.soak.verdict import Status, Verdict, at_most, not_above
 
@@ -44,15 +45,24 @@ def drift(seen: Seen) -> list[Verdict]:
 
 
 def memory(seen: Seen) -> list[Verdict]:
-    """Resident memory of each process."""
+    """Resident memory of each process: over all that happens, and between the faults alone.
+
+    The first faults of a life touch stacks and code that nothing else does; what grows with time is a leak.
+    """
     everything = np.ones(len(seen.samples), np.bool_)
-    return [
-        _not_above(
-            seen, "memory", f"{name}'s memory grows", f"{name}_rss_mb", _lives(seen, name), everything,
-            RSS_MB_H, "MB/h",
+    parts = np.searchsorted([w.from_s for w in seen.explained.faults], seen.samples.at_s).astype(np.float64)
+    verdicts = []
+    for name in seen.samples.processes:
+        column, lives = f"{name}_rss_mb", _lives(seen, name)
+        verdicts.append(
+            _not_above(seen, "memory", f"{name}'s memory grows", column, lives, everything, RSS_MB_H, "MB/h")
         )
-        for name in seen.samples.processes
-    ]  # fmt: skip
+        if of_kind(seen.events, "fault"):
+            words = f"{name} grows between faults"
+            verdicts.append(
+                _not_above(seen, "memory", words, column, lives, seen.quiet, RSS_MB_H, "MB/h", parts)
+            )
+    return verdicts
 
 
 def handles(seen: Seen) -> list[Verdict]:
@@ -68,15 +78,19 @@ GROWTH = (drift, memory, handles)
 
 
 def stretches(
-    at_s: Array, values: Array, lives: Array, use: Mask, width_s: float
+    at_s: Array, values: Array, lives: Array, use: Mask, width_s: float, parts: Array | None = None
 ) -> list[tuple[Array, Array]]:
-    """A series (N,) life by life: without each one's warm-up, in bins; times in hours."""
+    """A series (N,) life by life: without each one's warm-up, in bins; times in hours.
+
+    `parts` (N,) numbers what is to be told apart within a life too.
+    """
     out = []
     for life in np.unique(lives[np.isfinite(lives)]):
         mine = lives == life
         warm = mine & use & (at_s >= at_s[mine][0] + WARM_UP_S)
-        if warm.any():
-            middles_s, medians = in_bins(at_s[warm], values[warm], width_s)
+        for part in np.unique(parts[warm]) if parts is not None else (None,):
+            here = warm if parts is None else warm & (parts == part)
+            middles_s, medians = in_bins(at_s[here], values[here], width_s)
             if len(middles_s):
                 out.append((middles_s / 3600.0, medians))
     return out
@@ -87,21 +101,26 @@ def _lives(seen: Seen, name: str) -> Array:
     return seen.samples[f"{name}_life"]
 
 
-def _slope(seen: Seen, column: str, lives: Array, use: Mask) -> tuple[Slope | None, float]:
-    """The slope per hour, and how long the longest life was after its warm-up, s."""
+def _slope(
+    seen: Seen, column: str, lives: Array, use: Mask, parts: Array | None = None
+) -> tuple[Slope | None, float]:
+    """The slope per hour, and how long the longest life was after its warm-up, s; of parts: all together."""
     at_s = seen.samples.at_s
     width_s = max(NARROWEST_S, float(at_s[-1] - at_s[0]) / BINS) if len(at_s) else NARROWEST_S
-    series = stretches(at_s, seen.samples[column], lives, use, width_s)
-    longest_s = max((3600.0 * float(np.ptp(x)) for x, _ in series), default=0.0)
-    return (slope(series) if longest_s >= SHORTEST_S else None), longest_s
+    series = stretches(at_s, seen.samples[column], lives, use, width_s, parts)
+    lengths_s = [3600.0 * float(np.ptp(x)) for x, _ in series]
+    judged_s = max(lengths_s, default=0.0) if parts is None else sum(lengths_s)
+    return (slope(series) if judged_s >= SHORTEST_S else None), judged_s
 
 
 def _not_above(
-    seen: Seen, group: str, name: str, column: str, lives: Array, use: Mask, limit: float, unit: str
-) -> Verdict:
-    found, longest_s = _slope(seen, column, lives, use)
+    seen: Seen, group: str, name: str, column: str, lives: Array, use: Mask, limit: float, unit: str,
+    parts: Array | None = None,
+) -> Verdict:  # fmt: skip
+    found, judged_s = _slope(seen, column, lives, use, parts)
+    what = "one life" if parts is None else "all stretches between faults"
     too_short = (
-        f"too short: {longest_s:.0f} s of one life after {WARM_UP_S:.0f} s of warm-up, "
+        f"too short: {judged_s:.0f} s of {what} after {WARM_UP_S:.0f} s of warm-up, "
         f"at least {SHORTEST_S:.0f} s are needed"
     )
     return not_above(group, name, found, limit, unit, "", too_short)

@@ -7,10 +7,11 @@ import pytest
 
 from common.quaternion import Array
 from deploy.soak.criteria import Seen
+from deploy.soak.events import Event
 from deploy.soak.growth import DRIFT_MS_H, MORE, RSS_MB_H, SHORTEST_S, WARM_UP_S, drift, handles, memory
 from deploy.soak.verdict import Status, Verdict
 
-from .conftest import Make
+from .conftest import FAULT, RECOVERED, STORY, Make
 
 LONG = 3600
 
@@ -58,6 +59,31 @@ def test_a_leak_in_every_life_is_found_though_each_begins_anew(make: Make) -> No
         "master_rss_mb": lambda at_s: 100.0 + 10.0 * (at_s % 900) / 3600.0 + 0.01 * np.sin(at_s),
     }
     assert rss(make(LONG, **lives)).status is Status.FAIL
+
+
+def many_faults(seconds: int, every_s: int) -> tuple[Event, ...]:
+    begins = range(200, seconds - 100, every_s)
+    faults = [(float(s), FAULT | {"begun_s": float(s), "number": n}) for n, s in enumerate(begins)]
+    told = [Event(s, "fault", what) for s, what in faults]
+    return (*STORY[:6], *told, *(Event(s + 5.0, "recovered", RECOVERED | what) for s, what in faults))
+
+
+def test_what_each_fault_costs_is_told_apart_from_what_grows_with_time(make: Make) -> None:
+    events = many_faults(LONG, 100)
+
+    def stepping(at_s: Array) -> Array:
+        return 100.0 + 0.2 * np.maximum(0.0, (at_s - 100.0) // 100)
+
+    def between(seen: Seen) -> Verdict:
+        return of(memory(seen), "master grows between faults")
+
+    steps = make(LONG, events, master_rss_mb=stepping)
+    assert rss(steps).status is Status.FAIL
+    assert between(steps).status is Status.PASS
+    leak = between(make(LONG, events, master_rss_mb=growing(3.0 * RSS_MB_H, noise=0.001)))
+    assert leak.status is Status.FAIL
+    assert leak.figure == pytest.approx(3.0 * RSS_MB_H, rel=0.1)
+    assert not [v for v in memory(make(LONG, STORY[:6])) if "between" in v.name]
 
 
 def test_short_lives_are_not_judged_and_it_is_said(make: Make) -> None:
