@@ -22,10 +22,12 @@ settings.load_profile("tandem")
 TRIES = 4
 
 Story = Callable[[Host], Awaitable[None]]
+OnThisHost = Callable[[Story], None]
+"""The fixture's type."""
 
 
 @pytest.fixture
-def on_this_host() -> Callable[[Story], None]:
+def on_this_host() -> OnThisHost:
     """Runs a story of real processes beside a loop that does nothing but tick.
 
     Where it fails and the host itself stood still meanwhile, nothing was shown, and it is tried again, up to

@@ -47,7 +47,7 @@ def descriptor(bus: can.BusABC) -> int | None:
     """What an event loop can watch, or None where the interface has no such thing."""
     try:
         number = bus.fileno()
-    except NotImplementedError:
+    except NotImplementedError:  # python-can's word for an interface without a descriptor
         return None
     return number if number >= 0 else None
 
@@ -131,7 +131,7 @@ def _reason(error: BaseException) -> str:
 def _advice(config: BusConfig, error: BaseException) -> str:
     number = error_number(error) or 0
     channel = config.channel
-    if isinstance(error, NotImplementedError):
+    if isinstance(error, NotImplementedError):  # python-can's word for an interface that it does not know
         return "use an interface that python-can has, such as socketcan or udp_multicast"
     if config.interface == "socketcan":
         bitrate = f"ip link set {channel} type can bitrate 1000000"

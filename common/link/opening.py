@@ -73,6 +73,6 @@ def _close_unwanted(opening: asyncio.Future[zenoh.Session]) -> None:
 
 def _close(session: zenoh.Session) -> None:
     try:
-        session.close()  # type: ignore[no-untyped-call]  # untyped in zenoh
+        session.close()
     except Exception as error:  # nobody wants it any more
         log.debug("close: %s", error)

@@ -49,7 +49,7 @@ class Answerer:
         """Called in Zenoh's thread: stamp, copy, hand over, nothing else."""
         arrived_ns = monotonic_ns()
         if self._closed:
-            query.drop()  # type: ignore[no-untyped-call]  # untyped in zenoh
+            query.drop()
             return
         self._counters.received += 1
         # each of the two counts has one writer, so their difference needs no lock

@@ -153,7 +153,7 @@ class Session:
 
     def _close_session(self, closed: asyncio.Future[None]) -> None:
         try:
-            self._session.close()  # type: ignore[no-untyped-call]  # untyped in zenoh
+            self._session.close()
         except Exception as error:  # a link that leads nowhere: nothing to be done about it now
             log.debug("close: %s", error)
         wake(self._loop, _settle, closed)

@@ -36,7 +36,7 @@ async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: floa
                 try:
                     await there.wait()
                 finally:
-                    events.undeclare()  # type: ignore[no-untyped-call]  # untyped in zenoh
+                    events.undeclare()
                 return
             querier = session.declare_querier(key, allowed_destination=zenoh.Locality.REMOTE)
             try:
@@ -45,7 +45,7 @@ async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: floa
                     there.clear()
                     await there.wait()
             finally:
-                querier.undeclare()  # type: ignore[no-untyped-call]  # untyped in zenoh
+                querier.undeclare()
     except TimeoutError:
         what = "another session" if key is None else f"anyone who answers {key}"
         raise LinkTimeoutError(f"no link to {what} within {timeout_s:g} s") from None

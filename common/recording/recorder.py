@@ -156,7 +156,7 @@ class Recorder:
                 self._flush()
                 due_ns = monotonic_ns() + self._flush_ns
         self._flush()
-        self._writer.finish()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
+        self._writer.finish()
         self._stream.flush()
 
     def _write(self, item: _Item) -> None:
@@ -172,7 +172,7 @@ class Recorder:
         )
 
     def _flush(self) -> None:
-        self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
+        self._writer.flush()
         self._whole = self._stream.tell()
         self.counters.written += self._unflushed
         self._unflushed = 0

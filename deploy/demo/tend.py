@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from common.clock import monotonic_ns, to_ns
@@ -12,6 +13,7 @@ from common.errors import LinkTimeoutError, TandemError
 from common.messages import Action
 from deploy.demo.operator import Operator
 from deploy.rig.host import Host
+from deploy.rig.observer import Observer
 from deploy.rig.rig import Rig, at_most
 
 LOOK_S = 0.25
@@ -58,9 +60,8 @@ class Tending:
         for robot, observer in self._rig.observers.items():
             await self._disengage(robot)
             await self._rig.until(
-                lambda observer=observer: observer.guard == "hold",  # type: ignore[misc]
-                HOLD_S, f"hold of {robot} after disengaging", self._look,
-            )  # fmt: skip
+                partial(_holds, observer), HOLD_S, f"hold of {robot} after disengaging", self._look
+            )
 
     def rows(self) -> list[dict[str, Any]]:
         """A report's `holds`, in the order in which they happened."""
@@ -98,3 +99,7 @@ class Tending:
                 said = reply.text
             await asyncio.sleep(LOOK_S)
         raise TandemError(f"{robot}: disengaging was refused for {AGREE_S:g} s: {said}")
+
+
+def _holds(observer: Observer) -> bool:
+    return observer.guard == "hold"

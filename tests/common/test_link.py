@@ -320,7 +320,7 @@ def test_a_question_that_is_not_answered_times_out() -> None:
                 assert monotonic_ns() - begun_ns >= 0.9e9
                 assert link.counters()["clock"]["timeouts"] == 1
         for query in kept:
-            query.drop()  # type: ignore[no-untyped-call]
+            query.drop()
 
     run(test)
 

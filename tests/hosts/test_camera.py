@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
@@ -14,8 +13,10 @@ from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
 from deploy.rig.tracking import until_tracking
 
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
-OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 SEEN_S = 1.0
 """How long the robot is watched after the kill."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -13,8 +13,10 @@ from deploy.demo.tend import Tending
 from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
 
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
-OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 
 async def tended(rig: Rig, said: list[str]) -> Tending:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,8 +14,10 @@ from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
 from deploy.rig.tracking import until_tracking
 
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
-OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 COMMAND_TIMEOUT_S = 0.2
 STATE_PERIOD_S = 0.02

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,8 +14,10 @@ from deploy.rig.host import Host
 from deploy.rig.rig import Rig, open_rig
 from deploy.rig.tracking import until_tracking
 
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(600)]
-OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 ELBOW = "right_elbow_pitch"
 ZERO_COUNTS = 1000

@@ -7,10 +7,10 @@ import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -23,8 +23,10 @@ from deploy.network.network import Host, open_network
 from deploy.rig.child import Child
 from deploy.rig.host import Host as ThisHost
 
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(600)]
-OnThisHost = Callable[[Callable[[ThisHost], Awaitable[None]]], None]
 
 ALIGN_S, LOOK_S = 30.0, 0.1
 

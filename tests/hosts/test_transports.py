@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -14,8 +14,10 @@ from deploy.rig.keys import MASTER, access_override
 from deploy.rig.rig import ROBOT, ROLES, Rig, open_rig
 from deploy.rig.tracking import until_tracking
 
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
-OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 
 async def tracks(rig: Rig) -> None:

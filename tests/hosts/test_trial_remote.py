@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
-from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -16,8 +16,10 @@ from deploy.trial.cell import Status
 from deploy.trial.plan import CellKey, Plan, Setup
 from deploy.trial.remote.operator import run_remote_cell
 
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
-OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 
 
 def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(

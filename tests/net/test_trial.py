@@ -11,15 +11,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from deploy.rig.host import Host
 
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 pytestmark = pytest.mark.timeout(600)
-OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
 TRIAL = (sys.executable, "-m", "deploy", "trial")
 PLAN = ("--transports", "tcp,unixsock-stream", "--profiles", "4g", "--strategies", "predict", "--repeat", "1",
         "--seconds", "8", "--outage", "1")  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -13,7 +13,9 @@ from deploy.rig.rig import ROLES, Rig, open_rig
 from deploy.rig.tracking import until_tracking
 from slave.guard.config import GuardConfig
 
-OnThisHost = Callable[[Callable[[Host], Awaitable[None]]], None]
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
 
 OUTAGE_S = 5.0
 BACK_S = 1.5
