@@ -13,7 +13,7 @@ import msgpack
 
 from common import fields
 from common.errors import CodecError
-from common.fields import MAX_ITEMS, MAX_NAME, MAX_TEXT
+from common.fields import MAX_DOUBT, MAX_ITEMS, MAX_NAME, MAX_TEXT
 from common.messages import (
     Action,
     BaseAttitude,
@@ -30,7 +30,7 @@ from common.messages import (
     Truth,
 )
 
-VERSION = 2
+VERSION = 3
 MAX_PAYLOAD = 256 * 1024
 ANGLE_LIMIT_RAD = 4 * math.pi
 """No joint turns twice round; a larger angle is a fault, not a posture."""
@@ -80,12 +80,12 @@ def _pack_command(m: Command) -> tuple[Any, ...]:
     return (
         m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.solved_ns, s.put_ns,
         m.deadman_held, fields.pack_mask(m.valid), fields.pack_floats(m.position_rad, m.velocity_rad_s),
-        m.seen_frame, m.seen_ns,
+        m.seen_frame, m.seen_ns, m.doubt[:MAX_DOUBT],
     )  # fmt: skip
 
 
 def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
-    fields.length(f, 13)
+    fields.length(f, 14)
     lease, sequence, tick, sampled_ns, frames_in_ns, solved_ns, put_ns = fields.counts(f[1:8])
     position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
     return Command(
@@ -98,7 +98,9 @@ def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
         fields.mask(f[9], joints),
         position_rad,
         velocity_rad_s,
-        *fields.counts(f[11:]),
+        fields.count(f[11]),
+        fields.count(f[12]),
+        fields.text(f[13], MAX_DOUBT),
     )
 
 

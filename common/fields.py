@@ -15,6 +15,8 @@ from common.quaternion import Array
 
 MAX_NAME = 64
 MAX_TEXT = 512
+MAX_DOUBT = 240
+"""Of a command, which must fit into one packet on every path."""
 MAX_ITEMS = 4096
 """Entries of one array or map."""
 MAX_DEPTH = 16

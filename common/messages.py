@@ -48,6 +48,9 @@ class Command:
     """Number of the newest video frame that the operator had seen when he moved so; 0 where there is none."""
     seen_ns: int = 0
     """When that frame arrived, ns of the master's clock; 0 where there is none."""
+    doubt: str = ""
+    """Why nobody should engage on this posture, in words (a zero pose that was not taken, a node that lies);
+    empty where the operator's side has nothing against it."""
 
 
 @dataclass(frozen=True, slots=True)

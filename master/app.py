@@ -20,6 +20,7 @@ from common.ticker import ticks
 from common.topics import STATISTICS
 from common.version import software
 from master.config import MasterConfig
+from master.doubt import DoubtLog, as_figures
 from master.pipeline import MasterPipeline, Solved
 from master.robot import CommandedRobot
 from master.suit.protocol import SuitProtocol
@@ -45,6 +46,7 @@ class Master:
             for name in config.commanded
         ]
         self._given_up: set[str] = set()
+        self._doubt_log = DoubtLog()
 
     async def run(self) -> None:
         """Capture, send, keep each robot's lease and clock until cancelled."""
@@ -106,6 +108,8 @@ class Master:
                 solved.frames_in_ns - solved.sampled_ns, solved_ns - solved.frames_in_ns, done_ns - solved_ns
             )
             self._frames_in_to_put.record(done_ns - solved.frames_in_ns)
+        for line in self._doubt_log.lines(self._pipeline.doubts, solved_ns):
+            log.warning("%s", line)
 
     async def _tell(self) -> None:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
@@ -121,6 +125,7 @@ class Master:
             "stages_ms": self._stages.summary(),
             "frames_in_to_put_ms": self._frames_in_to_put.summary(),
             "nodes": self._pipeline.node_counts(),
+            "doubts": as_figures(self._pipeline.doubts),
             "buses": {bus.name: bus.summary() for bus in self._buses},
         }
 

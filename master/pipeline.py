@@ -5,7 +5,7 @@ poll ▸ calibrate ▸ low-pass ▸ fuse ▸ (every 16th tick) solve ▸ command
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from common.messages import Command, CommandStamps, Mask
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from master.config import MasterConfig
+from master.doubt import Doubts, NodeDoubt, Weight, refusal, together
 from master.fuse.estimator import Estimator
 from master.solve.solver import JointSolver
 from master.suit.nodes import NodeConfig
@@ -36,6 +37,8 @@ class Solved:
     position_rad: Array
     velocity_rad_s: Array
     valid: Mask
+    doubt: str = ""
+    """Why nobody should engage on it, in words."""
 
 
 class MasterPipeline:
@@ -56,6 +59,9 @@ class MasterPipeline:
         self._window_open = False
         self._last_sweep: Sweep | None = None
         self._decided_period = -1
+        self._parts: tuple[Callable[[], Doubts], ...] = (self._of_estimator,)
+        self.doubts: Doubts = {}
+        """Nodes that were not believed, or not wholly, when the last posture was solved."""
 
     def tick(self, tick: int, now_ns: int) -> tuple[Frame, Solved | None]:
         """Open a tick: the SYNC frame for every bus, and what the last window gave if it was still open."""
@@ -97,8 +103,9 @@ class MasterPipeline:
     def _solve(self, sweep: Sweep) -> Solved:
         posture = self.estimator.posture()
         position, velocity = self.solver.solve(posture.q_world_from_segment, posture.rate_rad_s)
+        self.doubts = together(*(part() for part in self._parts))
         # a joint is known only if the nodes on both its segments are
-        missing = self.skeleton.joint_needs_node @ ~posture.valid
+        missing = self.skeleton.joint_needs_node @ ~(posture.valid & self._believed())
         known = np.isfinite(position) & np.isfinite(velocity) & ~missing
         return Solved(
             tick=sweep.tick,
@@ -107,7 +114,20 @@ class MasterPipeline:
             position_rad=np.where(known, position, 0.0),
             velocity_rad_s=np.where(known, velocity, 0.0),
             valid=known,
+            doubt=refusal(self.doubts) if self.doubts else "",
         )
+
+    def _of_estimator(self) -> Doubts:
+        names = self.skeleton.segment_names
+        return {names[node]: doubt for node, doubt in self.estimator.doubts().items()}
+
+    def _believed(self) -> Mask:
+        """(N,) False for nodes whose doubt makes their joints invalid."""
+        names = self.skeleton.segment_names
+        if not self.doubts:
+            return np.ones(len(names), np.bool_)
+        told = NodeDoubt("", Weight.TOLD)
+        return np.array([self.doubts.get(name, told).weight < Weight.INVALID for name in names])
 
 
 def bridged(last: Sweep | None, now: Sweep) -> list[Sweep]:
@@ -178,4 +198,5 @@ class CommandWriter:
             velocity_rad_s=solved.velocity_rad_s,
             seen_frame=seen[0],
             seen_ns=seen[1],
+            doubt=solved.doubt,
         )

@@ -35,13 +35,24 @@ class Heard:
 
     state: RobotState | None = None
     figures: Mapping[str, Any] | None = None
+    operator_figures: Mapping[str, Any] | None = None
+    """Of the master that commands it."""
     all: asyncio.Event = field(default_factory=asyncio.Event)
     """Set when there is nothing more to wait for."""
 
-    def take(self, state: RobotState | None = None, figures: Mapping[str, Any] | None = None) -> None:
+    def take(
+        self,
+        state: RobotState | None = None,
+        figures: Mapping[str, Any] | None = None,
+        operator_figures: Mapping[str, Any] | None = None,
+    ) -> None:
         """Keep what is newer."""
         self.state, self.figures = state or self.state, figures or self.figures
-        if self.state is not None and self.figures is not None:
+        self.operator_figures = operator_figures or self.operator_figures
+        if self.state is None or self.figures is None:
+            return
+        # without a lease there may be no master to tell anything
+        if self.operator_figures is not None or not self.state.operator:
             self.all.set()
 
 
@@ -76,6 +87,8 @@ def listen(link: Link) -> Heard:
             return
         if statistics.role == "slave":
             heard.take(figures=statistics.figures)
+        elif statistics.role == "master":
+            heard.take(operator_figures=statistics.figures)
 
     link.subscribe(STATE, on_state)
     link.subscribe(STATISTICS, on_statistics)
@@ -103,6 +116,7 @@ def as_tree(answer: Answer, heard: Heard) -> dict[str, Any]:
         "operator": state.operator if state else None,
         "lease": figures.get("lease"),
         "faults": dict(state.faults) if state else None,
+        "node_doubts": None if heard.operator_figures is None else heard.operator_figures.get("doubts"),
         "encoders_invalid": int((~state.encoder_valid).sum()) if state else None,
         "base": None
         if base is None
@@ -156,6 +170,7 @@ def _add_row(table: Table, name: str, one: Mapping[str, Any]) -> None:
 def _words(one: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
     words = [(str(one["reason"]), "")]
     words += [(f"{what}: {why}", "red") for what, why in (one["faults"] or {}).items()]
+    words += [(f"node {node}: {why}", "yellow") for node, why in (one["node_doubts"] or {}).items()]
     if one["encoders_invalid"]:
         words.append((f"encoders not heard: {one['encoders_invalid']}", "red"))
     return words

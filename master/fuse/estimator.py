@@ -17,6 +17,7 @@ from common.messages import Mask
 from common.quaternion import Array, conjugate, from_rotation_vector, heading_rad, multiply, rotate
 from common.skeleton import Skeleton
 from master.calibrate.affine import ACC, GYR, MAG, Calibration, apply, load_calibration
+from master.doubt import NodeDoubt
 from master.fuse.ekf import EkfConfig
 from master.fuse.filter import FilterBank, FilterName
 from master.fuse.filters import makers
@@ -238,6 +239,10 @@ class Estimator:
         for nodes in (done & self._mounted, done & ~self._mounted):
             if nodes.any():
                 self._heading.stand(nodes, self._stance.correction_rad, self._q_of_filters(), mag_ut)
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Nodes that are not believed, or not wholly, by their number."""
+        return {}
 
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""

@@ -24,6 +24,8 @@ class Readiness:
     """What is amiss with the encoders."""
     body_fault: str | None
     """What is amiss with the drives or the base."""
+    operator_doubt: str
+    """What the operator's side has against it, as its last command said; empty where it has nothing."""
     any_valid: bool
     """Whether the last command has a valid joint."""
     unsettled: str | None
@@ -59,6 +61,10 @@ def _command(at: Readiness) -> str | None:
     return at.command_loss
 
 
+def _operator_side(at: Readiness) -> str | None:
+    return at.operator_doubt or None
+
+
 def _valid(at: Readiness) -> str | None:
     return None if at.any_valid else "no joint of the last command is valid"
 
@@ -84,7 +90,7 @@ def _strayed(at: Readiness) -> str | None:
 
 
 CONDITIONS: tuple[Condition, ...] = (
-    _state, _holder, _command, _valid, _encoder, _body, _unsettled, _rest, _strayed,
+    _state, _holder, _command, _operator_side, _valid, _encoder, _body, _unsettled, _rest, _strayed,
 )  # fmt: skip
 
 

@@ -91,6 +91,7 @@ class Guard:
         self._refusal = ""
         self._newest_sequence = -1
         self._valid: Mask = np.zeros(len(names), np.bool_)
+        self._operator_doubt = ""
 
     @property
     def operator(self) -> str:
@@ -140,7 +141,7 @@ class Guard:
         if command.valid.any():
             self._somebody_ns = received_ns
         self._refusal = ""
-        self._valid = command.valid.copy()
+        self._valid, self._operator_doubt = command.valid.copy(), command.doubt
         self._tracker.accept(
             situation.sampled_ns(command), now_ns, command.position_rad, command.velocity_rad_s
         )
@@ -201,6 +202,7 @@ class Guard:
                 encoder_loss=body,
                 body_fault=self._body.amiss,
                 unsettled=self._plausible.unsettled(),
+                operator_doubt=self._operator_doubt,
                 any_valid=bool(self._valid.any()),
                 at_rest=self._limiter.at_rest,
                 strayed=self._strayed(),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from common.codec import ANGLE_LIMIT_RAD, MAX_PAYLOAD, RATE_LIMIT_RAD_S, VERSION, decode, encode
 from common.errors import CodecError
-from common.fields import MAX_DEPTH, MAX_NAME, MAX_TEXT
+from common.fields import MAX_DEPTH, MAX_DOUBT, MAX_NAME, MAX_TEXT
 from common.messages import (
     Action,
     BaseAttitude,
@@ -67,6 +67,7 @@ def commands(draw: st.DrawFn, joints: int = 25) -> Command:
         position_rad=draw(values(joints, ANGLE_LIMIT_RAD)),
         velocity_rad_s=draw(values(joints, RATE_LIMIT_RAD_S)),
         seen_frame=draw(counts),
+        doubt=draw(st.text(max_size=MAX_DOUBT)),
     )
 
 
@@ -226,7 +227,7 @@ def test_each_count_of_a_command_is_checked(index: int, value: object) -> None:
     [
         (0, "state", "kind 'state', expected command"),
         (0, 5, "kind 5, expected command"),
-        (1, VERSION + 1, "schema version 3, expected 2"),
+        (1, VERSION + 1, "schema version 4, expected 3"),
         (1, True, "schema version True"),
         (2, "x" * (MAX_NAME + 1), "text of at most 64"),
         (2, b"robot-1", "text of at most 64"),

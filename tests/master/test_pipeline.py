@@ -14,6 +14,7 @@ from common.clock import NS_PER_MS, NS_PER_S
 from common.config import load_config
 from common.messages import Mask
 from master.config import MasterConfig
+from master.doubt import NodeDoubt, Weight
 from master.pipeline import MOST_BRIDGED, CommandWriter, MasterPipeline, Solved, bridged
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
@@ -148,3 +149,24 @@ def test_the_sequence_counts_up_and_the_lease_is_carried(settled: Bench) -> None
     assert (first.sequence, second.sequence) == (1, 2)
     assert (first.lease, second.lease, second.deadman_held) == (5, 6, False)
     assert (second.stamps.solved_ns, second.stamps.put_ns) == (20, 21)
+
+
+def test_a_doubted_node_s_joints_are_invalid_and_what_refuses_engage_is_in_the_command(
+    settled: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = settled.pipeline.skeleton.segment_names.index("left_forearm")
+    doubts = {node: NodeDoubt("it repeats one reading", Weight.INVALID)}
+    monkeypatch.setattr(settled.pipeline.estimator, "doubts", lambda: doubts)
+    solved = settled.run(16)[-1]
+    names = settled.pipeline.skeleton.joint_names
+    gone = {name for name, ok in zip(names, solved.valid, strict=True) if not ok}
+    assert gone == {"left_elbow_pitch", "left_elbow_roll", "left_wrist_yaw"}
+    assert solved.doubt == ""
+    assert settled.pipeline.doubts == {"left_forearm": doubts[node]}
+    doubts[node] = NodeDoubt("two nodes answer", Weight.REFUSED)
+    solved = settled.run(16)[-1]
+    assert CommandWriter("r").write(solved, 1, True, 0, 0).doubt == "left_forearm: two nodes answer"
+    doubts[node] = NodeDoubt("its field is odd", Weight.TOLD)
+    solved = settled.run(16)[-1]
+    assert solved.valid.all()
+    assert solved.doubt == ""

@@ -6,6 +6,7 @@ import asyncio
 import io
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -62,6 +63,22 @@ def test_an_offset_that_is_not_trusted_has_no_bound() -> None:
     assert said["offset_ms"] == {"offset": 5.0, "bound": None, "trusted": False}
 
 
+def test_what_the_operator_s_side_doubts_is_said_by_node() -> None:
+    told = heard()
+    told.take(operator_figures={"doubts": {"left_forearm": "its gyro is 5°/s off"}})
+    said = tree(told)
+    assert said["node_doubts"] == {"left_forearm": "its gyro is 5°/s off"}
+    assert "robot-1: node left_forearm: its gyro is 5°/s off" in rendered({"robot-1": said})
+
+
+def test_with_a_lease_it_waits_for_the_master_s_figures_too() -> None:
+    told = heard()
+    told.take(state=state())
+    assert not told.all.is_set()
+    told.take(operator_figures={"doubts": {}})
+    assert told.all.is_set()
+
+
 def test_a_robot_that_told_nothing_is_said_to_have_told_nothing() -> None:
     said = as_tree(Answer("robot-1", False, "does not answer"), Heard())
     assert said["answers"] is False
@@ -97,7 +114,7 @@ def test_it_waits_until_both_have_come() -> None:
         heard = Heard()
         heard.take(figures={"ticks": {}})
         assert not heard.all.is_set()
-        heard.take(state=state())
+        heard.take(state=replace(state(), operator=""))
         assert heard.all.is_set()
 
     asyncio.run(story())

@@ -182,6 +182,9 @@ def doubtful(rig: Any) -> None:
 about("condition _state")(not_engaged(lambda rig: rig.to_track()))
 about("condition _holder", "engage.holder_only")(not_engaged(lambda rig: rig.to_leased(), "ben"))
 about("condition _command")(not_engaged(lambda rig: rig.to_leased().run(0.25, commands=False)))
+about("condition _operator_side")(
+    not_engaged(lambda rig: rig.to_leased().run(0.1, doubt="waist: leans by 30°"))
+)
 about("condition _valid")(
     not_engaged(lambda rig: rig.to_leased().run(0.1, valid=np.zeros(rig.joints, np.bool_)))
 )

@@ -36,6 +36,10 @@ def all_nodes_lost(rig: Any) -> None:
     rig.to_leased().run(0.1, valid=np.zeros(rig.joints, np.bool_))
 
 
+def operator_side_refuses(rig: Any) -> None:
+    rig.to_leased().run(0.1, doubt="waist: turned at 30°/s in the zero pose")
+
+
 def encoder_lost(rig: Any) -> None:
     rig.to_leased()
     rig.encoder_valid[6] = False
@@ -79,6 +83,7 @@ CASES: list[tuple[Callable[..., Any], Callable[[Any], None], str]] = [
     (engage._state, in_estop, "reset it first"),
     (engage._holder, stranger, "ben holds the lease"),
     (engage._command, silent_master, "no command for"),
+    (engage._operator_side, operator_side_refuses, "waist: turned at 30°/s in the zero pose"),
     (engage._valid, all_nodes_lost, "no joint of the last command is valid"),
     (engage._encoder, encoder_lost, "left_elbow_pitch"),
     (engage._body, drive_faulty, "the drive of left_elbow_pitch: over-current"),
@@ -110,6 +115,12 @@ def test_without_its_condition_it_would_move(
 
 def test_every_condition_has_a_case() -> None:
     assert [case[0] for case in CASES] == list(engage.CONDITIONS)
+
+
+def test_a_doubt_that_the_operator_side_took_back_refuses_nothing(rig: Any) -> None:
+    operator_side_refuses(rig)
+    rig.run(0.1)
+    assert rig.ask(Action.ENGAGE).done
 
 
 def test_refused_before_the_encoders_are_known(rig: Any) -> None:

@@ -1,0 +1,106 @@
+"""Nodes that answer but are not, or not wholly, believed: the one form in which all of the master says so.
+
+A part gives `{node: NodeDoubt}`. The pipeline puts the parts together. From there a doubt reaches the joints'
+validity, the log, the statistics (`doubts`), `tandem status` and, if heavy enough, the refusal of `engage`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+from common.clock import to_ns
+
+MOST_NAMED = 3
+"""Nodes that a refusal names; the others are counted."""
+_AGAIN_S = 10.0
+"""Until other words for the same node are logged anew: figures in them change from tick to tick."""
+
+
+class Weight(IntEnum):
+    """What follows from a doubt; each includes the ones before it."""
+
+    TOLD = 0
+    """People are told."""
+    INVALID = 1
+    """The node's joints are not valid: the robot holds them."""
+    REFUSED = 2
+    """Nobody engages while it lasts. Who is engaged already stays so: invalid joints are held anyway."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeDoubt:
+    """What is wrong with one node, in words that follow its name and a colon."""
+
+    words: str
+    weight: Weight
+
+
+Doubts = Mapping[str, NodeDoubt]
+"""By node (segment)."""
+
+
+def together(*parts: Doubts) -> dict[str, NodeDoubt]:
+    """All that is said of each node: the heaviest first, and its weight for the whole."""
+    out: dict[str, NodeDoubt] = {}
+    for part in parts:
+        for node, doubt in part.items():
+            before = out.get(node)
+            if before is None:
+                out[node] = doubt
+                continue
+            first, second = sorted((before, doubt), key=lambda each: -each.weight)
+            out[node] = NodeDoubt(f"{first.words}; {second.words}", first.weight)
+    return out
+
+
+def refusal(doubts: Doubts) -> str:
+    """Why nobody should engage now, in words; empty where nothing speaks against it."""
+    by_words: dict[str, list[str]] = {}
+    for node, doubt in doubts.items():
+        if doubt.weight is Weight.REFUSED:
+            by_words.setdefault(doubt.words, []).append(node)
+    return "; ".join(f"{_names(nodes)}: {words}" for words, nodes in by_words.items())
+
+
+def _names(nodes: list[str]) -> str:
+    more = len(nodes) - MOST_NAMED
+    return ", ".join(nodes[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def as_figures(doubts: Doubts) -> dict[str, str]:
+    """The words alone, by node, for statistics."""
+    return {node: doubt.words for node, doubt in doubts.items()}
+
+
+class DoubtLog:
+    """Lines for the log: when a doubt begins, changes its weight or ends, and at times its newer words."""
+
+    def __init__(self) -> None:
+        self._said: dict[str, tuple[NodeDoubt, int]] = {}
+
+    def lines(self, doubts: Doubts, now_ns: int) -> list[str]:
+        """What to log now."""
+        if not doubts and not self._said:
+            return []
+        out = []
+        for node, doubt in doubts.items():
+            said, said_ns = self._said.get(node, (None, 0))
+            if said == doubt:
+                continue
+            stale = now_ns - said_ns > to_ns(_AGAIN_S)
+            if said is None or said.weight != doubt.weight or stale:
+                self._said[node] = doubt, now_ns
+                out.append(f"node {node}: {doubt.words}{_CONSEQUENCE[doubt.weight]}")
+        for node in [name for name in self._said if name not in doubts]:
+            del self._said[node]
+            out.append(f"node {node}: believed again")
+        return out
+
+
+_CONSEQUENCE = {
+    Weight.TOLD: "",
+    Weight.INVALID: " (its joints are invalid)",
+    Weight.REFUSED: " (its joints are invalid; engage is refused)",
+}
