@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from rich.console import Console
 
-from deploy.calibrate.options import AsJson, Nodes, OutFolder, RecordingFile, ReportFile
+from deploy.calibrate.options import AsJson, HemisphereOption, Nodes, OutFolder, RecordingFile, ReportFile
 
 if TYPE_CHECKING:
     from deploy.calibrate.session import Session
@@ -18,27 +19,53 @@ if TYPE_CHECKING:
     from master.calibrate.recording import NodeRecording
 
 
+def _axes(text: str | None) -> str | None:
+    from master.calibrate.magnetic_axes import axes_matrix
+
+    if text is not None:
+        try:
+            axes_matrix(text)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+    return text
+
+
 def mag(
     recording: RecordingFile,
     out: OutFolder = Path("calibration"),
     node: Nodes = None,
+    hemisphere: HemisphereOption = "north",
+    axes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Accept axes as soldered: which reading, with its sign, is the node's x, y and "
+            "z, as in y,x,-z.",
+            callback=_axes,
+        ),
+    ] = None,
     report: ReportFile = None,
     as_json: AsJson = False,
 ) -> None:
     """Calibrate magnetometers from a recording: 3 minutes of free rotation through every attitude.
 
     Where the folder has the node's accelerometer already and the recording has rests in eight attitudes or
-    more, the magnetometer's axes are turned into the accelerometer's.
+    more, the magnetometer's axes are turned into the accelerometer's. Gyroscope and gravity must agree with
+    how the field turns: swapped axes are refused unless you accept them by --axes, and a mirror image always
+    is.
 
     Example: `tandem calibrate mag rotation.npz --out calibration --node left_hand`
     """
     from deploy.calibrate import session as sessions
     from deploy.calibrate.pictures import draw_magnetic
-    from master.calibrate.magnetic import calibrate_magnetic
+    from master.calibrate.magnetic import MagneticOptions, calibrate_magnetic
+    from master.calibrate.magnetic_axes import axes_matrix, hemisphere_named
     from master.calibrate.node_file import accelerometer_map
 
+    options = MagneticOptions(hemisphere_named(hemisphere), None if axes is None else axes_matrix(axes))
+
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
-        return calibrate_magnetic(raw, accelerometer_map(out, raw.name))
+        return calibrate_magnetic(raw, accelerometer_map(out, raw.name), options)
 
     sessions.make_folder(out)
     day = date.today()
@@ -57,6 +84,7 @@ def _gist(found: MagneticCalibration) -> dict[str, Any]:
         "field_ut": found.fit.field_ut,
         "coverage": found.coverage,
         "aligned_deg": None if found.alignment is None else math.degrees(found.alignment.angle_rad),
+        "evidence": [one.as_report() for one in found.evidence],
         "hold_out_percent": 100.0 * found.hold_out_spread_ut / found.fit.field_ut,
     }
 

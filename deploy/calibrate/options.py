@@ -20,4 +20,20 @@ Nodes = Annotated[list[str] | None, typer.Option("--node", help="Only this node;
 ReportFile = Annotated[
     Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
 ]
+
+
+def _hemisphere(text: str) -> str:
+    if text not in ("north", "south"):
+        raise typer.BadParameter("expected north or south")
+    return text
+
+
+HemisphereOption = Annotated[
+    str,
+    typer.Option(
+        metavar="north|south",
+        help="Where it was recorded: tells a magnetometer's mirror image from the field's dip.",
+        callback=_hemisphere,
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")]

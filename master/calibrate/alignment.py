@@ -23,6 +23,10 @@ _LARGEST_RAD = np.radians(10.0)
 _WORST_CONDITION = 1e3
 
 
+class UndeterminedError(RecordingError):
+    """The attitudes do not tell how the magnetometer sits: nothing speaks against it either."""
+
+
 @dataclass(frozen=True, slots=True)
 class Alignment:
     """What was found, and how good it is."""
@@ -51,11 +55,12 @@ def align_magnetometer(acc: Array, mag: Array) -> Alignment:
     """Calibrated readings (K, 3) of both sensors, at rest in K attitudes. Only directions count.
 
     Gauss-Newton over rotation r and c = -sin(dip): a · exp(r) m = c in every attitude.
-    Raises RecordingError where the attitudes do not determine it.
+    Raises UndeterminedError where the attitudes do not determine it, and RecordingError where the sensors
+    contradict each other.
     """
     again = "rest the node in twenty attitudes, every side up and turned about the vertical too"
     if len(acc) < _FEWEST_ATTITUDES:
-        raise RecordingError(f"{len(acc)} attitudes do not tell how the magnetometer sits; {again}")
+        raise UndeterminedError(f"{len(acc)} attitudes do not tell how the magnetometer sits; {again}")
     up, field = normalise(acc), normalise(mag)
     q = np.array([1.0, 0.0, 0.0, 0.0])
     before = _dip_errors(up, field)
@@ -64,7 +69,7 @@ def align_magnetometer(acc: Array, mag: Array) -> Alignment:
         product = np.sum(up * turned, axis=1)
         jacobian = np.column_stack([cross(turned, up), -np.ones(len(up))])
         if not np.linalg.cond(jacobian) < _WORST_CONDITION:
-            raise RecordingError(f"the attitudes do not tell how the magnetometer sits; {again}")
+            raise UndeterminedError(f"the attitudes do not tell how the magnetometer sits; {again}")
         step = np.linalg.lstsq(jacobian, np.mean(product) - product, rcond=None)[0]
         q = normalise(multiply(from_rotation_vector(step[:3]), q))
     after = _dip_errors(up, rotate(q, field))

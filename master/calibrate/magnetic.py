@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from common.calibration import Made
 from common.quaternion import Array
-from master.calibrate.alignment import Alignment, align_magnetometer
+from master.calibrate.alignment import Alignment, UndeterminedError, align_magnetometer
 from master.calibrate.ellipsoid import (
     Ellipsoid,
     NoEllipsoidError,
@@ -19,6 +19,8 @@ from master.calibrate.ellipsoid import (
     coverage,
     fit_ellipsoid,
 )
+from master.calibrate.evidence import Evidence, refuse_contradictions, unjudged
+from master.calibrate.magnetic_axes import Hemisphere, check_axes
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
 from master.calibrate.soundness import check_clipped, check_samples
@@ -60,11 +62,17 @@ class MagneticCalibration:
     alignment: Alignment | None = None
     """Into the accelerometer's axes; None where they are not known."""
     notes: tuple[str, ...] = ()
+    evidence: tuple[Evidence, ...] = ()
+    """What was compared before this was believed."""
+    axes: Array = field(default_factory=lambda: np.eye(3))
+    """(3, 3), the signed permutation that took the readings as they came to the node's axes, before the
+    fit."""
 
     @property
     def affine(self) -> Array:
         """(3, 4): calibrated µT, in the accelerometer's axes where they are known, from readings."""
-        return self.fit.affine if self.alignment is None else self.alignment.apply(self.fit.affine)
+        plain = self.fit.affine if self.alignment is None else self.alignment.apply(self.fit.affine)
+        return np.column_stack([plain[:, :3] @ self.axes, plain[:, 3]])
 
     @property
     def spread_before_ut(self) -> float:
@@ -95,31 +103,72 @@ class MagneticCalibration:
         return {"magnetometer": (self.affine, made)}
 
 
-def calibrate_magnetic(recording: NodeRecording, accelerometer: Array | None = None) -> MagneticCalibration:
-    """Find the magnetometer's map. Raises RecordingError when the recording does not determine it.
+@dataclass(frozen=True, slots=True)
+class MagneticOptions:
+    """What a person may choose."""
+
+    hemisphere: Hemisphere = "north"
+    """Where it was recorded: the field dips below the horizon in the north, and rises in the south."""
+    axes: Array | None = None
+    """(3, 3): a signed permutation, accepted by a person, that takes the readings to the node's axes."""
+
+
+def calibrate_magnetic(
+    recording: NodeRecording,
+    accelerometer: Array | None = None,
+    options: MagneticOptions = MagneticOptions(),
+) -> MagneticCalibration:
+    """Find the magnetometer's map.
+
+    Raises RecordingError when the recording does not determine it, or contradicts itself.
 
     With the accelerometer's map (3, 4), and rests in the recording, the magnetometer's axes are turned into
     the accelerometer's; a note says where that was not possible.
     """
     if recording.mag_ut is None:
         raise RecordingError("there are no magnetometer readings; record a node that has one")
-    check_samples("magnetometer", recording.mag_ut)
-    everywhere = np.ones(len(recording.mag_ut), dtype=np.bool_)
+    axes = np.eye(3) if options.axes is None else options.axes
+    mag = recording.mag_ut @ axes.T
+    check_samples("magnetometer", mag)
+    everywhere = np.ones(len(mag), dtype=np.bool_)
     check_clipped(
         "magnetometer",
-        recording.mag_ut,
+        mag,
         everywhere,
         max(3, round(_LIMIT_S * recording.rate_hz)),
         "set a larger range, or take it away from the magnet",
     )
-    known = np.all(np.isfinite(recording.mag_ut), axis=1)
-    readings = recording.mag_ut[known]
+    known = np.all(np.isfinite(mag), axis=1)
+    fit, hold_out = _fitted(mag[known], np.flatnonzero(known) // max(1, round(_BLOCK_S * recording.rate_hz)))
+    seen = coverage(fit, mag[known])
+    calibrated = mag @ fit.affine[:, :3].T + fit.affine[:, 3]
+    evidence = refuse_contradictions(check_axes(recording, calibrated, options.hemisphere))
+    notes = () if seen >= GOOD_COVERAGE else (f"{100 * seen:.0f} % of the sphere seen; more makes it surer",)
+    alignment, words = _align(recording, mag, fit, accelerometer)
+    said = (*words, *unjudged(evidence))
+    sigma = affine_sigma(fit, mag[known])
+    return MagneticCalibration(
+        name=recording.name,
+        fit=fit,
+        sigma=np.column_stack([sigma[:, :3] @ np.abs(axes), sigma[:, 3]]),
+        coverage=seen,
+        readings_ut=mag[known],
+        hold_out_ut=hold_out,
+        alignment=alignment,
+        notes=(*notes, *(["; ".join(said)] if said else [])),
+        evidence=evidence,
+        axes=axes,
+    )
+
+
+def _fitted(readings: Array, blocks: NDArray[np.intp]) -> tuple[Ellipsoid, Array]:
+    """The ellipsoid of readings (K, 3), and what it holds out (K,). Raises RecordingError."""
     if len(readings) < _FEWEST_SAMPLES:
         raise RecordingError(f"{len(readings)} readings are too few; {_TURN}, for 3 minutes")
     try:
         fit = fit_ellipsoid(readings)
-        seen = _check_coverage(fit, readings)
-        hold_out = _held_out(readings, np.flatnonzero(known) // max(1, round(_BLOCK_S * recording.rate_hz)))
+        _check_coverage(fit, readings)
+        hold_out = _held_out(readings, blocks)
     except NoEllipsoidError as error:
         raise RecordingError(f"the sphere is covered too thinly: {error}; {_TURN}") from None
     spread = float(np.std(fit.norms(readings))) / fit.field_ut
@@ -133,18 +182,7 @@ def calibrate_magnetic(recording: NodeRecording, accelerometer: Array | None = N
             f"the field is {fit.field_ut:.3g} µT strong, and the earth's is 22 to 67 µT; "
             "are the readings in µT? 1 gauss is 100 µT"
         )
-    notes = () if seen >= GOOD_COVERAGE else (f"{100 * seen:.0f} % of the sphere seen; more makes it surer",)
-    alignment, words = _align(recording, recording.mag_ut, fit, accelerometer)
-    return MagneticCalibration(
-        recording.name,
-        fit,
-        affine_sigma(fit, readings),
-        seen,
-        readings,
-        hold_out,
-        alignment,
-        (*notes, *words),
-    )
+    return fit, hold_out
 
 
 def _align(
@@ -157,18 +195,18 @@ def _align(
     level = motion_level(recording.gyr_rad_s, recording.rate_hz)
     limit = min(6.0 * stillest_level(level, floor=1e-3), _MOST_AT_REST_RAD_S)
     still = still_intervals(level, limit, recording.rate_hz, _REST_S)
-    force, field = (
+    force, earth = (
         interval_means(readings @ map_[:, :3].T + map_[:, 3], still)
         for readings, map_ in ((recording.acc_m_s2, accelerometer), (mag_ut, fit.affine))
     )
-    whole = np.isfinite(force).all(axis=1) & np.isfinite(field).all(axis=1)
+    whole = np.isfinite(force).all(axis=1) & np.isfinite(earth).all(axis=1)
     try:
-        return align_magnetometer(force[whole], field[whole]), ()
-    except RecordingError as error:
+        return align_magnetometer(force[whole], earth[whole]), ()
+    except UndeterminedError as error:
         return None, (f"{without}: {error}",)
 
 
-def _check_coverage(fit: Ellipsoid, readings: Array) -> float:
+def _check_coverage(fit: Ellipsoid, readings: Array) -> None:
     seen = coverage(fit, readings)
     carried = amplification(fit, readings)
     if seen < LEAST_COVERAGE:
@@ -178,7 +216,6 @@ def _check_coverage(fit: Ellipsoid, readings: Array) -> float:
         )
     if carried > MOST_AMPLIFICATION:
         raise RecordingError(f"the sphere is covered too thinly: one side of it was not seen; {_TURN}")
-    return seen
 
 
 def _held_out(readings: Array, blocks: NDArray[np.intp]) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from deploy.calibrate.options import AsJson, ReportFile
+from deploy.calibrate.options import AsJson, HemisphereOption, ReportFile
 
 if TYPE_CHECKING:
     from deploy.calibrate.live.guide import What
@@ -30,6 +30,7 @@ def live(
     ] = 0.85,
     limber_s: Annotated[float, typer.Option(help="How long every joint is to move, s.", min=2.0)] = 20.0,
     gravity: Annotated[float, typer.Option(help="m/s² where you are.", min=9.7, max=9.9)] = 9.80665,
+    hemisphere: HemisphereOption = "north",
     pictures: Annotated[bool, typer.Option(help="Draw every node before and after.")] = True,
     report: ReportFile = None,
     as_json: AsJson = False,
@@ -51,6 +52,7 @@ def live(
     from deploy.calibrate.live.guide import GuideOptions
     from deploy.calibrate.live.run import LiveSession, Session
     from deploy.calibrate.session import make_folder, tell_machines
+    from master.calibrate.magnetic_axes import hemisphere_named
     from master.config import MasterConfig
 
     checked = load_config(config, MasterConfig, set_ or ())
@@ -77,7 +79,8 @@ def live(
             f"stopped before the end; recorded so far: {kept or 'nothing'}. "
             "`tandem calibrate imu`, `mag` and `mount` can read it"
         )
-    figures, refusals = compute(checked, session, Choice(wanted, gravity, still_s, pictures), out, console)
+    choice = Choice(wanted, gravity, still_s, hemisphere_named(hemisphere), pictures)
+    figures, refusals = compute(checked, session, choice, out, console)
     tell_machines(figures, report, to_stdout=as_json)
     if refusals:
         raise TandemError("\n".join(refusals))

@@ -22,7 +22,8 @@ from deploy.calibrate.pictures import draw_inertial, draw_magnetic
 from deploy.calibrate.views import inertial_table, magnetic_table, notes
 from deploy.output import writing
 from master.calibrate.inertial import InertialCalibration, InertialOptions, calibrate_inertial
-from master.calibrate.magnetic import MagneticCalibration, calibrate_magnetic
+from master.calibrate.magnetic import MagneticCalibration, MagneticOptions, calibrate_magnetic
+from master.calibrate.magnetic_axes import Hemisphere
 from master.calibrate.mounting import find_mounting
 from master.calibrate.mounting_files import calibrated, write_mounting
 from master.calibrate.node_file import accelerometer_map
@@ -39,6 +40,7 @@ class Choice:
     what: tuple[What, ...]
     gravity_m_s2: float
     still_s: float
+    hemisphere: Hemisphere = "north"
     pictures: bool = True
     """Draw each node before and after: a second or more a node."""
 
@@ -109,7 +111,9 @@ def _mag(
     refusals: list[str],
 ) -> dict[str, Any]:
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
-        return calibrate_magnetic(raw, accelerometer_map(folder, raw.name))
+        return calibrate_magnetic(
+            raw, accelerometer_map(folder, raw.name), MagneticOptions(choice.hemisphere)
+        )
 
     magnetic = [name for name in load_recordings(path) if config.nodes[name].magnetometer]
     if not magnetic:
