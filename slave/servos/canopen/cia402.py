@@ -21,6 +21,7 @@ class Power(StrEnum):
     FAULT = "fault"
 
 
+DISABLE_VOLTAGE = 0x00
 SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, FAULT_RESET = 0x06, 0x07, 0x0F, 0x02, 0x80
 """Controlwords (6040h). A drive takes FAULT_RESET at the rising edge of its bit only."""
 
@@ -48,17 +49,22 @@ def power(statusword: int) -> Power | None:
     return None
 
 
-def towards_enabled(state: Power | None, last_controlword: int, reset_fault: bool) -> int:
+def towards_enabled(
+    state: Power | None, last_controlword: int, reset_fault: bool, *, knows_16: bool = True
+) -> int:
     """The controlword that leads one step nearer to ENABLED.
 
-    From QUICK_STOP straight back, without ever letting the joint go (transition 16). A fault is reset only
-    where allowed, with the bit lowered in between.
+    From QUICK_STOP straight back, without ever letting the joint go: transition 16, which CiA 402 leaves to
+    the maker. A drive that does not know it (`knows_16` false) can only be led round by "disable voltage"
+    (transition 12). A fault is reset only where allowed, with the bit lowered in between.
     """
     match state:
         case Power.SWITCH_ON_DISABLED:
             return SHUTDOWN
         case Power.READY:
             return SWITCH_ON
+        case Power.QUICK_STOP if not knows_16:
+            return DISABLE_VOLTAGE
         case Power.SWITCHED_ON | Power.ENABLED | Power.QUICK_STOP:
             return ENABLE
         case Power.FAULT if reset_fault and last_controlword != FAULT_RESET:

@@ -8,11 +8,14 @@ from enum import Enum, auto
 from common.clock import NS_PER_MS
 from slave.servos.canopen.cia402 import FAULT_RESET, QUICK_STOP, SHUTDOWN, Power, power, towards_enabled
 from slave.servos.canopen.emergency import Emergency
-from slave.servos.canopen.sdo import Transfer, answer, request
+from slave.servos.canopen.sdo import Exchange, More, Transfer
 
 SDO_TIMEOUT_NS = 300 * NS_PER_MS
 SDO_TRIES = 3
 ENABLE_TIMEOUT_NS = 2000 * NS_PER_MS
+TRANSITION_16_NS = 500 * NS_PER_MS
+"""In quick stop active, told "enable" for so long and still there: the drive does not know transition 16.
+Until then it has also braked: "disable voltage" lets the joint go for some SYNCs."""
 
 
 class Phase(Enum):
@@ -44,6 +47,7 @@ class Drive:
     _step: int = 0
     _tries: int = 0
     _patient: bool = False
+    _exchange: Exchange | None = None
 
     def start(self, now_ns: int, may_reset: bool, configure: bool) -> bytes | None:
         """On the way to RUNNING, whatever was before; the SDO request that comes first, if any.
@@ -71,9 +75,12 @@ class Drive:
         """The next request, or None: nothing was waited for, it failed, or all is done (`configured`)."""
         if self.phase is not Phase.CONFIGURING or self.configured:
             return None
-        said = answer(self.setup[self._step], data)
+        said = None if self._exchange is None else self._exchange.on_answer(data)
         if said is None:
             return None
+        if isinstance(said, More):
+            self._asked_ns = now_ns
+            return said.request
         if not said.done:
             self.fail(f"refuses its configuration: {said.words}")
             return None
@@ -90,7 +97,7 @@ class Drive:
         if self.phase is not Phase.CONFIGURING or now_ns - self._asked_ns < SDO_TIMEOUT_NS:
             return None
         if self._tries >= SDO_TRIES and not self._patient:
-            self.fail("does not answer")
+            self.fail(self._silence)
             return None
         return self._ask(now_ns)
 
@@ -115,21 +122,30 @@ class Drive:
             self.fail(f"cannot be enabled: it is in {state or 'no state'}")
             self._controlword = QUICK_STOP
             return
-        self._controlword = towards_enabled(state, self._controlword, self._may_reset)
+        knows_16 = now_ns - self.since_ns < TRANSITION_16_NS
+        self._controlword = towards_enabled(state, self._controlword, self._may_reset, knows_16=knows_16)
         if self._controlword == FAULT_RESET:
             self.emergency = None
 
     def _ask(self, now_ns: int) -> bytes:
         self._asked_ns = now_ns
         self._tries += 1
-        return request(self.setup[self._step])
+        if self._tries == 1 or self._exchange is None:
+            self._exchange = Exchange(self.setup[self._step])
+        return self._exchange.begin()
+
+    @property
+    def _silence(self) -> str:
+        """What a request without a proper answer is called."""
+        strange = self._exchange.strange if self._exchange is not None else ""
+        return strange or "does not answer"
 
     @property
     def words(self) -> str:
         """What is wrong with it; empty where all is well."""
         said = [self.failure] if self.failure else []
         if self.phase in (Phase.CONFIGURING, Phase.ENABLING):
-            said.append("does not answer" if self._tries > 1 else "is being enabled")
+            said.append(self._silence if self._tries > 1 else "is being enabled")
         if self.emergency is not None:
             said.append(self.emergency.words)
         if self.encoder:

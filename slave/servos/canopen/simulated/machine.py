@@ -22,8 +22,11 @@ def statusword(state: Power) -> int:
     return STATUSWORDS[state] | _VOLTAGE
 
 
-def after(state: Power, controlword: int, last: int) -> Power:
-    """The state that follows; `last` is the controlword before, for the edge of the fault reset."""
+def after(state: Power, controlword: int, last: int, knows_16: bool = True) -> Power:
+    """The state that follows; `last` is the controlword before, for the edge of the fault reset.
+
+    `knows_16`: whether "enable operation" leads out of quick stop active, which CiA 402 leaves to the maker.
+    """
     if state in (Power.NOT_READY, Power.FAULT_REACTION):
         return state
     if state is Power.FAULT:
@@ -35,13 +38,13 @@ def after(state: Power, controlword: int, last: int) -> Power:
         # quick stop: with power it brakes and stays, without there is nothing to stop
         stops = state in (Power.ENABLED, Power.QUICK_STOP)
         return Power.QUICK_STOP if stops else Power.SWITCH_ON_DISABLED
-    return _step(state, controlword & 0x0F)
+    return _step(state, controlword & 0x0F, knows_16)
 
 
-def _step(state: Power, command: int) -> Power:
+def _step(state: Power, command: int, knows_16: bool) -> Power:
     """Neither voltage nor quick stop is taken away: 6, 7 and F lead up and down the ladder."""
     if state is Power.QUICK_STOP:
-        return Power.ENABLED if command == 0x0F else state
+        return Power.ENABLED if knows_16 and command == 0x0F else state
     if command == 0x06:
         return Power.READY
     if command == 0x07:

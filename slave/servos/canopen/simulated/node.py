@@ -20,6 +20,7 @@ from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION, Power
 from slave.servos.canopen.simulated.faults import CODES, DEMAND, Fault
 from slave.servos.canopen.simulated.machine import after, statusword
+from slave.servos.canopen.simulated.traits import Reformed, Traits
 
 EDS = Path(__file__).with_name("drive.eds")
 Send = Callable[[int, bytes], None]
@@ -76,6 +77,7 @@ class SimulatedDrive:
         self.target = 0
         self.state = Power.SWITCH_ON_DISABLED
         self.fault = Fault.NONE
+        self.traits = Traits()
         self.rebooted = False
         """Set where the drive has lost what it was told; whoever reads it clears it."""
         self._send_frame = send
@@ -86,6 +88,9 @@ class SimulatedDrive:
         self._stuck = 0
         self._beaten_ns = 0
         self._heard_ns: int | None = None
+        self._now_ns = 0
+        self._reformed = Reformed()
+        self._late: list[tuple[int, bytes]] = []
         self._boot()
 
     def _boot(self) -> None:
@@ -108,12 +113,19 @@ class SimulatedDrive:
 
     def on_frame(self, frame_id: int, data: bytes, now_ns: int) -> None:
         """NMT, SDO, the targets, and the master's heartbeat."""
+        self._now_ns = now_ns
         if frame_id == pdo.RPDO1 + self.id:
             self._pending = data
         elif frame_id == pdo.NMT:
             self._on_nmt(data)
         elif frame_id == self._master_beat and len(data) == 1:
             self._heard_ns = now_ns
+        elif frame_id == pdo.SDO_REQUEST + self.id and len(data) == 8:
+            segment = self._reformed.segment(data)
+            if segment is not None:
+                self._answer_sdo(segment)
+            else:
+                self._network.notify(frame_id, bytearray(data), 0.0)
         else:
             self._network.notify(frame_id, bytearray(data), 0.0)
 
@@ -152,7 +164,10 @@ class SimulatedDrive:
             self._send(pdo.TPDO1 + self.id, layout.pack(*(now[name] for name in names)))
 
     def beat(self, now_ns: int) -> None:
-        """Send a heartbeat that is due, and miss the master's that is overdue."""
+        """Send a heartbeat or an answer that is due, and miss the master's heartbeat that is overdue."""
+        self._now_ns = now_ns
+        while self._late and now_ns >= self._late[0][0]:
+            self._send_now(pdo.SDO_ANSWER + self.id, self._late.pop(0)[1])
         if self._beat_ns and now_ns - self._beaten_ns >= self._beat_ns:
             self._beaten_ns = now_ns
             self._send(pdo.HEARTBEAT + self.id, bytes([self._node.nmt._state]))
@@ -204,7 +219,7 @@ class SimulatedDrive:
 
     def _command(self, controlword: int) -> None:
         was = self.state
-        state = after(self.state, controlword, self._controlword)
+        state = after(self.state, controlword, self._controlword, self.traits.knows_16)
         if state is Power.ENABLED and self.value(0x6060) != CYCLIC_SYNCHRONOUS_POSITION:
             state = was
         self.state, self._controlword = state, controlword
@@ -224,6 +239,18 @@ class SimulatedDrive:
         self._send(pdo.EMERGENCY + self.id, struct.pack("<HB5x", code, register))
 
     def _send(self, frame_id: int, data: bytes) -> None:
+        if frame_id == pdo.SDO_ANSWER + self.id:
+            self._answer_sdo(self._reformed.answer(data, self.traits.read_form))
+        else:
+            self._send_now(frame_id, data)
+
+    def _answer_sdo(self, data: bytes) -> None:
+        if self.traits.answers_after_ns:
+            self._late.append((self._now_ns + self.traits.answers_after_ns, data))
+        else:
+            self._send_now(pdo.SDO_ANSWER + self.id, data)
+
+    def _send_now(self, frame_id: int, data: bytes) -> None:
         if self.fault is not Fault.SILENT:
             self._send_frame(frame_id, data)
 

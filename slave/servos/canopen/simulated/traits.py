@@ -1,0 +1,69 @@
+"""How makers' drives differ within the standards: what a simulated drive can be told to be like. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+_UNSIZED, _SEGMENTED, _LENGTH_TOLD = 0x42, 0x40, 0x01
+_UPLOAD_BITS, _UPLOADED, _EXPEDITED = 0xE0, 0x40, 0x02
+_ASK_SEGMENT, _TOGGLE, _ABORT, _TOGGLE_ERROR = 0x60, 0x10, 0x80, 0x0503_0000
+_SEGMENT_BYTES = 7
+
+
+class ReadForm(Enum):
+    """The form in which a drive answers an SDO read of up to four bytes (CiA 301)."""
+
+    SIZED = "expedited, size told: 4F, 4B, 47, 43"
+    UNSIZED = "expedited, size not told: 42"
+    SEGMENTED = "segmented, length told: 41"
+    SEGMENTED_UNSIZED = "segmented, length not told: 40"
+
+
+@dataclass(slots=True)
+class Traits:
+    """Of one drive."""
+
+    knows_16: bool = True
+    """Whether "enable operation" leads out of quick stop active: CiA 402 leaves transition 16 to the maker."""
+    read_form: ReadForm = ReadForm.SIZED
+    answers_after_ns: int = 0
+    """How long it takes to answer an SDO request."""
+
+
+class Reformed:
+    """Turns the answers of one SDO server into another form, and serves the segments itself."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+        self._toggle = 0
+        self._serving = False
+
+    def answer(self, data: bytes, form: ReadForm) -> bytes:
+        """An answer of the server, as a drive of this form gives it."""
+        command = data[0]
+        if form is ReadForm.SIZED or command & (_UPLOAD_BITS | _EXPEDITED) != _UPLOADED | _EXPEDITED:
+            return data
+        if form is ReadForm.UNSIZED:
+            return bytes([_UNSIZED]) + data[1:]
+        size = 4 - (command >> 2 & 3)
+        self._rest, self._toggle, self._serving = data[4 : 4 + size], 0, True
+        if form is ReadForm.SEGMENTED:
+            return bytes([_SEGMENTED | _LENGTH_TOLD]) + data[1:4] + size.to_bytes(4, "little")
+        return bytes([_SEGMENTED]) + data[1:4] + bytes(4)
+
+    def segment(self, request: bytes) -> bytes | None:
+        """The segment that a request asks for; None where the request is the server's to answer."""
+        if not self._serving:
+            return None
+        if request[0] & ~_TOGGLE != _ASK_SEGMENT:
+            self._serving = False
+            return None
+        if request[0] & _TOGGLE != self._toggle:
+            self._serving = False
+            return bytes([_ABORT, 0, 0, 0]) + _TOGGLE_ERROR.to_bytes(4, "little")
+        part, self._rest = self._rest[:_SEGMENT_BYTES], self._rest[_SEGMENT_BYTES:]
+        self._serving = bool(self._rest)
+        head = self._toggle | (_SEGMENT_BYTES - len(part)) << 1 | (not self._rest)
+        self._toggle ^= _TOGGLE
+        return bytes([head]) + part.ljust(_SEGMENT_BYTES, b"\0")
