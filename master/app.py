@@ -98,6 +98,8 @@ class Master:
 
     def _send(self, solved: Solved) -> None:
         solved_ns = monotonic_ns()
+        for line in self._pipeline.to_tell:
+            log.warning("%s", line)
         held = self._config.operator.deadman == "always_held"
         for robot in self._robots:
             if robot.name in self._given_up:
@@ -126,6 +128,7 @@ class Master:
             "frames_in_to_put_ms": self._frames_in_to_put.summary(),
             "nodes": self._pipeline.node_counts(),
             "doubts": as_figures(self._pipeline.doubts),
+            "beyond_reach": self._pipeline.beyond_reach.figures(),
             "buses": {bus.name: bus.summary() for bus in self._buses},
         }
 

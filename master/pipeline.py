@@ -5,6 +5,7 @@ poll ▸ calibrate ▸ low-pass ▸ fuse ▸ (every 16th tick) solve ▸ command
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 
@@ -18,6 +19,7 @@ from common.skeleton import Skeleton
 from master.config import MasterConfig
 from master.doubt import Doubts, NodeDoubt, Weight, refusal, together
 from master.fuse.estimator import Estimator
+from master.solve.beyond import BeyondReach
 from master.solve.solver import JointSolver
 from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll, Sweep
@@ -55,6 +57,10 @@ class MasterPipeline:
         )
         self.estimator = Estimator(config.estimation, nodes, config.capture.rate_hz, skeleton=self.skeleton)
         self.solver = JointSolver(self.skeleton)
+        self.beyond_reach = BeyondReach(self.skeleton.segment_names)
+        self.to_tell: list[str] = []
+        """What the operator is to be told of the last solve."""
+        self._solved_ns: int | None = None
         self._decimation = config.capture.decimation
         self._window_open = False
         self._last_sweep: Sweep | None = None
@@ -102,10 +108,18 @@ class MasterPipeline:
 
     def _solve(self, sweep: Sweep) -> Solved:
         posture = self.estimator.posture()
-        position, velocity = self.solver.solve(posture.q_world_from_segment, posture.rate_rad_s)
         self.doubts = together(*(part() for part in self._parts))
+        known_nodes = posture.valid & self._believed()
+        q = posture.q_world_from_segment
+        if not known_nodes.all():
+            # of a node that is not heard, or not believed, the solver must not remember anything either
+            q = np.where(known_nodes[:, None], q, np.nan)
+        before_ns, self._solved_ns = self._solved_ns, sweep.sampled_ns
+        elapsed_s = math.inf if before_ns is None else to_s(sweep.sampled_ns - before_ns)
+        position, velocity = self.solver.solve(q, posture.rate_rad_s, elapsed_s)
+        self.to_tell = self.beyond_reach.note(sweep.sampled_ns, self.solver.short_rad)
         # a joint is known only if the nodes on both its segments are
-        missing = self.skeleton.joint_needs_node @ ~(posture.valid & self._believed())
+        missing = self.skeleton.joint_needs_node @ ~known_nodes
         known = np.isfinite(position) & np.isfinite(velocity) & ~missing
         return Solved(
             tick=sweep.tick,

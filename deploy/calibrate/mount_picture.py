@@ -13,7 +13,7 @@ from deploy.output import writing
 from master.calibrate.mounting import Mounting, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import NodeRecording
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 
 _PICTURE_HZ = 20.0
 
@@ -28,7 +28,7 @@ def solved_angles(
     rows = [skeleton.segment_names.index(name) for name in found.nodes]
     everyone = np.tile(IDENTITY, (len(q), len(skeleton.segments), 1))
     everyone[:, rows] = q
-    solver, still = JointSolver(skeleton), np.zeros((len(skeleton.segments), 3))
+    solver, still = JointAngles(skeleton), np.zeros((len(skeleton.segments), 3))
     angles = np.array([solver.solve(now, still)[0] for now in everyone])
     missing = np.ones(len(skeleton.segments), dtype=np.bool_)
     missing[rows] = False

@@ -16,7 +16,8 @@ MAY_IMPORT = {
 PURE = [
     "common/codec.py", "common/fields.py", "common/messages.py", "common/pacing.py", "common/mailbox.py",
     "common/latency.py", "common/offset/estimator.py", "common/offset/exchange.py", "common/quaternion.py",
-    "common/kinematics.py", "common/topics.py", "common/throttle.py", "common/endpoint.py",
+    "common/kinematics.py", "common/reach/nearest.py", "common/reach/chart.py", "common/reach/reach.py",
+    "common/topics.py", "common/throttle.py", "common/endpoint.py",
 ]  # fmt: skip
 RIM = {"asyncio", "zenoh", "can", "time", "socket", "uvloop", "mujoco", "serial"}
 

@@ -16,7 +16,7 @@ from deploy.accuracy.papers.units import SESSION, calibrate
 from master.calibrate.affine import Calibration, identity
 from master.fuse.estimator import EstimationConfig, Estimator
 from master.solve.angles import intrinsic_angles
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 from master.suit.simulated.imperfections import Imperfections
 from master.suit.simulated.minimum_jerk import MinimumJerkMotion, Move
 from master.suit.simulated.tray import TrayConfig
@@ -121,7 +121,7 @@ def moved(units: Imperfections, seed: int, seconds: float = 60.0) -> Take:
 
 def still_figures(rows: Sequence[slice], q: Array, rate: Array) -> list[Figure]:
     """Mean error and spread of the hinge's angle at each hold, as the master solves it."""
-    solver = JointSolver(hinged_pair())
+    solver = JointAngles(hinged_pair())
     errors, spreads = [], []
     for hold, angle_deg in zip(rows, ANGLES_DEG, strict=True):
         solved = [solver.solve(q[k], rate[k])[0][3] for k in range(*hold.indices(len(q)))]

@@ -23,7 +23,7 @@ from master.calibrate.mounting_files import calibrated, write_mounting
 from master.calibrate.oriented import orient
 from master.calibrate.recording import NodeRecording, load_recordings
 from master.fuse.hinge_angle import HingeAngleConfig, hinge_angles
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 from master.suit.simulated.imperfections import Imperfections
 from master.suit.simulated.sensors import IdealSensors, earth_field_ut
 
@@ -114,7 +114,7 @@ def solved_deg(nodes: dict[str, NodeRecording], skeleton: Skeleton, found: Mount
     q = posture(orient(nodes, list(found.nodes)), found)[::step]
     everyone = np.tile(IDENTITY, (len(q), len(skeleton.segments), 1))
     everyone[:, [skeleton.segment_names.index(name) for name in found.nodes]] = q
-    solver, still = JointSolver(skeleton), np.zeros((len(skeleton.segments), 3))
+    solver, still = JointAngles(skeleton), np.zeros((len(skeleton.segments), 3))
     return np.degrees([solver.solve(now, still)[0] for now in everyone])
 
 

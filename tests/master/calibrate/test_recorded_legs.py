@@ -16,7 +16,7 @@ from master.calibrate.mounting import find_mounting, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import load_recordings
 from master.fuse.hinge_angle import HingeAngle, HingeAngleConfig, hinge_of
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 
 pytestmark = pytest.mark.recordings
 
@@ -61,7 +61,7 @@ def person() -> Person:
         for r in zip(*((r.gyr_rad_s, r.acc_m_s2) for r in recordings.values()), strict=True)
     )
     rates = rotate(conjugate(q_sensor_from_segment), gyr)
-    solver = JointSolver(LEGS)
+    solver = JointAngles(LEGS)
     solved = np.degrees([solver.solve(*tick) for tick in zip(posture(suit, mounting), rates, strict=True)])
     hinge = hinge_of(LEGS, ["left_shank", "right_shank"], q_sensor_from_segment)
     online = HingeAngle(HingeAngleConfig(), hinge, suit.rate_hz)

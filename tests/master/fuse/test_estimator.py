@@ -21,7 +21,7 @@ from common.quaternion import (
 from common.skeleton import load_skeleton
 from master.calibrate.affine import Calibration, identity
 from master.fuse.estimator import EstimationConfig, Estimator
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 
 RATE_HZ = 200.0
 GRAVITY, FIELD_UT = np.array([0.0, 0.0, 9.81]), np.array([0.0, 28.0, -39.0])
@@ -114,7 +114,7 @@ def test_a_person_s_motion_through_perfect_sensors_gives_the_joints_back() -> No
     acc = (places[0] - 2.0 * places[1] + places[2]) / h**2 + GRAVITY
     rate = to_rotation_vector(multiply(conjugate(q_before), q_after)) / (2.0 * h)
     velocity = (pose(t_s + h) - pose(t_s - h)) / (2.0 * h)
-    fuse, solver = estimator(len(node_m)), JointSolver(skeleton)
+    fuse, solver = estimator(len(node_m)), JointAngles(skeleton)
     errors, velocity_errors = [], []
     for tick in range(len(t_s)):
         fuse.update(seen_by(q[tick], rate[tick], acc[tick]))

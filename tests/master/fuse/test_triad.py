@@ -10,7 +10,7 @@ from common.kinematics import orientations
 from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, multiply, rotate
 from common.skeleton import load_skeleton
 from master.fuse.triad import q_from_gravity_and_field
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 from master.suit.simulated.sensors import IdealSensors, earth_field_ut
 
 LEGS = load_skeleton("lower_limb")
@@ -50,7 +50,7 @@ def test_two_nodes_give_the_hip_s_three_angles(seed: int) -> None:
     readings = IdealSensors(LEGS, FIELD_UT, askew).read(position, still, still)
     q: Array = multiply(q_from_gravity_and_field(readings[:, 0:3], readings[:, 6:9]), conjugate(askew))
     np.testing.assert_allclose(angle_between(q, orientations(LEGS, position)), 0.0, atol=1e-6)
-    solved, _ = JointSolver(LEGS).solve(q, np.zeros((7, 3)))
+    solved, _ = JointAngles(LEGS).solve(q, np.zeros((7, 3)))
     np.testing.assert_allclose(solved, position, atol=1e-6)
     thigh = LEGS.segment_names.index("right_thigh")
     pelvis_from_thigh = np.roll(multiply(conjugate(q[0]), q[thigh]), -1)

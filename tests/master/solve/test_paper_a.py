@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from common.kinematics import orientations
 from common.quaternion import Array, conjugate, multiply
 from common.skeleton import load_skeleton
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 
 SKELETON = load_skeleton("nursing")
-SOLVER = JointSolver(SKELETON)
+SOLVER = JointAngles(SKELETON)
 
 PAPER_FROM_OURS = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 M_X, M_Y, M_Z = np.eye(4)[1:]

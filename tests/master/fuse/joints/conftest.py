@@ -16,7 +16,7 @@ from common.skeleton import Skeleton, load_skeleton
 from master.calibrate.affine import identity
 from master.fuse.estimator import EstimationConfig, Estimator
 from master.fuse.filter import FilterName
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 from master.suit.simulated.disturbance import Disturbance, DisturbanceConfig
 from master.suit.simulated.imperfections import Imperfections
 from master.suit.simulated.motion import Motion
@@ -93,7 +93,7 @@ def wear(
     cutoffs = {f"{s}_cutoff_hz": 0.25 * rate_hz for s in ("accelerometer", "gyroscope", "magnetometer")}
     config = EstimationConfig.model_validate(cutoffs | estimation)
     fuse = Estimator(config, [Node()] * count, rate_hz, calibration, skeleton)
-    solver = JointSolver(skeleton)
+    solver = JointAngles(skeleton)
     fresh, lost = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     t_s, errors = [], []
     for tick in range(round(seconds * rate_hz)):

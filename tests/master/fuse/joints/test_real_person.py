@@ -17,7 +17,7 @@ from master.calibrate.affine import Calibration, identity
 from master.calibrate.mounting import find_mounting
 from master.calibrate.recording import load_recordings
 from master.fuse.estimator import EstimationConfig, Estimator
-from master.solve.solver import JointSolver
+from master.solve.decomposition import JointAngles
 
 pytestmark = pytest.mark.recordings
 
@@ -65,7 +65,7 @@ def person(request: pytest.FixtureRequest, recordings_folder: Path) -> Person:
     calibration = Calibration(identity(len(segments)).affine, mounting, known)
     rate_hz = next(iter(nodes.values())).rate_hz
     estimator = Estimator(CONFIG, [Node()] * len(segments), rate_hz, calibration, skeleton)
-    solver = JointSolver(skeleton)
+    solver = JointAngles(skeleton)
     all_, none = np.ones(len(segments), dtype=np.bool_), np.zeros(len(segments), dtype=np.bool_)
     no_field = np.full((len(segments), 3), np.nan)
     solved = []

@@ -1,0 +1,315 @@
+"""The postures that a robot takes for those that an operator takes: nearest, continuous, of bounded speed.
+
+What is nearest. Each segment's rotation relative to its neighbour is followed by itself: of all the rotations
+that the joints between the two can make within their limits, the one at the least angle to the operator's is
+taken, all those joints together. An angle that the robot lacks is one whose limits are both 0. What a segment
+cannot reach is not handed on to the segments beyond it: they keep their posture relative to it, as the
+operator's do. So a joint depends on the two nodes beside it and on nothing else, an arm that cannot be raised
+further does not bend its elbow instead, and a lean that the trunk lacks does not turn the head. A joint that
+drives angles of several segments follows them by least squares, and is limited likewise.
+
+What is continuous. The nearest posture can lie far from the last one although the operator hardly moved:
+beside the pole of a ball joint (its middle angle at ±90°), and where two postures at limits are equally
+near. So
+
+- of the two decompositions the one nearer to the last posture is kept, its angles unwrapped. Clamped, it
+  is preferred to a nearest posture that needs joints to turn far and gains little (`_KEPT_RAD`);
+- no joint turns farther from one posture to the next than a share of what the operator's segment turned
+  (`farthest_turn`), nor does the robot's segment. What is left is made up for as the operator goes on, or
+  slowly while he stands still.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from common.messages import Mask
+from common.quaternion import Array
+from common.reach.chart import Group, make_chart
+from common.reach.nearest import (
+    Nearest,
+    Range,
+    Tensor,
+    Triple,
+    decompositions,
+    left_rad,
+    nearest_angles,
+    scalar_product,
+    tensor,
+)
+from common.skeleton import Skeleton
+
+NOMINAL_S = 0.08
+"""From one posture to the next, where nobody says."""
+FORGOTTEN_S = 0.5
+"""Postures farther apart than this have nothing to do with each other."""
+MOST_GAIN = 3.0
+"""No joint turns faster than this times the operator's segment."""
+_GAIN, _CREEP_RAD_S = 1.5, math.radians(20.0)
+_MOST_CREEP_RAD = math.radians(1.8)
+_KEPT_RAD = math.radians(15.0)
+"""The kept decomposition, clamped, may be farther from the operator by this than the nearest posture,"""
+_KEPT_SHARE = 4.0
+"""and by this times the angle that the nearest one leaves: what can be reached, is."""
+_NEAR_RAD, _FAR_RAD = math.radians(15.0), math.radians(30.0)
+"""A nearest posture whose joints are within the first of the kept one's is taken, beyond the second never."""
+_FLOOR = 1e-12
+_ROUNDING_RAD = 1e-9
+"""At rest many joints stand at their limits: rounding puts none of them beyond."""
+_SAME_RAD = math.radians(0.1)
+_TURN = 2.0 * math.pi
+
+
+def farthest_turn(turned_rad: Array, elapsed_s: float) -> Array:
+    """How far (...) a joint may turn while the operator's segment turns by `turned_rad` (...).
+
+    min(max(3 t, creep), 1.5 t + creep): three times as far, and never more than half as far again and 1.8°.
+    """
+    creep = min(_CREEP_RAD_S * elapsed_s, _MOST_CREEP_RAD)
+    out: Array = np.minimum(np.maximum(MOST_GAIN * turned_rad, creep), _GAIN * turned_rad + creep)
+    return out
+
+
+class Reach:
+    """A robot's limits, and the posture it was last given."""
+
+    def __init__(self, skeleton: Skeleton, lower_rad: Array, upper_rad: Array) -> None:
+        """For joint limits (J,), rad."""
+        count, joints = len(skeleton.segments), len(skeleton.joints)
+        self._lower, self._upper = lower_rad.copy(), upper_rad.copy()
+        self._chart = chart = make_chart(skeleton, self._lower, self._upper)
+        self._centre = chart.centre_rad.take(chart.driven)
+        # where a joint turns by more than a whole turn the last position tells which one is meant
+        self._wide = np.flatnonzero(self._upper - self._lower > 2.0 * math.pi)
+        self._limits = list(zip(self._lower.tolist(), self._upper.tolist(), strict=True))
+        self._axes = [_signed_order(skeleton.axis_frames[group.segment]) for group in chart.groups]
+        self._group_of_joint = np.full(joints, -1)
+        for g, group in enumerate(chart.groups):
+            self._group_of_joint[group.turning] = g
+        self._group_segments = np.array([group.segment for group in chart.groups], dtype=np.intp)
+        self._sums = (self._group_of_joint == np.arange(len(chart.groups))[:, None]).astype(np.float64)
+        self._sums *= np.abs(_scales(chart.groups, joints))
+        self._pair = np.empty((count, 4, 2))
+        self._free_angles = np.empty((2, 3, count))
+        self._last_q = np.full((count, 4), np.nan)
+        self._last = np.full(joints, np.nan)
+        self.short_rad: Array = np.zeros(count)
+        """(N,) what the robot cannot follow of each segment: the angle from the robot's posture to theirs."""
+
+    def forget(self) -> None:
+        """The next posture has nothing to do with those before: it becomes the nearest there is."""
+        self._last[:] = np.nan
+
+    def follow(self, q: Array, q_rate: Array, elapsed_s: float = NOMINAL_S) -> tuple[Array, Array]:
+        """Joint positions (J,) rad, all within limits, and velocities (J,) rad/s.
+
+        Takes the segments' rotations relative to their neighbours, parent from segment (N, 4), their
+        derivatives (N, 4) 1/s, and the time since the posture before. NaN stays within the joints that need
+        its segment, and these begin anew after it.
+        """
+        if not 0.0 < elapsed_s <= FORGOTTEN_S:
+            self.forget()
+            elapsed_s = NOMINAL_S
+        free, velocity = self._free(q, q_rate)
+        position = np.minimum(np.maximum(free, self._lower), self._upper)
+        most = farthest_turn(_turned(self._last_q, q), elapsed_s)
+        most_of_joint = most.take(self._chart.segment_of_joint).max(axis=1)
+        beyond = np.abs(position - free) > _ROUNDING_RAD
+        step = np.abs(position - self._last)
+        late = step > most_of_joint
+        # a group's joints together turn its segment by no more than the sum of their steps; a step that is
+        # not known counts as far, and must not spread
+        far = self._sums @ np.fmin(step, _TURN) > most.take(self._group_segments)
+        self.short_rad = np.zeros(len(q))
+        if beyond.any() or late.any() or far.any():
+            velocity[beyond] = 0.0
+            self.short_rad[self._chart.segment_of_joint[:, 0]] = np.abs(free - position)
+            step_of = _Step(elapsed_s, most, most_of_joint, self._last, free, position, velocity)
+            position, velocity = self._together(q, step_of, beyond, late, far)
+        # |q'| is half the speed of the rotation
+        fastest = (2.0 * MOST_GAIN) * np.sqrt(np.einsum("ij,ij->i", q_rate, q_rate))
+        fastest_joint = fastest.take(self._chart.segment_of_joint).max(axis=1)
+        velocity = np.minimum(np.maximum(velocity, -fastest_joint), fastest_joint)
+        self._last, self._last_q = position, q.copy()
+        return position.copy(), velocity
+
+    def _free(self, q: Array, q_rate: Array) -> tuple[Array, Array]:
+        """Positions and velocities (J,) of the nearest rotations without limits (chart.py)."""
+        chart, pair = self._chart, self._pair
+        pair[:, :, 0], pair[:, :, 1] = q, q_rate
+        terms = chart.forms @ pair
+        over, under = terms[:, 0::2, 0], terms[:, 1::2, 0]
+        over_rate, under_rate = terms[:, 0::2, 1], terms[:, 1::2, 1]
+        square = np.maximum(over * over + under * under, _FLOOR)
+        half = np.arctan2(over, under)
+        half_rate = (under * over_rate - over * under_rate) / square
+        length = np.sqrt(square)
+        angles, rates = self._free_angles
+        np.add(half[:, 0], half[:, 1], out=angles[0])
+        np.subtract(half[:, 0], half[:, 1], out=angles[1])
+        np.arctan2(length[:, 0], length[:, 1], out=angles[2])
+        angles[2] += angles[2]
+        angles[2] -= 0.5 * math.pi
+        np.add(half_rate[:, 0], half_rate[:, 1], out=rates[0])
+        np.subtract(half_rate[:, 0], half_rate[:, 1], out=rates[1])
+        # of three angles the squared lengths are 1 ± sin b, and the product of the lengths is cos b
+        growth = over[:, 0] * over_rate[:, 0] + under[:, 0] * under_rate[:, 0]
+        np.divide(2.0 * growth, length[:, 0] * length[:, 1], out=rates[2])
+        driven = self._free_angles.reshape(2, -1).take(chart.driven, axis=1)
+        driven[0] -= _TURN * np.rint((driven[0] - self._reference()) / _TURN)
+        free: Array = np.einsum("tjk,jk->tj", driven, chart.weights)
+        return free[0], free[1]
+
+    def _reference(self) -> Array:
+        """Of angles that a whole turn lies between, the one nearest to this is meant, (J, K)."""
+        if not self._wide.size:
+            return self._centre
+        reference = self._centre.copy()
+        known = self._wide[np.isfinite(self._last[self._wide])]
+        reference[known, 0] = self._last[known] / self._chart.weights[known, 0]
+        return reference
+
+    def _together(self, q: Array, at: _Step, beyond: Mask, late: Mask, far: Mask) -> tuple[Array, Array]:
+        """Positions and velocities (J,) where groups are beyond limits, or joints cannot keep up."""
+        project = set(self._group_of_joint[beyond].tolist()) - {-1}
+        behind = set(self._group_of_joint[late].tolist()) - {-1}
+        # where the pole is within its limits a group may be on the wrong one of two decompositions
+        project.update(g for g in behind if self._chart.groups[g].crosses)
+        for g in project:
+            self._project(g, q[self._chart.groups[g].segment].tolist(), at)
+        at.limit()
+        for g in project.union(behind, np.flatnonzero(far).tolist()):
+            at.limit_turn(self._chart.groups[g])
+        return np.array(at.position), np.array(at.velocity)
+
+    def _project(self, g: int, q: list[float], at: _Step) -> None:
+        """Put one group's nearest posture into `at`, and the velocities that go with it."""
+        group = self._chart.groups[g]
+        w, *vector = q
+        if not math.isfinite(sum(q)):
+            return
+        i, j, k = self._axes[g][0]
+        a, b, c = self._axes[g][1]
+        wanted = tensor(w, a * vector[i], b * vector[j], c * vector[k])
+        last = group.angles(at.last)
+        known = math.isfinite(last[0] + last[1] + last[2])
+        nearest = nearest_angles(wanted, group.ranges, last if known else group.middle)
+        if known and group.ball:
+            nearest = _kept(wanted, group, nearest, last)
+        self.short_rad[group.segment] = nearest.left_rad
+        for k, joint in enumerate(group.joints):
+            if joint is not None:
+                lower, upper = self._limits[joint]
+                at.position[joint] = now = min(max(nearest.angles[k] / group.scale[k], lower), upper)
+                if abs(now - at.free[joint]) < _SAME_RAD:
+                    continue  # the velocity of the decomposition is its own
+                resting = now in (lower, upper) or not known
+                at.velocity[joint] = 0.0 if resting else (now - at.last[joint]) / at.elapsed_s
+
+
+class _Step:
+    """One step from the last posture to the next, as plain numbers: a dozen of them are quicker so."""
+
+    def __init__(
+        self,
+        elapsed_s: float,
+        most: Array,
+        most_of_joint: Array,
+        last: Array,
+        free: Array,
+        position: Array,
+        velocity: Array,
+    ) -> None:
+        self.elapsed_s = elapsed_s
+        self.last: list[float] = last.tolist()
+        self.free: list[float] = free.tolist()
+        self.position: list[float] = position.tolist()
+        self.velocity: list[float] = velocity.tolist()
+        self._most: list[float] = most.tolist()
+        self._most_of_joint: list[float] = most_of_joint.tolist()
+
+    def limit(self) -> None:
+        """No joint goes farther at once than it may."""
+        for j, (now, last, most) in enumerate(
+            zip(self.position, self.last, self._most_of_joint, strict=True)
+        ):
+            if abs(now - last) > most:
+                self._put(j, last + math.copysign(most, now - last))
+
+    def limit_turn(self, group: Group) -> None:
+        """Nor does the segment that a group of joints turns."""
+        last, most = group.angles(self.last), self._most[group.segment]
+        for _ in range(3):
+            turn = left_rad(_product(last, group.angles(self.position)))
+            if not turn > most:
+                return
+            for j in group.turning:
+                self._put(j, self.last[j] + 0.98 * most / turn * (self.position[j] - self.last[j]))
+
+    def _put(self, joint: int, position_rad: float) -> None:
+        self.position[joint] = position_rad
+        self.velocity[joint] = (position_rad - self.last[joint]) / self.elapsed_s
+
+
+def _scales(groups: Sequence[Group], joints: int) -> Array:
+    """(J,): each joint's angle for 1 rad; 1 where it is of no group."""
+    out = np.ones(joints)
+    for group in groups:
+        for j, scale in zip(group.joints, group.scale, strict=True):
+            if j is not None:
+                out[j] = scale
+    return out
+
+
+def _kept(wanted: Tensor, group: Group, nearest: Nearest, last: Triple) -> Nearest:
+    """The nearest posture, or for it the kept decomposition where much turning would gain little."""
+    if nearest.left_rad < _SAME_RAD:
+        return nearest
+    near, off = last, math.inf
+    x, y, z = last
+    one, two, three = group.ranges
+    for a, b, c in decompositions(wanted):
+        # unwrapped: of whole turns the one nearest to the last posture
+        a -= _TURN * round((a - x) / _TURN)
+        b -= _TURN * round((b - y) / _TURN)
+        c -= _TURN * round((c - z) / _TURN)
+        way = max(abs(a - x), abs(b - y), abs(c - z))
+        if way < off:
+            near, off = (_clamped(a, one), _clamped(b, two), _clamped(c, three)), way
+    left = left_rad(scalar_product(wanted, near))
+    if left > nearest.left_rad + min(_KEPT_SHARE * nearest.left_rad, _KEPT_RAD):
+        return nearest
+    apart = max(abs(a - b) for a, b in zip(near, nearest.angles, strict=True))
+    share = min(max((_FAR_RAD - apart) / (_FAR_RAD - _NEAR_RAD), 0.0), 1.0)
+    blended = [a + share * (b - a) for a, b in zip(near, nearest.angles, strict=True)]
+    angles = (blended[0], blended[1], blended[2])
+    return Nearest(angles, abs(scalar_product(wanted, angles)))
+
+
+def _clamped(angle: float, allowed: Range) -> float:
+    return min(max(angle, allowed.lower.rad), allowed.upper.rad)
+
+
+def _product(p: Triple, q: Triple) -> float:
+    """Scalar product of the quaternions that two triples of angles make."""
+    (a, b, c), (d, e, f) = ([0.5 * angle for angle in triple] for triple in (p, q))
+    # each is the other turned back: ⟨qx(a) qy(b) qz(c), qx(d) qy(e) qz(f)⟩ depends on a - d and c - f alone
+    x, z = a - d, c - f
+    return math.cos(x) * math.cos(b - e) * math.cos(z) - math.sin(x) * math.sin(b + e) * math.sin(z)
+
+
+def _signed_order(frame: Array) -> tuple[list[int], list[float]]:
+    """Which component of a vector, with which sign, is each of its components in the axis frame (3, 3)."""
+    order = np.argmax(np.abs(frame), axis=0)
+    return order.tolist(), frame[order, np.arange(3)].tolist()
+
+
+def _turned(before: Array, after: Array) -> Array:
+    """By how much each rotation (N, 4) turned, rad; a little less where it is much. NaN where not known."""
+    product = np.abs(np.einsum("ij,ij->i", before, after))
+    # twice the chord between the two quaternions, which is 2 sin(t / 4)
+    out: Array = 2.0 * np.sqrt(np.maximum(2.0 - 2.0 * product, 0.0))
+    return out
