@@ -111,11 +111,12 @@ def _pack_state(m: RobotState) -> tuple[Any, ...]:
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, m.reason[:MAX_TEXT], m.operator,
         fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad), echo,
         m.master_offset_ns, m.offset_bound_ns, _short_faults(m.faults), _pack_base(m.base), m.lease_id,
+        m.instance,
     )  # fmt: skip
 
 
 def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
-    fields.length(f, 15)
+    fields.length(f, 16)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -135,6 +136,7 @@ def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
         faults=fields.texts(f[12], MAX_NAME, MAX_TEXT),
         base=_unpack_base(f[13]),
         lease_id=fields.count(f[14]),
+        instance=fields.count(f[15]),
     )
 
 
@@ -189,13 +191,15 @@ def _unpack_control_request(f: tuple[Any, ...], _: int) -> ControlRequest:
 
 
 def _pack_control_reply(m: ControlReply) -> tuple[Any, ...]:
-    return (m.done, m.guard, m.text[:MAX_TEXT], m.lease, m.challenge)
+    return (m.done, m.guard, m.text[:MAX_TEXT], m.lease, m.challenge, m.instance, m.place[:MAX_TEXT])
 
 
 def _unpack_control_reply(f: tuple[Any, ...], _: int) -> ControlReply:
-    fields.length(f, 5)
+    fields.length(f, 7)
     guard, text = fields.text(f[1], MAX_NAME), fields.text(f[2], MAX_TEXT)
-    return ControlReply(fields.flag(f[0]), guard, text, fields.count(f[3]), fields.count(f[4]))
+    lease, challenge, instance = fields.counts(f[3:6])
+    place = fields.text(f[6], MAX_TEXT)
+    return ControlReply(fields.flag(f[0]), guard, text, lease, challenge, instance=instance, place=place)
 
 
 def _pack_clock_query(m: ClockQuery) -> tuple[Any, ...]:
@@ -208,11 +212,11 @@ def _unpack_clock_query(f: tuple[Any, ...], _: int) -> ClockQuery:
 
 
 def _pack_clock_reply(m: ClockReply) -> tuple[Any, ...]:
-    return (m.asked_ns, m.received_ns, m.replied_ns)
+    return (m.asked_ns, m.received_ns, m.replied_ns, m.instance)
 
 
 def _unpack_clock_reply(f: tuple[Any, ...], _: int) -> ClockReply:
-    fields.length(f, 3)
+    fields.length(f, 4)
     return ClockReply(*fields.counts(f))
 
 

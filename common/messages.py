@@ -113,6 +113,8 @@ class RobotState:
     """None where the base carries no sensor, or it has never answered."""
     lease_id: int = 0
     """Which lease it is (`common.lease.lease_id`): two masters may bear one name. 0 where there is none."""
+    instance: int = 0
+    """Which process says so (`common.instance`): two robots may bear one name by mistake."""
 
 
 class Action(StrEnum):
@@ -154,6 +156,10 @@ class ControlReply:
     """The token granted, for `claim`."""
     challenge: int = 0
     """For `status`: what an `engage` or `reset` must quote soon, once."""
+    instance: int = 0
+    """Which process answers (`common.instance`): two robots may bear one name by mistake."""
+    place: str = ""
+    """Where that process is, in words: host and endpoints."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +186,8 @@ class ClockReply:
     """t2, slave's clock."""
     replied_ns: int
     """t3, slave's clock."""
+    instance: int = 0
+    """Whose clock it is."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,21 +6,22 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-from common.codec import VERSION
+from common.codec import VERSION as SCHEMA
 
 
 @cache
 def software() -> dict[str, object]:
     """Versions of tandem, of its messages' schema, of Zenoh and of Python; part of every side's figures."""
     return {
-        "tandem": _installed("tandem"),
-        "schema": VERSION,
-        "zenoh": _installed("eclipse-zenoh"),
+        "tandem": installed("tandem"),
+        "schema": SCHEMA,
+        "zenoh": installed("eclipse-zenoh"),
         "python": platform.python_version(),
     }
 
 
-def _installed(package: str) -> str:
+def installed(package: str) -> str:
+    """A package's version, `unknown` where it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:  # run from a checkout that is not installed

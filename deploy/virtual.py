@@ -14,7 +14,7 @@ from functools import partial
 from common.clock import NS_PER_MS, NS_PER_S
 from common.codec import decode, encode
 from common.config import Model, load_config
-from common.control import CHALLENGED
+from common.control import CHALLENGED, read_reply, request_bytes
 from common.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState
 from common.offset import MasterExchange
 from deploy.judge import Trace
@@ -81,7 +81,7 @@ class VirtualRun:
         self._writer = CommandWriter(self.robot)
         self._lease = LeaseKeeper(self.robot, self.master_config.operator.name)
         self.clock = MasterExchange()
-        self.slave = SlavePipeline(self.slave_config, draw_token=itertools.count(1).__next__)
+        self.slave = SlavePipeline(self.slave_config, draw_token=itertools.count(1).__next__, instance=1)
         self.now_ns = world.start_ns
         self._robot = SimulatedRobot(
             self.slave_config.skeleton, self.slave_config.encoders, origin_ns=self.slave_ns
@@ -123,7 +123,7 @@ class VirtualRun:
         request = ControlRequest(self.robot, action, operator, key)
         if action in CHALLENGED:
             request = replace(request, challenge=self.ask(Action.STATUS, operator=operator).challenge)
-        return decode(self.slave.on_control(encode(request), self.slave_ns), ControlReply)
+        return read_reply(self.slave.on_control(request_bytes(request), self.slave_ns), action)
 
     def _step(self) -> None:
         begin_ns = self.now_ns

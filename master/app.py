@@ -12,6 +12,7 @@ from common.latency import Durations, StageTimes
 from common.launch import WriteFigures
 from common.link import Session, open_session
 from common.link.audit import Audit
+from common.link.place import own_endpoints
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.realtime import enter_real_time
@@ -41,8 +42,9 @@ class Master:
         self._ticks_missed = 0
         self._buses = [CanBus(bus, self._on_frame, self._on_bus) for bus in config.capture.buses]
         joints = len(self._pipeline.skeleton.joints)
+        endpoints = own_endpoints(config.link)
         self._robots = [
-            CommandedRobot(name, config.operator.name, joints, session.link(name))
+            CommandedRobot(name, config.operator.name, joints, link=session.link(name), endpoints=endpoints)
             for name in config.commanded
         ]
         self._given_up: set[str] = set()

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from common.clock import monotonic_ns, to_ns
 from common.codec import decode, encode
 from common.errors import CodecError, LinkError
+from common.instance import draw_instance
 from common.link import Link
 from common.messages import ClockReply, ControlReply, RobotState, Statistics
 from common.offset import MasterExchange
@@ -27,8 +28,13 @@ log = logging.getLogger("tandem.master")
 class CommandedRobot:
     """Sends one robot the operator's postures, keeps its lease and measures its clock."""
 
-    def __init__(self, name: str, operator: str, joints: int, link: Link) -> None:
+    def __init__(
+        self, name: str, operator: str, joints: int, *, link: Link, endpoints: Sequence[str] = ()
+    ) -> None:
+        """`endpoints`: where this master is, for people who find two of it."""
         self.name = name
+        self._instance = draw_instance()
+        self._endpoints = endpoints
         self._joints = joints
         self._link = link
         asker = 1 + secrets.randbelow((1 << 63) - 1)
@@ -45,7 +51,7 @@ class CommandedRobot:
 
     async def run(self) -> None:
         """Keep the lease and the clock until cancelled."""
-        self._link.declare_alive("master")
+        self._link.declare_alive("master", self._instance, self._endpoints)
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._keep_lease())
             tasks.create_task(self._keep_clock())

@@ -13,9 +13,11 @@ from common.heap import freeze_heap, reserve_heap
 from common.launch import WriteFigures
 from common.link import Link, open_session
 from common.link.audit import Audit
+from common.link.place import own_endpoints
 from common.messages import Statistics
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
+from common.presence import place
 from common.realtime import enter_real_time
 from common.runtime import until_stopped
 from common.ticker import ticks
@@ -50,7 +52,8 @@ class Slave:
         self._servos = servos
         self._base = base
         self._notifier = notifier or Notifier()
-        self._pipeline = SlavePipeline(config)
+        endpoints = own_endpoints(config.link)
+        self._pipeline = SlavePipeline(config, place=place(endpoints))
         self._stopped = False
         self._ticks_expected = 0
         self._ticks_missed = 0
@@ -67,7 +70,8 @@ class Slave:
 
     async def run(self) -> None:
         """Guard, drive and tell until cancelled."""
-        self._link.declare_alive("slave")
+        endpoints = own_endpoints(self._config.link)
+        self._link.declare_alive("slave", self._pipeline.instance, endpoints)
         with self._camera or nullcontext():
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._drive())
@@ -137,6 +141,7 @@ class Slave:
         offset = pipeline.clock.estimator.estimate(monotonic_ns())
         return {
             "software": software(),
+            "instance": self._pipeline.instance,
             "ticks": {"expected": self._ticks_expected, "missed": self._ticks_missed},
             "guard": {
                 "state": str(pipeline.guard.state),

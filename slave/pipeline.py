@@ -6,12 +6,14 @@ decode ▸ guard (gates) ▸ track ▸ limit ▸ servos ▸ encoders ▸ state
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from common.codec import decode, encode
 from common.control import OPEN
 from common.errors import CodecError
+from common.instance import draw_instance
 from common.latency import Told
 from common.lease import lease_id
 from common.messages import (
@@ -25,6 +27,7 @@ from common.messages import (
 )
 from common.offset import Offset, SlaveExchange
 from common.quaternion import Array
+from common.stop import StopAnswer, pack_stop_answer, read_stop
 from slave.arrivals import Arrivals
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
@@ -40,8 +43,13 @@ from slave.track.config import make_tracker
 class SlavePipeline:
     """Guard, tracker and counters between ticks. `draw_token` makes the tokens of its leases."""
 
-    def __init__(self, config: SlaveConfig, draw_token: DrawToken = random_token) -> None:
+    def __init__(
+        self, config: SlaveConfig, draw_token: DrawToken = random_token, instance: int = 0, place: str = ""
+    ) -> None:
+        """`instance`: this process's number, drawn where it is 0; `place`: where it is, for people."""
         self.robot = config.robot
+        self.instance = instance or draw_instance()
+        self.place = place
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
         self.guard = Guard(
@@ -92,27 +100,42 @@ class SlavePipeline:
         """Answer whoever may only stop the robot, or ask how it is; never with silence."""
         return self.on_control(payload, now_ns, OPEN)
 
+    def _stopped(self, by: str, now_ns: int) -> bytes:
+        """Stop, and answer in the form that every version reads."""
+        reply = self.guard.on_control(ControlRequest(self.robot, Action.ESTOP, by), now_ns)
+        return pack_stop_answer(StopAnswer(reply.done, reply.guard, reply.text, self.instance))
+
     def on_control(
         self, payload: bytes, now_ns: int, allowed: frozenset[Action] = frozenset(Action)
     ) -> bytes:
-        """Answer a request of a person or a master; never with silence."""
+        """Answer a request of a person or a master; never with silence.
+
+        A stop comes before all else: whatever its version, and whatever else is wrong with it.
+        """
+        by = read_stop(payload)
+        if by is not None:
+            return self._stopped(by, now_ns)
         try:
             request = decode(payload, ControlRequest)
         except CodecError as error:
             self._count("control")
-            return encode(ControlReply(False, self.guard.state, f"not understood: {error}"))
+            return self._reply(ControlReply(False, self.guard.state, f"not understood: {error}"))
         if request.action not in allowed:
             text = f"{request.action} is for the robot's operators: ask it where they do"
-            return encode(ControlReply(False, self.guard.state, text))
+            return self._reply(ControlReply(False, self.guard.state, text))
         reply = self.guard.on_control(request, now_ns)
         if request.action is Action.CLAIM and reply.done:
             self.clock.follow(request.clock)
             self.journeys.forget()
-        return encode(reply)
+        return self._reply(reply)
+
+    def _reply(self, reply: ControlReply) -> bytes:
+        return encode(replace(reply, instance=self.instance, place=self.place))
 
     def on_clock(self, payload: bytes, received_ns: int, now_ns: int) -> bytes:
         """Answer the master's clock query. Raises CodecError, which the link counts."""
-        return encode(self.clock.on_query(decode(payload, ClockQuery), received_ns, now_ns))
+        reply = self.clock.on_query(decode(payload, ClockQuery), received_ns, now_ns)
+        return encode(replace(reply, instance=self.instance))
 
     def tick(self, now_ns: int, reading: EncoderReading, body: Body = WELL) -> Setpoint:
         """One turn of the 200 Hz loop: what to write to the servos now."""
@@ -150,6 +173,7 @@ class SlavePipeline:
                 faults=self._faults(),
                 base=self.base,
                 lease_id=lease_id(self.guard.lease.token),
+                instance=self.instance,
             )
         )
 

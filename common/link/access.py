@@ -40,7 +40,7 @@ def access_control(access: AccessConfig) -> dict[str, Any]:
         _robot(table, access, robot)
     everyone = sorted(named(access))
     # presence is no secret among those who are named, and any of them may stop a robot
-    table.allow(everyone, ("watch", "watched"), [_alive("*", "*")])
+    table.allow(everyone, ("watch", "watched"), [_alive("*", "**")])
     table.allow(everyone, ("ask",), [STOP.key_for("*")])
     return table.zenoh()
 
@@ -62,11 +62,11 @@ def _robot(table: _Table, access: AccessConfig, robot: str) -> None:
     table.allow(me, ("publish",), [_key(STATE, robot), _key(STATISTICS, robot), video])
     table.allow(me, ("hear",), [_key(COMMAND, robot)])
     table.allow(me, ("answer",), [_key(CONTROL, robot), _key(STOP, robot), _key(CLOCK, robot)])
-    table.allow(me, ("live",), [_alive(robot, "slave")])
+    table.allow(me, ("live",), [_alive(robot, "slave/**")])
     table.allow(operators, ("publish",), [_key(COMMAND, robot), _key(STATISTICS, robot), _key(TRUTH, robot)])
     table.allow(operators, ("hear",), [*(_key(topic, robot) for topic in HEARD), video])
     table.allow(operators, ("ask",), [_key(CONTROL, robot), _key(CLOCK, robot)])
-    table.allow(operators, ("live",), [_alive(robot, "master")])
+    table.allow(operators, ("live",), [_alive(robot, "master/**")])
     table.allow([*observers, *viewers], ("hear",), [_key(topic, robot) for topic in HEARD])
     table.allow(viewers, ("hear",), [video])
 

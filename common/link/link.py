@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 import zenoh
@@ -13,8 +13,10 @@ from zenoh.handlers import Callback
 from common.clock import monotonic_ns
 from common.link.counters import TopicCounters
 from common.link.inbox import Inbox, wake
-from common.link.queries import Answerer, ask
+from common.link.presence import watch_presence
+from common.link.queries import Answered, Answerer, Asking
 from common.link.waiting import count_peers, wait_for_peer
+from common.presence import Presence, present
 from common.throttle import Throttle
 from common.topics import ALIVE, Topic
 
@@ -114,12 +116,37 @@ class Link:
     async def ask_stamped(self, topic: Topic, payload: bytes) -> tuple[bytes, int]:
         """As `ask`, with the answer's arrival in ns, stamped in Zenoh's thread."""
         topic = self._quality(topic)
-        return await ask(self._session, topic, topic.key_for(self.robot), payload, self._count(topic))
+        asking = Asking(self._session, topic, topic.key_for(self.robot), self._count(topic))
+        return await asking.first(payload)
 
-    def declare_alive(self, role: str) -> None:
-        """Show other sessions that this role lives, until the session closes or dies."""
+    async def ask_all(
+        self, topic: Topic, payload: bytes, on_answer: Callable[[Answered], None] = lambda _: None
+    ) -> list[Answered]:
+        """The answers of everybody who answers the topic; `on_answer` hears each as it comes.
+
+        It lasts until each has answered, or for the topic's time-out. Raises as `ask` where nobody answered.
+        """
+        topic = self._quality(topic)
+        asking = Asking(self._session, topic, topic.key_for(self.robot), self._count(topic))
+        return await asking.all(payload, on_answer)
+
+    def declare_alive(self, role: str, instance: int = 0, endpoints: Sequence[str] = ()) -> None:
+        """Show other sessions that this role lives, until the session closes or dies.
+
+        With an instance number also which process it is, of which version, and where.
+        """
         self._roles.add(role)
-        self._held.append(self._session.liveliness().declare_token(self._alive_key(role)))
+        keys = [self._alive_key(role)]
+        if instance:
+            keys.append(present(self.robot, role, instance, endpoints).key)
+        self._held += [self._session.liveliness().declare_token(key) for key in keys]
+
+    def watch_presence(self, on_change: Callable[[Presence, bool], None]) -> None:
+        """Call `on_change(presence, alive)` on the loop as processes of this robot's name come and go.
+
+        Those already alive are reported at once, this session's own among them.
+        """
+        watch_presence(self._session, self._loop, self.robot, on_change, self._held)
 
     def watch_alive(self, on_change: Callable[[str, bool], None]) -> None:
         """Call `on_change(role, alive)` on the loop as other sessions' roles come and go.

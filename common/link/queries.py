@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import zenoh
 from zenoh.handlers import Callback
@@ -88,22 +89,72 @@ class Answerer:
         self._counters.answered += 1
 
 
-class Question:
-    """One question on its way: the first answer, or what came instead, decides."""
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """One answer of somebody."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
-        self.answer: asyncio.Future[tuple[bytes, int]] = loop.create_future()
+    payload: bytes
+    arrived_ns: int
+    """This host's clock."""
+    replier: str = ""
+    """The session that answered; empty where Zenoh does not tell."""
 
-    def send(self, session: zenoh.Session, topic: Topic, key: str, payload: bytes) -> None:
-        """Ask every remote answerer of the key. Raises ZError where the session is closed."""
-        session.get(
-            key,
-            Callback(self._on_reply, self._on_end, indirect=False),
+
+class Asking:
+    """Asks a key's answerers: `first` takes the nearest one's answer, `all` everybody's."""
+
+    def __init__(self, session: zenoh.Session, topic: Topic, key: str, counters: TopicCounters) -> None:
+        self._session = session
+        self._topic = topic
+        self._key = key
+        self._counters = counters
+
+    async def first(self, payload: bytes) -> tuple[bytes, int]:
+        """The first answer and when it arrived, ns of this host's clock.
+
+        Raises LinkTimeoutError after the topic's time-out, LinkError at once where nobody can answer.
+        """
+        question = Question(asyncio.get_running_loop(), enough=1)
+        answers = await self._ask(question, zenoh.QueryTarget.BEST_MATCHING, payload)
+        return answers[0].payload, answers[0].arrived_ns
+
+    async def all(self, payload: bytes, on_answer: Callable[[Answered], None]) -> list[Answered]:
+        """What everybody answered, through peers and routers, until each has or the time-out is over.
+
+        Raises as `first` where nobody answered.
+        """
+        question = Question(asyncio.get_running_loop(), on_answer=on_answer)
+        return await self._ask(question, zenoh.QueryTarget.ALL, payload)
+
+    async def _ask(self, question: Question, target: zenoh.QueryTarget, payload: bytes) -> list[Answered]:
+        topic, counters = self._topic, self._counters
+        counters.asked += 1
+        try:
+            self._send(question, target, payload)
+            # Zenoh's own time-out comes first; this one is for a Zenoh that does not keep it
+            async with asyncio.timeout(topic.timeout_s + 0.1):
+                await question.over
+        except TimeoutError:
+            question.fail(LinkTimeoutError("no answer in time"))
+        except zenoh.ZError as error:
+            question.fail(LinkError(str(error)))
+        if question.answers:
+            return question.answers
+        if isinstance(question.failure, LinkTimeoutError):
+            counters.timeouts += 1
+            raise LinkTimeoutError(f"{self._key}: no answer within {topic.timeout_s:g} s") from None
+        counters.unanswered += 1
+        raise LinkError(f"{self._key}: {question.failure or 'nobody is there to answer'}") from None
+
+    def _send(self, question: Question, target: zenoh.QueryTarget, payload: bytes) -> None:
+        topic = self._topic
+        self._session.get(
+            self._key,
+            Callback(question.on_reply, question.on_end, indirect=False),
             payload=payload,
             timeout=topic.timeout_s,
-            target=zenoh.QueryTarget.BEST_MATCHING,
-            # else an answer is held back until every answerer has finished
+            target=target,
+            # else an answer is held back until every answerer has finished, and two may become one
             consolidation=zenoh.ConsolidationMode.NONE,
             congestion_control=zenoh.CongestionControl.DROP,
             priority=getattr(zenoh.Priority, topic.priority.name),
@@ -111,44 +162,53 @@ class Question:
             allowed_destination=zenoh.Locality.REMOTE,
         )
 
-    def _on_reply(self, reply: zenoh.Reply) -> None:
+
+class Question:
+    """One question on its way: `over` when enough answers came, or no more will."""
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        enough: int = 0,
+        on_answer: Callable[[Answered], None] = lambda _: None,
+    ) -> None:
+        """`enough`: so many answers, or an error, end it; 0: only Zenoh's word that no more will come."""
+        self._loop = loop
+        self._enough = enough
+        self._on_answer = on_answer
+        self.over: asyncio.Future[None] = loop.create_future()
+        self.answers: list[Answered] = []
+        self.failure: LinkError | None = None
+
+    def on_reply(self, reply: zenoh.Reply) -> None:
+        """Called in Zenoh's thread."""
         arrived_ns = monotonic_ns()
         if reply.ok is not None:
-            wake(self._loop, self._settle, (reply.ok.payload.to_bytes(), arrived_ns), None)
+            replier = "" if reply.replier_id is None else str(reply.replier_id.zid)
+            wake(self._loop, self._take, Answered(reply.ok.payload.to_bytes(), arrived_ns, replier))
             return
         text = reply.err.payload.to_bytes().decode("utf-8", "replace") if reply.err is not None else ""
         error = LinkTimeoutError("no answer in time") if text == _TIMED_OUT else LinkError(f"refused: {text}")
-        wake(self._loop, self._settle, None, error)
+        wake(self._loop, self.fail, error)
 
-    def _on_end(self) -> None:
-        wake(self._loop, self._settle, None, LinkError("nobody is there to answer"))
+    def on_end(self) -> None:
+        """Called in Zenoh's thread: no more will come."""
+        wake(self._loop, self._end)
 
-    def _settle(self, answer: tuple[bytes, int] | None, error: LinkError | None) -> None:
-        if self.answer.done():
+    def fail(self, error: LinkError) -> None:
+        """Note that somebody did not answer."""
+        self.failure = self.failure or error
+        if self._enough:
+            self._end()
+
+    def _take(self, answer: Answered) -> None:
+        if self.over.done():
             return
-        if answer is not None:
-            self.answer.set_result(answer)
-        elif error is not None:
-            self.answer.set_exception(error)
+        self.answers.append(answer)
+        self._on_answer(answer)
+        if self._enough and len(self.answers) >= self._enough:
+            self._end()
 
-
-async def ask(
-    session: zenoh.Session, topic: Topic, key: str, payload: bytes, counters: TopicCounters
-) -> tuple[bytes, int]:
-    """The first answer and when it arrived, ns of this host's clock.
-
-    Raises LinkTimeoutError after the topic's time-out, LinkError at once where nobody can answer.
-    """
-    counters.asked += 1
-    question = Question(asyncio.get_running_loop())
-    try:
-        question.send(session, topic, key, payload)
-        # Zenoh's own time-out comes first; this one is for a Zenoh that does not keep it
-        async with asyncio.timeout(topic.timeout_s + 0.1):
-            return await question.answer
-    except TimeoutError:  # LinkTimeoutError is one too
-        counters.timeouts += 1
-        raise LinkTimeoutError(f"{key}: no answer within {topic.timeout_s:g} s") from None
-    except (LinkError, zenoh.ZError) as error:
-        counters.unanswered += 1
-        raise LinkError(f"{key}: {error}") from None
+    def _end(self) -> None:
+        if not self.over.done():
+            self.over.set_result(None)

@@ -19,7 +19,9 @@ from common.link.certificates import check_keys
 from common.link.inbox import wake
 from common.link.link import Link
 from common.link.opening import open_zenoh
+from common.link.presence import watch_presence
 from common.link.waiting import count_peers
+from common.presence import Presence
 from common.topics import ALIVE, Topic
 
 CLOSE_TIMEOUT_S = 1.0
@@ -104,6 +106,10 @@ class Session:
                 f"{ALIVE.key_for('*')}/slave", Callback(on_sample, indirect=False), history=True
             )
         )
+
+    def watch_presence(self, on_change: Callable[[Presence, bool], None], robot: str = "*") -> None:
+        """Call `on_change(presence, alive)` on the loop as processes come and go, of every robot's name."""
+        watch_presence(self._session, self._loop, robot, on_change, self._held)
 
     def watch_peers(self, on_change: Callable[[str, str, bool], None]) -> None:
         """Call `on_change(session_id, name, connected)` on the loop, for those already there at once.

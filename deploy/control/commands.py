@@ -126,6 +126,11 @@ def status(
         else:
             Console().print(status_table(robots))
         silent = [f"{name} {one['reason']}" for name, one in robots.items() if not one["answers"]]
+        silent += [
+            f"{name}: another robot bears this name; this one is at {one['place']}"
+            for name, one in robots.items()
+            if one["namesakes"]
+        ]
         if silent:
             raise TandemError("; ".join(silent))
 

@@ -21,7 +21,8 @@ from common.messages import Action, RobotState, Statistics
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.topics import STATE, STATISTICS
-from deploy.control.ask import Answer, ask
+from deploy.control.answer import Answer
+from deploy.control.ask import ask
 from deploy.control.reach import ROUTER_S, Reach
 from deploy.tables import GUARD_STYLE, UNKNOWN, plain_table
 
@@ -61,38 +62,56 @@ async def ask_status(where: Reach, listen_s: float = LISTEN_S) -> dict[str, dict
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
         links = [session.link(robot) for robot in where.robots]
         each = await asyncio.gather(*(_status(link, where, listen_s) for link in links))
-    return {answer.robot: as_tree(answer, heard) for answer, heard in each}
+    trees: dict[str, dict[str, Any]] = {}
+    for answers, heard in each:
+        for answer in answers:
+            # of several that bear one name each is shown, by its instance number too
+            name = answer.robot if len(answers) == 1 else f"{answer.robot} {answer.instance:08x}"
+            trees[name] = as_tree(answer, heard.of(answer.instance), namesakes=len(answers) - 1)
+    return trees
 
 
-async def _status(link: Link, where: Reach, listen_s: float) -> tuple[Answer, Heard]:
-    heard = listen(link)
-    answer = await ask(link, where, Action.STATUS)
-    if answer.done:
-        with suppress(TimeoutError):
-            await asyncio.wait_for(heard.all.wait(), listen_s)
-    return answer, heard
+async def _status(link: Link, where: Reach, listen_s: float) -> tuple[list[Answer], HeardOfAll]:
+    heard = HeardOfAll(link)
+    answers = await ask(link, where, Action.STATUS)
+    with suppress(TimeoutError):
+        async with asyncio.timeout(listen_s):
+            for answer in answers:
+                if answer.done:
+                    await heard.of(answer.instance).all.wait()
+    return answers, heard
 
 
-def listen(link: Link) -> Heard:
-    """Keep the newest of what the robot says from now on."""
-    heard = Heard()
+class HeardOfAll:
+    """What each robot of one name says from now on, by instance."""
 
-    def on_state(payload: bytes, _: int) -> None:
-        heard.take(state=decode_state(payload))
+    def __init__(self, link: Link) -> None:
+        self._heard: dict[int, Heard] = {}
+        link.subscribe(STATE, self._on_state)
+        link.subscribe(STATISTICS, self._on_statistics)
 
-    def on_statistics(payload: bytes, _: int) -> None:
+    def of(self, instance: int) -> Heard:
+        """What that one said."""
+        return self._heard.setdefault(instance, Heard())
+
+    def _on_state(self, payload: bytes, _: int) -> None:
+        state = decode_state(payload)
+        if state is not None:
+            self.of(state.instance).take(state=state)
+
+    def _on_statistics(self, payload: bytes, _: int) -> None:
         try:
             statistics = decode(payload, Statistics)
         except CodecError:
             return
+        figures = statistics.figures
         if statistics.role == "slave":
-            heard.take(figures=statistics.figures)
+            instance = figures.get("instance")
+            self.of(instance if isinstance(instance, int) else 0).take(figures=figures)
         elif statistics.role == "master":
-            heard.take(operator_figures=statistics.figures)
-
-    link.subscribe(STATE, on_state)
-    link.subscribe(STATISTICS, on_statistics)
-    return heard
+            # which of several robots it commands is not told: it is the operator's own affair
+            for heard in self._heard.values():
+                heard.take(operator_figures=figures)
 
 
 def decode_state(payload: bytes) -> RobotState | None:
@@ -105,7 +124,7 @@ def decode_state(payload: bytes) -> RobotState | None:
     return None
 
 
-def as_tree(answer: Answer, heard: Heard) -> dict[str, Any]:
+def as_tree(answer: Answer, heard: Heard, namesakes: int = 0) -> dict[str, Any]:
     """A robot's status as plain JSON values; None where the robot did not tell."""
     state, figures = heard.state, heard.figures or {}
     base = state.base if state else None
@@ -113,6 +132,9 @@ def as_tree(answer: Answer, heard: Heard) -> dict[str, Any]:
         "answers": bool(answer.guard),
         "guard": answer.guard or None,
         "reason": answer.text,
+        "instance": answer.instance,
+        "place": answer.place,
+        "namesakes": namesakes,
         "operator": state.operator if state else None,
         "lease": figures.get("lease"),
         "faults": dict(state.faults) if state else None,
@@ -169,6 +191,8 @@ def _add_row(table: Table, name: str, one: Mapping[str, Any]) -> None:
 
 def _words(one: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
     words = [(str(one["reason"]), "")]
+    if one["namesakes"]:
+        words.append((f"another robot bears this name; this one is at {one['place']}", "bold red"))
     words += [(f"{what}: {why}", "red") for what, why in (one["faults"] or {}).items()]
     words += [(f"node {node}: {why}", "yellow") for node, why in (one["node_doubts"] or {}).items()]
     if one["encoders_invalid"]:

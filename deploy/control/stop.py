@@ -1,76 +1,71 @@
-"""An emergency stop that is repeated until the robot has acknowledged it, or the time is up.
+"""An emergency stop that is repeated until every robot of that name has acknowledged it, or the time is up.
 
 A lost question must not be the end of it, nor an answer that is waited for: a new one leaves every
-REPEAT_S, whatever became of those before. To stop twice is harmless.
+REPEAT_S, whatever became of those before. To stop twice is harmless. Two robots may bear one name by
+mistake: the stop asks all, and answers are counted by instance.
 """
 
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 
-from common.codec import decode, encode
-from common.errors import CodecError, LinkError
+from common.errors import LinkError
 from common.link import Session, open_session
-from common.messages import Action, ControlReply, ControlRequest
+from common.link.queries import Answered
+from common.presence import Presence
+from common.stop import pack_stop, read_stop_answer
 from common.topics import STOP
-from deploy.control.ask import Answer
+from deploy.control.answer import Answer
 from deploy.control.reach import Reach
+from deploy.control.stop_count import StopCount
 
 REPEAT_S = 0.2
 WITHIN_S = 5.0
 SETTLE_S = 0.5
 """After the last endpoint is connected: a robot there shows itself within milliseconds."""
-STOPPED = "estop"
 
-Ask = Callable[[bytes], Awaitable[bytes]]
+OnAnswer = Callable[[Answered], None]
+AskAll = Callable[[bytes, OnAnswer], Awaitable[object]]
 Tell = Callable[[Answer], None]
+
+log = logging.getLogger("tandem.stop")
 
 
 async def repeat_until_stopped(
-    ask: Ask, request: ControlRequest, within_s: float = WITHIN_S, repeat_s: float = REPEAT_S
-) -> ControlReply | None:
-    """The reply of a robot that says it is stopped; None where none came in time."""
-    under_way: set[asyncio.Task[ControlReply | None]] = set()
-    payload = encode(request)
+    ask_all: AskAll,
+    count: StopCount,
+    payload: bytes,
+    settled: asyncio.Event,
+    tell: Tell,
+    repeat_s: float = REPEAT_S,
+) -> None:
+    """Ask until the count is complete once it is `settled` which robots there are. It ends by itself only so.
+
+    `tell` hears each acknowledgement once, as it comes.
+    """
+    under_way: set[asyncio.Task[None]] = set()
+
+    def on_answer(answered: Answered) -> None:
+        answer = read_stop_answer(answered.payload)
+        said = None if answer is None else count.on_answer(answer, answered.replier)
+        if said is not None:
+            tell(said)
+
+    async def ask() -> None:
+        with suppress(LinkError):
+            await ask_all(payload, on_answer)
+
     try:
-        async with asyncio.timeout(within_s):
-            while True:
-                under_way.add(asyncio.create_task(_ask_once(ask, payload)))
-                reply = await _acknowledged(under_way, repeat_s)
-                if reply is not None:
-                    return reply
-    except TimeoutError:
-        return None
+        while not (settled.is_set() and count.complete):
+            under_way.add(asyncio.create_task(ask()))
+            await asyncio.sleep(repeat_s)
+            under_way = {task for task in under_way if not task.done()}
     finally:
         for task in under_way:
             task.cancel()
-
-
-async def _ask_once(ask: Ask, payload: bytes) -> ControlReply | None:
-    try:
-        reply = decode(await ask(payload), ControlReply)
-    except (LinkError, CodecError):
-        return None
-    return reply if reply.done and reply.guard == STOPPED else None
-
-
-async def _acknowledged(
-    under_way: set[asyncio.Task[ControlReply | None]], for_s: float
-) -> ControlReply | None:
-    """The first acknowledgement of any question that is under way; None when the time is up."""
-    loop = asyncio.get_running_loop()
-    until_s = loop.time() + for_s
-    while (left_s := until_s - loop.time()) > 0:
-        if not under_way:
-            await asyncio.sleep(left_s)  # all failed at once: nobody is there yet
-            return None
-        done, _ = await asyncio.wait(under_way, timeout=left_s, return_when=asyncio.FIRST_COMPLETED)
-        for task in done:
-            under_way.discard(task)
-            if (reply := task.result()) is not None:
-                return reply
-    return None
 
 
 async def stop_robots(
@@ -88,15 +83,16 @@ async def stop_robots(
         stopping = _Stopping(session, where.operator, tell, within_s)
         for robot in where.robots:
             stopping.stop(robot)
-        if everyone:
-            session.watch_robots(lambda robot, alive: stopping.stop(robot) if alive else None)
-            await _until_all_showed(session, doors, within_s)
-        answers = await stopping.answers()
+        session.watch_presence(lambda presence, here: stopping.on_presence(presence, here, everyone))
+        await _until_all_showed(session, doors, within_s)
         missing = doors - session.peers
-        if everyone and missing > 0:
+        stopping.settled.set()
+        answers = await stopping.answers()
+        if missing > 0:
             many = f"{missing} of {doors} endpoints"
             text = f"NOT REACHED: {many} ({', '.join(endpoints)}); whoever is there is not stopped"
-            answers.append(Answer("", False, text))
+            # where robots were named, each of them has answered or is said not to have
+            answers.append(Answer("", not everyone, text))
             tell(answers[-1])
         elif everyone and not answers:
             answers.append(Answer("", False, "NOBODY STOPPED: no robot showed itself at the endpoints"))
@@ -105,36 +101,52 @@ async def stop_robots(
 
 
 class _Stopping:
-    """The stops under way, one a robot."""
+    """The stops under way, one a name."""
 
     def __init__(self, session: Session, operator: str, tell: Tell, within_s: float) -> None:
         self._session = session
         self._operator = operator
         self._tell = tell
         self._within_s = within_s
-        self._tasks: dict[str, asyncio.Task[Answer]] = {}
+        self.settled = asyncio.Event()
+        """Whether all who are there have had the time to show themselves."""
+        self._counts: dict[str, StopCount] = {}
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+
+    def on_presence(self, presence: Presence, here: bool, everyone: bool) -> None:
+        """Somebody showed himself: a robot is stopped if it is named, or everybody is."""
+        if presence.role != "slave" or not here:
+            return
+        if everyone:
+            self.stop(presence.robot)
+        if presence.robot in self._counts:
+            self._counts[presence.robot].expect(presence)
 
     def stop(self, robot: str) -> None:
-        """Begin to stop a robot, once."""
+        """Begin to stop all robots of a name, once."""
         if robot not in self._tasks:
+            self._counts[robot] = StopCount(robot, self._within_s)
             self._tasks[robot] = asyncio.create_task(self._stop(robot))
 
     async def answers(self) -> list[Answer]:
         """All of them, by name."""
         await asyncio.gather(*self._tasks.values())
-        return [self._tasks[robot].result() for robot in sorted(self._tasks)]
+        return [answer for robot in sorted(self._counts) for answer in self._counts[robot].answers()]
 
-    async def _stop(self, robot: str) -> Answer:
+    async def _stop(self, robot: str) -> None:
         link = self._session.link(robot)
-        request = ControlRequest(robot, Action.ESTOP, self._operator)
-        reply = await repeat_until_stopped(lambda p: link.ask(STOP, p), request, self._within_s)
-        if reply is None:
-            text = f"NOT STOPPED by this: no answer within {self._within_s:g} s. Stop it at the robot itself"
-            answer = Answer(robot, False, text)
-        else:
-            answer = Answer(robot, True, reply.text, reply.guard)
-        self._tell(answer)
-        return answer
+        count, payload = self._counts[robot], pack_stop(robot, self._operator)
+
+        async def ask_all(question: bytes, on_answer: OnAnswer) -> object:
+            return await link.ask_all(STOP, question, on_answer)
+
+        with suppress(TimeoutError):
+            async with asyncio.timeout(self._within_s):
+                await repeat_until_stopped(ask_all, count, payload, self.settled, self._tell)
+        for answer in count.failures():
+            self._tell(answer)
+        if (namesakes := count.namesakes()) is not None:
+            log.warning("%s", namesakes)
 
 
 async def _until_all_showed(session: Session, endpoints: int, within_s: float) -> None:

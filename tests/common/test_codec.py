@@ -115,9 +115,9 @@ messages = st.one_of(
     states(),
     truths(),
     st.builds(ControlRequest, names, st.sampled_from(Action), names, texts, counts),
-    st.builds(ControlReply, flags, names, texts, counts),
+    st.builds(ControlReply, flags, names, texts, counts, counts, counts, texts),
     st.builds(ClockQuery, counts, counts, counts, counts),
-    st.builds(ClockReply, counts, counts, counts),
+    st.builds(ClockReply, counts, counts, counts, counts),
     st.builds(Statistics, names, counts, trees),
 )
 

@@ -5,8 +5,10 @@ import asyncio
 import pytest
 
 from common.codec import decode, encode
-from common.control import CHALLENGED, ask_control
+from common.control import CHALLENGED, ask_control, read_reply
+from common.errors import CodecError
 from common.messages import Action, ControlReply, ControlRequest
+from common.stop import StopAnswer, pack_stop, pack_stop_answer
 
 
 class Robot:
@@ -19,7 +21,21 @@ class Robot:
         return encode(ControlReply(True, "hold", self.heard[-1].action, challenge=given))
 
 
-@pytest.mark.parametrize("action", Action)
+def test_a_stop_goes_in_its_own_form_and_is_answered_in_it() -> None:
+    asked: list[bytes] = []
+
+    async def ask(payload: bytes) -> bytes:
+        asked.append(payload)
+        return pack_stop_answer(StopAnswer(True, "estop", "stopped", 9))
+
+    reply = asyncio.run(ask_control(ask, ControlRequest("robot-1", Action.ESTOP, "anna")))
+    assert asked == [pack_stop("robot-1", "anna")]
+    assert (reply.done, reply.guard, reply.instance) == (True, "estop", 9)
+    with pytest.raises(CodecError, match="not an answer to a stop"):
+        read_reply(encode(ControlReply(True, "estop", "stopped")), Action.ESTOP)
+
+
+@pytest.mark.parametrize("action", sorted(set(Action) - {Action.ESTOP}))
 def test_only_what_could_move_it_asks_twice(action: Action) -> None:
     robot = Robot()
     request = ControlRequest("robot-1", action, "anna", "key")

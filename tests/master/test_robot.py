@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,7 @@ class FakeLink:
     def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
         self.hear[topic.name] = on_payload
 
-    def declare_alive(self, role: str) -> None: ...
+    def declare_alive(self, role: str, instance: int, endpoints: Sequence[str]) -> None: ...
 
     def counters(self) -> dict[str, dict[str, int]]:
         return {}
@@ -163,7 +163,7 @@ def test_a_master_with_no_robot_left_ends() -> None:
 
 def test_a_state_that_is_garbage_is_counted_at_its_robot() -> None:
     link: Any = FakeLink()
-    robot = CommandedRobot("a", "nurse-1", JOINTS, link)
+    robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
     link.hear["state"](b"garbage", 1)
     link.hear["state"](encode(ControlReply(True, "hold", "")), 2)
     figures: Any = robot.figures()
@@ -173,7 +173,7 @@ def test_a_state_that_is_garbage_is_counted_at_its_robot() -> None:
 
 def test_each_round_trip_is_told_once() -> None:
     link: Any = FakeLink()
-    robot = CommandedRobot("a", "nurse-1", JOINTS, link)
+    robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
     robot._watch.round_trip.record(2_000_000)
     robot.tell(1, {})
     robot.tell(2, {})

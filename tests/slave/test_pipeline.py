@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import msgpack
 import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S
 from common.codec import decode, encode
 from common.config import LinkConfig
+from common.control import read_reply
 from common.errors import CodecError
 from common.messages import (
     Action,
@@ -18,6 +22,7 @@ from common.messages import (
     RobotState,
 )
 from common.offset import MasterExchange
+from common.stop import pack_stop, read_stop_answer
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline
 
@@ -59,7 +64,8 @@ def test_commands_are_judged_by_the_clock_of_who_holds_the_lease(pipeline: Slave
 def test_a_query_that_is_no_query_changes_nothing(pipeline: SlavePipeline) -> None:
     with pytest.raises(CodecError, match="clock"):
         pipeline.on_clock(encode(ControlReply(True, "", "")), 1, 1)
-    assert decode(pipeline.on_clock(encode(ClockQuery(5)), 6, 7), ClockReply) == ClockReply(5, 6, 7)
+    reply = decode(pipeline.on_clock(encode(ClockQuery(5)), 6, 7), ClockReply)
+    assert reply == ClockReply(5, 6, 7, pipeline.instance)
 
 
 def test_a_new_holder_never_sees_the_echo_of_the_last_ones_commands(pipeline: SlavePipeline) -> None:
@@ -89,4 +95,34 @@ def test_where_anybody_may_ask_the_robot_is_stopped_and_told_of_but_not_engaged(
         assert reply.text == f"{action} is for the robot's operators: ask it where they do"
     assert not pipeline.guard.lease.held_by("ben")
     assert ask(Action.STATUS).done
-    assert ask(Action.ESTOP).guard == "estop"
+    assert read_reply(pipeline.on_stop(pack_stop("robot-1", "ben"), NS_PER_S), Action.ESTOP).guard == "estop"
+
+
+@pytest.mark.parametrize("way", [SlavePipeline.on_stop, SlavePipeline.on_control])
+@pytest.mark.parametrize(
+    "payload",
+    [
+        pack_stop("robot-1", "ben"),
+        pack_stop("another robot", ""),
+        encode(ControlRequest("robot-1", Action.ESTOP, "ben")),
+        msgpack.packb(["control", 99, "robot-1", "estop", "ben", {"of": "later"}]),
+    ],
+    ids=["frozen", "misaddressed", "codec", "later"],
+)
+def test_a_stop_of_any_version_stops_on_every_way_in_and_is_answered_in_the_frozen_form(
+    pipeline: SlavePipeline, way: Callable[..., bytes], payload: bytes
+) -> None:
+    answer = read_stop_answer(way(pipeline, payload, NS_PER_S))
+    assert answer is not None
+    assert answer.stopped
+    assert answer.instance == pipeline.instance
+    assert pipeline.guard.state == "estop"
+
+
+def test_every_answer_and_state_tells_which_process_it_is_of(pipeline: SlavePipeline) -> None:
+    assert pipeline.instance > 0
+    asked = encode(ControlRequest("robot-1", Action.STATUS, "ben"))
+    for payload in (asked, b"garbage"):
+        assert decode(pipeline.on_control(payload, NS_PER_S), ControlReply).instance == pipeline.instance
+    state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
+    assert state.instance == pipeline.instance

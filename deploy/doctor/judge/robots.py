@@ -12,6 +12,7 @@ from slave.guard.config import GuardConfig
 
 OLDEST_MS = 1000.0 * GuardConfig().max_age_s
 """A command older than that is refused by a guard as it is shipped."""
+_NAMESAKES = "robots bear the name"
 _SCHEMA = "schema version"
 """In the words of the codec, where the two sides' messages differ."""
 
@@ -22,6 +23,8 @@ def judge_robot(facts: RobotFacts, ours: Mapping[str, Any]) -> list[Finding]:
     if not facts.guard:
         if _SCHEMA in facts.text:
             return [fail(f"{name}: versions", facts.text, "install the same tandem on both hosts")]
+        if _NAMESAKES in facts.text:
+            return [fail(f"{name}: names", facts.text, "until then nobody can engage either of them")]
         return [fail(name, facts.text, "on its host: `tandem doctor` with its own file, and its log")]
     reached = ok(name, f"answers: {facts.guard}: {facts.text}")
     return [reached, _time(facts), *_clock(facts), _versions(facts, ours)]

@@ -16,10 +16,11 @@ from common.errors import CodecError, LinkError
 from common.link import Link, open_session
 from common.messages import Action, ClockReply
 from common.offset import MasterExchange
+from common.presence import several_bear
 from common.topics import CLOCK
 from deploy.control.ask import ask
 from deploy.control.reach import ROUTER_S, Reach
-from deploy.control.status import listen
+from deploy.control.status import HeardOfAll
 
 EXCHANGES = 20
 PAUSE_S = 0.02
@@ -58,8 +59,13 @@ async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) ->
 
 
 async def _read(link: Link, where: Reach) -> RobotFacts:
-    heard = listen(link)
-    answer = await ask(link, where, Action.STATUS)
+    all_heard = HeardOfAll(link)
+    answers = await ask(link, where, Action.STATUS)
+    if len(answers) > 1:
+        places = [f"{each.place} (instance {each.instance:08x})" for each in answers]
+        return RobotFacts(link.robot, "", several_bear(link.robot, places))
+    answer = answers[0]
+    heard = all_heard.of(answer.instance)
     if not answer.guard:
         return RobotFacts(link.robot, "", answer.text)
     exchange = MasterExchange(asker=1 + secrets.randbelow((1 << 63) - 1))

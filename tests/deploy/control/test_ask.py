@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from collections.abc import Callable
+from contextlib import AsyncExitStack
 from typing import Any
+
+import pytest
 
 from common.codec import decode, encode
 from common.config import LinkConfig
 from common.errors import LinkTimeoutError
-from common.link import open_link
+from common.link import open_link, open_session
 from common.messages import Action, ControlReply, ControlRequest
-from common.topics import CONTROL, Topic
-from deploy.control.ask import Answer, ask, ask_robots
+from common.topics import CONTROL, STOP, Topic
+from deploy.control.answer import Answer
+from deploy.control.ask import ask, ask_robots
 from deploy.control.reach import Reach
 
 
@@ -60,12 +65,52 @@ class Hanging:
 
     async def connected(self, topic: Topic) -> None: ...
 
-    async def ask(self, topic: Topic, payload: bytes) -> bytes:
+    peers = 1
+
+    async def ask_all(self, topic: Topic, payload: bytes) -> list[Any]:
         raise LinkTimeoutError("no answer within 1 s")
 
 
 def test_a_robot_that_is_there_but_gives_no_answer_may_have_done_it() -> None:
     link: Any = Hanging()
-    answer = asyncio.run(ask(link, Reach(LinkConfig(), ("a",), "anna"), Action.DISENGAGE))
+    (answer,) = asyncio.run(ask(link, Reach(LinkConfig(), ("a",), "anna"), Action.DISENGAGE))
     assert (answer.done, answer.guard) == (False, "")
     assert "what it did is not known" in answer.text
+
+
+@pytest.mark.parametrize("through_a_router", [False, True])
+def test_while_two_bear_one_name_nothing_that_moves_is_asked_of_either(through_a_router: bool) -> None:
+    asked: list[Action] = []
+
+    def robot(instance: int) -> Callable[[bytes, int], bytes]:
+        def answer(payload: bytes, _: int) -> bytes:
+            asked.append(decode(payload, ControlRequest).action)
+            place = f"room {instance}"
+            return encode(ControlReply(True, "hold", "waits", challenge=5, instance=instance, place=place))
+
+        return answer
+
+    async def story() -> list[list[Answer]]:
+        at = [endpoint(), endpoint()]
+        async with AsyncExitStack() as stack:
+            links = [LinkConfig(listen=[each]) for each in at]
+            where = LinkConfig(connect=at)
+            if through_a_router:
+                await stack.enter_async_context(open_session(LinkConfig(listen=[at[0]]), "router"))
+                where = LinkConfig(connect=[at[0]], mode="client")
+                links = [where, where]
+            for instance, link in enumerate(links, 1):
+                one = await stack.enter_async_context(open_link(link, "a"))
+                one.answer(CONTROL, robot(instance))
+                one.answer(STOP, robot(instance))
+            acts = (Action.STATUS, Action.ENGAGE, Action.RESET, Action.DISENGAGE)
+            return [await ask_robots(Reach(where, ("a",), "anna"), action) for action in acts]
+
+    status, engage, reset, disengage = asyncio.run(story())
+    assert sorted((answer.instance, answer.done) for answer in status) == [(1, True), (2, True)]
+    for refused in (engage, reset):
+        assert [answer.done for answer in refused] == [False, False]
+        assert "room 1 (instance 00000001) and room 2 (instance 00000002)" in refused[0].text
+    assert [answer.done for answer in disengage] == [True, True]
+    assert Action.ENGAGE not in asked
+    assert Action.RESET not in asked

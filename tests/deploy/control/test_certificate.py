@@ -15,8 +15,10 @@ from common.link import open_link
 from common.link_config import AccessConfig
 from common.messages import Action, ControlReply, ControlRequest
 from common.roles import Role
+from common.stop import StopAnswer, pack_stop_answer, read_stop
 from common.topics import CONTROL, STOP
-from deploy.control.ask import Answer, ask_robots
+from deploy.control.answer import Answer
+from deploy.control.ask import ask_robots
 from deploy.control.reach import reach
 from deploy.keys.folder import stem
 from deploy.rig.keys import make_keys, tls_of
@@ -41,6 +43,8 @@ def asked(at: str, keys: Path, who: str, *actions: Action) -> list[Answer]:
         async with open_link(config, "robot-1") as robot:
 
             def answer(payload: bytes, _: int) -> bytes:
+                if read_stop(payload) is not None:
+                    return pack_stop_answer(StopAnswer(True, "estop", ""))
                 return encode(
                     ControlReply(True, str(decode(payload, ControlRequest).action), "", challenge=1)
                 )

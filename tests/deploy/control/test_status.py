@@ -16,7 +16,7 @@ from common.codec import encode
 from common.messages import BaseAttitude, RobotState
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
-from deploy.control.ask import Answer
+from deploy.control.answer import Answer
 from deploy.control.status import Heard, as_tree, decode_state, status_table
 
 

@@ -13,6 +13,7 @@ import pytest
 from common.clock import NS_PER_S
 from common.codec import decode, encode
 from common.config import LinkConfig
+from common.control import read_reply
 from common.errors import RobotError
 from common.messages import Action, ClockReply, Command, CommandStamps, ControlReply, ControlRequest
 from common.offset import MasterExchange
@@ -179,7 +180,7 @@ class Session:
 
     def ask(self, action: Action, **more: Any) -> ControlReply:
         request = ControlRequest("robot-1", action, "anna", **more)
-        return decode(self.pipeline.on_control(encode(request), self.rig.now_ns), ControlReply)
+        return read_reply(self.pipeline.on_control(encode(request), self.rig.now_ns), action)
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds * NS_PER_S / TICK_NS)):

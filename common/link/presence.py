@@ -1,0 +1,37 @@
+"""Hears which processes are alive, from their liveliness tokens."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import zenoh
+from zenoh.handlers import Callback
+
+from common.link.inbox import wake
+from common.presence import Presence, read_presence
+from common.topics import ALIVE
+
+
+def watch_presence(
+    session: zenoh.Session,
+    loop: asyncio.AbstractEventLoop,
+    robot: str,
+    on_change: Callable[[Presence, bool], None],
+    held: list[object],
+) -> None:
+    """Call `on_change(presence, alive)` on the loop; those already there at once. `robot` may be `*`.
+
+    A key that is no token of tandem's is passed over. What hears of them is added to `held`.
+    """
+
+    def on_sample(sample: zenoh.Sample) -> None:
+        presence = read_presence(str(sample.key_expr))
+        if presence is not None:
+            wake(loop, on_change, presence, sample.kind == zenoh.SampleKind.PUT)
+
+    held.append(
+        session.liveliness().declare_subscriber(
+            f"{ALIVE.key_for(robot)}/**", Callback(on_sample, indirect=False), history=True
+        )
+    )
