@@ -74,16 +74,18 @@ def mount(
             nodes, skeleton, between, lambda done, of: bar.update(task, completed=done, total=of)
         )
     write_mounting(found, recording, out, date.today())
-    draw_angles(nodes, skeleton, found, out / "mounting.png")
+    if found.nodes:
+        draw_angles(nodes, skeleton, found, out / "mounting.png")
     figures = as_report(found, recording)
     tell_machines(figures, report, to_stdout=as_json)
     if not as_json:
         console = Console()
         console.print(nodes_table(found), joints_table(found))
-        console.print(
-            f"stance {found.stance_s[0]:.1f} to {found.stance_s[1]:.1f} s; written to {out}; angles over the "
-            "recording: mounting.png"
-        )
+        if found.nodes:
+            console.print(
+                f"stance {found.stance_s[0]:.1f} to {found.stance_s[1]:.1f} s; written to {out}; angles "
+                "over the recording: mounting.png"
+            )
     if found.refused:
         lines = [f"{recording}: {name} is not written: {why}" for name, why in found.refused.items()]
         raise TandemError("\n".join(lines))
@@ -106,6 +108,20 @@ def as_report(found: Mounting, recording: Path) -> dict[str, Any]:
         },
         "joints": {joint.segment: _joint(joint) for joint in found.joints},
         "refused": found.refused,
+        "evidence": {
+            name: [
+                {
+                    "compared": e.compared,
+                    "figure": None if math.isnan(e.figure) else e.figure,
+                    "limit": e.limit if math.isfinite(e.limit) else None,
+                    "unit": e.unit,
+                    "verdict": e.verdict,
+                    "advice": e.advice,
+                }
+                for e in evidence
+            ]
+            for name, evidence in found.evidence.items()
+        },
     }
 
 

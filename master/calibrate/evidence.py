@@ -32,6 +32,11 @@ class Evidence:
     advice: str = ""
     """For a person: what is wrong and what to do; for what was not judged, why."""
 
+    @property
+    def contradicts(self) -> bool:
+        """Whether it refuses the result."""
+        return self.verdict == "contradicts"
+
     def as_report(self) -> dict[str, Any]:
         """For machines."""
         return {
@@ -67,6 +72,11 @@ def refuse_contradictions(evidence: Iterable[Evidence]) -> tuple[Evidence, ...]:
         if one.verdict == "contradicts":
             raise RecordingError(one.advice)
     return judged
+
+
+def first_contradiction(evidence: Iterable[Evidence]) -> Evidence | None:
+    """The likeliest cause, for whom a refusal concerns one node of many; None where all is well."""
+    return next((one for one in evidence if one.contradicts), None)
 
 
 def unjudged(evidence: Iterable[Evidence]) -> tuple[str, ...]:

@@ -14,12 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.quaternion import heading_turn, to_matrix
+from master.calibrate.evidence import first_contradiction
 from master.calibrate.gauss_newton import tangents
 from master.calibrate.hinge import Hinge as FoundHinge
 from master.calibrate.hinge import PoorMotionError, again, check_moved, find_hinge
 from master.calibrate.joint_fit import JointFit, fit_joint
 from master.calibrate.oriented import bridged, moving, orient, rows_moving
 from master.calibrate.recording import NodeRecording
+from master.calibrate.unit_evidence import unit_evidence
 from master.fuse.hinge_angle import Hinge
 
 _LEAST_SAMPLES = 60
@@ -45,6 +47,10 @@ def find_hinge_pair(one: NodeRecording, two: NodeRecording) -> HingePair:
     Raises PoorMotionError, saying what to do, where the motion does not tell.
     """
     readings = {"unit 1": _named(one, "unit 1"), "unit 2": _named(two, "unit 2")}
+    for name, unit in readings.items():
+        wrong = first_contradiction(unit_evidence(unit))
+        if wrong is not None:
+            raise PoorMotionError(f"{name}: {wrong.advice}")
     suit = orient(readings, list(readings))
     found = find_hinge(suit.gyr_rad_s[0], suit.gyr_rad_s[1], suit.rate_hz)
     check_moved(found, "the joint")

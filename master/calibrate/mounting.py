@@ -15,18 +15,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from common.quaternion import Array, conjugate, heading_turn, multiply, rotate
 from common.skeleton import Skeleton
+from master.calibrate.evidence import Evidence, first_contradiction
 from master.calibrate.facing import Axis, Island, axes_by_node, facing_of, islands_of, joint_angles
 from master.calibrate.hinge import PoorMotionError
 from master.calibrate.joint_motion import JointMotion, joint_motion
 from master.calibrate.oriented import Oriented, mean_rotation, moving, orient
 from master.calibrate.recording import NodeRecording
 from master.calibrate.standing import find_stance, given_stance
+from master.calibrate.unit_evidence import unit_evidence
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +53,11 @@ class Mounting:
 
     nodes: dict[str, NodeMounting]
     refused: dict[str, str]
-    """Nodes that the recording does not determine: why, and what to do."""
+    """Nodes that the recording does not determine, or whose evidence contradicts it: why, and what to do."""
     joints: list[JointMotion]
     stance_s: tuple[float, float]
+    evidence: dict[str, list[Evidence]]
+    """What was compared before the answer was believed, by node."""
 
 
 def find_mounting(
@@ -66,11 +70,17 @@ def find_mounting(
 
     `recordings` are by segment; readings must be calibrated. Without `stance_s` the first stretch in which
     everyone rests is the stance. Raises PoorMotionError where nothing at all can be said; what fails for
-    single nodes is in `refused`.
+    single nodes is in `refused`. A node whose own readings contradict each other takes no part.
     """
     names = [name for name in skeleton.segment_names if name in recordings]
     if len(names) < 2:
         raise PoorMotionError(f"the recording has fewer than two nodes of the profile {skeleton.name}")
+    evidence = {name: unit_evidence(recordings[name]) for name in names}
+    contradicted = {name: e.advice for name in names if (e := first_contradiction(evidence[name]))}
+    names = [name for name in names if name not in contradicted]
+    if len(names) < 2:
+        alone = dict.fromkeys(names, "no neighbour of it is left to compare it with")
+        return Mounting({}, contradicted | alone, [], (0.0, 0.0), evidence)
     suit = orient(recordings, names)
     if stance_s is None:
         stance = find_stance(suit.gyr_rad_s, suit.rate_hz)
@@ -87,7 +97,8 @@ def find_mounting(
             joint_motion(skeleton, i, units[names.index(parent)], units[names.index(child)], spacing_s)
         )
     progress(len(pairs), len(pairs))
-    return _assemble(skeleton, suit, stance, joints)
+    found = _assemble(skeleton, suit, stance, joints)
+    return replace(found, refused=contradicted | found.refused, evidence=evidence)
 
 
 def posture(suit: Oriented, mounting: Mounting) -> Array:
@@ -117,7 +128,7 @@ def _assemble(skeleton: Skeleton, suit: Oriented, stance: slice, joints: list[Jo
             nodes[name] = _node(skeleton, name, q_stance[name], island, axes, facing, joints)
     limits = (stance.start / suit.rate_hz, stance.stop / suit.rate_hz)
     joints = [_with_flexion(skeleton, suit, joint, nodes) for joint in joints]
-    return Mounting({name: nodes[name] for name in suit.names if name in nodes}, refused, joints, limits)
+    return Mounting({name: nodes[name] for name in suit.names if name in nodes}, refused, joints, limits, {})
 
 
 def _node(

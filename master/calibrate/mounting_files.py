@@ -64,6 +64,7 @@ def calibrated(recordings: Mapping[str, NodeRecording], folder: Path) -> dict[st
             gyr_rad_s=_mapped(file.gyroscope, raw.gyr_rad_s),
             mag_ut=None if raw.mag_ut is None else _mapped(file.magnetometer, raw.mag_ut),
             counts=False,
+            as_read=raw,
         )
     return out
 

@@ -35,6 +35,8 @@ class NodeRecording:
     """(T, 3), sensor frame; None without a magnetometer."""
     counts: bool = False
     """True: the three arrays hold the converters' raw counts, of which the unit is not known."""
+    as_read: NodeRecording | None = None
+    """Where a calibration has been applied, the readings before it: only those show the ends of a range."""
 
     @property
     def duration_s(self) -> float:

@@ -158,7 +158,7 @@ def _mount(
         refusals.append(f"mount: {error}")
         return {"refused": {"": str(error)}}
     write_mounting(mounting, session.worn, folder, day)
-    if choice.pictures:
+    if choice.pictures and mounting.nodes:
         draw_angles(nodes, config.skeleton, mounting, folder / "mounting.png")
     console.print(nodes_table(mounting), joints_table(mounting))
     refusals += [f"mount: {name}: {why}" for name, why in mounting.refused.items()]

@@ -1,0 +1,192 @@
+"""The gyroscope's turns against gravity's: whether both sensors of a unit tell of one and the same motion.
+
+Turned back by the gyroscope's rates, the specific force of some seconds averages to gravity, always in the
+same direction: f̄ = (1/T) ∫ R(t) f(t) dt = g + Δv / T. Rates in another unit, an axis that is negated or
+exchanged, a clipped gyroscope, or a unit that was turned between two samples scatter it. Each guess of what
+is wrong (the 48 signed permutations of the gyroscope's axes, and other units) is tried: one that fits clearly
+better than the readings as they are names the fault.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.quaternion import Array, from_rotation_vector, multiply, rotate
+from master.calibrate.evidence import Evidence, compare, not_judged
+
+WINDOW_S = 6.0
+_BLOCKS = 3
+"""A window's force is averaged over each third; their scatter is what counts."""
+_THINNED_HZ = 50.0
+_FEWEST_WINDOWS = 2
+_MOST_WINDOWS = 60
+WORST_SCATTER = 0.15
+"""RMS scatter, as a share of gravity, beyond which both contradict each other. A person jogging scatters a
+foot by 0.07, a simulated foot by 0.08."""
+_BETTER = 0.75
+"""Another guess must leave less than this share of the scatter to be the cause."""
+_LEAST_GAIN = 0.004
+"""And so much less of gravity: below that the unit hardly turned."""
+_TOLD = 0.01
+"""Scatter of a wrong guess from which on the motion tells the right one from it."""
+_DEG = math.pi / 180.0
+_UNITS = {_DEG: "°/s", 1e-3 * _DEG: "thousandths of °/s", 1.0 / _DEG: "radians that were converted twice"}
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """How the gyroscope and gravity agree, and what would explain it better."""
+
+    scatter: float
+    """RMS over the windows, as a share of gravity."""
+    by_window: Array
+    """(K,) of each window."""
+    window_s: float
+    step_s: float
+    """From one window's begin to the next."""
+    best: Array
+    """(3, 3): the guess that fits best, times the readings; the identity where no other is clearly better."""
+    best_scatter: float
+    typical: float
+    """Median scatter of all wrong guesses: near 0 where the unit hardly turned."""
+
+
+def gyro_gravity(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> Agreement | None:
+    """Compare over a recording (T, 3), its gaps bridged; None where it is too short."""
+    thin = max(1, round(rate_hz / _THINNED_HZ))
+    length = len(acc_m_s2) // thin * thin
+    acc = acc_m_s2[:length].reshape(-1, thin, 3).mean(axis=1)
+    gyr = gyr_rad_s[:length].reshape(-1, thin, 3).mean(axis=1)
+    rate_hz /= thin
+    samples = round(WINDOW_S * rate_hz / _BLOCKS) * _BLOCKS
+    if len(acc) < (_FEWEST_WINDOWS + 1) * samples // 2:
+        return None
+    gyr = gyr - _bias(gyr, rate_hz)
+    turning = np.linalg.norm(gyr, axis=1)
+    gravity = float(np.median(np.linalg.norm(acc[turning <= np.quantile(turning, 0.1)], axis=1)))
+    step = max(samples // 2, (len(acc) - samples) // _MOST_WINDOWS)
+    first = np.arange(0, len(acc) - samples + 1, step)
+    rows = first[:, None] + np.arange(samples)
+    guesses = _guesses()
+    by_window = _scatter(acc[rows] / max(gravity, 1e-9), gyr[rows] / rate_hz, guesses)
+    scatter = np.sqrt(np.mean(by_window**2, axis=1))
+    best = int(np.argmin(scatter))
+    clearly = scatter[best] < _BETTER * scatter[0] and scatter[0] - scatter[best] > _LEAST_GAIN
+    best = best if clearly else 0
+    return Agreement(
+        float(scatter[0]),
+        by_window[0],
+        samples / rate_hz,
+        step / rate_hz,
+        guesses[best],
+        float(scatter[best]),
+        float(np.median(scatter[1:48])),
+    )
+
+
+def judge_agreement(found: Agreement | None) -> list[Evidence]:
+    """Units of the gyroscope first, then its axes, then whatever else makes both contradict each other."""
+    of_unit, of_axes = "the gyroscope's unit, by gravity's turns", "the gyroscope's axes, by gravity's turns"
+    if found is None:
+        why = f"the recording is shorter than {1.5 * WINDOW_S:.0f} s"
+        return [not_judged(of_axes, WORST_SCATTER, "g", why)]
+    if found.typical < _TOLD:
+        return [not_judged(of_axes, WORST_SCATTER, "g", "the unit hardly turned")]
+    scale = float(np.abs(found.best).max())
+    other = bool(np.any(found.best != np.eye(3)))
+    limit = found.scatter if not other else found.best_scatter
+    by = f"it scatters gravity by {found.scatter:.2f} g, and by {found.best_scatter:.2f} g otherwise"
+    return [
+        compare(
+            of_unit,
+            found.scatter,
+            limit if not math.isclose(scale, 1.0) else math.inf,
+            "g",
+            f"its gyroscope seems to read {_unit(scale)}, expected rad/s ({by}); convert the recording to "
+            "rad/s, or set the node's scale",
+        ),
+        compare(
+            of_axes,
+            found.scatter,
+            limit if other and math.isclose(scale, 1.0) else math.inf,
+            "g",
+            f"its gyroscope contradicts gravity: {describe(found.best)} ({by}); set the axes in the node's "
+            "firmware or its DBC, and record again",
+        ),
+        compare(
+            "gyroscope against gravity",
+            found.scatter,
+            WORST_SCATTER,
+            "g",
+            f"its gyroscope and its accelerometer do not tell of one motion (gravity scatters by "
+            f"{found.scatter:.2f} g, expected below {WORST_SCATTER:g} g): look whether the gyroscope is "
+            "clipped, its bias wanders, or the unit slipped; then calibrate it (`tandem calibrate imu`)",
+        ),
+    ]
+
+
+def describe(guess: Array) -> str:
+    """In words, what a signed permutation (3, 3) times the readings would put right."""
+    if np.array_equal(guess, -np.eye(3)):
+        return "all its axes, or all the accelerometer's, seem mirrored (a left-handed frame)"
+    signs = guess.sum(axis=1)
+    source = np.argmax(np.abs(guess), axis=1)
+    said = []
+    moved = [i for i in range(3) if source[i] != i]
+    if moved:
+        said.append(f"its axes {' and '.join('xyz'[i] for i in moved)} seem exchanged with each other")
+    negated = [i for i in range(3) if signs[i] < 0]
+    if negated:
+        said.append(f"its axis {' and '.join('xyz'[source[i]] for i in negated)} seems negated")
+    return ", ".join(said)
+
+
+def _bias(gyr: Array, rate_hz: float) -> Array:
+    """What the gyroscope reads (3,) in the quietest second; 0 where it never rests."""
+    width = max(2, round(rate_hz))
+    second = gyr[: len(gyr) // width * width].reshape(-1, width, 3)
+    spread = np.linalg.norm(second.std(axis=1), axis=1)
+    quietest = int(np.argmin(spread))
+    # in any unit: a person at rest sways a hundredth of what they move
+    if spread[quietest] > 0.1 * float(np.median(np.linalg.norm(gyr, axis=1))):
+        return np.zeros(3)
+    return np.asarray(second[quietest].mean(axis=0))
+
+
+def _unit(scale: float) -> str:
+    return next((name for s, name in _UNITS.items() if math.isclose(s, scale)), f"{scale:g} × rad/s")
+
+
+def _guesses() -> Array:
+    """(G, 3, 3), the identity first, then the other signed permutations, then other units."""
+    turns = []
+    for place in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), place] = signs
+            turns.append(matrix)
+    # itertools begins with the identity
+    return np.array([*turns, *(_DEG * turn for turn in turns), 1e-3 * _DEG * np.eye(3), np.eye(3) / _DEG])
+
+
+def _scatter(force: Array, turn_rad: Array, guesses: Array) -> Array:
+    """(G, K) of windows (K, n, 3): how far each third's mean force is from one vector of length 1."""
+    count, length = force.shape[:2]
+    q = np.zeros((len(guesses), count, 4))
+    q[..., 0] = 1.0
+    means = np.zeros((_BLOCKS, len(guesses), count, 3))
+    for k in range(length):
+        # the force is felt half-way through the sample's turn
+        half = from_rotation_vector(0.5 * np.einsum("gij,kj->gki", guesses, turn_rad[:, k]))
+        q = multiply(q, half)
+        means[k * _BLOCKS // length] += rotate(q, np.broadcast_to(force[:, k], (len(guesses), count, 3)))
+        q = multiply(q, half)
+    means *= _BLOCKS / length
+    mean = means.mean(axis=0)
+    spread = np.mean(np.sum((means - mean) ** 2, axis=-1), axis=0)
+    out: Array = np.sqrt(spread + (np.linalg.norm(mean, axis=-1) - 1.0) ** 2)
+    return out

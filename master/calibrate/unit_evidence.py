@@ -1,0 +1,126 @@
+"""Whether one unit's readings can be believed at all, before anything is concluded from them.
+
+In the order of how likely each cause is: the accelerometer's unit and calibration by gravity at rest, the
+gyroscope alive, both within their ranges, the gyroscope's unit and axes by gravity's turns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from common.quaternion import Array
+from master.calibrate.clipped import clipped, range_ends
+from master.calibrate.evidence import Evidence, compare
+from master.calibrate.gyro_gravity import gyro_gravity, judge_agreement
+from master.calibrate.oriented import LONGEST_GAP_S, bridged, longest_gap
+from master.calibrate.recording import NodeRecording
+
+GRAVITY_M_S2 = 9.80665
+WORST_GRAVITY = 0.06
+"""Error of gravity's norm at rest, as a share. A worn unit's is 0.001 to 0.035; it tilts the unit so much."""
+_CLIPPED_GYRO_S = 0.05
+"""Each clipped sample loses a part of the turn, and turns the heading for the rest of the recording."""
+_CLIPPED_ACC = 0.01
+_LEAST_GYRO_RAD_S, _LEAST_ACC_M_S2 = 1.0, 12.0
+"""No sensor's range ends below these."""
+_OTHER_UNITS = {
+    "g": 1.0,
+    "thousandths of g": 1000.0,
+    "cm/s²": 100.0 * GRAVITY_M_S2,
+    "feet/s²": GRAVITY_M_S2 / 0.3048,
+}
+
+
+def rest_gravity(acc_m_s2: Array, gyr: Array) -> float:
+    """Median norm of the force (T, 3) where the unit turns least.
+
+    A walking thigh feels a quarter more than gravity most of the time.
+    """
+    rate = np.linalg.norm(gyr, axis=1)
+    return float(np.median(np.linalg.norm(acc_m_s2[rate <= np.quantile(rate, 0.1)], axis=1)))
+
+
+def unit_evidence(recording: NodeRecording) -> list[Evidence]:
+    """All checks of one unit, the likeliest cause first; readings in SI units, short gaps are left out."""
+    there = _complete(recording)
+    if there.contradicts:
+        return [there]
+    acc = bridged(recording.acc_m_s2, recording.name, recording.rate_hz)
+    gyr = bridged(recording.gyr_rad_s, recording.name, recording.rate_hz)
+    norm = rest_gravity(acc, gyr)
+    out = [there, _gravity(norm), _alive(gyr)]
+    if any(e.contradicts for e in out):
+        return out
+    return [*out, *clipping(recording), *judge_agreement(gyro_gravity(acc, gyr, recording.rate_hz))]
+
+
+def clipping(recording: NodeRecording) -> list[Evidence]:
+    """Time in which the gyroscope stood at an end of its range, and the accelerometer's share of samples."""
+    read = recording.as_read or recording
+    gyr, acc = read.gyr_rad_s, read.acc_m_s2
+    if read.counts:
+        # whole counts hold the very top of a slow turn for three samples now and then
+        gyr_out, acc_out = clipped(gyr, 0.0, run=4), clipped(acc, 0.0, run=4)
+    else:
+        gyr_out, acc_out = clipped(gyr, _LEAST_GYRO_RAD_S), clipped(acc, _LEAST_ACC_M_S2)
+    seconds, share = float(gyr_out.sum()) / read.rate_hz, float(acc_out.mean())
+    gyro_unit, acc_unit = ("counts", "counts") if read.counts else ("rad/s", "m/s²")
+    return [
+        compare(
+            "gyroscope within its range",
+            seconds,
+            _CLIPPED_GYRO_S,
+            "s",
+            f"its gyroscope is clipped for {seconds:.2f} s ({range_ends(gyr, gyr_out)} {gyro_unit}); set a "
+            "larger range, or move more slowly, and record again",
+        ),
+        compare(
+            "accelerometer within its range",
+            share,
+            _CLIPPED_ACC,
+            "share",
+            f"its accelerometer is clipped in {share:.1%} of the samples ({range_ends(acc, acc_out)} "
+            f"{acc_unit}); set a larger range, and record again",
+        ),
+    ]
+
+
+def _complete(recording: NodeRecording) -> Evidence:
+    gap = max(longest_gap(recording.acc_m_s2), longest_gap(recording.gyr_rad_s))
+    return compare(
+        "samples without long gaps",
+        (gap - 1) / recording.rate_hz,
+        max(1.0 / recording.rate_hz, LONGEST_GAP_S - 1.0 / recording.rate_hz),
+        "s",
+        f"its samples are missing for more than {LONGEST_GAP_S:g} s; look at its cable or the bus, and "
+        "record again",
+    )
+
+
+def _gravity(norm: float) -> Evidence:
+    """The unit of the accelerometer by its norm at rest."""
+    said = f"its accelerometer reads {norm:.4g} m/s² at rest; expected about 9.81"
+    unit = next((u for u, one in _OTHER_UNITS.items() if abs(norm / one - 1.0) < 0.1), None)
+    if unit is not None:
+        advice = f"{said}: these seem to be {unit}. Convert the recording to m/s², or set the node's scale"
+    elif abs(norm / GRAVITY_M_S2 - 1.0) < 0.5:
+        advice = f"{said}. Calibrate it first (`tandem calibrate imu`)"
+    else:
+        advice = f"{said}: another unit, raw counts, or it is broken. Look at the node's scale, or replace it"
+    return compare(
+        "norm at rest against gravity", abs(norm / GRAVITY_M_S2 - 1.0), WORST_GRAVITY, "share", advice
+    )
+
+
+def _alive(gyr: Array) -> Evidence:
+    constant = np.ptp(gyr, axis=0) == 0.0
+    # a perfect sensor, as in a simulation, reads zero about an axis about which nothing turns
+    noisy = constant.all() or bool(np.median(np.abs(np.diff(gyr[:, ~constant], axis=0)).min(axis=1)) > 0.0)
+    dead = [name for name, stuck in zip("xyz", constant.tolist(), strict=True) if stuck and noisy]
+    return compare(
+        "gyroscope alive",
+        float(len(dead)),
+        0.0,
+        "axes",
+        f"its gyroscope says the same all the time on {', '.join(dead)}; is it alive? Replace the node",
+    )
