@@ -1,7 +1,7 @@
 """Whether one unit's readings can be believed at all, before anything is concluded from them.
 
-In the order of how likely each cause is: the accelerometer's unit and calibration by gravity at rest, the
-gyroscope alive, both within their ranges, the gyroscope's unit and axes by gravity's turns.
+In the order of how likely each cause is: samples missing, the gyroscope dead, the accelerometer's unit and
+calibration by gravity at rest, both within their ranges, the gyroscope's unit and axes by gravity's turns.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from common.quaternion import Array
 from master.calibrate.clipped import clipped, range_ends
-from master.calibrate.evidence import Evidence, compare
+from master.calibrate.evidence import Evidence, compare, not_judged
 from master.calibrate.gyro_gravity import gyro_gravity, judge_agreement
 from master.calibrate.oriented import LONGEST_GAP_S, bridged, longest_gap
 from master.calibrate.recording import NodeRecording
@@ -18,6 +18,7 @@ from master.calibrate.recording import NodeRecording
 GRAVITY_M_S2 = 9.80665
 WORST_GRAVITY = 0.06
 """Error of gravity's norm at rest, as a share. A worn unit's is 0.001 to 0.035; it tilts the unit so much."""
+_SHORTEST_S = 2.0
 _CLIPPED_GYRO_S = 0.05
 """Each clipped sample loses a part of the turn, and turns the heading for the rest of the recording."""
 _CLIPPED_ACC = 0.01
@@ -42,13 +43,15 @@ def rest_gravity(acc_m_s2: Array, gyr: Array) -> float:
 
 def unit_evidence(recording: NodeRecording) -> list[Evidence]:
     """All checks of one unit, the likeliest cause first; readings in SI units, short gaps are left out."""
+    if recording.duration_s < _SHORTEST_S:
+        return [not_judged("everything", _SHORTEST_S, "s", f"it is {recording.duration_s:.1f} s long")]
     there = _complete(recording)
     if there.contradicts:
         return [there]
     acc = bridged(recording.acc_m_s2, recording.name, recording.rate_hz)
     gyr = bridged(recording.gyr_rad_s, recording.name, recording.rate_hz)
     norm = rest_gravity(acc, gyr)
-    out = [there, _gravity(norm), _alive(gyr)]
+    out = [there, _alive(gyr), _gravity(norm)]
     if any(e.contradicts for e in out):
         return out
     return [*out, *clipping(recording), *judge_agreement(gyro_gravity(acc, gyr, recording.rate_hz))]

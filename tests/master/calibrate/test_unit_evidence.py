@@ -22,13 +22,9 @@ Spoil = Callable[[Array, Array], tuple[Array, Array]]
 
 @pytest.fixture(scope="module")
 def units() -> dict[str, NodeRecording]:
-    """Arms and legs of two simulated persons; a pelvis that never moves is left out."""
-    out = {}
-    for seed in (3, 4):
-        for profile in ("nursing", "lower_limb"):
-            nodes = wear(profile, seed).nodes
-            out |= {f"{seed} {name}": unit for name, unit in nodes.items() if name != "pelvis"}
-    return out
+    """Arms and legs of simulated persons; a pelvis that never moves is left out."""
+    nodes = {**wear("nursing", 3).nodes, **wear("lower_limb", 4).nodes}
+    return {name: unit for name, unit in nodes.items() if name != "pelvis"}
 
 
 def said(unit: NodeRecording, spoil: Spoil = lambda acc, gyr: (acc, gyr)) -> str | None:
@@ -78,14 +74,14 @@ def test_each_fault_is_told_by_its_likeliest_cause(
     """Of a chest or head that hardly turned a fault may go unnoticed; never of a limb."""
     for name, unit in units.items():
         text = said(unit, spoil)
-        if text is None and name.endswith(("chest", "head")):
+        if text is None and name in ("chest", "head"):
             continue
         assert text is not None, name
         assert re.search(expected, text), (name, text)
 
 
 def test_clipping_is_judged_on_the_readings_before_their_calibration(units: dict[str, NodeRecording]) -> None:
-    unit = units["3 left_forearm"]
+    unit = units["left_forearm"]
     cut = replace(unit, gyr_rad_s=np.clip(unit.gyr_rad_s, -2.0, 2.0))
     mixed = np.eye(3) + 0.01 * np.ones((3, 3))
     mapped = replace(cut, gyr_rad_s=cut.gyr_rad_s @ mixed, as_read=cut)
