@@ -108,20 +108,7 @@ def as_report(found: Mounting, recording: Path) -> dict[str, Any]:
         },
         "joints": {joint.segment: _joint(joint) for joint in found.joints},
         "refused": found.refused,
-        "evidence": {
-            name: [
-                {
-                    "compared": e.compared,
-                    "figure": None if math.isnan(e.figure) else e.figure,
-                    "limit": e.limit if math.isfinite(e.limit) else None,
-                    "unit": e.unit,
-                    "verdict": e.verdict,
-                    "advice": e.advice,
-                }
-                for e in evidence
-            ]
-            for name, evidence in found.evidence.items()
-        },
+        "evidence": {name: [e.as_report() for e in evidence] for name, evidence in found.evidence.items()},
     }
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.quaternion import Array, from_rotation_vector, multiply, rotate
-from master.calibrate.evidence import Evidence, compare, not_judged
+from master.calibrate.evidence import Evidence, at_most, not_judged
 
 WINDOW_S = 6.0
 _BLOCKS = 3
@@ -93,36 +93,38 @@ def judge_agreement(found: Agreement | None) -> list[Evidence]:
     of_unit, of_axes = "the gyroscope's unit, by gravity's turns", "the gyroscope's axes, by gravity's turns"
     if found is None:
         why = f"the recording is shorter than {1.5 * WINDOW_S:.0f} s"
-        return [not_judged(of_axes, WORST_SCATTER, "g", why)]
+        return [not_judged(of_axes, why)]
     if found.typical < _TOLD:
-        return [not_judged(of_axes, WORST_SCATTER, "g", "the unit hardly turned")]
+        return [not_judged(of_axes, "the unit hardly turned")]
     scale = float(np.abs(found.best).max())
-    other = bool(np.any(found.best != np.eye(3)))
-    limit = found.scatter if not other else found.best_scatter
+    other_unit = not math.isclose(scale, 1.0)
+    other_axes = not other_unit and bool(np.any(found.best != np.eye(3)))
+    # another guess that is clearly better sets the limit by itself
+    limit = found.best_scatter if other_unit or other_axes else WORST_SCATTER
     by = f"it scatters gravity by {found.scatter:.2f} g, and by {found.best_scatter:.2f} g otherwise"
     return [
-        compare(
+        at_most(
             of_unit,
             found.scatter,
-            limit if not math.isclose(scale, 1.0) else math.inf,
+            limit if other_unit else max(found.scatter, WORST_SCATTER),
             "g",
-            f"its gyroscope seems to read {_unit(scale)}, expected rad/s ({by}); convert the recording to "
-            "rad/s, or set the node's scale",
+            advice=f"its gyroscope seems to read {_unit(scale)}, expected rad/s ({by}); convert the "
+            "recording to rad/s, or set the node's scale",
         ),
-        compare(
+        at_most(
             of_axes,
             found.scatter,
-            limit if other and math.isclose(scale, 1.0) else math.inf,
+            limit if other_axes else max(found.scatter, WORST_SCATTER),
             "g",
-            f"its gyroscope contradicts gravity: {describe(found.best)} ({by}); set the axes in the node's "
-            "firmware or its DBC, and record again",
+            advice=f"its gyroscope contradicts gravity: {describe(found.best)} ({by}); set the axes in the "
+            "node's firmware or its DBC, and record again",
         ),
-        compare(
+        at_most(
             "gyroscope against gravity",
             found.scatter,
             WORST_SCATTER,
             "g",
-            f"its gyroscope and its accelerometer do not tell of one motion (gravity scatters by "
+            advice="its gyroscope and its accelerometer do not tell of one motion (gravity scatters by "
             f"{found.scatter:.2f} g, expected below {WORST_SCATTER:g} g): look whether the gyroscope is "
             "clipped, its bias wanders, or the unit slipped; then calibrate it (`tandem calibrate imu`)",
         ),

@@ -10,7 +10,7 @@ import numpy as np
 
 from common.quaternion import Array
 from master.calibrate.clipped import clipped, range_ends
-from master.calibrate.evidence import Evidence, compare, not_judged
+from master.calibrate.evidence import Evidence, at_most, not_judged
 from master.calibrate.gyro_gravity import gyro_gravity, judge_agreement
 from master.calibrate.oriented import LONGEST_GAP_S, bridged, longest_gap
 from master.calibrate.recording import NodeRecording
@@ -44,7 +44,7 @@ def rest_gravity(acc_m_s2: Array, gyr: Array) -> float:
 def unit_evidence(recording: NodeRecording) -> list[Evidence]:
     """All checks of one unit, the likeliest cause first; readings in SI units, short gaps are left out."""
     if recording.duration_s < _SHORTEST_S:
-        return [not_judged("everything", _SHORTEST_S, "s", f"it is {recording.duration_s:.1f} s long")]
+        return [not_judged("everything", f"it is {recording.duration_s:.1f} s long")]
     there = _complete(recording)
     if there.contradicts:
         return [there]
@@ -69,20 +69,20 @@ def clipping(recording: NodeRecording) -> list[Evidence]:
     seconds, share = float(gyr_out.sum()) / read.rate_hz, float(acc_out.mean())
     gyro_unit, acc_unit = ("counts", "counts") if read.counts else ("rad/s", "m/s²")
     return [
-        compare(
+        at_most(
             "gyroscope within its range",
             seconds,
             _CLIPPED_GYRO_S,
             "s",
-            f"its gyroscope is clipped for {seconds:.2f} s ({range_ends(gyr, gyr_out)} {gyro_unit}); set a "
-            "larger range, or move more slowly, and record again",
+            advice=f"its gyroscope is clipped for {seconds:.2f} s ({range_ends(gyr, gyr_out)} {gyro_unit}); "
+            "set a larger range, or move more slowly, and record again",
         ),
-        compare(
+        at_most(
             "accelerometer within its range",
             share,
             _CLIPPED_ACC,
-            "share",
-            f"its accelerometer is clipped in {share:.1%} of the samples ({range_ends(acc, acc_out)} "
+            "",
+            advice=f"its accelerometer is clipped in {share:.1%} of the samples ({range_ends(acc, acc_out)} "
             f"{acc_unit}); set a larger range, and record again",
         ),
     ]
@@ -90,13 +90,13 @@ def clipping(recording: NodeRecording) -> list[Evidence]:
 
 def _complete(recording: NodeRecording) -> Evidence:
     gap = max(longest_gap(recording.acc_m_s2), longest_gap(recording.gyr_rad_s))
-    return compare(
+    return at_most(
         "samples without long gaps",
         (gap - 1) / recording.rate_hz,
         max(1.0 / recording.rate_hz, LONGEST_GAP_S - 1.0 / recording.rate_hz),
         "s",
-        f"its samples are missing for more than {LONGEST_GAP_S:g} s; look at its cable or the bus, and "
-        "record again",
+        advice=f"its samples are missing for more than {LONGEST_GAP_S:g} s; look at its cable or the bus, "
+        "and record again",
     )
 
 
@@ -110,8 +110,8 @@ def _gravity(norm: float) -> Evidence:
         advice = f"{said}. Calibrate it first (`tandem calibrate imu`)"
     else:
         advice = f"{said}: another unit, raw counts, or it is broken. Look at the node's scale, or replace it"
-    return compare(
-        "norm at rest against gravity", abs(norm / GRAVITY_M_S2 - 1.0), WORST_GRAVITY, "share", advice
+    return at_most(
+        "norm at rest against gravity", abs(norm / GRAVITY_M_S2 - 1.0), WORST_GRAVITY, advice=advice
     )
 
 
@@ -120,10 +120,11 @@ def _alive(gyr: Array) -> Evidence:
     # a perfect sensor, as in a simulation, reads zero about an axis about which nothing turns
     noisy = constant.all() or bool(np.median(np.abs(np.diff(gyr[:, ~constant], axis=0)).min(axis=1)) > 0.0)
     dead = [name for name, stuck in zip("xyz", constant.tolist(), strict=True) if stuck and noisy]
-    return compare(
+    return at_most(
         "gyroscope alive",
         float(len(dead)),
         0.0,
         "axes",
-        f"its gyroscope says the same all the time on {', '.join(dead)}; is it alive? Replace the node",
+        advice=f"its gyroscope says the same all the time on {', '.join(dead)}; is it alive? "
+        "Replace the node",
     )
