@@ -32,7 +32,8 @@ def drives(
 ) -> None:
     """Run the simulated drives: CiA 402 drives as CANopen nodes that turn the simulated robot.
 
-    Faults also on demand: write their number to object 2010h of a drive.
+    Faults also on demand: write their number to object 2010h of a drive. The slave takes whoever does so
+    for a second master, and stops.
 
     Example: `tandem drives deploy/examples/slave.toml --fault left_elbow_pitch=over-current@10`
     """

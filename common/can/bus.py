@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 import can
 
 from common.can.config import BusConfig
+from common.can.echo import Echo
 from common.can.frame import Frame
 from common.can.interface import descriptor, error_number, open_bus
 from common.can.quiet import OncePerSecond
@@ -52,6 +53,8 @@ class BusCounters:
     """Datagrams of a udp_multicast group that are no CAN frame."""
     own_heard: int = 0
     """Frames with an identifier this side sends: its echo on udp_multicast, elsewhere a second sender."""
+    second_sender: int = 0
+    """Those of them that are no echo: another program, or device, sends what only this side should."""
     foreign: int = 0
     """Frames with a 29-bit identifier, and remote frames: not of this protocol."""
     error_frames: int = 0
@@ -79,13 +82,19 @@ class CanBus:
         on_frame: OnFrame,
         on_change: OnChange | None = None,
         opener: Opener = open_bus,
+        *,
+        on_second_sender: OnFrame | None = None,
     ) -> None:
+        """`on_second_sender` is told of frames with an identifier of this side's that it did not send."""
         self.name = config.name
         self.counters = BusCounters()
         self.last_error = ""
         self._config = config
         self._on_frame = on_frame
         self._on_change = on_change
+        self._on_second_sender = on_second_sender
+        echoes = config.interface == "udp_multicast" or bool(config.options.get("receive_own_messages"))
+        self._echo = Echo(echoes)
         self._opener = opener
         self._bus: can.BusABC | None = None
         self._reader: Reader | None = None
@@ -125,6 +134,8 @@ class CanBus:
     def send(self, frame: Frame) -> None:
         """Send without waiting. Never raises: what cannot be sent is counted, and brings the bus down."""
         self._sent_ids.add(frame.id)
+        if self._on_second_sender is not None:
+            self._echo.sent(frame.id, frame.data, monotonic_ns())
         bus = self._bus
         if bus is None:
             self.counters.send_errors += 1
@@ -166,10 +177,18 @@ class CanBus:
             counters.foreign += 1
         elif frame_id in self._sent_ids:
             counters.own_heard += 1
+            if self._on_second_sender is not None:
+                self._on_own_id(frame_id, bytes(message.data))
         else:
             counters.received += 1
             self._attempt = 0
             self._on_frame(self.name, frame_id, bytes(message.data), monotonic_ns())
+
+    def _on_own_id(self, frame_id: int, data: bytes) -> None:
+        now_ns = monotonic_ns()
+        if self._on_second_sender is not None and not self._echo.is_ours(frame_id, data, now_ns):
+            self.counters.second_sender += 1
+            self._on_second_sender(self.name, frame_id, data, now_ns)
 
     def _on_error_frame(self, error_id: int) -> None:
         self.counters.error_frames += 1

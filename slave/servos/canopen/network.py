@@ -22,12 +22,13 @@ from slave.servos.canopen.cia402 import ENABLED_BITS, SHUTDOWN, STATE_BITS
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drive import Drive, Phase
 from slave.servos.canopen.emergency import HEARTBEAT_MISSED, emergency
+from slave.servos.canopen.second_master import SecondMaster
 from slave.servos.canopen.setup import transfers
 from slave.servos.servos import EncoderReading
 
 Outgoing = tuple[str, int, bytes]
 """Bus name, identifier, data."""
-_START, _PRE_OPERATIONAL = 0x01, 0x80
+_START, _STOP, _PRE_OPERATIONAL = 0x01, 0x02, 0x80
 """NMT commands."""
 _BOOTED, _OPERATIONAL = 0x00, 0x05
 """NMT states in a heartbeat."""
@@ -45,6 +46,10 @@ class DriveNetwork:
         self._where = [(drive.bus, drive.id) for drive in drives]
         self._by_tpdo = {(bus, pdo.TPDO1 + n): i for i, (bus, n) in enumerate(self._where)}
         self._by_node = {where: i for i, where in enumerate(self._where)}
+        nodes: dict[str, dict[int, str]] = {bus.name: {} for bus in config.buses}
+        for joint, (bus_name, node_id) in zip(self._names, self._where, strict=True):
+            nodes.setdefault(bus_name, {})[node_id] = joint
+        self.second_master = SecondMaster(nodes, config.node_id)
         self._rpdo = [(bus, pdo.RPDO1 + n) for bus, n in self._where]
         self._drives = [
             Drive(transfers(config, drive, joint))
@@ -89,14 +94,21 @@ class DriveNetwork:
     # in
 
     def start(self, now_ns: int) -> None:
-        """Configure every drive afresh, then enable it."""
+        """Configure every drive afresh, then enable it; not while a second master speaks."""
+        if not self._alone(now_ns):
+            return
         self._stopping = False
         for i in range(len(self._drives)):
             self._start(i, now_ns, configure=True)
         self._tell()
 
     def release(self, now_ns: int) -> None:
-        """After a stop: enable every drive again, and those that had failed, too."""
+        """After a stop: enable every drive again, and those that had failed, too.
+
+        Not while a second master speaks.
+        """
+        if not self._alone(now_ns):
+            return
         self._stopping = False
         for i in range(len(self._drives)):
             self._start(i, now_ns, configure=False)
@@ -116,7 +128,7 @@ class DriveNetwork:
         self._tell()
 
     def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
-        """One frame of any drive."""
+        """One frame that this side did not send: of a drive, or of a second master."""
         drive = self._by_tpdo.get((bus, frame_id))
         if drive is None:
             self._on_other(bus, frame_id, data, now_ns)
@@ -129,6 +141,9 @@ class DriveNetwork:
             self.unknown += 1
 
     def _on_other(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        if self.second_master.hear(bus, frame_id, now_ns):
+            self._on_second_master()
+            return
         i = self._by_node.get((bus, frame_id & 0x7F))
         if i is None:
             self.unknown += 1
@@ -157,8 +172,25 @@ class DriveNetwork:
             case _:
                 self.unknown += 1
 
+    def _alone(self, now_ns: int) -> bool:
+        if self.second_master.speaks(now_ns):
+            return False
+        self.second_master.forget()
+        return True
+
+    def _on_second_master(self) -> None:
+        """Stop all drives, by what two masters' controlwords cannot take turns at: NMT."""
+        if any(drive.phase is not Phase.FAILED for drive in self._drives):
+            for i, drive in enumerate(self._drives):
+                drive.fail("stopped", reconfigure=True)
+                self._nmt(i, _STOP)
+        self._tell()
+
     def _on_state(self, i: int, state: int, now_ns: int) -> None:
         drive = self._drives[i]
+        if self.second_master.buses and state == _OPERATIONAL:
+            self._nmt(i, _STOP)  # the other has started it again
+            return
         if drive.phase is Phase.CONFIGURING and state == _BOOTED:
             # what it was told before is forgotten, the slave's heartbeat that it shall watch for among it
             self._start(i, now_ns, configure=True)
@@ -199,6 +231,9 @@ class DriveNetwork:
         data = pdo.pack_targets(controlwords, targets)
         # a drive that may have stopped by itself meanwhile must not be told "enable" unseen: that moves it
         seen = (now_ns - self._known_ns < self._blind_ns).tolist()
+        if self.second_master.buses:
+            # its controlwords and these would lead each drive to and fro, SYNC by SYNC: NMT has stopped them
+            seen = [False] * len(seen)
         frames = zip(self._rpdo, data, seen, strict=True)
         out += [(bus, frame_id, part) for (bus, frame_id), part, told in frames if told]
         self._cycles += 1
@@ -237,12 +272,12 @@ class DriveNetwork:
     # within
 
     def _start(self, i: int, now_ns: int, configure: bool) -> None:
-        drive, (bus, node) = self._drives[i], self._where[i]
+        drive = self._drives[i]
         self._joined[i] = self._running[i] = False
         self._settled = False
         first = drive.start(now_ns, self._config.fault_reset, configure)
         if first is not None:
-            self.outbox.append((bus, pdo.NMT, bytes([_PRE_OPERATIONAL, node])))
+            self._nmt(i, _PRE_OPERATIONAL)
             self._ask(i, first)
         else:
             self._heard_ns[i] = self._answered_ns[i] = now_ns
@@ -252,9 +287,12 @@ class DriveNetwork:
         self.outbox.append((bus, pdo.SDO_REQUEST + node, data))
 
     def _operate(self, i: int, now_ns: int) -> None:
-        bus, node = self._where[i]
         self._heard_ns[i] = self._answered_ns[i] = now_ns
-        self.outbox.append((bus, pdo.NMT, bytes([_START, node])))
+        self._nmt(i, _START)
+
+    def _nmt(self, i: int, command: int) -> None:
+        bus, node = self._where[i]
+        self.outbox.append((bus, pdo.NMT, bytes([command, node])))
 
     def _supervise(self, fresh: Mask, now_ns: int) -> NDArray[np.uint16]:
         statusword = self._answers.statusword
@@ -308,8 +346,11 @@ class DriveNetwork:
 
     def _tell(self) -> None:
         said = {}
+        other = self.second_master.words
         for name, (bus, _), drive in zip(self._names, self._where, self._drives, strict=True):
             words = drive.words
+            if other:
+                words = "; ".join(filter(None, [other, words]))
             if bus in self._down:
                 words = "; ".join(filter(None, [f"bus {bus} is down: {self._down[bus]}", words]))
             if words:

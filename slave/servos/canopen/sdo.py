@@ -1,7 +1,8 @@
 """The client's side of SDO transfers (CiA 301, SDO protocol). Pure.
 
-Writes are expedited, at most 4 bytes each. A read may be answered in any form that the standard has: expedited
-with its size (4Fh, 4Bh, 47h, 43h), expedited without (42h), or segmented with its length (41h) or without (40h).
+Writes are expedited, at most 4 bytes each. A read may be answered in any form that the standard has:
+expedited with its size (4Fh, 4Bh, 47h, 43h), expedited without (42h), or segmented with its length (41h) or
+without (40h).
 """
 
 from __future__ import annotations

@@ -27,6 +27,8 @@ from slave.servos.canopen.pdo import RPDO1
 from slave.servos.servos import EncoderReading
 
 _POLL_S = 0.0005
+_LISTEN_NS = 250 * NS_PER_MS
+"""Before the first frame is sent: SYNC and heartbeat of a second master come several times within this."""
 _TOLD = 3
 """Of more drives than these only the number is told."""
 _EARLY_NS = 2 * NS_PER_MS
@@ -78,9 +80,12 @@ class CanopenServos:
         self._setpoint = None
         try:
             for config in self._config.buses:
-                bus = CanBus(config, self._on_frame, self._on_change, self._opener)
+                bus = CanBus(
+                    config, self._on_frame, self._on_change, self._opener, on_second_sender=self._on_frame
+                )
                 bus.open()
                 self._buses[config.name] = bus
+            self._listen()
             self._come_up()
         except BaseException:
             self.stop()
@@ -131,8 +136,19 @@ class CanopenServos:
             "sync_period_ms": self._period.summary(),
             "unanswered_syncs": self._network.unanswered,
             "unknown_frames": self._network.unknown,
+            "second_master_frames": self._network.second_master.frames,
             "buses": {name: bus.summary() for name, bus in self._buses.items()},
         }
+
+    def _listen(self) -> None:
+        """Say nothing for a while: a second master would take this one's first frame for an attack."""
+        until_ns = self._clock() + max(3 * self._period_ns, _LISTEN_NS)
+        while self._clock() < until_ns:
+            for bus in self._buses.values():
+                bus.read()
+            if other := self._network.second_master.words:
+                raise RobotError(f"{other}; nothing has been sent to the drives")
+            time.sleep(_POLL_S)
 
     def _come_up(self) -> None:
         now_ns = self._clock()
@@ -171,9 +187,9 @@ class CanopenServos:
         if self._synced_ns:
             self._period.record(synced_ns - self._synced_ns)
         self._synced_ns = synced_ns
-        # on the grid while on time; from now where a whole period was missed
+        # on the grid while on time; from now where a whole period was missed, or a stop or reset came between
         self._due_ns += self._period_ns
-        if self._due_ns <= now_ns - _EARLY_NS:
+        if not now_ns - _EARLY_NS < self._due_ns <= now_ns + self._period_ns + _EARLY_NS:
             self._due_ns = now_ns + self._period_ns
 
     def _flush(self) -> None:

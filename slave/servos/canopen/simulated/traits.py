@@ -25,7 +25,7 @@ class Traits:
     """Of one drive."""
 
     knows_16: bool = True
-    """Whether "enable operation" leads out of quick stop active: CiA 402 leaves transition 16 to the maker."""
+    """Whether "enable operation" leads out of quick stop active: transition 16, which is optional."""
     read_form: ReadForm = ReadForm.SIZED
     answers_after_ns: int = 0
     """How long it takes to answer an SDO request."""
