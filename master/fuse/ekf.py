@@ -21,9 +21,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from common.config import Section
 from common.messages import Mask
 from common.quaternion import (
     IDENTITY,
@@ -33,12 +33,16 @@ from common.quaternion import (
     multiply,
     to_matrix,
 )
-from master.fuse.mahony import initial_orientation
+from master.doubt import NodeDoubt
+from master.fuse.front import Front
+from master.fuse.gross_bias import BiasSection
+from master.fuse.mahony import begun_anew, initial_orientation
 from master.fuse.rest import Rest, RestState
 
 _GRAVITY_M_S2 = 9.81
 _EAST, _NORTH, _UP = 0, 1, 2
 _BIAS = slice(3, 6)
+_REACH_RAD_S = math.radians(1.9)
 _IDENTITY_6 = np.eye(6)
 _FAINTEST_UT = 1e-9
 _DIP_RAD = math.radians(100.0)
@@ -47,7 +51,7 @@ _ACCELERATED_TAU_S = 1.0
 _START_INCLINATION_RAD, _START_HEADING_RAD = 0.1, 0.2
 
 
-class EkfConfig(Section):
+class EkfConfig(BiasSection):
     """`[estimation.ekf]`. Noises are densities: the same values hold at every rate."""
 
     gyroscope_noise: float = Field(default=3e-3, gt=0.0, allow_inf_nan=False)
@@ -101,6 +105,7 @@ class EkfFilter:
     def __init__(self, config: EkfConfig, rate_hz: float, count: int) -> None:
         self._config = config
         self._period_s = 1.0 / rate_hz
+        self._front = Front(config.rest_bias_limit_deg_s, _REACH_RAD_S, rate_hz, count)
         self._rest = Rest()
         self._state = _State(
             q=np.tile(IDENTITY, (count, 1)),
@@ -117,9 +122,12 @@ class EkfFilter:
         """One tick's readings, (n, 3) each."""
         config, state = self._config, self._state
         dt_s = self._period_s if dt_s is None else dt_s
+        gyr_rad_s, acc_m_s2, mag_ut = self._front.take(gyr_rad_s, acc_m_s2, mag_ut, dt_s)
+        if self._front.corrected is not None:
+            self._begin_at_rest(self._front.corrected, acc_m_s2, mag_ut)
         state.q = propagate(state.q, gyr_rad_s - state.bias, dt_s)
         if not state.started.all():
-            self._start(~state.started, acc_m_s2, mag_ut)
+            self._start(~state.started & acc_m_s2.any(axis=1), acc_m_s2, mag_ut)
         matrix = to_matrix(state.q)
         covariance = predict(state.covariance, matrix, dt_s, config.gyroscope_noise**2, config.bias_walk**2)
         correction = np.zeros((len(covariance), 6))
@@ -138,15 +146,24 @@ class EkfFilter:
         state.covariance[new] = np.diag(np.square(deviations))
         state.started |= new
 
+    def _begin_at_rest(self, nodes: Mask, acc: Array, mag: Array) -> None:
+        """Let gravity and field set the orientation anew, by which a gross bias has dragged it."""
+        q = begun_anew(self._state.q[nodes], acc[nodes], mag[nodes])
+        self.restart(nodes)
+        self._start(nodes, acc, mag)
+        self._state.q[nodes] = q
+
     def _take_accelerometer(
         self, correction: Array, covariance: Array, matrix: Array, acc: Array, dt_s: float
     ) -> None:
         linear = np.einsum("nij,nj->ni", matrix, acc)
-        linear[:, _UP] -= _GRAVITY_M_S2
+        missing = ~acc.any(axis=1)
+        linear[~missing, _UP] -= _GRAVITY_M_S2
         mean = self._state.accelerated
         mean += min(1.0, dt_s / _ACCELERATED_TAU_S) * (np.einsum("ni,ni->n", linear, linear) - mean)
         calm = (self._config.accelerometer_noise / _GRAVITY_M_S2) ** 2 / dt_s
         variance = calm * (1.0 + mean / self._config.accelerated_m_s2**2)
+        variance[missing] = np.inf
         tilt = linear / _GRAVITY_M_S2
         scalar_update(correction, covariance, _EAST, tilt[:, _NORTH], variance)
         scalar_update(correction, covariance, _NORTH, -tilt[:, _EAST], variance)
@@ -206,10 +223,25 @@ class EkfFilter:
 
     def bias_rad_s(self) -> Array:
         """Gyro biases (n, 3)."""
-        return self._state.bias.copy()
+        return self._front.with_offset(self._state.bias.copy())
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Nodes whose gyros want a calibration, by number."""
+        return self._front.doubts()
+
+    @property
+    def spoilt(self) -> Mask | None:
+        """(n,) who had a reading that was none in the last update; None for nobody."""
+        return self._front.spoilt
+
+    @property
+    def skipped(self) -> NDArray[np.int64]:
+        """(n,) ticks with a reading that was none."""
+        return self._front.skipped
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
+        self._front.restart(nodes)
         state = self._state
         state.started[nodes] = False
         state.bias[nodes] = 0.0
@@ -220,13 +252,14 @@ class EkfFilter:
 
     def snapshot(self) -> object:
         """Orientation, bias, covariance, the usual field and what tells rest."""
-        return copy.deepcopy(self._state)
+        return copy.deepcopy(self._state), self._front.snapshot()
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
-        if not isinstance(snapshot, _State) or snapshot.q.shape != self._state.q.shape:
+        if not isinstance(snapshot, tuple) or snapshot[0].q.shape != self._state.q.shape:
             raise TypeError("not a snapshot of this filter")
-        self._state = copy.deepcopy(snapshot)
+        self._state = copy.deepcopy(snapshot[0])
+        self._front.restore(snapshot[1])
 
 
 def propagate(q: Array, rate_rad_s: Array, dt_s: float) -> Array:

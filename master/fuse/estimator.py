@@ -214,9 +214,16 @@ class Estimator:
         if changes.came.any():
             self._lowpass.restart(changes.came)
             self._bank.restart(changes.came)
-        filtered = self._lowpass.update(apply(self._affine, samples))
+        # what is absurd may overflow here; the filters leave it out
+        with np.errstate(over="ignore", invalid="ignore"):
+            filtered = self._lowpass.update(apply(self._affine, samples))
         self._gyr_rad_s = filtered[GYR]
         self._bank.update(filtered[GYR], filtered[ACC], filtered[MAG], dt_s)
+        spoilt = self._bank.spoilt
+        if spoilt is not None:
+            # a low-pass would pass it on for long
+            self._lowpass.restart(spoilt)
+            self._gyr_rad_s = np.where(spoilt[:, None], self._bank.bias_rad_s(), self._gyr_rad_s)
         if changes.settled.any():
             self._find(changes.settled, np.isfinite(filtered[MAG, :, 0]))
         if not self._stance.known.all():
@@ -242,7 +249,7 @@ class Estimator:
 
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes that are not believed, or not wholly, by their number."""
-        return {}
+        return self._bank.doubts()
 
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from common.messages import Mask
 from common.quaternion import Array
+from master.doubt import NodeDoubt
 
 FilterName = Literal["vqf", "mahony", "ekf"]
 """What a TOML calls the filters; `filters.py` makes them."""
@@ -36,6 +37,17 @@ class OrientationFilter(Protocol):
 
     def bias_rad_s(self) -> Array:
         """What the filter takes for the gyros' bias, (n, 3): the true rate is the reading minus this."""
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Nodes that the filter does not, or not wholly, believe, by their number."""
+
+    @property
+    def spoilt(self) -> Mask | None:
+        """(n,) who had a reading that was none in the last update; None for nobody."""
+
+    @property
+    def skipped(self) -> NDArray[np.int64]:
+        """(n,) ticks with a reading that was none (NaN, infinite, absurd), which was left out."""
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
@@ -86,6 +98,33 @@ class FilterBank:
         out = np.empty((self._count, 3))
         for rows, part in self._parts:
             out[rows] = part.bias_rad_s()
+        return out
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Doubted nodes by their number among all N."""
+        out = {}
+        for rows, part in self._parts:
+            places = np.arange(self._count)[rows].tolist()
+            out.update({places[node]: doubt for node, doubt in part.doubts().items()})
+        return out
+
+    @property
+    def spoilt(self) -> Mask | None:
+        """(N,), or None for nobody."""
+        out = None
+        for rows, part in self._parts:
+            spoilt = part.spoilt
+            if spoilt is not None:
+                out = np.zeros(self._count, dtype=np.bool_) if out is None else out
+                out[rows] = spoilt
+        return out
+
+    @property
+    def skipped(self) -> NDArray[np.int64]:
+        """(N,)."""
+        out = np.zeros(self._count, dtype=np.int64)
+        for rows, part in self._parts:
+            out[rows] = part.skipped
         return out
 
     def restart(self, nodes: Mask) -> None:

@@ -10,14 +10,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from common.config import Section
 from common.messages import Mask
-from common.quaternion import Array, cross, heading_turn, multiply, to_matrix
+from common.quaternion import Array, conjugate, cross, heading_rad, heading_turn, multiply, to_matrix
+from master.doubt import NodeDoubt
+from master.fuse.front import Front
+from master.fuse.gross_bias import BiasSection
+
+_REACH_RAD_S = np.radians(0.5)
+"""Its integral learns slowly, and about the vertical not at all without a magnetometer."""
 
 
-class MahonyConfig(Section):
+class MahonyConfig(BiasSection):
     """`[estimation.mahony]`."""
 
     # the best of a coarse grid over the BROAD trials at hand: 5.9° total; 0.35 to 0.74 lie within 0.4°
@@ -37,6 +43,7 @@ class _Snapshot:
     integral: Array
     pulled_rad: Array
     started: Mask
+    front: object
 
 
 class MahonyFilter:
@@ -45,6 +52,9 @@ class MahonyFilter:
     def __init__(self, config: MahonyConfig, rate_hz: float, count: int) -> None:
         self._config = config
         self._period_s = 1.0 / rate_hz
+        self._front = Front(
+            config.rest_bias_limit_deg_s if config.ki > 0.0 else 0.0, _REACH_RAD_S, rate_hz, count
+        )
         self._q = np.zeros((count, 4))
         self._q[:, 0] = 1.0
         self._error = np.zeros((count, 3))
@@ -59,16 +69,25 @@ class MahonyFilter:
     def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array, dt_s: float | None = None) -> None:
         """One tick's readings, (n, 3) each."""
         period_s = self._period_s if dt_s is None else dt_s
+        gyr_rad_s, acc_m_s2, mag_ut = self._front.take(gyr_rad_s, acc_m_s2, mag_ut, dt_s)
+        if self._front.corrected is not None:
+            self._begin_at_rest(self._front.corrected, acc_m_s2, mag_ut)
         rate = gyr_rad_s + self._config.kp * self._error + self._integral  # Eqs 10, 11
         self._q = integrate(self._q, rate, period_s)  # Eq. 12
         if not self._started.all():
-            new = ~self._started
+            new = ~self._started & acc_m_s2.any(axis=1)
             self._q[new] = initial_orientation(acc_m_s2[new], mag_ut[new])
             self._started[new] = True
         self._pulled_rad += (self._config.kp * period_s) * self._turn
         # taken at the orientation that belongs to these readings, and fed back in the next period
         self._error, self._turn = attitude_error(self._q, acc_m_s2, mag_ut)
         self._learn_bias(period_s)
+
+    def _begin_at_rest(self, nodes: Mask, acc: Array, mag: Array) -> None:
+        """Let gravity and field set the orientation anew, by which a gross bias has dragged it."""
+        q = begun_anew(self._q[nodes], acc[nodes], mag[nodes])
+        self.restart(nodes)
+        self._q[nodes], self._started[nodes] = q, True
 
     def _learn_bias(self, period_s: float) -> None:
         config = self._config
@@ -88,10 +107,25 @@ class MahonyFilter:
 
     def bias_rad_s(self) -> Array:
         """Gyro biases (n, 3): the integral with its sign turned."""
-        return -self._integral
+        return self._front.with_offset(-self._integral)
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Nodes whose gyros want a calibration, by number."""
+        return self._front.doubts()
+
+    @property
+    def spoilt(self) -> Mask | None:
+        """(n,) who had a reading that was none in the last update; None for nobody."""
+        return self._front.spoilt
+
+    @property
+    def skipped(self) -> NDArray[np.int64]:
+        """(n,) ticks with a reading that was none."""
+        return self._front.skipped
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
+        self._front.restart(nodes)
         self._started[nodes] = False
         self._integral[nodes] = 0.0
         self._error[nodes] = 0.0
@@ -107,6 +141,7 @@ class MahonyFilter:
             self._integral.copy(),
             self._pulled_rad.copy(),
             self._started.copy(),
+            self._front.snapshot(),
         )
 
     def restore(self, snapshot: object) -> None:
@@ -119,6 +154,7 @@ class MahonyFilter:
         self._integral = snapshot.integral.copy()
         self._pulled_rad = snapshot.pulled_rad.copy()
         self._started = snapshot.started.copy()
+        self._front.restore(snapshot.front)
 
 
 def attitude_error(q_world_from_sensor: Array, acc: Array, mag: Array) -> tuple[Array, Array]:
@@ -160,6 +196,15 @@ def initial_orientation(acc: Array, mag: Array) -> Array:
     q /= np.linalg.norm(q, axis=-1, keepdims=True)
     field = np.einsum("nij,nj->ni", to_matrix(q), _directions(mag))
     return multiply(heading_turn(np.arctan2(field[:, 0], field[:, 1])), q)
+
+
+def begun_anew(q: Array, acc: Array, mag: Array) -> Array:
+    """Orientations (n, 4) at rest by gravity and field; without a field the heading stays that of `q`."""
+    out = initial_orientation(acc, mag)
+    blind = np.isnan(mag[:, 0])
+    kept = heading_rad(multiply(q[blind], conjugate(out[blind])))
+    out[blind] = multiply(heading_turn(kept), out[blind])
+    return out
 
 
 def _directions(v: Array) -> Array:

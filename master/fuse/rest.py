@@ -11,7 +11,7 @@ from common.quaternion import Array
 
 _TAU_S = 0.5
 _NEAR_RAD_S, _NEAR_M_S2 = np.radians(2.0), 0.5
-_LARGEST_BIAS_RAD_S = np.radians(6.0)
+_LARGEST_BIAS_RAD_S = np.radians(2.0)
 _AFTER_S = 1.5
 _SHARES: Array = np.repeat([[_NEAR_RAD_S**-2, 0.0], [0.0, _NEAR_M_S2**-2]], 3, axis=0)
 """Squares (n, 6) times this: how far gyro and accelerometer are off, as shares of the thresholds squared."""
@@ -39,7 +39,7 @@ class Rest:
     """Still is a node whose gyro and accelerometer stay near their own low-passed values for a while.
 
     Thresholds as VQF has them: 2 °/s and 0.5 m/s² for 1.5 s. To any such test a steady turn looks like
-    rest; turns beyond 6 °/s are told apart by their rate.
+    rest; turns beyond 2 °/s are told apart by their rate, and a larger bias is left to `gross_bias.py`.
     """
 
     def start(self, count: int) -> RestState:

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 from vqf import VQF
 
-from common.config import Section
 from common.messages import Mask
 from common.quaternion import Array
+from master.doubt import NodeDoubt
+from master.fuse.front import Front
+from master.fuse.gross_bias import BiasSection
+
+_REACH_RAD_S = np.radians(1.9)
+"""Just below the package's `biasClip` of 2 °/s, beyond which it takes no rest for one."""
 
 
-class VqfConfig(Section):
+class VqfConfig(BiasSection):
     """`[estimation.vqf]`."""
 
     tau_acc_s: float = Field(default=3.0, gt=0.0, allow_inf_nan=False)
@@ -36,6 +42,8 @@ class VqfFilter:
 
     def __init__(self, config: VqfConfig, rate_hz: float, count: int) -> None:
         self._period_s = 1.0 / rate_hz
+        limit_deg_s = config.rest_bias_limit_deg_s if config.rest_bias else 0.0
+        self._front = Front(limit_deg_s, _REACH_RAD_S, rate_hz, count)
         self._filters = [
             VQF(
                 1.0 / rate_hz,
@@ -50,16 +58,19 @@ class VqfFilter:
 
     def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array, dt_s: float | None = None) -> None:
         """One tick's readings, (n, 3) each; rows must be contiguous float64."""
+        gyr_rad_s, acc_m_s2, mag_ut = self._front.take(gyr_rad_s, acc_m_s2, mag_ut, dt_s)
+        if self._front.corrected is not None:
+            self._begin_at_rest(self._front.corrected)
         if dt_s is not None and dt_s != self._period_s:
-            bias = self.bias_rad_s()
+            bias = self._own_bias_rad_s()
             # the package takes the bias off again: (gyr' - bias) period = (gyr - bias) dt
             gyr_rad_s = bias + (gyr_rad_s - bias) * (dt_s / self._period_s)
-        has_mag = np.isfinite(mag_ut[:, 0])
-        if has_mag.all():
+        magnetic = self._front.magnetic.tolist()
+        if all(magnetic):
             for vqf, gyr, acc, mag in zip(self._filters, gyr_rad_s, acc_m_s2, mag_ut, strict=True):
                 vqf.update(gyr, acc, mag)
             return
-        rows = zip(self._filters, gyr_rad_s, acc_m_s2, mag_ut, has_mag.tolist(), strict=True)
+        rows = zip(self._filters, gyr_rad_s, acc_m_s2, mag_ut, magnetic, strict=True)
         for vqf, gyr, acc, mag, nine_axis in rows:
             if nine_axis:
                 vqf.update(gyr, acc, mag)
@@ -76,20 +87,53 @@ class VqfFilter:
 
     def bias_rad_s(self) -> Array:
         """Gyro biases (n, 3)."""
+        return self._front.with_offset(self._own_bias_rad_s())
+
+    def _own_bias_rad_s(self) -> Array:
         return np.concatenate([vqf.getBiasEstimate()[0] for vqf in self._filters]).reshape(-1, 3)
+
+    def _begin_at_rest(self, nodes: Mask) -> None:
+        """Let gravity and field set the orientation anew, by which a gross bias has dragged it.
+
+        Without a field the heading goes on from where it is.
+        """
+        for i in np.flatnonzero(nodes):
+            vqf = self._filters[i]
+            kept = vqf.state["gyrQuat"], vqf.state["accQuat"], vqf.state["delta"]
+            vqf.resetState()
+            state = vqf.state
+            state["gyrQuat"], state["accQuat"], state["delta"] = kept
+            vqf.state = state
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Nodes whose gyros want a calibration, by number."""
+        return self._front.doubts()
+
+    @property
+    def spoilt(self) -> Mask | None:
+        """(n,) who had a reading that was none in the last update; None for nobody."""
+        return self._front.spoilt
+
+    @property
+    def skipped(self) -> NDArray[np.int64]:
+        """(n,) ticks with a reading that was none."""
+        return self._front.skipped
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
+        self._front.restart(nodes)
         for i in np.flatnonzero(nodes):
             self._filters[i].resetState()
 
     def snapshot(self) -> object:
         """Each object's state."""
-        return [vqf.state for vqf in self._filters]
+        return self._front.snapshot(), [vqf.state for vqf in self._filters]
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
-        if not isinstance(snapshot, list) or len(snapshot) != len(self._filters):
+        if not isinstance(snapshot, tuple) or len(snapshot[1]) != len(self._filters):
             raise TypeError("not a snapshot of this filter")
-        for vqf, state in zip(self._filters, snapshot, strict=True):
+        front, states = snapshot
+        self._front.restore(front)
+        for vqf, state in zip(self._filters, states, strict=True):
             vqf.state = state

@@ -156,7 +156,9 @@ def test_learns_the_gyro_s_bias_through_k_i() -> None:
 @pytest.mark.parametrize(("limit", "bounded"), [(0.01, True), (0.0, False)])
 def test_the_integral_stays_within_its_limit(limit: float, bounded: bool) -> None:
     truth, bias = attitudes(1, 4), np.full((1, 3), 0.05)
-    filter_ = MahonyFilter(MahonyConfig(ki=0.1, bias_limit_rad_s=limit), RATE_HZ, 1)
+    filter_ = MahonyFilter(
+        MahonyConfig(ki=0.1, bias_limit_rad_s=limit, rest_bias_limit_deg_s=0.0), RATE_HZ, 1
+    )
     run(filter_, truth, bias, 2000)
     assert bool(np.all(np.abs(filter_.bias_rad_s()) <= 0.01)) == bounded
 
