@@ -29,6 +29,7 @@ from common.messages import (
     Statistics,
     Truth,
 )
+from common.metrics import MasterMetrics, SlaveMetrics, from_tree, to_tree
 
 VERSION = 3
 MAX_PAYLOAD = 256 * 1024
@@ -37,6 +38,10 @@ ANGLE_LIMIT_RAD = 4 * math.pi
 RATE_LIMIT_RAD_S = 100.0
 _POSTURE = (ANGLE_LIMIT_RAD, RATE_LIMIT_RAD_S)
 _ANGLES = (ANGLE_LIMIT_RAD, ANGLE_LIMIT_RAD)
+
+_METRICS: dict[str, type[MasterMetrics | SlaveMetrics]] = {"master": MasterMetrics, "slave": SlaveMetrics}
+"""What statistics hold, by the role of the process that sends them."""
+_ROLES = {kind: role for role, kind in _METRICS.items()}
 
 _pack = msgpack.Packer(autoreset=True).pack
 _unpack = msgpack.unpackb
@@ -221,12 +226,16 @@ def _unpack_clock_reply(f: tuple[Any, ...], _: int) -> ClockReply:
 
 
 def _pack_statistics(m: Statistics) -> tuple[Any, ...]:
-    return (m.role, m.sent_ns, fields.pack_figures(m.figures))
+    return (_ROLES[type(m.metrics)], m.sent_ns, to_tree(m.metrics))
 
 
 def _unpack_statistics(f: tuple[Any, ...], _: int) -> Statistics:
     fields.length(f, 3)
-    return Statistics(fields.text(f[0], MAX_NAME), fields.count(f[1]), fields.figures(f[2]))
+    role = fields.text(f[0], MAX_NAME)
+    kind = _METRICS.get(role)
+    if kind is None:
+        raise CodecError(f"statistics of {fields.short(role)}, expected one of {', '.join(_METRICS)}")
+    return Statistics(fields.count(f[1]), from_tree(kind, f[2]))
 
 
 def _pack_truth(m: Truth) -> tuple[Any, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from typing import Any
 
@@ -19,8 +18,6 @@ MAX_DOUBT = 240
 """Of a command, which must fit into one packet on every path."""
 MAX_ITEMS = 4096
 """Entries of one array or map."""
-MAX_DEPTH = 16
-"""Levels of a tree of figures."""
 _U63 = (1 << 63) - 1
 _F4 = np.dtype("<f4")
 
@@ -115,45 +112,6 @@ def length(fields: tuple[Any, ...], expected: int) -> None:
     """Refuse an array of any other length."""
     if len(fields) != expected:
         raise CodecError(f"{len(fields)} fields, expected {expected}")
-
-
-def pack_figures(value: object) -> object:
-    """A tree that msgpack carries: numpy numbers made plain, a value that is not finite made None."""
-    if isinstance(value, dict):
-        return {str(key): pack_figures(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [pack_figures(item) for item in value]
-    if isinstance(value, np.ndarray | np.generic):
-        return pack_figures(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def figures(value: Any) -> dict[str, object]:
-    """A tree of maps with text keys, arrays, texts, finite numbers, flags and None."""
-    if type(value) is not dict:
-        raise CodecError("figures are not a map")
-    _check_figures(value, MAX_DEPTH)
-    return value
-
-
-def _check_figures(value: object, depth: int) -> None:
-    if depth == 0:
-        raise CodecError(f"figures are nested more than {MAX_DEPTH} deep")
-    if isinstance(value, dict):
-        for key, item in value.items():
-            if type(key) is not str:
-                raise CodecError(f"{short(key)} is not a key")
-            _check_figures(item, depth - 1)
-    elif isinstance(value, tuple):
-        for item in value:
-            _check_figures(item, depth - 1)
-    elif isinstance(value, float):
-        if not math.isfinite(value):
-            raise CodecError(f"{short(value)} is not a figure")
-    elif not (value is None or isinstance(value, int | str)):
-        raise CodecError(f"{short(value)} is not a figure")
 
 
 def short(value: object) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from hdrh.histogram import HdrHistogram
 
 from common.clock import NS_PER_MS
+from common.metrics import Summary
 
 if TYPE_CHECKING:  # a histogram needs none of the messages that it comes with
     from common.offset import Offset
@@ -28,9 +29,6 @@ _LONGEST_US = 60_000_000
 _DIGITS = 3
 MOST_RECENT = 256
 """Statistics tell what came in a second: a dozen, and more only where a link lets go what it held back."""
-
-Summary = dict[str, float]
-"""`count`, and `mean`, `p50`, `p99`, `max` in ms."""
 
 
 class Durations:
@@ -63,16 +61,16 @@ class Durations:
         self.clamped += other.clamped
 
     def summary(self) -> Summary:
-        """Mean and maximum exact, percentiles to three digits; only `count` where there is nothing."""
+        """Mean and maximum exact, percentiles to three digits."""
         if not self.count:
-            return {"count": 0}
-        return {
-            "count": self.count,
-            "mean": self._sum_ns / self.count / NS_PER_MS,
-            "p50": self._histogram.get_value_at_percentile(50) / 1000,
-            "p99": self._histogram.get_value_at_percentile(99) / 1000,
-            "max": self._max_ns / NS_PER_MS,
-        }
+            return Summary(0)
+        return Summary(
+            count=self.count,
+            mean=self._sum_ns / self.count / NS_PER_MS,
+            p50=self._histogram.get_value_at_percentile(50) / 1000,
+            p99=self._histogram.get_value_at_percentile(99) / 1000,
+            max=self._max_ns / NS_PER_MS,
+        )
 
 
 class Told(Durations):
@@ -87,9 +85,9 @@ class Told(Durations):
         super().record(duration_ns)
         self._recent_us.append(max(0, round(duration_ns / 1000)))
 
-    def take_recent(self) -> list[int]:
+    def take_recent(self) -> tuple[int, ...]:
         """Those since the last call in µs, the newest MOST_RECENT of them."""
-        recent_us = list(self._recent_us)
+        recent_us = tuple(self._recent_us)
         self._recent_us.clear()
         return recent_us
 
@@ -194,8 +192,9 @@ class LatencyBudget:
     def summary(self) -> dict[str, Summary]:
         """A row a stage in ms; `put→received` also has `bound`, the widest its offset had."""
         rows = self._stages.summary()
-        if rows["put→received"]["count"]:
-            rows["put→received"]["bound"] = self._bound_ns / NS_PER_MS
+        crossing = rows["put→received"]
+        if crossing.count:
+            rows["put→received"] = replace(crossing, bound=self._bound_ns / NS_PER_MS)
         return rows
 
     def total(self) -> Summary:

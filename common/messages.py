@@ -8,6 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from common.metrics import MasterMetrics, SlaveMetrics
 from common.quaternion import Array
 
 Mask = NDArray[np.bool_]
@@ -192,11 +193,10 @@ class ClockReply:
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """Counters and figures of one process, 1 Hz, for tables and reports; a tree of plain values."""
+    """What one process counted and measured, 1 Hz, for tables and reports."""
 
-    role: str
     sent_ns: int
-    figures: dict[str, object] = field(default_factory=dict)
+    metrics: MasterMetrics | SlaveMetrics
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,17 +7,18 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 from common.codec import VERSION as SCHEMA
+from common.metrics import Software
 
 
 @cache
-def software() -> dict[str, object]:
+def software() -> Software:
     """Versions of tandem, of its messages' schema, of Zenoh and of Python; part of every side's figures."""
-    return {
-        "tandem": installed("tandem"),
-        "schema": SCHEMA,
-        "zenoh": installed("eclipse-zenoh"),
-        "python": platform.python_version(),
-    }
+    return Software(
+        tandem=installed("tandem"),
+        schema=SCHEMA,
+        zenoh=installed("eclipse-zenoh"),
+        python=platform.python_version(),
+    )
 
 
 def installed(package: str) -> str:

@@ -15,6 +15,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.launch import WriteFigures
 from common.link import Link, open_link
 from common.messages import Truth
+from common.metrics import to_tree
 from common.topics import FAULTS, TRUTH
 from master.suit.simulated.app import run as answer
 from master.suit.simulated.config import SuitConfig
@@ -40,7 +41,7 @@ async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigur
 
         buses = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in config.buses)
         log.info("answers every SYNC for %d nodes on %s", len(config.nodes), buses)
-        write_figures(await answer(config, stop, tell, on_suit))
+        write_figures(to_tree(await answer(config, stop, tell, on_suit)))
 
 
 def _take(told: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:

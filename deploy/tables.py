@@ -16,8 +16,8 @@ from deploy.judge.motion import Motion
 from deploy.judge.paper import ETA_PERCENT, TABLE_1
 from deploy.targets import Verdict
 
-Stage = Mapping[str, float]
-"""`mean`, `p50`, `p99`, `max` in ms, and `count`."""
+Stage = Mapping[str, Any]
+"""A `Summary` as plain values: `count`, and `mean`, `p50`, `p99`, `max` in ms, None where count is 0."""
 UNKNOWN = "–"
 
 
@@ -35,7 +35,7 @@ def latency_table(
     for name, stage in stages.items():
         table.add_row(name, *_stage_cells(stage))
     table.add_section()
-    mean = sum(stage.get("mean", 0.0) for stage in stages.values())
+    mean = sum(stage.get("mean") or 0.0 for stage in stages.values())
     count = min((stage.get("count", 0) for stage in stages.values()), default=0)
     sums = {"mean": mean, "count": count} if count else {}
     table.add_row("total", *_stage_cells({**(total or {}), **sums}), style="bold")
@@ -154,7 +154,7 @@ def verdict_table(title: str, verdicts: Iterable[Verdict]) -> RenderableType:
     return table
 
 
-def ticks_text(ours: Mapping[str, Mapping[str, int]], host: Mapping[str, Any]) -> RenderableType:
+def ticks_text(ours: Mapping[str, Mapping[str, int] | None], host: Mapping[str, Any]) -> RenderableType:
     """Ticks that our loops missed beside those of a loop that does nothing else, from a report's `host`."""
     missed = ", ".join(f"{name} {_missed(ticks)}" for name, ticks in ours.items())
     if not host:
@@ -179,7 +179,8 @@ def holds_text(holds: Iterable[Mapping[str, Any]]) -> RenderableType:
     return Text("\n".join(lines), "yellow")
 
 
-def _missed(ticks: Mapping[str, int]) -> str:
+def _missed(ticks: Mapping[str, int] | None) -> str:
+    ticks = ticks or {}
     return f"{ticks.get('missed', UNKNOWN)} of {ticks.get('expected', UNKNOWN)}"
 
 

@@ -85,10 +85,10 @@ class _Seen:
         self._kept = frame
 
     def words(self) -> str:
-        frame, counted = self.watch.frame, self.watch.figures()
+        frame, counted = self.watch.frame, self.watch.metrics()
         if frame is None:
             return "no picture yet"
-        rate_hz, kb_s = counted["received"] / self.elapsed_s, self._bytes / self.elapsed_s / 1000
+        rate_hz, kb_s = counted.received / self.elapsed_s, self._bytes / self.elapsed_s / 1000
         newest = f"picture {frame.number}: {frame.width}×{frame.height}, {len(frame.jpeg)} bytes"
-        wrong = f"{counted['late']} late, {counted['undecodable']} broken"
+        wrong = f"{counted.late} late, {counted.undecodable} broken"
         return f"{newest}; {rate_hz:.1f} Hz, {kb_s:.1f} kB/s; {wrong}"

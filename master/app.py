@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from dataclasses import replace
 
 from common.can.bus import CanBus
 from common.clock import monotonic_ns
@@ -13,6 +14,7 @@ from common.launch import WriteFigures
 from common.link import Session, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
+from common.metrics import MasterMetrics, Ticks, to_tree
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.realtime import enter_real_time
@@ -117,26 +119,27 @@ class Master:
 
     async def _tell(self) -> None:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
-            shared = self._shared_figures()
+            shared = self._shared_metrics()
             for robot in self._robots:
-                robot.tell(due.scheduled_ns, shared)
+                robot.publish_metrics(due.scheduled_ns, shared)
             self._notifier.status("; ".join(robot.standing for robot in self._robots))
 
-    def _shared_figures(self) -> dict[str, object]:
-        return {
-            "software": software(),
-            "ticks": {"expected": self._ticks_expected, "missed": self._ticks_missed},
-            "stages_ms": self._stages.summary(),
-            "frames_in_to_put_ms": self._frames_in_to_put.summary(),
-            "nodes": self._pipeline.node_counts(),
-            "doubts": as_figures(self._pipeline.doubts),
-            "beyond_reach": self._pipeline.beyond_reach.figures(),
-            "buses": {bus.name: bus.summary() for bus in self._buses},
-        }
+    def _shared_metrics(self) -> MasterMetrics:
+        return MasterMetrics(
+            software=software(),
+            ticks=Ticks(self._ticks_expected, self._ticks_missed),
+            stages_ms=self._stages.summary(),
+            frames_in_to_put_ms=self._frames_in_to_put.summary(),
+            nodes=self._pipeline.node_counts(),
+            doubts=as_figures(self._pipeline.doubts),
+            beyond_reach=self._pipeline.beyond_reach.metrics(),
+            buses={bus.name: bus.summary() for bus in self._buses},
+            robots={},
+        )
 
-    def figures(self) -> dict[str, object]:
-        """Counters and percentiles for tables and reports; each robot's own under `robots`."""
-        return {**self._shared_figures(), "robots": {robot.name: robot.figures() for robot in self._robots}}
+    def metrics(self) -> MasterMetrics:
+        """Counters and percentiles of the whole process, for tables and reports."""
+        return replace(self._shared_metrics(), robots={robot.name: robot.metrics() for robot in self._robots})
 
 
 async def run(config: MasterConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
@@ -161,4 +164,4 @@ async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
             await master.run()
         finally:
             notifier.stopping()
-            write_figures({**master.figures(), "access": audit.figures()})
+            write_figures(to_tree(replace(master.metrics(), access=audit.metrics())))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from common.clock import monotonic_ns, to_ns
 from common.codec import decode, encode
@@ -13,6 +14,7 @@ from common.errors import CodecError, LinkError
 from common.instance import draw_instance
 from common.link import Link
 from common.messages import ClockReply, ControlReply, RobotState, Statistics
+from common.metrics import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
 from common.offset import MasterExchange
 from common.pacing import TickGrid
 from common.ticker import ticks
@@ -62,11 +64,10 @@ class CommandedRobot:
         command = self._writer.write(solved, self._lease.token, deadman_held, solved_ns, monotonic_ns(), seen)
         self._put_command(encode(command))
 
-    def tell(self, now_ns: int, shared: Mapping[str, object]) -> None:
-        """Publish what the master counted, and what of it is this robot's own."""
-        recent_us = self._watch.round_trip.take_recent()
-        figures = {**shared, **self.figures(), "round_trip_recent_us": recent_us}
-        self._put_statistics(encode(Statistics("master", now_ns, figures)))
+    def publish_metrics(self, now_ns: int, shared: MasterMetrics) -> None:
+        """Publish what the master counted, with what it counted of this robot alone."""
+        own = replace(self.metrics(), round_trip_recent_us=self._watch.round_trip.take_recent())
+        self._put_statistics(encode(Statistics(now_ns, replace(shared, robots={self.name: own}))))
 
     def _on_state(self, payload: bytes, arrived_ns: int) -> None:
         try:
@@ -110,17 +111,14 @@ class CommandedRobot:
             return f"{self.name}: not heard"
         return f"{self.name}: {state.guard if self._lease.token else self._lease.answer}"
 
-    def figures(self) -> dict[str, object]:
+    def metrics(self) -> CommandedMetrics:
         """Counters and percentiles of this robot alone."""
-        return {
-            "commands_sent": self._writer.sent,
-            "round_trip_ms": self._watch.round_trip.summary(),
-            "robot": {
-                "silent": self._watch.silent(monotonic_ns()),
-                "times_lost": self._watch.times_lost,
-                "undecodable": self._undecodable,
-            },
-            "lease": {"held": bool(self._lease.token), "answer": self._lease.answer},
-            "video": self.video.figures(),
-            "link": self._link.counters(),
-        }
+        watch = self._watch
+        return CommandedMetrics(
+            commands_sent=self._writer.sent,
+            round_trip_ms=watch.round_trip.summary(),
+            robot=RobotHeard(watch.silent(monotonic_ns()), watch.times_lost, self._undecodable),
+            lease=LeaseHeld(bool(self._lease.token), self._lease.answer),
+            video=self.video.metrics(),
+            link=self._link.counters(),
+        )

@@ -6,6 +6,7 @@ from collections import deque
 
 from common.clock import to_ns
 from common.errors import CodecError
+from common.metrics import VideoReceived
 from common.video import VideoFrame, decode_frame
 
 _SILENT_S = 2.0
@@ -44,6 +45,6 @@ class VideoWatch:
                 return number, arrived_ns
         return 0, 0
 
-    def figures(self) -> dict[str, int]:
+    def metrics(self) -> VideoReceived:
         """Counters."""
-        return {"received": self.received, "late": self.late, "undecodable": self.undecodable}
+        return VideoReceived(self.received, self.late, self.undecodable)

@@ -6,6 +6,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 
 from common.clock import monotonic_ns, to_ms
 from common.codec import encode
@@ -15,6 +16,7 @@ from common.link import Link, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
 from common.messages import Statistics
+from common.metrics import OffsetMetrics, SlaveMetrics, Ticks, to_tree
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.presence import place
@@ -132,40 +134,33 @@ class Slave:
 
     async def _tell(self) -> None:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
-            figures = {**self.figures(), "one_way_recent_us": self._pipeline.one_way.take_recent()}
-            self._put_statistics(encode(Statistics("slave", due.scheduled_ns, figures)))
+            metrics = replace(self.metrics(), one_way_recent_us=self._pipeline.one_way.take_recent())
+            self._put_statistics(encode(Statistics(due.scheduled_ns, metrics)))
 
-    def figures(self) -> dict[str, object]:
+    def metrics(self) -> SlaveMetrics:
         """Counters and percentiles for tables and reports."""
         pipeline = self._pipeline
         offset = pipeline.clock.estimator.estimate(monotonic_ns())
-        return {
-            "software": software(),
-            "instance": self._pipeline.instance,
-            "ticks": {"expected": self._ticks_expected, "missed": self._ticks_missed},
-            "guard": {
-                "state": str(pipeline.guard.state),
-                "reason": pipeline.guard.reason,
-                **pipeline.guard.counters.summary(),
-            },
-            "lease": pipeline.guard.lease.summary(monotonic_ns()),
-            "stages_ms": pipeline.journeys.budget.summary(),
-            "end_to_end_ms": pipeline.journeys.budget.total(),
-            "one_way_ms": pipeline.one_way.summary(),
-            "commands": pipeline.arrivals.summary(),
-            "early": pipeline.one_way.clamped,
-            "unmoved": pipeline.journeys.unmoved,
-            "offset": {
-                "offset_ms": to_ms(offset.offset_ns),
-                "bound_ms": to_ms(offset.bound_ns),
-                "trusted": offset.trusted,
-            },
-            "undecodable": pipeline.undecodable,
-            "base": self._base.counters() if self._base else {},
-            "servos": self._servos.figures(),
-            "video": self._camera.figures() if self._camera else {},
-            "link": self._link.counters(),
-        }
+        guard = pipeline.guard
+        return SlaveMetrics(
+            software=software(),
+            instance=pipeline.instance,
+            ticks=Ticks(self._ticks_expected, self._ticks_missed),
+            guard=guard.counters.metrics(str(guard.state), guard.reason),
+            lease=guard.lease.metrics(monotonic_ns()),
+            stages_ms=pipeline.journeys.budget.summary(),
+            end_to_end_ms=pipeline.journeys.budget.total(),
+            one_way_ms=pipeline.one_way.summary(),
+            commands=pipeline.arrivals.metrics(),
+            early=pipeline.one_way.clamped,
+            unmoved=pipeline.journeys.unmoved,
+            offset=OffsetMetrics(to_ms(offset.offset_ns), to_ms(offset.bound_ns), offset.trusted),
+            undecodable=dict(pipeline.undecodable),
+            base=self._base.counters() if self._base else {},
+            servos=self._servos.metrics(),
+            video=self._camera.metrics() if self._camera else None,
+            link=self._link.counters(),
+        )
 
 
 async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
@@ -198,7 +193,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
                 await slave.run()
             finally:
                 notifier.stopping()
-                write_figures({**slave.figures(), "access": audit.figures()})
+                write_figures(to_tree(replace(slave.metrics(), access=audit.metrics())))
     finally:
         servos.stop()
         if base is not None:

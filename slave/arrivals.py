@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from common.metrics import ArrivalCounts
+
 REMEMBERED = 256
 """A missing number may still come this many numbers later (20 s) and is then late, not lost."""
 
@@ -44,6 +46,6 @@ class Arrivals:
         else:
             self.repeated += 1
 
-    def summary(self) -> dict[str, int]:
-        """Plain values, for statistics and reports."""
-        return {"arrived": self.arrived, "lost": self.lost, "late": self.late, "repeated": self.repeated}
+    def metrics(self) -> ArrivalCounts:
+        """The counts so far."""
+        return ArrivalCounts(self.arrived, self.lost, self.late, self.repeated)

@@ -162,7 +162,7 @@ class CanBus:
         if self._reader is not None:
             self._reader.read()
 
-    def summary(self) -> dict[str, object]:
+    def summary(self) -> dict[str, bool | int | str]:
         """State and counters as plain values."""
         return {"up": self.up, "last_error": self.last_error, **asdict(self.counters)}
 

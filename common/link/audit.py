@@ -10,6 +10,7 @@ from common.link.access import named
 from common.link.listening import hear_refusals
 from common.link.refusals import Refusals
 from common.link.session import Session
+from common.metrics import AccessMetrics
 
 log = logging.getLogger("tandem.access")
 
@@ -49,10 +50,10 @@ class Audit:
         else:
             log.info("%s connected", who)
 
-    def figures(self) -> dict[str, object]:
+    def metrics(self) -> AccessMetrics:
         """For reports."""
-        return {
-            "connected": dict(self._here),
-            "connections": dict(self._connections),
-            "refused": self._refusals.figures() if self._refusals else {},
-        }
+        return AccessMetrics(
+            connected=dict(self._here),
+            connections=dict(self._connections),
+            refused=self._refusals.metrics() if self._refusals else None,
+        )

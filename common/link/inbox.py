@@ -9,8 +9,8 @@ from collections.abc import Callable
 import zenoh
 
 from common.clock import monotonic_ns
-from common.link.counters import TopicCounters
 from common.mailbox import Mailbox
+from common.metrics import TopicCounters
 from common.throttle import Throttle
 
 log = logging.getLogger(__name__)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import replace
 
 import zenoh
 from zenoh.handlers import Callback
 
 from common.clock import monotonic_ns
-from common.link.counters import TopicCounters
 from common.link.inbox import Inbox, wake
 from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
 from common.link.waiting import count_peers, wait_for_peer
+from common.metrics import TopicCounters
 from common.presence import Presence, present
 from common.throttle import Throttle
 from common.topics import ALIVE, Topic
@@ -174,9 +174,9 @@ class Link:
             )
         )
 
-    def counters(self) -> dict[str, dict[str, int]]:
-        """Counters per topic name."""
-        return {name: asdict(counters) for name, counters in self._counters.items()}
+    def counters(self) -> dict[str, TopicCounters]:
+        """A copy of the counters, by topic name."""
+        return {name: replace(counters) for name, counters in self._counters.items()}
 
     @property
     def peers(self) -> int:

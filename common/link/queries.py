@@ -12,8 +12,8 @@ from zenoh.handlers import Callback
 
 from common.clock import monotonic_ns
 from common.errors import LinkError, LinkTimeoutError
-from common.link.counters import TopicCounters
 from common.link.inbox import wake
+from common.metrics import TopicCounters
 from common.throttle import Throttle
 from common.topics import Topic
 

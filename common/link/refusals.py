@@ -12,6 +12,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from common.clock import to_ns
+from common.metrics import RefusalMetrics
 from common.throttle import Throttle
 
 REPEAT_S = 10.0
@@ -109,7 +110,7 @@ class Refusals:
         if session in self.names:
             self._gone[session] = None
 
-    def figures(self) -> dict[str, object]:
+    def metrics(self) -> RefusalMetrics:
         """For reports: handshakes by reason, messages by certificate, kind and key, and how many in all."""
         handshakes = {r.what: n for r, n in list(self.counts.items()) if not r.who}
         messages: dict[str, dict[str, int]] = {}
@@ -119,4 +120,4 @@ class Refusals:
                 kind = f"{refusal.what} {refusal.key}"
                 kinds[kind] = kinds.get(kind, 0) + count
         total = self.counts.total() + self.more
-        return {"total": total, "handshakes": handshakes, "messages": messages}
+        return RefusalMetrics(total, handshakes, messages)

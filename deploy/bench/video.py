@@ -15,7 +15,6 @@ import socket
 import sys
 from contextlib import AsyncExitStack
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from common.config import LinkConfig
 from common.latency import Durations
 from common.link import Link, open_link
 from common.messages import Command, CommandStamps, RobotState
+from common.metrics import CameraMetrics, Summary
 from common.offset import Offset
 from common.pacing import TickGrid
 from common.skeleton import load_skeleton
@@ -48,10 +48,10 @@ _ZERO = np.zeros(len(_ALL))
 class VideoRun:
     """What one run measured; ages in ms."""
 
-    command_ms: dict[str, float]
-    state_ms: dict[str, float]
-    video: dict[str, Any]
-    """Figures of the feed, with `fps` as received over the whole run; empty without video."""
+    command_ms: Summary
+    state_ms: Summary
+    video: CameraMetrics | None
+    """Of the feed, with `fps` as received over the whole run; None without video."""
 
 
 class FullCamera:
@@ -120,9 +120,7 @@ async def measure(options: SlowLinkOptions, seconds: float, video: str = "contro
         began_ns = monotonic_ns()
         until_ns = began_ns + to_ns(seconds)
         await asyncio.gather(_command(operator, watch, until_ns), _tell(robot, until_ns))
-        shown: dict[str, Any] = {}
-        if feed is not None:
-            shown = {**feed.figures(), "fps": watch.received / seconds}
+        shown = None if feed is None else replace(feed.metrics(), fps=watch.received / seconds)
         return VideoRun(commands.summary(), states.summary(), shown)
 
 

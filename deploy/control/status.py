@@ -18,6 +18,7 @@ from common.codec import decode
 from common.errors import CodecError
 from common.link import Link, open_session
 from common.messages import Action, RobotState, Statistics
+from common.metrics import MasterMetrics, SlaveMetrics, to_tree
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.topics import STATE, STATISTICS
@@ -35,8 +36,8 @@ class Heard:
     """What one robot sent while it was listened to."""
 
     state: RobotState | None = None
-    figures: Mapping[str, Any] | None = None
-    operator_figures: Mapping[str, Any] | None = None
+    metrics: SlaveMetrics | None = None
+    master: MasterMetrics | None = None
     """Of the master that commands it."""
     all: asyncio.Event = field(default_factory=asyncio.Event)
     """Set when there is nothing more to wait for."""
@@ -44,16 +45,16 @@ class Heard:
     def take(
         self,
         state: RobotState | None = None,
-        figures: Mapping[str, Any] | None = None,
-        operator_figures: Mapping[str, Any] | None = None,
+        metrics: SlaveMetrics | None = None,
+        master: MasterMetrics | None = None,
     ) -> None:
         """Keep what is newer."""
-        self.state, self.figures = state or self.state, figures or self.figures
-        self.operator_figures = operator_figures or self.operator_figures
-        if self.state is None or self.figures is None:
+        self.state, self.metrics = state or self.state, metrics or self.metrics
+        self.master = master or self.master
+        if self.state is None or self.metrics is None:
             return
         # without a lease there may be no master to tell anything
-        if self.operator_figures is not None or not self.state.operator:
+        if self.master is not None or not self.state.operator:
             self.all.set()
 
 
@@ -104,14 +105,12 @@ class HeardOfAll:
             statistics = decode(payload, Statistics)
         except CodecError:
             return
-        figures = statistics.figures
-        if statistics.role == "slave":
-            instance = figures.get("instance")
-            self.of(instance if isinstance(instance, int) else 0).take(figures=figures)
-        elif statistics.role == "master":
+        if isinstance(statistics.metrics, SlaveMetrics):
+            self.of(statistics.metrics.instance).take(metrics=statistics.metrics)
+        else:
             # which of several robots it commands is not told: it is the operator's own affair
             for heard in self._heard.values():
-                heard.take(operator_figures=figures)
+                heard.take(master=statistics.metrics)
 
 
 def decode_state(payload: bytes) -> RobotState | None:
@@ -126,7 +125,8 @@ def decode_state(payload: bytes) -> RobotState | None:
 
 def as_tree(answer: Answer, heard: Heard, namesakes: int = 0) -> dict[str, Any]:
     """A robot's status as plain JSON values; None where the robot did not tell."""
-    state, figures = heard.state, heard.figures or {}
+    state, metrics = heard.state, heard.metrics
+    figures: Mapping[str, Any] = to_tree(metrics) if metrics else {}
     base = state.base if state else None
     return {
         "answers": bool(answer.guard),
@@ -138,7 +138,7 @@ def as_tree(answer: Answer, heard: Heard, namesakes: int = 0) -> dict[str, Any]:
         "operator": state.operator if state else None,
         "lease": figures.get("lease"),
         "faults": dict(state.faults) if state else None,
-        "node_doubts": None if heard.operator_figures is None else heard.operator_figures.get("doubts"),
+        "node_doubts": None if heard.master is None else heard.master.doubts,
         "encoders_invalid": int((~state.encoder_valid).sum()) if state else None,
         "base": None
         if base is None

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from deploy.demo.report import Seen
+from common.metrics import MasterMetrics, SlaveMetrics
+from deploy.demo.report import Seen, tree_or_none, trees
 from deploy.judge import TruthSeries, motion
 from deploy.rig.observer import Observer
 from deploy.rig.rig import Rig
@@ -44,15 +45,17 @@ def make_many_report(
     if seen.problem:
         problems.append(seen.problem)
     master = rig.children["master"]
-    counted = master.figures()
+    counted = master.metrics(MasterMetrics)
+    if counted is None:
+        problems.append("the master left no figures")
     tree = {
         "options": {"profile": options.profile, "seconds": options.seconds, "transport": options.transport},
         "master": {
-            "ticks": counted.get("ticks", {}),
-            "frames_in_to_put_ms": counted.get("frames_in_to_put_ms", {}),
+            "ticks": tree_or_none(counted and counted.ticks),
+            "frames_in_to_put_ms": tree_or_none(counted and counted.frames_in_to_put_ms),
             "cpu_percent": round(master.cpu_percent, 1),
             "rss_mb": round(master.rss_mb, 1),
-            "robots": counted.get("robots", {}),
+            "robots": trees(counted.robots if counted else {}),
         },
         "robots": robots,
         "host": seen.host,
@@ -65,21 +68,21 @@ def make_many_report(
 
 
 def _robot(observer: Observer, child: Child, truth: TruthSeries) -> dict[str, Any]:
-    counted = child.figures()
-    guard = counted.get("guard", {})
+    counted = child.metrics(SlaveMetrics)
+    guard = counted.guard if counted else None
     moved = motion(truth, observer.trace.moved(), observer.trace.joint_names)
     tracked = [state.guard == "track" for state in observer.states]
     # the way to the operator's posture is none of it
     since = tracked[tracked.index(True) :] if any(tracked) else []
     return {
         "in_track": sum(since) / len(since) if since else 0.0,
-        "ticks": counted.get("ticks", {}),
-        "received": guard.get("received", 0),
-        "accepted": guard.get("accepted", 0),
-        "dropped": guard.get("dropped", {}),
-        "losses": guard.get("losses", {}),
-        "one_way_ms": counted.get("one_way_ms", {}),
-        "end_to_end_ms": counted.get("end_to_end_ms", {}),
+        "ticks": tree_or_none(counted and counted.ticks),
+        "received": guard.received if guard else None,
+        "accepted": guard.accepted if guard else None,
+        "dropped": guard.dropped if guard else None,
+        "losses": guard.losses if guard else None,
+        "one_way_ms": tree_or_none(counted and counted.one_way_ms),
+        "end_to_end_ms": tree_or_none(counted and counted.end_to_end_ms),
         "rmse_deg": moved.rmse_deg if moved else None,
         "motion_lag_ms": moved.lag_ms if moved else None,
         "cpu_percent": round(child.cpu_percent, 1),
@@ -94,22 +97,23 @@ def many_table(tree: Mapping[str, Any]) -> RenderableType:
         table.add_row(
             robot,
             f"{one['in_track']:.0%}",
-            str(one["ticks"].get("missed", UNKNOWN)),
-            str(one["ticks"].get("expected", UNKNOWN)),
+            str((one["ticks"] or {}).get("missed", UNKNOWN)),
+            str((one["ticks"] or {}).get("expected", UNKNOWN)),
             f"{one['cpu_percent']:.0f}",
-            _number(one["one_way_ms"].get("p99"), 1),
-            _number(one["end_to_end_ms"].get("p99"), 1),
+            _number((one["one_way_ms"] or {}).get("p99"), 1),
+            _number((one["end_to_end_ms"] or {}).get("p99"), 1),
             _number(one["rmse_deg"], 2),
             _number(one["motion_lag_ms"], 0),
         )
     master, ticks = tree["master"], tree["master"]["ticks"]
-    put_ms = _number(master["frames_in_to_put_ms"].get("p99"), 2)
+    put_ms = _number((master["frames_in_to_put_ms"] or {}).get("p99"), 2)
     text = (
         f"master: {master['cpu_percent']:.0f} % of a core, last frame in → put p99 {put_ms} ms; "
         "times in ms, p99"
     )
     ours = {robot: one["ticks"] for robot, one in tree["robots"].items()}
-    slowest = max(ours, key=lambda robot: int(ours[robot].get("missed", 0)), default="")
+    known = {robot: ticks["missed"] for robot, ticks in ours.items() if ticks}
+    slowest = max(known, key=lambda robot: int(known[robot]), default="")
     loops = {"master": ticks, **({slowest: ours[slowest]} if slowest else {})}
     return Group(table, Text(text, "dim"), ticks_text(loops, tree["host"]), holds_text(tree["holds"]))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from common.config import load_config
 from common.messages import Mask
+from common.metrics import CommandedMetrics, MasterMetrics, SlaveMetrics, to_tree
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.synergy import synergy_positions
 from deploy.demo.baseline import MOST_S, Comparison, arrivals, compare
@@ -20,6 +22,8 @@ from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig
 
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
     from deploy.demo.run import DemoOptions
 
 
@@ -70,11 +74,16 @@ def make_report(
     slave_config = load_config(example("slave", options.profile), SlaveConfig)
     accepted = arrivals(observer.commands, observer.states)
     compared = compare(truth, moved, accepted, slave_config) if moved_right else None
-    figures = {child.role: child.figures() for child in children}
-    master, slave = figures.get("master", {}), figures.get("slave", {})
-    of_robot = master.get("robots", {}).get(ROBOT, {})
+    by_role = {child.role: child for child in children}
+    master = by_role["master"].metrics(MasterMetrics)
+    slave = by_role["slave"].metrics(SlaveMetrics)
+    of_robot = master.robots.get(ROBOT) if master else None
     problems = [f"{role} ended with status {status}" for role, status in statuses.items() if status != 0]
-    problems += [f"{role} left no figures" for role in ("master", "slave") if not figures.get(role)]
+    problems += [
+        f"{role} left no figures" for role, one in (("master", master), ("slave", slave)) if one is None
+    ]
+    if not observer.commands:
+        problems.append("no command was observed: nothing below was judged")
     if "track" not in observer.guards_seen:
         problems.append("the robot never reached track")
     if seen.problem:
@@ -90,15 +99,15 @@ def make_report(
             "seed": options.seed,
             "servos": options.servos,
         },
-        "ticks": master.get("ticks", {}),
+        "ticks": tree_or_none(master and master.ticks),
         "host": seen.host,
         "holds": seen.holds,
         "commands": _commands(of_robot, slave),
-        "stages_ms": slave.get("stages_ms", {}),
-        "frames_in_to_put_ms": master.get("frames_in_to_put_ms", {}),
-        "end_to_end_ms": slave.get("end_to_end_ms", {}),
+        "stages_ms": trees(slave.stages_ms if slave else {}),
+        "frames_in_to_put_ms": tree_or_none(master and master.frames_in_to_put_ms),
+        "end_to_end_ms": tree_or_none(slave and slave.end_to_end_ms),
         "one_way_ms": _one_way(slave),
-        "round_trip_ms": of_robot.get("round_trip_ms", {}),
+        "round_trip_ms": tree_or_none(of_robot and of_robot.round_trip_ms),
         "motion_lag_ms": moved_right.lag_ms if moved_right else None,
         "motion": _motion(moved_right),
         "motion_by_strategy": _motion_by_strategy(compared),
@@ -110,15 +119,15 @@ def make_report(
         "eta_percent": solved_right.eta_percent,
         "table_1": _table_1(solved_right),
         # the newest told while it tracked: at its end nobody is left to see anything
-        "video": observer.video,
+        "video": tree_or_none(observer.video),
         "cpu_percent": {child.role: round(child.cpu_percent, 1) for child in children},
         "rss_mb": {child.role: round(child.rss_mb, 1) for child in children},
-        "guard": slave.get("guard", {}),
+        "guard": tree_or_none(slave and slave.guard),
         "guards_seen": observer.guards_seen,
-        "nodes": master.get("nodes", {}),
-        "buses": master.get("buses", {}),
-        "servos": slave.get("servos", {}),
-        "slave_ticks": slave.get("ticks", {}),
+        "nodes": master.nodes if master else None,
+        "buses": master.buses if master else None,
+        "servos": tree_or_none(slave and slave.servos),
+        "slave_ticks": tree_or_none(slave and slave.ticks),
         "exit_status": statuses,
         "problems": problems,
     }
@@ -132,24 +141,33 @@ def _what_moved(options: DemoOptions) -> str:
     return options.motion or load_config(example("suit", options.profile), SuitConfig).motion
 
 
-def _commands(of_robot: dict[str, Any], slave: dict[str, Any]) -> dict[str, Any]:
-    guard = slave.get("guard", {})
+def tree_or_none(metrics: DataclassInstance | None) -> dict[str, Any] | None:
+    """Plain values; None where the process did not publish them."""
+    return None if metrics is None else to_tree(metrics)
+
+
+def trees(parts: Mapping[str, DataclassInstance]) -> dict[str, Any]:
+    """Plain values of each."""
+    return {name: to_tree(part) for name, part in parts.items()}
+
+
+def _commands(of_robot: CommandedMetrics | None, slave: SlaveMetrics | None) -> dict[str, Any]:
     return {
-        "sent": of_robot.get("commands_sent", 0),
-        "received": guard.get("received", 0),
-        "accepted": guard.get("accepted", 0),
-        "dropped": guard.get("dropped", {}),
+        "sent": of_robot.commands_sent if of_robot else None,
+        "received": slave.guard.received if slave else None,
+        "accepted": slave.guard.accepted if slave else None,
+        "dropped": slave.guard.dropped if slave else None,
     }
 
 
-def _one_way(slave: dict[str, Any]) -> dict[str, Any]:
-    measured = slave.get("one_way_ms", {})
-    offset = slave.get("offset", {})
+def _one_way(slave: SlaveMetrics | None) -> dict[str, Any]:
+    if slave is None:
+        return {"p50": None, "p99": None, "bound": None, "trusted": False}
     return {
-        "p50": measured.get("p50"),
-        "p99": measured.get("p99"),
-        "bound": offset.get("bound_ms"),
-        "trusted": offset.get("trusted", False),
+        "p50": slave.one_way_ms.p50,
+        "p99": slave.one_way_ms.p99,
+        "bound": slave.offset.bound_ms,
+        "trusted": slave.offset.trusted,
     }
 
 

@@ -7,7 +7,7 @@ from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from deploy.demo.draw_curves import in_terminal
-from deploy.demo.report import Report
+from deploy.demo.report import Report, trees
 from deploy.rig.rig import Rig
 from deploy.tables import (
     Live,
@@ -28,13 +28,12 @@ from deploy.targets import BY_PROFILE, verdicts
 def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
     """The live view of a running rig."""
     observer = rig.observer
-    master = observer.statistics.get("master", {})
-    slave = observer.statistics.get("slave", {})
+    master, slave = observer.master, observer.slave
     state = observer.state
     reason = state.reason if state else "not heard"
     if not observer.ready and observer.guard == "hold":
         reason = observer.waiting_for()
-    video = slave.get("video", {})
+    video = slave.video if slave else None
     usage = {f"{role} CPU %": child.cpu_percent for role, child in rig.children.items()}
     view = live_view(
         Live(
@@ -42,18 +41,18 @@ def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
             guard=observer.guard,
             reason=reason,
             rates_hz=observer.rates_hz,
-            stages=slave.get("stages_ms", {}),
+            stages=trees(slave.stages_ms if slave else {}),
             joint_error_deg=_errors_deg(rig),
             drops={
-                "ticks missed": master.get("ticks", {}).get("missed", 0),
+                **({"ticks missed": master.ticks.missed} if master else {}),
                 "by the host": host_missed,
-                **slave.get("guard", {}).get("dropped", {}),
+                **(slave.guard.dropped if slave else {}),
             },
         )
     )
     words = [f"{name} {value:.0f}" for name, value in usage.items()]
     if video:
-        words.append(video["fault"] or f"video {video['fps']:.0f} Hz, {video['kb_s']:.0f} kB/s")
+        words.append(video.fault or f"video {video.fps:.0f} Hz, {video.kb_s:.0f} kB/s")
     return Group(view, Text("   ".join(words), "dim"))
 
 

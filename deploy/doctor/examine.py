@@ -102,7 +102,5 @@ async def others(needs: Needs) -> Sequence[Finding]:
 
 def _software() -> Finding:
     ours = software()
-    words = (
-        f"tandem {ours['tandem']}, schema {ours['schema']}, Zenoh {ours['zenoh']}, Python {ours['python']}"
-    )
+    words = f"tandem {ours.tandem}, schema {ours.schema}, Zenoh {ours.zenoh}, Python {ours.python}"
     return ok("software", words)

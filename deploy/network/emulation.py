@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
-from common.latency import Summary
+from common.metrics import Summary, to_tree
 from deploy.network.profile import Profile
 from deploy.network.scheduler import Counters, PacketScheduler
 
@@ -85,8 +85,8 @@ class EmulatedLink:
         return {
             way: {
                 "counters": asdict(scheduler.counters),
-                "late_ms": scheduler.late.summary(),
-                "planned_ms": scheduler.planned.summary(),
+                "late_ms": to_tree(scheduler.late.summary()),
+                "planned_ms": to_tree(scheduler.planned.summary()),
             }
             for way, scheduler in self._ways.items()
         }

@@ -11,7 +11,7 @@ from typing import Any
 
 from common.clock import to_ns, wall_ns
 from common.errors import NetworkError
-from common.latency import Summary
+from common.metrics import Summary
 from deploy.network.emulation import DIRECTIONS, Emulation
 from deploy.network.figures import Measured, WayMeasured, judge, rate_mbit
 from deploy.network.host import Host
@@ -128,6 +128,5 @@ def _mean_ms(before: Mapping[str, Summary], after: Mapping[str, Summary], way: s
     if way not in after:
         return None
     was, now = before[way], after[way]
-    count = now["count"] - was["count"]
-    total = now["count"] * now.get("mean", 0.0) - was["count"] * was.get("mean", 0.0)
-    return total / count if count else None
+    count = now.count - was.count
+    return (now.total - was.total) / count if count else None

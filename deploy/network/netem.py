@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from common.errors import NetworkError
+from common.metrics import Summary
 from deploy.network.emulation import LinkCounters
 from deploy.network.loss import gilbert_elliott
 from deploy.network.namespaces import LINK, Run, ip, link_addresses
@@ -126,7 +127,7 @@ class Netem:
         to_robot, to_operator = (replace(one, dropped=dict(one.dropped)) for one in self._totals.values())
         return LinkCounters(to_robot, to_operator)
 
-    def planned(self) -> dict[str, dict[str, float]]:
+    def planned(self) -> dict[str, Summary]:
         """The kernel does not tell what it draws."""
         return {}
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import NetworkError
-from common.latency import Summary
+from common.metrics import Summary, from_tree
 from deploy.network.emulation import TO_OPERATOR, TO_ROBOT, LinkCounters
 from deploy.network.namespaces import LINK, Run, ip, link_addresses
 from deploy.network.profile import Profile
@@ -74,11 +74,11 @@ class Forwarder:
 
     def planned(self) -> dict[str, Summary]:
         """How long packets take by what was drawn, each way."""
-        return {way: answer["planned_ms"] for way, answer in self._ask({}).items()}
+        return {way: from_tree(Summary, answer["planned_ms"]) for way, answer in self._ask({}).items()}
 
     def late_ms(self) -> dict[str, Summary]:
         """How late packets were released, each way: what this machine adds to the profile."""
-        return {way: answer["late_ms"] for way, answer in self._ask({}).items()}
+        return {way: from_tree(Summary, answer["late_ms"]) for way, answer in self._ask({}).items()}
 
     def close(self) -> None:
         """End the process."""

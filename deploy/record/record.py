@@ -133,7 +133,7 @@ def _tell(tape: Tape, taken: Taken, tell: Callable[[str], None]) -> None:
 
 
 def _overwritten(link: Link | None) -> int:
-    return 0 if link is None else sum(c["overwritten"] for c in link.counters().values())
+    return 0 if link is None else sum(c.overwritten for c in link.counters().values())
 
 
 def _check(options: RecordOptions, tape: Tape, taken: Taken) -> None:

@@ -9,12 +9,15 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import psutil
 
 from common.errors import TandemError
+from common.metrics import from_tree
 from deploy.rig.spawn import Spawned
+
+_Metrics = TypeVar("_Metrics")
 
 STOP_S = 5.0
 """Grace between SIGTERM and SIGKILL: above the processes' own shutdown deadline."""
@@ -128,13 +131,16 @@ class Child:
                 await self.kill()
         return process.returncode
 
-    def figures(self) -> dict[str, Any]:
-        """What the process counted, written when it stopped; empty if it could not."""
+    def metrics(self, kind: type[_Metrics]) -> _Metrics | None:
+        """What the process counted, written when it stopped; None if it could not.
+
+        Raises CodecError where the file holds something else.
+        """
         try:
-            figures: dict[str, Any] = json.loads(self.figures_file.read_text("utf-8"))
+            tree = json.loads(self.figures_file.read_text("utf-8"))
         except (OSError, ValueError):
-            return {}
-        return figures
+            return None
+        return from_tree(kind, tree)
 
     def said(self) -> str:
         """Everything it has logged so far."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Any
 
 from common.clock import to_ns, to_s
 from common.codec import decode
 from common.errors import CodecError
 from common.link import Link
 from common.messages import Command, RobotState, Statistics, Truth
+from common.metrics import CameraMetrics, MasterMetrics, SlaveMetrics
 from common.skeleton import Skeleton
 from common.topics import COMMAND, STATE, STATISTICS, TRUTH
 from deploy.judge import Trace
@@ -31,14 +31,17 @@ class Observer:
         self.command: Command | None = None
         self.state: RobotState | None = None
         self.truth: Truth | None = None
-        self.statistics: dict[str, dict[str, Any]] = {}
+        self.master: MasterMetrics | None = None
+        self.slave: SlaveMetrics | None = None
+        self.undecodable = 0
+        """Messages that could not be read: of another version, or broken."""
         self.guards_seen: list[str] = []
         self.states: list[RobotState] = []
         """While recording."""
         self.commands: list[Command] = []
         """While recording."""
-        self.video: dict[str, Any] = {}
-        """What the robot last counted of its camera while recording; empty where it has none."""
+        self.video: CameraMetrics | None = None
+        """What the robot last counted of its camera while recording; None where it has none."""
         self.listeners: list[Callable[[Heard], None]] = []
         """Each is called with every message, whether recording or not."""
         self._known_from = -1
@@ -56,16 +59,12 @@ class Observer:
         try:
             message = decode(payload, kind, self._joints)
         except CodecError:
+            self.undecodable += 1
             return
         for listener in self.listeners:
             listener(message)
         if isinstance(message, Statistics):
-            self.statistics[message.role] = message.figures
-            if self.recording and message.role == "slave":
-                self.video = self.statistics["slave"].get("video", {})
-            ticks = self.statistics.get("master", {}).get("ticks", {})
-            if message.role == "master" and ticks:
-                self._rate("capture", ticks.get("expected", 0) - ticks.get("missed", 0), message.sent_ns)
+            self._take_metrics(message)
             return
         if isinstance(message, Command):
             self.command = message
@@ -88,6 +87,15 @@ class Observer:
             elif isinstance(message, Command):
                 self.commands.append(message)
         self._news.set()
+
+    def _take_metrics(self, message: Statistics) -> None:
+        if isinstance(message.metrics, MasterMetrics):
+            self.master, ticks = message.metrics, message.metrics.ticks
+            self._rate("capture", ticks.expected - ticks.missed, message.sent_ns)
+        else:
+            self.slave = message.metrics
+            if self.recording:
+                self.video = self.slave.video
 
     def _rate(self, name: str, count: int, at_ns: int) -> None:
         before, since_ns = self._marks.get(name, (0, 0))

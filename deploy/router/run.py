@@ -12,6 +12,7 @@ from common.launch import WriteFigures
 from common.link.audit import Audit
 from common.link.configuration import zenoh_configuration
 from common.link.session import Session, open_session
+from common.metrics import to_tree
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.runtime import until_stopped
@@ -48,7 +49,7 @@ async def run(config: RouterConfig, stop: asyncio.Event, write_figures: WriteFig
             await until_stopped(stop, tend(session, notifier))
         finally:
             notifier.stopping()
-            write_figures(audit.figures())
+            write_figures(to_tree(audit.metrics()))
     log.info("stopped")
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from common.metrics import Summary
 
 
 class Additions:
@@ -17,19 +16,11 @@ class Additions:
         before, self._last[name] = self._last.get(name, 0.0), value
         return value if value < before else value - before
 
-    def mean(self, name: str, summary: Mapping[str, float]) -> tuple[float, float]:
-        """How many were recorded since the last time, and their mean; of a `Durations` summary."""
-        count, total = summary.get("count", 0), summary.get("count", 0) * summary.get("mean", 0.0)
+    def mean(self, name: str, summary: Summary) -> tuple[float, float]:
+        """How many were recorded since the last time, and their mean."""
+        count, total = summary.count, summary.total
         fell = count < self._last.get(f"{name}.count", 0.0)
         added = self.take(f"{name}.count", count)
         before = 0.0 if fell else self._last.get(f"{name}.sum", 0.0)
         self._last[f"{name}.sum"] = total
         return added, (total - before) / added if added else float("nan")
-
-
-def within(tree: Mapping[str, Any], *path: str) -> float:
-    """A number of a tree of plain values; 0 where it is not there."""
-    found: Any = tree
-    for key in path:
-        found = found.get(key, {}) if isinstance(found, Mapping) else {}
-    return float(found) if isinstance(found, int | float) else 0.0

@@ -20,7 +20,8 @@ SEEN = (
     "round_trip_n", "round_trip_ms", "end_to_end_n", "end_to_end_ms",
     "sent", "arrived", "lost", "late", "repeated", "overwritten", "refused",
     "master_ticks", "master_missed", "slave_ticks", "slave_missed",
-    "times_lost", "states_missed", "strayed_deg", "host_still_ms", "link_lost", "link_out", "link_odd",
+    "times_lost", "states_missed", "undecodable", "strayed_deg", "host_still_ms",
+    "link_lost", "link_out", "link_odd",
 )  # fmt: skip
 """What a row holds of the whole; those in ms are NaN in a second in which nothing was measured."""
 OF_PROCESS = ("life", "rss_mb", "fds", "threads", "cpu_s")

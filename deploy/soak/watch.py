@@ -12,14 +12,13 @@ from common.codec import decode
 from common.errors import CodecError
 from common.link import Link
 from common.messages import Command, RobotState, Statistics
+from common.metrics import MasterMetrics, SlaveMetrics, Summary
 from common.skeleton import Skeleton
 from common.topics import COMMAND, STATE, STATISTICS
-from deploy.soak.counts import Additions, within
+from deploy.soak.counts import Additions
 from deploy.soak.motion import Motion
 
 FRESH_NS = to_ns(2.0 / COMMAND.rate_hz)
-NUMBERED = ("arrived", "late", "repeated")
-"""What the slave counts of commands by their numbers, beside those that are lost."""
 Tell = Callable[[str, Mapping[str, Any]], None]
 """Takes an event's kind and what there is to say of it."""
 
@@ -63,6 +62,7 @@ class Watch:
         try:
             self.command = decode(payload, Command, len(self._skeleton.joints))
         except CodecError:
+            self._add("undecodable", 1)
             return
         invalid = int((~self.command.valid).sum())
         if invalid != self._invalid:
@@ -74,6 +74,7 @@ class Watch:
         try:
             state = decode(payload, RobotState, len(self._skeleton.joints))
         except CodecError:
+            self._add("undecodable", 1)
             return
         before, self.state, self.state_ns = self.state, state, arrived_ns
         if before is not None and state.sequence > before.sequence:
@@ -116,39 +117,44 @@ class Watch:
         try:
             told = decode(payload, Statistics)
         except CodecError:
+            self._add("undecodable", 1)
             return
-        if told.role == "master":
-            self._on_master(told.figures)
-        elif told.role == "slave":
-            self._on_slave(told.figures)
+        if isinstance(told.metrics, MasterMetrics):
+            self._on_master(told.metrics)
+        else:
+            self._on_slave(told.metrics)
 
-    def _on_master(self, figures: Mapping[str, Any]) -> None:
+    def _on_master(self, metrics: MasterMetrics) -> None:
+        # a message tells of the robot that it is sent to, and of no other
+        (robot,) = metrics.robots.values()
         counters = {
-            "sent": within(figures, "commands_sent"),
-            "master_ticks": within(figures, "ticks", "expected"),
-            "master_missed": within(figures, "ticks", "missed"),
-            "times_lost": within(figures, "robot", "times_lost"),
+            "sent": robot.commands_sent,
+            "master_ticks": metrics.ticks.expected,
+            "master_missed": metrics.ticks.missed,
+            "times_lost": robot.robot.times_lost,
         }
         self._count("master", counters)
-        self._mean("master", "round_trip", figures.get("round_trip_ms", {}))
+        self._mean("master", "round_trip", robot.round_trip_ms)
 
-    def _on_slave(self, figures: Mapping[str, Any]) -> None:
-        dropped = figures.get("guard", {}).get("dropped", {})
+    def _on_slave(self, metrics: SlaveMetrics) -> None:
+        commands = metrics.commands
         counters = {
             # one that comes after all is late and not lost any more: only the two together never shrink
-            "missing": within(figures, "commands", "lost") + within(figures, "commands", "late"),
-            **{name: within(figures, "commands", name) for name in NUMBERED},
-            "overwritten": within(figures, "link", "command", "overwritten"),
-            "slave_ticks": within(figures, "ticks", "expected"),
-            "slave_missed": within(figures, "ticks", "missed"),
+            "missing": commands.lost + commands.late,
+            "arrived": commands.arrived,
+            "late": commands.late,
+            "repeated": commands.repeated,
+            "overwritten": metrics.link[COMMAND.name].overwritten,
+            "slave_ticks": metrics.ticks.expected,
+            "slave_missed": metrics.ticks.missed,
             # while nobody holds the lease every command is refused, and nothing is wrong with that
-            "refused": sum(count for gate, count in dropped.items() if gate != "lease"),
+            "refused": sum(count for gate, count in metrics.guard.dropped.items() if gate != "lease"),
         }
         added = {name: self._added["slave"].take(name, value) for name, value in counters.items()}
         added["lost"] = added.pop("missing") - added["late"]
         for name, count in added.items():
             self._add(name, count)
-        self._mean("slave", "end_to_end", figures.get("end_to_end_ms", {}))
+        self._mean("slave", "end_to_end", metrics.end_to_end_ms)
 
     def restarted(self, role: str) -> None:
         """A process begins anew: so do its counters, and a robot within it stands elsewhere."""
@@ -164,7 +170,7 @@ class Watch:
     def _add(self, name: str, count: float) -> None:
         self._row[name] = self._row.get(name, 0.0) + count
 
-    def _mean(self, role: str, name: str, summary: Mapping[str, float]) -> None:
+    def _mean(self, role: str, name: str, summary: Summary) -> None:
         count, mean = self._added[role].mean(name, summary)
         self._add(f"{name}_n", count)
         if count:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
-from deploy.trial.recording import Outage, Recording, counts, echoes, within
+from common.metrics import SlaveMetrics
+from deploy.trial.recording import Outage, Recording, counts, echoes, published
 
 MOVING = ("align", "track")
 LEFT_S = 0.5
@@ -68,15 +66,10 @@ def _stale_unseen(after: Recording, outage: Outage, max_age_s: float) -> int:
 
 def _accepted_unseen(after: Recording) -> int:
     """Accepted by the slave's counter and echoed by no state, between its first word and its last."""
-    told = [(s.sent_ns, n) for s in within(after.told, "slave") if (n := _accepted(s.figures)) is not None]
+    told = [(s.sent_ns, s.metrics.guard.accepted) for s in published(after.told, SlaveMetrics)]
     if len(told) < 2:
         return 0
     (from_ns, before), (until_ns, accepted) = told[0], told[-1]
     found = echoes(after.states).values()
     seen = sum(from_ns < e.accepted_ns <= until_ns + TELLS_NS for e in found)
     return max(0, accepted - before - seen)
-
-
-def _accepted(figures: Mapping[str, Any]) -> int | None:
-    accepted: int | None = figures.get("guard", {}).get("accepted")
-    return accepted

@@ -6,20 +6,20 @@ echoes it. Percentiles are those of single commands, never of other percentiles.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
+from common.metrics import MasterMetrics, SlaveMetrics
 from deploy.demo.baseline import arrivals, compare
 from deploy.judge import MovedSeries, TruthSeries, accuracy, motion
 from deploy.judge.motion import at_shift
 from deploy.trial.aftermath import aftermath
 from deploy.trial.cell import Excerpt
 from deploy.trial.figures import BY_NAME
-from deploy.trial.recording import Course, Recording, counts, echoes, latest_bound_ns, within
+from deploy.trial.recording import Course, Recording, counts, echoes, latest_bound_ns, published
 from slave.config import SlaveConfig
 
 EXCERPT_S = 6.0
@@ -80,9 +80,9 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
     ]
     bound_ns = latest_bound_ns(judged.states)
     return {
-        **_percentiles("one_way", _told_ms(judged, "slave", "one_way_recent_us")),
+        **_percentiles("one_way", _one_way_ms(judged)),
         "one_way_bound_ms": None if bound_ns is None else bound_ns / NS_PER_MS,
-        **_percentiles("round_trip", _told_ms(judged, "master", "round_trip_recent_us")),
+        **_percentiles("round_trip", _round_trip_ms(judged)),
         **_percentiles("age", ages),
         **(_percentiles("true_one_way", _transits_ms(judged)) if shared_clock else {}),
         "delivered": _delivered_percent(judged),
@@ -90,9 +90,17 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
     }
 
 
-def _told_ms(judged: Recording, role: str, name: str) -> list[float]:
-    """What a process told one by one between its first word and its last."""
-    return [us / 1000.0 for word in within(judged.told, role)[1:] for us in _recent_us(word.figures, name)]
+def _one_way_ms(judged: Recording) -> list[float]:
+    """Each one-way time that the slave published between its first message and its last."""
+    words = published(judged.told, SlaveMetrics)[1:]
+    return [us / 1000.0 for word in words for us in word.metrics.one_way_recent_us]
+
+
+def _round_trip_ms(judged: Recording) -> list[float]:
+    """Each round trip that the master published between its first message and its last."""
+    words = published(judged.told, MasterMetrics)[1:]
+    robots = [robot for word in words for robot in word.metrics.robots.values()]
+    return [us / 1000.0 for robot in robots for us in robot.round_trip_recent_us]
 
 
 def _transits_ms(judged: Recording) -> list[float]:
@@ -123,14 +131,13 @@ def _accepted_percent(judged: Recording) -> float | None:
 
 def _delivered_percent(judged: Recording) -> float | None:
     """Between the slave's first and last word: what came, of what was to come by the commands' numbers."""
-    told = within(judged.told, "slave")
+    told = published(judged.told, SlaveMetrics)
     if len(told) < 2:
         return None
-    first, last = (_arrivals(told[i].figures) for i in (0, -1))
-    grown = {name: last[name] - first[name] for name in last}
-    came = grown["arrived"] - grown["repeated"]
+    first, last = (told[i].metrics.commands for i in (0, -1))
+    came = (last.arrived - first.arrived) - (last.repeated - first.repeated)
     # one that was missing before the first word and came after it makes `lost` shrink
-    sent = came + max(0, grown["lost"])
+    sent = came + max(0, last.lost - first.lost)
     return 100.0 * came / sent if sent else None
 
 
@@ -174,30 +181,17 @@ def _guard(judged: Recording) -> dict[str, float | None]:
 
 def _missed_percent(judged: Recording) -> float | None:
     shares = []
-    for role in ("master", "slave"):
-        told = within(judged.told, role)
-        if len(told) < 2:
+    ticks_of_processes = (
+        [word.metrics.ticks for word in published(judged.told, MasterMetrics)],
+        [word.metrics.ticks for word in published(judged.told, SlaveMetrics)],
+    )
+    for ticks in ticks_of_processes:
+        if len(ticks) < 2:
             continue
-        first, last = (_ticks(told[i].figures) for i in (0, -1))
-        if last["expected"] > first["expected"]:
-            missed = last["missed"] - first["missed"]
-            shares.append(100.0 * missed / (last["expected"] - first["expected"]))
+        first, last = ticks[0], ticks[-1]
+        if last.expected > first.expected:
+            shares.append(100.0 * (last.missed - first.missed) / (last.expected - first.expected))
     return max(shares, default=None)
-
-
-def _ticks(figures: Mapping[str, Any]) -> dict[str, int]:
-    ticks: dict[str, int] = figures["ticks"]
-    return ticks
-
-
-def _arrivals(figures: Mapping[str, Any]) -> dict[str, int]:
-    arrivals: dict[str, int] = figures["commands"]
-    return arrivals
-
-
-def _recent_us(figures: Mapping[str, Any], name: str) -> Sequence[int]:
-    recent_us: Sequence[int] = figures.get(name, ())
-    return recent_us
 
 
 def _kilo(value: float | None) -> float | None:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Generic, TypeVar
 
 from common.messages import Command, CommandEcho, RobotState, Statistics, Truth
+from common.metrics import GuardMetrics, MasterMetrics, SlaveMetrics
 from common.skeleton import Skeleton
 from deploy.judge import Trace
+
+_Metrics = TypeVar("_Metrics", MasterMetrics, SlaveMetrics)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,9 +97,18 @@ def latest_bound_ns(states: Sequence[RobotState]) -> int | None:
     return max((s.offset_bound_ns for s in states if s.offset_bound_ns >= 0), default=None)
 
 
-def within(told: Iterable[Statistics], role: str) -> list[Statistics]:
+@dataclass(frozen=True, slots=True)
+class Published(Generic[_Metrics]):
+    """What one process published, and when, ns of its own clock."""
+
+    sent_ns: int
+    metrics: _Metrics
+
+
+def published(told: Iterable[Statistics], kind: type[_Metrics]) -> list[Published[_Metrics]]:
     """Of one process, in the order of their sending."""
-    return sorted((s for s in told if s.role == role), key=lambda s: s.sent_ns)
+    found = [Published(s.sent_ns, s.metrics) for s in told if isinstance(s.metrics, kind)]
+    return sorted(found, key=lambda one: one.sent_ns)
 
 
 def echoes(states: Sequence[RobotState]) -> dict[int, CommandEcho]:
@@ -106,14 +118,18 @@ def echoes(states: Sequence[RobotState]) -> dict[int, CommandEcho]:
 
 def counts(heard: Recording) -> dict[str, dict[str, int]]:
     """The guard's events between the slave's first and last word, by kind and name, if any."""
-    told = within(heard.told, "slave")
+    told = published(heard.told, SlaveMetrics)
     if not told:
         return {}
-    first, last = (_counted(told[i].figures) for i in (0, -1))
+    first, last = (_counted(told[i].metrics.guard) for i in (0, -1))
     grown = {kind: Counter(last[kind]) - Counter(first[kind]) for kind in last}
     return {kind: dict(sorted(count.items())) for kind, count in grown.items() if count}
 
 
-def _counted(figures: Mapping[str, Any]) -> dict[str, dict[str, int]]:
-    guard = figures.get("guard", {})
-    return {kind: guard.get(kind, {}) for kind in ("dropped", "losses", "clamps", "doubts")}
+def _counted(guard: GuardMetrics) -> dict[str, dict[str, int]]:
+    return {
+        "dropped": guard.dropped,
+        "losses": guard.losses,
+        "clamps": guard.clamps,
+        "doubts": guard.doubts,
+    }

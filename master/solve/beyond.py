@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock import to_ns
+from common.metrics import Unreached
 from common.quaternion import Array
 
 COUNTED_RAD = math.radians(5.0)
@@ -54,13 +55,13 @@ class BeyondReach:
                 )
         return said
 
-    def figures(self) -> dict[str, dict[str, float]]:
-        """The segments that were beyond reach: share of all solves, degrees now and at most."""
+    def metrics(self) -> dict[str, Unreached]:
+        """The segments that were beyond reach."""
         return {
-            self._names[i]: {
-                "percent": round(100.0 * int(self._times[i]) / self._solves, 2),
-                "now_deg": round(math.degrees(self._now_rad[i]), 1),
-                "most_deg": round(math.degrees(self._most_rad[i]), 1),
-            }
+            self._names[i]: Unreached(
+                percent=round(100.0 * int(self._times[i]) / self._solves, 2),
+                now_deg=round(math.degrees(self._now_rad[i]), 1),
+                most_deg=round(math.degrees(self._most_rad[i]), 1),
+            )
             for i in np.flatnonzero(self._times).tolist()
         }

@@ -15,6 +15,7 @@ from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns, to_s
 from common.errors import CodecError, RobotError
 from common.latency import Durations
 from common.messages import Command
+from common.metrics import CameraMetrics
 from common.offset import Offset
 from common.quaternion import Array
 from common.video import VideoFrame, encode_frame
@@ -56,7 +57,7 @@ class Camera(Protocol):
 
 
 class CameraFeed:
-    """One camera. `look`, `seen_by` and `figures` are for the loop, and cost it microseconds."""
+    """One camera. `look`, `seen_by` and `metrics` are for the loop, and cost it microseconds."""
 
     def __init__(
         self,
@@ -117,18 +118,24 @@ class CameraFeed:
             self._seen.append(seen)
             self._wake.set()
 
-    def figures(self) -> dict[str, object]:
+    def metrics(self) -> CameraMetrics:
         """Rates of the last seconds, counters, and percentiles in ms."""
-        return {
-            **self._count.rates(self._clock()),
-            "budget_bytes": self._rate.budget_bytes,
-            "gave_way": self._rate.lowered,
-            "unseen": self._rate.lost,
-            "make_ms": self._make.summary(),
-            "transit_ms": self.sight.transit.summary(),
-            "action_to_observation_ms": self.sight.observation_age.summary(),
-            "fault": self.fault,
-        }
+        sizes, over_s = self._count.lately(self._clock())
+        return CameraMetrics(
+            pictures=self._count.pictures,
+            fps=len(sizes) / over_s,
+            kb_s=sum(sizes) / over_s / 1000,
+            mean_kb=sum(sizes) / len(sizes) / 1000 if sizes else 0.0,
+            width=self._count.width,
+            sent_kb=self._count.bytes / 1000,
+            budget_bytes=self._rate.budget_bytes,
+            gave_way=self._rate.lowered,
+            unseen=self._rate.lost,
+            make_ms=self._make.summary(),
+            transit_ms=self.sight.transit.summary(),
+            action_to_observation_ms=self.sight.observation_age.summary(),
+            fault=self.fault,
+        )
 
     def _run(self) -> None:
         back_off_s = _FIRST_BACK_OFF_S
@@ -216,27 +223,20 @@ class _Count:
 
     def __init__(self, now_ns: int) -> None:
         self.pictures = 0
-        self._bytes = 0
-        self._width = 0
+        self.bytes = 0
+        self.width = 0
         self._since_ns = now_ns
         self._lately: deque[tuple[int, int]] = deque(maxlen=512)
 
     def add(self, size: int, width: int, now_ns: int) -> None:
         self.pictures += 1
-        self._bytes += size
-        self._width = width
+        self.bytes += size
+        self.width = width
         self._lately.append((now_ns, size))
 
-    def rates(self, now_ns: int) -> dict[str, object]:
+    def lately(self, now_ns: int) -> tuple[list[int], float]:
+        """Sizes in bytes of the last seconds' pictures, and over how many seconds."""
         since_ns = max(now_ns - self._OVER_NS, self._since_ns)
         # copied at once: the other thread may add to it meanwhile
         sizes = [size for at_ns, size in self._lately.copy() if at_ns > since_ns]
-        over_s = max(to_s(now_ns - since_ns), 1e-3)
-        return {
-            "pictures": self.pictures,
-            "fps": len(sizes) / over_s,
-            "kb_s": sum(sizes) / over_s / 1000,
-            "mean_kb": sum(sizes) / len(sizes) / 1000 if sizes else 0.0,
-            "width": self._width,
-            "sent_kb": self._bytes / 1000,
-        }
+        return sizes, max(to_s(now_ns - since_ns), 1e-3)

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from common.metrics import GuardMetrics
+
 
 class Rule(StrEnum):
     """Which limit a clamp kept."""
@@ -84,14 +86,16 @@ class GuardCounters:
     late_steps: int = 0
     """Steps so late that the setpoint was moved by less than the time that had passed."""
 
-    def summary(self) -> dict[str, object]:
-        """Plain values, for statistics and reports."""
-        return {
-            "received": self.received,
-            "accepted": self.accepted,
-            "dropped": dict(self.dropped),
-            "losses": dict(self.losses),
-            "clamps": {str(rule): count for rule, count in self.clamps.items()},
-            "doubts": dict(self.doubts),
-            "late_steps": self.late_steps,
-        }
+    def metrics(self, state: str, reason: str) -> GuardMetrics:
+        """The counters so far, with the guard's state and why it is there."""
+        return GuardMetrics(
+            state=state,
+            reason=reason,
+            received=self.received,
+            accepted=self.accepted,
+            dropped=dict(self.dropped),
+            losses=dict(self.losses),
+            clamps={str(rule): count for rule, count in self.clamps.items()},
+            doubts=dict(self.doubts),
+            late_steps=self.late_steps,
+        )

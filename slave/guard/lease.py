@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from common.clock import to_s
 from common.lease import lease_id
+from common.metrics import LeaseMetrics
 
 DrawToken = Callable[[], int]
 """Gives a new token, 1 to 2⁶³ - 1, that nobody can guess. Tests pass a counter."""
@@ -64,13 +65,13 @@ class Lease:
         """Whether an operator of that name holds it; call `lapse` first."""
         return self.token != 0 and operator == self.operator
 
-    def summary(self, now_ns: int) -> dict[str, object]:
-        """Whose it is, which, since when, and how long ago a command renewed it; {} where nobody holds it."""
+    def metrics(self, now_ns: int) -> LeaseMetrics | None:
+        """Whose it is, which, since when, and how long ago a command renewed it; None: nobody holds it."""
         if not self.token:
-            return {}
-        return {
-            "operator": self.operator,
-            "id": lease_id(self.token),
-            "held_s": round(to_s(now_ns - self._granted_ns), 3),
-            "renewed_s": round(to_s(now_ns - self._renewed_ns), 3),
-        }
+            return None
+        return LeaseMetrics(
+            operator=self.operator,
+            id=lease_id(self.token),
+            held_s=round(to_s(now_ns - self._granted_ns), 3),
+            renewed_s=round(to_s(now_ns - self._renewed_ns), 3),
+        )

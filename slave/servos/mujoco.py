@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from common.clock import Clock, monotonic_ns, to_s
 from common.errors import RobotError
+from common.metrics import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders import EncoderConfig
@@ -63,9 +64,9 @@ class MujocoServos:
     def quick_stop(self, stop: bool) -> None:
         """Nothing to be done here: the guard's setpoint brakes, and these drives only follow it."""
 
-    def figures(self) -> dict[str, object]:
+    def metrics(self) -> ServoMetrics:
         """Cycles that the machine has cost it."""
-        return {"skipped_cycles": self.skipped_cycles}
+        return ServoMetrics(counters={"skipped_cycles": self.skipped_cycles})
 
     def stop(self) -> None:
         """End the thread; the robot stays where it is, and its setpoint with it."""

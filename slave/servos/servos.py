@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.messages import Mask
+from common.metrics import ServoMetrics
 from common.quaternion import Array
 
 
@@ -51,8 +52,8 @@ class Servos(Protocol):
         """
         ...
 
-    def figures(self) -> dict[str, object]:
-        """What was counted and measured since the start, as plain values."""
+    def metrics(self) -> ServoMetrics:
+        """What was counted and measured since the start."""
         ...
 
     def stop(self) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from common.codec import ANGLE_LIMIT_RAD, MAX_PAYLOAD, RATE_LIMIT_RAD_S, VERSION, decode, encode
 from common.errors import CodecError
-from common.fields import MAX_DEPTH, MAX_DOUBT, MAX_NAME, MAX_TEXT
+from common.fields import MAX_DOUBT, MAX_NAME, MAX_TEXT
 from common.messages import (
     Action,
     BaseAttitude,
@@ -26,22 +26,14 @@ from common.messages import (
     Statistics,
     Truth,
 )
+from common.metrics import LeaseHeld, to_tree
+from tests.published import commanded, master_metrics, slave_metrics
 
 counts = st.integers(0, 2**63 - 1)
 signed = st.integers(-(2**63) + 1, 2**63 - 1)
 names = st.text(st.characters(exclude_categories=["Cs"]), max_size=MAX_NAME)
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=MAX_TEXT)
 flags = st.booleans()
-plain = st.none() | flags | signed | st.floats(allow_nan=False, allow_infinity=False) | texts
-trees = st.dictionaries(
-    names,
-    st.recursive(
-        plain,
-        lambda inner: st.lists(inner, max_size=3).map(tuple) | st.dictionaries(names, inner, max_size=3),
-        max_leaves=10,
-    ),
-    max_size=4,
-)
 
 
 def values(joints: int, limit: float) -> st.SearchStrategy[Any]:
@@ -118,7 +110,7 @@ messages = st.one_of(
     st.builds(ControlReply, flags, names, texts, counts, counts, counts, texts),
     st.builds(ClockQuery, counts, counts, counts, counts),
     st.builds(ClockReply, counts, counts, counts, counts),
-    st.builds(Statistics, names, counts, trees),
+    st.builds(Statistics, counts, st.sampled_from([master_metrics(), slave_metrics()])),
 )
 
 
@@ -273,11 +265,10 @@ def test_each_field_of_a_state_is_checked(index: int, value: object, why: str) -
         (ControlReply(True, "hold", ""), 5, -1, "63-bit count"),
         (ClockQuery(1, 2, 3), 2, -1, "63-bit count"),
         (ClockReply(1, 2, 3), 4, 1.5, "63-bit count"),
-        (Statistics("master", 1, {}), 4, [], "figures are not a map"),
-        (Statistics("master", 1, {}), 4, {"a": b"x"}, "is not a figure"),
-        (Statistics("master", 1, {}), 4, {"a": [math.nan]}, "nan is not a figure"),
-        (Statistics("master", 1, {}), 4, {"a": {b"b": 1}}, "is not a key"),
-        (Statistics("master", 1, {}), 4, {"a": msgpack.ExtType(5, b"x")}, "is not a figure"),
+        (Statistics(1, master_metrics()), 2, "suit", "statistics of 'suit', expected one of master, slave"),
+        (Statistics(1, master_metrics()), 4, [], "MasterMetrics"),
+        (Statistics(1, master_metrics()), 4, {}, "MasterMetrics: software: field required"),
+        (Statistics(1, slave_metrics()), 4, to_tree(master_metrics()), "SlaveMetrics"),
         (Truth(1, 2, np.zeros(3), np.zeros(3)), 4, b"", "float32 values"),
     ],
 )
@@ -291,7 +282,7 @@ def test_each_field_of_the_other_messages_is_checked(
 @pytest.mark.parametrize(
     "message",
     [COMMAND, STATE, ControlRequest("r", Action.CLAIM, "o"), ControlReply(True, "", ""), ClockQuery(1),
-     ClockReply(1, 2, 3), Statistics("m", 1, {}), Truth(1, 2, np.zeros(3), np.zeros(3))],
+     ClockReply(1, 2, 3), Statistics(1, master_metrics()), Truth(1, 2, np.zeros(3), np.zeros(3))],
     ids=lambda m: type(m).__name__,
 )  # fmt: skip
 def test_a_field_too_many_or_too_few_is_refused(message: Any) -> None:
@@ -303,33 +294,10 @@ def test_a_field_too_many_or_too_few_is_refused(message: Any) -> None:
             decode(end, type(message), 3)
 
 
-def test_figures_are_made_plain() -> None:
-    figures: Any = {
-        "mean": math.nan,
-        "worst": np.float64(math.inf),
-        "count": np.int64(3),
-        "fresh": np.array([True, False]),
-        5: (1, 2),
-        "empty": {},
-    }
-    decoded = decode(encode(Statistics("master", 1, figures)), Statistics)
-    assert decoded.figures == {
-        "mean": None, "worst": None, "count": 3, "fresh": (True, False), "5": (1, 2), "empty": {},
-    }  # fmt: skip
-
-
-def test_figures_may_be_nested_only_so_deep() -> None:
-    def nested(levels: int) -> dict[str, object]:
-        return {"a": nested(levels - 1)} if levels > 1 else {}
-
-    decode(encode(Statistics("m", 1, nested(MAX_DEPTH))), Statistics)
-    with pytest.raises(CodecError, match="nested more than 16 deep"):
-        decode(encode(Statistics("m", 1, nested(MAX_DEPTH + 1))), Statistics)
-
-
 def test_a_payload_may_be_only_so_long() -> None:
-    figures: dict[str, object] = {"a": "x" * (MAX_PAYLOAD - 24)}
-    payload = encode(Statistics("m", 1, figures))
+    robot = commanded(lease=LeaseHeld(True, ""))
+    spare = MAX_PAYLOAD - len(encode(Statistics(1, master_metrics(robot)))) - 4
+    payload = encode(Statistics(1, master_metrics(commanded(lease=LeaseHeld(True, "x" * spare)))))
     assert len(payload) == MAX_PAYLOAD
     decode(payload, Statistics)
     with pytest.raises(CodecError, match="bytes, expected at most"):
@@ -341,7 +309,12 @@ def test_a_long_text_is_cut_where_a_reader_can_bear_it() -> None:
 
 
 def test_what_cannot_be_encoded_is_a_codec_error_and_spoils_nothing() -> None:
-    for bad in (ClockQuery(2**70), Statistics("m", 1, {"a": object()}), ControlReply(True, "\ud800", "")):
+    unknown = Statistics(1, master_metrics(nodes={"a": object()}))
+    for bad in (
+        ClockQuery(2**70),
+        unknown,
+        ControlReply(True, "\ud800", ""),
+    ):
         with pytest.raises(CodecError, match="cannot be encoded"):
             encode(bad)
     assert decode(encode(ClockQuery(1)), ClockQuery) == ClockQuery(1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from common.clock import to_ns
 from common.link.refusals import MAX_KINDS, REPEAT_S, Refusals
+from common.metrics import RefusalMetrics
 
 AT = "2026-11-28T08:16:01.873954Z TRACE"
 ACL = "zenoh::net::routing::interceptor::access_control:"
@@ -38,14 +39,14 @@ def fed(*lines: str) -> Refusals:
 def test_what_was_dropped_is_told_by_name_kind_and_key() -> None:
     refusals = fed(named(1, "operator:ben", "Query"), cached(1, "Put"))
     assert refusals.feed(dropped(1), 0) == "operator:ben was refused: Put tandem/r/command (1 so far)"
-    assert refusals.figures() == {
-        "total": 1, "handshakes": {}, "messages": {"operator:ben": {"Put tandem/r/command": 1}},
-    }  # fmt: skip
+    assert refusals.metrics() == RefusalMetrics(
+        total=1, handshakes={}, messages={"operator:ben": {"Put tandem/r/command": 1}}
+    )
 
 
 def test_only_what_is_dropped_next_in_the_same_thread_counts() -> None:
     both = fed(cached(1, "Put"), cached(2, "Query"), dropped(2), dropped(3), dropped(2))
-    assert both.figures()["messages"] == {ZID: {"Query tandem/r/command": 1}}
+    assert both.metrics().messages == {ZID: {"Query tandem/r/command": 1}}
     # what might be asked later is looked up at once, and refuses nothing
     assert fed(named(1, "a:b", "Put"), cached(1, "Put", "authorized"), dropped(1)).counts.total() == 0
     # what is not sent to somebody is no attempt of his
@@ -55,7 +56,7 @@ def test_only_what_is_dropped_next_in_the_same_thread_counts() -> None:
 def test_a_stranger_is_named_by_whoever_knows_him_even_afterwards() -> None:
     refusals = fed(cached(1, "Put"), dropped(1))
     refusals.learn(ZID, "observer:stranger")
-    assert refusals.figures()["messages"] == {"observer:stranger": {"Put tandem/r/command": 1}}
+    assert refusals.metrics().messages == {"observer:stranger": {"Put tandem/r/command": 1}}
 
 
 def test_refused_handshakes_are_told_by_their_reason_alone() -> None:
@@ -65,11 +66,11 @@ def test_refused_handshakes_are_told_by_their_reason_alone() -> None:
     ended = "WARN acc-0 ThreadId(6) x::tls::expiration: Closing {} link 1.2.3.4:5 => 1.2.3.4:6 : {}"
     gone = "remote certificate chain expired"
     refusals = fed(ended.format("TLS", gone), ended.format("QUIC", gone))
-    assert refusals.figures()["handshakes"] == {gone: 2}
+    assert refusals.metrics().handshakes == {gone: 2}
     refusals = fed(
         tls.format(expired.format(1)), tls.format(expired.format(2)), quic.format("peer sent no certificates")
     )
-    assert refusals.figures()["handshakes"] == {
+    assert refusals.metrics().handshakes == {
         "invalid peer certificate: certificate expired": 2, "peer sent no certificates": 1,
     }  # fmt: skip
 
@@ -95,7 +96,7 @@ def test_a_flood_of_different_refusals_costs_no_memory() -> None:
         refusals.feed(dropped(1), 0)
         refusals.learn(f"{n:032x}", "somebody")
     assert (len(refusals.counts), refusals.more, len(refusals.names)) == (MAX_KINDS, 5, MAX_KINDS)
-    assert refusals.figures()["total"] == MAX_KINDS + 5
+    assert refusals.metrics().total == MAX_KINDS + 5
 
 
 def test_who_is_still_connected_is_remembered_however_many_came_and_went() -> None:

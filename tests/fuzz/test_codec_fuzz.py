@@ -23,6 +23,7 @@ from common.messages import (
     Statistics,
     Truth,
 )
+from tests.published import master_metrics
 
 J = 25
 ones, zeros = np.ones(J, np.bool_), np.zeros(J)
@@ -47,7 +48,7 @@ SEEDS: dict[str, Any] = {
     "controlled": ControlReply(True, "hold", "claimed", 2**40),
     "clock": ClockQuery(2**50, 2**49, 2**48),
     "clocked": ClockReply(1, 2, 3),
-    "statistics": Statistics("master", 5, {"ticks": {"missed": 0}, "mean": 0.5, "list": (1, "a", None)}),
+    "statistics": Statistics(5, master_metrics()),
     "truth": Truth(5, 6, zeros, zeros),
 }
 KINDS = [type(seed) for seed in SEEDS.values()]

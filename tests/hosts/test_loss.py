@@ -10,6 +10,7 @@ import pytest
 
 from common.clock import to_ns
 from common.messages import RobotState
+from common.metrics import SlaveMetrics
 from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
 from deploy.rig.tracking import until_tracking
@@ -98,7 +99,9 @@ def test_each_process_stops_cleanly(on_this_host: OnThisHost, stop: signal.Signa
             assert statuses == {"master": 0, "suit": 0, "slave": 0}, {
                 role: child.last_words() for role, child in rig.children.items()
             }
-            assert rig.children["slave"].figures()["guard"]["accepted"] > 0
+            counted = rig.children["slave"].metrics(SlaveMetrics)
+            assert counted is not None
+            assert counted.guard.accepted > 0
 
     on_this_host(story)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from common.endpoint import SECURE, TRANSPORTS
+from common.metrics import AccessMetrics, MasterMetrics, SlaveMetrics
 from common.skeleton import load_skeleton
 from deploy.rig.host import Host
 from deploy.rig.keys import MASTER, access_override
@@ -39,11 +40,14 @@ def test_the_robot_tracks_over(on_this_host: OnThisHost, transport: str, routed:
             assert rig.observer.state.offset_bound_ns > 0
             statuses = await rig.stop()
             assert set(statuses.values()) == {0}
-            figures = {name: child.figures() for name, child in rig.children.items()}
-        guard = figures["router"] if routed else figures["slave"]["access"]
+            slave = rig.children["slave"].metrics(SlaveMetrics)
+            assert slave is not None
+            guard = rig.children["router"].metrics(AccessMetrics) if routed else slave.access
         if transport in SECURE:
-            assert guard["connections"][f"operator:{MASTER}"] >= 1
-            assert guard["refused"]["handshakes"] == {}
+            assert guard is not None
+            assert guard.connections[f"operator:{MASTER}"] >= 1
+            assert guard.refused is not None
+            assert guard.refused.handshakes == {}
 
     on_this_host(story)
 
@@ -68,7 +72,9 @@ def test_body_nodes_on_classic_can_and_gloves_on_fd(on_this_host: OnThisHost) ->
             await tracks(rig)
             statuses = await rig.stop()
             assert set(statuses.values()) == {0}
-            counts = rig.children["master"].figures()["buses"]
+            master = rig.children["master"].metrics(MasterMetrics)
+            assert master is not None
+            counts = master.buses
             # three frames a node and tick on the classic bus, one on the other
             assert counts["body"]["received"] > 8 * 3 * 200
             assert counts["suit"]["received"] > 28 * 200

@@ -13,6 +13,7 @@ from common.config import LinkConfig, Section, load_config
 from common.errors import ConfigMistake
 from common.link import open_session
 from common.link.audit import Audit
+from common.metrics import to_tree
 from common.runtime import run
 from common.topics import COMMAND, CONTROL, STATE, STOP, VIDEO
 
@@ -41,7 +42,7 @@ async def robot(stop: asyncio.Event) -> None:
         while not stop.is_set():
             state(b"state")
             video(b"picture")
-            sys.stdout.write(json.dumps({"heard": heard, "access": audit.figures()}) + "\n")
+            sys.stdout.write(json.dumps({"heard": heard, "access": to_tree(audit.metrics())}) + "\n")
             sys.stdout.flush()
             await asyncio.sleep(0.02)
 

@@ -26,11 +26,13 @@ from common.messages import (
     RobotState,
     Statistics,
 )
+from common.metrics import MasterMetrics
 from common.topics import CLOCK, CONTROL, STATE, Topic
 from master.app import Master
 from master.config import MasterConfig
 from master.pipeline import Solved
 from master.robot import CommandedRobot
+from tests.published import master_metrics
 
 EXAMPLE = Path(__file__).parents[2] / "deploy" / "examples" / "master.toml"
 JOINTS = 25
@@ -136,8 +138,8 @@ def test_each_robot_gets_the_same_posture_under_its_own_name_lease_and_number() 
     assert (to_a.robot, to_a.lease, to_a.sequence) == ("a", 7, 1)
     assert (to_b.robot, to_b.lease, to_b.sequence) == ("b", 8, 1)
     assert to_a.tick == to_b.tick == 16
-    figures: Any = master.figures()
-    assert {name: one["commands_sent"] for name, one in figures["robots"].items()} == {"a": 1, "b": 1}
+    robots = master.metrics().robots
+    assert {name: one.commands_sent for name, one in robots.items()} == {"a": 1, "b": 1}
 
 
 @pytest.mark.parametrize("fails", [ValueError, OSError])
@@ -166,16 +168,20 @@ def test_a_state_that_is_garbage_is_counted_at_its_robot() -> None:
     robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
     link.hear["state"](b"garbage", 1)
     link.hear["state"](encode(ControlReply(True, "hold", "")), 2)
-    figures: Any = robot.figures()
-    assert figures["robot"]["undecodable"] == 2
-    assert figures["robot"]["silent"] is True
+    heard = robot.metrics().robot
+    assert heard.undecodable == 2
+    assert heard.silent is True
 
 
 def test_each_round_trip_is_told_once() -> None:
     link: Any = FakeLink()
     robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
     robot._watch.round_trip.record(2_000_000)
-    robot.tell(1, {})
-    robot.tell(2, {})
-    told = [decode(payload, Statistics).figures["round_trip_recent_us"] for payload in link.put["statistics"]]
-    assert told == [(2000,), ()]
+    shared = master_metrics()
+    robot.publish_metrics(1, shared)
+    robot.publish_metrics(2, shared)
+    told = [decode(payload, Statistics).metrics for payload in link.put["statistics"]]
+    assert [one.robots["a"].round_trip_recent_us for one in told if isinstance(one, MasterMetrics)] == [
+        (2000,),
+        (),
+    ]

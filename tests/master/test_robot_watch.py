@@ -7,6 +7,7 @@ import pytest
 
 from common.clock import NS_PER_MS, to_ns
 from common.messages import CommandEcho, RobotState
+from common.metrics import Summary
 from common.topics import STATE
 from master.robot_watch import RobotWatch
 
@@ -45,16 +46,16 @@ def test_a_round_trip_takes_off_the_time_on_the_slave_and_needs_no_common_clock(
     echo = CommandEcho(5, 1 * NS_PER_MS, received_ns, received_ns, received_ns)
     held_ns = 11 * NS_PER_MS
     watch.on_state(state(received_ns + held_ns, echo), 1 * NS_PER_MS + held_ns + 4 * NS_PER_MS)
-    assert watch.round_trip.summary()["mean"] == pytest.approx(4.0)
+    assert watch.round_trip.summary().mean == pytest.approx(4.0)
     # the same echo again, later, is the same command
     watch.on_state(state(received_ns + 2 * held_ns, echo), 10**12)
-    assert watch.round_trip.summary()["count"] == 1
+    assert watch.round_trip.summary().count == 1
 
 
 def test_the_echo_of_another_masters_command_closes_no_round_trip() -> None:
     watch = RobotWatch()
     echo = CommandEcho(5, 10**14, SLAVE_AHEAD_NS, SLAVE_AHEAD_NS, SLAVE_AHEAD_NS)
     watch.on_state(state(SLAVE_AHEAD_NS, echo), 10**15, ours=False)
-    assert watch.round_trip.summary() == {"count": 0}
+    assert watch.round_trip.summary() == Summary(0)
     watch.on_state(state(SLAVE_AHEAD_NS, echo), 10**14 + NS_PER_MS)
-    assert watch.round_trip.summary()["count"] == 1
+    assert watch.round_trip.summary().count == 1

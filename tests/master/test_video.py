@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from common.metrics import VideoReceived
 from common.video import VideoFrame, encode_frame
 from master.video import VideoWatch
 
@@ -27,7 +28,7 @@ def test_what_comes_late_twice_or_broken_is_counted_and_changes_nothing() -> Non
     for wrong in (payload(4), payload(5), b"", payload(6)[:-1]):
         watch.on_payload(wrong, 200)
     assert watch.seen_by(300) == (5, 100)
-    assert watch.figures() == {"received": 3, "late": 2, "undecodable": 2}
+    assert watch.metrics() == VideoReceived(received=3, late=2, undecodable=2)
 
 
 def test_a_robot_that_started_anew_may_count_from_below() -> None:

@@ -12,6 +12,7 @@ import pytest
 from common.codec import decode
 from common.config import LinkConfig
 from common.messages import Statistics
+from common.metrics import ServoMetrics
 from common.notify import Notifier
 from common.pacing import Due, TickGrid
 from common.topics import Topic
@@ -63,14 +64,14 @@ def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     class Keeping(FakeLink):
         def publish(self, topic: Topic) -> Callable[[bytes], None]:
-            return lambda payload: words.append(decode(payload, Statistics).figures["one_way_recent_us"])
+            return lambda payload: words.append(decode(payload, Statistics).metrics.one_way_recent_us)
 
         def counters(self) -> dict[str, object]:
             return {}
 
     class Plain(StillServos):
-        def figures(self) -> dict[str, object]:
-            return {}
+        def metrics(self) -> ServoMetrics:
+            return ServoMetrics()
 
     async def two_seconds(grid: TickGrid) -> AsyncIterator[Due]:
         for tick in range(2):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.metrics import ArrivalCounts
 from slave.arrivals import REMEMBERED, Arrivals
 
 
@@ -16,13 +17,13 @@ def noted(*sequences: int, lease: int = 7) -> Arrivals:
 
 
 def test_nothing_is_missing_in_an_unbroken_row_wherever_it_begins() -> None:
-    assert noted(*range(41, 60)).summary() == {"arrived": 19, "lost": 0, "late": 0, "repeated": 0}
+    assert noted(*range(41, 60)).metrics() == ArrivalCounts(19, 0, 0, 0)
 
 
 def test_a_gap_is_lost_a_late_one_is_not_and_the_same_again_is_a_repetition() -> None:
-    assert noted(1, 2, 5).summary() == {"arrived": 3, "lost": 2, "late": 0, "repeated": 0}
-    assert noted(1, 2, 5, 4).summary() == {"arrived": 4, "lost": 1, "late": 1, "repeated": 0}
-    assert noted(1, 2, 5, 4, 4, 5, 1).summary() == {"arrived": 7, "lost": 1, "late": 1, "repeated": 3}
+    assert noted(1, 2, 5).metrics() == ArrivalCounts(3, 2, 0, 0)
+    assert noted(1, 2, 5, 4).metrics() == ArrivalCounts(4, 1, 1, 0)
+    assert noted(1, 2, 5, 4, 4, 5, 1).metrics() == ArrivalCounts(7, 1, 1, 3)
 
 
 def test_a_new_lease_begins_anew() -> None:
@@ -34,8 +35,8 @@ def test_a_new_lease_begins_anew() -> None:
 
 def test_what_comes_after_its_number_is_forgotten_is_no_longer_late() -> None:
     newest = REMEMBERED + 2
-    assert noted(0, newest, 2).summary()["late"] == 1
-    assert noted(0, newest, 1).summary() == {"arrived": 3, "lost": newest - 1, "late": 0, "repeated": 1}
+    assert noted(0, newest, 2).metrics().late == 1
+    assert noted(0, newest, 1).metrics() == ArrivalCounts(3, newest - 1, 0, 1)
 
 
 @given(st.lists(st.integers(1, 60), min_size=1, max_size=120))
@@ -49,5 +50,5 @@ def test_it_agrees_with_an_account_of_every_number(sequences: list[int]) -> None
         seen.add(sequence)
         newest = max(newest, sequence)
     lost = len(set(range(sequences[0], newest)) - seen)
-    expected = {"arrived": len(sequences), "lost": lost, "late": late, "repeated": repeated}
-    assert noted(*sequences).summary() == expected
+    expected = ArrivalCounts(len(sequences), lost, late, repeated)
+    assert noted(*sequences).metrics() == expected

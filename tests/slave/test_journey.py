@@ -41,9 +41,9 @@ def written(offset: Offset = OFFSET) -> Journeys:
 def test_every_stage_is_the_time_between_two_stamps() -> None:
     journeys = written()
     journeys.read(reading(12, STILL + [0, 0, MOVED_COUNTS]))
-    rows = {name: row["mean"] for name, row in journeys.budget.summary().items()}
+    rows = {name: row.mean for name, row in journeys.budget.summary().items()}
     assert list(rows.values()) == pytest.approx([1, 1, 1, 2, 1, 2, 4])
-    assert journeys.budget.total()["mean"] == pytest.approx(12)
+    assert journeys.budget.total().mean == pytest.approx(12)
 
 
 @pytest.mark.parametrize(
@@ -60,33 +60,33 @@ def test_every_stage_is_the_time_between_two_stamps() -> None:
 def test_what_counts_as_moved(counts: np.ndarray, moved: bool) -> None:
     journeys = written()
     journeys.read(reading(12, counts))
-    assert journeys.budget.total()["count"] == moved
+    assert journeys.budget.total().count == moved
 
 
 def test_a_reading_from_before_the_write_shows_nothing() -> None:
     journeys = written()
     journeys.read(reading(8, STILL + 100))
-    assert journeys.budget.total()["count"] == 0
+    assert journeys.budget.total().count == 0
 
 
 def test_an_encoder_that_cannot_be_trusted_has_not_moved() -> None:
     journeys = written()
     journeys.read(reading(12, STILL + [0, 0, 100], (True, True, False)))
-    assert journeys.budget.total()["count"] == 0
+    assert journeys.budget.total().count == 0
 
 
 def test_each_command_is_recorded_once() -> None:
     journeys = written()
     journeys.read(reading(12, STILL + 100))
     journeys.read(reading(17, STILL + 200))
-    assert journeys.budget.total()["count"] == 1
+    assert journeys.budget.total().count == 1
 
 
 def test_a_command_that_moved_nothing_is_counted_when_the_next_comes() -> None:
     journeys = written()
     journeys.accepted(command(2), at(85), at(86), OFFSET)
     assert journeys.unmoved == 1
-    assert journeys.budget.total()["count"] == 0
+    assert journeys.budget.total().count == 0
 
 
 def test_a_command_accepted_while_the_robot_holds_is_echoed_but_not_followed() -> None:
@@ -95,7 +95,7 @@ def test_a_command_accepted_while_the_robot_holds_is_echoed_but_not_followed() -
     # engaged meanwhile: what is written now is not of that command
     journeys.written(at(70), STILL)
     journeys.read(reading(75, STILL + 100))
-    assert journeys.budget.total()["count"] == 0
+    assert journeys.budget.total().count == 0
     assert journeys.echo is not None
     assert journeys.echo.written_ns == 0
 
@@ -115,5 +115,5 @@ def test_the_echo_carries_the_newest_commands_stamps() -> None:
 def test_without_a_trusted_offset_nothing_is_called_latency() -> None:
     journeys = written(NEVER_MEASURED)
     journeys.read(reading(12, STILL + 100))
-    assert journeys.budget.total()["count"] == 0
+    assert journeys.budget.total().count == 0
     assert journeys.budget.untrusted == 1

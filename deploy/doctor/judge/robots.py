@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from statistics import median
-from typing import Any
 
+from common.metrics import Software
 from deploy.doctor.finding import Finding, fail, ok, warn
 from deploy.doctor.read.robots import RobotFacts
 from slave.guard.config import GuardConfig
@@ -17,7 +16,7 @@ _SCHEMA = "schema version"
 """In the words of the codec, where the two sides' messages differ."""
 
 
-def judge_robot(facts: RobotFacts, ours: Mapping[str, Any]) -> list[Finding]:
+def judge_robot(facts: RobotFacts, ours: Software) -> list[Finding]:
     """Reached, time, clock, versions; only the first where it did not answer."""
     name = facts.name
     if not facts.guard:
@@ -54,16 +53,19 @@ def _clock(facts: RobotFacts) -> list[Finding]:
     return [ok(f"{facts.name}: clock", words)]
 
 
-def _versions(facts: RobotFacts, ours: Mapping[str, Any]) -> Finding:
+def _versions(facts: RobotFacts, ours: Software) -> Finding:
     check = f"{facts.name}: versions"
     theirs = facts.software
-    if not theirs:
+    if theirs is None:
         advice = "it runs an older tandem, or its statistics may not be heard: see [link.access]"
         return warn(check, "the robot does not tell its own", advice)
-    parts = ("tandem", "schema", "zenoh")
-    differing = [part for part in parts if theirs.get(part) != ours[part]]
-    other = [f"{part} {theirs.get(part)} there, {ours[part]} here" for part in differing]
+    parts = {
+        "tandem": (theirs.tandem, ours.tandem),
+        "schema": (theirs.schema, ours.schema),
+        "zenoh": (theirs.zenoh, ours.zenoh),
+    }
+    other = [f"{part} {there} there, {here} here" for part, (there, here) in parts.items() if there != here]
     if not other:
-        return ok(check, ", ".join(f"{part} {ours[part]}" for part in parts) + " on both")
-    judge = fail if theirs.get("schema") != ours["schema"] else warn
+        return ok(check, ", ".join(f"{part} {here}" for part, (_, here) in parts.items()) + " on both")
+    judge = fail if theirs.schema != ours.schema else warn
     return judge(check, "; ".join(other), "install the same tandem on both hosts")

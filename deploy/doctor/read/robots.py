@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 from common.clock import monotonic_ns, to_ms
 from common.codec import decode, encode
@@ -15,6 +14,7 @@ from common.config import LinkConfig
 from common.errors import CodecError, LinkError
 from common.link import Link, open_session
 from common.messages import Action, ClockReply
+from common.metrics import Software
 from common.offset import MasterExchange
 from common.presence import several_bear
 from common.topics import CLOCK
@@ -44,8 +44,8 @@ class RobotFacts:
     offset_ms: float = 0.0
     """Its clock minus ours."""
     bound_ms: float = 0.0
-    software: Mapping[str, Any] = field(default_factory=dict)
-    """Empty where it did not tell."""
+    software: Software | None = None
+    """None where it did not tell."""
 
 
 async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) -> list[RobotFacts]:
@@ -73,7 +73,6 @@ async def _read(link: Link, where: Reach) -> RobotFacts:
     with suppress(TimeoutError):
         await asyncio.wait_for(heard.all.wait(), LISTEN_S)
     offset = exchange.estimator.estimate(monotonic_ns())
-    software = (heard.figures or {}).get("software", {})
     return RobotFacts(
         link.robot,
         answer.guard,
@@ -82,7 +81,7 @@ async def _read(link: Link, where: Reach) -> RobotFacts:
         EXCHANGES,
         to_ms(offset.offset_ns) if round_trips else 0.0,
         to_ms(offset.bound_ns) if round_trips else 0.0,
-        software if isinstance(software, Mapping) else {},
+        heard.metrics.software if heard.metrics else None,
     )
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import asdict
 
 import can
 
 from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.clock import to_s
+from common.metrics import SuitMetrics
 from common.realtime import enter_real_time
 from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
@@ -25,7 +25,7 @@ async def run(
     stop: asyncio.Event,
     publish_truth: PublishTruth | None = None,
     on_suit: Callable[[SimulatedSuit], None] = lambda _: None,
-) -> dict[str, object]:
+) -> SuitMetrics:
     """Answer every SYNC until `stop` is set; returns what was counted.
 
     `publish_truth` is called once a tick, after the answers have gone out; `on_suit` once, with the suit
@@ -56,8 +56,12 @@ async def run(
         await stop.wait()
     finally:
         await asyncio.gather(*(bus.close() for bus in buses.values()))
-    return {
-        **asdict(peer.counters),
-        "stale_syncs": newest.stale,
-        "buses": {name: bus.summary() for name, bus in buses.items()},
-    }
+    counted = peer.counters
+    return SuitMetrics(
+        syncs=counted.syncs,
+        malformed_syncs=counted.malformed_syncs,
+        ticks=counted.ticks,
+        frames=counted.frames,
+        stale_syncs=newest.stale,
+        buses={name: bus.summary() for name, bus in buses.items()},
+    )

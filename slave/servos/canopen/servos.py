@@ -19,6 +19,7 @@ from common.can.frame import Frame
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
 from common.errors import RobotError
 from common.latency import Durations
+from common.metrics import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.servos.canopen.config import CanopenConfig
@@ -129,16 +130,20 @@ class CanopenServos:
             bus.close_now()
         self._buses = {}
 
-    def figures(self) -> dict[str, object]:
+    def metrics(self) -> ServoMetrics:
         """Counters and times: SYNC to the last drive's answer, and from SYNC to SYNC."""
-        return {
-            "sync_to_positions_ms": self._answered.summary(),
-            "sync_period_ms": self._period.summary(),
-            "unanswered_syncs": self._network.unanswered,
-            "unknown_frames": self._network.unknown,
-            "second_master_frames": self._network.second_master.frames,
-            "buses": {name: bus.summary() for name, bus in self._buses.items()},
-        }
+        return ServoMetrics(
+            counters={
+                "unanswered_syncs": self._network.unanswered,
+                "unknown_frames": self._network.unknown,
+                "second_master_frames": self._network.second_master.frames,
+            },
+            times_ms={
+                "sync_to_positions": self._answered.summary(),
+                "sync_period": self._period.summary(),
+            },
+            buses={name: bus.summary() for name, bus in self._buses.items()},
+        )
 
     def _listen(self) -> None:
         """Say nothing for a while: a second master would take this one's first frame for an attack."""

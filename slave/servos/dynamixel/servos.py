@@ -9,6 +9,7 @@ import numpy as np
 
 from common.clock import Clock, monotonic_ns, to_s
 from common.errors import RobotError
+from common.metrics import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders import EncoderConfig
@@ -84,15 +85,17 @@ class DynamixelServos:
             self._thread = None
             self._driver.close()
 
-    def figures(self) -> dict[str, object]:
+    def metrics(self) -> ServoMetrics:
         """What went wrong on the bus."""
         driver = self._driver
-        return {
-            "missed": driver.missed,
-            "broken": driver.broken,
-            "lost": driver.lost,
-            "late_cycles": self.late_cycles,
-        }
+        return ServoMetrics(
+            counters={
+                "missed": driver.missed,
+                "broken": driver.broken,
+                "lost": driver.lost,
+                "late_cycles": self.late_cycles,
+            }
+        )
 
     def _run(self) -> None:
         due_ns = self._clock()

@@ -14,10 +14,12 @@ from rich.console import Console
 
 from common.codec import encode
 from common.messages import BaseAttitude, RobotState
+from common.metrics import LeaseMetrics, Summary
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from deploy.control.answer import Answer
 from deploy.control.status import Heard, as_tree, decode_state, status_table
+from tests.published import master_metrics, slave_metrics
 
 
 def state(joints: int = 25, bound_ns: int = 40_000) -> RobotState:
@@ -35,12 +37,11 @@ def tree(heard: Heard) -> dict[str, object]:
 
 
 def heard() -> Heard:
-    figures = {
-        "lease": {"operator": "anna", "held_s": 61.2},
-        "end_to_end_ms": {"p99": 31.25},
-        "one_way_ms": {},
-    }
-    return Heard(state(), figures)
+    metrics = slave_metrics(
+        lease=LeaseMetrics("anna", 9, 61.2, 0.1),
+        end_to_end_ms=Summary(5, p99=31.25),
+    )
+    return Heard(state(), metrics)
 
 
 def test_a_status_is_json_and_tells_all() -> None:
@@ -65,7 +66,7 @@ def test_an_offset_that_is_not_trusted_has_no_bound() -> None:
 
 def test_what_the_operator_s_side_doubts_is_said_by_node() -> None:
     told = heard()
-    told.take(operator_figures={"doubts": {"left_forearm": "its gyro is 5°/s off"}})
+    told.take(master=master_metrics(doubts={"left_forearm": "its gyro is 5°/s off"}))
     said = tree(told)
     assert said["node_doubts"] == {"left_forearm": "its gyro is 5°/s off"}
     assert "robot-1: node left_forearm: its gyro is 5°/s off" in rendered({"robot-1": said})
@@ -75,7 +76,7 @@ def test_with_a_lease_it_waits_for_the_master_s_figures_too() -> None:
     told = heard()
     told.take(state=state())
     assert not told.all.is_set()
-    told.take(operator_figures={"doubts": {}})
+    told.take(master=master_metrics())
     assert told.all.is_set()
 
 
@@ -112,7 +113,7 @@ def test_what_is_no_state_is_none() -> None:
 def test_it_waits_until_both_have_come() -> None:
     async def story() -> None:
         heard = Heard()
-        heard.take(figures={"ticks": {}})
+        heard.take(metrics=slave_metrics())
         assert not heard.all.is_set()
         heard.take(state=replace(state(), operator=""))
         assert heard.all.is_set()

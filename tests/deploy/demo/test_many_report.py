@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import io
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from rich.console import Console
 
 from common.messages import RobotState
+from common.metrics import MasterMetrics, SlaveMetrics, Summary, Ticks
 from deploy.demo.many_report import ManyReport, make_many_report, many_table
 from deploy.demo.report import Seen
 from deploy.demo.run import DemoOptions
 from deploy.judge import Trace
 from deploy.rig.rig import Rig, robot_name, slave_name
+from tests.published import guard_metrics, master_metrics, slave_metrics
 
 JOINTS = ("left_elbow_pitch",)
 ROBOTS = 8
 HELD = {"robot": "robot-3", "at_s": 2.0, "reason": "no encoder", "lasted_s": 1.0, "host_still_ms": 140}
-COUNTED: dict[str, Any] = {
-    "ticks": {"expected": 4000, "missed": 3},
-    "guard": {"received": 150, "accepted": 140, "dropped": {"lease": 10}},
-    "one_way_ms": {"p99": 1.25},
-    "end_to_end_ms": {"p99": 30.5},
-}
+COUNTED = slave_metrics(
+    ticks=Ticks(4000, 3),
+    guard=guard_metrics(received=150, accepted=140, dropped={"lease": 10}),
+    one_way_ms=Summary(140, p99=1.25),
+    end_to_end_ms=Summary(140, p99=30.5),
+)
 
 
 def state(guard: str) -> RobotState:
@@ -35,8 +37,8 @@ def state(guard: str) -> RobotState:
 def report(lost_by: int = 0, ended: dict[str, int] | None = None, problem: str = "") -> ManyReport:
     """Of a run in which robot 1 was engaged first, and one robot was in `track` for half of the time only."""
 
-    def child(counted: dict[str, Any]) -> SimpleNamespace:
-        return SimpleNamespace(figures=lambda: counted, cpu_percent=12.34, rss_mb=98.76)
+    def child(counted: MasterMetrics | SlaveMetrics) -> SimpleNamespace:
+        return SimpleNamespace(metrics=lambda kind: counted, cpu_percent=12.34, rss_mb=98.76)
 
     def observer(number: int) -> SimpleNamespace:
         guards = ["track"] * 100 if number != lost_by else ["track", "hold"] * 50
@@ -49,7 +51,7 @@ def report(lost_by: int = 0, ended: dict[str, int] | None = None, problem: str =
     numbers = range(1, ROBOTS + 1)
     slaves = [slave_name(n) for n in numbers]
     observers = {robot_name(n): observer(n) for n in numbers}
-    children = {name: child(COUNTED) for name in slaves} | {"master": child({"ticks": {"missed": 0}})}
+    children = {name: child(COUNTED) for name in slaves} | {"master": child(master_metrics())}
     rig = SimpleNamespace(
         slaves=slaves, observers=observers, observer=observers["robot-1"], children=children
     )

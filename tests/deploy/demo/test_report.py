@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import pytest
 from rich.console import Console
 
 from common.messages import Action
+from common.metrics import MasterMetrics, SlaveMetrics, Ticks
 from deploy.demo.report import Report, Seen, make_report
 from deploy.demo.run import DemoOptions
 from deploy.demo.view import print_report
@@ -19,6 +20,7 @@ from deploy.judge import Trace
 from deploy.rig.rig import Rig
 from deploy.targets import BY_PROFILE, DEMO, verdicts
 from deploy.virtual import VirtualRun, World
+from tests.published import master_metrics, slave_metrics
 
 ENDED_WELL: dict[str, int | None] = {"master": 0, "suit": 0, "slave": 0}
 
@@ -26,17 +28,20 @@ ENDED_WELL: dict[str, int | None] = {"master": 0, "suit": 0, "slave": 0}
 @dataclass
 class FakeChild:
     role: str
-    counted: dict[str, Any] = field(default_factory=lambda: {"ticks": {"expected": 5, "missed": 0}})
+    published: bool = True
     cpu_percent: float = 12.34
     rss_mb: float = 56.78
 
-    def figures(self) -> dict[str, Any]:
-        return self.counted
+    def metrics(self, kind: type[MasterMetrics | SlaveMetrics]) -> MasterMetrics | SlaveMetrics | None:
+        if not self.published:
+            return None
+        ticks = Ticks(5, 0)
+        return master_metrics(ticks=ticks) if kind is MasterMetrics else slave_metrics(ticks=ticks)
 
 
 def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
     observer = SimpleNamespace(
-        trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen, video={}
+        trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen, video=None
     )
     children = {role: FakeChild(role) for role in ENDED_WELL}
     return cast(Rig, SimpleNamespace(observer=observer, children=children))
@@ -110,7 +115,7 @@ def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualRun) -> None:
 def test_every_problem_is_named(tracked: VirtualRun) -> None:
     failed = rig(tracked, ["hold"])
     failed.observer.trace = Trace(tracked.trace.joint_names)
-    cast(FakeChild, failed.children["slave"]).counted = {}
+    cast(FakeChild, failed.children["slave"]).published = False
     seen = Seen(problem="robot-1 held 3 times within 20 s")
     problems = make_report(DemoOptions(), failed, {**ENDED_WELL, "slave": -9}, seen).problems
     assert problems == [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from common.config import LinkConfig
 from common.link import Link, open_session
 from common.link_config import AccessConfig, TlsConfig
 from common.messages import ClockQuery, ClockReply, ControlReply, Statistics
+from common.metrics import Software
 from common.roles import Role
 from common.topics import CLOCK, STATISTICS, STOP
 from common.version import software
@@ -29,8 +31,9 @@ from deploy.doctor.read.keys import KeyFacts, read_keys
 from deploy.doctor.read.robots import EXCHANGES, RobotFacts, read_robots
 from deploy.keys.folder import stem, write_pair
 from deploy.keys.make import new_authority, new_identity
+from tests.published import slave_metrics
 
-OURS = {"tandem": "1.2", "schema": 2, "zenoh": "1.10.2", "python": "3.11"}
+OURS = Software("1.2", 3, "1.10.2", "3.11")
 WELL = KeyFacts("", "robot:robot-1", ("192.168.7.2",), 300.0)
 
 
@@ -165,14 +168,14 @@ def test_a_way_that_is_too_long_for_the_guard(trips: tuple[float, ...], verdict:
     ("theirs", "verdict"),
     [
         (OURS, Verdict.OK),
-        ({**OURS, "python": "3.13"}, Verdict.OK),
-        ({**OURS, "tandem": "1.3"}, Verdict.WARN),
-        ({**OURS, "zenoh": "1.9"}, Verdict.WARN),
-        ({**OURS, "schema": 3}, Verdict.FAIL),
-        ({}, Verdict.WARN),
+        (replace(OURS, python="3.13"), Verdict.OK),
+        (replace(OURS, tandem="1.3"), Verdict.WARN),
+        (replace(OURS, zenoh="1.9"), Verdict.WARN),
+        (replace(OURS, schema=4), Verdict.FAIL),
+        (None, Verdict.WARN),
     ],
 )
-def test_two_hosts_with_other_software(theirs: dict[str, object], verdict: Verdict) -> None:
+def test_two_hosts_with_other_software(theirs: Software | None, verdict: Verdict) -> None:
     finding = judge_robot(robot(software=theirs), OURS)[-1]
     assert (finding.check, finding.verdict) == ("robot-1: versions", verdict)
 
@@ -184,7 +187,7 @@ def test_a_robot_that_does_not_answer_or_in_another_schema() -> None:
     assert (other.check, other.verdict) == ("robot-1: versions", Verdict.FAIL)
 
 
-def a_robot_answers(link: Link, software_: dict[str, object]) -> None:
+def a_robot_answers(link: Link, software_: Software) -> None:
     def clock(payload: bytes, received_ns: int) -> bytes:
         query = decode(payload, ClockQuery)
         return encode(ClockReply(query.asked_ns, received_ns, monotonic_ns()))
@@ -195,7 +198,7 @@ def a_robot_answers(link: Link, software_: dict[str, object]) -> None:
 
     async def tell() -> None:
         while True:
-            put(encode(Statistics("slave", monotonic_ns(), {"software": software_})))
+            put(encode(Statistics(monotonic_ns(), slave_metrics(software=software_))))
             await asyncio.sleep(0.05)
 
     link.told = asyncio.create_task(tell())  # type: ignore[attr-defined]

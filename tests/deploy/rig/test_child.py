@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import TandemError
+from common.metrics import Ticks
 from deploy.rig import child as child_module
 from deploy.rig.child import Child
 
@@ -68,7 +70,9 @@ def test_it_gets_role_file_figures_and_overrides(tmp_path: Path) -> None:
     async def test(child: Child) -> None:
         await ended(child)
         figures = ["--figures", str(tmp_path / "master.figures.json")]
-        assert child.figures() == {"argv": ["master", "some.toml", *figures, "--set", 'robot="r"']}
+        assert json.loads(child.figures_file.read_text("utf-8")) == {
+            "argv": ["master", "some.toml", *figures, "--set", 'robot="r"']
+        }
         assert await child.stop() == 0
 
     run(tmp_path, "here(); open(sys.argv[5], 'w').write(json.dumps({'argv': sys.argv[2:]}))", test)
@@ -103,7 +107,7 @@ def test_one_that_exits_leaves_its_last_words(tmp_path: Path) -> None:
             TandemError, match=r"the master ended with status 3: line 2 \| line 3 \| no such bus"
         ):
             child.check()
-        assert child.figures() == {}
+        assert child.metrics(Ticks) is None
         child.measure()
 
     run(
@@ -156,4 +160,4 @@ def test_one_that_was_never_started_is_at_peace(tmp_path: Path) -> None:
     child.check()
     child.measure()
     assert asyncio.run(child.stop()) is None
-    assert child.figures() == {}
+    assert child.metrics(Ticks) is None

@@ -13,9 +13,11 @@ import pytest
 from common.codec import encode
 from common.link import Link
 from common.messages import Command, CommandEcho, CommandStamps, Message, RobotState, Statistics, Truth
+from common.metrics import Ticks
 from common.skeleton import load_skeleton
 from common.topics import COMMAND, STATE, STATISTICS, TRUTH, Topic
 from deploy.rig.observer import RATE_OVER_NS, Observer
+from tests.published import master_metrics, slave_metrics
 
 SKELETON = load_skeleton("nursing")
 JOINTS = len(SKELETON.joints)
@@ -120,14 +122,14 @@ def test_what_is_no_message_changes_nothing() -> None:
         on_payload(b"\xc1", 0)
         on_payload(encode(GOOD_COMMAND if topic is not COMMAND else GOOD_STATE), 0)
     assert (wire.observer.command, wire.observer.state, wire.observer.truth) == (None, None, None)
-    assert wire.observer.statistics == {}
+    assert (wire.observer.master, wire.observer.slave) == (None, None)
+    assert wire.observer.undecodable == 8, "and is counted"
 
 
 def test_statistics_are_kept_by_role() -> None:
-    observer = Wire().hear(
-        Statistics("master", 1, {"a": 1}), Statistics("slave", 1, {}), Statistics("master", 2, {"a": 2})
-    )
-    assert observer.statistics == {"master": {"a": 2}, "slave": {}}
+    old, new, robot = master_metrics(), master_metrics(ticks=Ticks(2, 0)), slave_metrics()
+    observer = Wire().hear(Statistics(1, old), Statistics(1, robot), Statistics(2, new))
+    assert (observer.master, observer.slave) == (new, robot)
 
 
 def test_rates_are_by_the_senders_own_numbers_so_that_unheard_messages_count_too() -> None:
@@ -147,8 +149,8 @@ def test_rates_are_by_the_senders_own_numbers_so_that_unheard_messages_count_too
 def test_the_capture_rate_is_the_masters_ticks_that_ran() -> None:
     wire = Wire()
     for second in range(1, 3):
-        ticks = {"expected": 200 * second, "missed": 4 * second}
-        wire.hear(Statistics("master", second * 1_000_000_000, {"ticks": ticks}))
+        ticks = Ticks(200 * second, 4 * second)
+        wire.hear(Statistics(second * 1_000_000_000, master_metrics(ticks=ticks)))
     assert wire.observer.rates_hz == {"capture": 196.0}
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from common.errors import ConfigError
 from common.latency import Durations
-from deploy.soak.counts import Additions, within
+from deploy.soak.counts import Additions
 from deploy.soak.faults import FAULTS, chosen
 from deploy.soak.options import in_words, seconds
 from deploy.soak.trend import Slope
@@ -65,16 +65,6 @@ def test_the_mean_of_each_look_is_that_of_what_came_since(looks: list[list[int]]
     count, mean = added.mean("x", durations.summary())
     assert count == 0
     assert math.isnan(mean)
-
-
-def test_within_finds_numbers_only() -> None:
-    tree = {"a": {"b": 3}, "c": "text"}
-    assert (within(tree, "a", "b"), within(tree, "a", "x"), within(tree, "c", "d"), within(tree, "c")) == (
-        3,
-        0,
-        0,
-        0,
-    )
 
 
 windows = st.lists(

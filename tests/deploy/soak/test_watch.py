@@ -12,9 +12,11 @@ import pytest
 from common.clock import NS_PER_MS, NS_PER_S
 from common.codec import encode
 from common.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics
+from common.metrics import ArrivalCounts, MasterMetrics, SlaveMetrics, Summary, Ticks
 from common.skeleton import load_skeleton
 from deploy.soak.motion import Motion
 from deploy.soak.watch import FRESH_NS, Watch
+from tests.published import commanded, guard_metrics, master_metrics, slave_metrics
 
 SKELETON = load_skeleton("nursing")
 JOINTS = len(SKELETON.joints)
@@ -37,8 +39,8 @@ class Heard:
     def state(self, arrived_ns: int = 0, **changes: Any) -> None:
         self.watch.on_state(encode(replace(STATE, **changes)), arrived_ns)
 
-    def statistics(self, role: str, **figures: Any) -> None:
-        self.watch.on_statistics(encode(Statistics(role, 0, figures)), 0)
+    def statistics(self, metrics: MasterMetrics | SlaveMetrics) -> None:
+        self.watch.on_statistics(encode(Statistics(0, metrics)), 0)
 
     def of(self, kind: str) -> list[Mapping[str, Any]]:
         return [what for each, what in self.events if each == kind]
@@ -116,34 +118,34 @@ def test_joints_that_are_not_known_are_told(heard: Heard) -> None:
 
 
 def test_counters_are_what_came_since_and_begin_anew_with_a_process(heard: Heard) -> None:
-    commands = {"arrived": 100, "lost": 2, "late": 1, "repeated": 0}
-    heard.statistics("slave", commands=commands, ticks={"expected": 900, "missed": 3})
+    commands = ArrivalCounts(arrived=100, lost=2, late=1, repeated=0)
+    heard.statistics(slave_metrics(commands=commands, ticks=Ticks(900, 3)))
     assert heard.watch.row()["lost"] == 2.0
     heard.watch.restarted("slave")
-    heard.statistics("slave", commands={**commands, "lost": 5}, ticks={"expected": 1000, "missed": 4})
+    heard.statistics(slave_metrics(commands=replace(commands, lost=5), ticks=Ticks(1000, 4)))
     row = heard.watch.row()
     assert (row["lost"], row["slave_ticks"], row["slave_missed"]) == (5.0, 1000.0, 4.0)
 
 
 def test_a_command_that_comes_after_all_is_not_lost_and_loses_no_others(heard: Heard) -> None:
     """What was lost shrinks then: that is no new process, whose whole count would be new."""
-    commands = {"arrived": 100, "lost": 40, "late": 0, "repeated": 0}
-    heard.statistics("slave", commands=commands)
+    commands = ArrivalCounts(arrived=100, lost=40, late=0, repeated=0)
+    heard.statistics(slave_metrics(commands=commands))
     assert heard.watch.row()["lost"] == 40.0
-    heard.statistics("slave", commands={**commands, "arrived": 101, "lost": 39, "late": 1})
+    heard.statistics(slave_metrics(commands=ArrivalCounts(101, 39, 1, 0)))
     row = heard.watch.row()
     assert (row["lost"], row["late"], row["arrived"]) == (-1.0, 1.0, 1.0)
 
 
 def test_commands_without_a_lease_are_no_refusals(heard: Heard) -> None:
-    heard.statistics("slave", guard={"dropped": {"lease": 30, "age": 2, "clock": 1}})
+    heard.statistics(slave_metrics(guard=guard_metrics(dropped={"lease": 30, "age": 2, "clock": 1})))
     assert heard.watch.row()["refused"] == 3.0
 
 
 def test_the_master_s_round_trips_are_means_of_what_came_since(heard: Heard) -> None:
-    heard.statistics("master", round_trip_ms={"count": 10, "mean": 1.0})
+    heard.statistics(master_metrics(commanded(round_trip_ms=Summary(10, 1.0))))
     heard.watch.row()
-    heard.statistics("master", round_trip_ms={"count": 20, "mean": 2.0})
+    heard.statistics(master_metrics(commanded(round_trip_ms=Summary(20, 2.0))))
     row = heard.watch.row()
     assert (row["round_trip_n"], row["round_trip_ms"]) == (10.0, 3.0)
 
@@ -152,6 +154,7 @@ def test_what_is_no_message_changes_nothing(heard: Heard) -> None:
     for take in (heard.watch.on_state, heard.watch.on_command, heard.watch.on_statistics):
         take(b"nonsense", 0)
     assert heard.events == []
+    assert heard.watch.row()["undecodable"] == 3.0, "and is counted"
 
 
 # the robot's joints

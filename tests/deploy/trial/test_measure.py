@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +10,14 @@ import pytest
 
 from common.config import LinkConfig
 from common.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics, Truth
+from common.metrics import ArrivalCounts, Ticks
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.trial.aftermath import aftermath
 from deploy.trial.measure import excerpt, measure, one_way_percentiles_ms
 from deploy.trial.recording import Course, Outage, Recording, counts, on_masters_clock
 from slave.config import SlaveConfig
+from tests.published import commanded, guard_metrics, master_metrics, slave_metrics
 
 MS, S = 1_000_000, 1_000_000_000
 SKELETON = load_skeleton("nursing")
@@ -56,22 +58,22 @@ def state(sent_ns: int, newest: CommandEcho | None, guard: str = "track") -> Rob
     )  # fmt: skip
 
 
-def told(role: str, at_ns: int, **figures: object) -> Statistics:
-    given = {"ticks": {"expected": at_ns // (5 * MS), "missed": 0}, **figures}
-    return Statistics(role, at_ns, given)
-
-
 def slave_told(
     at_ns: int, arrived: int, lost: int, age: int = 0, p50: float = 40.0, accepted: int = 0
 ) -> Statistics:
     dropped = {"age": age} if age else {}
-    return told(
-        "slave",
-        at_ns,
-        guard={"dropped": dropped, "losses": {}, "clamps": {}, "doubts": {}, "accepted": accepted},
-        commands={"arrived": arrived, "lost": lost, "late": 0, "repeated": 0},
-        one_way_recent_us=[round(1000 * p50)] * 12,
+    metrics = slave_metrics(
+        ticks=Ticks(at_ns // (5 * MS), 0),
+        guard=guard_metrics(dropped=dropped, accepted=accepted),
+        commands=ArrivalCounts(arrived, lost, 0, 0),
+        one_way_recent_us=tuple([round(1000 * p50)] * 12),
     )
+    return Statistics(at_ns, metrics)
+
+
+def master_told(at_ns: int, round_trip_recent_us: Sequence[int]) -> Statistics:
+    robot = commanded(round_trip_recent_us=tuple(round_trip_recent_us))
+    return Statistics(at_ns, master_metrics(robot, ticks=Ticks(at_ns // (5 * MS), 0)))
 
 
 def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) -> Recording:
@@ -93,7 +95,7 @@ def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) ->
         states,
         truth,
         [slave_told(ends[0], 12, 0), slave_told(ends[1], 132, 5, age=3),
-         *(told("master", at_ns, round_trip_recent_us=[81_000, 99_000]) for at_ns in ends)],
+         *(master_told(at_ns, [81_000, 99_000]) for at_ns in ends)],
     )  # fmt: skip
 
 
@@ -116,16 +118,13 @@ def test_one_way_is_told_by_the_slave_and_checked_by_the_shared_clock(figures: d
 
 
 def test_one_way_and_round_trip_are_of_the_judged_time() -> None:
-    words = [
-        told(role, BEGIN_NS + n * S, **{name: us})
-        for role, name in (("slave", "one_way_recent_us"), ("master", "round_trip_recent_us"))
-        # the first word of a stretch tells of the second before it: a slow start-up is no part of it
-        for n, us in enumerate(([900_000] * 12, [40_000, 41_000], [], [42_000, 400_000]))
-    ]
-    slaves = [replace(w, figures={**slave_told(w.sent_ns, 0, 0).figures, **w.figures}) for w in words[:4]]
-    figures = measure(
-        Course(replace(recording(), told=[*slaves, *words[4:]]), 0.3, shared_clock=True), CONFIG
-    )
+    # the first word of a stretch tells of the second before it: a slow start-up is no part of it
+    of_seconds: list[list[int]] = [[900_000] * 12, [40_000, 41_000], [], [42_000, 400_000]]
+    words: list[Statistics] = []
+    for n, us in enumerate(of_seconds):
+        at_ns = BEGIN_NS + n * S
+        words += [Statistics(at_ns, slave_metrics(one_way_recent_us=tuple(us))), master_told(at_ns, us)]
+    figures = measure(Course(replace(recording(), told=words), 0.3, shared_clock=True), CONFIG)
     assert figures["one_way_p50_ms"] == figures["round_trip_p50_ms"] == pytest.approx(41.5)
     # one that the guard refuses for its age has taken its time all the same
     assert figures["one_way_p99_ms"] == figures["round_trip_p99_ms"] == pytest.approx(400.0, abs=11.0)

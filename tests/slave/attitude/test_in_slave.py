@@ -13,6 +13,7 @@ import pytest
 from common.codec import decode
 from common.config import LinkConfig
 from common.messages import BaseAttitude, RobotState
+from common.metrics import ServoMetrics
 from common.pacing import Due, TickGrid
 from common.topics import Topic
 from slave import app
@@ -46,8 +47,8 @@ class StillServos:
 
     def write(self, _: object) -> None: ...
 
-    def figures(self) -> dict[str, object]:
-        return {}
+    def metrics(self) -> ServoMetrics:
+        return ServoMetrics()
 
 
 class FakeBase:
@@ -73,7 +74,7 @@ def state_with(base: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[RobotState, 
     config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]))
     slave = app.Slave(config, link, servos, base)
     asyncio.run(slave._drive())
-    return decode(link.states[-1], RobotState, 25), slave.figures()
+    return decode(link.states[-1], RobotState, 25), slave.metrics()
 
 
 def attitude(tilt_deg: float, age_s: float = 0.0) -> BaseAttitude:
@@ -81,17 +82,17 @@ def attitude(tilt_deg: float, age_s: float = 0.0) -> BaseAttitude:
 
 
 def test_without_a_sensor_nothing_is_told_and_nothing_amiss(monkeypatch: pytest.MonkeyPatch) -> None:
-    state, figures = state_with(None, monkeypatch)
+    state, metrics = state_with(None, monkeypatch)
     assert state.base is None
     assert "base" not in state.faults
-    assert figures["base"] == {}
+    assert metrics.base == {}
 
 
 def test_a_level_base_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    state, figures = state_with(FakeBase(attitude(1.0)), monkeypatch)
+    state, metrics = state_with(FakeBase(attitude(1.0)), monkeypatch)
     assert state.base == attitude(1.0)
     assert state.faults == {"neck_yaw": "over-current"}
-    assert figures["base"] == {"frames": 7}
+    assert metrics.base == {"frames": 7}
 
 
 @pytest.mark.parametrize(

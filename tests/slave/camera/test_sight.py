@@ -21,8 +21,8 @@ def test_the_age_of_what_the_operator_saw_is_taken_on_one_clock() -> None:
     sight = Sight()
     sight.sent(7, captured_ns=100 * MS, sent_ns=110 * MS)
     seen = sight.on_command(command(7, 5150, 5200), 300 * MS, AHEAD)
-    assert sight.observation_age.summary()["max"] == 100.0
-    assert sight.transit.summary()["max"] == 40.0
+    assert sight.observation_age.summary().max == 100.0
+    assert sight.transit.summary().max == 40.0
     assert seen is not None
     assert (seen.number, seen.known_ns, seen.delay_ns) == (7, 300 * MS, 38 * MS)
 

@@ -164,7 +164,7 @@ class Ticking:
     async def until(self, condition: Callable[[], bool]) -> None:
         deadline_s = time.monotonic() + DEADLINE_S
         while not condition():
-            assert time.monotonic() < deadline_s, (dict(self.servos.faults()), self.servos.figures())
+            assert time.monotonic() < deadline_s, (dict(self.servos.faults()), self.servos.metrics())
             self.servos.read()
             self.servos.write(self.setpoint)
             await asyncio.sleep(0.005)
@@ -190,10 +190,8 @@ def test_start_follow_quick_stop_fault_and_back(config: CanopenConfig, tmp_path:
             servos.quick_stop(True)
             before = ticking.encoders.position_rad(servos.read().counts)
             ticking.setpoint = ticking.setpoint * 0.5
-            syncs = servos.figures()["sync_to_positions_ms"]["count"]  # type: ignore[index]
-            await ticking.until(
-                lambda: servos.figures()["sync_to_positions_ms"]["count"] > syncs + 10  # type: ignore[index]
-            )
+            syncs = servos.metrics().times_ms["sync_to_positions"].count
+            await ticking.until(lambda: servos.metrics().times_ms["sync_to_positions"].count > syncs + 10)
             assert np.abs(ticking.encoders.position_rad(servos.read().counts) - before).max() < 0.05
             servos.quick_stop(False)
             await ticking.until(ticking.near)

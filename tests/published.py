@@ -1,0 +1,94 @@
+"""What a master and a robot publish in tests: whole metrics, of which a test changes what it is about."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from common.metrics import (
+    ArrivalCounts,
+    CommandedMetrics,
+    GuardMetrics,
+    LeaseHeld,
+    MasterMetrics,
+    OffsetMetrics,
+    RobotHeard,
+    ServoMetrics,
+    SlaveMetrics,
+    Software,
+    Summary,
+    Ticks,
+    TopicCounters,
+    VideoReceived,
+)
+
+NOTHING = Summary(0)
+SOFTWARE = Software("0.1.0", 3, "1.10.2", "3.11.7")
+
+
+def commanded(**changes: Any) -> CommandedMetrics:
+    """One robot as its master commands it."""
+    given: dict[str, Any] = {
+        "commands_sent": 0,
+        "round_trip_ms": NOTHING,
+        "robot": RobotHeard(silent=False, times_lost=0, undecodable=0),
+        "lease": LeaseHeld(held=True, answer="granted"),
+        "video": VideoReceived(0, 0, 0),
+        "link": {},
+    }
+    return CommandedMetrics(**{**given, **changes})
+
+
+def master_metrics(robot: CommandedMetrics | None = None, **changes: Any) -> MasterMetrics:
+    """A master's, to one robot."""
+    given: dict[str, Any] = {
+        "software": SOFTWARE,
+        "ticks": Ticks(0, 0),
+        "stages_ms": {},
+        "frames_in_to_put_ms": NOTHING,
+        "nodes": {},
+        "doubts": {},
+        "beyond_reach": {},
+        "buses": {},
+        "robots": {"robot-1": robot or commanded()},
+    }
+    return MasterMetrics(**{**given, **changes})
+
+
+def guard_metrics(**changes: Any) -> GuardMetrics:
+    """A guard's."""
+    given: dict[str, Any] = {
+        "state": "track",
+        "reason": "follows",
+        "received": 0,
+        "accepted": 0,
+        "dropped": {},
+        "losses": {},
+        "clamps": {},
+        "doubts": {},
+        "late_steps": 0,
+    }
+    return GuardMetrics(**{**given, **changes})
+
+
+def slave_metrics(**changes: Any) -> SlaveMetrics:
+    """A robot's."""
+    given: dict[str, Any] = {
+        "software": SOFTWARE,
+        "instance": 0,
+        "ticks": Ticks(0, 0),
+        "guard": guard_metrics(),
+        "lease": None,
+        "stages_ms": {},
+        "end_to_end_ms": NOTHING,
+        "one_way_ms": NOTHING,
+        "commands": ArrivalCounts(0, 0, 0, 0),
+        "early": 0,
+        "unmoved": 0,
+        "offset": OffsetMetrics(0.0, 0.0, trusted=False),
+        "undecodable": {},
+        "base": {},
+        "servos": ServoMetrics(),
+        "video": None,
+        "link": {"command": TopicCounters()},
+    }
+    return SlaveMetrics(**{**given, **changes})
