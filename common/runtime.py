@@ -23,18 +23,26 @@ SWITCH_INTERVAL_S = 0.0005
 """How long a Python thread may keep the interpreter: 5 ms, the default, delays the loop by as much."""
 
 
-def run(main: Callable[[asyncio.Event], Awaitable[None]], shutdown_s: float = SHUTDOWN_S) -> None:
+def run(
+    main: Callable[[asyncio.Event], Awaitable[None]],
+    shutdown_s: float = SHUTDOWN_S,
+    hangup_stops: bool = True,
+) -> None:
     """Run `main(stop)` under uvloop until it returns; whatever it raises passes through.
 
-    SIGINT and SIGTERM set `stop`. From then, or from the end of `main`, all must be over within
-    `shutdown_s`; else the process says what hangs and exits with EXIT_HUNG. A second signal ends it at
-    once with 128 + signal. For the main thread only.
+    SIGINT, SIGTERM and SIGHUP set `stop`; SIGHUP does not where it came ignored, as from nohup, or where
+    `hangup_stops` is false: then it changes nothing. From then, or from the end of `main`, all must be over
+    within `shutdown_s`; else the process says what hangs and exits with EXIT_HUNG. A second signal ends it at
+    once with 128 + signal, but for SIGHUP: a terminal that closes sends several. For the main thread only.
     """
     shutdown = _Shutdown(shutdown_s)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     use_one_arena()
     freeze_heap()
     handlers = {number: signal.signal(number, shutdown.on_signal) for number in _SIGNALS}
+    if (before := signal.getsignal(signal.SIGHUP)) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, shutdown.on_hangup if hangup_stops else signal.SIG_IGN)
+        handlers[signal.SIGHUP] = before
     try:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             shutdown.loop = runner.get_loop()
@@ -78,18 +86,27 @@ class _Shutdown:
         self.loop: asyncio.AbstractEventLoop | None = None
         self._shutdown_s = shutdown_s
         self._signals = 0
+        self._hung_up = False
         self._begun = False
 
     @property
     def told(self) -> bool:
         """Whether a signal has come."""
-        return self._signals > 0
+        return self._signals > 0 or self._hung_up
 
     def on_signal(self, number: int, _: FrameType | None) -> None:
         """Runs between two bytecodes of the main thread, so also when the loop is stuck in one callback."""
         self._signals += 1
         if self._signals > 1:
             self._end(128 + number, "second signal")
+        self._stop()
+
+    def on_hangup(self, _: int, __: FrameType | None) -> None:
+        """As on_signal, but it ends nothing hard: shell, terminal and manager may each send one."""
+        self._hung_up = True
+        self._stop()
+
+    def _stop(self) -> None:
         self.begin()
         if self.loop is not None and not self.loop.is_closed():
             self.loop.call_soon_threadsafe(self.stop.set)
@@ -107,7 +124,8 @@ class _Shutdown:
     def _end(self, status: int, why: str) -> None:
         # straight to the descriptor: a lock of logging or stderr may be what hangs
         lines = [f"stopped hard ({why}); still running:", *self._hanging()]
-        os.write(2, ("\n  ".join(lines) + "\n").encode("utf-8", "replace"))
+        with suppress(OSError):  # nobody may read it any more: the process ends all the same
+            os.write(2, ("\n  ".join(lines) + "\n").encode("utf-8", "replace"))
         os._exit(status)
 
     def _hanging(self) -> list[str]:

@@ -13,11 +13,14 @@ from rich.console import Console
 
 from common.config import load_config
 from common.errors import TandemError
+from common.logs import flush_log, in_words, start_log
 from common.runtime import run as run_until_stopped
+from common.streams import lost_output, secure
 from deploy.accuracy.commands import app as accuracy_app
 from deploy.attitude.command import attitude
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.control.commands import COMMANDS as OPERATORS_ACTS
+from deploy.control.teller import acted
 from deploy.doctor.command import doctor
 from deploy.drives import drives
 from deploy.faults.command import faults
@@ -53,6 +56,10 @@ app.command()(record)
 app.command()(recording)
 app.command()(soak)
 _debug = False
+EXIT_FAULT = 70
+"""Status after a fault that no person caused (`EX_SOFTWARE`)."""
+EXIT_OUTPUT = 74
+"""Status of a report that could not be written (`EX_IOERR`); an act that was done keeps its own status."""
 
 
 ConfigFile = Annotated[Path, typer.Argument(help="TOML file; deploy/examples has one to start from.")]
@@ -85,11 +92,7 @@ def _options(
 ) -> None:
     global _debug
     _debug = debug
-    logging.basicConfig(
-        level=logging.DEBUG if debug else logging.INFO,
-        format="%(asctime)s %(name)s: %(message)s",
-        stream=sys.stderr,
-    )
+    start_log(logging.DEBUG if debug else logging.INFO)
 
 
 @app.command()
@@ -231,14 +234,39 @@ def _write_figures(path: Path | None) -> Any:
 
 def main() -> None:
     """Entry point: errors a person can cause are one clear line each, and status 1."""
+    secure()
+    status = _run()
+    flush_log()
+    if status == 0 and not acted() and (why := lost_output()) is not None:
+        _say(f"not all of the output could be written: {why}")
+        status = EXIT_OUTPUT
+    sys.exit(status)
+
+
+def _run() -> int:
+    """The status: 1 for what a person can mend, EXIT_FAULT for a fault of tandem itself."""
     try:
         app()
+    except SystemExit as done:
+        return done.code if isinstance(done.code, int) else int(done.code is not None)
     except TandemError as error:
         if _debug:
             raise
-        for line in str(error).splitlines():
-            print(f"tandem: {line}", file=sys.stderr)  # noqa: T201
-        sys.exit(1)
+        flush_log()
+        _say(str(error))
+        return 1
+    except Exception as error:
+        if _debug:
+            raise
+        flush_log()
+        _say(f"a fault of tandem itself: {in_words(error)}; `tandem --debug` shows where it came from")
+        return EXIT_FAULT
+    return 0
+
+
+def _say(text: str) -> None:
+    for line in text.splitlines():
+        print(f"tandem: {line}", file=sys.stderr)  # noqa: T201
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import zenoh
 
 from common.clock import monotonic_ns
 from common.link.refusals import HANDSHAKES, MESSAGES, Refusals
+from common.streams import lossy
 
 PIPE_BYTES = 1 << 20
 LOOK_S = 0.1
@@ -44,7 +45,7 @@ def hear_refusals(messages: bool = True) -> Refusals:
 
 def _divert_standard_output() -> int:
     sys.stdout.flush()
-    own = os.fdopen(os.dup(1), "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors, buffering=1)
+    own = lossy(os.dup(1), sys.stdout, buffered=False)
     reading, writing = os.pipe()
     fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
     os.set_blocking(writing, False)

@@ -16,6 +16,7 @@ from common.messages import Action
 from common.runtime import run as run_until_stopped
 from deploy.control.certificate import Certificate
 from deploy.control.reach import Reach, reach
+from deploy.control.teller import Say, telling
 
 Connect = Annotated[list[str] | None, typer.Option(help="A robot's endpoint; may be given several times.")]
 Robot = Annotated[list[str] | None, typer.Option(help="A robot's name; may be given several times.")]
@@ -76,17 +77,16 @@ def estop(
     if not (all_ or where.robots):
         raise TandemError("which robot? Name it by --robot, or stop every one by --all")
 
-    async def tell() -> None:
-        console = Console()
+    async def tell(say: Say) -> None:
         try:
-            said = await stop_robots(where, all_, lambda answer: console.print(answer.line, highlight=False))
+            said = await stop_robots(where, all_, lambda answer: say(answer.line))
         except LinkError as error:
             raise TandemError(f"NOBODY IS STOPPED BY THIS: {error}. Stop it at the robot itself") from None
         failed = [answer for answer in said if not answer.done]
         if failed:
             raise TandemError("NOT EVERY ROBOT IS STOPPED: " + "; ".join(answer.line for answer in failed))
 
-    _run(tell)
+    _carry_out(tell)
 
 
 def reset(
@@ -144,18 +144,17 @@ COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, stat
 def _act(action: Action, where: Reach, key: str = "") -> None:
     from deploy.control.ask import ask_robots
 
-    async def tell() -> None:
-        console = Console()
+    async def tell(say: Say) -> None:
         answers = await ask_robots(where, action, key)
         for answer in answers:
             if answer.guard:
-                console.print(answer.line, highlight=False)
+                say(answer.line)
         silent = [f"{a.robot} {a.text}" for a in answers if not a.guard]
         refused = [f"{a.robot}: {action} was refused: {a.text}" for a in answers if a.guard and not a.done]
         if silent or refused:
             raise TandemError("\n".join([*silent, *refused]))
 
-    _run(tell)
+    _carry_out(tell)
 
 
 def _named(where: Reach) -> Reach:
@@ -177,7 +176,13 @@ def _holder(
     return where
 
 
-def _run(work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+def _carry_out(act: Callable[[Say], Coroutine[Any, Any, None]]) -> None:
+    """Run an act to its end, whatever becomes of the terminal: closed, full, paused."""
+    with telling() as say:
+        _run(lambda: act(say), hangup_stops=False)
+
+
+def _run(work: Callable[[], Coroutine[Any, Any, None]], hangup_stops: bool = True) -> None:
     """Run it; a Ctrl-C ends it, and says that it is not known what the robot did."""
 
     async def main(stop: asyncio.Event) -> None:
@@ -190,4 +195,4 @@ def _run(work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         working.cancel()
         raise TandemError("interrupted: whether the robot heard it is not known")
 
-    run_until_stopped(main)
+    run_until_stopped(main, hangup_stops=hangup_stops)

@@ -29,6 +29,7 @@ PRIORITY = 90
 
 def main() -> None:
     """Tick on every core until standard input ends."""
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for whoever started this one
     first = enter_real_time(PRIORITY)
     cores = sorted(os.sched_getaffinity(0))

@@ -165,3 +165,60 @@ def test_a_link_whose_close_hangs_does_not_hold_the_process() -> None:
     )
     assert (done.returncode, done.stdout) == (0, "over\n")
     assert "left behind" in done.stderr
+
+
+def test_a_terminal_that_closes_stops_in_order_however_often_it_says_so() -> None:
+    done = process(
+        """
+        async def main(stop):
+            for _ in range(3):
+                told(signal.SIGHUP)
+            told()  # as a session's manager does beside it
+            await stop.wait()
+            await asyncio.sleep(0.01)
+            print("cleaned up")
+        """
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "cleaned up\nover\n", "")
+
+
+def test_a_hangup_that_nohup_ignores_stays_ignored() -> None:
+    body = """
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+        async def main(stop):
+            told(signal.SIGHUP)
+            await asyncio.sleep(0.02)
+            assert not stop.is_set()
+        """
+    assert process(body).returncode == 0
+
+
+def test_an_act_goes_on_though_the_terminal_closes() -> None:
+    program = HEAD + textwrap.dedent(
+        """
+        async def main(stop):
+            told(signal.SIGHUP)
+            await asyncio.sleep(0.02)
+            assert not stop.is_set()
+
+        run(main, hangup_stops=False)
+        print(signal.getsignal(signal.SIGHUP) is signal.SIG_DFL)
+        """
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, "True\n")
+
+
+def test_what_hangs_is_ended_though_nobody_can_be_told() -> None:
+    done = process(
+        """
+        async def main(stop):
+            os.close(2)
+            told()
+            await asyncio.sleep(60)
+        """
+    )
+    assert done.returncode == EXIT_HUNG
