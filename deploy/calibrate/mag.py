@@ -44,6 +44,10 @@ def mag(
             callback=_axes,
         ),
     ] = None,
+    overflow: Annotated[
+        list[float] | None,
+        typer.Option(help='A value that means "out of range" in the recording; may be repeated.'),
+    ] = None,
     report: ReportFile = None,
     as_json: AsJson = False,
 ) -> None:
@@ -62,7 +66,9 @@ def mag(
     from master.calibrate.magnetic_axes import axes_matrix, hemisphere_named
     from master.calibrate.node_file import accelerometer_map
 
-    options = MagneticOptions(hemisphere_named(hemisphere), None if axes is None else axes_matrix(axes))
+    options = MagneticOptions(
+        hemisphere_named(hemisphere), None if axes is None else axes_matrix(axes), tuple(overflow or ())
+    )
 
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
         return calibrate_magnetic(raw, accelerometer_map(out, raw.name), options)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.quaternion import Array, cross, from_rotation_vector, multiply, normalise, rotate
+from common.quaternion import Array, cross, from_rotation_vector, multiply, normalise, rotate, to_matrix
 from master.calibrate.recording import RecordingError
 
 _FEWEST_ATTITUDES = 8
@@ -49,6 +49,14 @@ class Alignment:
     def apply(self, affine: Array) -> Array:
         """A magnetometer's map (3, 4) with its outcome in the accelerometer's axes."""
         return rotate(self.q_acc_from_mag, affine.T).T
+
+    def widen(self, sigma: Array, affine: Array) -> Array:
+        """1σ (3, 4) of what `apply` gives, of a map's 1σ (3, 4): the rotation's own is added."""
+        turned, rotation = self.apply(affine), to_matrix(self.q_acc_from_mag)
+        # a turn by δ moves a column by δ × column: what it has across each axis
+        across = np.maximum(np.sum(turned**2, axis=0) - turned**2, 0.0)
+        out: Array = np.sqrt(rotation**2 @ sigma**2 + self.sigma_rad**2 * across)
+        return out
 
 
 def align_magnetometer(acc: Array, mag: Array) -> Alignment:

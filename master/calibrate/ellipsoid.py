@@ -2,8 +2,9 @@
 
 h_o = G⁻¹ (h_s - b). The ellipsoid is fitted with Li and Griffiths' constraint ("Least squares ellipsoid
 specific fitting", 2004), a generalised eigenproblem with one positive eigenvalue, then brought to the least
-Σ (‖h_o‖ - F)² by Gauss–Newton, which takes off the bias that noise gives the algebraic fit. G⁻¹ is the
-symmetric one: of all that make the sphere, it turns directions least.
+sum of a robust loss of the distances in µT (`surface.py`) by Gauss–Newton. An error relative to the
+ellipsoid's size would prefer larger ellipsoids where only one side was seen; the distance does not. G⁻¹ is
+the symmetric one: of all that make the sphere, it turns directions least.
 """
 
 from __future__ import annotations
@@ -14,14 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.quaternion import Array
+from master.calibrate.accelerometer import sphere
+from master.calibrate.surface import Parameters, RunsAwayError, distances, refined, slopes_of_norm, weights
 from master.calibrate.uncertainty import covariance, propagate
 
 UNKNOWNS = 9
 _SYMMETRIC = np.triu_indices(3)
 _BANDS, _SECTORS = 8, 16
 CELLS = _BANDS * _SECTORS
-_STEPS = 20
 _CONSTRAINT_K = 4.0
+_SUBSETS, _SUBSET, _SCORED = 80, 40, 2000
+"""Random subsets to start from where all readings together give none: outliers steer the algebraic fit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +38,8 @@ class Ellipsoid:
     """(3,), hard iron, µT."""
     field_ut: float
     """Strength of the field, the mean radius."""
+    refined: bool = True
+    """False: the least distances ran away, and this is the algebraic solution."""
 
     def norms(self, readings: Array) -> Array:
         """Strength of the calibrated readings (K, 3), µT, (K,)."""
@@ -50,15 +56,65 @@ class NoEllipsoidError(ValueError):
     """The readings lie on no ellipsoid."""
 
 
-def fit_ellipsoid(readings: Array) -> Ellipsoid:
-    """The ellipsoid nearest to readings (K ≥ 10, 3). Raises NoEllipsoidError."""
-    centre = readings.mean(axis=0)
-    scale = float(np.sqrt(np.mean(np.sum((readings - centre) ** 2, axis=1))))
+def fit_ellipsoid(readings: Array, near: Ellipsoid | None = None) -> Ellipsoid:
+    """The ellipsoid nearest to readings (K ≥ 10, 3), whatever a few of them are. Raises NoEllipsoidError.
+
+    With one that is `near` already, as of most of these readings, the search begins there.
+    """
+    centre = np.median(readings, axis=0)
+    scale = 1.5 * float(np.median(np.linalg.norm(readings - centre, axis=1)))
     if not scale > 0.0:
         raise NoEllipsoidError("all readings are the same")
-    first = _constrained((readings - centre) / scale)
-    found = _refined(first, (readings - centre) / scale)
-    return _sized(found[0], centre + scale * found[1], scale)
+    m = (readings - centre) / scale
+    if near is None:
+        starts = [_start(m), _sphere(m)]
+    else:
+        starts = [(near.shape * scale / near.field_ut, (near.centre - centre) / scale)]
+    trials = []
+    for start in starts:
+        try:
+            trials.append(refined(start, m))
+        except RunsAwayError:
+            continue
+    if not trials:
+        return _sized(starts[0], centre, scale, sound=False)
+    return _sized(min(trials, key=lambda trial: _median_off(trial, m)), centre, scale, sound=True)
+
+
+def _median_off(parameters: Parameters, m: Array) -> float:
+    return float(np.median(np.abs(distances(parameters, m))))
+
+
+def _sphere(m: Array) -> Parameters:
+    """The sphere that fits best, outliers left out: rounder than iron makes it, and so a safe start."""
+    centre, radius = sphere(m)
+    for _ in range(5):
+        off = np.abs(np.linalg.norm(m - centre, axis=1) - radius)
+        centre, radius = sphere(m[off <= max(3.0 * float(np.median(off)), 1e-9)])
+    return np.eye(3) / max(radius, 1e-9), centre
+
+
+def _start(m: Array) -> Parameters:
+    """Of the algebraic fits to all readings and to random few, the one whose median distance is the least."""
+    scored = m[:: max(1, len(m) // _SCORED)]
+    rng = np.random.default_rng(0)
+    found: list[tuple[float, Parameters]] = []
+    problem = NoEllipsoidError("no ellipsoid fits the readings")
+    for n in range(_SUBSETS + 1):
+        few = m if n == 0 else m[rng.choice(len(m), _SUBSET, replace=False)]
+        try:
+            trial = _constrained(few)
+        except NoEllipsoidError as error:
+            problem = error if n == 0 else problem
+            continue
+        left = np.abs(distances(trial, scored))
+        found.append((float(np.median(left)), trial))
+        # without outliers the fit to all is the best, and no other need be looked for
+        if len(m) <= 2 * _SUBSET or (n == 0 and np.max(left) < 6.0 * np.sqrt(np.mean(left**2))):
+            break
+    if not found:
+        raise problem
+    return min(found, key=lambda one: one[0])[1]
 
 
 def parameter_slopes(fit: Ellipsoid, readings: Array) -> Array:
@@ -66,14 +122,32 @@ def parameter_slopes(fit: Ellipsoid, readings: Array) -> Array:
 
     Here shape is the one that brings readings to the unit sphere, `fit.shape` / `fit.field_ut`.
     """
-    return _slopes(fit.shape / fit.field_ut, fit.centre, readings)
+    return slopes_of_norm((fit.shape / fit.field_ut, fit.centre), readings)
+
+
+def spread_ut(fit: Ellipsoid, readings: Array) -> float:
+    """Standard deviation of the readings' distances from the ellipsoid, outliers left out, µT."""
+    left = off_ut(fit, readings)
+    return float(1.4826 * np.median(np.abs(left - np.median(left))))
+
+
+def off_ut(fit: Ellipsoid, readings: Array) -> Array:
+    """Distances (K,) of readings (K, 3) from the ellipsoid, µT; positive outside."""
+    return distances((fit.shape / fit.field_ut, fit.centre), readings)
 
 
 def affine_sigma(fit: Ellipsoid, readings: Array) -> Array:
     """1σ of `fit.affine`, (3, 4), from the spread of readings (K, 3) about the fit."""
-    slope = parameter_slopes(fit, readings)
-    left = fit.norms(readings) / fit.field_ut - 1.0
-    cov = covariance(slope, left, len(readings) - UNKNOWNS)
+    unit = fit.shape / fit.field_ut
+    left = distances((unit, fit.centre), readings)
+    # near the surface a distance changes as the norm does, over the norm's steepness
+    mapped = (readings - fit.centre) @ unit
+    steepness = np.linalg.norm(mapped @ unit, axis=1) / np.linalg.norm(mapped, axis=1)
+    root = np.sqrt(weights(left))
+    slope = parameter_slopes(fit, readings) / steepness[:, None]
+    # a robust fit of Gaussian readings is known 5 % worse than the plain one: by the weights' own slope
+    effective = float(np.mean(root**2))
+    cov = covariance(root[:, None] * slope, root * left, len(readings) - UNKNOWNS) / max(effective, 0.1)
     to_affine = np.zeros((12, UNKNOWNS))
     for n, (i, j) in enumerate(zip(*_SYMMETRIC, strict=True)):
         basis = np.zeros((3, 3))
@@ -163,37 +237,8 @@ def _from_quadric(quadratic: Array, linear: Array, constant: float) -> tuple[Arr
     return shape, centre.astype(np.float64)
 
 
-def _refined(first: tuple[Array, Array], m: Array) -> tuple[Array, Array]:
-    """Gauss–Newton on Σ (‖S (m - c)‖ - 1)² from (S, c)."""
-    shape, centre = first
-    for _ in range(_STEPS):
-        left = np.linalg.norm((m - centre) @ shape, axis=1) - 1.0
-        step = np.linalg.lstsq(_slopes(shape, centre, m), -left, rcond=None)[0]
-        change = np.zeros((3, 3))
-        change[_SYMMETRIC] = step[:6]
-        change += np.triu(change, 1).T
-        shape, centre = shape + change, centre + step[6:]
-        if not np.linalg.eigvalsh(shape)[0] > 0.0:
-            raise NoEllipsoidError(
-                "the fit runs away: the readings cover too little of the sphere, or lie on none"
-            )
-        if np.abs(step).max() < 1e-10:
-            break
-    return shape, centre
-
-
-def _slopes(shape: Array, centre: Array, m: Array) -> Array:
-    """Derivatives (K, 9) of ‖S (m - c)‖ by S's upper triangle and c."""
-    centred = m - centre
-    mapped = centred @ shape
-    unit = mapped / np.linalg.norm(mapped, axis=1, keepdims=True)
-    i, j = _SYMMETRIC
-    product = unit[:, i] * centred[:, j]
-    product += np.where(i == j, 0.0, unit[:, j] * centred[:, i])
-    return np.hstack([product, -unit @ shape])
-
-
-def _sized(shape: Array, centre: Array, scale: float) -> Ellipsoid:
+def _sized(found: Parameters, middle: Array, scale: float, *, sound: bool) -> Ellipsoid:
     # S / scale takes readings to the unit sphere
+    shape, centre = found
     root = float(np.cbrt(np.linalg.det(shape)))
-    return Ellipsoid(shape / root, centre, scale / root)
+    return Ellipsoid(shape / root, middle + scale * centre, scale / root, sound)

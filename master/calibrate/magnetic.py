@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from common.calibration import Made
 from common.quaternion import Array
 from master.calibrate.alignment import Alignment, UndeterminedError, align_magnetometer
+from master.calibrate.codes import clean
 from master.calibrate.ellipsoid import (
     Ellipsoid,
     NoEllipsoidError,
     affine_sigma,
-    amplification,
     coverage,
     fit_ellipsoid,
+    off_ut,
+    spread_ut,
 )
 from master.calibrate.evidence import Evidence, refuse_contradictions, unjudged
 from master.calibrate.magnetic_axes import Hemisphere, check_axes
@@ -29,7 +31,10 @@ from master.calibrate.uncertainty import folds
 
 LEAST_COVERAGE = 0.5
 GOOD_COVERAGE = 0.8
-MOST_AMPLIFICATION = 1.0
+MOST_CENTRE_ERROR = 0.1
+"""Of the hard iron as stated, 95 %, over the field."""
+_MOST_OUTLIERS = 0.05
+"""So many readings may lie off the ellipsoid: a door, a passing trolley. More, and the field was another."""
 MOST_SPREAD = 0.1
 """Of the calibrated strength over itself; beyond it the field is not one field."""
 _FIELD_UT = (10.0, 200.0)
@@ -111,6 +116,8 @@ class MagneticOptions:
     """Where it was recorded: the field dips below the horizon in the north, and rises in the south."""
     axes: Array | None = None
     """(3, 3): a signed permutation, accepted by a person, that takes the readings to the node's axes."""
+    overflow_ut: tuple[float, ...] = ()
+    """Values that the converter or its driver gives for "out of range", as they stand in the recording."""
 
 
 def calibrate_magnetic(
@@ -128,8 +135,9 @@ def calibrate_magnetic(
     if recording.mag_ut is None:
         raise RecordingError("there are no magnetometer readings; record a node that has one")
     axes = np.eye(3) if options.axes is None else options.axes
-    mag = recording.mag_ut @ axes.T
-    check_samples("magnetometer", mag)
+    whole = clean(recording.mag_ut, options.overflow_ut)
+    mag = whole.readings @ axes.T
+    check_samples("magnetometer", mag, whole.missing)
     everywhere = np.ones(len(mag), dtype=np.bool_)
     check_clipped(
         "magnetometer",
@@ -139,14 +147,21 @@ def calibrate_magnetic(
         "set a larger range, or take it away from the magnet",
     )
     known = np.all(np.isfinite(mag), axis=1)
-    fit, hold_out = _fitted(mag[known], np.flatnonzero(known) // max(1, round(_BLOCK_S * recording.rate_hz)))
+    blocks = np.flatnonzero(known) // max(1, round(_BLOCK_S * recording.rate_hz))
+    fit, sigma, hold_out = _fitted(mag[known], blocks)
     seen = coverage(fit, mag[known])
     calibrated = mag @ fit.affine[:, :3].T + fit.affine[:, 3]
     evidence = refuse_contradictions(check_axes(recording, calibrated, options.hemisphere))
-    notes = () if seen >= GOOD_COVERAGE else (f"{100 * seen:.0f} % of the sphere seen; more makes it surer",)
+    notes = [*recording.notes, *whole.notes]
+    if seen < GOOD_COVERAGE:
+        notes.append(
+            f"{100 * seen:.0f} % of the sphere seen; more makes it surer: the hard iron is known to "
+            f"±{1.96 * float(sigma[:, 3].max()):.2g} µT (95 %)"
+        )
     alignment, words = _align(recording, mag, fit, accelerometer)
     said = (*words, *unjudged(evidence))
-    sigma = affine_sigma(fit, mag[known])
+    if alignment is not None:
+        sigma = alignment.widen(sigma, fit.affine)
     return MagneticCalibration(
         name=recording.name,
         fit=fit,
@@ -155,23 +170,33 @@ def calibrate_magnetic(
         readings_ut=mag[known],
         hold_out_ut=hold_out,
         alignment=alignment,
-        notes=(*notes, *(["; ".join(said)] if said else [])),
+        notes=(*notes, *(("; ".join(said),) if said else ())),
         evidence=evidence,
         axes=axes,
     )
 
 
-def _fitted(readings: Array, blocks: NDArray[np.intp]) -> tuple[Ellipsoid, Array]:
-    """The ellipsoid of readings (K, 3), and what it holds out (K,). Raises RecordingError."""
+def _fitted(readings: Array, blocks: NDArray[np.intp]) -> tuple[Ellipsoid, Array, Array]:
+    """The ellipsoid of readings (K, 3), its map's 1σ (3, 4), what it holds out (K,)."""
     if len(readings) < _FEWEST_SAMPLES:
         raise RecordingError(f"{len(readings)} readings are too few; {_TURN}, for 3 minutes")
     try:
         fit = fit_ellipsoid(readings)
-        _check_coverage(fit, readings)
-        hold_out = _held_out(readings, blocks)
+        _check_field(fit, readings)
+        sigma = affine_sigma(fit, readings) * _widened(fit, readings, blocks)
+        _check_coverage(fit, readings, sigma)
+        hold_out = _held_out(fit, readings, blocks)
     except NoEllipsoidError as error:
         raise RecordingError(f"the sphere is covered too thinly: {error}; {_TURN}") from None
-    spread = float(np.std(fit.norms(readings))) / fit.field_ut
+    return fit, sigma, hold_out
+
+
+def _check_field(fit: Ellipsoid, readings: Array) -> None:
+    """Refuse a field that is not one field, or in another unit; where too little was seen, say that first."""
+    if coverage(fit, readings) < LEAST_COVERAGE:
+        return
+    off = np.abs(off_ut(fit, readings)) / fit.field_ut
+    spread = max(spread_ut(fit, readings) / fit.field_ut, float(np.quantile(off, 1.0 - _MOST_OUTLIERS)) / 2.0)
     if spread > MOST_SPREAD:
         raise RecordingError(
             f"the calibrated field varies by {100 * spread:.0f} %: it was disturbed; go away from iron, "
@@ -182,7 +207,21 @@ def _fitted(readings: Array, blocks: NDArray[np.intp]) -> tuple[Ellipsoid, Array
             f"the field is {fit.field_ut:.3g} µT strong, and the earth's is 22 to 67 µT; "
             "are the readings in µT? 1 gauss is 100 µT"
         )
-    return fit, hold_out
+
+
+def _widened(fit: Ellipsoid, readings: Array, blocks: NDArray[np.intp]) -> float:
+    """By how much the fit is less sure than it says, as readings next to each other err alike: at least 1.
+
+    The root of the variance of the blocks' summed errors over what independent readings would give.
+    """
+    off = off_ut(fit, readings)
+    off = np.clip(off, -5.0 * spread_ut(fit, readings), 5.0 * spread_ut(fit, readings))
+    _, place, counts = np.unique(blocks, return_inverse=True, return_counts=True)
+    sums = np.bincount(place, weights=off)
+    independent = float(np.sum(off**2))
+    if len(counts) < 10 or not independent > 0.0:
+        return 1.0
+    return max(1.0, float(np.sqrt(np.sum(sums**2) / independent)))
 
 
 def _align(
@@ -206,25 +245,28 @@ def _align(
         return None, (f"{without}: {error}",)
 
 
-def _check_coverage(fit: Ellipsoid, readings: Array) -> None:
+def _check_coverage(fit: Ellipsoid, readings: Array, sigma: Array) -> None:
     seen = coverage(fit, readings)
-    carried = amplification(fit, readings)
     if seen < LEAST_COVERAGE:
         raise RecordingError(
             f"the sphere is covered too thinly: {100 * seen:.0f} % of it was seen, at least "
             f"{100 * LEAST_COVERAGE:.0f} % is needed; {_TURN}"
         )
-    if carried > MOST_AMPLIFICATION:
-        raise RecordingError(f"the sphere is covered too thinly: one side of it was not seen; {_TURN}")
+    error = 1.96 * float(sigma[:, 3].max())
+    if not error < MOST_CENTRE_ERROR * fit.field_ut:
+        raise RecordingError(
+            f"the sphere is covered too thinly: one side of it was not seen, and the hard iron is known to "
+            f"±{error:.1f} µT only (95 %); {_TURN}"
+        )
 
 
-def _held_out(readings: Array, blocks: NDArray[np.intp]) -> Array:
+def _held_out(whole: Ellipsoid, readings: Array, blocks: NDArray[np.intp]) -> Array:
     """Calibrated strength minus the field (K,), each by a fit to the other blocks (K,) of readings."""
     _, place = np.unique(blocks, return_inverse=True)
     errors = np.empty(len(readings))
     for out in folds(int(place.max()) + 1):
         held = out[place]
         if held.any():
-            fit = fit_ellipsoid(readings[~held])
+            fit = fit_ellipsoid(readings[~held], near=whole)
             errors[held] = fit.norms(readings[held]) - fit.field_ut
     return errors

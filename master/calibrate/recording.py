@@ -14,6 +14,8 @@ from common.npz import Arrays, read_arrays
 from common.quaternion import Array
 
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 5.0, 20_000.0
+_RATE_UNKNOWN_HZ = 100.0
+"""Of a magnetometer alone without times: what is held out are blocks of two seconds."""
 _JITTER = 0.25
 """Stamps further than this share of a period off their place are not a rate."""
 _LARGEST_LOSS = 0.5
@@ -37,6 +39,8 @@ class NodeRecording:
     """True: the three arrays hold the converters' raw counts, of which the unit is not known."""
     as_read: NodeRecording | None = None
     """Where a calibration has been applied, the readings before it: only those show the ends of a range."""
+    notes: tuple[str, ...] = ()
+    """What was repaired in the recording, for a person."""
 
     @property
     def duration_s(self) -> float:
@@ -47,7 +51,8 @@ class NodeRecording:
 def load_recordings(path: Path) -> dict[str, NodeRecording]:
     """The nodes of a file, by name. Raises RecordingError.
 
-    `.npz` of one unit: `gyr` rad/s, `acc` m/s², (T, 3) each, optionally `mag` µT, and `rate_hz`.
+    `.npz` of one unit: `gyr` rad/s, `acc` m/s², (T, 3) each, optionally `mag` µT, and `rate_hz`;
+    `mag` alone is enough for hard and soft iron.
     `.npz` of a suit: `t_s`, (T,), and for each segment `{segment}_acc`, `_gyr`, optionally `_mag`.
     `.npz` of a unit in raw counts (as imu_tk's): `acc_raw`, `gyr_raw`, and `t` in seconds.
     `.mcap` of a suit, as `tandem calibrate record` and `live` write it.
@@ -69,7 +74,7 @@ def _load_npz(path: Path) -> dict[str, NodeRecording]:
     arrays = read_arrays(path)
     if "acc_raw" in arrays:
         return _raw_unit(path, arrays)
-    if "acc" in arrays or "gyr" in arrays:
+    if "acc" in arrays or "gyr" in arrays or "mag" in arrays:
         return _single_unit(path, arrays)
     return _suit(path, arrays)
 
@@ -82,8 +87,10 @@ def _raw_unit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
 
 
 def _single_unit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
-    acc, gyr = (_vectors(path, arrays, key) for key in ("acc", "gyr"))
     mag = _vectors(path, arrays, "mag") if "mag" in arrays else None
+    if mag is not None and "acc" not in arrays and "gyr" not in arrays:
+        return _magnetometer_alone(path, arrays, mag)
+    acc, gyr = (_vectors(path, arrays, key) for key in ("acc", "gyr"))
     slots = None
     if "rate_hz" in arrays:
         rate_hz = _rate(path, arrays["rate_hz"])
@@ -93,6 +100,13 @@ def _single_unit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
             raise RecordingError(f"{path}: has neither rate_hz nor t_s; add the rate in Hz")
         rate_hz, slots = _grid(path, time, arrays[time], len(acc))
     return {path.stem: _node(path, path.stem, rate_hz, (acc, gyr, mag), slots)}
+
+
+def _magnetometer_alone(path: Path, arrays: Arrays, mag: Array) -> dict[str, NodeRecording]:
+    """Enough for hard and soft iron, which need no times; a rate that is not given is of no account."""
+    rate_hz = _rate(path, arrays["rate_hz"]) if "rate_hz" in arrays else _RATE_UNKNOWN_HZ
+    none = np.full(mag.shape, np.nan)
+    return {path.stem: NodeRecording(path.stem, rate_hz, none, none.copy(), mag)}
 
 
 def _suit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:

@@ -15,9 +15,13 @@ _CLIPPED_RUN = 3
 _AXES = "xyz"
 
 
-def check_samples(sensor: str, samples: Array) -> None:
-    """Refuse readings (T, 3) of which too many are missing, or an axis of which never changes."""
-    missing = float(np.mean(~np.isfinite(samples).all(axis=1)))
+def check_samples(sensor: str, samples: Array, missing: float | None = None) -> None:
+    """Refuse readings (T, 3) of which too many are missing, or an axis of which never changes.
+
+    `missing` is the share that is missing of a sensor with a rate of its own.
+    """
+    if missing is None:
+        missing = float(np.mean(~np.isfinite(samples).all(axis=1)))
     if missing > _MOST_MISSING:
         raise RecordingError(
             f"{100 * missing:.0f} % of the {sensor}'s readings are missing (NaN); look at the cable or the "

@@ -84,12 +84,29 @@ def test_the_share_seen_is_said() -> None:
         calibrate_magnetic(recorded(as_delivered(free_rotation(180.0, reach=0.4), 1)))
 
 
-def test_half_of_the_sphere_is_too_little() -> None:
-    upper = np.random.default_rng(0).normal(size=(4000, 3))
+@pytest.mark.parametrize("noise_ut", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_half_of_the_sphere_is_enough_and_stated_less_sure(noise_ut: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    half, side, noise = rng.normal(size=(16000, 3)), rng.normal(size=3), rng.normal(size=(16000, 3))
+    half *= FIELD_UT / np.linalg.norm(half, axis=1, keepdims=True)
+    half *= np.sign(half @ side)[:, None]
+    whole = half * np.where(np.arange(16000) % 2, 1.0, -1.0)[:, None]
+    hard, soft = np.array([12.0, -7.0, 20.0]), np.array([1.05, 0.97, 1.0])
+    found, surer = (calibrate_magnetic(recorded(v * soft + hard + noise_ut * noise)) for v in (half, whole))
+    assert np.linalg.norm(found.fit.centre - hard) < 0.5
+    assert np.all(np.abs(found.affine[:, 3] + found.affine[:, :3] @ hard) < 4.0 * found.sigma[:, 3])
+    assert found.sigma[:, 3].max() > 2.0 * surer.sigma[:, 3].max()
+    assert any("the hard iron is known to ±" in note for note in found.notes)
+
+
+def test_a_side_that_noise_hides_is_refused() -> None:
+    upper = np.random.default_rng(0).normal(size=(200, 3))
     upper *= FIELD_UT / np.linalg.norm(upper, axis=1, keepdims=True)
     upper[:, 2] = np.abs(upper[:, 2])
+    noise = np.random.default_rng(1).normal(size=upper.shape)
     with pytest.raises(RecordingError, match="one side of it was not seen"):
-        calibrate_magnetic(recorded(as_delivered(upper, 1)))
+        calibrate_magnetic(recorded(upper + 4.0 * noise))
 
 
 def test_less_of_the_sphere_than_is_good_is_said() -> None:
