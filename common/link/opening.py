@@ -1,4 +1,4 @@
-"""Opens a Zenoh session: at once between peers; through routers once one of them answers."""
+"""Opens a Zenoh session; what the host or its network does not have yet is waited for."""
 
 from __future__ import annotations
 
@@ -17,8 +17,16 @@ from common.errors import LinkError
 from common.link.configuration import zenoh_configuration
 
 RETRY_S = 0.5
+MOST_RETRY_S = 5.0
+"""Between two attempts, which begin RETRY_S apart and grow rarer."""
+BACK_OFF = 1.5
 _RUST_PLACE = re.compile(r"[!.]?\s+at \S+\.rs:\d+\.?")
 _NO_ROUTER = "Unable to connect to any of"
+_NOT_YET = re.compile(
+    r"\(os error (?:19|99|100|101)\)"  # no such device, address not available, network down or unreachable
+    r"|Name or service not known|Temporary failure in name resolution|No address associated with hostname"
+)
+"""Of an endpoint that this host may have a little later: an interface that is not up, a name without DNS."""
 
 log = logging.getLogger(__name__)
 
@@ -29,22 +37,39 @@ async def open_zenoh(
     within_s: float = math.inf,
     waits: Callable[[str], None] = lambda _: None,
 ) -> zenoh.Session:
-    """The session. As a client it waits `within_s` for its router, and says so. Raises LinkError."""
+    """The session. It waits `within_s` for what a host may not have yet, and says so. Raises LinkError.
+
+    As a client it waits for its router; whoever listens, for the address or the name where it is to.
+    """
     turn, until_s = 0, asyncio.get_running_loop().time() + within_s
+    pause_s = RETRY_S
     while True:
         try:
             return await _open_off_the_loop(_in_turn(config, turn), mode)
         except zenoh.ZError as error:
-            if config.mode != "client" or _NO_ROUTER not in str(error):
-                raise LinkError(f"the link cannot be opened: {_RUST_PLACE.sub('', str(error))}") from None
-        routers = ", ".join(config.connect)
+            words = _RUST_PLACE.sub("", str(error))
+        missing = _missing(config, words)
+        if missing is None:
+            raise LinkError(f"the link cannot be opened: {words}") from None
         if asyncio.get_running_loop().time() >= until_s:
-            raise LinkError(f"no router answered at {routers} within {within_s:g} s")
-        waits(f"waits for a router at {routers}")
+            raise LinkError(f"{missing} within {within_s:g} s")
+        waits(f"waiting: {missing}")
         if turn == 0:
-            log.warning("no router answers at %s: tried until one does", routers)
+            log.warning("%s: retrying every %g s at most, until it is there", missing, MOST_RETRY_S)
         turn += 1
-        await asyncio.sleep(RETRY_S)
+        await asyncio.sleep(pause_s)
+        # a router is looked for as often as before: each attempt lasts a while by itself
+        pause_s = RETRY_S if config.mode == "client" else min(MOST_RETRY_S, BACK_OFF * pause_s)
+
+
+def _missing(config: LinkConfig, words: str) -> str | None:
+    """What this host or its network does not have yet, in words; None where waiting would not help."""
+    if config.mode == "client" and _NO_ROUTER in words:
+        return f"no router answered at {', '.join(config.connect)}"
+    if config.listen and _NOT_YET.search(words):
+        why = words.rpartition(": ")[2].strip("[]")
+        return f"this host cannot listen at {', '.join(config.listen)} yet ({why})"
+    return None
 
 
 def _in_turn(config: LinkConfig, turn: int) -> LinkConfig:

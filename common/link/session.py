@@ -39,8 +39,9 @@ async def open_session(
 ) -> AsyncIterator[Session]:
     """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later.
 
-    `mode`: `router`, in place of the configuration's own. `router_within_s`: how long a client waits for its
-    router; a robot waits for ever, a person who asks does not. `waits` is told now and then that it does.
+    `mode`: `router`, in place of the configuration's own. `router_within_s`: how long it waits for a router,
+    or for an address to listen at; a robot waits for ever, a person who asks does not. `waits` is told now
+    and then that it does.
     """
     if not (config.listen or config.connect):
         raise LinkError("the link has no endpoint: set `listen` or `connect` under [link]")

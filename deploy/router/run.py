@@ -12,7 +12,6 @@ from common.launch import WriteFigures
 from common.link.audit import Audit
 from common.link.configuration import zenoh_configuration
 from common.link.session import Session, open_session
-from common.metrics import to_tree
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.runtime import until_stopped
@@ -40,17 +39,22 @@ async def run(config: RouterConfig, stop: asyncio.Event, write_figures: WriteFig
     """Route until `stop` is set. Raises LinkError where it cannot listen."""
     if config.link.tls is None:
         log.warning("no [link.tls]: anyone who reaches this router may command every robot at it")
+    # an address that is not there yet is waited for, so what stops the router must reach it then too
+    await until_stopped(stop, _route(config, write_figures))
+    log.info("stopped")
+
+
+async def _route(config: RouterConfig, write_figures: WriteFigures) -> None:
     notifier = open_notifier()
     audit = Audit(config.link)
-    async with open_session(config.link, "router") as session:
+    async with open_session(config.link, "router", waits=notifier.waits) as session:
         audit.attach(session)
         log.info("%s: routes at %s", config.name, ", ".join(config.link.listen))
         try:
-            await until_stopped(stop, tend(session, notifier))
+            await tend(session, notifier)
         finally:
             notifier.stopping()
             write_figures(to_tree(audit.metrics()))
-    log.info("stopped")
 
 
 async def tend(session: Session, notifier: Notifier) -> None:

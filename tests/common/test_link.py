@@ -473,7 +473,7 @@ def test_a_client_waits_for_its_router_and_tries_each_in_turn(caplog: pytest.Log
         config = LinkConfig(mode="client", connect=[dead, late])
         async with AsyncExitStack() as stack:
             opening = asyncio.create_task(stack.enter_async_context(open_link(config, ROBOT)))
-            await until(lambda: "no router answers" in caplog.text)
+            await until(lambda: "no router answered" in caplog.text)
             assert not opening.done()
             router = await stack.enter_async_context(open_session(LinkConfig(listen=[late]), "router"))
             link = await opening
@@ -486,7 +486,7 @@ def test_a_client_that_gives_up_waiting_leaves_nothing_behind(caplog: pytest.Log
     async def test() -> None:
         config = LinkConfig(mode="client", connect=[free_endpoint()])
         opening = asyncio.create_task(open_link(config, ROBOT).__aenter__())
-        await until(lambda: "no router answers" in caplog.text)
+        await until(lambda: "no router answered" in caplog.text)
         opening.cancel()
         with pytest.raises(asyncio.CancelledError):
             await opening

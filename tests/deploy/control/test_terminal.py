@@ -1,4 +1,4 @@
-"""An act is carried through for every robot, whatever becomes of the terminal: `tandem` in its own process."""
+"""An act is carried through for every robot, whatever becomes of the terminal: `tandem` as a process."""
 
 from __future__ import annotations
 
@@ -39,7 +39,6 @@ async def estop(
         def answer(_: bytes, __: int) -> bytes:
             stopped.add(name)
             first.set()
-            # more than a pipe takes, so that a reader that does not read is noticed
             return pack_stop_answer(StopAnswer(True, "estop", "stopped", 1 + len(name)))
 
         return answer
