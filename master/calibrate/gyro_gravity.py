@@ -33,6 +33,10 @@ _LEAST_GAIN = 0.004
 """And so much less of gravity: below that the unit hardly turned."""
 _TOLD = 0.01
 """Scatter of a wrong guess from which on the motion tells the right one from it."""
+_STEP_WINDOW_S = 3.0
+WORST_STEP = 0.25
+"""A jump of 15°. A real person reaches 0.22 as they sit down, the simulated one 0.16."""
+_GRAVITY_M_S2 = 9.80665
 _DEG = math.pi / 180.0
 _UNITS = {_DEG: "°/s", 1e-3 * _DEG: "thousandths of °/s", 1.0 / _DEG: "radians that were converted twice"}
 
@@ -129,6 +133,48 @@ def judge_agreement(found: Agreement | None) -> list[Evidence]:
             "clipped, its bias wanders, or the unit slipped; then calibrate it (`tandem calibrate imu`)",
         ),
     ]
+
+
+def slipped(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> Evidence:
+    """Whether gravity jumps where the gyroscope did not turn: the unit slipped, or something knocked it.
+
+    The mean force of the seconds before an instant and after it, turned back by the gyroscope, differ by what
+    it missed. A person who sits down differs by 0.2 g at most, for an instant.
+    """
+    compared = "gravity before and after each instant"
+    thin = max(1, round(rate_hz / _THINNED_HZ))
+    length = len(acc_m_s2) // thin * thin
+    acc = acc_m_s2[:length].reshape(-1, thin, 3).mean(axis=1)
+    gyr = gyr_rad_s[:length].reshape(-1, thin, 3).mean(axis=1)
+    rate_hz /= thin
+    half = round(_STEP_WINDOW_S * rate_hz)
+    first = np.arange(0, len(acc) - 2 * half + 1, max(1, round(0.25 * rate_hz)))
+    if not len(first):
+        return not_judged(compared, f"the recording is shorter than {2.0 * _STEP_WINDOW_S:.0f} s")
+    gyr = gyr - _bias(gyr, rate_hz)
+    rows = first[:, None] + np.arange(2 * half)
+    force, turn = acc[rows] / _GRAVITY_M_S2, gyr[rows] / rate_hz
+    # tapered, so that a sudden movement at either end counts little
+    weight = np.sin(np.pi * (np.arange(half) + 0.5) / half) ** 2
+    weight = np.tile(weight / weight.sum(), 2)
+    q = np.tile([1.0, 0.0, 0.0, 0.0], (len(first), 1))
+    means = np.zeros((2, len(first), 3))
+    for k in range(2 * half):
+        step = from_rotation_vector(0.5 * turn[:, k])
+        q = multiply(q, step)
+        means[k // half] += weight[k] * rotate(q, force[:, k])
+        q = multiply(q, step)
+    apart = np.linalg.norm(means[1] - means[0], axis=1)
+    worst = int(np.argmax(apart))
+    at_s = (first[worst] + half) / rate_hz
+    return at_most(
+        compared,
+        float(apart[worst]),
+        WORST_STEP,
+        "g",
+        advice=f"at about {at_s:.0f} s gravity jumps in it by {apart[worst]:.2f} g without its gyroscope "
+        "turning: it slipped, or was knocked. Fix it firmly on the segment, and record again",
+    )
 
 
 def describe(guess: Array) -> str:

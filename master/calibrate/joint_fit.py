@@ -32,6 +32,7 @@ import numpy as np
 from common.quaternion import Array, heading_turn, rotate
 from master.calibrate.gauss_newton import half_sphere
 from master.calibrate.joint_residuals import Axes, JointProblem, Moving, Unknowns
+from master.calibrate.steadiness import Steadiness, steadiness
 
 _INDEPENDENT_S = 0.2
 """Samples nearer than that to each other say the same."""
@@ -47,7 +48,7 @@ _ALIKE_RAD = math.radians(20.0)
 
 @dataclass(frozen=True, slots=True)
 class JointFit:
-    """The best answer and how well the data determine it."""
+    """The best answer and how well the data determine it, by whichever way of telling is the most careful."""
 
     axes: tuple[Array, Array] | None
     """In the parent's and in the child's sensor frame; their common sign is arbitrary."""
@@ -61,6 +62,8 @@ class JointFit:
     """Cost of the best answer with quite another δ, in units of this one's."""
     axis_rival: float
     """Cost of the best answer with quite other axes, in units of this one's."""
+    steady: Steadiness
+    """Whether all parts of the recording tell the same."""
     misfit: dict[str, float]
     """RMS of each kind of residual: `aligned` rad, `rate` rad/s, `acceleration` m/s²."""
 
@@ -112,14 +115,22 @@ def fit_joint(
     scale = max(0.25, 2.0 * cost / fine.rows)
     covariance = scale * independent * np.linalg.pinv(normal, rcond=1e-12).astype(np.float64)
     axes = 4 if zero_axes is not None else 0
+    formal = (_worst(covariance[:2, :2]), _worst(covariance[2:4, 2:4])) if axes else (math.pi, math.pi)
+    steady = steadiness(fine, best)
     return JointFit(
         best.axes,
         _wrap(best.offset_rad),
         best.levers_m.reshape(2, 3),
-        (_worst(covariance[:2, :2]), _worst(covariance[2:4, 2:4])) if axes else (math.pi, math.pi),
-        min(math.pi, math.sqrt(covariance[axes, axes])),
+        (_true(formal[0], steady, 0), _true(formal[1], steady, 1)),
+        # a heading that changed half-way is right for neither half
+        max(
+            min(math.pi, math.sqrt(covariance[axes, axes])),
+            steady.offset_sigma_rad,
+            0.5 * steady.offset_change_rad,
+        ),
         min(rivals, default=math.inf) / max(cost, 1e-12),
         min(axis_rivals, default=math.inf) / max(cost, 1e-12),
+        steady,
         fine.misfit(best),
     )
 
@@ -157,6 +168,11 @@ def _starts_anywhere(parent: Moving, child: Moving, offsets: Array) -> list[Unkn
             axis2 = child.r_stance.T @ rotate(heading_turn(-offset), there)
             starts.append(Unknowns((axis, axis2), float(offset), np.zeros(6)))
     return starts
+
+
+def _true(formal: float, steady: Steadiness, end: int) -> float:
+    """An axis's standard deviation: the least that any of the ways to tell it leaves."""
+    return max(formal, steady.axis_sigma_rad[end], 0.5 * steady.axis_change_rad[end])
 
 
 def _worst(covariance: Array) -> float:

@@ -13,7 +13,7 @@ from master.calibrate.joint_fit import JointFit, fit_joint
 from master.calibrate.joint_residuals import Moving
 from master.calibrate.oriented import rows_moving
 
-_WORST_AXIS_RAD = math.radians(6.0)
+_WORST_AXIS_RAD = math.radians(10.0)
 _WORST_OFFSET_RAD = math.radians(8.0)
 _WORST_RIVAL = 1.15
 _LEAST_SAMPLES = 60
@@ -58,7 +58,13 @@ def joint_motion(skeleton: Skeleton, i: int, parent: Moving, child: Moving, spac
         return JointMotion(entry.name, entry.parent, kind, None, f"it hardly moved; {ask}", False)
     fit = fit_joint(parent.some(rows), child.some(rows), axes, spacing_s)
     refusal = None
-    if fit.offset_sigma_rad > _WORST_OFFSET_RAD:
+    if 0.5 * fit.steady.offset_change_rad > _WORST_OFFSET_RAD:
+        refusal = (
+            f"{_percent(fit.steady.change_share)} of the way through the motion the heading between both "
+            f"changes by {math.degrees(fit.steady.offset_change_rad):.0f}°: {entry.name} or {entry.parent} "
+            "slipped, or its gyroscope is not to be trusted. Fix both firmly, and record again"
+        )
+    elif fit.offset_sigma_rad > _WORST_OFFSET_RAD:
         refusal = f"heading only known to ± {math.degrees(fit.offset_sigma_rad):.0f}°; {ask}"
     elif fit.rival < _WORST_RIVAL:
         refusal = f"another heading explains the motion as well; {ask}"
@@ -69,6 +75,10 @@ def joint_motion(skeleton: Skeleton, i: int, parent: Moving, child: Moving, spac
         and fit.axis_rival > _WORST_RIVAL
     )
     return JointMotion(entry.name, entry.parent, kind, fit, refusal, known)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def _ask(kind: str, segment: str, parent: str) -> str:

@@ -90,6 +90,21 @@ class JointProblem:
         stance, slope = self._stance(unknowns.axes, jacobian.shape[1])
         return np.concatenate([residual, stance]), np.concatenate([jacobian, slope])
 
+    def by_sample(self, unknowns: Unknowns) -> tuple[Array, Array, Array]:
+        """Of each sample the gradient Jᵀr (K, P) and the normal matrix JᵀJ (K, P, P); (P, P) the prior's."""
+        *pieces, (_, prior) = self._pieces(unknowns)
+        count = len(self._1.r)
+        residual = np.concatenate([p[0].reshape(count, -1) for p in pieces], axis=1)
+        jacobian = np.concatenate([p[1].reshape(count, -1, p[1].shape[-1]) for p in pieces], axis=1)
+        shape = jacobian.shape
+        tame, slope = _huber(residual.reshape(-1), jacobian.reshape(-1, shape[-1]))
+        tame, slope = tame.reshape(residual.shape), slope.reshape(shape)
+        return (
+            np.einsum("kmp,km->kp", slope, tame),
+            np.einsum("kmp,kmq->kpq", slope, slope),
+            prior.T @ prior,
+        )
+
     def misfit(self, unknowns: Unknowns) -> dict[str, float]:
         """RMS of each kind of residual in its own unit."""
         kinds = ["acceleration"] if unknowns.axes is None else ["acceleration", "aligned", "rate"]

@@ -25,6 +25,7 @@ from master.calibrate.evidence import Evidence, first_contradiction
 from master.calibrate.facing import Axis, Island, axes_by_node, facing_of, islands_of, joint_angles
 from master.calibrate.hinge import PoorMotionError
 from master.calibrate.joint_motion import JointMotion, joint_motion
+from master.calibrate.neighbours import check_order, fit_pairs
 from master.calibrate.oriented import Oriented, mean_rotation, moving, orient
 from master.calibrate.recording import NodeRecording
 from master.calibrate.standing import find_stance, given_stance
@@ -89,6 +90,12 @@ def find_mounting(
     units, spacing_s = moving(suit, stance)
     pairs = [(i, skeleton.segments[i].parent) for i, n in enumerate(skeleton.segment_names) if n in names]
     pairs = [(i, parent) for i, parent in pairs if parent in names]
+    links = [(names.index(parent), names.index(skeleton.segment_names[i])) for i, parent in pairs]
+    order = check_order(fit_pairs(names, units), links)
+    if order.contradicts:
+        evidence = {name: [*found, order] for name, found in evidence.items()}
+        limits = (stance.start / suit.rate_hz, stance.stop / suit.rate_hz)
+        return Mounting({}, contradicted | dict.fromkeys(names, order.advice), [], limits, evidence)
     joints = []
     for done, (i, parent) in enumerate(pairs):
         progress(done, len(pairs))

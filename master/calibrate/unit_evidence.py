@@ -11,7 +11,7 @@ import numpy as np
 from common.quaternion import Array
 from master.calibrate.clipped import clipped, range_ends
 from master.calibrate.evidence import Evidence, at_most, not_judged
-from master.calibrate.gyro_gravity import gyro_gravity, judge_agreement
+from master.calibrate.gyro_gravity import gyro_gravity, judge_agreement, slipped
 from master.calibrate.oriented import LONGEST_GAP_S, bridged, longest_gap
 from master.calibrate.recording import NodeRecording
 
@@ -54,7 +54,8 @@ def unit_evidence(recording: NodeRecording) -> list[Evidence]:
     out = [there, _alive(gyr), _gravity(norm)]
     if any(e.contradicts for e in out):
         return out
-    return [*out, *clipping(recording), *judge_agreement(gyro_gravity(acc, gyr, recording.rate_hz))]
+    turns = judge_agreement(gyro_gravity(acc, gyr, recording.rate_hz))
+    return [*out, *clipping(recording), *turns[:-1], slipped(acc, gyr, recording.rate_hz), turns[-1]]
 
 
 def clipping(recording: NodeRecording) -> list[Evidence]:

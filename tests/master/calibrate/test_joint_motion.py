@@ -11,15 +11,17 @@ from master.calibrate import joint_motion as module
 from master.calibrate.joint_fit import JointFit
 from master.calibrate.joint_motion import JointMotion, joint_motion
 from master.calibrate.joint_residuals import Moving
+from master.calibrate.steadiness import Steadiness
 
 ARMS = load_skeleton("nursing")
 Y = np.array([0.0, 1.0, 0.0])
+STEADY = Steadiness(0.0, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0)
 
 
 def judge(monkeypatch: pytest.MonkeyPatch, segment: str, moving: bool = True, **fit: Any) -> JointMotion:
     """What is made of a fit with those properties, and otherwise beyond doubt."""
     good = {"axis_sigma_rad": (0.01, 0.01), "offset_sigma_rad": 0.01, "rival": 9.0, "axis_rival": 9.0}
-    found = JointFit((Y, Y), 0.0, np.zeros((2, 3)), misfit={}, **(good | fit))
+    found = JointFit((Y, Y), 0.0, np.zeros((2, 3)), misfit={}, steady=STEADY, **(good | fit))
     monkeypatch.setattr(module, "fit_joint", lambda *_: found)
     count, turning = 100, 2.0 if moving else 0.0
     unit = Moving(
@@ -56,9 +58,9 @@ def test_another_heading_that_explains_the_motion_as_well_refuses_it(
 @pytest.mark.parametrize(
     ("fit", "known"),
     [
-        ({"axis_sigma_rad": (0.01, math.radians(5.9))}, True),
-        ({"axis_sigma_rad": (0.01, math.radians(6.1))}, False),
-        ({"axis_sigma_rad": (math.radians(6.1), 0.01)}, False),
+        ({"axis_sigma_rad": (0.01, math.radians(9.9))}, True),
+        ({"axis_sigma_rad": (0.01, math.radians(10.1))}, False),
+        ({"axis_sigma_rad": (math.radians(10.1), 0.01)}, False),
         ({"axis_rival": 1.16}, True),
         ({"axis_rival": 1.14}, False),
     ],

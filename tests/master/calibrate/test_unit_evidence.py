@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.quaternion import Array
+from common.quaternion import Array, from_axis_angle, normalise, rotate
 from master.calibrate.clipped import clipped
 from master.calibrate.evidence import first_contradiction
 from master.calibrate.gyro_gravity import describe
@@ -107,3 +107,18 @@ def test_the_words_name_the_axes() -> None:
     assert describe(np.diag([1.0, -1.0, 1.0])) == "its axis y seems negated"
     assert describe(np.eye(3)[[1, 0, 2]]) == "its axes x and y seem exchanged with each other"
     assert "left-handed" in describe(-np.eye(3))
+
+
+@pytest.mark.parametrize(("deg", "told"), [(0.0, False), (5.0, False), (30.0, True)])
+def test_a_unit_that_slips_between_two_samples_is_told(
+    units: dict[str, NodeRecording], deg: float, told: bool
+) -> None:
+    """About a level axis; a slip about the vertical is for its neighbours to tell."""
+    unit = units["left_upper_arm"]
+    up = unit.acc_m_s2[1200] / np.linalg.norm(unit.acc_m_s2[1200])
+    turn = from_axis_angle(normalise(np.cross(up, [0.3, 0.5, 0.8])), np.radians(deg))
+    acc, gyr = unit.acc_m_s2.copy(), unit.gyr_rad_s.copy()
+    acc[1200:], gyr[1200:] = rotate(turn, acc[1200:]), rotate(turn, gyr[1200:])
+    text = said_as_is(replace(unit, acc_m_s2=acc, gyr_rad_s=gyr))
+    assert (text is not None) == told
+    assert text is None or "at about 12 s gravity jumps" in text
