@@ -12,6 +12,7 @@ from common.launch import WriteFigures
 from common.link.audit import Audit
 from common.link.configuration import zenoh_configuration
 from common.link.session import Session, open_session
+from common.metrics import to_tree
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
 from common.runtime import until_stopped

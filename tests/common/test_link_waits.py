@@ -48,9 +48,7 @@ ABSENT = "Can not create a new TCP listener bound to tcp/x: [x: Cannot assign re
 NO_DNS = "failed to lookup address information: Temporary failure in name resolution"
 
 
-@pytest.mark.parametrize(
-    "words", [ABSENT, NO_DNS, NO_DNS.replace("Temporary failure", "Name or service not known")]
-)
+@pytest.mark.parametrize("words", [ABSENT, NO_DNS, "lookup: Name or service not known"])
 def test_an_address_that_the_host_does_not_have_yet_is_waited_for(
     monkeypatch: pytest.MonkeyPatch, words: str
 ) -> None:
@@ -89,7 +87,7 @@ def test_a_person_does_not_wait_for_ever(monkeypatch: pytest.MonkeyPatch) -> Non
         raise zenoh.ZError(ABSENT)
 
     monkeypatch.setattr(opening, "_open_off_the_loop", attempt)
-    with pytest.raises(LinkError, match="cannot listen at .* yet .* within 0 s"):
+    with pytest.raises(LinkError, match=r"cannot listen at .* yet .* within 0 s"):
         asyncio.run(opening.open_zenoh(LinkConfig(listen=[ROUTER]), within_s=0.0))
 
 
