@@ -84,7 +84,7 @@ class DoubtLog:
         """What to log now."""
         if not doubts and not self._said:
             return []
-        out = []
+        new: dict[NodeDoubt, list[str]] = {}
         for node, doubt in doubts.items():
             said, said_ns = self._said.get(node, (None, 0))
             if said == doubt:
@@ -92,11 +92,14 @@ class DoubtLog:
             stale = now_ns - said_ns > to_ns(_AGAIN_S)
             if said is None or said.weight != doubt.weight or stale:
                 self._said[node] = doubt, now_ns
-                out.append(f"node {node}: {doubt.words}{_CONSEQUENCE[doubt.weight]}")
-        for node in [name for name in self._said if name not in doubts]:
+                new.setdefault(doubt, []).append(node)
+        out = [
+            f"node {_names(nodes)}: {doubt.words}{_CONSEQUENCE[doubt.weight]}" for doubt, nodes in new.items()
+        ]
+        gone = [name for name in self._said if name not in doubts]
+        for node in gone:
             del self._said[node]
-            out.append(f"node {node}: believed again")
-        return out
+        return [*out, f"node {_names(gone)}: believed again"] if gone else out
 
 
 _CONSEQUENCE = {

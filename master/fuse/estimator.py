@@ -26,7 +26,7 @@ from master.fuse.joints.online import OnlineConfig, OnlineHeadings
 from master.fuse.liveness import Liveness
 from master.fuse.lowpass import LowPass
 from master.fuse.mahony import MahonyConfig
-from master.fuse.stance import Stance
+from master.fuse.stance import Stance, StanceLimits
 from master.fuse.vqf import VqfConfig
 
 _GRAVITY_M_S2 = 9.81
@@ -54,6 +54,11 @@ class EstimationConfig(Section):
     file does not give it; 0: headings by the magnetometers, mounting as calibrated."""
     stance_heading_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
     """Where the operator faces meanwhile, from east towards north."""
+    stance_turn_deg_s: float = Field(default=15.0, gt=0.0, le=360.0)
+    """A node that turns faster meanwhile, degrees/s, does not stand still: the pose is asked for again."""
+    stance_lean_deg: float = Field(default=15.0, gt=0.0, le=90.0)
+    """A segment that leans farther from upright, degrees, is not in the zero pose: it is asked for again.
+    Noticed only where the node's file gives its mounting."""
     vqf: VqfConfig = VqfConfig()
     mahony: MahonyConfig = MahonyConfig()
     ekf: EkfConfig = EkfConfig()
@@ -188,6 +193,7 @@ class Estimator:
             math.ceil(config.stance_s * rate_hz),
             math.radians(config.stance_heading_deg),
             calibration.mounted,
+            limits=StanceLimits(math.radians(config.stance_turn_deg_s), math.radians(config.stance_lean_deg)),
         )
         self._mounted = calibration.mounted
         self._parts: tuple[_Stateful, ...] = (
@@ -241,7 +247,8 @@ class Estimator:
 
     def _stand(self, mag_ut: Array) -> None:
         """One tick of the stance."""
-        done = self._stance.add(self._oriented(self._rate_of_sensors()), self._liveness.settled)
+        rate = self._rate_of_sensors()
+        done = self._stance.add(self._oriented(rate), self._liveness.settled, rate)
         # apart: the heading of a mounting found now is the magnetometer's own
         for nodes in (done & self._mounted, done & ~self._mounted):
             if nodes.any():
@@ -249,7 +256,7 @@ class Estimator:
 
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes that are not believed, or not wholly, by their number."""
-        return self._bank.doubts()
+        return {**self._bank.doubts(), **self._stance.doubts(self._liveness.settled)}
 
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""

@@ -28,8 +28,8 @@ PERIOD_NS = 5 * NS_PER_MS
 class Bench:
     """A master's pipeline and a suit, wired together without time between them."""
 
-    def __init__(self, *suit: str, examples: Path = EXAMPLES) -> None:
-        config = load_config(examples / "master.toml", MasterConfig)
+    def __init__(self, *suit: str, examples: Path = EXAMPLES, master: tuple[str, ...] = ()) -> None:
+        config = load_config(examples / "master.toml", MasterConfig, master)
         protocol = SuitProtocol.load(config.capture.dbc)
         self.pipeline = MasterPipeline(config, protocol)
         calm = ('motion="calibration_pose"', *suit)
@@ -170,3 +170,17 @@ def test_a_doubted_node_s_joints_are_invalid_and_what_refuses_engage_is_in_the_c
     solved = settled.run(16)[-1]
     assert solved.valid.all()
     assert solved.doubt == ""
+
+
+def test_nobody_engages_before_a_zero_pose_was_good() -> None:
+    config = ("estimation.stance_s=0.5",)
+    still = Bench(master=config)
+    solved = still.run(400)
+    assert "waits for the zero pose" in solved[15].doubt
+    assert not solved[15].valid.any()
+    assert solved[-1].doubt == ""
+    assert solved[-1].valid.all()
+    # it stands for 3.5 s before it reaches for the bottle
+    last = Bench('motion="bottle"', master=("estimation.stance_s=3.0",)).run(1000)[-1]
+    assert "zero pose refused: turned" in last.doubt
+    assert not last.valid.any()

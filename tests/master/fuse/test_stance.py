@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from common.quaternion import angle_between, conjugate, from_rotation_vector, heading_turn, multiply
+from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, heading_turn, multiply
+from master.doubt import Weight
 from master.fuse.heading import HeadingMemory
 from master.fuse.stance import Stance
 
@@ -42,17 +43,18 @@ def test_the_operator_s_facing_is_kept() -> None:
 
 def test_only_settled_nodes_count_and_one_that_drops_out_begins_again() -> None:
     stance = Stance(SAME, 4, 0.0)
-    first, wrong = np.array([True, True, False]), heading_turn(np.ones(3))
+    first, alone = np.array([True, True, False]), np.array([True, False, False])
+    wrong = np.concatenate([MOUNTED[:1], heading_turn(np.ones(2))])
     for _ in range(3):
         stance.add(wrong, first)
-    stance.add(MOUNTED, np.array([True, False, False]))
+    stance.add(wrong, alone)
     assert stance.known.tolist() == [True, False, False]
     for _ in range(4):
         assert not stance.known[1:].any()
         stance.add(MOUNTED, ALL)
     assert stance.known.all()
     zero = multiply(MOUNTED, stance.q_sensor_from_segment)
-    assert np.max(angle_between(zero, SAME)[1:]) < 1e-7
+    assert np.max(angle_between(zero, SAME)) < 1e-7
 
 
 def test_once_known_it_stays_even_while_the_node_is_lost() -> None:
@@ -118,3 +120,83 @@ def test_of_mounted_nodes_it_takes_the_heading_and_says_how_far_they_lean() -> N
     assert np.isnan(stance.lean_rad[2])
     zero = multiply(standing[2:], stance.q_sensor_from_segment[2:])
     assert np.max(angle_between(zero, heading_turn(0.7))) < 1e-7
+
+
+STILL = np.zeros((3, 3))
+
+
+def leaning(deg: float, node: int = 1) -> Array:
+    """All in the zero pose but one, whose segment leans."""
+    turn = np.zeros((3, 3))
+    turn[node, 1] = np.radians(deg)
+    return multiply(from_rotation_vector(turn), conjugate(MOUNTED))
+
+
+@pytest.mark.parametrize(("deg", "taken"), [(14.9, True), (15.1, False), (25.0, False), (90.0, False)])
+def test_a_lean_of_a_mounted_segment_is_refused_for_all(deg: float, taken: bool) -> None:
+    stance = Stance(MOUNTED, 4, 0.0, ALL)
+    for _ in range(4):
+        stance.add(leaning(deg), ALL, STILL)
+    assert stance.known.all() == taken
+    assert stance.known.any() == taken
+    doubts = stance.doubts(ALL)
+    if taken:
+        assert doubts == {}
+        return
+    assert stance.refused == 1
+    assert list(doubts) == [1, 0, 2]
+    assert doubts[1].words == f"zero pose refused: leaned by {deg:.0f}°, at most 15 is upright"
+    assert doubts[0].words == "waits for the zero pose: stand upright, arms hanging, and still"
+    assert {doubt.weight for doubt in doubts.values()} == {Weight.REFUSED}
+    for _ in range(4):
+        stance.add(leaning(2.0), ALL, STILL)
+    assert stance.known.all()
+    assert stance.doubts(ALL) == {}
+
+
+@pytest.mark.parametrize(("deg_s", "taken"), [(14.9, True), (15.1, False), (60.0, False)])
+def test_who_turns_during_the_pose_is_asked_again(deg_s: float, taken: bool) -> None:
+    stance, turning = Stance(SAME, 4, 0.0), STILL.copy()
+    turning[2, 0] = np.radians(deg_s)
+    for tick in range(4):
+        stance.add(MOUNTED, ALL, turning if tick == 2 else STILL)
+    assert stance.known.all() == taken
+    if not taken:
+        assert stance.reasons == {2: f"turned at {deg_s:.0f}°/s, at most 15 is standing still"}
+        # from the beginning, not from where it was
+        for _ in range(2):
+            assert not stance.add(MOUNTED, ALL, STILL).any()
+            assert not stance.known.any()
+        stance.add(MOUNTED, ALL, STILL)
+    assert stance.known.all()
+
+
+def test_who_bends_slowly_is_asked_again_too() -> None:
+    stance = Stance(SAME, 400, 0.0)
+    for tick in range(400):
+        bend = np.zeros((3, 3))
+        bend[0, 1] = np.radians(8.0) * tick / 400
+        stance.add(multiply(MOUNTED, from_rotation_vector(bend)), ALL, STILL)
+    assert not stance.known.any()
+    assert "turned by 6°" in stance.reasons[0]
+
+
+def test_of_an_unknown_mounting_a_lean_cannot_be_noticed() -> None:
+    stance = Stance(SAME, 4, 0.0)
+    for _ in range(4):
+        stance.add(leaning(25.0), ALL, STILL)
+    assert stance.known.all()
+
+
+def test_a_node_that_comes_later_needs_the_whole_pose_again() -> None:
+    stance, first = Stance(MOUNTED, 4, 0.0, ALL), np.array([True, True, False])
+    for _ in range(4):
+        stance.add(leaning(0.0), first, STILL)
+    assert stance.known.tolist() == [True, True, False]
+    for _ in range(8):
+        stance.add(leaning(40.0), ALL, STILL)
+    assert not stance.known[2]
+    assert "is 40° from the zero pose" in stance.doubts(ALL)[1].words
+    for _ in range(4):
+        stance.add(leaning(0.0), ALL, STILL)
+    assert stance.known.all()
