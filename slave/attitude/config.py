@@ -26,6 +26,8 @@ class BaseConfig(Section):
     """Of the field at this place, positive where the needle points east of true north."""
     level_tool_face_deg: float = Field(0.0, ge=0.0, lt=360.0)
     """The tool-face that the instrument shows when the base stands level."""
+    most_deg_s: float = Field(500.0, gt=0.0, le=5000.0)
+    """Of `serial`: the base cannot lean over faster. A base of 1 m that tips over lands at 310°/s."""
     calibration: RelativePath | None = None
     """Of `simulated`: the file of the two sensors' maps, as a suit's node has one."""
     time_constant_s: float = Field(3.0, ge=0.0, le=30.0)

@@ -2,7 +2,8 @@
 
 `FF 01 00 23 44 05 61` is inclination 10.0°, azimuth 234.4°, tool-face 56.1°. The azimuth is the magnetic one.
 An angle that has no meaning travels as EE EE, which is no BCD: an addition of ours. The frame has no check
-sum, but a header that no digit can be: whatever is lost or added, the next FF begins anew.
+sum, but a header that no digit can be: whatever is lost or added, the next FF begins anew. What turns one
+digit into another is for `vote.py` to see. 360.0, as some instruments round 359.96, is 0.0.
 """
 
 from __future__ import annotations
@@ -66,13 +67,17 @@ def decode(frame: bytes) -> FrameAngles | None:
         return None
     inclination = _number(frame[1:3], _HALF_TURN)
     azimuth, tool_face = (
-        None if part == _NO_ANGLE else _number(part, _TURN - 1) for part in (frame[3:5], frame[5:7])
+        None if part == _NO_ANGLE else _number(part, _TURN) for part in (frame[3:5], frame[5:7])
     )
     if inclination is None or (azimuth is None and frame[3:5] != _NO_ANGLE):
         return None
     if tool_face is None and frame[5:7] != _NO_ANGLE:
         return None
-    return FrameAngles(inclination, azimuth, tool_face)
+    return FrameAngles(
+        inclination,
+        None if azimuth is None else azimuth % _TURN,
+        None if tool_face is None else tool_face % _TURN,
+    )
 
 
 @dataclass(slots=True)

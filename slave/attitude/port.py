@@ -21,6 +21,7 @@ from slave.attitude.attitude import turned
 from slave.attitude.base import base_attitude, less
 from slave.attitude.config import BaseConfig
 from slave.attitude.frame import FrameAngles, FrameParser, encode, radians
+from slave.attitude.vote import Vote
 
 log = logging.getLogger("tandem.slave")
 
@@ -119,6 +120,7 @@ class SerialBase:
         self._config = config
         self._attitude: BaseAttitude | None = None
         self._unclear = 0
+        self._vote = Vote(math.radians(config.most_deg_s))
         self._reader = FrameReader(config.port, config.baud, self._on_frame, clock)
 
     def start(self) -> None:
@@ -126,19 +128,22 @@ class SerialBase:
         self._reader.start()
 
     def read(self) -> BaseAttitude | None:
-        """Of the newest frame."""
+        """Of the newest frames that agree: see `vote.py`."""
         return self._attitude
 
     def counters(self) -> dict[str, int]:
-        """The reader's, and frames that did not tell the tilt."""
-        return {**self._reader.counters(), "unclear": self._unclear}
+        """The reader's, frames that did not tell the tilt, and frames that contradict their neighbours."""
+        return {**self._reader.counters(), "unclear": self._unclear, "outvoted": self._vote.outvoted}
 
     def stop(self) -> None:
         """Close the port."""
         self._reader.stop()
 
     def _on_frame(self, angles: FrameAngles, now_ns: int) -> None:
-        attitude = of_frame(angles, now_ns, self._config)
+        told = self._vote.hear(angles, now_ns)
+        if told is None:
+            return
+        attitude = of_frame(told.angles, told.came_ns, self._config)
         if attitude is None:
             self._unclear += 1
         else:

@@ -65,8 +65,8 @@ def test_a_turn_that_rounds_up_is_none() -> None:
     "frame",
     [
         "FF 18 01 00 00 00 00",  # an inclination of 180.1°
-        "FF 01 00 36 00 00 00",  # an azimuth of 360.0°
-        "FF 01 00 00 00 36 00",
+        "FF 01 00 36 01 00 00",  # an azimuth of 360.1°
+        "FF 01 00 00 00 36 01",
         "FF 0A 00 00 00 00 00",  # no digit
         "FF 00 0F 00 00 00 00",
         "FF EE EE 00 00 00 00",  # an inclination is always known

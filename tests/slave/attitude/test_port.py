@@ -125,7 +125,7 @@ def test_the_base_keeps_its_last_attitude_with_its_age(line: Any) -> None:
     assert base.read() is None
     base.start()
     try:
-        line.send(encode(FrameAngles(850, 10, 3540)))
+        line.send(3 * encode(FrameAngles(850, 10, 3540)))
         wanted = BaseAttitude(5, math.radians(85.0), math.radians(358.5), math.radians(354.0), 0.0)
         assert until(lambda: base.read() is not None)
         found = base.read()
