@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.quaternion import Array
-from common.reach.nearest import Ranges, Triple, angle_range
+from common.reach.nearest import Box, Triple, angle_range, box
 from common.skeleton import Skeleton
 
 SUM, DIFFERENCE, MIDDLE = range(3)
@@ -54,14 +54,12 @@ class Group:
     """The angle for 1 rad of its joint; 1 where there is none."""
     turning: list[int]
     """Those joints that there are."""
-    ranges: Ranges
+    box: Box
     """Of the angles: fixed where no joint turns it, without ends where any value will do (the heading)."""
     middle: Triple
     """Amid the ranges, rad."""
     ball: bool
     """Whether it has all three angles, so that it has a pole."""
-    crosses: bool
-    """Whether the pole lies within its ranges, so that a rotation may be made in two ways."""
 
     def angles(self, position_rad: list[float]) -> Triple:
         """Its angles at joint positions (J,)."""
@@ -168,15 +166,13 @@ def _group(
             ends[k] = (low, high)
         elif k == 0 and heading:
             ends[k] = (-math.inf, math.inf)
-    ball = all(low != high for low, high in ends)
     middle = [0.5 * (low + high) if math.isfinite(low) else 0.0 for low, high in ends]
     return Group(
         index,
         (joints[0], joints[1], joints[2]),
         (scale[0], scale[1], scale[2]),
         [j for j in joints if j is not None],
-        (angle_range(*ends[0]), angle_range(*ends[1]), angle_range(*ends[2])),
+        box(angle_range(*ends[0]), angle_range(*ends[1]), angle_range(*ends[2])),
         (middle[0], middle[1], middle[2]),
-        ball,
-        ball and max(-ends[1][0], ends[1][1]) > 0.5 * math.pi,
+        all(low != high for low, high in ends),
     )

@@ -77,6 +77,10 @@ class Nearest(NamedTuple):
         return left_rad(self.cosine)
 
 
+NOTHING = Nearest((0.0, 0.0, 0.0), -1.0)
+"""Anything is nearer."""
+
+
 def left_rad(cosine: float) -> float:
     """The angle between two rotations, rad, from the cosine of its half."""
     return 2.0 * math.acos(min(abs(cosine), 1.0))
@@ -105,19 +109,46 @@ def decompositions(t: Tensor) -> tuple[Triple, Triple]:
     return (a, b, c), (a + math.pi, math.pi - b, c + math.pi)
 
 
-def nearest_angles(t: Tensor, ranges: Ranges, towards: Triple) -> Nearest:
+class Box(NamedTuple):
+    """What three angles may be together. Make one with `box`."""
+
+    ranges: Ranges
+    free: tuple[int, ...]
+    """Those that are not fixed."""
+    fixed: int
+    """The first that is; -1 where none is."""
+    twofold: bool
+    """Whether more than one triple within the ranges may make the same rotation."""
+
+
+def box(one: Range, two: Range, three: Range) -> Box:
+    """The ranges of three angles."""
+    ranges = (one, two, three)
+    free = tuple(k for k in range(3) if not ranges[k].fixed)
+    fixed = next((k for k in range(3) if k not in free), -1)
+    past_the_pole = len(free) == 3 and max(-two.lower.rad, two.upper.rad) > 0.5 * math.pi
+    # without ends it is a heading, which nobody unwraps
+    whole_turn = any(TURN <= r.upper.rad - r.lower.rad < math.inf for r in ranges)
+    return Box(ranges, free, fixed, past_the_pole or whole_turn)
+
+
+def nearest_angles(
+    t: Tensor, within: Box, towards: Triple, inside: bool = True, known: Nearest = NOTHING
+) -> Nearest:
     """The angles within their ranges whose rotation is the nearest to the wanted one.
 
     `towards` lies within the ranges, and decides between equals: of angles that differ by whole turns, and of
-    two exact decompositions, those that are nearer to it are taken.
+    two exact decompositions, those that are nearer to it are taken. `inside` may be False where it is known
+    that no three angles within the ranges make the wanted rotation exactly: that saves looking for them. So
+    does a `known` triple within the ranges, where it is near already.
     """
-    free = [k for k in range(3) if not ranges[k].fixed]
-    if len(free) == 3:
-        return _exact(t, ranges, towards) or _at_a_limit(t, ranges, towards)
+    ranges, free, k, _ = within
+    if k < 0:
+        exact = _exact(t, ranges, towards) if inside else None
+        return exact or _at_a_limit(t, ranges, towards, known)
     if not free:
         angles = (ranges[0].lower.rad, ranges[1].lower.rad, ranges[2].lower.rad)
         return Nearest(angles, abs(scalar_product(t, angles)))
-    k = next(k for k in range(3) if ranges[k].fixed)
     first, second = _OTHERS[k]
     rest = _without(t, k, ranges[k].lower)
     if len(free) == 2:
@@ -153,15 +184,15 @@ def _exact(t: Tensor, ranges: Ranges, towards: Triple) -> Nearest | None:
     return found
 
 
-def _at_a_limit(t: Tensor, ranges: Ranges, towards: Triple) -> Nearest:
-    """Three angles, at least one of them at a limit."""
+def _at_a_limit(t: Tensor, ranges: Ranges, towards: Triple, known: Nearest) -> Nearest:
+    """Three angles, at least one of them at a limit; those that are known unless there are nearer ones."""
     faces = []
     for k in range(3):
         for end in ranges[k].ends:
             rest = _without(t, k, end)
             faces.append((-_most(rest), k, end, rest))
     faces.sort()
-    best, most = towards, -1.0
+    best, most = known
     for bound, k, end, rest in faces:
         if -bound <= most:
             break

@@ -30,11 +30,11 @@ from common.messages import Mask
 from common.quaternion import Array
 from common.reach.chart import Group, make_chart
 from common.reach.nearest import (
+    NOTHING,
     Nearest,
     Range,
     Tensor,
     Triple,
-    decompositions,
     left_rad,
     nearest_angles,
     scalar_product,
@@ -115,8 +115,11 @@ class Reach:
             elapsed_s = NOMINAL_S
         free, velocity = self._free(q, q_rate)
         position = np.minimum(np.maximum(free, self._lower), self._upper)
-        most = farthest_turn(_turned(self._last_q, q), elapsed_s)
-        most_of_joint = most.take(self._chart.segment_of_joint).max(axis=1)
+        # of each segment: how far it may turn, and how fast its joints may be told to; |q'| is half its speed
+        bounds = np.empty((2, len(q)))
+        bounds[0] = most = farthest_turn(_turned(self._last_q, q), elapsed_s)
+        bounds[1] = (2.0 * MOST_GAIN) * np.sqrt(np.einsum("ij,ij->i", q_rate, q_rate))
+        most_of_joint, fastest = bounds.take(self._chart.segment_of_joint, axis=1).max(axis=-1)
         beyond = np.abs(position - free) > _ROUNDING_RAD
         step = np.abs(position - self._last)
         late = step > most_of_joint
@@ -129,10 +132,7 @@ class Reach:
             self.short_rad[self._chart.segment_of_joint[:, 0]] = np.abs(free - position)
             step_of = _Step(elapsed_s, most, most_of_joint, self._last, free, position, velocity)
             position, velocity = self._together(q, step_of, beyond, late, far)
-        # |q'| is half the speed of the rotation
-        fastest = (2.0 * MOST_GAIN) * np.sqrt(np.einsum("ij,ij->i", q_rate, q_rate))
-        fastest_joint = fastest.take(self._chart.segment_of_joint).max(axis=1)
-        velocity = np.minimum(np.maximum(velocity, -fastest_joint), fastest_joint)
+        velocity = np.minimum(np.maximum(velocity, -fastest), fastest)
         self._last, self._last_q = position, q.copy()
         return position.copy(), velocity
 
@@ -177,10 +177,13 @@ class Reach:
         project = set(self._group_of_joint[beyond].tolist()) - {-1}
         behind = set(self._group_of_joint[late].tolist()) - {-1}
         # where the pole is within its limits a group may be on the wrong one of two decompositions
-        project.update(g for g in behind if self._chart.groups[g].crosses)
+        project.update(g for g in behind if self._chart.groups[g].box.twofold)
         for g in project:
             self._project(g, q[self._chart.groups[g].segment].tolist(), at)
-        at.limit()
+        moved = np.flatnonzero(late).tolist()
+        for g in project:
+            moved += self._chart.groups[g].turning
+        at.limit(moved)
         for g in project.union(behind, np.flatnonzero(far).tolist()):
             at.limit_turn(self._chart.groups[g])
         return np.array(at.position), np.array(at.velocity)
@@ -196,9 +199,14 @@ class Reach:
         wanted = tensor(w, a * vector[i], b * vector[j], c * vector[k])
         last = group.angles(at.last)
         known = math.isfinite(last[0] + last[1] + last[2])
-        nearest = nearest_angles(wanted, group.ranges, last if known else group.middle)
+        towards = last if known else group.middle
+        kept = NOTHING
         if known and group.ball:
-            nearest = _kept(wanted, group, nearest, last)
+            angles = _kept(group.angles(at.free), group, last)
+            kept = Nearest(angles, abs(scalar_product(wanted, angles)))
+        nearest = nearest_angles(wanted, group.box, towards, group.box.twofold, kept)
+        if kept is not NOTHING:
+            nearest = _chosen(wanted, nearest, kept)
         self.short_rad[group.segment] = nearest.left_rad
         for k, joint in enumerate(group.joints):
             if joint is not None:
@@ -231,11 +239,10 @@ class _Step:
         self._most: list[float] = most.tolist()
         self._most_of_joint: list[float] = most_of_joint.tolist()
 
-    def limit(self) -> None:
-        """No joint goes farther at once than it may."""
-        for j, (now, last, most) in enumerate(
-            zip(self.position, self.last, self._most_of_joint, strict=True)
-        ):
+    def limit(self, joints: list[int]) -> None:
+        """None of these joints goes farther at once than it may."""
+        for j in joints:
+            now, last, most = self.position[j], self.last[j], self._most_of_joint[j]
             if abs(now - last) > most:
                 self._put(j, last + math.copysign(most, now - last))
 
@@ -264,28 +271,33 @@ def _scales(groups: Sequence[Group], joints: int) -> Array:
     return out
 
 
-def _kept(wanted: Tensor, group: Group, nearest: Nearest, last: Triple) -> Nearest:
-    """The nearest posture, or for it the kept decomposition where much turning would gain little."""
-    if nearest.left_rad < _SAME_RAD:
-        return nearest
-    near, off = last, math.inf
+def _kept(exact: Triple, group: Group, last: Triple) -> Triple:
+    """Of the two decompositions, of which `exact` is one, the one nearer to the last angles: clamped."""
+    kept, least = last, math.inf
     x, y, z = last
-    one, two, three = group.ranges
-    for a, b, c in decompositions(wanted):
+    one, two, three = group.box.ranges
+    for a, b, c in (exact, (exact[0] + math.pi, math.pi - exact[1], exact[2] + math.pi)):
         # unwrapped: of whole turns the one nearest to the last posture
         a -= _TURN * round((a - x) / _TURN)
         b -= _TURN * round((b - y) / _TURN)
         c -= _TURN * round((c - z) / _TURN)
         way = max(abs(a - x), abs(b - y), abs(c - z))
-        if way < off:
-            near, off = (_clamped(a, one), _clamped(b, two), _clamped(c, three)), way
-    left = left_rad(scalar_product(wanted, near))
-    if left > nearest.left_rad + min(_KEPT_SHARE * nearest.left_rad, _KEPT_RAD):
+        if way < least:
+            kept, least = (_clamped(a, one), _clamped(b, two), _clamped(c, three)), way
+    return kept
+
+
+def _chosen(wanted: Tensor, nearest: Nearest, kept: Nearest) -> Nearest:
+    """The nearest posture, or the kept one where much turning would gain little."""
+    left = nearest.left_rad
+    if left < _SAME_RAD or kept.left_rad > left + min(_KEPT_SHARE * left, _KEPT_RAD):
         return nearest
-    apart = max(abs(a - b) for a, b in zip(near, nearest.angles, strict=True))
-    share = min(max((_FAR_RAD - apart) / (_FAR_RAD - _NEAR_RAD), 0.0), 1.0)
-    blended = [a + share * (b - a) for a, b in zip(near, nearest.angles, strict=True)]
-    angles = (blended[0], blended[1], blended[2])
+    (a, b, c), (x, y, z) = kept.angles, nearest.angles
+    apart = max(abs(a - x), abs(b - y), abs(c - z))
+    if apart >= _FAR_RAD:
+        return kept
+    share = min((_FAR_RAD - apart) / (_FAR_RAD - _NEAR_RAD), 1.0)
+    angles = (a + share * (x - a), b + share * (y - b), c + share * (z - c))
     return Nearest(angles, abs(scalar_product(wanted, angles)))
 
 
@@ -295,9 +307,9 @@ def _clamped(angle: float, allowed: Range) -> float:
 
 def _product(p: Triple, q: Triple) -> float:
     """Scalar product of the quaternions that two triples of angles make."""
-    (a, b, c), (d, e, f) = ([0.5 * angle for angle in triple] for triple in (p, q))
-    # each is the other turned back: ⟨qx(a) qy(b) qz(c), qx(d) qy(e) qz(f)⟩ depends on a - d and c - f alone
-    x, z = a - d, c - f
+    # ⟨qx(a) qy(b) qz(c), qx(d) qy(e) qz(f)⟩ depends on a - d and c - f alone, and not on a and c
+    x, z = 0.5 * (p[0] - q[0]), 0.5 * (p[2] - q[2])
+    b, e = 0.5 * p[1], 0.5 * q[1]
     return math.cos(x) * math.cos(b - e) * math.cos(z) - math.sin(x) * math.sin(b + e) * math.sin(z)
 
 

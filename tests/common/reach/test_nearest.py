@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from common.quaternion import Array, from_axis_angle, multiply
 from common.reach.nearest import (
-    Ranges,
+    Box,
     Triple,
     angle_range,
+    box,
     decompositions,
     nearest_angles,
     scalar_product,
@@ -32,16 +33,15 @@ BOXES_DEG = {
     "third alone": ((0.0, 0.0), (0.0, 0.0), (-30.0, 90.0)),
 }
 angles = st.tuples(*[st.floats(-math.pi, math.pi)] * 3)
-BOXES = pytest.mark.parametrize("box", BOXES_DEG.values(), ids=BOXES_DEG)
+BOXES = pytest.mark.parametrize("ends_deg", BOXES_DEG.values(), ids=BOXES_DEG)
 
 
-def ranges(box: tuple[tuple[float, float], ...]) -> Ranges:
-    one, two, three = (angle_range(*np.radians(ends)) for ends in box)
-    return one, two, three
+def boxed(ends_deg: tuple[tuple[float, float], ...]) -> Box:
+    return box(*(angle_range(*np.radians(ends)) for ends in ends_deg))
 
 
-def amid(box: tuple[tuple[float, float], ...]) -> Triple:
-    a, b, c = (math.radians(0.5 * (low + high)) for low, high in box)
+def amid(ends_deg: tuple[tuple[float, float], ...]) -> Triple:
+    a, b, c = (math.radians(0.5 * (low + high)) for low, high in ends_deg)
     return a, b, c
 
 
@@ -65,9 +65,9 @@ def test_both_decompositions_make_the_rotation(wanted: Triple) -> None:
 
 
 @BOXES
-def test_no_other_angles_within_the_limits_are_nearer(box: tuple[tuple[float, float], ...]) -> None:
+def test_no_other_angles_within_the_limits_are_nearer(ends_deg: tuple[tuple[float, float], ...]) -> None:
     rng = np.random.default_rng(1)
-    low, high = np.radians(box).T
+    low, high = np.radians(ends_deg).T
     grid = np.stack(
         np.meshgrid(*(np.linspace(a, b, 25 if b > a else 1) for a, b in zip(low, high, strict=True))), -1
     ).reshape(-1, 3)
@@ -75,39 +75,39 @@ def test_no_other_angles_within_the_limits_are_nearer(box: tuple[tuple[float, fl
     for _ in range(300):
         q = rng.normal(size=4)
         q /= np.linalg.norm(q)
-        found = nearest_angles(tensor(*q), ranges(box), amid(box))
+        found = nearest_angles(tensor(*q), boxed(ends_deg), amid(ends_deg))
         assert np.all((low <= found.angles) & (found.angles <= high))
         assert abs(rotation(np.array(found.angles)) @ q) == pytest.approx(found.cosine, abs=1e-9)
         assert found.cosine >= np.abs(searched @ q).max() - 1e-12
 
 
 @BOXES
-def test_what_can_be_reached_is_reached(box: tuple[tuple[float, float], ...]) -> None:
+def test_what_can_be_reached_is_reached(ends_deg: tuple[tuple[float, float], ...]) -> None:
     rng = np.random.default_rng(2)
-    low, high = np.radians(box).T
+    low, high = np.radians(ends_deg).T
     for _ in range(200):
         inside = rng.uniform(low, high)
-        found = nearest_angles(tensor(*rotation(inside)), ranges(box), tuple(inside))
+        found = nearest_angles(tensor(*rotation(inside)), boxed(ends_deg), tuple(inside))
         np.testing.assert_allclose(found.angles, inside, atol=1e-6)
 
 
 def test_of_two_decompositions_within_the_limits_the_nearer_one_is_kept() -> None:
-    box = ranges(((-190.0, 190.0), (-20.0, 170.0), (-190.0, 190.0)))
+    within = boxed(((-190.0, 190.0), (-20.0, 170.0), (-190.0, 190.0)))
     here = np.radians([20.0, 100.0, -30.0])
     other = np.radians([-160.0, 80.0, 150.0])
     t = tensor(*rotation(here))
-    np.testing.assert_allclose(nearest_angles(t, box, tuple(here + 0.1)).angles, here, atol=1e-9)
-    np.testing.assert_allclose(nearest_angles(t, box, tuple(other - 0.1)).angles, other, atol=1e-9)
+    np.testing.assert_allclose(nearest_angles(t, within, tuple(here + 0.1)).angles, here, atol=1e-9)
+    np.testing.assert_allclose(nearest_angles(t, within, tuple(other - 0.1)).angles, other, atol=1e-9)
 
 
 def test_an_angle_beyond_half_a_turn_is_unwrapped() -> None:
-    box = ranges(((-45.0, 200.0), (-15.0, 80.0), (-80.0, 80.0)))
+    within = boxed(((-45.0, 200.0), (-15.0, 80.0), (-80.0, 80.0)))
     t = tensor(*rotation(np.radians([185.0, 10.0, 5.0])))
     np.testing.assert_allclose(
-        np.degrees(nearest_angles(t, box, amid(((-45.0, 200.0), (-15.0, 80.0), (-80.0, 80.0)))).angles),
+        np.degrees(nearest_angles(t, within, amid(((-45.0, 200.0), (-15.0, 80.0), (-80.0, 80.0)))).angles),
         [185.0, 10.0, 5.0],
         atol=1e-9,
     )
-    shorter = ranges(BOXES_DEG["shoulder"])
+    shorter = boxed(BOXES_DEG["shoulder"])
     t = tensor(*rotation(np.radians([185.0, 0.0, 0.0])))
     assert np.degrees(nearest_angles(t, shorter, (0.0, 0.0, 0.0)).angles[0]) == pytest.approx(150.0)
