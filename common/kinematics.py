@@ -77,6 +77,11 @@ def orientations(skeleton: Skeleton, position_rad: Array, heading_rad: ArrayLike
     return q[..., :-1, :]
 
 
+def relative_orientations(skeleton: Skeleton, position_rad: Array) -> Array:
+    """Rotation of every segment relative to its neighbour, (..., N, 4), parent from segment, for (..., J)."""
+    return _local(_chain(skeleton), position_rad)[..., :-1, :]
+
+
 def _local(chain: _Chain, position_rad: Array) -> Array:
     """Each segment's rotation from its parent, and the world's identity, (..., N + 1, 4)."""
     half = position_rad @ chain.half_angles

@@ -103,6 +103,12 @@ class Reach:
         """The next posture has nothing to do with those before: it becomes the nearest there is."""
         self._last[:] = np.nan
 
+    def joints_beside(self, joints: Mask) -> Mask:
+        """Those (J,) that turn a segment together with one of `joints` (J,), these included."""
+        concerned = np.unique(self._group_of_joint[joints])
+        out: Mask = np.isin(self._group_of_joint, concerned[concerned >= 0])
+        return out
+
     def follow(self, q: Array, q_rate: Array, elapsed_s: float = NOMINAL_S) -> tuple[Array, Array]:
         """Joint positions (J,) rad, all within limits, and velocities (J,) rad/s.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -11,8 +12,8 @@ import numpy as np
 from common.can.frame import Frame
 from common.codec import decode, encode
 from common.heap import freeze_heap
+from common.kinematics import orientations
 from common.messages import Command, CommandStamps
-from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.bench.measure import spread_us, time_calls
 from master.fuse.estimator import EstimationConfig, Estimator
@@ -44,7 +45,8 @@ def pipeline(seconds: float) -> dict[str, Any]:
         "nodes_8": ticks(0.1 * seconds, 8),
         "nodes_36_mahony": ticks(0.15 * seconds, 36, filter_name="mahony"),
         "nodes_36_ekf": ticks(0.15 * seconds, 36, filter_name="ekf"),
-        "solve_us": solve(0.15 * seconds),
+        "solve_us": solve(0.1 * seconds),
+        "solve_beyond_us": solve(0.05 * seconds, beyond=True),
         "codec_us": codec(0.15 * seconds),
     }
 
@@ -82,15 +84,21 @@ def answers(protocol: SuitProtocol, count: int, tick: int, fd: bool) -> list[Fra
     return frames
 
 
-def solve(seconds: float) -> dict[str, Any]:
-    """µs for one solve of all joints with their velocities."""
+def solve(seconds: float, beyond: bool = False) -> dict[str, Any]:
+    """µs for one solve of all joints with their velocities.
+
+    The operator goes to and fro about the middle of the robot's range; or `beyond`, where trunk, head, both
+    shoulders and both forearms cannot be followed, and must be projected each time.
+    """
     skeleton = load_skeleton("nursing")
     solver = JointSolver(skeleton)
-    rng = np.random.default_rng(0)
-    q: Array = rng.normal(size=(len(skeleton.segments), 4))
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    rate = rng.normal(size=(len(skeleton.segments), 3))
-    return time_calls(lambda: solver.solve(q, rate), seconds)
+    sway = 0.02 * np.sin(np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False))[:, None]
+    position = 0.5 * (skeleton.lower_rad + skeleton.upper_rad) + sway
+    if beyond:
+        position = skeleton.upper_rad + 0.35 + sway
+    postures = itertools.cycle(orientations(skeleton, position))
+    rate = np.random.default_rng(0).normal(size=(len(skeleton.segments), 3))
+    return time_calls(lambda: solver.solve(next(postures), rate), seconds)
 
 
 def codec(seconds: float) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from slave.guard.engage import Readiness, refusal
 from slave.guard.events import Change, Doubt, GuardCounters, Journal
 from slave.guard.lease import DrawToken, Lease, random_token
 from slave.guard.limit import SetpointLimiter
+from slave.guard.nearest import NearestPosture
 from slave.guard.plausible import Plausibility
 from slave.guard.states import MOVING, Event, State, next_state
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES, EncoderLife, Signs, Watch, first_loss
@@ -81,6 +82,7 @@ class Guard:
         self._encoders = EncoderLife(names, to_ns(config.encoder_timeout_s))
         self._plausible = Plausibility(names, skeleton.max_velocity_rad_s, config)
         self._body = WELL
+        self._nearest = NearestPosture(skeleton, limits)
         self._limiter = SetpointLimiter(names, limits)
         self._alignment = Alignment(names, config)
         self._rejoin = Rejoin(limits, config)
@@ -142,9 +144,7 @@ class Guard:
             self._somebody_ns = received_ns
         self._refusal = ""
         self._valid, self._operator_doubt = command.valid.copy(), command.doubt
-        self._tracker.accept(
-            situation.sampled_ns(command), now_ns, command.position_rad, command.velocity_rad_s
-        )
+        self._accept(command, situation.sampled_ns(command), now_ns)
         return verdict
 
     def step(
@@ -241,6 +241,18 @@ class Guard:
 
     # the rest is the guard's own
 
+    def _accept(self, command: Command, sampled_ns: int, now_ns: int) -> None:
+        """What the operator does, as far as this robot's own limits let it, becomes the tracker's."""
+        asked = command.position_rad
+        # by the master's own stamps: what is thought of its clock may step
+        position, velocity = self._nearest.of(
+            command.stamps.sampled_ns, asked, command.velocity_rad_s, command.valid
+        )
+        for clamp in self._nearest.clamps(now_ns, asked, position):
+            self.counters.clamps[clamp.rule] += 1
+            self.events.add(clamp)
+        self._tracker.accept(sampled_ns, now_ns, position, velocity)
+
     def _signs(self, now_ns: int) -> Signs:
         somebody_ns = now_ns if self._valid.any() else self._somebody_ns
         return Signs(
@@ -278,6 +290,7 @@ class Guard:
         else:
             # what the operator did before must not move the robot after
             self._tracker.reset()
+            self._nearest.forget()
         if after in (State.HOLD, State.ESTOP):
             self._command_ns = None
 
