@@ -20,7 +20,7 @@ def open_servos(config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfi
         case "canopen":
             from slave.servos.canopen.servos import CanopenServos
 
-            return CanopenServos(config.canopen, skeleton)
+            return CanopenServos(config.canopen, skeleton, encoders=encoders)
         case "dynamixel":
             from slave.servos.dynamixel.servos import DynamixelServos
 

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 from common.clock import NS_PER_MS
-from slave.servos.canopen.cia402 import FAULT_RESET, QUICK_STOP, SHUTDOWN, Power, power, towards_enabled
+from slave.servos.canopen.cia402 import (
+    ENABLE,
+    FAULT_RESET,
+    QUICK_STOP,
+    SHUTDOWN,
+    Power,
+    power,
+    towards_enabled,
+)
 from slave.servos.canopen.emergency import Emergency
-from slave.servos.canopen.sdo import Exchange, More, Transfer
+from slave.servos.canopen.sdo import Exchange, More, Read, Transfer, request
+from slave.servos.canopen.status_bits import amiss
 
 SDO_TIMEOUT_NS = 300 * NS_PER_MS
 SDO_TRIES = 3
@@ -16,12 +25,20 @@ ENABLE_TIMEOUT_NS = 2000 * NS_PER_MS
 TRANSITION_16_NS = 500 * NS_PER_MS
 """In quick stop active, told "enable" for so long and still there: the drive does not know transition 16.
 Until then it has also braked: "disable voltage" lets the joint go for some SYNCs."""
+_AGAIN_NS = 20 * NS_PER_MS
+"""Before an entry that must change is read again."""
+_UPLOADED = 0x40
+"""The least command specifier of an answer that names its entry."""
+_BOOTS_APART_NS = 1000 * NS_PER_MS
+"""Two boot-ups of one id closer together are of two drives."""
 
 
 class Phase(Enum):
     """What is being done with a drive."""
 
     CONFIGURING = auto()
+    CHECKING = auto()
+    """Configured, and listened to; not enabled before `StartGate` lets it."""
     ENABLING = auto()
     RUNNING = auto()
     FAILED = auto()
@@ -48,6 +65,12 @@ class Drive:
     _tries: int = 0
     _patient: bool = False
     _exchange: Exchange | None = None
+    _again_ns: int | None = None
+    _repeats: int = 0
+    _answered: bytes = b""
+    """Index and subindex of the request that was answered last, where it had been sent once."""
+    _booted_ns: int | None = None
+    _was_running: bool = False
 
     def start(self, now_ns: int, may_reset: bool, configure: bool) -> bytes | None:
         """On the way to RUNNING, whatever was before; the SDO request that comes first, if any.
@@ -56,11 +79,13 @@ class Drive:
         """
         self.failure, self.emergency, self._may_reset = "", None, may_reset
         self.since_ns = now_ns
+        self._was_running = self.phase is Phase.RUNNING and not configure
         if not configure and self.configured:
-            self.phase = Phase.ENABLING
+            self.phase = Phase.CHECKING
             return None
         self.phase, self.configured = Phase.CONFIGURING, False
-        self._step = self._tries = 0
+        self._step = self._tries = self._repeats = 0
+        self._again_ns, self._answered = None, b""
         self._patient = configure
         return self._ask(now_ns)
 
@@ -73,6 +98,7 @@ class Drive:
 
     def on_sdo(self, data: bytes, now_ns: int) -> bytes | None:
         """The next request, or None: nothing was waited for, it failed, or all is done (`configured`)."""
+        self._notice_second(data)
         if self.phase is not Phase.CONFIGURING or self.configured:
             return None
         said = None if self._exchange is None else self._exchange.on_answer(data)
@@ -81,19 +107,51 @@ class Drive:
         if isinstance(said, More):
             self._asked_ns = now_ns
             return said.request
+        transfer = self.setup[self._step]
+        if not said.done and isinstance(transfer, Read):
+            if self._repeats < transfer.again:
+                self._repeats += 1
+                self._again_ns = now_ns + _AGAIN_NS
+                return None
+            said = replace(said, done=transfer.optional)
         if not said.done:
             self.fail(f"refuses its configuration: {said.words}")
             return None
+        self._answered = data[1:4] if self._tries == 1 and not self._repeats else b""
         self._step += 1
-        self._tries = 0
+        self._tries = self._repeats = 0
         if self._step < len(self.setup):
             return self._ask(now_ns)
         self.configured = True
-        self.phase, self.since_ns = Phase.ENABLING, now_ns
+        self.phase, self.since_ns = Phase.CHECKING, now_ns
         return None
+
+    def on_boot(self, now_ns: int) -> bool:
+        """It says that it has started. False: two said so at once, so there are two, and it has failed."""
+        before_ns, self._booted_ns = self._booted_ns, now_ns
+        if before_ns is not None and now_ns - before_ns < _BOOTS_APART_NS:
+            self.fail("has said twice within a second that it has started: two drives have its id", True)
+            return False
+        return True
+
+    def admit(self, now_ns: int) -> None:
+        """Checked: from now on it is led to RUNNING."""
+        if self.phase is Phase.CHECKING:
+            self.phase, self.since_ns = Phase.ENABLING, now_ns
+
+    def _notice_second(self, data: bytes) -> None:
+        # a request that was sent once and is answered twice; the one under way may be for the same entry
+        asked = self.phase is Phase.CONFIGURING and request(self.setup[self._step])[1:4] == data[1:4]
+        if self._answered and data[1:4] == self._answered and data[0] >= _UPLOADED and not asked:
+            self.fail("answers one request twice: two drives have its id", reconfigure=True)
 
     def overdue(self, now_ns: int) -> bytes | None:
         """The request once more, where its answer is overdue; after the last try it has failed."""
+        if self._again_ns is not None and self.phase is Phase.CONFIGURING:
+            if now_ns < self._again_ns:
+                return None
+            self._again_ns, self._tries = None, 0
+            return self._ask(now_ns)
         if self.phase is not Phase.CONFIGURING or now_ns - self._asked_ns < SDO_TIMEOUT_NS:
             return None
         if self._tries >= SDO_TRIES and not self._patient:
@@ -108,16 +166,24 @@ class Drive:
             if stopping and answered and state in (Power.FAULT, Power.FAULT_REACTION):
                 self.fail("drive fault")
             self._controlword = QUICK_STOP
+        elif self.phase is Phase.CHECKING:
+            # one that goes on holding is not made to brake and start anew
+            self._controlword = ENABLE if self._was_running and state is Power.ENABLED else QUICK_STOP
         elif self.phase is Phase.ENABLING and answered:
-            self._enable(state, now_ns)
+            self._enable(state, statusword, now_ns)
         elif self.phase is Phase.RUNNING and answered and state is not Power.ENABLED:
             self.fail(_why_not(state, statusword))
             self._controlword = QUICK_STOP
         return self._controlword
 
-    def _enable(self, state: Power | None, now_ns: int) -> None:
-        if state is Power.ENABLED:
+    def _enable(self, state: Power | None, statusword: int, now_ns: int) -> None:
+        said = amiss(statusword) if state is Power.ENABLED else ""
+        if state is Power.ENABLED and not said:
             self.phase = Phase.RUNNING
+        elif said and now_ns - self.since_ns > ENABLE_TIMEOUT_NS:
+            self.fail(f"is enabled, but {said}")
+            self._controlword = QUICK_STOP
+            return
         elif now_ns - self.since_ns > ENABLE_TIMEOUT_NS or (state is Power.FAULT and not self._may_reset):
             self.fail(f"cannot be enabled: it is in {state or 'no state'}")
             self._controlword = QUICK_STOP
@@ -144,7 +210,7 @@ class Drive:
     def words(self) -> str:
         """What is wrong with it; empty where all is well."""
         said = [self.failure] if self.failure else []
-        if self.phase in (Phase.CONFIGURING, Phase.ENABLING):
+        if self.phase in (Phase.CONFIGURING, Phase.CHECKING, Phase.ENABLING):
             said.append(self._silence if self._tries > 1 else "is being enabled")
         if self.emergency is not None:
             said.append(self.emergency.words)

@@ -17,13 +17,16 @@ from common.clock import NS_PER_MS, NS_PER_S
 from common.messages import Mask
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from slave.encoders import EncoderConfig, Encoders
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import ENABLED_BITS, SHUTDOWN, STATE_BITS
-from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.config import CanopenConfig, limits_rad
 from slave.servos.canopen.drive import Drive, Phase
 from slave.servos.canopen.emergency import HEARTBEAT_MISSED, emergency
 from slave.servos.canopen.second_master import SecondMaster
 from slave.servos.canopen.setup import transfers
+from slave.servos.canopen.watch import DriveWatch, Seen
+from slave.servos.canopen.watch import Frame as DriveFrame
 from slave.servos.servos import EncoderReading
 
 Outgoing = tuple[str, int, bytes]
@@ -32,13 +35,22 @@ _START, _STOP, _PRE_OPERATIONAL = 0x01, 0x02, 0x80
 """NMT commands."""
 _BOOTED, _OPERATIONAL = 0x00, 0x05
 """NMT states in a heartbeat."""
+_LISTENED = (Phase.CHECKING, Phase.ENABLING, Phase.RUNNING)
 _FLAGS = np.uint16(pdo.MAGNET_LOST | pdo.PARITY_ERROR)
 
 
 class DriveNetwork:
     """The drives of one robot, in the order of its joints."""
 
-    def __init__(self, config: CanopenConfig, skeleton: Skeleton) -> None:
+    def __init__(
+        self,
+        config: CanopenConfig,
+        skeleton: Skeleton,
+        encoders: EncoderConfig | None = None,
+        *,
+        last_known_rad: Mapping[str, float] = MappingProxyType({}),
+    ) -> None:
+        """`encoders`: how they are mounted at the output shafts; `last_known_rad`: where joints stood."""
         self._config = config
         self._names = skeleton.joint_names
         drives = list(config.drives_of(skeleton).values())
@@ -57,6 +69,23 @@ class DriveNetwork:
         ]
         self._scale = np.array([drive.increments_per_rad for drive in drives])
         self._zero = np.array([drive.zero_increments for drive in drives], dtype=np.float64)
+        self._watch = DriveWatch(
+            self._names,
+            DriveFrame(
+                self._scale,
+                self._zero,
+                tuple(
+                    limits_rad(drive, joint.lower_rad, joint.upper_rad)
+                    for drive, joint in zip(drives, skeleton.joints, strict=True)
+                ),
+            ),
+            Encoders(skeleton, encoders),
+            period_ns=period_ns(config),
+            pending_ns=config.dead_ms * NS_PER_MS,
+            last_known_rad=last_known_rad,
+        )
+        self.warnings: Mapping[str, str] = MappingProxyType({})
+        """What drives warn of, by joint: no reason to stop yet."""
         self._step_rad = math.radians(config.join_deg_s) / config.sync_hz
         self._dead_ns = config.drive_dead_ms * NS_PER_MS
         self._blind_ns = config.dead_ms * NS_PER_MS // 2
@@ -133,12 +162,18 @@ class DriveNetwork:
         if drive is None:
             self._on_other(bus, frame_id, data, now_ns)
         elif self._answers.take(drive, data):
+            self._note_answer(drive)
             if self._answers.complete:
                 if self.answered_after_ns is None:
                     self.answered_after_ns = now_ns - self._synced_ns
                 self._publish()
         else:
             self.unknown += 1
+
+    def _note_answer(self, i: int) -> None:
+        twice = self._watch.answered(i)
+        if twice and self._drives[i].phase in _LISTENED:
+            self._fail(i, twice)
 
     def _on_other(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
         if self.second_master.hear(bus, frame_id, now_ns):
@@ -154,7 +189,7 @@ class DriveNetwork:
                 following = drive.on_sdo(data, now_ns)
                 if following is not None:
                     self._ask(i, following)
-                elif drive.phase is Phase.ENABLING:
+                elif drive.phase is Phase.CHECKING:
                     self._operate(i, now_ns)
                 else:
                     self._tell()
@@ -192,12 +227,15 @@ class DriveNetwork:
             self._nmt(i, _STOP)  # the other has started it again
             return
         if drive.phase is Phase.CONFIGURING and state == _BOOTED:
+            if not drive.on_boot(now_ns):
+                self._tell()
+                return
             # what it was told before is forgotten, the slave's heartbeat that it shall watch for among it
             self._start(i, now_ns, configure=True)
             return
         # while it is enabled, a heartbeat from before NMT's start may still be on its way
         left = drive.phase is Phase.RUNNING and state != _OPERATIONAL
-        if left or (drive.phase is Phase.ENABLING and state == _BOOTED):
+        if left or (drive.phase in (Phase.CHECKING, Phase.ENABLING) and state == _BOOTED):
             drive.fail("has restarted" if state == _BOOTED else "is not operational", reconfigure=True)
             self._tell()
 
@@ -224,8 +262,10 @@ class DriveNetwork:
             self._heard_ns = [now_ns] * len(self._heard_ns)
         self._cycled_ns = now_ns
         self.pending(now_ns)
+        self._look(now_ns, fresh)
         controlwords = self._supervise(fresh, now_ns)
         targets = self._targets(setpoint_rad)
+        self._watch.aim(self._target_rad, self._running)
         beat = self._cycles % self._beat_every == 0
         out = [(bus.name, self._beat, bytes([_OPERATIONAL])) for bus in self._config.buses] if beat else []
         data = pdo.pack_targets(controlwords, targets)
@@ -242,6 +282,7 @@ class DriveNetwork:
     def sync(self, now_ns: int) -> list[Outgoing]:
         """The SYNCs, to be sent right now."""
         self._answers.begin()
+        self._watch.asked()
         self._synced_ns = now_ns
         self.answered_after_ns = None
         return [(bus.name, pdo.SYNC, b"") for bus in self._config.buses]
@@ -259,11 +300,13 @@ class DriveNetwork:
     @property
     def not_running(self) -> dict[str, str]:
         """Drives that do not run, with node, bus and reason, by joint."""
-        return {
-            name: f"node {node} on bus {bus} {drive.words}"
-            for name, (bus, node), drive in zip(self._names, self._where, self._drives, strict=True)
-            if drive.phase is not Phase.RUNNING
-        }
+        rows = zip(self._names, self._where, self._drives, strict=True)
+        # those that have failed first: the others may only wait
+        waiting = sorted(
+            (row for row in rows if row[2].phase is not Phase.RUNNING),
+            key=lambda row: row[2].phase is not Phase.FAILED,
+        )
+        return {name: f"node {node} on bus {bus} {drive.words}" for name, (bus, node), drive in waiting}
 
     def where(self, joint: str) -> tuple[str, int]:
         """Bus and node id of a joint's drive."""
@@ -275,6 +318,7 @@ class DriveNetwork:
         drive = self._drives[i]
         self._joined[i] = self._running[i] = False
         self._settled = False
+        self._watch.restart(i)
         first = drive.start(now_ns, self._config.fault_reset, configure)
         if first is not None:
             self._nmt(i, _PRE_OPERATIONAL)
@@ -288,11 +332,53 @@ class DriveNetwork:
 
     def _operate(self, i: int, now_ns: int) -> None:
         self._heard_ns[i] = self._answered_ns[i] = now_ns
+        self._watch.connect(i)
         self._nmt(i, _START)
 
     def _nmt(self, i: int, command: int) -> None:
         bus, node = self._where[i]
         self.outbox.append((bus, pdo.NMT, bytes([command, node])))
+
+    def _fail(self, i: int, why: str) -> None:
+        self._drives[i].fail(why)
+        self._settled = False
+        self._tell()
+
+    def _look(self, now_ns: int, fresh: Mask) -> None:
+        """Let those be enabled that may be, and stop those that do what nobody asked for."""
+        words = self._answers.encoder
+        seen = Seen(
+            self._synced_ns,
+            fresh,
+            self._answers.statusword,
+            fresh & (words & _FLAGS == 0),
+            (words & pdo.COUNT_BITS).astype(np.int64),
+            self._answers.position,
+        )
+        self._watch.take(seen)
+        if not self._settled:
+            self._check(now_ns, seen)
+        on = self._running.copy() if self._settled else self._switched_on()
+        for i, why in self._watch.judge(seen, on, self._running).items():
+            self._fail(i, why)
+        warnings = self._watch.warnings(seen)
+        if warnings != self.warnings:
+            self.warnings = MappingProxyType(warnings)
+
+    def _check(self, now_ns: int, seen: Seen) -> None:
+        for i, drive in enumerate(self._drives):
+            if drive.phase is Phase.CHECKING and seen.fresh[i] and not self._stopping:
+                passed, why = self._watch.check(i, seen)
+                if why:
+                    self._fail(i, why)
+                elif passed:
+                    drive.admit(now_ns)
+
+    def _switched_on(self) -> Mask:
+        on = (Phase.ENABLING, Phase.RUNNING)
+        phases = [drive.phase in on and not self._stopping for drive in self._drives]
+        out: Mask = np.array(phases, np.bool_)
+        return out
 
     def _supervise(self, fresh: Mask, now_ns: int) -> NDArray[np.uint16]:
         statusword = self._answers.statusword
@@ -303,7 +389,7 @@ class DriveNetwork:
             return self._words
         words = np.empty_like(self._words)
         for i, drive in enumerate(self._drives):
-            if silent[i] and drive.phase in (Phase.ENABLING, Phase.RUNNING):
+            if silent[i] and drive.phase in _LISTENED:
                 drive.fail("silent: neither heartbeat nor position", reconfigure=True)
             was_running = drive.phase is Phase.RUNNING
             words[i] = drive.controlword(int(statusword[i]), bool(fresh[i]), self._stopping, now_ns)

@@ -79,6 +79,10 @@ class Read:
     expected: int
     meaning: str
     """What it is, as in "is a CiA 402 drive"."""
+    optional: bool = False
+    """Whether a drive may lack the entry."""
+    again: int = 0
+    """How often to ask again while it does not hold what is expected: it takes a drive a while."""
 
 
 Transfer = Write | Read

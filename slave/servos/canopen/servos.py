@@ -6,6 +6,7 @@ therefore falls silent, and the drives stop by themselves.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Mapping
 
@@ -22,10 +23,13 @@ from common.latency import Durations
 from common.metrics import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from slave.encoders import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.network import DriveNetwork, Outgoing, period_ns
 from slave.servos.canopen.pdo import RPDO1
 from slave.servos.servos import EncoderReading
+
+log = logging.getLogger("tandem.servos")
 
 _POLL_S = 0.0005
 _LISTEN_NS = 250 * NS_PER_MS
@@ -56,19 +60,24 @@ class CanopenServos:
         skeleton: Skeleton,
         clock: Clock = monotonic_ns,
         opener: Opener = open_deaf_to_targets,
+        *,
+        encoders: EncoderConfig | None = None,
+        last_known_rad: Mapping[str, float] | None = None,
     ) -> None:
+        """`encoders`: how they are mounted at the output shafts; `last_known_rad`: where joints stood."""
         self._config = config
         self._skeleton = skeleton
         self._clock = clock
         self._period_ns = period_ns(config)
         self._opener = opener
-        self._network = DriveNetwork(config, skeleton)
+        self._network = DriveNetwork(config, skeleton, encoders, last_known_rad=last_known_rad or {})
         self._buses: dict[str, CanBus] = {}
         self._setpoint: Array | None = None
         self._due_ns = 0
         self._answered = Durations()
         self._period = Durations()
         self._synced_ns = 0
+        self._warned = self._network.warnings
         self._fd = {bus.name: bus.fd for bus in config.buses}
 
     def start(self) -> None:
@@ -137,6 +146,7 @@ class CanopenServos:
                 "unanswered_syncs": self._network.unanswered,
                 "unknown_frames": self._network.unknown,
                 "second_master_frames": self._network.second_master.frames,
+                "warnings": len(self._network.warnings),
             },
             times_ms={
                 "sync_to_positions": self._answered.summary(),
@@ -189,6 +199,10 @@ class CanopenServos:
         synced_ns = self._clock()
         for outgoing in network.sync(synced_ns):
             self._send(outgoing)
+        if network.warnings is not self._warned:
+            self._warned = network.warnings
+            for joint, words in self._warned.items():
+                log.warning("%s: %s", joint, words)
         if self._synced_ns:
             self._period.record(synced_ns - self._synced_ns)
         self._synced_ns = synced_ns

@@ -19,6 +19,7 @@ _QUICK_STOP_AND_STAY = 6
 _ON_ABORT_QUICK_STOP = 3
 """6007h: a lost connection is answered by a quick stop."""
 _MILLISECONDS = -3
+_MODE_TRIES = 25
 
 
 def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint) -> list[Transfer]:
@@ -32,6 +33,8 @@ def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint) -> list[T
     ramp = round(abs(scale) * joint.max_acceleration_rad_s2)
     return [
         Read(0x1000, 0, 0xFFFF, 402, "a CiA 402 drive"),
+        # whatever it says: two drives of one id differ in it, so that both their answers get through
+        *(Read(0x1018, sub, 0, 0, "its identity", optional=True) for sub in (1, 2, 3, 4)),
         Write(0x1016, 1, 4, config.node_id << 16 | config.dead_ms),
         Write(0x1017, 0, 2, config.drive_heartbeat_ms),
         *_pdo(0x1400, RPDO1 + drive.id, RPDO_MAPPING),
@@ -46,6 +49,15 @@ def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint) -> list[T
         Write(0x6085, 0, 4, ramp),
         Write(0x60C2, 1, 1, 1000 // config.sync_hz),
         Write(0x60C2, 2, 1, _MILLISECONDS),
+        # the last: a drive may take a while to change its mode
+        Read(
+            0x6061,
+            0,
+            0xFF,
+            CYCLIC_SYNCHRONOUS_POSITION,
+            "the mode asked for, cyclic synchronous position (8),",
+            again=_MODE_TRIES,
+        ),
     ]
 
 

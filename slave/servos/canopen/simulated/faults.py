@@ -23,6 +23,34 @@ class Fault(IntEnum):
     PARITY = 5
     SILENT = 6
     RESTART = 7
+    LOST_TURNS = 8
+    """The drive's position is 0 where it stands: its battery was empty."""
+    WRONG_ZERO = 9
+    """The drive's position is off by 30° of the joint."""
+    WRONG_GEAR = 10
+    """The gear turns the joint by half of what is configured."""
+    REVERSED = 11
+    """Motor and motor encoder turn the joint the wrong way round."""
+    DOUBLE_ID = 12
+    """Another drive, 49° away, has the same node id."""
+    ENCODER_ZERO = 13
+    """The output encoder's word is 0 for ever."""
+    RUNS_AWAY = 14
+    """While enabled it moves at 60°/s by itself, whatever its target."""
+    NOT_FOLLOWING = 15
+    """Enabled, with bit 12 clear: it ignores its target."""
+    LIMIT_ACTIVE = 16
+    """Bit 11: a limit of its own is active."""
+    LOCAL = 17
+    """Bit 9 clear: it ignores controlwords and targets."""
+    NO_VOLTAGE = 18
+    """Bit 4 clear: its motor stage has no voltage, it holds by its brake."""
+    WARNS = 19
+    """Bit 7; it works."""
+    WRONG_MODE = 20
+    """It displays profile position, whatever mode is asked for."""
+    POSITION_STUCK = 21
+    """The drive's position stays what it was."""
 
     @property
     def option(self) -> str:

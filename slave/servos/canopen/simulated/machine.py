@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from slave.servos.canopen.cia402 import Power
+from slave.servos.canopen.status_bits import FOLLOWS, REMOTE, VOLTAGE
 
 STATUSWORDS = {
     Power.NOT_READY: 0x00,
@@ -14,12 +15,11 @@ STATUSWORDS = {
     Power.FAULT_REACTION: 0x0F,
     Power.FAULT: 0x08,
 }
-_VOLTAGE = 0x10
 
 
 def statusword(state: Power) -> int:
-    """The word that tells a state (6041h)."""
-    return STATUSWORDS[state] | _VOLTAGE
+    """The word that tells a state (6041h): under remote control, and following its target while enabled."""
+    return STATUSWORDS[state] | VOLTAGE | REMOTE | (FOLLOWS if state is Power.ENABLED else 0)
 
 
 def after(state: Power, controlword: int, last: int, knows_16: bool = True) -> Power:

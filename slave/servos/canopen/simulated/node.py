@@ -21,6 +21,7 @@ from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION, Power
 from slave.servos.canopen.simulated.faults import CODES, DEMAND, Fault
 from slave.servos.canopen.simulated.machine import after, statusword
 from slave.servos.canopen.simulated.traits import Reformed, Traits
+from slave.servos.canopen.status_bits import FOLLOWS, LIMITED, REMOTE, VOLTAGE, WARNING
 
 EDS = Path(__file__).with_name("drive.eds")
 Send = Callable[[int, bytes], None]
@@ -33,6 +34,16 @@ _GIVEN = {0x6041: "statusword", pdo.ENCODER: "encoder", 0x6064: "position"}
 _NOT_MAPPABLE, _PRESENT_STATE = 0x0604_0041, 0x0800_0022
 _BOOT, _PRE_OPERATIONAL, _OPERATIONAL = 0x00, 0x7F, 0x05
 _RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
+_PROFILE_POSITION = 1
+_BITS = {
+    Fault.NOT_FOLLOWING: (FOLLOWS, 0),
+    Fault.LIMIT_ACTIVE: (0, LIMITED),
+    Fault.LOCAL: (REMOTE, 0),
+    Fault.NO_VOLTAGE: (VOLTAGE, 0),
+    Fault.WARNS: (0, WARNING),
+}
+"""Bits of the statusword that a fault clears and sets."""
+_DEAF = (Fault.NOT_FOLLOWING, Fault.LOCAL, Fault.NO_VOLTAGE)
 
 
 @lru_cache(maxsize=1)
@@ -68,13 +79,16 @@ class _Beat:
 class SimulatedDrive:
     """A drive without its motor: `target` is what it wants, `position` and `count` are what it is told."""
 
-    def __init__(self, node_id: int, send: Send) -> None:
+    def __init__(self, node_id: int, send: Send, serial: int = 1) -> None:
         self.id = node_id
+        self._serial = serial
         self.position = 0
         """Increments."""
         self.count = 0
         """Of the output encoder."""
         self.target = 0
+        self.limited = False
+        """Whether a limit of its own keeps it from its target."""
         self.state = Power.SWITCH_ON_DISABLED
         self.fault = Fault.NONE
         self.traits = Traits()
@@ -160,7 +174,7 @@ class SimulatedDrive:
             self._pending = None
         if self._tpdo is not None:
             layout, names = self._tpdo
-            now = {"statusword": statusword(self.state), "encoder": self.encoder, "position": self.position}
+            now = {"statusword": self.statusword, "encoder": self.encoder, "position": self.position}
             self._send(pdo.TPDO1 + self.id, layout.pack(*(now[name] for name in names)))
 
     def beat(self, now_ns: int) -> None:
@@ -191,7 +205,7 @@ class SimulatedDrive:
     def happen(self, fault: Fault) -> None:
         """A fault on demand; NONE ends what lasts."""
         self._stuck = self.count
-        self.fault = fault
+        self.fault, self.limited = fault, False
         if fault in CODES:
             self.fail(*CODES[fault])
         elif fault is Fault.RESTART:
@@ -202,8 +216,22 @@ class SimulatedDrive:
     # what it says
 
     @property
+    def statusword(self) -> int:
+        """6041h."""
+        word = statusword(self.state) | (LIMITED if self.limited else 0)
+        clear, set_ = _BITS.get(self.fault, (0, 0))
+        return word & ~clear | set_
+
+    @property
+    def follows(self) -> bool:
+        """Whether it goes where its target is."""
+        return self.state is Power.ENABLED and self.fault not in _DEAF
+
+    @property
     def encoder(self) -> int:
         """The encoder's word (2000h)."""
+        if self.fault is Fault.ENCODER_ZERO:
+            return 0
         if self.fault is Fault.ENCODER_STUCK:
             return self._stuck
         flag = {Fault.MAGNET_LOST: pdo.MAGNET_LOST, Fault.PARITY: pdo.PARITY_ERROR}.get(self.fault, 0)
@@ -219,6 +247,9 @@ class SimulatedDrive:
 
     def _command(self, controlword: int) -> None:
         was = self.state
+        if self.fault is Fault.LOCAL:
+            self._controlword = controlword
+            return
         state = after(self.state, controlword, self._controlword, self.traits.knows_16)
         if state is Power.ENABLED and self.value(0x6060) != CYCLIC_SYNCHRONOUS_POSITION:
             state = was
@@ -257,11 +288,13 @@ class SimulatedDrive:
     def _read(self, index: int, subindex: int, **_: object) -> int | None:
         match index:
             case 0x6041:
-                return statusword(self.state)
+                return self.statusword
             case 0x6064:
                 return self.position
             case 0x6061:
-                return self.value(0x6060)
+                return _PROFILE_POSITION if self.fault is Fault.WRONG_MODE else self.value(0x6060)
+            case 0x1018 if subindex == 4:
+                return self._serial
             case pdo.ENCODER:
                 return self.encoder
         return None

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.clock import NS_PER_MS, NS_PER_S
+from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders import EncoderConfig
 from slave.servos.canopen import pdo
@@ -24,6 +25,7 @@ _FOLLOWING_ERROR = (0x8611, 0x21)
 _LOOK_NS = 10 * NS_PER_MS
 """Between two looks at heartbeats and following errors."""
 _UNBOUNDED = 0xFFFF_FFFF
+_WRONG_ZERO_RAD, _TWIN_RAD, _RUNS_AWAY_RAD_S = np.radians((30.0, 49.0, 60.0)).tolist()
 
 log = logging.getLogger("tandem.drives")
 
@@ -49,9 +51,12 @@ class DrivePeer:
         send: SendOn,
         origin_ns: int,
         faults: Sequence[Planned] = (),
+        *,
+        position_rad: Array | None = None,
     ) -> None:
+        """`position_rad` (J,): where the joints stand at first; else at 0, or as near as limits let them."""
         self.counters = DriveCounters()
-        self.plant = Plant(skeleton, encoders, origin_ns)
+        self.plant = Plant(skeleton, encoders, origin_ns, position_rad)
         self._names = skeleton.joint_names
         self._first_sync_ns: int | None = None
         self._looked_ns = 0
@@ -61,31 +66,48 @@ class DrivePeer:
         self._zero = np.array([drive.zero_increments for drive in drives], dtype=np.float64)
         self._lower, self._upper = np.full(len(drives), -np.inf), np.full(len(drives), np.inf)
         self._period_ns = NS_PER_S // config.sync_hz
+        self._gear, self._shift = np.ones(len(drives)), np.zeros(len(drives))
+        """What a drive is wrong by: true scale over the configured one, and increments."""
+        self._stuck: dict[int, int] = {}
         self._read()
-        self.drives = [SimulatedDrive(drive.id, _sender(send, drive.bus)) for drive in drives]
+        senders = [_sender(send, drive.bus) for drive in drives]
+        self.drives = [
+            SimulatedDrive(drive.id, sender, serial)
+            for serial, (drive, sender) in enumerate(zip(drives, senders, strict=True), 1)
+        ]
+        self._senders = senders
+        self._twins: dict[int, SimulatedDrive] = {}
+        """Drives without a joint that have the id of a joint's."""
         self._on_bus: dict[str, list[int]] = {bus.name: [] for bus in config.buses}
-        self._by_id: dict[tuple[str, int], int] = {}
+        self._by_id: dict[tuple[str, int], list[int]] = {}
         for i, drive in enumerate(drives):
             self._on_bus[drive.bus].append(i)
             for code in (pdo.RPDO1, pdo.SDO_REQUEST):
-                self._by_id[drive.bus, code + drive.id] = i
+                self._by_id.setdefault((drive.bus, code + drive.id), []).append(i)
         self._states = [drive.state for drive in self.drives]
         self._show()
 
     def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
         """One frame from the slave, or from whoever asks."""
-        i = self._by_id.get((bus, frame_id))
-        if i is not None:
-            self.drives[i].on_frame(frame_id, data, now_ns)
-            if frame_id == pdo.RPDO1 + self.drives[i].id:
+        addressed = self._by_id.get((bus, frame_id))
+        if addressed is not None:
+            for i in addressed:
+                self._tell(i, frame_id, data, now_ns)
+                if frame_id != pdo.RPDO1 + self.drives[i].id:
+                    self._take_in_settings(i)
+            if frame_id & 0x780 == pdo.RPDO1:
                 return  # it waits for SYNC
-            self._take_in_settings(i)
         elif frame_id == pdo.SYNC:
             self._on_sync(bus, now_ns)
         elif frame_id == pdo.NMT or frame_id & 0x780 == pdo.HEARTBEAT:
             for i in self._on_bus.get(bus, ()):
-                self.drives[i].on_frame(frame_id, data, now_ns)
+                self._tell(i, frame_id, data, now_ns)
         self._follow_states()
+
+    def _tell(self, i: int, frame_id: int, data: bytes, now_ns: int) -> None:
+        self.drives[i].on_frame(frame_id, data, now_ns)
+        if i in self._twins:
+            self._twins[i].on_frame(frame_id, data, now_ns)
 
     def advance(self, now_ns: int) -> None:
         """Physics, heartbeats, following errors, and faults that are due. Call every few milliseconds."""
@@ -100,6 +122,8 @@ class DrivePeer:
                 self.happen(due.joint, due.fault)
         late = self.plant.beyond_ns
         moving = self.plant.moving
+        for twin in self._twins.values():
+            twin.beat(now_ns)
         for i, drive in enumerate(self.drives):
             drive.beat(now_ns)
             if late[i] and drive.state is Power.ENABLED and late[i] >= drive.value(0x6066) * NS_PER_MS:
@@ -112,8 +136,36 @@ class DrivePeer:
         """Make a drive fail, or well again."""
         log.info("%s: %s", joint, fault.option)
         self.counters.faults += 1
-        self.drives[self._names.index(joint)].happen(fault)
+        self._drive(self._names.index(joint), fault)
         self._follow_states()
+
+    def _drive(self, i: int, fault: Fault) -> None:
+        """A fault of the mechanics, which the drive itself does not know of; or of the drive."""
+        drive, scale = self.drives[i], self._scale[i]
+        true = self._zero[i] + scale * self.plant.position_rad[i]
+        self._gear[i], self._shift[i] = 1.0, 0.0
+        self._twins.pop(i, None)
+        self._stuck.pop(i, None)
+        match fault:
+            case Fault.LOST_TURNS:
+                self._shift[i] = -true
+            case Fault.WRONG_ZERO:
+                self._shift[i] = _WRONG_ZERO_RAD * scale
+            case Fault.WRONG_GEAR:
+                self._gear[i] = 2.0
+            case Fault.REVERSED:
+                self._gear[i] = -1.0
+            case Fault.POSITION_STUCK:
+                self._stuck[i] = drive.position
+            case Fault.DOUBLE_ID:
+                twin = SimulatedDrive(drive.id, self._senders[i], serial=1000 + i)
+                twin.position = round(true + _TWIN_RAD * scale)
+                self._twins[i] = twin
+        drive.happen(fault)
+        self._show()
+        if drive.state is Power.ENABLED:
+            # it goes on from where it is, in whichever frame it believes itself to be
+            drive.target = self._increments[i]
 
     def _on_sync(self, bus: str, now_ns: int) -> None:
         self.counters.syncs += 1
@@ -124,10 +176,21 @@ class DrivePeer:
         for i in self._on_bus.get(bus, ()):
             drive = self.drives[i]
             drive.on_sync()
-            if drive.state is Power.ENABLED:
-                wanted = (drive.target - self._zero[i]) / self._scale[i]
-                target = min(max(wanted, self._lower[i]), self._upper[i])
-                self.plant.follow(i, target, self._period_ns, now_ns)
+            if i in self._twins:
+                self._twins[i].on_sync()
+            if drive.follows:
+                self._follow(i, drive, now_ns)
+
+    def _follow(self, i: int, drive: SimulatedDrive, now_ns: int) -> None:
+        if drive.fault is Fault.RUNS_AWAY:
+            step = _RUNS_AWAY_RAD_S * self._period_ns / NS_PER_S
+            self.plant.follow(i, float(self.plant.position_rad[i]) + 2.0 * step, 2 * self._period_ns, now_ns)
+            return
+        believed = (drive.target - self._zero[i]) / self._scale[i]
+        allowed = min(max(believed, self._lower[i]), self._upper[i])
+        drive.limited = abs(believed - allowed) > 1e-6
+        true = (self._zero[i] + self._scale[i] * allowed - self._shift[i] - self._zero[i]) / self._scale[i]
+        self.plant.follow(i, true / self._gear[i], self._period_ns, now_ns)
 
     def _follow_states(self) -> None:
         for i, drive in enumerate(self.drives):
@@ -152,8 +215,11 @@ class DrivePeer:
         self._lower[i], self._upper[i] = min(ends), max(ends)
 
     def _read(self) -> None:
-        position = self.plant.position_rad
-        self._increments = np.rint(self._zero + self._scale * position).astype(np.int64).tolist()
+        position = self.plant.position_rad * self._gear
+        shown = np.rint(self._zero + self._scale * position + self._shift)
+        self._increments = shown.astype(np.int64).tolist()
+        for i, increments in self._stuck.items():
+            self._increments[i] = increments
         self._counts = self.plant.counts.tolist()
 
     def _show(self) -> None:

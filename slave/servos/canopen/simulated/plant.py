@@ -20,8 +20,14 @@ MOST_CYCLES = 25
 class Plant:
     """All joints, on the drives' own 4 ms cycle."""
 
-    def __init__(self, skeleton: Skeleton, encoders: EncoderConfig, origin_ns: int) -> None:
-        self._robot = SimulatedRobot(skeleton, encoders, origin_ns)
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        encoders: EncoderConfig,
+        origin_ns: int,
+        position_rad: Array | None = None,
+    ) -> None:
+        self._robot = SimulatedRobot(skeleton, encoders, origin_ns, position_rad)
         self._encoders = Encoders(skeleton, encoders)
         self._demand = self._robot.position_rad
         self._velocity = np.zeros(len(self._demand))

@@ -31,7 +31,7 @@ class Wired:
         """False: the slave is dead, its drives are on their own."""
         self.cut: set[str] = set()
         """Buses that carry nothing."""
-        self.network = DriveNetwork(self.config, self.skeleton)
+        self.network = DriveNetwork(self.config, self.skeleton, encoders)
         self.peer = DrivePeer(
             self.config, self.skeleton, encoders or EncoderConfig(), self._to_slave, self.now_ns
         )

@@ -128,7 +128,7 @@ def test_an_encoder_that_warns_is_not_valid_until_it_is_well_again(
     assert wired.network.reading.valid.all()
 
 
-def test_an_encoder_that_is_stuck_shows_what_it_showed(wired: Wired) -> None:
+def test_an_encoder_that_is_stuck_is_found_once_its_joint_has_turned_by_two_degrees(wired: Wired) -> None:
     wired.up()
     wired.happen(ELBOW, Fault.ENCODER_STUCK)
     before = wired.read_rad()
@@ -136,7 +136,8 @@ def test_an_encoder_that_is_stuck_shows_what_it_showed(wired: Wired) -> None:
     wired.run(1.5)
     joint = wired.index(ELBOW)
     assert wired.read_rad()[joint] == before[joint]
-    assert abs(wired.peer.plant.position_rad[joint] - 0.2) < 0.01
+    assert np.degrees(wired.peer.plant.position_rad[joint]) < 4.0
+    assert "its output encoder 0.0°" in wired.network.faults[ELBOW]
 
 
 def test_quick_stop_brakes_all_and_holds_whatever_is_written(wired: Wired) -> None:

@@ -1,0 +1,92 @@
+"""What must be known of a drive before it may be enabled: that it stands where it says. Pure.
+
+A drive is enabled at the position that it tells of itself, and every later target is told in that frame. So
+that frame must be right first, by somebody else's word: the encoder at the output shaft, or, where that says
+nothing, the last position that was known before.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from slave.agreement import WINDOW_RAD
+from slave.servos.canopen.status_bits import amiss
+
+CHECKED_SYNCS = 5
+"""Seen so often, standing still, a drive may be enabled. Two drives of one id show by then."""
+SLACK_RAD = math.radians(0.1)
+"""At a software limit a drive may stand this far beyond it: encoders flicker."""
+LAST_KNOWN_RAD = math.radians(5.0)
+"""A joint that nobody turned while it was off stands within this of where it was."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where one joint stands, by everybody who can say; rad."""
+
+    drive_rad: float
+    """By the drive."""
+    encoder_rad: float | None
+    """By the output encoder; None where its word cannot be believed."""
+    last_known_rad: float | None
+    """Before the robot was switched off; None where that is not known."""
+    limits_rad: tuple[float, float]
+    """The drive's software limits."""
+    increments_per_rad: float
+    zero_increments: int
+
+
+def refusal(place: Place, statusword: int) -> str:
+    """Why a drive may not be enabled, in words; empty where it may."""
+    return _bits(statusword) or _reference(place) or _range(place)
+
+
+def _bits(statusword: int) -> str:
+    said = amiss(statusword, enabled=False)
+    return f"is not ready: {said}" if said else ""
+
+
+def _range(place: Place) -> str:
+    lower, upper = place.limits_rad
+    beyond = max(lower - place.drive_rad, place.drive_rad - upper)
+    if beyond <= SLACK_RAD:
+        return ""
+    return (
+        f"stands at {_deg(place.drive_rad)}, {_deg(beyond)} beyond its software limits of {_deg(lower)} to "
+        f"{_deg(upper)}: enabled, it would jump to them; turn the joint back by hand, or correct the limits"
+    )
+
+
+def _reference(place: Place) -> str:
+    if place.encoder_rad is not None:
+        return _by_encoder(place, place.encoder_rad)
+    if place.last_known_rad is None:
+        return (
+            f"says {_deg(place.drive_rad)}, and nothing confirms it: its output encoder says nothing "
+            "that can be believed, and no last position is known; mend it, or look at the joint and confirm "
+            "with `tandem home`"
+        )
+    if abs(place.drive_rad - place.last_known_rad) <= LAST_KNOWN_RAD:
+        return ""
+    return (
+        f"says {_deg(place.drive_rad)}, but the joint stood at {_deg(place.last_known_rad)} when it was last "
+        "known, and its output encoder says nothing that can be believed; look at the joint and confirm with "
+        "`tandem home`"
+    )
+
+
+def _by_encoder(place: Place, encoder_rad: float) -> str:
+    off = place.drive_rad - encoder_rad
+    if abs(off) <= WINDOW_RAD:
+        return ""
+    zero = round(place.zero_increments + off * place.increments_per_rad)
+    return (
+        f"says {_deg(place.drive_rad)}, its output encoder {_deg(encoder_rad)}: it has lost its turns, or "
+        "its zero, gear ratio or direction is wrong, or the encoder is; look at the joint: if the encoder is "
+        f"right and only the zero is wrong, zero_increments = {zero}"
+    )
+
+
+def _deg(angle_rad: float) -> str:
+    return f"{math.degrees(angle_rad):.1f}°"

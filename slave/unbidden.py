@@ -1,0 +1,108 @@
+"""Which joints move although nobody told them to, or against what they were told. Pure.
+
+A servo that has settled at a setpoint that stands must stay there. While its setpoint moves it follows late,
+but never leaves the span of the last setpoints far behind, outwards. Both are judged by distance, reading by
+reading: a joint that runs away at 30°/s is found before it has turned by a degree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.clock import NS_PER_MS, NS_PER_S
+from common.messages import Mask
+from common.quaternion import Array
+
+STILL_RAD = math.radians(0.5)
+"""A joint that has settled may be this far from where it settled: six counts of a 12-bit encoder."""
+ASTRAY_RAD = 0.06
+"""While the setpoint moves, or has just stopped: this far outside of its span, and going on outwards. Honest
+servos stay within 0.03 (see guard/README.md)."""
+OUTWARD_RAD_S = 0.15
+"""Slower than this nobody "goes on outwards": it sags, or a count flickers."""
+SETTLE_NS = 300 * NS_PER_MS
+"""A servo has come to rest so long after its setpoint has."""
+STANDS_RAD = 4e-3
+"""A setpoint that moves by less than this within its span all but stands: its joint is right behind."""
+CREEP_RAD_S = math.radians(0.3)
+"""A settled joint may sag so slowly: warmth, load. How far is bounded by the guard's other windows."""
+
+
+class UnbiddenMotion:
+    """Watches J joints. Give it each reading once, with the span of the setpoints of the time just gone."""
+
+    def __init__(self, joint_names: Sequence[str]) -> None:
+        joints = len(joint_names)
+        self._names = tuple(joint_names)
+        self._settled_ns: NDArray[np.int64] = np.full(joints, -1, np.int64)
+        """When each setpoint began to stand; -1 where it moves or is not known."""
+        self._stands_rad: Array = np.zeros(joints)
+        self._rests_rad: Array = np.full(joints, np.nan)
+        """Where each joint came to rest; NaN while it has not."""
+        self._before_rad: Array = np.full(joints, np.nan)
+        self._before_ns = 0
+        self.words: dict[str, str] = {}
+        """What moved in the last reading that was judged, by joint."""
+
+    def forget(self, joints: Mask) -> None:
+        """These joints (J,) begin anew: they have been told to be elsewhere, or were switched off."""
+        self._settled_ns[joints] = -1
+        self._rests_rad[joints] = self._before_rad[joints] = np.nan
+
+    def begin(self, now_ns: int, joints: Mask, position_rad: Array) -> None:
+        """These joints (J,) stand here (J,), and have settled already: they are switched on now."""
+        self._settled_ns[joints] = now_ns - SETTLE_NS
+        for kept in (self._stands_rad, self._rests_rad, self._before_rad):
+            np.copyto(kept, position_rad, where=joints)
+
+    def judge(self, read_ns: int, span: tuple[Array, Array], position_rad: Array, heard: Mask) -> Mask:
+        """(J,) who moves unbidden, by a reading (J,) of the joints that are `heard`; `words` says how.
+
+        `span` is the lowest and the highest setpoint (J,) that may still be on its way into the motors.
+        """
+        low, high = span
+        dt_s = min(max((read_ns - self._before_ns) / NS_PER_S, 0.0), 0.1)
+        middle = 0.5 * (low + high)
+        stands = high - low < STANDS_RAD
+        self._rests_rad = self._rests_rad + (middle - self._stands_rad)
+        self._stands_rad = middle
+        self._settled_ns = np.where(
+            stands, np.where(self._settled_ns < 0, read_ns, self._settled_ns), np.int64(-1)
+        )
+        self._rests_rad = np.where(stands, self._rests_rad, np.nan)
+        rested = stands & (np.abs(read_ns - self._settled_ns) >= SETTLE_NS) & heard
+        self._rests_rad = np.where(rested & np.isnan(self._rests_rad), position_rad, self._rests_rad)
+        moved = position_rad - self._rests_rad
+        # comparing a NaN says False: not at rest, or never heard
+        left = (np.abs(moved) > STILL_RAD) & heard
+        self._rests_rad += np.clip(moved, -CREEP_RAD_S * dt_s, CREEP_RAD_S * dt_s)
+        astray = self._astray(low, high, position_rad, dt_s) & heard
+        np.copyto(self._before_rad, position_rad, where=heard)
+        self._before_ns = read_ns
+        out: Mask = left | astray
+        self.words = {}
+        if out.any():
+            self._say(out, left, moved, np.maximum(low - position_rad, position_rad - high))
+        return out
+
+    def _astray(self, low: Array, high: Array, position_rad: Array, dt_s: float) -> Mask:
+        """Outside of the span now and before, and going on outwards."""
+        step = OUTWARD_RAD_S * dt_s
+        up = (self._before_rad > high + ASTRAY_RAD) & (position_rad > self._before_rad + step)
+        down = (self._before_rad < low - ASTRAY_RAD) & (position_rad < self._before_rad - step)
+        out: Mask = up | down
+        return out
+
+    def _say(self, out: Mask, left: Mask, moved: Array, beyond: Array) -> None:
+        for j in np.flatnonzero(out).tolist():
+            if left[j]:
+                words = f"moves by itself: {abs(math.degrees(moved[j])):.1f}° from where it was told to stay"
+            else:
+                words = (
+                    f"moves against its setpoint: {math.degrees(beyond[j]):.1f}° outside of where it was sent"
+                )
+            self.words[self._names[j]] = words

@@ -1,0 +1,288 @@
+"""A drive's word is not taken for the truth: every verdict here is on the plant's true joint angle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from slave.encoders import EncoderConfig
+from slave.servos.canopen.cia402 import Power
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.drive import Drive
+from slave.servos.canopen.simulated.faults import Fault
+from slave.servos.canopen.simulated.peer import DrivePeer
+from slave.servos.canopen.start_check import LAST_KNOWN_RAD, SLACK_RAD, Place, refusal
+from slave.servos.canopen.status_bits import FOLLOWS, GOOD, LIMITED, REMOTE, VOLTAGE, amiss
+from slave.servos.canopen.watch import DriveWatch
+from tests.slave.servos.canopen.conftest import Wired
+
+ELBOW = "left_elbow_pitch"
+READY = VOLTAGE | REMOTE
+
+
+def standing(
+    elbow_deg: float, config: CanopenConfig | None = None, encoders: EncoderConfig | None = None
+) -> Wired:
+    """A robot whose elbow stands at an angle, not started yet."""
+    wired = Wired(config, encoders)
+    stands = np.zeros(25)
+    stands[wired.index(ELBOW)] = np.radians(elbow_deg)
+    wired.peer = DrivePeer(
+        wired.config,
+        wired.skeleton,
+        encoders or EncoderConfig(),
+        wired._to_slave,
+        wired.now_ns,
+        position_rad=stands,
+    )
+    return wired
+
+
+def moved_deg(wired: Wired, joint: str = ELBOW) -> float:
+    """How far a joint truly was from where it began, at most."""
+    course = np.array(wired.positions)[:, wired.index(joint)]
+    return float(np.degrees(np.abs(course - course[0]).max()))
+
+
+def wrong_from_the_start(fault: Fault, elbow_deg: float = 40.0) -> Wired:
+    wired = standing(elbow_deg)
+    wired.happen(ELBOW, fault)
+    wired.start()
+    wired.run(1.0)
+    return wired
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (Fault.LOST_TURNS, "0.0°, its output encoder 40"),
+        (Fault.WRONG_ZERO, "says 70.0°, its output encoder 40"),
+        (Fault.WRONG_GEAR, "says 79.9°, its output encoder 40"),
+        (Fault.REVERSED, "says -40.0°, its output encoder 40"),
+        (Fault.ENCODER_ZERO, "says 40.0°, its output encoder 0.0°"),
+        (Fault.DOUBLE_ID, "two drives have its id"),
+        (
+            Fault.WRONG_MODE,
+            "object 6061:0 is 0x1: the mode asked for, cyclic synchronous position (8)",
+        ),
+        (Fault.LIMIT_ACTIVE, "is not ready: a limit of its own is active"),
+        (Fault.LOCAL, "is not ready: it is under local control"),
+        (Fault.NOT_FOLLOWING, "is enabled, but it does not follow its target (bit 12)"),
+        (Fault.NO_VOLTAGE, "is enabled, but its motor stage has no voltage (statusword bit 4)"),
+    ],
+)
+def test_a_drive_that_is_wrong_at_the_start_is_named_and_moves_nothing(fault: Fault, said: str) -> None:
+    wired = wrong_from_the_start(fault)
+    wired.run(2.0)
+    assert said in wired.network.faults[ELBOW]
+    assert not wired.network.running
+    assert wired.network.failed
+    # a setpoint of the guard's, who sits at the encoder, changes nothing
+    wired.setpoint = wired.read_rad()
+    wired.run(1.0)
+    assert moved_deg(wired) < 0.3
+    assert wired.peer.drives[wired.index(ELBOW)].state is not Power.ENABLED
+
+
+def test_which_zero_would_agree_is_told() -> None:
+    wired = wrong_from_the_start(Fault.LOST_TURNS)
+    increments = round(-65536 * 40.0 / 360.0)
+    told = int(wired.network.faults[ELBOW].rpartition("= ")[2])
+    assert told == pytest.approx(increments, abs=65536 / 4096)
+
+
+@pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 20.0])
+def test_a_drive_beyond_its_software_limit_is_not_enabled(beyond_deg: float) -> None:
+    plain = CanopenConfig()
+    drives = plain.drives_of(Wired().skeleton)
+    drives[ELBOW] = drives[ELBOW].model_copy(update={"upper_deg": 40.0 - beyond_deg})
+    wired = standing(40.0, plain.model_copy(update={"drives": drives}))
+    wired.start()
+    wired.run(1.0)
+    assert wired.network.running == (beyond_deg == 0.0)
+    assert moved_deg(wired) < 0.3
+    if beyond_deg:
+        assert f"stands at 40.0°, {beyond_deg:.1f}° beyond its software limits" in wired.network.faults[ELBOW]
+
+
+@pytest.mark.parametrize("rest_s", [0.0, 0.1, 0.5, 2.0])
+def test_a_drive_that_moves_by_itself_in_hold_is_stopped_within_50_ms(rest_s: float) -> None:
+    wired = standing(20.0)
+    wired.up()
+    wired.setpoint = wired.read_rad() if rest_s else None
+    wired.run(rest_s)
+    before, at_s = len(wired.positions), wired.now_ns / 1e9
+    wired.happen(ELBOW, Fault.RUNS_AWAY)
+    wired.until(lambda: ELBOW in wired.network.faults, 0.5)
+    course = np.array(wired.positions)[before - 1 :, wired.index(ELBOW)]
+    began = int(np.flatnonzero(np.abs(course - course[0]) > np.radians(0.5))[0])
+    assert (wired.now_ns / 1e9 - at_s) - began * 0.004 <= 0.05
+    wired.run(1.0)
+    assert "by itself" in wired.network.faults[ELBOW]
+    assert wired.peer.drives[wired.index(ELBOW)].state is Power.QUICK_STOP
+    # and braked on its ramp
+    assert moved_deg(wired) < 8.0
+    assert moved_deg(wired, "right_elbow_pitch") < 0.5
+
+
+@pytest.mark.parametrize(
+    "fault", [Fault.REVERSED, Fault.WRONG_GEAR, Fault.ENCODER_ZERO, Fault.POSITION_STUCK]
+)
+def test_what_cannot_be_seen_at_zero_is_seen_at_the_first_degrees(fault: Fault) -> None:
+    wired = wrong_from_the_start(fault, elbow_deg=0.0)
+    assert wired.network.running
+    wired.setpoint = np.zeros(25)
+    wired.setpoint[wired.index(ELBOW)] = 0.6
+    wired.run(2.0)
+    assert wired.network.faults[ELBOW]
+    assert moved_deg(wired) < 5.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (Fault.NOT_FOLLOWING, "it does not follow its target (bit 12)"),
+        (Fault.LIMIT_ACTIVE, "a limit of its own is active"),
+        (Fault.LOCAL, "under local control"),
+        (Fault.NO_VOLTAGE, "has no voltage"),
+        # the other one says that it has started
+        (Fault.DOUBLE_ID, "has restarted"),
+    ],
+)
+def test_an_enabled_drive_that_says_it_does_not_obey_is_stopped_within_50_ms(fault: Fault, said: str) -> None:
+    wired = standing(20.0)
+    wired.up()
+    wired.run(0.5)
+    wired.happen(ELBOW, fault)
+    wired.run(0.068)
+    assert said in wired.network.faults[ELBOW]
+
+
+def test_a_warning_is_told_and_stops_nothing() -> None:
+    wired = standing(20.0)
+    wired.up()
+    wired.happen(ELBOW, Fault.WARNS)
+    wired.run(0.1)
+    assert dict(wired.network.warnings) == {ELBOW: "its drive warns: something is about to fail (bit 7)"}
+    assert wired.network.running
+
+
+def test_two_joints_with_one_id_in_the_drives_are_two_drives() -> None:
+    """As somebody wires them: the slave's file says 5 and 6, and both are set to 5."""
+    wired = Wired()
+    drives = wired.config.drives_of(wired.skeleton)
+    names = list(drives)
+    one, other = names[3], names[4]
+    drives[other] = drives[other].model_copy(update={"id": drives[one].id, "bus": drives[one].bus})
+    wrongly = wired.config.model_copy(update={"drives": drives})
+    wired.peer = DrivePeer(wrongly, wired.skeleton, EncoderConfig(), wired._to_slave, wired.now_ns)
+    wired.start()
+    wired.run(1.0)
+    assert "two drives have its id" in wired.network.faults[one]
+    assert "does not answer" in wired.network.faults[other]
+    assert moved_deg(wired, one) < 0.3
+
+
+def test_two_boot_ups_of_one_id_are_two_drives() -> None:
+    wired = Wired()
+    wired.network.start(wired.now_ns)
+    for _ in range(2):
+        wired.network.on_frame("left", 0x701, b"\x00", wired.now_ns)
+    assert "two drives have its id" in wired.network.faults["neck_yaw"]
+
+
+def test_a_drive_that_took_a_while_to_change_its_mode_is_taken() -> None:
+    wired = standing(20.0)
+    wired.happen(ELBOW, Fault.WRONG_MODE)
+    wired.start()
+    wired.run(0.2)
+    wired.happen(ELBOW, Fault.NONE)
+    wired.until(lambda: wired.network.running, 1.0)
+
+
+def test_a_release_checks_again() -> None:
+    """A drive whose count was lost while it was switched off for the e-stop."""
+    wired = standing(20.0)
+    wired.up()
+    wired.network.stop()
+    wired.run(0.5)
+    wired.happen(ELBOW, Fault.LOST_TURNS)
+    wired.setpoint = wired.read_rad()
+    wired.network.release(wired.now_ns)
+    wired._flush()
+    wired.run(1.0)
+    assert "its output encoder" in wired.network.faults[ELBOW]
+    assert moved_deg(wired) < 0.5
+
+
+# without what holds it off, each comes true
+
+
+def test_without_the_start_check_a_lost_count_moves_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("slave.servos.canopen.watch.refusal", lambda *_: "")
+    monkeypatch.setattr(DriveWatch, "judge", lambda *_: {})
+    wired = wrong_from_the_start(Fault.LOST_TURNS)
+    wired.setpoint = wired.read_rad()
+    wired.run(4.0)
+    assert moved_deg(wired) > 30.0
+
+
+def test_without_the_watch_a_runaway_runs_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DriveWatch, "judge", lambda *_: {})
+    wired = standing(20.0)
+    wired.up()
+    wired.happen(ELBOW, Fault.RUNS_AWAY)
+    wired.run(0.5)
+    assert moved_deg(wired) > 12.0
+
+
+def test_without_counting_answers_two_drives_of_one_id_are_not_called_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(DriveWatch, "answered", lambda *_: "")
+    monkeypatch.setattr(Drive, "_notice_second", lambda *_: None)
+    assert "two drives" not in wrong_from_the_start(Fault.DOUBLE_ID).network.faults.get(ELBOW, "")
+
+
+@pytest.mark.parametrize("kept", ["answered", "_notice_second"])
+def test_either_way_alone_finds_two_drives_of_one_id(monkeypatch: pytest.MonkeyPatch, kept: str) -> None:
+    if kept != "answered":
+        monkeypatch.setattr(DriveWatch, "answered", lambda *_: "")
+    else:
+        monkeypatch.setattr(Drive, "_notice_second", lambda *_: None)
+    assert "two drives" in wrong_from_the_start(Fault.DOUBLE_ID).network.faults[ELBOW]
+
+
+# boundaries
+
+
+def place(**changes: object) -> Place:
+    good: dict[str, object] = {
+        "drive_rad": 0.5, "encoder_rad": 0.5, "last_known_rad": None, "limits_rad": (-1.0, 1.0),
+        "increments_per_rad": 1e4, "zero_increments": 0,
+    }  # fmt: skip
+    return Place(**(good | changes))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_each_check_at_its_boundary(sign: int) -> None:
+    window = np.radians(2.0)
+    assert not refusal(place(encoder_rad=0.5 + sign * (window - 1e-9)), READY)
+    assert refusal(place(encoder_rad=0.5 + sign * (window + 1e-9)), READY)
+    at = sign * (1.0 + SLACK_RAD)
+    assert not refusal(place(drive_rad=at - sign * 1e-9, encoder_rad=at), READY)
+    assert refusal(place(drive_rad=at + sign * 1e-9, encoder_rad=at), READY)
+    blind = {"encoder_rad": None}
+    assert not refusal(place(**blind, last_known_rad=0.5 + sign * (LAST_KNOWN_RAD - 1e-9)), READY)
+    assert "tandem home" in refusal(
+        place(**blind, last_known_rad=0.5 + sign * (LAST_KNOWN_RAD + 1e-9)), READY
+    )
+    assert "tandem home" in refusal(place(**blind), READY)
+
+
+@pytest.mark.parametrize("bit", [VOLTAGE, REMOTE, LIMITED, FOLLOWS])
+def test_each_bit_alone_is_a_reason(bit: int) -> None:
+    assert amiss(GOOD) == ""
+    assert amiss(GOOD ^ bit)
+    # before it is enabled a drive need neither follow nor have voltage
+    assert bool(amiss(READY & ~FOLLOWS ^ bit, enabled=False)) == (bit in (REMOTE, LIMITED))
