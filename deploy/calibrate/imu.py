@@ -60,6 +60,7 @@ def _gist(found: InertialCalibration) -> dict[str, Any]:
     return {
         "still_intervals": len(found.still),
         "attitudes": found.attitudes,
+        "evidence": [one.as_report() for one in found.evidence],
         "moves": len(found.gyroscope.errors_rad),
         "accelerometer_cost_m4_s8": found.accelerometer.cost,
         "gyroscope_cost": found.gyroscope.cost,

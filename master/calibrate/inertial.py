@@ -12,9 +12,11 @@ from common.calibration import Made
 from common.quaternion import Array
 from master.calibrate import accelerometer as acc
 from master.calibrate import gyroscope as gyr
+from master.calibrate import inertial_evidence as compare
+from master.calibrate.evidence import Evidence, refuse_contradictions
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
-from master.calibrate.soundness import check_inertial, check_samples, filled
+from master.calibrate.soundness import check_inertial, check_samples, filled, without_zeros
 from master.calibrate.still import (
     THRESHOLDS,
     Intervals,
@@ -43,11 +45,9 @@ _WORST_GAIN, _WORST_BIAS_M_S2 = 0.02, 0.1
 _WORST_GYRO_GAIN = 0.02
 _MOST_COMMON_GAIN = 0.1
 """Makers keep to 3 % (MPU-6050); a wrong rate is a factor on all axes."""
-_PLAUSIBLE_ERROR_RAD = 0.2
-"""Of gravity after a move, by an uncalibrated gyro in the right unit."""
 _ONE_DEGREE = np.pi / 180.0
-_HOPELESS_ERROR_RAD, _WORST_ERROR_RAD = 30.0 * _ONE_DEGREE, 5.0 * _ONE_DEGREE
-"""Of gravity after a move, on average: with the best single scale, and calibrated."""
+_HOPELESS_ERROR_RAD = 30.0 * _ONE_DEGREE
+"""Of gravity after a move, on average, with the best single scale."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +78,8 @@ class InertialCalibration:
     counts: bool
     """The maps take raw counts."""
     notes: tuple[str, ...] = field(default=())
+    evidence: tuple[Evidence, ...] = ()
+    """What was compared before this was believed."""
 
     def parts(self, day: date, recording: str) -> dict[Part, tuple[Array, Made]]:
         """As `write_calibration` takes them."""
@@ -113,35 +115,52 @@ def calibrate_inertial(
 
     `progress` hears what share is done.
     """
+    recording = without_zeros(recording)
     check_samples("accelerometer", recording.acc_m_s2)
     check_samples("gyroscope", recording.gyr_rad_s)
+    gravity = options.gravity_m_s2
+    evidence = [] if recording.counts else [compare.known_unit(_median_norm(recording), gravity)]
+    refuse_contradictions(evidence)
     rates = filled(recording.gyr_rad_s, round(_LONGEST_GAP_S * recording.rate_hz))
     level = motion_level(rates, recording.rate_hz)
     rest = stillest_level(level, floor=1.0 if recording.counts else 1e-3)
     check_inertial(recording, level, _CLIP_WATCH * rest)
+    evidence += refuse_contradictions(compare.ranges(recording, rates[level < 2.0 * rest]))
     still, readings, first = _best_stills(recording, level, rest, options)
-    fit = acc.fit_accelerometer(readings, options.gravity_m_s2, first)
-    attitudes = _check_attitudes(fit, readings, options.gravity_m_s2)
+    fit = acc.fit_accelerometer(readings, gravity, first)
+    attitudes = _check_attitudes(fit, readings, gravity)
     progress(0.1)
     moves, still_rates = _moves(recording, rates, still, readings @ fit.gain.T + fit.gain @ fit.bias)
-    scale = _gyro_unit(moves, counts=recording.counts)
+    scale, axes = _gyro_unit(moves, counts=recording.counts)
+    evidence += [axes, *compare.found_accelerometer(fit, gravity, counts=recording.counts)]
+    refuse_contradictions(evidence)
     progress(0.2)
     held = np.concatenate([rates[a:b] for a, b in still])
     noise = np.nanstd(held, axis=0) / np.sqrt(len(held))
     turned = gyr.fit_gyroscope(moves, still_rates, noise, scale, lambda share: progress(0.2 + 0.8 * share))
+    found = compare.found_gyroscope(turned, scale)
+    # what does not fit, then what is not determined, then what is not plausible
+    refuse_contradictions(found[:1])
     _check_gyro(turned, scale, counts=recording.counts)
-    plain = acc.nominal(readings, options.gravity_m_s2, counts=recording.counts)
+    evidence += refuse_contradictions(found)
+    plain = acc.nominal(readings, gravity, counts=recording.counts)
     return InertialCalibration(
         name=recording.name,
         still=still,
         attitudes=attitudes,
         accelerometer=fit,
         gyroscope=turned,
-        acc_before_m_s2=acc.norm_errors(plain, readings, options.gravity_m_s2),
+        acc_before_m_s2=acc.norm_errors(plain, readings, gravity),
         gyr_before_rad=gyr.gravity_errors(scale * np.eye(3), moves),
         counts=recording.counts,
-        notes=_notes(recording, attitudes, len(moves.counts), len(still) - 1),
+        notes=(*recording.notes, *_notes(recording, attitudes, len(moves.counts), len(still) - 1)),
+        evidence=tuple(evidence),
     )
+
+
+def _median_norm(recording: NodeRecording) -> float:
+    norms = np.linalg.norm(recording.acc_m_s2, axis=1)
+    return float(np.median(norms[np.isfinite(norms)]))
 
 
 def _best_stills(
@@ -158,7 +177,9 @@ def _best_stills(
         if len(still) < FEWEST_STILL:
             continue
         readings = interval_means(recording.acc_m_s2, still)
-        _check_acc_unit(readings, options.gravity_m_s2, counts=recording.counts)
+        if not recording.counts:
+            at_rest = float(np.median(np.linalg.norm(readings, axis=1)))
+            refuse_contradictions([compare.acceleration_unit(at_rest, options.gravity_m_s2)])
         first = acc.start(readings, options.gravity_m_s2, counts=recording.counts)
         theta = acc.solve(readings, options.gravity_m_s2, first)
         error = float(np.mean(np.abs(acc.norm_errors(theta, readings, options.gravity_m_s2))))
@@ -174,21 +195,6 @@ def _best_stills(
     best = min(f[1] for f in candidates)
     _, _, still, readings, theta = next(f for f in candidates if f[1] <= _AS_GOOD * best)
     return still, readings, theta
-
-
-def _check_acc_unit(readings: Array, gravity_m_s2: float, *, counts: bool) -> None:
-    if counts:
-        return
-    norm = float(np.median(np.linalg.norm(readings, axis=1)))
-    if 0.7 < norm < 1.3:
-        raise RecordingError(
-            f"the accelerometer reads {norm:.3g} at rest: that is g, not m/s²; multiply by 9.81"
-        )
-    if not 0.5 < norm / gravity_m_s2 < 1.5:
-        raise RecordingError(
-            f"the accelerometer reads {norm:.3g} m/s² at rest, not {gravity_m_s2:.3g}; "
-            "are its readings in m/s²?"
-        )
 
 
 def _check_attitudes(fit: acc.AccelerometerFit, readings: Array, gravity_m_s2: float) -> int:
@@ -228,16 +234,25 @@ def _moves(recording: NodeRecording, rates: Array, still: Intervals, force: Arra
     ), still_rates
 
 
-def _gyro_unit(moves: gyr.Moves, *, counts: bool) -> float:
-    """rad/s of one unit of the readings: 1 where they are in rad/s, and refused where they cannot be."""
-    if not counts and np.mean(gyr.gravity_errors(np.eye(3), moves)) < _PLAUSIBLE_ERROR_RAD:
-        return 1.0
+def _gyro_unit(moves: gyr.Moves, *, counts: bool) -> tuple[float, Evidence]:
+    """rad/s of one unit of the readings, 1 where they are in rad/s, and what gravity says of the axes.
+
+    Refused where neither another unit nor other axes explain it.
+    """
+    scale = gyr.nominal_scale(moves) if counts else 1.0
+    plain = float(np.mean(gyr.gravity_errors(scale * np.eye(3), moves)))
+    axes = compare.gyroscope_axes(moves, scale, counts=counts)
+    if plain < compare.PLAUSIBLE_ERROR_RAD or axes.verdict == "contradicts":
+        return scale, axes
     scale = gyr.nominal_scale(moves)
     error = float(np.mean(gyr.gravity_errors(scale * np.eye(3), moves)))
     if error > _HOPELESS_ERROR_RAD:
-        raise _unexplained(error)
+        raise RecordingError(
+            f"the gyroscope does not explain how gravity turns ({error / _ONE_DEGREE:.0f}° off on average); "
+            "were samples lost, or are its axes not the accelerometer's?"
+        )
     if counts:
-        return scale
+        return scale, axes
     if 0.8 < scale / _ONE_DEGREE < 1.25:
         raise RecordingError("the gyroscope's readings are in °/s, not rad/s; multiply them by π/180")
     if not 0.8 < scale < 1.25:
@@ -245,21 +260,11 @@ def _gyro_unit(moves: gyr.Moves, *, counts: bool) -> float:
             f"gravity turns {scale:.2g} times as far as the gyroscope says; is the rate of the recording "
             "right, and are the readings in rad/s?"
         )
-    return 1.0
-
-
-def _unexplained(error_rad: float) -> RecordingError:
-    return RecordingError(
-        f"the gyroscope does not explain how gravity turns ({error_rad / _ONE_DEGREE:.0f}° off on average); "
-        "were samples lost, or are its axes not the accelerometer's?"
-    )
+    return 1.0, axes
 
 
 def _check_gyro(fit: gyr.GyroscopeFit, scale: float, *, counts: bool) -> None:
     worst = float(fit.sigma.max()) / scale
-    error = float(np.mean(fit.errors_rad))
-    if error > _WORST_ERROR_RAD:
-        raise _unexplained(error)
     if not worst < _WORST_GYRO_GAIN:
         raise RecordingError(
             f"the moves do not determine the gyroscope's matrix (1σ of {100 * worst:.0f} %); "

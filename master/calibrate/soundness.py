@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from common.messages import Mask
@@ -33,6 +35,19 @@ def check_samples(sensor: str, samples: Array, missing: float | None = None) -> 
         raise RecordingError(
             f"the {sensor} reads the same all along on {axes}; it is broken or not connected"
         )
+
+
+def without_zeros(recording: NodeRecording) -> NodeRecording:
+    """The recording without accelerometer readings of zero on all axes: under gravity there are none.
+
+    Not so for raw counts, of which zero is the end of the range.
+    """
+    zeros = np.all(recording.acc_m_s2 == 0.0, axis=1)
+    if recording.counts or not zeros.any() or zeros.mean() > _MOST_MISSING:
+        return recording
+    force = np.where(zeros[:, None], np.nan, recording.acc_m_s2)
+    note = f"{int(zeros.sum())} accelerometer readings of zero on all axes dropped"
+    return replace(recording, acc_m_s2=force, notes=(*recording.notes, note))
 
 
 def check_clipped(sensor: str, samples: Array, watched: Mask, shortest: int, remedy: str) -> None:

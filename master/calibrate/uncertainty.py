@@ -12,8 +12,11 @@ def covariance(jacobian: Array, residuals: Array, freedom: int, *, least_varianc
     """Covariance (P, P) of the P parameters of a least-squares fit, s² (JᵀJ)⁻¹.
 
     J is (M, P) and s² the residuals' sum of squares over the `freedom` left, at least `least_variance`.
-    Infinite where the data cannot tell the parameters.
+    Where few degrees of freedom are left s² itself is not sure: it is enlarged so that 1.96 σ is Student's
+    95 % bound. Infinite where the data cannot tell the parameters.
     """
+    from scipy.stats import t
+
     scale = np.linalg.norm(jacobian, axis=0)
     count = jacobian.shape[1]
     if freedom <= 0 or not np.all(scale > 0.0):
@@ -21,7 +24,8 @@ def covariance(jacobian: Array, residuals: Array, freedom: int, *, least_varianc
     _, singular, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
     if not singular[-1] > 1e-12 * singular[0]:
         return np.full((count, count), np.inf)
-    variance = max(float(residuals @ residuals) / freedom, least_variance)
+    student = float(t.ppf(0.975, freedom)) / 1.96
+    variance = max(float(residuals @ residuals) / freedom * student**2, least_variance)
     inverse = rows.T / singular**2 @ rows
     out: Array = variance * inverse / np.outer(scale, scale)
     return out

@@ -147,6 +147,36 @@ def swapped(r: NodeRecording) -> NodeRecording:
     return NodeRecording("unit", r.rate_hz, r.acc_m_s2, r.gyr_rad_s[:, [1, 0, 2]])
 
 
+def in_degrees_and_swapped(r: NodeRecording) -> NodeRecording:
+    return NodeRecording("unit", r.rate_hz, r.acc_m_s2, np.degrees(r.gyr_rad_s[:, [1, 0, 2]]))
+
+
+def negated(r: NodeRecording) -> NodeRecording:
+    return NodeRecording("unit", r.rate_hz, r.acc_m_s2, r.gyr_rad_s * [1.0, 1.0, -1.0])
+
+
+def mirrored_acc(r: NodeRecording) -> NodeRecording:
+    return NodeRecording("unit", r.rate_hz, r.acc_m_s2 * [-1.0, 1.0, 1.0], r.gyr_rad_s)
+
+
+def briefly_clipped_gyro(r: NodeRecording) -> NodeRecording:
+    limit = 0.93 * np.abs(r.gyr_rad_s).max()
+    return NodeRecording("unit", r.rate_hz, r.acc_m_s2, np.clip(r.gyr_rad_s, -limit, limit))
+
+
+def few_in_g(r: NodeRecording) -> NodeRecording:
+    return NodeRecording("unit", r.rate_hz, r.acc_m_s2[:3000] / 9.81, r.gyr_rad_s[:3000])
+
+
+def in_milli_g(r: NodeRecording) -> NodeRecording:
+    return NodeRecording("unit", r.rate_hz, r.acc_m_s2 / 9.81e-3, r.gyr_rad_s)
+
+
+def counts_negated(r: NodeRecording) -> NodeRecording:
+    acc, gyr = np.rint(r.acc_m_s2 * 417.0), np.rint(r.gyr_rad_s * [-1.0, 1.0, 1.0] * 6258.0)
+    return NodeRecording("unit", r.rate_hz, acc, gyr, counts=True)
+
+
 def few(r: NodeRecording) -> NodeRecording:
     return NodeRecording("unit", r.rate_hz, r.acc_m_s2[:3000], r.gyr_rad_s[:3000])
 
@@ -164,6 +194,16 @@ def few(r: NodeRecording) -> NodeRecording:
         (in_g, r"that is g, not m/s²"),
         (in_degrees, r"in °/s, not rad/s"),
         (swapped, r"gravity turns|does not explain how gravity turns"),
+        (in_degrees_and_swapped, r"gyroscope's x and y axes are swapped.*in °/s, not rad/s"),
+        (
+            negated,
+            r"does not explain how gravity turns .*the gyroscope's z axis is negated \(a mirror image\)",
+        ),
+        (mirrored_acc, r"the accelerometer's x axis is negated \(a mirror image\)"),
+        (counts_negated, r"the gyroscope's x axis is negated"),
+        (briefly_clipped_gyro, r"gyroscope is clipped"),
+        (few_in_g, r"that is g, not m/s²"),
+        (in_milli_g, r"thousandths of g"),
         (few, r"too few attitudes: 7 rests"),
     ],
 )
