@@ -11,7 +11,6 @@ from common.clock import NS_PER_S, Clock, monotonic_ns
 from common.pacing import Due, TickGrid
 
 _CLOCK_MONOTONIC = 1
-_TFD_TIMER_ABSTIME = 1
 _EXPIRATIONS_BYTES = 8
 
 
@@ -30,46 +29,60 @@ async def ticks(grid: TickGrid, clock: Clock = monotonic_ns) -> AsyncGenerator[D
     clock, or one that runs with it. The timer is closed when the iteration ends or is cancelled.
     """
     loop = asyncio.get_running_loop()
-    timer = _open_timer(grid.next_ns, grid.period_ns)
+    timer = _Timer()
     waiter: asyncio.Future[None] = loop.create_future()
 
     def on_expired() -> None:
-        try:
-            os.read(timer, _EXPIRATIONS_BYTES)
-        except BlockingIOError:
-            return
-        if not waiter.done():
+        if timer.expired() and not waiter.done():
             waiter.set_result(None)
 
-    loop.add_reader(timer, on_expired)
+    loop.add_reader(timer.fd, on_expired)
     try:
         while True:
-            if clock() >= grid.next_ns:
+            # the timer runs by the steered clock: it is set for each tick, and again where it was early
+            wait_ns = grid.next_ns - clock()
+            if wait_ns <= 0:
                 await asyncio.sleep(0)
             else:
                 waiter = loop.create_future()
+                timer.set(wait_ns)
                 await waiter
             due = grid.due(clock())
             if due is not None:
                 yield due
     finally:
-        loop.remove_reader(timer)
-        os.close(timer)
+        loop.remove_reader(timer.fd)
+        timer.close()
 
 
-def _open_timer(first_ns: int, period_ns: int) -> int:
-    """A non-blocking timerfd that expires at first_ns + k * period_ns of CLOCK_MONOTONIC."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    timer = int(libc.timerfd_create(_CLOCK_MONOTONIC, os.O_NONBLOCK | os.O_CLOEXEC))
-    if timer < 0:
-        raise OSError(ctypes.get_errno(), "no kernel timer: timerfd_create")
-    # an absolute time of 0 would disarm it
-    setting = _Itimerspec(_timespec(period_ns), _timespec(max(first_ns, 1)))
-    if libc.timerfd_settime(timer, _TFD_TIMER_ABSTIME, ctypes.byref(setting), None) != 0:
-        number = ctypes.get_errno()
-        os.close(timer)
-        raise OSError(number, "no kernel timer: timerfd_settime")
-    return timer
+class _Timer:
+    """A non-blocking timerfd that expires once, so long after it was set."""
+
+    def __init__(self) -> None:
+        self._libc = ctypes.CDLL(None, use_errno=True)
+        self.fd = int(self._libc.timerfd_create(_CLOCK_MONOTONIC, os.O_NONBLOCK | os.O_CLOEXEC))
+        if self.fd < 0:
+            raise OSError(ctypes.get_errno(), "no kernel timer: timerfd_create")
+        self._setting = _Itimerspec()
+        self._by_reference = ctypes.byref(self._setting)
+
+    def set(self, wait_ns: int) -> None:
+        """Expire so much later, above 0."""
+        self._setting.it_value = _timespec(wait_ns)
+        if self._libc.timerfd_settime(self.fd, 0, self._by_reference, None) != 0:
+            raise OSError(ctypes.get_errno(), "no kernel timer: timerfd_settime")
+
+    def expired(self) -> bool:
+        """Whether it has; asking begins anew."""
+        try:
+            os.read(self.fd, _EXPIRATIONS_BYTES)
+        except BlockingIOError:
+            return False
+        return True
+
+    def close(self) -> None:
+        """It expires no more."""
+        os.close(self.fd)
 
 
 def _timespec(time_ns: int) -> _Timespec:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from common.clock import NS_PER_S
 from common.messages import ClockQuery, ClockReply
-from common.offset.estimator import OffsetEstimator
+from common.offset.estimator import RAW_CLOCKS, OffsetEstimator
 
 REMEMBERED = 16
 """Exchanges that may be under way, or lost, before one is forgotten."""
@@ -27,7 +27,7 @@ class MasterExchange:
 
     def __init__(self, asker: int = 0) -> None:
         self.asker = asker
-        self.estimator = OffsetEstimator()
+        self.estimator = OffsetEstimator(RAW_CLOCKS)
         self.foreign = 0
         """Replies to questions that were not asked, or answered before."""
         self._asked: dict[int, None] = {}
@@ -100,7 +100,7 @@ class _Asker:
     """
 
     def __init__(self) -> None:
-        self.estimator = OffsetEstimator()
+        self.estimator = OffsetEstimator(RAW_CLOCKS)
         self._replied: dict[int, int] = {}
         self._measured_ns: int | None = None
 

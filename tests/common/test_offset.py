@@ -6,7 +6,16 @@ from hypothesis import strategies as st
 
 from common.clock import NS_PER_S, to_ns
 from common.messages import ClockQuery, ClockReply
-from common.offset import NEVER_MEASURED, UNKNOWN_NS, MasterExchange, Offset, OffsetEstimator, SlaveExchange
+from common.offset import (
+    NEVER_MEASURED,
+    RAW_CLOCKS,
+    UNKNOWN_NS,
+    MasterExchange,
+    Offset,
+    OffsetEstimator,
+    RateLaw,
+    SlaveExchange,
+)
 from common.offset.exchange import MOST_ASKERS
 
 MS = 1_000_000
@@ -61,7 +70,7 @@ def test_the_truth_lies_within_the_bound_whatever_the_delays(
     ahead_ns: int, drift_ppm: float, start_ns: int, legs: list[tuple[int, ...]], later_ns: int
 ) -> None:
     remote = RemoteClock(ahead_ns, drift_ppm, start_ns)
-    estimator = OffsetEstimator()
+    estimator = OffsetEstimator(RAW_CLOCKS)
     now_ns = start_ns
     for pause_ns, out_ns, held_ns, back_ns in legs:
         now_ns = exchange(estimator, remote, now_ns + pause_ns, out_ns, held_ns, back_ns)
@@ -98,7 +107,7 @@ def steady(
 
 def test_equal_delays_give_the_offset_itself_and_half_the_round_trip_as_bound() -> None:
     remote = RemoteClock(5 * HOUR, 0.0, 0)
-    estimator = OffsetEstimator()
+    estimator = OffsetEstimator(RAW_CLOCKS)
     now_ns = steady(estimator, remote, 60)
     offset = estimator.estimate(now_ns)
     assert abs(offset.offset_ns - remote.ahead_ns) < 10
@@ -108,7 +117,7 @@ def test_equal_delays_give_the_offset_itself_and_half_the_round_trip_as_bound() 
 
 def test_one_way_only_is_off_by_exactly_the_bound() -> None:
     remote = RemoteClock(0, 0.0, 0)
-    estimator = OffsetEstimator(max_drift_ppm=0.0, wander_ppm=0.0)
+    estimator = OffsetEstimator(RateLaw(0.0, 0.0))
     now_ns = exchange(estimator, remote, 0, 10 * MS, 0, 0)
     offset = estimator.estimate(now_ns)
     assert offset.offset_ns == 5 * MS
@@ -118,7 +127,7 @@ def test_one_way_only_is_off_by_exactly_the_bound() -> None:
 def test_the_drift_within_a_long_exchange_is_in_the_bound() -> None:
     for drift_ppm in (100.0, -100.0):
         remote = RemoteClock(0, drift_ppm, 0)
-        estimator = OffsetEstimator()
+        estimator = OffsetEstimator(RAW_CLOCKS)
         # held for 10 s without any delay: by their clock, longer or shorter than we waited
         now_ns = exchange(estimator, remote, 0, 0, 10 * NS_PER_S, 0)
         assert holds(estimator.estimate(now_ns), remote, now_ns)
@@ -126,17 +135,17 @@ def test_the_drift_within_a_long_exchange_is_in_the_bound() -> None:
 
 def test_the_shortest_round_trip_decides() -> None:
     remote = RemoteClock(0, 0.0, 0)
-    estimator = OffsetEstimator()
+    estimator = OffsetEstimator(RAW_CLOCKS)
     exchange(estimator, remote, 0, 50 * MS, 0, 90 * MS)
     now_ns = exchange(estimator, remote, NS_PER_S, MS, 0, MS)
     good = estimator.estimate(now_ns).bound_ns
     now_ns = exchange(estimator, remote, 2 * NS_PER_S, 50 * MS, 0, 90 * MS)
-    assert estimator.estimate(now_ns).bound_ns <= good + 300_000  # a second's drift at 200 ppm
+    assert estimator.estimate(now_ns).bound_ns <= good + 600_000  # a second's drift at 500 ppm
 
 
 def test_the_drift_is_fitted_and_makes_a_stale_offset_last() -> None:
     remote = RemoteClock(0, 80.0, 0)
-    estimator = OffsetEstimator()
+    estimator = OffsetEstimator(RAW_CLOCKS)
     now_ns = steady(estimator, remote, 60, out_us=30, back_us=60, jitter_us=100)
     assert abs(estimator.drift_ppm - 80) < 5
     later_ns = now_ns + 20 * NS_PER_S
@@ -148,7 +157,7 @@ def test_the_drift_is_fitted_and_makes_a_stale_offset_last() -> None:
 
 def test_a_long_round_trip_says_nothing_of_the_drift() -> None:
     remote = RemoteClock(0, 80.0, 0)
-    estimator = OffsetEstimator()
+    estimator = OffsetEstimator(RAW_CLOCKS)
     steady(estimator, remote, 60, out_us=60_000, back_us=60_000)
     assert estimator.drift_ppm == 0.0
 
@@ -169,7 +178,7 @@ def test_it_is_trusted_from_the_third_exchange_and_until_it_is_stale() -> None:
 
 
 def test_a_step_of_the_other_clock_begins_anew() -> None:
-    estimator = OffsetEstimator()
+    estimator = OffsetEstimator(RAW_CLOCKS)
     now_ns = steady(estimator, RemoteClock(0, 0.0, 0), 10)
     stepped = RemoteClock(10 * MS, 0.0, 0)
     now_ns = exchange(estimator, stepped, now_ns + MS, 200_000, 0, 200_000)
@@ -183,14 +192,14 @@ def test_a_step_of_the_other_clock_begins_anew() -> None:
 
 
 def test_a_jump_within_the_bounds_is_no_step() -> None:
-    estimator = OffsetEstimator()
+    estimator = OffsetEstimator(RAW_CLOCKS)
     now_ns = steady(estimator, RemoteClock(0, 0.0, 0), 10)
     exchange(estimator, RemoteClock(300_000, 0.0, 0), now_ns + MS, 200_000, 0, 200_000)
     assert estimator.steps == 0
 
 
 def test_impossible_stamps_are_refused_and_change_nothing() -> None:
-    estimator = OffsetEstimator()
+    estimator = OffsetEstimator(RAW_CLOCKS)
     now_ns = steady(estimator, RemoteClock(0, 0.0, 0), 2)
     before = estimator.estimate(now_ns)
     assert not estimator.add(now_ns + 10, now_ns, now_ns, now_ns + 5)  # heard before asked
