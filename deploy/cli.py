@@ -30,6 +30,7 @@ from deploy.output import in_a_folder, write_json
 from deploy.panels import arrange
 from deploy.record.command import record, recording
 from deploy.router.command import router
+from deploy.servos import servos
 from deploy.soak.command import soak
 from deploy.trial.command import app as trial_app
 from deploy.video import video
@@ -51,6 +52,7 @@ app.command()(drives)
 app.command()(attitude)
 app.command()(faults)
 app.command()(router)
+app.command()(servos)
 app.command()(doctor)
 app.command()(record)
 app.command()(recording)

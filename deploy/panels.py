@@ -7,7 +7,7 @@ import typer
 PANELS = {
     "Run": ("demo", "master", "slave", "suit", "router", "drives"),
     "People": ("engage", "disengage", "estop", "reset", "status", "attitude", "video"),
-    "Set up": ("doctor", "calibrate", "keys", "record", "recording"),
+    "Set up": ("doctor", "servos", "calibrate", "keys", "record", "recording"),
     "Judge": ("trial", "soak", "faults", "bench", "accuracy", "network"),
 }
 """In the order of the help."""

@@ -2,8 +2,8 @@
 
 A bit that flips on the wire turns one frame's angle into another, often one that looks sound. The median of
 the newest three frames, angle by angle, lies within what the other two say: a single false frame shows no
-more than that the instrument moved as it did. What then still moves faster than the base can is not told before
-three frames agree on it.
+more than that the instrument moved as it did. What then still moves faster than the base can is not told
+before three frames agree on it.
 
 How late this makes a true tilt: it is told with the second frame beyond a limit; after a turn
 faster than `most_rad_s` with the third frame that agrees. Where frames go on contradicting each other nothing

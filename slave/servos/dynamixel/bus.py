@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -53,6 +54,13 @@ class Bus:
         self._packets: Any = PacketHandler(_PROTOCOL)
         self.broken = 0
         """Answers that were cut short or failed their checksum."""
+        self.quickest_s = 0.0
+        """The least time from a request to one servo to its answer; 0 before any."""
+
+    @property
+    def late_bytes(self) -> int:
+        """Bytes that came when nobody waited for them any more."""
+        return self._port.late_bytes
 
     def close(self) -> None:
         """Safe to call twice."""
@@ -146,9 +154,12 @@ class Bus:
             if i:
                 # the answer that did not come in time must not be taken for the next one's
                 self._port.settle()
+            asked_s = time.monotonic()
             answer = ask()
+            took_s = time.monotonic() - asked_s
             result, error = answer[-2:]
             if result == COMM_SUCCESS:
+                self.quickest_s = min(self.quickest_s or took_s, took_s)
                 refusal = error & ~_ALERT
                 if not refusal:
                     return answer

@@ -15,9 +15,10 @@ from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT, Counts, EncoderConfig
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
 from slave.servos.dynamixel.config import WATCHDOG_UNIT_S, DynamixelConfig
+from slave.servos.dynamixel.latency import BEST_MS, advice, timer_ms, too_late
 from slave.servos.dynamixel.port import Port, PortLostError
 from slave.servos.dynamixel.settings import Settings, settings_of
-from slave.servos.dynamixel.startup import arm, prepare
+from slave.servos.dynamixel.startup import arm, inspect, prepare
 from slave.servos.servos import EncoderReading
 
 log = logging.getLogger("tandem.slave.dynamixel")
@@ -61,6 +62,7 @@ class Driver:
         self._retry_ns = 0
         self._sent_ns = 0
         self._polled = 0
+        self._late_before = 0
         self._stopping = False
         self._misses = np.zeros(count, np.int64)
         self._stands: Counts = np.zeros(count, np.int64)  # as the servos tell it: below 0 past their end
@@ -82,22 +84,45 @@ class Driver:
         return self._broken_before + (self._bus.broken if self._bus else 0)
 
     def start(self) -> None:
-        """Open the port and make all servos ready. Raises RobotError naming what cannot be used."""
+        """Open the port and make all servos ready. Raises RobotError naming what cannot be used.
+
+        All are looked at before anything is written: a refusal leaves them as they were.
+        """
         try:
-            self._open()
+            bus = self._open()
+            with bus.patient(_START_PATIENCE_S):
+                wrong = self._inspect(bus)
+                late = too_late(self._config.port, bus.quickest_s, self._config.reply_timeout_s)
+            if wrong or late:
+                self._drop()
+                raise RobotError(self._cannot_be_used(wrong) if wrong else f"{self._config.port}: {late}")
             wrong = self._prepare(self._servos, _START_PATIENCE_S)
         except PortLostError:
             self._drop()
             raise
         if wrong:
             self.close()
-            lines = "\n".join(f"  {servo.joint} (id {servo.id}): {why}" for servo, why in wrong)
-            raise RobotError(
-                f"{self._config.port}: {len(wrong)} of {len(self._servos)} servos cannot be used; "
-                f"check power, cable, ids and baud rate:\n{lines}"
-            )
+            raise RobotError(self._cannot_be_used(wrong))
         self._faults.clear()
         self._publish()
+
+    def _cannot_be_used(self, wrong: list[tuple[Settings, str]]) -> str:
+        timer = timer_ms(self._config.port)
+        slow = f"; {advice(self._config.port, timer)}" if timer is not None and timer > BEST_MS else ""
+        lines = "\n".join(f"  {servo.joint} (id {servo.id}): {why}" for servo, why in wrong)
+        return (
+            f"{self._config.port}: {len(wrong)} of {len(self._servos)} servos cannot be used; "
+            f"check power, cable, ids and baud rate{slow}:\n{lines}"
+        )
+
+    def _inspect(self, bus: Bus) -> list[tuple[Settings, str]]:
+        wrong = []
+        for servo in self._servos:
+            try:
+                inspect(bus, servo)
+            except ServoError as error:
+                wrong.append((servo, str(error)))
+        return wrong
 
     def cycle(self, setpoint_rad: Array | None, stop: bool = False) -> None:
         """Write the setpoints (J,), read the positions, look after one servo's health.
@@ -124,7 +149,7 @@ class Driver:
             # waiting by it for so long that they stop
             patience_s = to_s(self._watchdog_ns) / 4.0
             faulty = [servo for servo in self._servos if servo.joint in self._faults]
-            self._prepare(faulty, min(patience_s, _START_PATIENCE_S))
+            self._prepare(faulty, min(patience_s, _START_PATIENCE_S), inspected=False)
         except PortLostError as error:
             self._lose(error)
         self._publish()
@@ -183,16 +208,20 @@ class Driver:
 
     # the servos
 
-    def _prepare(self, servos: list[Settings], patience_s: float) -> list[tuple[Settings, str]]:
+    def _prepare(
+        self, servos: list[Settings], patience_s: float, inspected: bool = True
+    ) -> list[tuple[Settings, str]]:
         assert self._bus is not None
         with self._bus.patient(patience_s):
-            return self._prepare_on(self._bus, servos)
+            return self._prepare_on(self._bus, servos, inspected)
 
-    def _prepare_on(self, bus: Bus, servos: list[Settings]) -> list[tuple[Settings, str]]:
+    def _prepare_on(self, bus: Bus, servos: list[Settings], inspected: bool) -> list[tuple[Settings, str]]:
         wrong = []
         for servo in servos:
             j = self._joint_of[servo.id]
             try:
+                if not inspected:
+                    inspect(bus, servo)
                 self._goal[j] = self._stands[j] = prepare(bus, servo)
             except ServoError as error:
                 wrong.append((servo, str(error)))
@@ -214,6 +243,8 @@ class Driver:
 
     def _converse(self, bus: Bus, setpoint_rad: Array | None, stop: bool) -> None:
         self._notice_gap()
+        if not self._misses.any():
+            self._late_before = bus.late_bytes
         self._aim(setpoint_rad, stop)
         well = [j for j, servo in enumerate(self._servos) if servo.joint not in self._faults]
         bus.write_all(x.GOAL_POSITION, {self._servos[j].id: int(self._goal[j]) for j in well})
@@ -270,7 +301,12 @@ class Driver:
         self.missed += 1
         self._misses[j] += 1
         if self._misses[j] >= self._config.silent_after:
-            self._fault(self._servos[j], f"servo {self._servos[j].id} does not answer")
+            late = self._bus.late_bytes if self._bus is not None else 0
+            words = f"servo {self._servos[j].id} does not answer"
+            if late > self._late_before:
+                timer = advice(self._config.port, timer_ms(self._config.port))
+                words = f"servo {self._servos[j].id} answers too late ({late} bytes came late): {timer}"
+            self._fault(self._servos[j], words)
 
     def _look_after(self, bus: Bus, j: int) -> None:
         """Read one servo's health. One that was silent is asked only here, so it costs one wait a round."""

@@ -37,6 +37,8 @@ class Port:
         self._byte_s = _BITS_PER_BYTE / baud
         self._deadline_s = 0.0
         self._received = b""
+        self.late_bytes = 0
+        """Bytes that came when nobody waited for them any more."""
         with self._named():
             # the adapter would rather fail than let two programs write to one robot
             self._serial = serial.Serial(device, baud, timeout=0, write_timeout=1.0, exclusive=True)
@@ -48,8 +50,9 @@ class Port:
 
     def clearPort(self) -> None:  # noqa: N802
         """Forget what was received before a request: it answers something older."""
-        self._received = b""
         with self._named():
+            self.late_bytes += len(self._received) + self._serial.in_waiting
+            self._received = b""
             self._serial.reset_input_buffer()
 
     def writePort(self, packet: list[int]) -> int:  # noqa: N802

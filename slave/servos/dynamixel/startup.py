@@ -5,18 +5,53 @@ from __future__ import annotations
 from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
+from slave.servos.dynamixel.lasting import HOW, Difference, differences, in_words
 from slave.servos.dynamixel.settings import Settings
 
 _DEG_PER_COUNT = RAD_PER_COUNT * 180.0 / 3.141592653589793
 
 
+def inspect(bus: Bus, servo: Settings) -> None:
+    """Whether a servo can be used as it is. Writes nothing that lasts.
+
+    Raises ServoError, in words, for one that cannot; PortLostError.
+    """
+    different = know(bus, servo)
+    if different:
+        raise ServoError(f"{in_words(different)}; {HOW}")
+    _check_place(servo, x.position_at_end(bus.read_bytes(servo.id, x.PLACE)))
+
+
+def know(bus: Bus, servo: Settings) -> list[Difference]:
+    """Whether it is a servo of this series and well, and what it keeps that must be replaced; only reads.
+
+    Raises ServoError, in words, for one that cannot be used whatever is replaced; PortLostError.
+    """
+    model = bus.ping(servo.id)
+    if not x.is_x_series(model):
+        raise ServoError(f"it is model {model}, not of the X series (model numbers 1000 to 1299)")
+    try:
+        firmware = bus.read(servo.id, x.FIRMWARE)
+    except ServoError:
+        _let_answer(bus, servo)  # it answers a ping, so it may be set to answer nothing else
+        firmware = bus.read(servo.id, x.FIRMWARE)
+    if firmware < x.WATCHDOG_FIRMWARE:
+        raise ServoError(
+            f"its firmware {firmware} has no bus watchdog; update it to {x.WATCHDOG_FIRMWARE} or later"
+        )
+    error = x.hardware_words(bus.read(servo.id, x.HARDWARE_ERROR))
+    if error:
+        raise ServoError(f"{error}; it has let go: mend the cause, switch its power off and on")
+    return differences(bus, servo)
+
+
 def prepare(bus: Bus, servo: Settings) -> int:
-    """Check and set a servo, and switch its torque on with the goal where it stands: counts.
+    """Set a servo that was inspected, and switch its torque on with the goal where it stands: counts.
 
     A servo that holds already never lets go meanwhile. Its watchdog is left off: see `arm`.
-    Raises ServoError, in words, for one that cannot be used; PortLostError.
+    Raises ServoError, PortLostError.
     """
-    _know(bus, servo)
+    _let_answer(bus, servo)
     for register, value in servo.passing:
         bus.write(servo.id, register, value)
     # a servo that its watchdog has stopped refuses goals until this. What it does until the goal is set,
@@ -27,9 +62,6 @@ def prepare(bus: Bus, servo: Settings) -> int:
     stands = x.position_at_end(bus.read_bytes(servo.id, x.PLACE))
     if holding:
         _set_goal(bus, servo, stands)
-    _set_lasting(bus, servo, holding)
-    # read again: the settings decide how a position is told
-    stands = x.position_at_end(bus.read_bytes(servo.id, x.PLACE))
     _check_place(servo, stands)
     if not holding:
         # with the torque on first some servos take the goal that was left from before
@@ -43,33 +75,10 @@ def arm(bus: Bus, servo: Settings) -> None:
     bus.write(servo.id, x.BUS_WATCHDOG, servo.watchdog)
 
 
-def _know(bus: Bus, servo: Settings) -> None:
-    model = bus.ping(servo.id)
-    # by the bus-wide way, which needs no answer: a servo may be set to give none but to a ping
+def _let_answer(bus: Bus, servo: Settings) -> None:
+    # by the bus-wide way, which needs no answer: a servo may be set to give none but to a ping. It is lost
+    # with the power
     bus.write_all(x.STATUS_RETURN, {servo.id: x.ANSWER_ALL})
-    if not x.is_x_series(model):
-        raise ServoError(f"it is model {model}, not of the X series (model numbers 1000 to 1299)")
-    firmware = bus.read(servo.id, x.FIRMWARE)
-    if firmware < x.WATCHDOG_FIRMWARE:
-        raise ServoError(
-            f"its firmware {firmware} has no bus watchdog; update it to {x.WATCHDOG_FIRMWARE} or later"
-        )
-    error = x.hardware_words(bus.read(servo.id, x.HARDWARE_ERROR))
-    if error:
-        raise ServoError(f"{error}; it has let go: mend the cause, switch its power off and on")
-
-
-def _set_lasting(bus: Bus, servo: Settings, holding: bool) -> None:
-    for register, value in servo.lasting:
-        found = bus.read(servo.id, register)
-        if found == value:
-            continue
-        if holding:
-            raise ServoError(
-                f"register {register.address} is {found}, should be {value}, and can be set only while "
-                "the torque is off: support the robot, switch the servos' power off and on"
-            )
-        bus.write(servo.id, register, value)
 
 
 def _set_goal(bus: Bus, servo: Settings, stands: int) -> None:

@@ -43,6 +43,9 @@ class Rig:
         self.config = DynamixelConfig(port=self.port.device, ids=self.ids, **values)
         assert self.config.mistakes_for(self.skeleton, self.encoder_config) == []
         self.driver = Driver(self.config, self.skeleton, self.encoder_config, self.clock)
+        for servo, settings in zip(self.servos, self.driver._servos, strict=True):
+            for register, value in settings.lasting:
+                servo.put(register, value)
 
     def clock(self) -> int:
         return self.now_ns

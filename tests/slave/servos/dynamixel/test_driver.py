@@ -73,13 +73,18 @@ def test_a_start_names_every_servo_that_cannot_be_used_and_why(rig: Rig) -> None
     rig.servos[2].fail(0x24)
     rig.servos[3].position = 4000.0
     rig.servos[4].put(x.OPERATING_MODE, 1)
-    rig.servos[4].put(x.TORQUE, 1)
     with pytest.raises(RobotError) as raised:
         rig.driver.start()
     text = str(raised.value)
     assert "5 of 14 servos" in text
     for j, words in enumerate(
-        ["not of the X series", "no bus watchdog", "overheated, overloaded", "beyond its range", "support"]
+        [
+            "not of the X series",
+            "no bus watchdog",
+            "overheated, overloaded",
+            "beyond its range",
+            "operating mode",
+        ]
     ):
         assert f"{rig.names[j]} (id {rig.ids[rig.names[j]]})" in text
         assert words in text
@@ -93,18 +98,6 @@ def test_a_servo_that_answers_nothing_is_named(make_rig: Callable[..., Rig]) -> 
     rig.servos[5].silent = True
     with pytest.raises(RobotError, match=rf"{rig.names[5]} \(id 15\): it does not answer"):
         rig.driver.start()
-
-
-def test_servos_that_were_set_up_otherwise_are_set_right(rig: Rig) -> None:
-    for servo in rig.servos:
-        servo.put(x.STATUS_RETURN, 0)
-        servo.put(x.HOMING_OFFSET, -300)
-        servo.put(x.DRIVE_MODE, 1)
-        servo.put(x.OPERATING_MODE, 4)
-    rig.driver.start()
-    rig.cycles(2)
-    assert np.abs(rig.measured_rad - rig.start_rad).max() <= COUNT_RAD
-    assert all(servo.get(x.OPERATING_MODE) == x.POSITION_MODE for servo in rig.servos)
 
 
 def test_one_that_falls_silent_is_held_and_named_and_the_others_still_read(rig: Rig) -> None:
@@ -308,15 +301,15 @@ def test_an_answer_that_comes_late_is_never_taken_for_anothers(make_rig: Callabl
             return b""
         return held.pop() + answer if held else answer
 
-    rig.servos[0].put(x.RETURN_DELAY, 77)
     rig.port.garble = hold_back
     rig.driver._servos = rig.driver._servos[:1]
     try:
         assert rig.driver._open() is not None
-        assert rig.driver._prepare(rig.driver._servos, 0.1) == []
+        assert rig.driver._prepare(rig.driver._servos, 0.1, inspected=False) == []
     finally:
         rig.driver.close()
-    assert rig.servos[0].get(x.RETURN_DELAY) == 0
+    assert rig.servos[0].get(x.PROFILE_VELOCITY) == rig.driver._servos[0].velocity
+    assert rig.servos[0].get(x.TORQUE) == 1
 
 
 def test_a_health_that_comes_late_is_no_position(make_rig: Callable[..., Rig]) -> None:
