@@ -72,7 +72,10 @@ def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
     if array[0] != name:
         raise CodecError(f"kind {fields.short(array[0])}, expected {name}")
     if type(array[1]) is not int or array[1] != VERSION:
-        raise CodecError(f"schema version {fields.short(array[1])}, expected {VERSION}")
+        raise CodecError(
+            f"schema version {fields.short(array[1])}, expected {VERSION}: the other side runs another "
+            "version of tandem, install the same on both hosts"
+        )
     message: _Decoded = unpack(array[2:], joints)
     return message
 

@@ -128,6 +128,8 @@ class Action(StrEnum):
     ESTOP = "estop"
     RESET = "reset"
     STATUS = "status"
+    NAMESAKE = "namesake"
+    """Another robot of this name answers too: its holder of the lease says so, and the robot holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +141,7 @@ class ControlRequest:
     operator: str
     """Who asks; `engage` and `disengage` are for the lease holder's name only."""
     key: str = ""
-    """The reset key, for `reset`."""
+    """The reset key, for `reset`; where the other is, for `namesake`."""
     clock: int = 0
     """For `claim`: the asker whose clock queries tell of the clock that stamps this master's commands."""
     challenge: int = 0

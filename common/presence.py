@@ -45,6 +45,17 @@ class Presence:
         return f"{short}/{self.instance:08x}/{version}/{quote(self.place[:_MOST_PLACE], safe=': ,') or '-'}"
 
     @property
+    def other_version(self) -> str:
+        """What to say where its messages are of another version than this process's; empty where not."""
+        if not self.instance or self.schema == SCHEMA:
+            return ""
+        return (
+            f"the {self.role} at {self.words} runs tandem {self.software} with messages of schema "
+            f"{self.schema}, this is tandem {installed('tandem')} with schema {SCHEMA}: but for a stop they "
+            "do not understand each other. Install the same tandem on both hosts"
+        )
+
+    @property
     def words(self) -> str:
         """For people: where it is, and its number."""
         where = self.place or "an unknown place"

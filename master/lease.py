@@ -23,6 +23,8 @@ class LeaseKeeper:
         self._next_claim_ns = 0
         self._granted_ns = 0
         self.token = 0
+        self.instance = 0
+        """Which of the processes of that name granted the lease."""
         self.answer = "the robot has not been asked yet"
 
     def request(self, now_ns: int) -> ControlRequest | None:
@@ -36,12 +38,12 @@ class LeaseKeeper:
         """Take the robot's answer to a claim."""
         self.answer = reply.text
         if reply.done:
-            self.token = reply.lease
+            self.token, self.instance = reply.lease, reply.instance
             self._granted_ns = now_ns
 
     def holds(self, state: RobotState) -> bool:
         """Whether the robot says that this master's lease is the live one; another's may bear its name."""
-        return self.token != 0 and state.lease_id == lease_id(self.token)
+        return self.token != 0 and state.instance == self.instance and state.lease_id == lease_id(self.token)
 
     def on_state(self, state: RobotState, now_ns: int) -> None:
         """Notice a lease that was lost: it is claimed anew, but only a person engages again."""

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import secrets
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from common.clock import monotonic_ns, to_ns
@@ -17,8 +18,11 @@ from common.messages import ClockReply, ControlReply, RobotState, Statistics
 from common.metrics import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
 from common.offset import MasterExchange
 from common.pacing import TickGrid
+from common.presence import Presence
+from common.throttle import Throttle
 from common.ticker import ticks
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
+from master.homonyms import Homonyms
 from master.lease import LeaseKeeper
 from master.pipeline import CommandWriter, Solved
 from master.robot_watch import RobotWatch
@@ -44,12 +48,16 @@ class CommandedRobot:
         self._clock = MasterExchange(asker)
         self._lease = LeaseKeeper(name, operator, asker)
         self._watch = RobotWatch()
+        self._homonyms = Homonyms(name, operator)
         self._undecodable = 0
+        self._unread, self._unread_ns = "", 0
+        self._throttle = Throttle()
         self._put_command: Callable[[bytes], None] = link.publish(COMMAND)
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
         self.video = VideoWatch()
         link.subscribe(STATE, self._on_state)
         link.subscribe(VIDEO, self.video.on_payload)
+        link.watch_presence(self._on_presence)
 
     async def run(self) -> None:
         """Keep the lease and the clock until cancelled."""
@@ -72,9 +80,16 @@ class CommandedRobot:
     def _on_state(self, payload: bytes, arrived_ns: int) -> None:
         try:
             state = decode(payload, RobotState, self._joints)
-        except CodecError:
+        except CodecError as error:
             self._undecodable += 1
+            self._unread, self._unread_ns = str(error), arrived_ns
+            if self._throttle.passes(arrived_ns):
+                log.warning("%s: a state cannot be read: %s (%d so far)", self.name, error, self._undecodable)
             return
+        self._homonyms.on_state(state.instance, arrived_ns)
+        two = self._homonyms.words(arrived_ns) is not None
+        if two and self._lease.token and state.instance != self._lease.instance:
+            return  # a namesake's: what this master's own robot does is not told by it
         self._lease.on_state(state, arrived_ns)
         self._watch.on_state(state, arrived_ns, ours=self._lease.holds(state))
 
@@ -83,6 +98,8 @@ class CommandedRobot:
             change = self._watch.change(due.scheduled_ns)
             if change:
                 log.warning("%s: %s", self.name, change)
+            if await self._two_answer(monotonic_ns()):
+                continue
             request = self._lease.request(monotonic_ns())
             if request is None or self._watch.silent(monotonic_ns()):
                 continue
@@ -94,21 +111,45 @@ class CommandedRobot:
             self._lease.on_reply(reply, monotonic_ns())
             log.info("%s: claim: %s", self.name, reply.text)
 
+    async def _two_answer(self, now_ns: int) -> bool:
+        """Whether two robots bear the name; then both are told, and neither is claimed."""
+        change = self._homonyms.change(now_ns)
+        if change:
+            log.warning("%s", change)
+        notice = self._homonyms.notice(now_ns)
+        if notice is not None:
+            with suppress(LinkError):
+                await self._link.ask_all(CONTROL, encode(notice))
+        return self._homonyms.words(now_ns) is not None
+
+    def _on_presence(self, presence: Presence, here: bool) -> None:
+        self._homonyms.on_presence(presence, here)
+        if here and presence.role == "slave" and presence.other_version:
+            log.warning("%s: %s", self.name, presence.other_version)
+
     async def _keep_clock(self) -> None:
         async for _ in ticks(TickGrid(monotonic_ns(), round(1e9 / CLOCK.rate_hz))):
             query = self._clock.query(monotonic_ns())
             try:
                 payload, arrived_ns = await self._link.ask_stamped(CLOCK, encode(query))
-                self._clock.on_reply(decode(payload, ClockReply), arrived_ns)
+                reply = decode(payload, ClockReply)
+                # a namesake's clock is another clock
+                if not self._lease.token or reply.instance == self._lease.instance:
+                    self._clock.on_reply(reply, arrived_ns)
             except (LinkError, CodecError):
                 continue
 
     @property
     def standing(self) -> str:
         """How this robot and the master stand, in words."""
+        now_ns = monotonic_ns()
+        two = self._homonyms.words(now_ns)
+        if two is not None:
+            return two
         state = self._watch.state
-        if state is None or self._watch.silent(monotonic_ns()):
-            return f"{self.name}: not heard"
+        if state is None or self._watch.silent(now_ns):
+            unread = self._unread and now_ns - self._unread_ns <= to_ns(STATE.timeout_s)
+            return f"{self.name}: heard, but {self._unread}" if unread else f"{self.name}: not heard"
         return f"{self.name}: {state.guard if self._lease.token else self._lease.answer}"
 
     def metrics(self) -> CommandedMetrics:

@@ -19,7 +19,7 @@ from common.messages import Statistics
 from common.metrics import OffsetMetrics, SlaveMetrics, Ticks, to_tree
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
-from common.presence import place
+from common.presence import Presence, place
 from common.realtime import enter_real_time
 from common.runtime import until_stopped
 from common.ticker import ticks
@@ -56,6 +56,7 @@ class Slave:
         self._notifier = notifier or Notifier()
         endpoints = own_endpoints(config.link)
         self._pipeline = SlavePipeline(config, place=place(endpoints))
+        self._pipeline.tell = log.warning
         self._stopped = False
         self._ticks_expected = 0
         self._ticks_missed = 0
@@ -69,6 +70,7 @@ class Slave:
         link.answer(CONTROL, self._on_control)
         link.answer(STOP, self._on_stop)
         link.answer(CLOCK, self._on_clock)
+        link.watch_presence(self._on_presence)
 
     async def run(self) -> None:
         """Guard, drive and tell until cancelled."""
@@ -82,7 +84,7 @@ class Slave:
     async def _drive(self) -> None:
         loop = self._config.loop
         period_ns = round(1e9 / loop.rate_hz)
-        said, told = "", -1
+        said, told, namesake = "", -1, self._pipeline.namesake
         async for due in ticks(TickGrid(monotonic_ns() + period_ns, period_ns)):
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
@@ -101,6 +103,9 @@ class Slave:
                 told = due.tick // loop.state_every
                 self._put_state(self._pipeline.state(monotonic_ns()))
             guard = self._pipeline.guard
+            if namesake != self._pipeline.namesake:
+                namesake = self._pipeline.namesake
+                log.warning("%s: %s", self._config.robot, namesake or "no other robot bears its name now")
             if guard.state != said:
                 said = guard.state
                 log.info("%s: %s: %s", self._config.robot, guard.state, guard.reason)
@@ -119,6 +124,11 @@ class Slave:
         if stop != self._stopped:
             self._stopped = stop
             self._servos.quick_stop(stop)
+
+    def _on_presence(self, presence: Presence, here: bool) -> None:
+        self._pipeline.namesakes.on_presence(presence, here)
+        if here and presence.other_version and presence.role == "master":
+            log.warning("%s: %s", self._config.robot, presence.other_version)
 
     def _on_command(self, payload: bytes, received_ns: int) -> None:
         self._pipeline.on_command(payload, received_ns, monotonic_ns())

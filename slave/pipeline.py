@@ -25,9 +25,11 @@ from common.messages import (
     ControlRequest,
     RobotState,
 )
+from common.namesakes import Namesakes
 from common.offset import Offset, SlaveExchange
 from common.quaternion import Array
 from common.stop import StopAnswer, pack_stop_answer, read_stop
+from common.throttle import Throttle
 from slave.arrivals import Arrivals
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
@@ -50,6 +52,10 @@ class SlavePipeline:
         self.robot = config.robot
         self.instance = instance or draw_instance()
         self.place = place
+        self.tell: Callable[[str], None] = lambda _: None
+        """What hears, at most once a second, of messages that cannot be read."""
+        self._throttle = Throttle()
+        self.namesakes = Namesakes(self.instance)
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
         self.guard = Guard(
@@ -82,8 +88,8 @@ class SlavePipeline:
         """Take a command from the link; whatever is wrong with it is counted and changes nothing."""
         try:
             command = decode(payload, Command, len(self.skeleton.joints))
-        except CodecError:
-            self._count("command")
+        except CodecError as error:
+            self._count("command", error, now_ns)
             return
         offset = self.clock.estimator.estimate(now_ns)
         # another operator's stamps are of another clock
@@ -118,12 +124,14 @@ class SlavePipeline:
         try:
             request = decode(payload, ControlRequest)
         except CodecError as error:
-            self._count("control")
+            self._count("control", error, now_ns)
             return self._reply(ControlReply(False, self.guard.state, f"not understood: {error}"))
         if request.action not in allowed:
             text = f"{request.action} is for the robot's operators: ask it where they do"
             return self._reply(ControlReply(False, self.guard.state, text))
         reply = self.guard.on_control(request, now_ns)
+        if request.action is Action.NAMESAKE and reply.done:
+            self.namesakes.on_notice(request.key, now_ns)
         if request.action is Action.CLAIM and reply.done:
             self.clock.follow(request.clock)
             self.journeys.forget()
@@ -139,6 +147,8 @@ class SlavePipeline:
 
     def tick(self, now_ns: int, reading: EncoderReading, body: Body = WELL) -> Setpoint:
         """One turn of the 200 Hz loop: what to write to the servos now."""
+        namesake = self.namesakes.words(now_ns)
+        body = body if namesake is None else replace(body, namesake=namesake)
         self._reading, self._body = reading, body
         self._position_rad = self.encoders.position_rad(reading.counts)
         self.journeys.read(reading)
@@ -178,15 +188,22 @@ class SlavePipeline:
         )
 
     @property
+    def namesake(self) -> str | None:
+        """Where another robot of this name is, as of the newest tick; None where none is known."""
+        return self._body.namesake
+
+    @property
     def position_rad(self) -> Array:
         """(J,) of the newest encoder reading."""
         return self._position_rad
 
     def _faults(self) -> dict[str, str]:
-        named = {"base": self._body.base, "camera": self.camera_fault}
+        named = {"base": self._body.base, "name": self._body.namesake, "camera": self.camera_fault}
         # what a drive says of itself comes before what the guard makes of its encoder
         doubts_and_drives = {**self.guard.doubts, **self._body.drives}
         return {**doubts_and_drives, **{name: words for name, words in named.items() if words}}
 
-    def _count(self, topic: str) -> None:
-        self.undecodable[topic] = self.undecodable.get(topic, 0) + 1
+    def _count(self, topic: str, error: CodecError, now_ns: int) -> None:
+        count = self.undecodable[topic] = self.undecodable.get(topic, 0) + 1
+        if self._throttle.passes(now_ns):
+            self.tell(f"{self.robot}: a {topic} message cannot be read: {error} ({count} so far)")

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import zenoh
 
 from common.clock import monotonic_ns
+from common.errors import CodecError
 from common.mailbox import Mailbox
 from common.metrics import TopicCounters
 from common.throttle import Throttle
@@ -54,6 +55,10 @@ class Inbox:
             return
         try:
             self._on_payload(*item)
+        except CodecError as error:
+            self._counters.handler_errors += 1
+            if self._throttle.passes(monotonic_ns()):
+                log.warning("%s: a message cannot be read: %s", self._key, error)
         except Exception:
             # one bad message must not end the session, nor flood the log
             self._counters.handler_errors += 1

@@ -11,7 +11,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from common.clock import monotonic_ns
-from common.errors import LinkError, LinkTimeoutError
+from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link.inbox import wake
 from common.metrics import TopicCounters
 from common.throttle import Throttle
@@ -79,6 +79,12 @@ class Answerer:
     def _reply(self, query: zenoh.Query, payload: bytes, arrived_ns: int) -> None:
         try:
             reply = self._handler(payload, arrived_ns)
+        except CodecError as error:
+            self._counters.handler_errors += 1
+            if self._throttle.passes(monotonic_ns()):
+                log.warning("%s: a question cannot be read: %s", self._key, error)
+            query.reply_err(str(error))
+            return
         except Exception as error:
             self._counters.handler_errors += 1
             if self._throttle.passes(monotonic_ns()):

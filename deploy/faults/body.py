@@ -9,6 +9,7 @@ import numpy as np
 
 from common.clock import NS_PER_S
 from common.messages import Action, BaseAttitude
+from common.presence import Presence
 from common.quaternion import Array
 from deploy.faults.scene import Scene
 from master.suit.simulated.faults import FaultsConfig, Loss
@@ -105,6 +106,12 @@ def base_tilted(scene: Scene) -> None:
         return Body(base=base_loss(attitude, now_ns, config))
 
     scene.run.troubles.body = body
+
+
+def namesake(scene: Scene) -> None:
+    """Another process shows itself under the robot's name."""
+    other = Presence(scene.run.robot, "slave", 2, 1, "1.0", "another room, tcp/192.168.7.9:7447")
+    scene.run.slave.namesakes.on_presence(other, here=True)
 
 
 def master_clock_ahead(scene: Scene) -> None:

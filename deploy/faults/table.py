@@ -113,6 +113,15 @@ STRANGERS = (
         ends=State.TRACK, strays_deg=0.0,
         refused_by=frozenset({"robot"}), held_by=frozenset({"robot"}),
     ),
+    Fault(
+        "another robot of the same name",
+        "A second robot starts under this one's name: nobody knows which of the two an order is for.",
+        Reaction.HOLDS,
+        "Brakes all joints and stands; names where the other is. Nobody can engage while both are there.",
+        "Give each robot a name of its own (`robot` in its file); then engage.",
+        body.namesake,
+        reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by=frozenset({"namesake"}),
+    ),
 )  # fmt: skip
 
 VALUES = (

@@ -1,4 +1,4 @@
-"""What the robot's body says of itself besides its encoders: drives that are not well, a base that tilts."""
+"""What is amiss with the robot besides its encoders: drives, a base that tilts, another of its name."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ class Body:
     """What is wrong with a joint's drive, in words, by joint; empty where all are well."""
     base: str | None = None
     """What is wrong with how the base stands, or None."""
+    namesake: str | None = None
+    """Where another robot of the same name is, or None: nobody knows then which of the two he commands."""
 
     @property
     def amiss(self) -> str | None:
         """The first thing that is wrong, in words, or None."""
-        return self.drive_fault or self.base
+        return self.drive_fault or self.base or self.namesake
 
     @property
     def drive_fault(self) -> str | None:

@@ -78,6 +78,8 @@ class Control:
                 return self._disengage(request.operator, now_ns)
             case Action.RESET:
                 return self._reset(request, now_ns)
+            case Action.NAMESAKE:
+                return self._reply(True, "holds while two bear its name")
             case Action.STATUS:
                 return replace(self._reply(True, guard.reason), challenge=self._challenges.issue(now_ns))
 

@@ -116,6 +116,10 @@ def _base(signs: Signs) -> str | None:
     return signs.body.base
 
 
+def _namesake(signs: Signs) -> str | None:
+    return signs.body.namesake
+
+
 ARRIVAL_WATCHES: tuple[Watch, ...] = (
     Watch("command", _command),
     Watch("lease", _lease),
@@ -128,6 +132,7 @@ BODY_WATCHES: tuple[Watch, ...] = (
     Watch("plausible", _plausible),
     Watch("drive", _drive),
     Watch("base", _base),
+    Watch("namesake", _namesake),
 )
 """Looked at in every step, right after the encoders were read."""
 

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgpack
 import numpy as np
 import pytest
 
 from common.clock import monotonic_ns
-from common.codec import decode, encode
+from common.codec import VERSION, decode, encode
 from common.config import load_config
 from common.lease import lease_id
 from common.messages import (
@@ -27,6 +28,7 @@ from common.messages import (
     Statistics,
 )
 from common.metrics import MasterMetrics
+from common.presence import Presence
 from common.topics import CLOCK, CONTROL, STATE, Topic
 from master.app import Master
 from master.config import MasterConfig
@@ -47,6 +49,8 @@ class FakeLink:
     put: dict[str, list[bytes]] = field(default_factory=dict)
     asked: list[Action] = field(default_factory=list)
     hear: dict[str, Callable[[bytes, int], None]] = field(default_factory=dict)
+    told: list[ControlRequest] = field(default_factory=list)
+    instance: int = 1
 
     def publish(self, topic: Topic) -> Callable[[bytes], None]:
         return self.put.setdefault(topic.name, []).append
@@ -55,6 +59,13 @@ class FakeLink:
         self.hear[topic.name] = on_payload
 
     def declare_alive(self, role: str, instance: int, endpoints: Sequence[str]) -> None: ...
+
+    def watch_presence(self, on_change: Callable[[Presence, bool], None]) -> None:
+        self.shown = on_change
+
+    async def ask_all(self, topic: Topic, payload: bytes) -> list[Any]:
+        self.told.append(decode(payload, ControlRequest))
+        return []
 
     def counters(self) -> dict[str, dict[str, int]]:
         return {}
@@ -67,16 +78,16 @@ class FakeLink:
             raise self.fails("planted")
         if topic is CLOCK:
             query = decode(payload, ClockQuery)
-            return encode(ClockReply(query.asked_ns, 10**15, 10**15)), query.asked_ns + 1000
+            return encode(ClockReply(query.asked_ns, 10**15, 10**15, self.instance)), query.asked_ns + 1000
         assert topic is CONTROL
         self.asked.append(decode(payload, ControlRequest).action)
-        return encode(ControlReply(True, "hold", "yours", self.token)), 0
+        return encode(ControlReply(True, "hold", "yours", self.token, instance=self.instance)), 0
 
-    def state(self, now_ns: int, token: int = 0, echo: CommandEcho | None = None) -> None:
+    def state(self, now_ns: int, token: int = 0, echo: CommandEcho | None = None, instance: int = 1) -> None:
         zeros, valid = np.zeros(JOINTS), np.ones(JOINTS, np.bool_)
         state = RobotState(
             "r", 1, now_ns, now_ns, "hold", "", "nurse-1" if token else "", valid, zeros, zeros, echo, 0, 1,
-            lease_id=lease_id(token),
+            lease_id=lease_id(token), instance=instance,
         )  # fmt: skip
         self.hear[STATE.name](encode(state), now_ns)
 
@@ -185,3 +196,41 @@ def test_each_round_trip_is_told_once() -> None:
         (2000,),
         (),
     ]
+
+
+def test_while_two_bear_the_name_both_are_told_and_neither_is_claimed() -> None:
+    link: Any = FakeLink()
+    master = master_of(a=link)
+    link.shown(Presence("a", "slave", 1, 3, "1.0", "room 1"), True)
+    link.shown(Presence("a", "slave", 2, 3, "1.0", "room 2"), True)
+
+    def until() -> bool:
+        for instance in (1, 2):
+            link.state(monotonic_ns(), instance=instance)
+        return len(link.told) >= 2
+
+    asyncio.run(served(master, until))
+    assert link.asked == []
+    assert {request.action for request in link.told} == {Action.NAMESAKE}
+    assert "room 1 (instance 00000001) and room 2 (instance 00000002)" in link.told[0].key
+    (robot,) = master._robots
+    assert "2 robots bear the name a" in robot.standing
+
+
+def test_a_namesake_s_states_do_not_end_the_lease_and_a_restart_does() -> None:
+    link: Any = FakeLink()
+    robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
+    robot._lease.on_reply(ControlReply(True, "hold", "yours", 7, instance=1), 0)
+    for tenth in range(1, 30):
+        for instance, token in ((1, 7), (2, 0)):
+            link.state(tenth * 100_000_000, token, instance=instance)
+    assert robot._lease.token == 7
+    link.state(10_000_000_000, instance=2)  # the other is not heard any more
+    assert robot._lease.token == 0
+
+
+def test_a_robot_of_another_version_is_named() -> None:
+    link: Any = FakeLink()
+    robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
+    link.hear["state"](msgpack.packb(["state", VERSION + 1, "whatever"]), monotonic_ns())
+    assert f"schema version {VERSION + 1}, expected {VERSION}" in robot.standing

@@ -35,6 +35,8 @@ class FakeLink:
 
     def answer(self, *_: object) -> None: ...
 
+    def watch_presence(self, *_: object) -> None: ...
+
 
 class StillServos:
     def faults(self) -> dict[str, str]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import msgpack
+import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S
-from common.codec import decode, encode
+from common.codec import VERSION, decode, encode
 from common.config import LinkConfig
 from common.control import read_reply
 from common.errors import CodecError
@@ -25,6 +26,7 @@ from common.offset import MasterExchange
 from common.stop import pack_stop, read_stop_answer
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline
+from slave.servos.servos import EncoderReading
 
 HOUR_NS = 3600 * NS_PER_S
 
@@ -126,3 +128,34 @@ def test_every_answer_and_state_tells_which_process_it_is_of(pipeline: SlavePipe
         assert decode(pipeline.on_control(payload, NS_PER_S), ControlReply).instance == pipeline.instance
     state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
     assert state.instance == pipeline.instance
+
+
+def test_told_of_a_namesake_it_is_said_with_the_state_and_passes(pipeline: SlavePipeline) -> None:
+    request = ControlRequest("robot-1", Action.NAMESAKE, "anna", "2 robots bear the name robot-1")
+    assert decode(pipeline.on_control(encode(request), NS_PER_S), ControlReply).done
+    reading = EncoderReading(NS_PER_S, np.zeros(25, np.int64), np.ones(25, np.bool_))
+
+    def faults(now_ns: int) -> dict[str, str]:
+        pipeline.tick(now_ns, reading)
+        return decode(pipeline.state(now_ns), RobotState, len(pipeline.skeleton.joints)).faults
+
+    assert faults(NS_PER_S) == {"name": "2 robots bear the name robot-1"}
+    assert faults(4 * NS_PER_S) == {}
+
+
+def test_who_may_only_stop_it_may_not_tell_it_of_a_namesake(pipeline: SlavePipeline) -> None:
+    request = ControlRequest("robot-1", Action.NAMESAKE, "anna", "words")
+    assert not decode(pipeline.on_stop(encode(request), NS_PER_S), ControlReply).done
+    assert pipeline.namesakes.words(NS_PER_S) is None
+
+
+def test_messages_of_another_version_are_counted_and_said_once_a_second(pipeline: SlavePipeline) -> None:
+    said: list[str] = []
+    pipeline.tell = said.append
+    later = msgpack.packb(["command", VERSION + 1, "robot-1", 0])
+    for tick in range(30):
+        pipeline.on_command(later, 1, NS_PER_S + tick * NS_PER_S // 10)
+    assert pipeline.undecodable == {"command": 30}
+    assert len(said) == 3
+    assert f"schema version {VERSION + 1}, expected {VERSION}" in said[0]
+    assert said[-1].endswith("(21 so far)")

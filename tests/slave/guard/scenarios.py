@@ -134,6 +134,18 @@ def base(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.HOLD
 
 
+@about("watch namesake")
+def namesake(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.body = Body(namesake="another robot bears this name")
+    rig.step()
+    assert rig.guard.state is State.HOLD
+    assert not rig.ask(Action.ENGAGE).done
+    rig.body = Body()
+    rig.run(0.5)
+    assert rig.guard.state is State.HOLD  # it goes on only when a person says so
+
+
 # before it moves
 
 

@@ -1,0 +1,62 @@
+"""What a master does while two robots bear one name: it tells them and people, and claims neither. Pure."""
+
+from __future__ import annotations
+
+from common.clock import to_ns
+from common.messages import Action, ControlRequest
+from common.namesakes import NOTICE_S
+from common.presence import Presence, several_bear
+
+HEARD_S = 0.5
+"""A robot that was not heard for so long counts no more: one that starts anew takes longer than that."""
+
+
+class Homonyms:
+    """Processes of one robot's name by the states that each sends; their places by what they show."""
+
+    def __init__(self, robot: str, operator: str) -> None:
+        self._robot = robot
+        self._operator = operator
+        self._heard: dict[int, int] = {}
+        self._shown: dict[int, Presence] = {}
+        self._next_notice_ns = 0
+        self._said: str | None = None
+
+    def on_presence(self, presence: Presence, here: bool) -> None:
+        """A process of the robot's name showed itself, or went."""
+        if presence.role == "slave" and presence.instance and here:
+            self._shown[presence.instance] = presence
+        elif not here:
+            self._shown.pop(presence.instance, None)
+
+    def on_state(self, instance: int, now_ns: int) -> None:
+        """A state of one of them came."""
+        self._heard[instance] = now_ns
+
+    def words(self, now_ns: int) -> str | None:
+        """Who bears the name, where more than one does."""
+        recent = [number for number, heard in self._heard.items() if abs(now_ns - heard) <= to_ns(HEARD_S)]
+        self._heard = {number: self._heard[number] for number in recent}
+        if len(recent) < 2:
+            return None
+        return several_bear(self._robot, [self._place(number) for number in recent])
+
+    def notice(self, now_ns: int) -> ControlRequest | None:
+        """What to tell all of them now, if it is time: each holds until it is told no more."""
+        words = self.words(now_ns)
+        if words is None or now_ns < self._next_notice_ns:
+            return None
+        self._next_notice_ns = now_ns + to_ns(NOTICE_S / 4)
+        return ControlRequest(self._robot, Action.NAMESAKE, self._operator, words)
+
+    def change(self, now_ns: int) -> str | None:
+        """What to tell people, once a change."""
+        words = self.words(now_ns)
+        if words == self._said:
+            return None
+        self._said = words
+        return words or f"one robot alone bears the name {self._robot} again"
+
+    def _place(self, instance: int) -> str:
+        shown = self._shown.get(instance)
+        return shown.words if shown else f"an unknown place (instance {instance:08x})"
