@@ -13,6 +13,7 @@ from common.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from master.fuse.estimator import EstimationConfig
 from master.suit.nodes import NodeConfig, wiring_mistakes
+from master.suit.plausibility import PlausibilityConfig
 
 RobotName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
 
@@ -28,6 +29,7 @@ class CaptureConfig(Section):
     """Missed ticks in a row after which a node counts as lost."""
     dbc: RelativePath
     """The frames' description."""
+    plausibility: PlausibilityConfig = PlausibilityConfig()
     buses: list[BusConfig] = Field(min_length=1)
 
 

@@ -6,7 +6,7 @@ poll ▸ calibrate ▸ low-pass ▸ fuse ▸ (every 16th tick) solve ▸ command
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from master.fuse.estimator import Estimator
 from master.solve.beyond import BeyondReach
 from master.solve.solver import JointSolver
 from master.suit.nodes import NodeConfig
+from master.suit.plausibility import Plausibility
 from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol
 
@@ -61,11 +62,16 @@ class MasterPipeline:
         self.to_tell: list[str] = []
         """What the operator is to be told of the last solve."""
         self._solved_ns: int | None = None
+        self.plausibility = Plausibility(
+            config.capture.plausibility, len(nodes), config.capture.rate_hz, protocol.fd.scale,
+            self.estimator.affine,
+        )  # fmt: skip
+        self._disbelieved: Mask = np.zeros(len(nodes), np.bool_)
         self._decimation = config.capture.decimation
         self._window_open = False
         self._last_sweep: Sweep | None = None
         self._decided_period = -1
-        self._parts: tuple[Callable[[], Doubts], ...] = (self._of_estimator,)
+        self._parts: tuple[Callable[[], Doubts], ...] = (self._of_suit, self._of_estimator)
         self.doubts: Doubts = {}
         """Nodes that were not believed, or not wholly, when the last posture was solved."""
 
@@ -94,6 +100,10 @@ class MasterPipeline:
         """Take the tick's answers through the filters; the joint angles if this tick decides."""
         self._window_open = False
         sweep = self.poll.close_window(now_ns)
+        sweep = self.plausibility.take(sweep, self.poll.readings, self.poll.saturated)
+        clashing = self.poll.clashes.doubted
+        if clashing.any():
+            sweep = replace(sweep, lost=sweep.lost | clashing)
         sweeps = [*bridged(self._last_sweep, sweep), sweep]
         dt_s = _spacing_s(self._last_sweep, sweep, len(sweeps))
         for each in sweeps:
@@ -101,7 +111,10 @@ class MasterPipeline:
         self._last_sweep = sweep
         # a deciding tick that was missed is made up for by the next, or a command would fall out
         period = sweep.tick // self._decimation
-        if period == self._decided_period:
+        disbelieved, before = self.plausibility.doubted | clashing, self._disbelieved
+        self._disbelieved = disbelieved
+        # a node that lies is told at once: in a period its joint would be driven on
+        if period == self._decided_period and not (disbelieved & ~before).any():
             return None
         self._decided_period = period
         return self._solve(sweep)
@@ -131,9 +144,18 @@ class MasterPipeline:
             doubt=refusal(self.doubts) if self.doubts else "",
         )
 
+    def _of_suit(self) -> Doubts:
+        clashes, implausible = self.poll.clashes.doubts(), self.plausibility.doubts()
+        if not (clashes or implausible):
+            return {}
+        return together(self._named(clashes), self._named(implausible))
+
     def _of_estimator(self) -> Doubts:
+        return self._named(self.estimator.doubts())
+
+    def _named(self, doubts: Mapping[int, NodeDoubt]) -> Doubts:
         names = self.skeleton.segment_names
-        return {names[node]: doubt for node, doubt in self.estimator.doubts().items()}
+        return {names[node]: doubt for node, doubt in doubts.items()}
 
     def _believed(self) -> Mask:
         """(N,) False for nodes whose doubt makes their joints invalid."""

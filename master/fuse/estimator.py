@@ -175,7 +175,8 @@ class Estimator:
         count = len(nodes)
         if calibration is None:
             calibration = load_calibration([node.calibration for node in nodes])
-        self._affine = calibration.affine
+        self.affine: Array = calibration.affine
+        """(3, N, 3, 4), what is applied to accelerometers, gyros and magnetometers."""
         self._samples = np.empty((3, count, 3))
         self._lowpass = LowPass(config.cutoffs_hz, config.order, rate_hz, count)
         self._bank = FilterBank(
@@ -222,7 +223,7 @@ class Estimator:
             self._bank.restart(changes.came)
         # what is absurd may overflow here; the filters leave it out
         with np.errstate(over="ignore", invalid="ignore"):
-            filtered = self._lowpass.update(apply(self._affine, samples))
+            filtered = self._lowpass.update(apply(self.affine, samples))
         self._gyr_rad_s = filtered[GYR]
         self._bank.update(filtered[GYR], filtered[ACC], filtered[MAG], dt_s)
         spoilt = self._bank.spoilt

@@ -39,6 +39,8 @@ class BusHealth:
     """What arrived on one bus and belongs to no node."""
 
     unknown_id: int = 0
+    foreign_sync: int = 0
+    """SYNCs that this master did not send."""
     overflow: int = 0
     """Frames dropped because more arrived in one window than any sound bus can carry."""
 

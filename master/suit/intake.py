@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,12 @@ class Answers:
     """(n,) at least one sound frame, of whatever tick."""
     raw: Raw
     """(n, 9) counts, of meaning only where usable."""
+    saturated: Mask
+    """(n,) said that a reading is clipped."""
+    differing: Mask
+    """(n,) gave two different sound answers to one tick, this or the one before."""
+    twice: Mask
+    """(n,) gave more than one sound answer to one tick, whatever was in them."""
 
 
 class Intake:
@@ -55,6 +61,10 @@ class Intake:
             [part.crc.blank(part.base_id + place.node_id) for place, part in keyed], dtype=np.uint8
         )
         self._raw: Raw = np.zeros((len(keyed), len(READINGS) // self.parts), dtype=np.int16)
+        self._got: Mask = np.zeros(len(keyed), dtype=np.bool_)
+        """Slots that answered the last window, with `_raw`."""
+        self._last_tick = -1
+        self._all: Mask = np.ones(len(keyed), dtype=np.bool_)
         self._slots: list[int] = []
         self._frames: list[bytes] = []
 
@@ -75,7 +85,9 @@ class Intake:
         joined = b"".join(chosen)
         if not self._layout.is_all(joined, tick, status=0, folded=self._blank):
             return None
-        return self._by_node(self._layout.raw(joined))
+        self._raw = self._layout.raw(joined)
+        self._got, self._last_tick = self._all, tick
+        return self._by_node(self._raw)
 
     def add(self, slot: int, data: bytes) -> None:
         """One more frame, of the right length."""
@@ -94,6 +106,11 @@ class Intake:
         counters.bad_checksum[self.rows] += self._frames_a_node(slots[~intact])
         counters.bad_tick[self.rows] += self._frames_a_node(slots[intact & ~good])
 
+        late = intact & ~good & (decoded.tick == self._last_tick & self._layout.tick.mask)
+        late &= self._got[slots]
+        again = self._again(slots, decoded.raw, late)
+        # a copy: the raw readings of a whole window lie in its frames
+        self._raw = self._raw.copy()
         # backwards: of two frames for one slot the later assignment stands, and the first frame should
         backwards = slots[good][::-1]
         self._raw[backwards] = decoded.raw[good][::-1]
@@ -102,15 +119,26 @@ class Intake:
         got = np.zeros(len(self.keys), dtype=np.bool_)
         got[backwards] = True
         counters.duplicates[self.rows] += self._frames_a_node(backwards) - self._by_node(got).sum(axis=1)
-        return self._judge(got, heard, status, counters)
+        again |= self._again(slots, decoded.raw, good)
+        twice = self._frames_a_node(backwards) > self._by_node(got).sum(axis=1)
+        twice |= self._frames_a_node(slots[late]) > 0
+        self._got, self._last_tick = got, tick
+        answers = self._judge(got, status, counters)
+        return replace(answers, heard=heard, differing=again, twice=twice)
 
-    def _judge(self, got: Mask, heard: Mask, status: NDArray[np.uint8], counters: NodeCounters) -> Answers:
+    def _again(self, slots: NDArray[np.intp], raw: Raw, chosen: Mask) -> Mask:
+        """(n,) nodes of which a chosen frame says something else than what stands for its slot."""
+        differs = (raw[chosen] != self._raw[slots[chosen]]).any(axis=1)
+        return self._frames_a_node(slots[chosen][differs]) > 0
+
+    def _judge(self, got: Mask, status: NDArray[np.uint8], counters: NodeCounters) -> Answers:
         answered: Mask = np.logical_and.reduce(self._by_node(got), axis=1)
         said = np.bitwise_or.reduce(self._by_node(status), axis=1)
         fault = answered & (said & Status.FAULT > 0)
         counters.faults[self.rows] += fault
-        counters.saturated[self.rows] += answered & (said & Status.SATURATED > 0)
-        return Answers(answered & ~fault, heard, self._by_node(self._raw))
+        saturated = answered & (said & Status.SATURATED > 0)
+        counters.saturated[self.rows] += saturated
+        return Answers(answered & ~fault, answered, self._by_node(self._raw), saturated, fault, fault)
 
     def _by_node(self, per_slot: NDArray[Any]) -> NDArray[Any]:
         return per_slot.reshape(len(self.rows), -1)

@@ -16,12 +16,14 @@ import numpy as np
 from common.can.frame import Frame
 from common.messages import Mask
 from common.quaternion import Array
+from master.suit.clash import Clashes
 from master.suit.health import BusHealth, NodeCounters, NodeHealth
 from master.suit.intake import Intake, Place
 from master.suit.layout import Raw
 from master.suit.nodes import NodeConfig
+from master.suit.number import number_of
 from master.suit.presence import Presence
-from master.suit.protocol import NO_VALUE, READINGS, SuitProtocol
+from master.suit.protocol import MAG_OVERFLOW, NO_VALUE, READINGS, SuitProtocol
 
 _IDS = 0x800
 """Identifiers of 11 bits."""
@@ -89,8 +91,13 @@ class Poll:
             key: (intake, slot) for intake in self._intakes for slot, key in enumerate(intake.keys)
         }
         self._capacity = _FRAMES_PER_PART * max(1, len(self._slots))
+        self.clashes = Clashes(np.array([self._bus_names.index(node.bus) for node in nodes], np.intp))
+        self._foreign: dict[str, int] = {}
+        self.saturated: Mask = np.zeros(count, np.bool_)
+        """(N,) nodes that said in the last window that a reading is clipped."""
 
         self._tick = 0
+        self._number = 0
         self._sampled_ns = 0
         self._complete_ns: int | None = None
         self._frames: list[tuple[int, bytes]] = []
@@ -102,6 +109,7 @@ class Poll:
     def open_window(self, tick: int, now_ns: int) -> Frame:
         """Begin a tick, at the time at which SYNC is sent; returns the SYNC for every bus."""
         self._tick = tick
+        self._number = number_of(tick)
         self._sampled_ns = now_ns
         self._complete_ns = None
         awaited = self._presence.awaited
@@ -115,11 +123,11 @@ class Poll:
             }
         self._waiting = self._awaited_keys.copy()
         self._set_tests()
-        return self._protocol.sync(tick)
+        return self._protocol.sync(self._number)
 
     def _set_tests(self) -> None:
         self._tests = {
-            bus: (self._first_key[bus], *intake.tick_test(self._tick))
+            bus: (self._first_key[bus], *intake.tick_test(self._number))
             for bus, intake in self._intake_of_bus.items()
         }
 
@@ -147,7 +155,9 @@ class Poll:
         """End the tick: decode what came, update values and health. Right when nothing came, too."""
         frames, self._frames = self._frames, []
         fresh = heard = self._all
-        if not self._take_whole(frames):
+        if self._take_whole(frames):
+            self.clashes.close(None, None, None)
+        else:
             self._sort(frames)
             fresh, heard = self._take()
         presence, counters = self._presence, self._counters
@@ -186,6 +196,7 @@ class Poll:
             **self._counters.totals(),
             "unknown_id": sum(bus.unknown_id for bus in self.bus_health.values()),
             "overflow": sum(bus.overflow for bus in self.bus_health.values()),
+            "foreign_sync": sum(bus.foreign_sync for bus in self.bus_health.values()),
             "lost_now": lost,
         }
 
@@ -196,19 +207,24 @@ class Poll:
         by_key = dict(frames)
         if by_key.keys() != self._slots.keys():
             return False
-        wholes = [intake.take_whole(by_key, self._tick) for intake in self._intakes]
+        wholes = [intake.take_whole(by_key, self._number) for intake in self._intakes]
         values = np.empty_like(self._values)
         for intake, raw in zip(self._intakes, wholes, strict=True):
             if raw is None:
                 return False
             values[intake.rows] = self._si(raw, intake)
         self._values = values
+        if self.saturated.any():
+            self.saturated = np.zeros(len(values), np.bool_)
         return True
 
     def _sort(self, frames: list[tuple[int, bytes]]) -> None:
         """Hand each frame to the intake of its format; count those of no node and those of wrong length."""
         for key, data in frames:
             place = self._slots.get(key)
+            if place is None and key % _IDS == self._protocol.sync_id:
+                self._foreign_sync(self._bus_names[key // _IDS])
+                continue
             if place is None:
                 self.bus_health[self._bus_names[key // _IDS]].unknown_id += 1
                 continue
@@ -218,23 +234,42 @@ class Poll:
             else:
                 self._counters.bad_length[intake.rows[slot // intake.parts]] += 1
 
+    def _foreign_sync(self, bus: str) -> None:
+        self.bus_health[bus].foreign_sync += 1
+        self._foreign[bus] = self._foreign.get(bus, 0) + 1
+
     def _take(self) -> tuple[Mask, Mask]:
         """Judge what was sorted, node by node; returns who is fresh and who was heard at all."""
         fresh = np.zeros(len(self._values), dtype=np.bool_)
         heard = np.zeros(len(self._values), dtype=np.bool_)
+        differing, twice = np.zeros_like(fresh), np.zeros_like(fresh)
+        self.saturated = np.zeros_like(fresh)
         values = self._values.copy()
         for intake in self._intakes:
-            answers = intake.take(self._tick, self._counters)
+            answers = intake.take(self._number, self._counters)
+            differing[intake.rows], twice[intake.rows] = answers.differing, answers.twice
+            self.saturated[intake.rows] = answers.saturated
             fresh[intake.rows] = answers.usable
             heard[intake.rows] = answers.heard
             values[intake.rows[answers.usable]] = self._si(answers.raw, intake)[answers.usable]
         self._values = values
+        foreign = np.array([self._foreign.get(bus, 0) for bus in self._bus_names]) if self._foreign else None
+        self._foreign = {}
+        self.clashes.close(differing, twice, foreign)
         return fresh, heard
+
+    @property
+    def readings(self) -> Array:
+        """(N, 9) of the last window, in SI units, as the sweep has them. Not to be written to."""
+        return self._values
 
     def _si(self, raw: Raw, intake: Intake) -> Array:
         """Counts (n, 9) of an intake's nodes in SI units; NaN where there is no magnetic reading."""
         values: Array = raw * self._scale
-        blank = raw[:, 6:] == NO_VALUE
+        mag = raw[:, 6:]
+        blank = (mag == NO_VALUE) | (mag == MAG_OVERFLOW)
+        # no power or an open bus: a field of exactly nothing on three axes
+        blank |= ((mag == 0) | (mag == -1)).all(axis=1)[:, None]
         if self._some_without_mag or blank.any():
             # two thirds of a field are no direction: one blank axis blanks all three
             values[blank.any(axis=1) | self._without_mag[intake.rows], 6:] = np.nan

@@ -27,6 +27,8 @@ FD_MESSAGES = ("NODE_SAMPLE",)
 CLASSIC_MESSAGES = ("NODE_ACC", "NODE_GYR", "NODE_MAG")
 NO_VALUE = -32768
 """Magnetometer counts of a sample without a magnetic reading."""
+MAG_OVERFLOW = -4096
+"""What the HMC5883L writes for an axis that overflowed (its data sheet, "Data Output X Registers")."""
 TICK_MASK = 0xFFFF_FFFF
 SHIPPED_DBC = Path(__file__).parents[2] / "deploy" / "suit.dbc"
 """The description that comes with tandem."""

@@ -48,9 +48,10 @@ class Bench:
         found = []
         for _ in range(ticks):
             self.tick += 1
-            _, late = self.pipeline.tick(self.tick, self.now_ns)
+            sync, late = self.pipeline.tick(self.tick, self.now_ns)
+            number = int.from_bytes(sync.data, "little")
             found.append(late)
-            frames = [] if self.silent else self.suit.on_sync(self.tick, self.now_ns).frames
+            frames = [] if self.silent else self.suit.on_sync(number, self.now_ns).frames
             complete = [
                 self.pipeline.frame(bus, frame.id, frame.data, self.now_ns + NS_PER_MS)
                 for bus, frame, _ in frames

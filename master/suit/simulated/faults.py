@@ -1,8 +1,7 @@
-"""Troubles on demand: lost nodes, late answers, corrupt and duplicate frames, repeatable by seed."""
+"""Troubles on demand: lost nodes, liars (`lies`), twins, late, corrupt and duplicate answers; by seed."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,18 +13,8 @@ from common.can.frame import Frame
 from common.clock import NS_PER_MS, to_s
 from common.config import Section
 from common.errors import ConfigMistake
-
-
-class Span(Section):
-    """When a fault acts, in seconds since the first SYNC."""
-
-    from_s: float = Field(default=0.0, ge=0.0)
-    until_s: float = math.inf
-    """Excluded; the default is for good."""
-
-    def includes(self, t_s: float) -> bool:
-        """Whether the fault acts at that time."""
-        return self.from_s <= t_s < self.until_s
+from master.suit.simulated.lies import Lie
+from master.suit.simulated.span import Span
 
 
 class Loss(Span):
@@ -45,9 +34,18 @@ class Delay(Span):
     """Share of its answers that are late."""
 
 
+class Twin(Span):
+    """`[[faults.twin]]`: a second node with the same id on the same bus, worn by somebody else."""
+
+    node: str | None = None
+    """Its segment; None: every node, which is a second suit."""
+
+
 class FaultsConfig(Section):
     """`[faults]`: none unless told."""
 
+    lie: list[Lie] = Field(default=[])
+    twin: list[Twin] = Field(default=[])
     lose: list[Loss] = Field(default=[])
     delay: list[Delay] = Field(default=[])
     corrupt_rate: float = Field(default=0.0, ge=0.0, le=1.0)
@@ -58,6 +56,8 @@ class FaultsConfig(Section):
     def unknown_nodes(self, nodes: Sequence[str]) -> list[ConfigMistake]:
         """Faults of nodes that there are not."""
         named = [(f"faults.lose.{i}.node", loss.node) for i, loss in enumerate(self.lose)]
+        named += [(f"faults.lie.{i}.node", lie.node) for i, lie in enumerate(self.lie)]
+        named += [(f"faults.twin.{i}.node", t.node) for i, t in enumerate(self.twin) if t.node is not None]
         named += [(f"faults.delay.{i}.node", d.node) for i, d in enumerate(self.delay) if d.node is not None]
         expected = "the segment of a configured node"
         return [ConfigMistake(key, node, expected) for key, node in named if node not in nodes]
@@ -102,6 +102,11 @@ class Faults:
         if self.config.duplicate_rate:
             out = [copy for o in out for copy in [o] * (1 + self._happens(self.config.duplicate_rate))]
         return out
+
+    def twins(self, t_ns: int) -> set[str] | None:
+        """The segments whose node has a twin at that time; None: all of them."""
+        active = [twin.node for twin in self.config.twin if twin.includes(to_s(t_ns))]
+        return None if None in active else {node for node in active if node is not None}
 
     def _delay_ns(self, node: str, delays: list[Delay]) -> int:
         due = [d.delay_ms for d in delays if d.node in (None, node) and self._happens(d.rate)]

@@ -51,7 +51,7 @@ _GYR_NOISE = 0.005 * _DEG * math.sqrt(100.0)
 _MAG_NOISE = 0.2
 
 GRADES: dict[GradeName, Grade] = {
-    # nothing but quantisation and saturation
+    # nothing but saturation, quantisation and a converter's restless last bit (`LAST_BIT`)
     "ideal": Grade(_NONE, _NONE, _NONE),
     # What a calibration as in paper B leaves. Accelerometer: a session of this method on a unit of this
     # class (Tedaldi et al. 2014's recording) leaves 0.0017 m/s² on intervals held out; three times that, for
@@ -73,6 +73,10 @@ GRADES: dict[GradeName, Grade] = {
     ),
 }
 
+LAST_BIT = 0.7
+"""Counts rms by which a converter's reading moves though nothing else does. Without it a sensor that stands
+still would repeat one reading exactly, as only a broken one does. A bit more than what dithers away the
+quantisation; at the MPU-6050's scales half of its gyro's noise and a twentieth of its accelerometer's."""
 LARGEST_COUNT = np.repeat([32767.0, 32767.0, 2047.0], 3)
 """Where each channel saturates: 16-bit converters of the MPU-6050, a 12-bit one in the HMC5883L."""
 
@@ -91,6 +95,8 @@ class Imperfections:
         spread = np.array([np.where(np.eye(3), s.scale, s.cross_axis) for s in sensors])
         self._gain = np.eye(3) + units.standard_normal((count, 3, 3, 3)) * spread
         self._noise_sd = np.repeat([s.noise for s in sensors], 3)
+        self.noisy = bool(self._noise_sd.all())
+        """Whether every channel has noise."""
 
     def apply(self, readings: Array) -> Array:
         """What the sensors read, for what they should read, (..., N, 9) both."""
@@ -101,8 +107,12 @@ class Imperfections:
         return distorted
 
 
-def quantise(readings: Array, scale: Array) -> tuple[Counts, Mask]:
-    """Counts (..., 9) of readings, for the value of one count a channel (9,); and who saturated, (...)."""
-    counts = np.rint(readings / scale)
+def quantise(readings: Array, scale: Array, random: np.random.Generator | None = None) -> tuple[Counts, Mask]:
+    """Counts (..., 9) of readings, for the value of one count a channel (9,); and who saturated, (...).
+
+    `random` moves the last bit (`LAST_BIT`); without it what stands still repeats exactly.
+    """
+    exact = readings / scale
+    counts = np.rint(exact if random is None else exact + LAST_BIT * random.standard_normal(exact.shape))
     clipped = np.clip(counts, -LARGEST_COUNT, LARGEST_COUNT)
     return clipped.astype(np.int16), np.any(clipped != counts, axis=-1)

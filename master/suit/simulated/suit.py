@@ -15,18 +15,21 @@ from common.messages import Truth
 from common.quaternion import IDENTITY, Array
 from common.skeleton import Skeleton, load_skeleton
 from master.suit.nodes import NodeConfig
+from master.suit.number import tick_of
 from master.suit.protocol import NO_VALUE, Status, SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.disturbance import Disturbance, DisturbanceConfig
 from master.suit.simulated.encode import BatchEncoder
 from master.suit.simulated.faults import Faults, NodeAnswer, Outgoing
 from master.suit.simulated.imperfections import Counts, Imperfections, quantise
+from master.suit.simulated.lies import Lies
 from master.suit.simulated.motion import Motion, load_motion
 from master.suit.simulated.replay import Replay, load_replay
 from master.suit.simulated.sensors import IdealSensors, earth_field_ut
 from master.suit.simulated.tray import Tray
 
 Bits = NDArray[np.int64]
+_OTHER_AXES = [1, 2, 0, 4, 5, 3, 7, 8, 6]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,10 @@ class Wearer(Protocol):
     def magnetic(self) -> bool:
         """Whether the readings include a magnetometer's."""
 
+    @property
+    def noisy(self) -> bool:
+        """Whether the readings have a sensor's noise; else the converter's last bit is made to move."""
+
     def at(self, t_s: float) -> Wearing:
         """The instant `t_s` after the first SYNC."""
 
@@ -68,6 +75,7 @@ class SimulatedOperator:
         self._motion = motion
         self._sensors = sensors
         self._imperfections = imperfections
+        self.noisy = imperfections.noisy
 
     def at(self, t_s: float) -> Wearing:
         """The motion at that time; draws new noise at each call."""
@@ -89,6 +97,7 @@ class CalibratingOperator:
         self._field_ut = field_ut
         self._imperfections = imperfections
         self._then = then
+        self.noisy = imperfections.noisy
 
     def at(self, t_s: float) -> Wearing:
         """The tray at that time, or whoever wears the units by then; no joints are true of a tray."""
@@ -98,9 +107,10 @@ class CalibratingOperator:
 
 
 class RecordedOperator:
-    """A real person's recording; real sensors made it, so nothing is added."""
+    """A recording of a real person, or one that was made up; no error is added but the last bit's."""
 
     magnetic = False
+    noisy = False
 
     def __init__(self, replay: Replay) -> None:
         self._replay = replay
@@ -136,21 +146,33 @@ class SimulatedSuit:
         )
         self._scale = protocol.fd.scale
         self._first_sync_ns: int | None = None
+        self._random = np.random.default_rng([len(nodes), 4])
+        self._lies = Lies(skeleton.segment_names, self._scale, seed=len(nodes))
 
-    def on_sync(self, tick: int, now_ns: int) -> SuitAnswer:
-        """The answers of all nodes on all buses to the SYNC of that tick, which they receive `now_ns`."""
+    def on_sync(self, number: int, now_ns: int) -> SuitAnswer:
+        """The answers of all nodes on all buses to the SYNC of that number, which they receive `now_ns`.
+
+        The truth bears the tick to which the number belongs: so do the commands.
+        """
         if self._first_sync_ns is None:
             self._first_sync_ns = now_ns
         t_ns = now_ns - self._first_sync_ns
         instant = self._wearer.at(to_s(t_ns))
-        answers = self._answers(tick, *self._counts(instant.readings))
-        truth = None if instant.joints is None else Truth(tick, now_ns, *instant.joints)
+        counts, status = self._counts(instant.readings)
+        counts, status = self._lies.apply(self.faults.config.lie, counts, status, to_s(t_ns))
+        answers = self._answers(number, counts, status)
+        twins = self.faults.twins(t_ns) if self.faults.config.twin else set()
+        if twins is None or twins:
+            # somebody else: the same readings about other axes
+            others = self._answers(number, counts[:, _OTHER_AXES], status)
+            answers += [answer for answer in others if twins is None or answer.node in twins]
+        truth = None if instant.joints is None else Truth(tick_of(number), now_ns, *instant.joints)
         return SuitAnswer(self.faults.apply(answers, t_ns), truth)
 
     def _counts(self, readings: Array) -> tuple[Counts, Bits]:
         """Counts (N, 9) and status bits (N,)."""
         readings[self._without_field, 6:] = 0.0
-        counts, saturated = quantise(readings, self._scale)
+        counts, saturated = quantise(readings, self._scale, None if self._wearer.noisy else self._random)
         counts[self._without_field, 6:] = NO_VALUE
         return counts, np.where(saturated, int(Status.SATURATED), 0)
 

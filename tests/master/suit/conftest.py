@@ -8,6 +8,7 @@ import pytest
 from common.can.frame import Frame
 from master.suit.health import NodeHealth
 from master.suit.nodes import NodeConfig
+from master.suit.number import number_of
 from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol
 
@@ -35,7 +36,7 @@ class Suit:
         self.complete: list[bool] = []
 
     def answer(self, node_id: int, tick: int, seed: int = 0, status: int = 0) -> list[Frame]:
-        return PROTOCOL.encode_sample(node_id, raw(seed), tick, status, self.fd)
+        return PROTOCOL.encode_sample(node_id, raw(seed), number_of(tick), status, self.fd)
 
     def answers(self, tick: int, seed: int = 0, without: tuple[int, ...] = ()) -> list[Frame]:
         return [f for n in self.nodes if n.id not in without for f in self.answer(n.id, tick, seed)]
@@ -47,7 +48,7 @@ class Suit:
 
     def open(self) -> None:
         self.tick += 1
-        assert self.poll.open_window(self.tick, self.tick * 5_000_000) == PROTOCOL.sync(self.tick)
+        assert self.poll.open_window(self.tick, self.tick * 5_000_000) == PROTOCOL.sync(number_of(self.tick))
 
     def close(self, frames: list[Frame]) -> Sweep:
         start = self.tick * 5_000_000

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from common.can.frame import Frame
 from master.suit.crc import frame_crc
+from master.suit.number import number_of
 
 if TYPE_CHECKING:
     from tests.master.suit.conftest import Suit
@@ -109,9 +110,15 @@ def test_the_tick_wraps_where_the_wire_does(suit: Suit) -> None:
 def test_a_tick_is_told_apart_as_far_as_its_frame_carries_it(suit: Suit, fd: bool) -> None:
     span = 2**32 if fd else 64
     suit.tick = span - 1
+
+    def shown(ahead: int) -> list[Frame]:
+        number = number_of(suit.tick + 1) + ahead
+        encode = suit.protocol.encode_sample
+        return [f for n in suit.nodes for f in encode(n.id, suit.raw(0), number, 0, fd)]
+
     for wrong in (span // 2, 1, span - 1):
-        assert not suit.window(suit.answers(suit.tick + 1 + wrong)).fresh.any()
-    assert suit.window(suit.answers(suit.tick + 1 + span)).fresh.all()
+        assert not suit.window(shown(wrong)).fresh.any()
+    assert suit.window(shown(span)).fresh.all()
 
 
 def test_an_unknown_identifier_is_counted_for_the_bus(suit: Suit, fd: bool) -> None:
@@ -128,7 +135,9 @@ def test_an_unknown_identifier_is_counted_for_the_bus(suit: Suit, fd: bool) -> N
     sweep = suit.window([*strangers, *good])
     assert sweep.fresh.all()
     assert suit.holds(sweep, 0, 3)
-    assert suit.poll.bus_health["arm"].unknown_id == len(strangers)
+    # one of them bears SYNC's identifier
+    assert suit.poll.bus_health["arm"].unknown_id == len(strangers) - 1
+    assert suit.poll.bus_health["arm"].foreign_sync == 1
     assert suit.poll.health[0].fresh == 2
 
 

@@ -11,6 +11,7 @@ from common.quaternion import rotate
 from common.skeleton import Skeleton
 from common.skeleton.full_body import RECORDED_AS
 from master.suit.nodes import NodeConfig
+from master.suit.number import number_of
 from master.suit.protocol import NO_VALUE, SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from master.suit.simulated.faults import FaultsConfig
@@ -68,7 +69,7 @@ def test_the_truth_is_the_motion_at_the_instant_of_sync(
 ) -> None:
     suit = build_suit(config, protocol)
     suit.on_sync(0, START_NS)
-    answer = suit.on_sync(900, START_NS + to_ns(4.5))
+    answer = suit.on_sync(number_of(900), START_NS + to_ns(4.5))
     assert answer.truth is not None
     position, velocity, _ = load_motion("bottle", skeleton).state(4.5)
     assert (answer.truth.tick, answer.truth.sampled_ns) == (900, START_NS + to_ns(4.5))
@@ -148,7 +149,7 @@ def test_faults_act_on_the_suits_own_time(config: SuitConfig, protocol: SuitProt
     assert [len(a.frames) for a in run(suit, 6)] == [36, 36, 35, 35, 36, 36]
 
 
-def test_a_replayed_person_has_no_magnetometer_no_noise_and_no_truth(
+def test_a_replayed_person_has_no_magnetometer_no_truth_and_no_noise_but_the_last_bit(
     config: SuitConfig, protocol: SuitProtocol, skeleton: Skeleton, tmp_path: Path
 ) -> None:
     arrays: dict[str, Any] = {"t_s": np.arange(3) * 0.01}
@@ -162,6 +163,7 @@ def test_a_replayed_person_has_no_magnetometer_no_noise_and_no_truth(
     raw = raw_of(answers[1], protocol)
     assert (raw[:, 6:] == NO_VALUE).all()
     expected = np.rint(np.array([0.0, 1.0, 9.0]) / protocol.acc_scale)
-    np.testing.assert_array_equal(raw[:, :3], np.tile(expected, (36, 1)))
+    off = raw[:, :3] - np.tile(expected, (36, 1))
+    assert 0 < np.abs(off).max() <= 4
     statuses = protocol.fd.parts[0].decode(b"".join(o.frame.data for o in answers[4].frames)).status
     assert set(statuses.tolist()) == {2}

@@ -1,0 +1,115 @@
+"""Whether a node's gyro turns as its accelerometer sees gravity turn. Pure.
+
+Two low-passes of the specific force in the node's own frame, one short, one long, are both carried along by
+the gyro (as VQF low-passes in an inertial frame, Laidig & Seel 2023, section 3.2):
+
+    v ← R(ω dt)ᵀ v,    v ← v + (1 − e^(−dt/τ)) (f − v)
+
+Where the gyro is right both point up, whatever the motion: accelerations of a body that stays in a room
+average out. A gyro that is dead, has a wrong sign or swapped axes carries the long one elsewhere than the
+short one, as soon as the node turns. So the evidence comes with the motion: some 35° of turn.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.messages import Mask
+from common.quaternion import Array
+
+SHORT_S, LONG_S = 0.8, 3.0
+_AGREES_DEG = 15.0
+_AGREED_RAD = 2.0
+"""A gyro that was not believed must carry gravity through so much turn, in agreement, to be so again."""
+_IN_A_ROW = 3
+_LARGEST_BIAS_RAD_S = math.radians(30.0)
+_STILL_S = 1.0
+_TURNING_RAD_S = math.radians(5.0)
+_LONGEST_STEP_S = 0.2
+
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+
+
+class GravityWatch:
+    """State of N nodes."""
+
+    def __init__(self, count: int, limit_deg: float, affine: Array | None = None) -> None:
+        """`affine` (3, N, 3, 4) of accelerometer, gyro and magnetometer; None: as they come."""
+        self._limit_cos = math.cos(math.radians(limit_deg)) if limit_deg < 180.0 else -2.0
+        self._affine = affine
+        self._memory = np.full((2, count, 3), np.nan)
+        self._bias_rad_s = np.zeros((count, 3))
+        self._quiet_mean = np.zeros((count, 3))
+        self._quiet_s = np.zeros(count)
+        self._dt_s = 0.0
+        self._beyond = np.zeros(count, np.int64)
+        self._agreed_rad = np.zeros(count)
+        self.contradicted: Mask = np.zeros(count, np.bool_)
+        """(N,) until the gyro has been seen to be right."""
+        self.worst_deg = np.zeros(count)
+        self.turned_rad = np.zeros(count)
+        """(N,) by how much each node turned in the last step; what is slower than 5 °/s is none."""
+
+    def calibrated_acc(self, acc_m_s2: Array) -> Array:
+        """Specific force (N, 3) after calibration."""
+        return acc_m_s2 if self._affine is None else _affine(self._affine[0], acc_m_s2)
+
+    def learn_bias(self, quiet: Mask, gyr_rad_s: Array) -> None:
+        """What a gyro reads while its node is still is its bias, raw (N, 3); up to 30 °/s."""
+        rate = gyr_rad_s if self._affine is None else _affine(self._affine[1], gyr_rad_s)
+        share = np.where(quiet & (self._quiet_s > 0.0), 0.1, 1.0)[:, None]
+        self._quiet_mean += share * (rate - self._quiet_mean)
+        self._quiet_s = (self._quiet_s + self._dt_s) * quiet
+        known = (self._quiet_s > _STILL_S) & (np.abs(self._quiet_mean).max(axis=1) < _LARGEST_BIAS_RAD_S)
+        if known.any():
+            self._bias_rad_s[known] = self._quiet_mean[known]
+
+    def update(self, acc_m_s2: Array, gyr_rad_s: Array, dt_s: float, silent: Mask) -> None:
+        """Means (N, 3) of the raw readings over the last `dt_s`; `silent` (N,) start anew."""
+        self._dt_s = dt_s
+        if dt_s <= 0.0 or dt_s > _LONGEST_STEP_S:
+            self._dt_s, silent = 0.0, np.ones_like(silent)
+        acc = self.calibrated_acc(acc_m_s2)
+        rate = gyr_rad_s if self._affine is None else _affine(self._affine[1], gyr_rad_s)
+        turn = self._dt_s * (rate - self._bias_rad_s)
+        memory = self._memory
+        anew = silent | np.isnan(memory[0, :, 0])
+        if anew.any():
+            memory[:, anew] = acc[anew]
+        tilted = _cross(memory, turn)
+        memory += tilted
+        memory += 0.5 * _cross(tilted, turn)
+        shares = [[[1.0 - math.exp(-self._dt_s / tau)]] for tau in (SHORT_S, LONG_S)]
+        memory += np.array(shares) * (acc - memory)
+        self._compare(turn, tilted[1], anew)
+
+    def _compare(self, turn: Array, tilted: Array, anew: Mask) -> None:
+        short, long = self._memory
+        dot, ss, ll = (np.einsum("ni,ni->n", a, b) for a, b in ((short, long), (short, short), (long, long)))
+        cos = dot / np.sqrt(np.maximum(ss * ll, 1e-9))
+        self._beyond = (self._beyond + 1) * ((cos < self._limit_cos) & ~anew)
+        angle = np.sqrt(np.einsum("ni,ni->n", turn, turn))
+        self.turned_rad = np.where(angle > _TURNING_RAD_S * self._dt_s, angle, 0.0)
+        fresh = (self._beyond >= _IN_A_ROW) & ~self.contradicted
+        if not (fresh.any() or self.contradicted.any()):
+            return
+        apart_deg = np.degrees(np.arccos(np.clip(cos, -1.0, 1.0)))
+        self.worst_deg = np.where(fresh, apart_deg, np.maximum(self.worst_deg, apart_deg))
+        path_rad = np.sqrt(np.einsum("ni,ni->n", tilted, tilted) / np.maximum(ll, 1e-9))
+        agrees = (apart_deg < _AGREES_DEG) & ~anew & ~fresh
+        self._agreed_rad = (self._agreed_rad + path_rad * (self.turned_rad > 0.0)) * agrees
+        self.contradicted = (self.contradicted | fresh) & ~(self._agreed_rad > _AGREED_RAD)
+
+
+def _cross(a: Array, b: Array) -> NDArray[np.float64]:
+    """A × b, the last axis of 3; np.cross takes eight times as long."""
+    out: NDArray[np.float64] = a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT]
+    return out
+
+
+def _affine(matrices: Array, readings: Array) -> Array:
+    out: Array = np.matmul(matrices[:, :, :3], readings[:, :, None])[:, :, 0] + matrices[:, :, 3]
+    return out

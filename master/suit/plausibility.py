@@ -1,0 +1,268 @@
+"""Whether what a node answers can be true: frozen, zero, stuck, clipped, or against gravity. Pure.
+
+    add ─▶ ring of 0.1 s ─ every 20 ms ─▶ evidence a node ─▶ doubt (N,), held for some time ─▶ words
+
+A real converter's last bits always move. In the recordings of people and of units at rest that there are no
+accelerometer and no gyro repeats all three axes for more than 3 samples (10 ms), nor one axis for more than
+10 (35 ms); one that hangs repeats for ever. All rules look at exact repeats, at the ends of the range, at
+gravity while a node is still, and at gravity against the gyro's turn (`gravity`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from common.clock import to_ns
+from common.config import Section
+from common.messages import Mask
+from common.quaternion import Array
+from master.doubt import NodeDoubt, Weight
+from master.suit.gravity import GravityWatch
+from master.suit.poll import Sweep
+
+BLOCK = 4
+"""Ticks from one judgement to the next."""
+_ACC, _GYR, _MAG = slice(0, 3), slice(3, 6), slice(6, 9)
+_G_M_S2 = 9.80665
+_CLIPPED_ACC, _CLIPPED_GYR = 0.5, 0.2
+"""Shares of the window at the end of the range. A knock on the unit clips its accelerometer for 4 samples of
+20 in the recordings; what a clipped gyro missed is lost for good, so it is believed less long."""
+_BLANK_COUNTS = 3.5
+"""Counts of the accelerometer's three axes together, in one sample: 0, 0, 0 is a sensor without power or
+after a reset, −1, −1, −1 a bus without a sensor. The sample is not used."""
+_QUIET_M_S2, _QUIET_RAD_S = 0.5, math.radians(5.0)
+"""Within the window: the node is still enough for its accelerometer to show gravity alone."""
+_MAG_TURN_RAD = 1.0
+_LIVELY_COUNTS = 3.5
+"""A sensor of which an axis goes farther than this within the window has noise of 0.8 counts or more, or
+moves: then one of its axes repeats for `axis_s` by chance less than once in 10¹⁰ windows."""
+
+
+class PlausibilityConfig(Section):
+    """`[capture.plausibility]`: when a node that answers is not believed. Times in seconds."""
+
+    noise_free: bool = False
+    """True: the nodes' readings have no noise (made without any, as no real sensor does), so that exact
+    repeats prove nothing. Then only clipping and contradictions of gravity are seen."""
+    repeats_s: float = Field(default=0.1, ge=0.05, le=2.0)
+    """An accelerometer or a gyro that repeats all three axes for so long is frozen. The recordings: 0.01."""
+    axis_s: float = Field(default=0.16, ge=0.05, le=5.0)
+    """One axis that stands for so long while the sensor's others move is stuck. The recordings: 0.035."""
+    still_axis_s: float = Field(default=0.5, ge=0.1, le=30.0)
+    """The same where the others are quiet too: a gyro whose noise is below a count repeats by chance."""
+    magnetometer_s: float = Field(default=1.0, ge=0.1, le=60.0)
+    """A magnetometer (most are slower than the nodes' rate) that stands for so long while its node turns by a
+    radian is stuck: it is not used, and the node goes on without it. In the recordings: 0.06."""
+    gravity_share: float = Field(default=0.25, gt=0.0, lt=1.0)
+    """By how much of g a still node may read another specific force. As delivered: 0.12; a range set wrongly
+    is 1 or 0.5. In the recordings: 0.07."""
+    contradiction_deg: float = Field(default=35.0, gt=5.0, le=180.0)
+    """How far gravity of the last 0.8 s may be from that of the last 3 s, both carried on by the gyro. In the
+    recordings: 14 on arms, trunk and head, 23 on a running person's foot. 180: not judged."""
+    clear_s: float = Field(default=2.0, ge=0.0, le=60.0)
+    """A node is believed again when nothing has been wrong for so long. Its filter then starts anew."""
+
+
+class Plausibility:
+    """State of N nodes between ticks."""
+
+    def __init__(
+        self,
+        config: PlausibilityConfig,
+        count: int,
+        rate_hz: float,
+        scale: Array,
+        affine: Array | None = None,
+    ) -> None:
+        """`scale` (9,): SI per count. `affine` (3, N, 3, 4): the calibration, None where there is none."""
+        self._config = config
+        self._scale = scale
+        self._rows = BLOCK * max(3, round(config.repeats_s * rate_hz / BLOCK))
+        self._ring = np.full((self._rows, count, 9), np.nan)
+        self._fresh = np.zeros((self._rows, count), np.bool_)
+        self._row = 0
+        self._blank_sum = _BLANK_COUNTS * float(scale[0])
+        self._top = 32767.0 * scale[:6] * (1.0 - 1e-9)
+        self._axis_blocks = self._blocks(config.axis_s, rate_hz)
+        self._still_blocks = self._blocks(config.still_axis_s, rate_hz)
+        self._mag_blocks = self._blocks(config.magnetometer_s, rate_hz)
+        self._stood = np.zeros((count, 9), np.int64)
+        """Judgements in a row in which a channel did not move."""
+        self._turned_rad = np.zeros((count, 3))
+        """By how much a node turned since each axis of its magnetometer moved."""
+        self._off_scale = np.zeros(count, np.int64)
+        self._held_until_ns = np.zeros(count, np.int64)
+        self._words: dict[int, str] = {}
+        self._mag_words: dict[int, str] = {}
+        self._saturated = np.zeros((self._rows, count), np.bool_)
+        self._gravity = GravityWatch(count, config.contradiction_deg, affine)
+        self._judged_ns = 0
+        self.doubted: Mask = np.zeros(count, np.bool_)
+        """(N,) whose readings are not to be used now."""
+        self.mag_doubted: Mask = np.zeros(count, np.bool_)
+
+    def _blocks(self, seconds: float, rate_hz: float) -> int:
+        return max(1, math.ceil((seconds * rate_hz - self._rows) / BLOCK) + 1)
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """What is wrong with which node, by its index."""
+        out = {node: NodeDoubt(words, Weight.REFUSED) for node, words in self._words.items()}
+        for node, words in self._mag_words.items():
+            out.setdefault(node, NodeDoubt(words, Weight.TOLD))
+        return out
+
+    def take(self, sweep: Sweep, readings: Array, saturated: Mask | None = None) -> Sweep:
+        """One tick's sweep with whoever is not believed taken as lost, and dead magnetometers left out.
+
+        `readings` (N, 9): the sweep's, in one array. `saturated` (N,): who says that a reading is clipped.
+        """
+        row = self._row
+        self._ring[row] = readings
+        blank = np.abs(readings[:, _ACC]).sum(axis=1) < self._blank_sum
+        self._fresh[row] = sweep.fresh
+        self._saturated[row] = False if saturated is None else saturated
+        self._row = (row + 1) % self._rows
+        if self._row % BLOCK == 0:
+            self._judge(sweep.sampled_ns)
+        if not (blank.any() or self._words or self._mag_words):
+            return sweep
+        mag = np.where(self.mag_doubted[:, None], np.nan, sweep.mag_ut) if self._mag_words else sweep.mag_ut
+        fresh = sweep.fresh & ~blank & ~self.doubted
+        return replace(sweep, mag_ut=mag, fresh=fresh, lost=sweep.lost | self.doubted)
+
+    def _judge(self, now_ns: int) -> None:
+        ring = self._ring
+        low, high = ring.min(axis=0), ring.max(axis=0)
+        span = high - low
+        heard = 2 * self._fresh.sum(axis=0) >= self._rows
+        same = (span == 0.0) & heard[:, None]
+        self._stood = (self._stood + 1) * same
+        dt_s, self._judged_ns = 1e-9 * (now_ns - self._judged_ns), now_ns
+        found: dict[int, str] = {}
+        if not self._config.noise_free:
+            self._find_repeats(same, span, found)
+        self._find_clipped(low, high, found)
+        self._find_wrong_gravity(low, high, span, heard, found)
+        block = slice(self._row - BLOCK if self._row else self._rows - BLOCK, self._row or self._rows)
+        self._follow_gravity(block, dt_s, found)
+        self._settle(found, now_ns)
+
+    def _follow_gravity(self, block: slice, dt_s: float, found: dict[int, str]) -> None:
+        mean = self._ring[block].mean(axis=0)
+        silent: Mask = ~np.logical_or.reduce(self._fresh[block], axis=0)
+        # what repeats or is clipped says nothing of how the gyro turns
+        silent[list(found)] = True
+        self._gravity.update(mean[:, _ACC], mean[:, _GYR], dt_s, silent)
+        if not self._config.noise_free:
+            self._find_stuck_magnetometers()
+        for contradicted in np.flatnonzero(self._gravity.contradicted):
+            node = int(contradicted)
+            found.setdefault(
+                node,
+                f"its gyroscope contradicts gravity by {self._gravity.worst_deg[node]:.0f}°: dead, wrong "
+                "sign, axis or scale, or a large bias; calibrate it, or replace it",
+            )
+
+    def _find_repeats(self, same: Mask, span: Array, found: dict[int, str]) -> None:
+        if not same[:, :6].any():
+            return
+        repeats: Mask = np.logical_and.reduce(same[:, :6].reshape(-1, 2, 3), axis=2)
+        newest = self._ring[self._row - 1]
+        for node in np.flatnonzero(repeats.any(axis=1)):
+            found[int(node)] = _frozen_words(newest[node] / self._scale, repeats[node])
+        lively = (span[:, :6].reshape(-1, 2, 3) > _LIVELY_COUNTS * self._scale[:6].reshape(2, 3)).any(axis=2)
+        needed = np.repeat(np.where(lively, self._axis_blocks, self._still_blocks), 3, axis=1)
+        stuck = self._stood[:, :6] >= needed
+        for node in np.flatnonzero(stuck.any(axis=1)):
+            axes = np.flatnonzero(stuck[node])
+            found.setdefault(int(node), f"{_axes(axes)} stuck at {_values(newest[node], axes)}")
+
+    def _find_clipped(self, low: Array, high: Array, found: dict[int, str]) -> None:
+        ends = (high[:, :6] >= self._top) | (low[:, :6] <= -self._top)
+        said = self._saturated.sum(axis=0) >= _CLIPPED_ACC * self._rows
+        if not (ends.any() or said.any()):
+            return
+        share = (np.abs(self._ring[..., :6]) >= self._top).mean(axis=0)
+        clipped = share >= np.repeat([_CLIPPED_ACC, _CLIPPED_GYR], 3)
+        for node in np.flatnonzero(clipped.any(axis=1) | said):
+            axes = np.flatnonzero(clipped[node])
+            which = _axes(axes) if len(axes) else "a reading is"
+            found[int(node)] = f"{which} saturated: at the end of its range"
+
+    def _find_wrong_gravity(
+        self, low: Array, high: Array, span: Array, heard: Mask, found: dict[int, str]
+    ) -> None:
+        quiet = heard & (span[:, _ACC].max(axis=1) < _QUIET_M_S2) & (span[:, _GYR].max(axis=1) < _QUIET_RAD_S)
+        centre = self._gravity.calibrated_acc(0.5 * (low[:, _ACC] + high[:, _ACC]))
+        norm = np.sqrt(np.einsum("ni,ni->n", centre, centre)) / _G_M_S2
+        off = quiet & (np.abs(norm - 1.0) > self._config.gravity_share)
+        self._gravity.learn_bias(quiet, self._ring[self._row - 1][:, _GYR])
+        self._off_scale = (self._off_scale + 1) * off
+        for node in np.flatnonzero(self._off_scale >= 3):
+            found.setdefault(
+                int(node),
+                f"its accelerometer reads {norm[node]:.2f} g while still: wrong range, self-test, or a "
+                "broken axis",
+            )
+
+    def _find_stuck_magnetometers(self) -> None:
+        stood = self._stood[:, _MAG]
+        turned = self._gravity.turned_rad[:, None]
+        self._turned_rad = (self._turned_rad + turned) * (stood > 0)
+        stuck = (stood >= self._mag_blocks) & (self._turned_rad > _MAG_TURN_RAD)
+        # once stuck, until it moves again
+        self.mag_doubted = np.logical_or.reduce(stuck, axis=1)
+        self._mag_words = {
+            int(node): f"its magnetometer's {_letters(np.flatnonzero(stuck[node]))} stuck: it is not used"
+            for node in np.flatnonzero(self.mag_doubted)
+        }
+
+    def _settle(self, found: dict[int, str], now_ns: int) -> None:
+        if not (found or self._words):
+            return
+        for node, words in found.items():
+            self._words[node] = words
+            self._held_until_ns[node] = now_ns + to_ns(self._config.clear_s)
+        for node in [n for n in self._words if n not in found and now_ns >= self._held_until_ns[n]]:
+            del self._words[node]
+        doubted = np.zeros_like(self.doubted)
+        doubted[list(self._words)] = True
+        self.doubted = doubted
+
+
+def _frozen_words(counts: Array, repeats: Mask) -> str:
+    which = {(True, True): "", (True, False): "its accelerometer ", (False, True): "its gyroscope "}
+    part = which[bool(repeats[0]), bool(repeats[1])]
+    said = np.rint(np.concatenate([counts[3 * k : 3 * k + 3] for k in range(2) if repeats[k]]))
+    if (said == 0.0).all():
+        return f"{part}reads zero on every axis: no power, asleep or just reset"
+    if (said == -1.0).all():
+        return f"{part}reads all ones (-1 on every axis): nothing drives its sensor's bus"
+    if (np.abs(said) >= 32767.0).all():
+        return f"{part}is saturated on every axis"
+    return f"{part}is frozen: repeats one reading; its sensor or the bus to it hangs"
+
+
+_LETTERS = "xyz"
+
+
+def _letters(axes: NDArray[np.intp]) -> str:
+    return " and ".join(_LETTERS[axis] for axis in axes) + (" is" if len(axes) == 1 else " are")
+
+
+def _axes(axes: NDArray[np.intp]) -> str:
+    names = [f"{'gyroscope' if axis > 2 else 'accelerometer'} {_LETTERS[axis % 3]}" for axis in axes]
+    return " and ".join(names) + (" is" if len(axes) == 1 else " are")
+
+
+def _values(readings: Array, axes: Sequence[int] | NDArray[np.intp]) -> str:
+    return " and ".join(
+        f"{math.degrees(readings[axis]):.1f} °/s" if axis > 2 else f"{readings[axis]:.2f} m/s²"
+        for axis in axes
+    )
