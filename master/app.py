@@ -42,7 +42,10 @@ class Master:
         self._frames_in_to_put = Durations()
         self._ticks_expected = 0
         self._ticks_missed = 0
-        self._buses = [CanBus(bus, self._on_frame, self._on_bus, on_second_sender=self._on_frame) for bus in config.capture.buses]
+        self._buses = [
+            CanBus(bus, self._on_frame, self._on_bus, on_second_sender=self._on_frame)
+            for bus in config.capture.buses
+        ]
         joints = len(self._pipeline.skeleton.joints)
         endpoints = own_endpoints(config.link)
         self._robots = [

@@ -36,7 +36,9 @@ _CLIPPED_ACC, _CLIPPED_GYR = 0.5, 0.2
 _BLANK_COUNTS = 3.5
 """Counts of the accelerometer's three axes together, in one sample: 0, 0, 0 is a sensor without power or
 after a reset, −1, −1, −1 a bus without a sensor. The sample is not used."""
-_QUIET_M_S2, _QUIET_RAD_S = 0.5, math.radians(5.0)
+_MOVES_M_S2 = 0.4
+"""Within the window; an accelerometer of 0.04 m/s² of noise goes through 0.16."""
+_QUIET_M_S2, _QUIET_RAD_S = 1.0, math.radians(5.0)
 """Within the window: the node is still enough for its accelerometer to show gravity alone."""
 _MAG_TURN_RAD = 1.0
 _LIVELY_COUNTS = 3.5
@@ -176,7 +178,10 @@ class Plausibility:
         newest = self._ring[self._row - 1]
         for node in np.flatnonzero(repeats.any(axis=1)):
             found[int(node)] = _frozen_words(newest[node] / self._scale, repeats[node])
-        lively = (span[:, :6].reshape(-1, 2, 3) > _LIVELY_COUNTS * self._scale[:6].reshape(2, 3)).any(axis=2)
+        wide = span[:, :6] > _LIVELY_COUNTS * self._scale[:6]
+        lively = np.logical_or.reduce(wide.reshape(-1, 2, 3), axis=2)
+        # a gyro turns about one axis alone at times; then gravity moves through the accelerometer
+        lively[:, 1] |= span[:, _ACC].max(axis=1) > _MOVES_M_S2
         needed = np.repeat(np.where(lively, self._axis_blocks, self._still_blocks), 3, axis=1)
         stuck = self._stood[:, :6] >= needed
         for node in np.flatnonzero(stuck.any(axis=1)):
