@@ -21,6 +21,16 @@ from common.can.frame import Frame
 from common.can.interface import descriptor, error_number, open_bus
 from common.can.quiet import OncePerSecond
 from common.can.reader import DescriptorReader, Reader, ThreadReader
+from common.can.state import (
+    CANNOT_SPEAK,
+    RESTARTED,
+    Controller,
+    ask_kernel,
+    bus_off_words,
+    error_words,
+    of_error_frame,
+    state_of,
+)
 from common.clock import monotonic_ns
 from common.errors import BusError
 
@@ -29,14 +39,14 @@ LONGEST_WAIT_S = 2.0
 SEND_ERRORS_IN_A_ROW = 20
 """A full queue is no reason to reopen a bus, but one that stays full is: 0.1 s at 200 Hz."""
 _QUEUE_FULL = frozenset({errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM})
-_BUS_OFF = 0x40
-"""Bit of a SocketCAN error frame's identifier (linux/can/error.h, CAN_ERR_BUSOFF)."""
 
 OnFrame = Callable[[str, int, bytes, int], object]
 """(bus name, identifier, data, arrival in monotonic ns)."""
 OnChange = Callable[[str, bool], object]
 """(bus name, whether it is up)."""
 Opener = Callable[[BusConfig], can.BusABC]
+StateOf = Callable[[BusConfig, can.BusABC], Controller | None]
+"""How the controller of an open bus stands, None where nothing tells."""
 
 log = logging.getLogger("tandem.bus")
 
@@ -84,11 +94,17 @@ class CanBus:
         opener: Opener = open_bus,
         *,
         on_second_sender: OnFrame | None = None,
+        state_of: StateOf = state_of,
     ) -> None:
         """`on_second_sender` is told of frames with an identifier of this side's that it did not send."""
         self.name = config.name
         self.counters = BusCounters()
         self.last_error = ""
+        self.state: Controller | None = None
+        """The controller's, by its last error frame; None where it has not told."""
+        self._state_of = state_of
+        self._doubtful = False
+        """Open again after bus-off, but nothing has shown yet that the controller is on the bus."""
         self._config = config
         self._on_frame = on_frame
         self._on_change = on_change
@@ -107,13 +123,18 @@ class CanBus:
 
     @property
     def up(self) -> bool:
-        """Whether the bus is open."""
-        return self._bus is not None
+        """Whether the bus is open, and its controller not known to be off it."""
+        return self._bus is not None and not self._doubtful
 
     def open(self) -> None:
         """Open the bus for the first time. Raises BusError where it cannot be opened at all."""
         if self._bus is None and self._reopening is None:
-            self._attach(self._opener(self._config))
+            bus = self._opener(self._config)
+            self.state = self._state_of(self._config, bus)
+            if self.state in CANNOT_SPEAK:
+                bus.shutdown()
+                raise BusError(f"bus {self.name}: {self._off_words(self.state)}")
+            self._attach(bus)
 
     async def close(self) -> None:
         """Close it for good. May be called again."""
@@ -164,7 +185,8 @@ class CanBus:
 
     def summary(self) -> dict[str, bool | int | str]:
         """State and counters as plain values."""
-        return {"up": self.up, "last_error": self.last_error, **asdict(self.counters)}
+        state = "" if self.state is None else str(self.state)
+        return {"up": self.up, "state": state, "last_error": self.last_error, **asdict(self.counters)}
 
     def _on_message(self, message: can.Message) -> None:
         counters = self.counters
@@ -172,7 +194,7 @@ class CanBus:
         if type(frame_id) is not int:  # udp_multicast carries whatever msgpack can, 256.0 too
             counters.undecodable += 1
         elif message.is_error_frame:
-            self._on_error_frame(frame_id)
+            self._on_error_frame(frame_id, bytes(message.data))
         elif message.is_extended_id or message.is_remote_frame:
             counters.foreign += 1
         elif frame_id in self._sent_ids:
@@ -182,6 +204,8 @@ class CanBus:
         else:
             counters.received += 1
             self._attempt = 0
+            if self._doubtful:
+                self._back()
             self._on_frame(self.name, frame_id, bytes(message.data), monotonic_ns())
 
     def _on_own_id(self, frame_id: int, data: bytes) -> None:
@@ -190,13 +214,34 @@ class CanBus:
             self.counters.second_sender += 1
             self._on_second_sender(self.name, frame_id, data, now_ns)
 
-    def _on_error_frame(self, error_id: int) -> None:
+    def _on_error_frame(self, error_id: int, data: bytes) -> None:
         self.counters.error_frames += 1
-        if error_id & _BUS_OFF and self._config.interface == "socketcan":
-            channel = self._config.channel
-            self._fail(f"bus-off; set `ip link set {channel} type can restart-ms 100` to recover by itself")
-        else:
+        if self._config.interface != "socketcan":  # the layout is SocketCAN's
             self._say("error frame", f"error frame {error_id:#x}")
+            return
+        state = of_error_frame(error_id, data)
+        self.state = state or self.state
+        if state is Controller.BUS_OFF:
+            self._doubtful = True
+            self._fail(self._off_words(state))
+            return
+        self._say("error frame", error_words(error_id, data))
+        if error_id & RESTARTED and self._doubtful:
+            self._back()
+
+    def _off_words(self, state: Controller | None) -> str:
+        channel = self._config.channel
+        if state is not Controller.BUS_OFF:
+            return f"the controller of {channel} is {state}"
+        link = ask_kernel(channel) if self._config.interface == "socketcan" else None
+        return bus_off_words(channel, link)
+
+    def _back(self) -> None:
+        """Something has shown that the controller is on the bus again."""
+        self._doubtful = False
+        log.info("bus %s: up again", self.name)
+        if self._on_change is not None:
+            self._on_change(self.name, True)
 
     def _on_recv_error(self, error: Exception) -> bool:
         if is_bad_frame(error):
@@ -224,7 +269,7 @@ class CanBus:
             self._reader = ThreadReader(bus, loop, self._on_message, self._on_recv_error)
         else:
             self._reader = DescriptorReader(bus, number, loop, self._on_message, self._on_recv_error)
-        if self._on_change is not None:
+        if self._on_change is not None and not self._doubtful:
             self._on_change(self.name, True)
 
     def _detach(self) -> tuple[can.BusABC | None, Reader | None]:
@@ -257,12 +302,24 @@ class CanBus:
                 self.last_error = str(error)
                 self._say("open", str(error))
                 continue
+            # a socket opens whatever the controller does: only the controller tells whether the bus works
+            state = await asyncio.to_thread(self._state_of, self._config, bus)
+            self.state = state or self.state
+            if state in CANNOT_SPEAK and not self._closing.is_set():
+                await asyncio.to_thread(_shut_down, bus, None)
+                self.last_error = self._off_words(state)
+                self._say("off", f"still {state}: {self.last_error}")
+                continue
             self._reopening = None
             if self._closing.is_set():
                 await asyncio.to_thread(_shut_down, bus, None)
+                return
+            self._doubtful = self._doubtful and state is None
+            if self._doubtful:
+                log.info("bus %s: open; up again once a frame has come", self.name)
             else:
                 log.info("bus %s: up again", self.name)
-                self._attach(bus)
+            self._attach(bus)
             return
 
     async def _closes_within(self, seconds: float) -> bool:

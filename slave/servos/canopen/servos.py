@@ -17,6 +17,7 @@ from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.can.deaf import open_deaf_to
 from common.can.frame import Frame
+from common.can.state import Controller
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
 from common.errors import RobotError
 from common.latency import Durations
@@ -185,6 +186,12 @@ class CanopenServos:
         said = self._network.not_running
         told = [f"{joint}: {words}" for joint, words in said.items()]
         listed = "; ".join(told[:_TOLD]) + (f"; and {len(told) - _TOLD} more" if len(told) > _TOLD else "")
+        states = [
+            f"the controller of bus {name} is {bus.state}"
+            for name, bus in self._buses.items()
+            if bus.state not in (None, Controller.ERROR_ACTIVE)
+        ]
+        listed = "; ".join([listed, *states])
         return (
             f"{len(said)} of {len(self._skeleton.joints)} drives do not start: {listed}; check their power, "
             "node ids and buses in [servos.canopen]; without hardware, start `tandem drives` on the same file"
