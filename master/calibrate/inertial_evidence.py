@@ -174,8 +174,7 @@ def found_gyroscope(fit: gyr.GyroscopeFit, scale: float) -> list[Evidence]:
             "gyroscope's gains and axes against a sound sensor's",
             off,
             _WORST_GAIN,
-            advice=f"the gyroscope's map is {100 * off:.0f} % off the axes delivered, more than a sensor's is: "
-            "is "
+            advice=f"the gyroscope's map is {100 * off:.0f} % off the axes delivered, unlike a sensor's: is "
             "an axis clipped, negated or exchanged? Look at its range and its driver",
         ),
     ]

@@ -12,14 +12,11 @@ from numpy.typing import NDArray
 from common.errors import RecordingError as RecordingError
 from common.npz import Arrays, read_arrays
 from common.quaternion import Array
+from master.calibrate.stamps import Grid, lay_out
 
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 5.0, 20_000.0
 _RATE_UNKNOWN_HZ = 100.0
 """Of a magnetometer alone without times: what is held out are blocks of two seconds."""
-_JITTER = 0.25
-"""Stamps further than this share of a period off their place are not a rate."""
-_LARGEST_LOSS = 0.5
-"""A recording of which more than this share is missing is not worth laying out on its grid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +79,8 @@ def _load_npz(path: Path) -> dict[str, NodeRecording]:
 def _raw_unit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
     acc, gyr = (_vectors(path, arrays, key) for key in ("acc_raw", "gyr_raw"))
     mag = _vectors(path, arrays, "mag_raw") if "mag_raw" in arrays else None
-    rate_hz, slots = _grid(path, "t", _need(path, arrays, "t"), len(acc))
-    return {path.stem: _node(path, path.stem, rate_hz, (acc, gyr, mag), slots, counts=True)}
+    grid = _grid(path, "t", _need(path, arrays, "t"), len(acc))
+    return {path.stem: _node(path, path.stem, grid, (acc, gyr, mag), counts=True)}
 
 
 def _single_unit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
@@ -91,15 +88,14 @@ def _single_unit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
     if mag is not None and "acc" not in arrays and "gyr" not in arrays:
         return _magnetometer_alone(path, arrays, mag)
     acc, gyr = (_vectors(path, arrays, key) for key in ("acc", "gyr"))
-    slots = None
     if "rate_hz" in arrays:
-        rate_hz = _rate(path, arrays["rate_hz"])
+        grid = Grid(_rate(path, arrays["rate_hz"]), np.arange(len(acc), dtype=np.float64), ())
     else:
         time = next((key for key in ("t_s", "t") if key in arrays), None)
         if time is None:
             raise RecordingError(f"{path}: has neither rate_hz nor t_s; add the rate in Hz")
-        rate_hz, slots = _grid(path, time, arrays[time], len(acc))
-    return {path.stem: _node(path, path.stem, rate_hz, (acc, gyr, mag), slots)}
+        grid = _grid(path, time, arrays[time], len(acc))
+    return {path.stem: _node(path, path.stem, grid, (acc, gyr, mag))}
 
 
 def _magnetometer_alone(path: Path, arrays: Arrays, mag: Array) -> dict[str, NodeRecording]:
@@ -116,34 +112,27 @@ def _suit(path: Path, arrays: Arrays) -> dict[str, NodeRecording]:
             f"{path}: has no gyroscope; expected gyr and acc of a unit, acc_raw and gyr_raw of a unit, "
             "or {segment}_gyr and {segment}_acc of a suit"
         )
-    rate_hz, slots = _grid(path, "t_s", _need(path, arrays, "t_s"))
+    grid = _grid(path, "t_s", _need(path, arrays, "t_s"))
     nodes = {}
     for name in names:
         acc, gyr = (_vectors(path, arrays, f"{name}_{key}") for key in ("acc", "gyr"))
         mag = _vectors(path, arrays, f"{name}_mag") if f"{name}_mag" in arrays else None
-        nodes[name] = _node(path, name, rate_hz, (acc, gyr, mag), slots)
+        nodes[name] = _node(path, name, grid, (acc, gyr, mag))
     return nodes
 
 
 def _node(
-    path: Path,
-    name: str,
-    rate_hz: float,
-    sensors: tuple[Array, Array, Array | None],
-    slots: Array | None,
-    *,
-    counts: bool = False,
+    path: Path, name: str, grid: Grid, sensors: tuple[Array, Array, Array | None], *, counts: bool = False
 ) -> NodeRecording:
     acc, gyr, mag = sensors
-    lengths = {len(s) for s in sensors if s is not None} | ({len(slots)} if slots is not None else set())
+    lengths = {len(s) for s in sensors if s is not None} | {len(grid.slots)}
     if len(lengths) != 1:
         raise RecordingError(f"{path}: {name}: its arrays differ in length: {sorted(lengths)}")
-    if slots is not None:
-        acc, gyr = _laid_out(acc, slots), _laid_out(gyr, slots)
-        mag = None if mag is None else _laid_out(mag, slots)
+    acc, gyr = _laid_out(acc, grid.slots), _laid_out(gyr, grid.slots)
+    mag = None if mag is None else _laid_out(mag, grid.slots)
     if mag is not None and np.isnan(mag).all():
         mag = None
-    return NodeRecording(name, rate_hz, acc, gyr, mag, counts)
+    return NodeRecording(name, grid.rate_hz, acc, gyr, mag, counts, notes=grid.notes)
 
 
 def _need(path: Path, arrays: Arrays, key: str) -> NDArray[np.generic]:
@@ -176,30 +165,19 @@ def _plausible(path: Path, rate: float) -> float:
     return rate
 
 
-def _grid(path: Path, key: str, times: NDArray[np.generic], count: int | None = None) -> tuple[float, Array]:
-    """The rate, and each sample's slot on the even grid, (T,) from 0. Refuses what is no even sampling."""
+def _grid(path: Path, key: str, times: NDArray[np.generic], count: int | None = None) -> Grid:
+    """The even grid of the samples; refuses what is no even sampling, and cannot be repaired."""
     if times.ndim != 1 or len(times) < 2 or times.dtype.kind not in "fiu":
         raise RecordingError(f"{path}: {key} must be a row of times, one a sample, s")
+    if count is not None and len(times) != count:
+        raise RecordingError(f"{path}: {key} has {len(times)} times for {count} samples")
     time_s = times.astype(np.float64)
-    if not np.isfinite(time_s).all():
-        raise RecordingError(f"{path}: {key} must be a row of finite times, one a sample")
-    if count is not None and len(time_s) != count:
-        raise RecordingError(f"{path}: {key} has {len(time_s)} times for {count} samples")
-    steps_s = np.diff(time_s)
-    period_s = float(np.median(steps_s))
-    if period_s <= 0.0 or np.any(steps_s <= 0.0):
-        raise RecordingError(f"{path}: {key} does not rise from sample to sample; record again")
-    _plausible(path, 1.0 / period_s)
-    steps = np.rint(steps_s / period_s)
-    if np.quantile(np.abs(steps_s / period_s - steps), 0.99) > _JITTER or np.any(steps < 1.0):
-        raise RecordingError(
-            f"{path}: {key} is not evenly spaced: steps of {1e3 * steps_s.min():.3g} to "
-            f"{1e3 * steps_s.max():.3g} ms; record at one rate"
-        )
-    slots = np.concatenate([[0.0], np.cumsum(steps)])
-    if len(slots) < _LARGEST_LOSS * (slots[-1] + 1.0):
-        raise RecordingError(f"{path}: more than half of the samples are missing by {key}; record again")
-    return float(slots[-1] / (time_s[-1] - time_s[0])), slots
+    span_s = float(np.ptp(time_s[np.isfinite(time_s)])) if np.isfinite(time_s).any() else 0.0
+    if span_s > 0.0 and not _LOWEST_RATE_HZ <= len(times) / span_s <= 2.0 * _HIGHEST_RATE_HZ:
+        _plausible(path, 1.0 / max(float(np.median(np.diff(time_s))), 1e-9))
+    grid = lay_out(f"{path}: {key}", time_s)
+    _plausible(path, grid.rate_hz)
+    return grid
 
 
 def _laid_out(values: Array, slots: Array) -> Array:
