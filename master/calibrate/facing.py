@@ -112,7 +112,7 @@ def _excess(
     """By how much, rad on average, the joint's bending is beyond its limits if the zero pose faced so."""
     entry = skeleton.segments[i]
     first = entry.human.index(True)
-    limits = _limits(skeleton, entry.angles[first])
+    limits = limits_of(skeleton, entry.angles[first])
     if limits is None:
         return 0.0
     turns = {name: facing_rad - island[name][0] for name in (joint.parent, joint.segment)}
@@ -139,7 +139,8 @@ def joint_angles(
     return angles
 
 
-def _limits(skeleton: Skeleton, angle: str | None) -> tuple[float, float] | None:
+def limits_of(skeleton: Skeleton, angle: str | None) -> tuple[float, float] | None:
+    """A joint angle's limits by the table, rad; None where it has none."""
     for joint in skeleton.joints:
         if angle is not None and angle in joint.drives:
             ends = sorted(joint.drives[angle] * limit for limit in (joint.lower_rad, joint.upper_rad))

@@ -14,22 +14,27 @@ The sign of an axis is the one by which the joint bends within its limits.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from common.quaternion import Array, conjugate, heading_turn, multiply, rotate
 from common.skeleton import Skeleton
+from master.calibrate.clock_lag import check_lags, joint_lag
 from master.calibrate.evidence import Evidence, first_contradiction
 from master.calibrate.facing import Axis, Island, axes_by_node, facing_of, islands_of, joint_angles
 from master.calibrate.hinge import PoorMotionError
 from master.calibrate.joint_motion import JointMotion, joint_motion
+from master.calibrate.joint_residuals import Moving
 from master.calibrate.neighbours import check_order, fit_pairs
 from master.calibrate.oriented import Oriented, mean_rotation, moving, orient
 from master.calibrate.recording import NodeRecording
+from master.calibrate.sides import check_sides
 from master.calibrate.standing import find_stance, given_stance
 from master.calibrate.unit_evidence import unit_evidence
+
+_ALONE = "no neighbour of it is left to compare it with"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +85,7 @@ def find_mounting(
     contradicted = {name: e.advice for name in names if (e := first_contradiction(evidence[name]))}
     names = [name for name in names if name not in contradicted]
     if len(names) < 2:
-        alone = dict.fromkeys(names, "no neighbour of it is left to compare it with")
+        alone = dict.fromkeys(names, _ALONE)
         return Mounting({}, contradicted | alone, [], (0.0, 0.0), evidence)
     suit = orient(recordings, names)
     if stance_s is None:
@@ -88,24 +93,70 @@ def find_mounting(
     else:
         stance = given_stance(*stance_s, suit.q.shape[1], suit.rate_hz)
     units, spacing_s = moving(suit, stance)
-    pairs = [(i, skeleton.segments[i].parent) for i, n in enumerate(skeleton.segment_names) if n in names]
-    pairs = [(i, parent) for i, parent in pairs if parent in names]
-    links = [(names.index(parent), names.index(skeleton.segment_names[i])) for i, parent in pairs]
-    order = check_order(fit_pairs(names, units), links)
-    if order.contradicts:
-        evidence = {name: [*found, order] for name, found in evidence.items()}
-        limits = (stance.start / suit.rate_hz, stance.stop / suit.rate_hz)
-        return Mounting({}, contradicted | dict.fromkeys(names, order.advice), [], limits, evidence)
+    wrong = _misplaced(skeleton, names, units, spacing_s, evidence)
+    names = [name for name in names if name not in wrong]
+    contradicted |= wrong
+    if len(names) < 2:
+        left = dict.fromkeys(names, _ALONE)
+        return Mounting({}, contradicted | left, [], _seconds(stance, suit), evidence)
+    at = dict(zip(suit.names, units, strict=True))
+    suit = suit.some(names)
     joints = []
-    for done, (i, parent) in enumerate(pairs):
+    pairs = _pairs(skeleton, names)
+    for done, (parent, child) in enumerate(pairs):
         progress(done, len(pairs))
-        child = skeleton.segment_names[i]
         joints.append(
-            joint_motion(skeleton, i, units[names.index(parent)], units[names.index(child)], spacing_s)
+            joint_motion(skeleton, skeleton.segment_names.index(child), at[parent], at[child], spacing_s)
         )
     progress(len(pairs), len(pairs))
-    found = _assemble(skeleton, suit, stance, joints)
+    found = _by_sides(skeleton, suit, _assemble(skeleton, suit, stance, joints), evidence)
     return replace(found, refused=contradicted | found.refused, evidence=evidence)
+
+
+def _by_sides(
+    skeleton: Skeleton, suit: Oriented, found: Mounting, evidence: dict[str, list[Evidence]]
+) -> Mounting:
+    """Nothing at all where left and right seem to be exchanged."""
+    ends = {name: (node.heading_rad, node.q_sensor_from_segment) for name, node in found.nodes.items()}
+    sides = check_sides(skeleton, suit, found.joints, ends)
+    for name in found.nodes:
+        evidence[name].append(sides)
+    if not sides.contradicts:
+        return found
+    return replace(found, nodes={}, refused=found.refused | dict.fromkeys(found.nodes, sides.advice))
+
+
+def _pairs(skeleton: Skeleton, names: Sequence[str]) -> list[tuple[str, str]]:
+    """(parent, child) of every joint whose two segments were recorded."""
+    return [(s.parent, s.name) for s in skeleton.segments if s.name in names and s.parent in names]
+
+
+def _misplaced(
+    skeleton: Skeleton,
+    names: list[str],
+    units: list[Moving],
+    spacing_s: float,
+    evidence: dict[str, list[Evidence]],
+) -> dict[str, str]:
+    """Nodes whose neighbours contradict them, and why: one that is late, or, of two exchanged, everyone.
+
+    A late node fits its neighbours badly, so it may look exchanged: what explains more is the cause.
+    """
+    links = [(names.index(parent), names.index(child)) for parent, child in _pairs(skeleton, names)]
+    lags = [joint_lag(units[parent], units[child], spacing_s) for parent, child in links]
+    late = check_lags(names, links, lags)
+    order = check_order(fit_pairs(names, units), links)
+    if order.contradicts and (order.figure or 0.0) > sum(gain for _, gain in late.values()):
+        for name in names:
+            evidence[name].append(order)
+        return dict.fromkeys(names, order.advice)
+    for name in names:
+        evidence[name].append(late[name][0])
+    return {name: late[name][0].advice for name in names if late[name][0].contradicts}
+
+
+def _seconds(stance: slice, suit: Oriented) -> tuple[float, float]:
+    return stance.start / suit.rate_hz, stance.stop / suit.rate_hz
 
 
 def posture(suit: Oriented, mounting: Mounting) -> Array:
@@ -133,7 +184,7 @@ def _assemble(skeleton: Skeleton, suit: Oriented, stance: slice, joints: list[Jo
             continue
         for name in island:
             nodes[name] = _node(skeleton, name, q_stance[name], island, axes, facing, joints)
-    limits = (stance.start / suit.rate_hz, stance.stop / suit.rate_hz)
+    limits = _seconds(stance, suit)
     joints = [_with_flexion(skeleton, suit, joint, nodes) for joint in joints]
     return Mounting({name: nodes[name] for name in suit.names if name in nodes}, refused, joints, limits, {})
 

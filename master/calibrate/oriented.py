@@ -38,6 +38,11 @@ class Oriented:
     q: Array
     """(N, T, 4), own earth frame (z up, arbitrary heading) from sensor."""
 
+    def some(self, names: Sequence[str]) -> Oriented:
+        """Only these units."""
+        rows = [self.names.index(name) for name in names]
+        return Oriented(tuple(names), self.rate_hz, self.acc_m_s2[rows], self.gyr_rad_s[rows], self.q[rows])
+
 
 def orient(recordings: Mapping[str, NodeRecording], names: Sequence[str]) -> Oriented:
     """Orientations by offline VQF (Laidig and Seel 2023), six axes: inclination right, heading arbitrary.

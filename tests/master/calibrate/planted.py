@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from common.errors import TandemError
 from common.quaternion import Array, angle_between, conjugate, from_axis_angle, normalise, rotate
-from master.calibrate.mounting import Mounting
+from master.calibrate.mounting import Mounting, find_mounting
 from master.calibrate.recording import NodeRecording
 from tests.master.calibrate.worn import Worn, wear
 
@@ -149,3 +152,29 @@ def covered(worn: Worn, found: Mounting) -> list[Covered]:
         )
         for name, node in found.nodes.items()
     ]
+
+
+def count(seeds: Iterable[int]) -> dict[str, Counter[str]]:
+    """By kind: sessions, nodes refused, nodes written, and written ones whose error is within 95 %."""
+    out: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
+    for seed in seeds:
+        planted = session(seed)
+        counts = out[planted.kind]
+        counts["sessions"] += 1
+        try:
+            found = find_mounting(planted.worn.nodes, planted.worn.skeleton)
+        except TandemError:
+            counts["refused"] += len(planted.worn.nodes)
+            continue
+        written = covered(planted.worn, found)
+        counts["refused"] += len(found.refused)
+        counts["written"] += len(written)
+        counts["covered"] += sum(node.inside for node in written)
+    return out
+
+
+if __name__ == "__main__":
+    totals = count(range(int(sys.argv[1]), int(sys.argv[2])))
+    for kind, counts in totals.items():
+        sys.stdout.write(f"{kind:22s} {dict(counts)}\n")
+    sys.stdout.write(f"all {dict(sum(totals.values(), Counter()))}\n")

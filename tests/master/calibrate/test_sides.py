@@ -1,0 +1,42 @@
+"""Everything of the left worn on the right is told, by limits or by where the joints' centres lie."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from common.skeleton import load_skeleton
+from master.calibrate.mounting import find_mounting
+from master.calibrate.mounting_files import of_profile
+from master.calibrate.recording import NodeRecording, load_recordings
+from tests.master.calibrate.worn import wear
+
+
+def exchanged(nodes: dict[str, NodeRecording]) -> dict[str, NodeRecording]:
+    def other(name: str) -> str:
+        if name.startswith("left_"):
+            return name.replace("left_", "right_", 1)
+        return name.replace("right_", "left_", 1)
+
+    return {name: nodes[other(name)] for name in nodes}
+
+
+def check(nodes: dict[str, NodeRecording], profile: str) -> None:
+    found = find_mounting(exchanged(nodes), load_skeleton(profile))
+    assert found.nodes == {}
+    assert any("left and right seem to be exchanged" in why for why in found.refused.values())
+
+
+@pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
+def test_exchanged_sides_are_refused(profile: str) -> None:
+    check(wear(profile, 2).nodes, profile)
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
+def test_a_real_person_s_too(profile: str) -> None:
+    folder = os.environ.get("TANDEM_DATA")
+    if not folder:
+        pytest.skip("TANDEM_DATA does not name the folder of recordings")
+    units = load_recordings(Path(folder) / "human_full_body.npz")
+    check(of_profile(units, load_skeleton(profile)), profile)
