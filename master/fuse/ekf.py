@@ -34,8 +34,7 @@ from common.quaternion import (
     to_matrix,
 )
 from master.doubt import NodeDoubt
-from master.fuse.front import Front
-from master.fuse.gross_bias import BiasSection
+from master.fuse.front import Front, FrontSection, Limits
 from master.fuse.mahony import begun_anew, initial_orientation
 from master.fuse.rest import Rest, RestState
 
@@ -51,7 +50,7 @@ _ACCELERATED_TAU_S = 1.0
 _START_INCLINATION_RAD, _START_HEADING_RAD = 0.1, 0.2
 
 
-class EkfConfig(BiasSection):
+class EkfConfig(FrontSection):
     """`[estimation.ekf]`. Noises are densities: the same values hold at every rate."""
 
     gyroscope_noise: float = Field(default=3e-3, gt=0.0, allow_inf_nan=False)
@@ -105,7 +104,8 @@ class EkfFilter:
     def __init__(self, config: EkfConfig, rate_hz: float, count: int) -> None:
         self._config = config
         self._period_s = 1.0 / rate_hz
-        self._front = Front(config.rest_bias_limit_deg_s, _REACH_RAD_S, rate_hz, count)
+        limits = Limits(config.rest_bias_limit_deg_s, _REACH_RAD_S, config.field_change)
+        self._front = Front(limits, rate_hz, count, self.q_inertial_from_sensor)
         self._rest = Rest()
         self._state = _State(
             q=np.tile(IDENTITY, (count, 1)),

@@ -3,42 +3,78 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from common.config import Section
 from common.messages import Mask
 from common.quaternion import Array
 from master.doubt import NodeDoubt, Weight
-from master.fuse.gross_bias import GrossBias
+from master.fuse.field_watch import FieldWatch
+from master.fuse.gross_bias import PERIOD_S, GrossBias
 from master.fuse.soundness import Soundness
 
 _MANY = 0.25
 """Share of unsound readings from which on a node's joints are invalid."""
 _FORGET = 0.8
 """Of the share of unsound readings, from one look to the next."""
+_WITHHELD_S, _SELDOM = 60.0, 16
+"""For so long a doubted field does not count at all, then in one tick of so many."""
 _TOLD_RAD_S = math.radians(2.0)
 """A bias larger than this is one that calibration should have taken off."""
 
 
-class Front:
-    """Leaves out what is no reading, and takes off a gross bias found at rest, for n nodes."""
+class FrontSection(Section):
+    """What the configurations of all filters share."""
 
-    def __init__(self, limit_deg_s: float, reach_rad_s: float, rate_hz: float, count: int) -> None:
-        """`limit_deg_s` of the bias that is learnt; `reach_rad_s` of what the filter learns by itself."""
+    rest_bias_limit_deg_s: float = Field(default=20.0, ge=0.0, le=90.0, allow_inf_nan=False)
+    """The largest bias of a gyro that is learnt at rest, degrees/s on any axis. A node whose gyro is further
+    off is called uncalibrated, and its joints are invalid."""
+    field_change: float = Field(default=0.1, ge=0.0, le=1.0, allow_inf_nan=False)
+    """Share by which a node's field may differ in strength from what it was since its start (0.1: or by 10°
+    in dip), over some seconds. Beyond it people are told, and the gyro keeps the heading. 0: no watch."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a front allows."""
+
+    bias_deg_s: float
+    """The largest bias that is learnt at rest, 0 for none."""
+    reach_rad_s: float
+    """What the filter learns by itself."""
+    field_change: float
+    """See `FrontSection.field_change`."""
+    any_field: bool = True
+    """The filter itself weighs a field that is unusual for a moment; else the front leaves it out."""
+
+
+class Front:
+    """Leaves out what is no reading, fields that have changed and gross biases found at rest, of n nodes."""
+
+    def __init__(
+        self, limits: Limits, rate_hz: float, count: int, q_inertial_from_sensor: Callable[[], Array]
+    ) -> None:
+        """`q_inertial_from_sensor` gives the filter's newest orientations (n, 4)."""
+        self._inertial = q_inertial_from_sensor
+        self._field = FieldWatch(limits.field_change, count)
+        self._any_field = limits.any_field
+        self._hidden: Mask | None = None
+        self._withheld_s = np.zeros(count)
         self._period_s = 1.0 / rate_hz
         self._sound = Soundness(count)
-        self._gross = GrossBias(math.radians(limit_deg_s), reach_rad_s, count)
+        self._gross = GrossBias(math.radians(limits.bias_deg_s), limits.reach_rad_s, count)
         self._ticks, self._seen = 0, np.zeros(count, dtype=np.int64)
         self._unsound = np.zeros(count)
+        self.magnetic: Mask = self._sound.magnetic
+        """(n,) who has a field in what `take` gave last."""
         self.corrected: Mask | None = None
         """(n,) whose bias was found with the readings taken last; None for nobody's. They lie still: gravity
         and field give their orientation, and what the filter made of the bias is to be forgotten."""
-
-    @property
-    def magnetic(self) -> Mask:
-        """(n,) who has a field in what was taken last."""
-        return self._sound.magnetic
 
     @property
     def skipped(self) -> NDArray[np.int64]:
@@ -59,7 +95,21 @@ class Front:
         if gross.due(self._period_s if dt_s is None else dt_s):
             self.corrected = gross.look(gyr, acc, mag)
             self._count()
+            self._field.look(mag, self._sound.magnetic, self._inertial(), PERIOD_S)
+            self._withheld_s = np.where(self._field.doubted, self._withheld_s + PERIOD_S, 0.0)
+            hidden = self._field.doubted if self._any_field else self._field.doubted | self._field.unusual
+            self._hidden = hidden if hidden.any() else None
+        self.magnetic = self._sound.magnetic
+        if self._hidden is not None:
+            mag = self._without(self._hidden, mag)
         return (gyr - gross.offset_rad_s if gross.some else gyr), acc, mag
+
+    def _without(self, hidden: Mask, mag: Array) -> Array:
+        """Fields (n, 3), NaN where `hidden` (n,); after a while a few of them count, not to lose north."""
+        if self._ticks % _SELDOM == 0:
+            hidden = hidden & (self._withheld_s < _WITHHELD_S)
+        self.magnetic = self.magnetic & ~hidden
+        return np.where(hidden[:, None], np.nan, mag)
 
     def _count(self) -> None:
         """Follow the share of ticks without a sound reading, (n,)."""
@@ -84,6 +134,9 @@ class Front:
         """Nodes whose gyros want a calibration, by number."""
         out = {}
         gross = self._gross
+        if self._field.doubted.any():
+            for node in np.flatnonzero(self._field.doubted).tolist():
+                out[node] = NodeDoubt(self._field.words(node), Weight.TOLD)
         if gross.some:
             off = np.abs(gross.offset_rad_s).max(axis=1)
             for node in np.flatnonzero(off > _TOLD_RAD_S).tolist():
@@ -108,16 +161,25 @@ class Front:
         """Forget the past of some nodes, mask (n,), but not their gyros' offsets."""
         self._sound.restart(nodes)
         self._gross.restart(nodes)
+        self._field.restart(nodes)
 
     def snapshot(self) -> object:
         """The state, to be given to `restore`."""
-        return self._sound.snapshot(), self._gross.snapshot()
+        return (
+            self._sound.snapshot(),
+            self._gross.snapshot(),
+            self._field.snapshot(),
+            self._withheld_s.copy(),
+        )
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
         if not isinstance(snapshot, tuple):
             raise TypeError("not a snapshot of this front")
-        sound, gross = snapshot
+        sound, gross, field, withheld_s = snapshot
+        self._field.restore(field)
+        self._hidden = self._field.doubted if self._field.doubted.any() else None
+        self._withheld_s = withheld_s.copy()
         self._sound.restore(sound)
         self._gross.restore(gross)
         self._ticks, self._seen = 0, self._sound.skipped.copy()

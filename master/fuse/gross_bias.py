@@ -14,9 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from common.config import Section
 from common.messages import Mask
 from common.quaternion import Array
 
@@ -34,14 +32,6 @@ _STEADY_LOOKS = 12
 _TURNS_RAD_S = math.radians(1.5)
 """Gravity or field turning faster than this: no rest."""
 _GYR, _ACC, _MAG = slice(0, 3), slice(3, 6), slice(6, 9)
-
-
-class BiasSection(Section):
-    """What the configurations of all filters share."""
-
-    rest_bias_limit_deg_s: float = Field(default=20.0, ge=0.0, le=90.0, allow_inf_nan=False)
-    """The largest bias of a gyro that is learnt at rest, degrees/s on any axis. A node whose gyro is further
-    off is called uncalibrated, and its joints are invalid."""
 
 
 @dataclass(slots=True)

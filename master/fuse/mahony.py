@@ -16,14 +16,13 @@ from pydantic import Field
 from common.messages import Mask
 from common.quaternion import Array, conjugate, cross, heading_rad, heading_turn, multiply, to_matrix
 from master.doubt import NodeDoubt
-from master.fuse.front import Front
-from master.fuse.gross_bias import BiasSection
+from master.fuse.front import Front, FrontSection, Limits
 
 _REACH_RAD_S = np.radians(0.5)
 """Its integral learns slowly, and about the vertical not at all without a magnetometer."""
 
 
-class MahonyConfig(BiasSection):
+class MahonyConfig(FrontSection):
     """`[estimation.mahony]`."""
 
     # the best of a coarse grid over the BROAD trials at hand: 5.9° total; 0.35 to 0.74 lie within 0.4°
@@ -52,9 +51,9 @@ class MahonyFilter:
     def __init__(self, config: MahonyConfig, rate_hz: float, count: int) -> None:
         self._config = config
         self._period_s = 1.0 / rate_hz
-        self._front = Front(
-            config.rest_bias_limit_deg_s if config.ki > 0.0 else 0.0, _REACH_RAD_S, rate_hz, count
-        )
+        limit_deg_s = config.rest_bias_limit_deg_s if config.ki > 0.0 else 0.0
+        limits = Limits(limit_deg_s, float(_REACH_RAD_S), config.field_change, any_field=False)
+        self._front = Front(limits, rate_hz, count, self.q_inertial_from_sensor)
         self._q = np.zeros((count, 4))
         self._q[:, 0] = 1.0
         self._error = np.zeros((count, 3))

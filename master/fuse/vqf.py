@@ -10,14 +10,13 @@ from vqf import VQF
 from common.messages import Mask
 from common.quaternion import Array
 from master.doubt import NodeDoubt
-from master.fuse.front import Front
-from master.fuse.gross_bias import BiasSection
+from master.fuse.front import Front, FrontSection, Limits
 
 _REACH_RAD_S = np.radians(1.9)
 """Just below the package's `biasClip` of 2 °/s, beyond which it takes no rest for one."""
 
 
-class VqfConfig(BiasSection):
+class VqfConfig(FrontSection):
     """`[estimation.vqf]`."""
 
     tau_acc_s: float = Field(default=3.0, gt=0.0, allow_inf_nan=False)
@@ -43,7 +42,9 @@ class VqfFilter:
     def __init__(self, config: VqfConfig, rate_hz: float, count: int) -> None:
         self._period_s = 1.0 / rate_hz
         limit_deg_s = config.rest_bias_limit_deg_s if config.rest_bias else 0.0
-        self._front = Front(limit_deg_s, _REACH_RAD_S, rate_hz, count)
+        field_change = config.field_change if config.reject_disturbed_field else 0.0
+        limits = Limits(limit_deg_s, float(_REACH_RAD_S), field_change)
+        self._front = Front(limits, rate_hz, count, self.q_inertial_from_sensor)
         self._filters = [
             VQF(
                 1.0 / rate_hz,
