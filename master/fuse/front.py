@@ -162,6 +162,9 @@ class Front:
         self._sound.restart(nodes)
         self._gross.restart(nodes)
         self._field.restart(nodes)
+        if self._hidden is not None:
+            # their first orientation needs their field
+            self._hidden = self._hidden & ~nodes
 
     def snapshot(self) -> object:
         """The state, to be given to `restore`."""
@@ -170,15 +173,15 @@ class Front:
             self._gross.snapshot(),
             self._field.snapshot(),
             self._withheld_s.copy(),
+            self._hidden,
         )
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
         if not isinstance(snapshot, tuple):
             raise TypeError("not a snapshot of this front")
-        sound, gross, field, withheld_s = snapshot
+        sound, gross, field, withheld_s, self._hidden = snapshot
         self._field.restore(field)
-        self._hidden = self._field.doubted if self._field.doubted.any() else None
         self._withheld_s = withheld_s.copy()
         self._sound.restore(sound)
         self._gross.restore(gross)

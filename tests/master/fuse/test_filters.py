@@ -159,18 +159,14 @@ def test_a_disturbed_field_never_touches_the_inclination(name: str) -> None:
         assert inclination_deg(ends[1], ends[0]) < 1e-6
 
 
-@pytest.mark.parametrize(
-    ("name", "least_deg", "most_deg"), [("vqf", 0, 3), ("ekf", 0, 3), ("mahony", 10, 60)]
-)
-def test_a_field_of_another_strength_is_left_out_save_by_mahony(
-    name: str, least_deg: float, most_deg: float
-) -> None:
+@every_filter
+def test_a_field_of_another_strength_is_left_out(name: str) -> None:
     filter_ = make(name)
     # vqf takes a field for the usual one after 5 s of motion
     truth = move(filter_, attitudes(5), np.full(1800, 1.0 / RATE_HZ))
     # by direction the field is then 55° off
     end = move(filter_, truth, np.full(600, 1.0 / RATE_HZ), FIELD_UT + [40.0, 0.0, 0.0])
-    assert least_deg <= off_deg(filter_.q_world_from_sensor(), end) <= most_deg
+    assert off_deg(filter_.q_world_from_sensor(), end) <= 3.0
 
 
 @every_filter
