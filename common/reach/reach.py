@@ -56,6 +56,10 @@ _KEPT_SHARE = 4.0
 """and by this times the angle that the nearest one leaves: what can be reached, is."""
 _NEAR_RAD, _FAR_RAD = math.radians(15.0), math.radians(30.0)
 """A nearest posture whose joints are within the first of the kept one's is taken, beyond the second never."""
+_BESIDE_POLE_RAD = math.acos(1.0 / MOST_GAIN)
+"""From this middle angle on (70.5°) joints may have to turn `MOST_GAIN` times as fast as the segment."""
+_IDLE_RAD, _WORTH_RAD = math.radians(1.0), math.radians(4.0)
+"""Beyond a limit beside the pole, turning that gains the first is not done, and the second at once."""
 _FLOOR = 1e-12
 _ROUNDING_RAD = 1e-9
 """At rest many joints stand at their limits: rounding puts none of them beyond."""
@@ -212,13 +216,15 @@ class Reach:
             kept = Nearest(angles, abs(scalar_product(wanted, angles)))
         nearest = nearest_angles(wanted, group.box, towards, group.box.twofold, kept)
         if kept is not NOTHING:
-            nearest = _chosen(wanted, nearest, kept)
+            nearest = _worth_turning(wanted, group, _chosen(wanted, nearest, kept), last)
         self.short_rad[group.segment] = nearest.left_rad
+        # beside the pole the decomposition's velocity of now tells nothing of what comes next
+        beside_pole = group.ball and abs(nearest.angles[1]) > _BESIDE_POLE_RAD
         for k, joint in enumerate(group.joints):
             if joint is not None:
                 lower, upper = self._limits[joint]
                 at.position[joint] = now = min(max(nearest.angles[k] / group.scale[k], lower), upper)
-                if abs(now - at.free[joint]) < _SAME_RAD:
+                if abs(now - at.free[joint]) < _SAME_RAD and not beside_pole:
                     continue  # the velocity of the decomposition is its own
                 resting = now in (lower, upper) or not known
                 at.velocity[joint] = 0.0 if resting else (now - at.last[joint]) / at.elapsed_s
@@ -304,6 +310,26 @@ def _chosen(wanted: Tensor, nearest: Nearest, kept: Nearest) -> Nearest:
         return kept
     share = min((_FAR_RAD - apart) / (_FAR_RAD - _NEAR_RAD), 1.0)
     angles = (a + share * (x - a), b + share * (y - b), c + share * (z - c))
+    return Nearest(angles, abs(scalar_product(wanted, angles)))
+
+
+def _worth_turning(wanted: Tensor, group: Group, aim: Nearest, last: Triple) -> Nearest:
+    """Towards `aim`, along the pole's valley only as far as that gains.
+
+    At a middle angle of ±90° the first and the third turn about one axis: while their sum (at -90° their
+    difference) is kept, turning them changes nothing, and close by next to nothing. What passes by the pole
+    beyond a limit would otherwise fling them about.
+    """
+    (a, b, c), x = aim.angles, last[0]
+    if aim.left_rad < _SAME_RAD or abs(b) < _BESIDE_POLE_RAD:
+        return aim
+    stay = (x, b, _clamped(a + c - x if b > 0.0 else c - a + x, group.box.ranges[2]))
+    gain = left_rad(scalar_product(wanted, stay)) - aim.left_rad
+    share = min(max((gain - _IDLE_RAD) / (_WORTH_RAD - _IDLE_RAD), 0.0), 1.0)
+    if share == 1.0:
+        return aim
+    z = stay[2]
+    angles = (x + share * (a - x), b, z + share * (c - z))
     return Nearest(angles, abs(scalar_product(wanted, angles)))
 
 

@@ -1,9 +1,9 @@
 """A site's tighter limits: the nearest posture within them, as the master finds it within the skeleton's.
 
 The master knows the skeleton's limits and keeps them. Where `[guard.joints]` tightens one of a shoulder's,
-cutting off each joint by itself would again make another posture of it. So the joints of a segment are brought
-within the tighter limits together (common/reach). Other joints are left to `limit.py`, which is also what holds
-in the end.
+cutting off each joint by itself would again make another posture of it. So a segment's joints are brought
+within the tighter limits together (common/reach). Other joints are left to `limit.py`, which is what holds in
+the end.
 """
 
 from __future__ import annotations
