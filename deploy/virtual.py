@@ -16,6 +16,7 @@ from common.codec import decode, encode
 from common.config import Model, load_config
 from common.control import CHALLENGED, read_reply, request_bytes
 from common.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState
+from common.metrics import Unreached
 from common.offset import MasterExchange
 from deploy.judge import Trace
 from deploy.network.profile import Profile
@@ -110,6 +111,10 @@ class VirtualRun:
         """Time at the robot itself, however the slave's clock is stepped."""
         drift = self.now_ns * self._world.slave_drift_ppm * 1e-6
         return self.now_ns + self._world.slave_ahead_ns + round(drift)
+
+    def beyond_reach(self) -> dict[str, Unreached]:
+        """What of the operator the robot could not follow, as the master counts it."""
+        return self._master.beyond_reach.metrics()
 
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
         """Go on for some time of the master's clock, or until a condition holds."""
