@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+import os
 import queue
 import threading
 import time
 import traceback
+from contextlib import suppress
 from pathlib import Path
 
 from common.streams import LossyRaw
@@ -60,6 +62,8 @@ class PatientHandler(logging.Handler):
             time.sleep(0.002)
 
     def _write(self) -> None:
+        with suppress(OSError):  # a loop's real-time priority is not for its log
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         while True:
             line = self._lines.get()
             lost, self._lost = self._lost, 0

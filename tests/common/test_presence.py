@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.codec import VERSION
 from common.presence import Presence, present, read_presence, several_bear
 
 KEY = "tandem/robot-1/alive/slave/0abcdef1/3-1.2.3/host, tcp%2F10.0.0.2:7447"
@@ -47,3 +48,12 @@ def test_it_tells_where_it_is() -> None:
 def test_two_of_a_name_are_told_by_place_in_one_order() -> None:
     assert several_bear("r", ["b", "a"]) == several_bear("r", ["a", "b"])
     assert "2 robots bear the name r: a and b" in several_bear("r", ["a", "b"])
+
+
+def test_another_version_is_named_with_its_place_and_the_own_is_not() -> None:
+    assert present("r", "slave", 5, ["tcp/10.0.0.2:7447"]).other_version == ""
+    assert Presence("r", "slave").other_version == ""  # the short form tells no version
+    said = Presence("r", "master", 5, VERSION + 1, "9.9", "host, 10.0.0.3").other_version
+    assert "the master at host, 10.0.0.3 (instance 00000005) runs tandem 9.9" in said
+    assert f"schema {VERSION + 1}" in said
+    assert f"with schema {VERSION}" in said

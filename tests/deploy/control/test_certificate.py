@@ -20,6 +20,7 @@ from common.topics import CONTROL, STOP
 from deploy.control.answer import Answer
 from deploy.control.ask import ask_robots
 from deploy.control.reach import reach
+from deploy.control.stop import stop_robots
 from deploy.keys.folder import stem
 from deploy.rig.keys import make_keys, tls_of
 
@@ -110,3 +111,18 @@ def test_a_certificate_alone_is_no_key(keys: Path, tmp_path: Path) -> None:
 def test_an_endpoint_that_is_none_is_still_told(keys: Path) -> None:
     with pytest.raises(ConfigError, match="expected a protocol out of"):
         reach(["tsl/127.0.0.1:1"], ["r"], certificate=keys / "operator-nurse-1.pem")
+
+
+def test_with_rules_a_robot_is_seen_with_its_instance_and_stopped_by_whoever_is_named(keys: Path) -> None:
+    at = endpoint()
+
+    async def story() -> list[Answer]:
+        config = LinkConfig(listen=[at], tls=tls_of(keys, Role.ROBOT, "robot-1"), access=ACCESS)
+        async with open_link(config, "robot-1") as robot:
+            robot.answer(STOP, lambda *_: pack_stop_answer(StopAnswer(True, "estop", "stopped", 7)))
+            robot.declare_alive("slave", 7, [at])
+            where = reach([at], [], "nurse-1", certificate=keys / "operator-nurse-1.pem")
+            return await stop_robots(where, everyone=True, within_s=5.0)
+
+    (answer,) = asyncio.run(story())
+    assert (answer.robot, answer.done, answer.instance) == ("robot-1", True, 7)
