@@ -12,7 +12,7 @@ from common.errors import LinkError
 from common.version import software
 from deploy.doctor.finding import Finding, fail, ok
 from deploy.doctor.judge.can import judge_buses, judge_interfaces
-from deploy.doctor.judge.devices import is_url, judge_camera, judge_port
+from deploy.doctor.judge.devices import is_url, judge_camera, judge_latency, judge_port
 from deploy.doctor.judge.endpoints import judge_endpoint
 from deploy.doctor.judge.keys import judge_keys
 from deploy.doctor.judge.machine import judge_clock, judge_disk, judge_machine, judge_receive_buffer
@@ -27,7 +27,9 @@ from deploy.doctor.read.keys import read_keys
 from deploy.doctor.read.machine import read_machine
 from deploy.doctor.read.process import read_process
 from deploy.doctor.read.robots import read_robots
+from deploy.doctor.read.servos import ping_servos
 from deploy.doctor.read.tree import Tree
+from slave.servos.dynamixel.port import Port
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +45,10 @@ class Options:
 async def examine(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
     """Every finding; at most some seconds, most of them for robots that do not answer."""
     found = [_software(), *host(needs, options, tree), *devices(needs, tree), *keys(needs)]
+    if needs.servos is not None and read_device(tree, needs.servos.port).usable:
+        port = Port if options.reach else None
+        pinged = await asyncio.to_thread(ping_servos, needs.servos, tree, port)
+        found.append(judge_latency(pinged, needs.servos.reply_timeout_s))
     found += [judge_endpoint(try_to_listen(endpoint)) for endpoint in needs.link.listen]
     if options.reach:
         found += await others(needs)

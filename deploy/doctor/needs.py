@@ -17,6 +17,7 @@ from deploy.router.config import RouterConfig
 from master.config import MasterConfig
 from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig
+from slave.servos.dynamixel.config import DynamixelConfig
 
 GENERAL = "host"
 """The role where no file is given."""
@@ -38,6 +39,10 @@ class BusNeed:
     nodes: int = 0
     """Sensor nodes that answer each tick; 0 where others hang on it."""
     rate_hz: float = 0.0
+    drives: int = 0
+    """Of a robot, each told and asked at every SYNC …"""
+    bits_per_s: float = 0.0
+    """… and what they put on the bus, heartbeats included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +53,8 @@ class Needs:
     buses: tuple[BusNeed, ...] = ()
     realtime_priority: int = 0
     serial_ports: tuple[str, ...] = ()
+    servos: DynamixelConfig | None = None
+    """Those on a serial bus, which is one of the ports."""
     camera: Camera = Camera.OFF
     camera_device: str = ""
     link: LinkConfig = field(default_factory=LinkConfig)
@@ -99,13 +106,23 @@ def _of_slave(config: SlaveConfig) -> Needs:
         ports.append(config.base.port)
     return Needs(
         role="slave",
-        buses=tuple(map(BusNeed, servos.canopen.buses)) if servos.backend == "canopen" else (),
+        buses=_of_drives(config) if servos.backend == "canopen" else (),
+        servos=servos.dynamixel if servos.backend == "dynamixel" else None,
         realtime_priority=config.process.realtime_priority,
         serial_ports=tuple(ports),
         camera=Camera(config.camera.source),
         camera_device=config.camera.device,
         link=config.link,
         certified_as=common_name(Role.ROBOT, config.robot),
+    )
+
+
+def _of_drives(config: SlaveConfig) -> tuple[BusNeed, ...]:
+    canopen = config.servos.canopen
+    loads = canopen.load(config.skeleton)
+    return tuple(
+        BusNeed(bus, rate_hz=canopen.sync_hz, drives=loads[bus.name][0], bits_per_s=loads[bus.name][1])
+        for bus in canopen.buses
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from deploy.doctor.finding import Finding, fail, ok, warn
 from deploy.doctor.needs import BusNeed
 from deploy.doctor.read.can import CanInterface
+from slave.servos.canopen.load import told_bitrate, too_much
 
 BUSY = 0.8
 """Share of its time that a bus may be occupied before late answers are to be expected."""
@@ -71,6 +72,8 @@ def _judge_running(check: str, need: BusNeed, at: CanInterface) -> Finding:
         advice = "look at the wiring, 120 Ω at both ends, and that all speak at this bit rate"
         judge = fail if at.state == "BUS-OFF" else warn
         return judge(check, f"{words}: {at.state.lower()}", advice)
+    if need.drives:
+        return _judge_drives(check, need, at)
     if not (need.nodes and at.bitrate):
         return ok(check, words)
     share = share_of_time(need, at.bitrate, at.data_bitrate)
@@ -79,6 +82,20 @@ def _judge_running(check: str, need: BusNeed, at: CanInterface) -> Finding:
         return ok(check, words)
     advice = "raise the (data) bit rate, use CAN FD, or spread the nodes over two buses"
     return fail(check, words, advice) if share > 1.0 else warn(check, words, advice)
+
+
+def _judge_drives(check: str, need: BusNeed, at: CanInterface) -> Finding:
+    bitrate = at.bitrate or told_bitrate(need.bus)
+    share = need.bits_per_s / bitrate
+    words = (
+        f"{_words(at)}; {need.drives} drives at {need.rate_hz:g} Hz put {need.bits_per_s / 1e6:.2f} Mbit/s "
+        f"on it, {100 * share:.0f} % of it"
+    )
+    if too := too_much(need.drives, round(need.rate_hz), need.bits_per_s, bitrate):
+        return fail(check, words, too)
+    if share > BUSY:
+        return warn(check, words, "answers may come late: lower sync_hz, or use more buses")
+    return ok(check, words)
 
 
 def _words(at: CanInterface) -> str:

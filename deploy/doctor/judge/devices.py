@@ -5,6 +5,8 @@ from __future__ import annotations
 from deploy.doctor.finding import Finding, fail, ok, warn
 from deploy.doctor.needs import Camera
 from deploy.doctor.read.devices import Device
+from deploy.doctor.read.servos import Pinged
+from slave.servos.dynamixel.latency import BEST_MS, advice
 
 
 def is_url(port: str) -> bool:
@@ -22,6 +24,24 @@ def judge_port(port: str, device: Device | None) -> Finding:
     if not device.usable:
         return fail(check, "this user may not use it", "usermod -a -G dialout USER; the unit has that group")
     return ok(check, "there, and may be used")
+
+
+def judge_latency(pinged: Pinged, reply_timeout_s: float) -> Finding:
+    """How soon the servos on a serial port answer, and what its adapter's latency timer has to do with it."""
+    port, timer, quickest_s = pinged.port, pinged.timer_ms, pinged.quickest_s
+    check = f"latency of {port}"
+    timed = "no latency timer known" if timer is None else f"latency timer {timer} ms"
+    if quickest_s is None:
+        words = f"{timed}; not measured: {pinged.why_not}"
+        slow = timer is not None and 1e-3 * timer > reply_timeout_s
+        return fail(check, words, advice(port, timer)) if slow else ok(check, words)
+    words = f"{timed}; the quickest of {pinged.answers} answers took {1e3 * quickest_s:.1f} ms"
+    if quickest_s > reply_timeout_s:
+        words += f", and reply_timeout_s waits {1e3 * reply_timeout_s:g} ms: all would be called silent"
+        return fail(check, words, advice(port, timer))
+    if timer is not None and timer > BEST_MS:
+        return warn(check, words, advice(port, timer))
+    return ok(check, words)
 
 
 def judge_camera(source: Camera, device: Device, egl: bool, v4l2: bool) -> Finding:

@@ -11,6 +11,7 @@ from common.can.config import BusConfig, names_used_twice
 from common.config import Section
 from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
+from slave.servos.canopen.load import bits_per_s, told_bitrate, too_much
 
 INCREMENTS_PER_TURN = 65536
 """Of a motor's own encoder."""
@@ -96,6 +97,16 @@ class CanopenConfig(Section):
             drives[name] = DriveConfig(id=used[bus], bus=bus)
         return drives
 
+    def load(self, skeleton: Skeleton) -> dict[str, tuple[int, float]]:
+        """By bus: how many drives hang on it, and the bits a second that they put on it."""
+        drives = list(self.drives_of(skeleton).values())
+        counts = {bus.name: sum(drive.bus == bus.name for drive in drives) for bus in self.buses}
+        beat_ms = max(self.heartbeat_ms, 1000 // self.sync_hz)
+        return {
+            name: (count, bits_per_s(count, self.sync_hz, beat_ms, self.drive_heartbeat_ms))
+            for name, count in counts.items()
+        }
+
     def mistakes_for(self, skeleton: Skeleton) -> list[ConfigMistake]:
         """Joints without a drive, drives without a joint, ids used twice, times that do not fit."""
         key = "servos.canopen"
@@ -119,7 +130,21 @@ class CanopenConfig(Section):
         ]
         if not missing and not mistakes:
             mistakes += self._wiring(self.drives_of(skeleton), skeleton)
+            mistakes += self._busy(skeleton)
         return mistakes
+
+    def _busy(self, skeleton: Skeleton) -> list[ConfigMistake]:
+        loads = self.load(skeleton)
+        said = [
+            (bus.name, too_much(count, self.sync_hz, bits, told_bitrate(bus)))
+            for bus in self.buses
+            for count, bits in (loads[bus.name],)
+        ]
+        return [
+            ConfigMistake("servos.canopen.sync_hz", self.sync_hz, f"what bus {name} can carry: {words}")
+            for name, words in said
+            if words
+        ]
 
     def _wiring(self, drives: Mapping[str, DriveConfig], skeleton: Skeleton) -> list[ConfigMistake]:
         names = [bus.name for bus in self.buses]

@@ -17,7 +17,7 @@ from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.can.deaf import open_deaf_to
 from common.can.frame import Frame
-from common.can.state import Controller
+from common.can.state import Controller, ask_kernel
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
 from common.errors import RobotError
 from common.latency import Durations
@@ -26,6 +26,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.load import WELL, too_much
 from slave.servos.canopen.network import DriveNetwork, Outgoing, period_ns
 from slave.servos.canopen.pdo import RPDO1
 from slave.servos.servos import EncoderReading
@@ -39,6 +40,8 @@ _TOLD = 3
 """Of more drives than these only the number is told."""
 _EARLY_NS = 2 * NS_PER_MS
 """A setpoint written this long before its SYNC is due goes with it: ticks jitter, SYNC must not skip one."""
+
+log = logging.getLogger("tandem.slave")
 
 Opener = Callable[[BusConfig], can.BusABC]
 
@@ -96,6 +99,7 @@ class CanopenServos:
                 )
                 bus.open()
                 self._buses[config.name] = bus
+                self._check_load(config)
             self._listen()
             self._come_up()
         except BaseException:
@@ -155,6 +159,17 @@ class CanopenServos:
             },
             buses={name: bus.summary() for name, bus in self._buses.items()},
         )
+
+    def _check_load(self, bus: BusConfig) -> None:
+        """The file is checked by the rate it names; the kernel knows the true one."""
+        link = ask_kernel(bus.channel) if bus.interface == "socketcan" else None
+        if link is None or not link.bitrate:
+            return
+        count, bits = self._config.load(self._skeleton)[bus.name]
+        if words := too_much(count, self._config.sync_hz, bits, link.bitrate):
+            raise RobotError(f"bus {bus.name} cannot carry its drives: {words}")
+        if bits > WELL * link.bitrate:
+            log.warning("bus %s is %.0f %% busy: answers may come late", bus.name, 100 * bits / link.bitrate)
 
     def _listen(self) -> None:
         """Say nothing for a while: a second master would take this one's first frame for an attack."""
