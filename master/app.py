@@ -27,6 +27,7 @@ from master.doubt import DoubtLog, as_figures
 from master.pipeline import MasterPipeline, Solved
 from master.robot import CommandedRobot
 from master.suit.protocol import SuitProtocol
+from master.suit.silence import BusSigns, SilenceWatch
 
 log = logging.getLogger("tandem.master")
 
@@ -53,13 +54,14 @@ class Master:
             for name in config.commanded
         ]
         self._given_up: set[str] = set()
+        self._silence = SilenceWatch()
         self._doubt_log = DoubtLog()
 
     async def run(self) -> None:
         """Capture, send, keep each robot's lease and clock until cancelled."""
         try:
             for bus in self._buses:
-                bus.open()
+                bus.open_or_retry()
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._capture())
                 tasks.create_task(self._tell())
@@ -125,7 +127,19 @@ class Master:
             shared = self._shared_metrics()
             for robot in self._robots:
                 robot.publish_metrics(due.scheduled_ns, shared)
-            self._notifier.status("; ".join(robot.standing for robot in self._robots))
+            for line in self._silence.lines(self._bus_signs(), due.scheduled_ns):
+                log.warning("%s", line)
+            away = [bus for bus in self._buses if not bus.up and bus.last_error]
+            waiting = [f"waiting for bus {bus.name}: {bus.last_error}" for bus in away]
+            self._notifier.status("; ".join([*waiting, *(robot.standing for robot in self._robots)]))
+
+    def _bus_signs(self) -> dict[str, BusSigns]:
+        poll = self._pipeline.poll
+        return {
+            bus.name: poll.signs(bus.name, bus.up, bus.counters)
+            for bus in self._buses
+            if bus.name in poll.buses_with_nodes
+        }
 
     def _shared_metrics(self) -> MasterMetrics:
         return MasterMetrics(

@@ -39,6 +39,8 @@ LONGEST_WAIT_S = 2.0
 SEND_ERRORS_IN_A_ROW = 20
 """A full queue is no reason to reopen a bus, but one that stays full is: 0.1 s at 200 Hz."""
 _QUEUE_FULL = frozenset({errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM})
+_LASTING = (NotImplementedError, ImportError, TypeError, ValueError)
+"""Behind a BusError: what no waiting mends."""
 
 OnFrame = Callable[[str, int, bytes, int], object]
 """(bus name, identifier, data, arrival in monotonic ns)."""
@@ -135,6 +137,21 @@ class CanBus:
                 bus.shutdown()
                 raise BusError(f"bus {self.name}: {self._off_words(self.state)}")
             self._attach(bus)
+
+    def open_or_retry(self) -> None:
+        """Open the bus; one that is not there yet is tried again with back-off, as one that fails later is.
+
+        Raises BusError where no waiting helps: an interface that python-can does not have, wrong options.
+        """
+        try:
+            self.open()
+        except BusError as error:
+            if isinstance(error.__cause__, _LASTING):
+                raise
+            self.counters.failed_opens += 1
+            self.last_error = str(error)
+            self._say("open", f"{error}; it is tried again until it opens")
+            self._reopening = asyncio.get_running_loop().create_task(self._reopen(None, None))
 
     async def close(self) -> None:
         """Close it for good. May be called again."""
@@ -290,8 +307,9 @@ class CanBus:
         if self._on_change is not None:
             self._on_change(self.name, False)
 
-    async def _reopen(self, failed: can.BusABC, reader: Reader | None) -> None:
-        await asyncio.to_thread(_shut_down, failed, reader)
+    async def _reopen(self, failed: can.BusABC | None, reader: Reader | None) -> None:
+        if failed is not None:
+            await asyncio.to_thread(_shut_down, failed, reader)
         while not await self._closes_within(wait_s(self._attempt)):
             self._attempt += 1
             try:

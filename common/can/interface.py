@@ -6,6 +6,7 @@ import errno
 import logging
 import os
 import socket
+from pathlib import Path
 from typing import Any
 
 import can
@@ -13,6 +14,13 @@ import can
 from common.can.config import BusConfig
 from common.errors import BusError
 
+FD_MTU = 72
+"""Room for a frame of an interface that carries CAN FD (linux/can.h, CANFD_MTU); classic CAN has 16."""
+_SYSFS = Path("/sys/class/net")
+_CLASSIC_ADAPTERS = frozenset(
+    {"canalystii", "gs_usb", "robotell", "seeedstudio", "serial", "slcan", "usb2can"}
+)
+"""Interfaces that take `fd` without a word and say of themselves that they carry CAN 2.0."""
 RECEIVE_BUFFER_BYTES = 1 << 20
 """Some 4000 waiting udp_multicast frames: half a second of 36 nodes."""
 _LOOPBACK = "127.0.0.1"
@@ -40,7 +48,35 @@ def open_bus(config: BusConfig) -> can.BusABC:
     except OSError as error:
         bus.shutdown()
         raise BusError(explain(config, error)) from error
+    classic = config.fd and carries_classic_only(config, bus)
+    if classic:
+        bus.shutdown()
+        raise BusError(f"bus {config.name}: {classic}")
     return bus
+
+
+def carries_classic_only(config: BusConfig, bus: can.BusABC, sysfs: Path = _SYSFS) -> str:
+    """Why a bus that is to carry CAN FD cannot, and what to do; empty where it can, or does not tell."""
+    otherwise = "or say fd = false, if the nodes speak classic CAN"
+    if config.interface == "socketcan":
+        try:
+            room = int((sysfs / config.channel / "mtu").read_text())
+        except (OSError, ValueError):
+            return ""
+        if room >= FD_MTU:
+            return ""
+        setting = "type can bitrate 1000000 dbitrate 5000000 fd on"
+        return (
+            f"{config.channel} carries classic CAN only (MTU {room}) and the file says fd = true: every "
+            f"answer would be lost; set it up with `ip link set {config.channel} {setting}`, {otherwise}"
+        )
+    told = getattr(bus, "protocol", None)
+    if config.interface in _CLASSIC_ADAPTERS and told is can.CanProtocol.CAN_20:
+        return (
+            f"python-can's {config.interface} carries classic CAN only and the file says fd = true: every "
+            f"answer would be lost; use another adapter, {otherwise}"
+        )
+    return ""
 
 
 def descriptor(bus: can.BusABC) -> int | None:

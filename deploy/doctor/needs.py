@@ -15,6 +15,7 @@ from common.errors import TandemError
 from common.roles import Role, common_name
 from deploy.router.config import RouterConfig
 from master.config import MasterConfig
+from master.suit.protocol import SuitProtocol
 from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig
 from slave.servos.dynamixel.config import DynamixelConfig
@@ -86,6 +87,8 @@ def _keys(path: Path) -> set[str]:
 
 
 def _of_master(config: MasterConfig) -> Needs:
+    fd = {bus.name: bus.fd for bus in config.capture.buses}
+    SuitProtocol.load(config.capture.dbc).check_identifiers(list(config.nodes.values()), fd)
     nodes = Counter(node.bus for node in config.nodes.values())
     return Needs(
         role="master",

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.can.bus import BusCounters
 from common.can.frame import Frame
 from common.messages import Mask
 from common.quaternion import Array
@@ -24,6 +25,7 @@ from master.suit.nodes import NodeConfig
 from master.suit.number import number_of
 from master.suit.presence import Presence
 from master.suit.protocol import MAG_OVERFLOW, NO_VALUE, READINGS, SuitProtocol
+from master.suit.silence import BusSigns
 
 _IDS = 0x800
 """Identifiers of 11 bits."""
@@ -58,8 +60,13 @@ class Poll:
     def __init__(
         self, nodes: Sequence[NodeConfig], protocol: SuitProtocol, lost_after: int, fd: Mapping[str, bool]
     ) -> None:
-        """`nodes` in skeleton order; `lost_after` in ticks; `fd` says of each bus whether it is CAN FD."""
+        """`nodes` in skeleton order; `lost_after` in ticks; `fd` says of each bus whether it is CAN FD.
+
+        Raises ConfigError where two frames of a bus would have one identifier.
+        """
         count = len(nodes)
+        protocol.check_identifiers(nodes, fd)
+        self._fd = dict(fd)
         self._protocol = protocol
         self._counters = NodeCounters(count)
         self._presence = Presence(count, lost_after)
@@ -183,6 +190,29 @@ class Poll:
         first_key = self._first_key[bus]
         self._frames = [frame for frame in self._frames if not first_key <= frame[0] < first_key + _IDS]
         self._presence.lose(np.array([name == bus for name in self._bus_of_node]))
+
+    @property
+    def buses_with_nodes(self) -> frozenset[str]:
+        """Names of the buses on which nodes hang."""
+        return frozenset(self._bus_of_node)
+
+    def signs(self, bus: str, up: bool, counters: BusCounters) -> BusSigns:
+        """What tells why nobody on a bus answers, with what the bus itself counted."""
+        here = np.array([name == bus for name in self._bus_of_node])
+        nodes = self._counters
+        return BusSigns(
+            up=up,
+            fd=self._fd[bus],
+            sync_id=self._protocol.sync_id,
+            received=counters.received,
+            fresh=int(nodes.fresh[here].sum()),
+            unknown_id=self.bus_health[bus].unknown_id,
+            bad_length=int(nodes.bad_length[here].sum()),
+            bad_checksum=int(nodes.bad_checksum[here].sum()),
+            bad_tick=int(nodes.bad_tick[here].sum()),
+            error_frames=counters.error_frames,
+            send_errors=counters.send_errors,
+        )
 
     @property
     def health(self) -> list[NodeHealth]:

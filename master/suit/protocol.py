@@ -6,6 +6,7 @@ An `AnswerFormat` is one of the two, so that the rest of the code need not care 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 from pathlib import Path
@@ -17,6 +18,7 @@ from common.can.frame import Frame
 from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
 from master.suit.layout import AnswerLayout, LayoutError, Raw
+from master.suit.nodes import NodeConfig
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
@@ -29,6 +31,7 @@ NO_VALUE = -32768
 """Magnetometer counts of a sample without a magnetic reading."""
 MAG_OVERFLOW = -4096
 """What the HMC5883L writes for an axis that overflowed (its data sheet, "Data Output X Registers")."""
+LARGEST_ID = 0x7FF
 TICK_MASK = 0xFFFF_FFFF
 SHIPPED_DBC = Path(__file__).parents[2] / "deploy" / "suit.dbc"
 """The description that comes with tandem."""
@@ -67,7 +70,11 @@ class AnswerFormat:
 class SuitProtocol:
     """Frames of the suit, laid out by a DBC."""
 
-    def __init__(self, sync_id: int, fd: AnswerFormat, classic: AnswerFormat) -> None:
+    def __init__(
+        self, sync_id: int, fd: AnswerFormat, classic: AnswerFormat, source: Path | str = SHIPPED_DBC
+    ) -> None:
+        """`source`: the file that describes them, for messages."""
+        self._source = source
         self.sync_id = sync_id
         self.fd = fd
         self.classic = classic
@@ -90,11 +97,33 @@ class SuitProtocol:
             classic = _format(messages, CLASSIC_MESSAGES, fd=False)
             if (fd.scale != classic.scale).any():
                 raise LayoutError("NODE_SAMPLE: expected the factors of NODE_ACC, NODE_GYR and NODE_MAG")
+            _apart(sync.frame_id, fd, classic)
         except KeyError as error:
             raise _mistake(dbc_path, f"a message {error}") from None
         except LayoutError as error:
             raise _mistake(dbc_path, str(error)) from None
-        return cls(sync.frame_id, fd, classic)
+        return cls(sync.frame_id, fd, classic, dbc_path)
+
+    def check_identifiers(self, nodes: Sequence[NodeConfig], fd: Mapping[str, bool]) -> None:
+        """Each frame of a bus must have an 11-bit identifier of its own. Raises ConfigError naming both.
+
+        A node's identifiers are those of the messages plus its number: with messages that lie close together
+        two nodes may get the same, and only one of them would be heard.
+        """
+        taken = {(bus, self.sync_id): "SYNC" for bus in fd}
+        mistakes = []
+        for node in nodes:
+            for part in self.answer_format(fd[node.bus]).parts:
+                frame_id, what = part.base_id + node.id, f"{part.name} of node {node.id}"
+                other = taken.setdefault((node.bus, frame_id), what)
+                if other != what:
+                    expected = f"identifiers that differ: {what} and {other} on bus {node.bus} have the same"
+                    mistakes.append(ConfigMistake("dbc", f"{frame_id:#x}", expected))
+                if frame_id > LARGEST_ID:
+                    expected = f"at most {LARGEST_ID:#x} (11 bits) as the identifier of {what}"
+                    mistakes.append(ConfigMistake("dbc", f"{frame_id:#x}", expected))
+        if mistakes:
+            raise ConfigError(self._source, mistakes)
 
     def answer_format(self, fd: bool) -> AnswerFormat:
         """How nodes answer on a bus of that kind."""
@@ -148,6 +177,16 @@ def _format(messages: dict[str, Message], names: tuple[str, ...], fd: bool) -> A
         if not part.same_shape(first):
             raise LayoutError(f"{part.name}: expected TICK, STATUS and CRC where {first.name} has them")
     return AnswerFormat(fd, tuple(parts), np.concatenate([part.scale for part in parts]))
+
+
+def _apart(sync_id: int, *forms: AnswerFormat) -> None:
+    """Messages of one bus need identifiers of their own, whatever the nodes' numbers."""
+    for form in forms:
+        names = {sync_id: "SYNC"}
+        for part in form.parts:
+            other = names.setdefault(part.base_id, part.name)
+            if other != part.name:
+                raise LayoutError(f"{part.name}: expected an identifier that {other} does not have")
 
 
 def _mistake(path: Path | str, expected: str) -> ConfigError:

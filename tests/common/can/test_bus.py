@@ -322,3 +322,50 @@ def test_own_echo_is_told_apart_from_answers(group: BusConfig) -> None:
         await bus.close()
 
     run(test())
+
+
+def test_a_bus_that_is_not_there_at_the_start_is_opened_once_it_is(caplog: pytest.LogCaptureFixture) -> None:
+    async def test() -> None:
+        away = [True, True, False]
+
+        def opener() -> can.BusABC:
+            if away.pop(0):
+                raise BusError("bus suit: cannot open socketcan can0: No such device")
+            return ScriptedBus()
+
+        scene = Scene(opener=opener)
+        scene.bus.open_or_retry()
+        assert not scene.bus.up
+        assert "No such device" in scene.bus.last_error
+        await scene.until(lambda: scene.bus.up)
+        assert scene.bus.counters.failed_opens == 2
+        await scene.bus.close()
+
+    with caplog.at_level("WARNING"):
+        run(test())
+    assert "it is tried again until it opens" in caplog.text
+
+
+def test_a_bus_that_no_waiting_can_open_is_an_error_at_once() -> None:
+    async def test() -> None:
+        def opener() -> can.BusABC:
+            raise BusError("bus suit: no such interface") from NotImplementedError()
+
+        scene = Scene(opener=opener)
+        with pytest.raises(BusError, match="no such interface"):
+            scene.bus.open_or_retry()
+        await scene.bus.close()
+
+    run(test())
+
+
+def test_a_bus_that_never_opens_can_be_closed() -> None:
+    async def test() -> None:
+        def opener() -> can.BusABC:
+            raise BusError("bus suit: away")
+
+        scene = Scene(opener=opener)
+        scene.bus.open_or_retry()
+        await asyncio.wait_for(scene.bus.close(), 5.0)
+
+    run(test())

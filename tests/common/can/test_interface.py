@@ -9,7 +9,14 @@ import can
 import pytest
 
 from common.can.config import BusConfig
-from common.can.interface import RECEIVE_BUFFER_BYTES, descriptor, error_number, explain, open_bus
+from common.can.interface import (
+    RECEIVE_BUFFER_BYTES,
+    carries_classic_only,
+    descriptor,
+    error_number,
+    explain,
+    open_bus,
+)
 from common.errors import BusError
 
 
@@ -91,3 +98,22 @@ def test_a_bus_that_stays_on_the_host_uses_loopback_and_a_large_buffer() -> None
             assert granted == 2 * min(RECEIVE_BUFFER_BYTES, most)
     finally:
         opened.shutdown()
+
+
+@pytest.mark.parametrize(("mtu", "fits"), [("16\n", False), ("72\n", True), (None, True), ("odd", True)])
+def test_a_classic_interface_cannot_carry_can_fd(tmp_path: Path, mtu: str | None, fits: bool) -> None:
+    (tmp_path / "can0").mkdir()
+    if mtu is not None:
+        (tmp_path / "can0" / "mtu").write_text(mtu)
+    config = BusConfig(name="suit", interface="socketcan", channel="can0", fd=True)
+    with can.Bus(interface="virtual", channel="no matter") as bus:
+        said = carries_classic_only(config, bus, tmp_path)
+    assert bool(said) is not fits
+    assert fits or "fd on`" in said
+
+
+def test_an_adapter_that_says_it_carries_classic_can_alone_is_refused() -> None:
+    with can.Bus(interface="virtual", channel="no matter", protocol=can.CanProtocol.CAN_20) as bus:
+        for interface, refused in (("slcan", True), ("virtual", False)):
+            config = BusConfig(name="suit", interface=interface, channel="x", fd=True)
+            assert bool(carries_classic_only(config, bus)) == refused

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from common.errors import ConfigError
 from master.suit.crc import frame_crc
+from master.suit.nodes import NodeConfig
 from master.suit.protocol import (
     CLASSIC_MESSAGES,
     FD_MESSAGES,
@@ -151,3 +152,51 @@ def test_a_field_that_moves_in_the_dbc_moves_on_the_wire(tmp_path: Path) -> None
     assert moved.encode_sample(1, raw, 0b100001, 0b10, False)[0].data[6] == 0b100001_10
     decoded = moved.classic.parts[0].decode(moved.encode_sample(1, raw, 0b100001, 0b10, False)[0].data)
     assert (decoded.tick[0], decoded.status[0]) == (0b100001, 0b10)
+
+
+def crowded(tmp_path: Path, **moved: int) -> SuitProtocol:
+    """The shipped description with some messages at other identifiers."""
+    text = SHIPPED_DBC.read_text("utf-8")
+    for name, frame_id in moved.items():
+        old = next(line for line in text.splitlines() if line.startswith("BO_ ") and f" {name}:" in line)
+        number = old.split()[1]
+        text = text.replace(f"BO_ {number} ", f"BO_ {frame_id} ").replace(
+            f"SG_ {number} ", f"SG_ {frame_id} "
+        )
+        text = text.replace(f"VAL_ {number} ", f"VAL_ {frame_id} ")
+    path = tmp_path / "crowded.dbc"
+    path.write_text(text, "utf-8")
+    return SuitProtocol.load(path)
+
+
+def node(number: int, bus: str = "arm") -> NodeConfig:
+    return NodeConfig(id=number, bus=bus)
+
+
+def test_two_nodes_whose_messages_get_one_identifier_are_named(tmp_path: Path) -> None:
+    protocol = crowded(tmp_path, NODE_GYR=0x201)
+    protocol.check_identifiers([node(1), node(3)], {"arm": False})
+    with pytest.raises(ConfigError, match=r"0x203.*NODE_ACC of node 3 and NODE_GYR of node 2 on bus arm"):
+        protocol.check_identifiers([node(1), node(2), node(3)], {"arm": False})
+
+
+def test_a_node_must_not_get_the_identifier_of_sync(tmp_path: Path) -> None:
+    protocol = crowded(tmp_path, SYNC=0x105)
+    protocol.check_identifiers([node(4)], {"arm": True})
+    with pytest.raises(ConfigError, match=r"0x105.*NODE_SAMPLE of node 5 and SYNC"):
+        protocol.check_identifiers([node(5)], {"arm": True})
+
+
+def test_nodes_of_two_buses_may_have_the_same_number(tmp_path: Path) -> None:
+    crowded(tmp_path).check_identifiers([node(1), node(1, "leg")], {"arm": False, "leg": False})
+
+
+def test_an_identifier_has_eleven_bits(tmp_path: Path) -> None:
+    protocol = crowded(tmp_path, NODE_MAG=0x7F0)
+    with pytest.raises(ConfigError, match="11 bits"):
+        protocol.check_identifiers([node(16)], {"arm": False})
+
+
+def test_two_messages_with_one_identifier_are_refused_when_read(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"NODE_SAMPLE|cantools"):
+        crowded(tmp_path, SYNC=0x100)
