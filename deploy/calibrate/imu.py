@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
 _STANDARD_GRAVITY_M_S2 = 9.80665
 
 
+def _method(text: str) -> str:
+    if text not in ("attitudes", "six-position"):
+        raise typer.BadParameter("expected attitudes or six-position")
+    return text
+
+
 def imu(
     recording: RecordingFile,
     out: OutFolder = Path("calibration"),
@@ -28,10 +35,24 @@ def imu(
         float, typer.Option(help="m/s² where it was recorded.", min=9.7, max=9.9)
     ] = _STANDARD_GRAVITY_M_S2,
     still_s: Annotated[float, typer.Option(help="Shortest rest that counts, s.", min=1.0, max=60.0)] = 2.0,
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="attitudes|six-position",
+            help="Many attitudes; or six faces and three turns, as the housing's axes have it.",
+            callback=_method,
+        ),
+    ] = "attitudes",
+    turn_deg: Annotated[
+        float, typer.Option(help="Angle of each of the three turns of six-position, °.", min=90.0, max=3600.0)
+    ] = 360.0,
     report: ReportFile = None,
     as_json: AsJson = False,
 ) -> None:
     """Calibrate accelerometers and gyroscopes from a recording: 20 or more attitudes, some seconds each.
+
+    With `--method six-position`: the node at rest on each of its six faces, in any order, and turned by a
+    known angle (a whole turn, or `--turn-deg` on a turntable) about each of its axes, from rest to rest.
 
     Example: `tandem calibrate imu session.npz --out calibration --report imu.json`
     """
@@ -39,6 +60,10 @@ def imu(
     from deploy.calibrate.pictures import draw_inertial
     from master.calibrate.inertial import InertialOptions, calibrate_inertial
 
+    if method == "six-position":
+        choice = (gravity, still_s, turn_deg)
+        _six_position(recording, (out, node or [], report), choice, as_json=as_json)
+        return
     options = InertialOptions(gravity, still_s)
 
     def calibrate(raw: NodeRecording, tell: Callable[[float], None]) -> InertialCalibration:
@@ -53,6 +78,48 @@ def imu(
     sessions.tell_machines(sessions.report(session, recording, day, _gist), report, to_stdout=as_json)
     if not as_json:
         _print(session, written, Console())
+    sessions.refuse(session, recording)
+
+
+def _six_position(
+    recording: Path,
+    where: tuple[Path, list[str], Path | None],
+    choice: tuple[float, float, float],
+    *,
+    as_json: bool,
+) -> None:
+    from deploy.calibrate import session as sessions
+    from deploy.calibrate.views import notes, six_position_table
+    from master.calibrate.six_session import (
+        SixPositionCalibration,
+        SixPositionOptions,
+        calibrate_six_position,
+    )
+
+    out, nodes, report = where
+    options = SixPositionOptions(choice[0], math.radians(choice[2]), choice[1])
+
+    def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> SixPositionCalibration:
+        return calibrate_six_position(raw, options)
+
+    def gist(found: SixPositionCalibration) -> dict[str, Any]:
+        return {
+            "method": "six-position",
+            "still_intervals": len(found.still),
+            "turns": len(found.gyroscope.after_rad),
+            "tilt_deg": math.degrees(found.accelerometer.tilt_rad),
+            "evidence": [one.as_report() for one in found.evidence],
+        }
+
+    sessions.make_folder(out)
+    day = date.today()
+    session = sessions.calibrate_nodes(recording, nodes, calibrate, Console(stderr=True))
+    written = sessions.write_nodes(session, recording, out, day)
+    sessions.tell_machines(sessions.report(session, recording, day, gist), report, to_stdout=as_json)
+    if not as_json and session.found:
+        console = Console()
+        console.print(six_position_table(session.found))
+        notes(session.found, written, console)
     sessions.refuse(session, recording)
 
 

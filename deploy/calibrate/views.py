@@ -15,6 +15,7 @@ from common.quaternion import Array
 from deploy.calibrate.session import Found, by_words
 from master.calibrate.inertial import InertialCalibration
 from master.calibrate.magnetic import MagneticCalibration
+from master.calibrate.six_session import SixPositionCalibration
 
 
 def inertial_table(found: Mapping[str, InertialCalibration]) -> Table:
@@ -38,6 +39,35 @@ def inertial_table(found: Mapping[str, InertialCalibration]) -> Table:
             *(f"{np.degrees(_mean(e)):.3f}" for e in (node.gyr_before_rad, g.errors_rad, g.hold_out_rad)),
             f"{100 * g.sigma.max() / scale[1]:.3f} %",
             f"{np.degrees(g.bias_sigma.max() * scale[1]):.4f} °/s",
+        )
+    return table
+
+
+def six_position_table(found: Mapping[str, SixPositionCalibration]) -> Table:
+    """A row a node and sensor: mean residual before and after, and the largest 1σ."""
+    table = _table("acc: |‖a‖ - g| at rest, m/s²; gyro: error of a turn's angle, °")
+    for name, node in found.items():
+        a, g = node.accelerometer, node.gyroscope
+        scale = [np.cbrt(abs(np.linalg.det(sensor.affine[:, :3]))) for sensor in (a, g)]
+        table.add_row(
+            name,
+            "acc",
+            f"{len(node.still)} rests",
+            f"{_mean(a.before_m_s2):.4f}",
+            f"{_mean(a.after_m_s2):.4f}",
+            "-",
+            f"{100 * a.sigma[:, :3].max() / scale[0]:.3f} %",
+            f"{a.sigma[:, 3].max():.4f} m/s²",
+        )
+        table.add_row(
+            "",
+            "gyro",
+            f"{len(g.after_rad)} turns",
+            f"{np.degrees(_mean(g.before_rad)):.3f}",
+            f"{np.degrees(_mean(g.after_rad)):.3f}",
+            "-",
+            f"{100 * g.sigma[:, :3].max() / scale[1]:.3f} %",
+            f"{np.degrees(g.sigma[:, 3].max()):.4f} °/s",
         )
     return table
 

@@ -58,6 +58,8 @@ class Carried:
     """(3, 3), A by least squares."""
     explained_by_matrix: float
     """Share that A explains, at most 1."""
+    signs_told: bool
+    """Whether the best axes with any one of them negated would fit clearly worse."""
 
     @property
     def confused(self) -> bool:
@@ -100,6 +102,11 @@ def carried(direction: Array, rates: Array, rate_hz: float) -> Carried | None:
         float((costs[0] + floor) / (costs[best] + floor)),
         solved[:9].reshape(3, 3),
         1.0 - float(whole - 2.0 * solved @ right + solved @ normal @ solved) / whole,
+        all(
+            _cost(_CANDIDATES[best] @ np.diag(signs), normal, right, whole)[0] + floor
+            > _CLEARLY_BETTER * (costs[best] + floor)
+            for signs in 1.0 - 2.0 * np.eye(3)
+        ),
     )
 
 

@@ -100,12 +100,12 @@ def gyroscope_axes(moves: gyr.Moves, scale: float, *, counts: bool) -> Evidence:
         "°",
         advice=f"the gyroscope does not explain how gravity turns ({np.degrees(error):.0f}° off on average, "
         "and "
-        f"{np.degrees(better):.0f}° otherwise): {_whose(axes)}{also}. Correct that in the driver, and "
+        f"{np.degrees(better):.0f}° otherwise): {whose(axes)}{also}. Correct that in the driver, and "
         "record again",
     )
 
 
-def _whose(axes: Array) -> str:
+def whose(axes: Array) -> str:
     """Whose axes are confused, where the rates times `axes` fit."""
     # an accelerometer turned by Q shows as Qᵀ, a mirrored one as -Qᵀ
     of_gyro = confusion(axes).replace("its", "the gyroscope's", 1)

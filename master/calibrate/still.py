@@ -38,6 +38,17 @@ def motion_level(gyr: Array, rate_hz: float) -> Array:
     return level
 
 
+def variation(samples: Array, rate_hz: float) -> Array:
+    """Standard deviation of the readings (T, 3) within a sliding window, (T,), infinite beside gaps."""
+    width = max(3, round(WINDOW_S * rate_hz) | 1)
+    missing = np.any(np.isnan(samples), axis=1)
+    known = np.where(missing[:, None], 0.0, samples - np.nanmean(samples, axis=0))
+    mean, square = _sliding(known, width), _sliding(known**2, width)
+    out: Array = np.sqrt(np.sum(np.maximum(square - mean**2, 0.0), axis=1))
+    out[_sliding(missing[:, None].astype(float), width)[:, 0] > 0.5 / width] = np.inf
+    return out
+
+
 def stillest_level(level: Array, floor: float) -> float:
     """The rate of a node at rest: its noise, or a hand's tremor; at least `floor`."""
     return max(float(np.quantile(level, _STILLEST)), floor)

@@ -15,6 +15,7 @@ from common.config import load_config
 from common.errors import TandemError
 from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate, to_matrix
 from deploy import cli
+from tests.master.calibrate.test_six_position import session as six_faces
 
 RATE_HZ = 50.0
 BIAS: Array = np.array([0.3, -0.2, 0.1])
@@ -148,3 +149,33 @@ def test_the_magnetometers_axes_are_turned_into_the_accelerometers(
     map_ = np.array(load_config(out / "unit.toml", NodeCalibration).magnetometer)[:, :3]
     turn = map_ @ np.linalg.inv(np.array(alone["magnetometer"]["value"])[:, :3])
     np.testing.assert_allclose(turn, to_matrix(from_rotation_vector(np.radians([0.0, 2.0, 0.0]))), atol=2e-3)
+
+
+def test_six_faces_and_three_turns_are_a_method_of_their_own(tmp_path: Path) -> None:
+    acc, gyr = six_faces()
+    noise = np.random.default_rng(0).normal(scale=2e-3, size=(2, len(acc), 3))
+    np.savez(tmp_path / "unit.npz", acc=acc - BIAS + 10 * noise[0], gyr=gyr + noise[1], rate_hz=100.0)
+    line = f"calibrate imu {tmp_path}/unit.npz --method six-position --out {tmp_path}"
+    said = run(f"{line} --report {tmp_path}/r.json")
+    assert "3 turns" in said
+    node = load_config(tmp_path / "unit.toml", NodeCalibration)
+    assert np.allclose(np.array(node.accelerometer)[:, 3], BIAS, atol=0.05)
+    figures = json.loads((tmp_path / "r.json").read_text())["nodes"]["unit"]
+    assert figures["method"] == "six-position"
+    assert {one["verdict"] for one in figures["evidence"]} == {"agrees"}
+
+
+@pytest.mark.parametrize("name", ["mirrored", "swapped"])
+def test_a_magnetometer_that_contradicts_the_gyroscope_is_not_written(
+    name: str, whole_session: Path, tmp_path: Path
+) -> None:
+    arrays = dict(np.load(whole_session))
+    mag = arrays["mag"]
+    arrays["mag"] = mag * [-1.0, 1.0, 1.0] if name == "mirrored" else mag[:, [1, 0, 2]] * [1.0, 1.0, -1.0]
+    np.savez(tmp_path / "unit.npz", **arrays)
+    with pytest.raises(TandemError, match=r"a mirror image|accept it with --axes=y,x,-z;"):
+        run(f"calibrate mag {tmp_path}/unit.npz --out {tmp_path}/out")
+    assert list((tmp_path / "out").glob("*.toml")) == []
+    if name == "swapped":
+        run(f"calibrate mag {tmp_path}/unit.npz --out {tmp_path}/out --axes=y,x,-z")
+        assert (tmp_path / "out" / "unit.toml").exists()

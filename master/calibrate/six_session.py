@@ -1,0 +1,152 @@
+"""`calibrate imu --method six-position`: six attitudes and three turns of a recording to a node's maps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import date
+
+import numpy as np
+
+from common.calibration import Made
+from common.quaternion import Array
+from master.calibrate import inertial_evidence as compare
+from master.calibrate.carried import carried
+from master.calibrate.evidence import Evidence, agrees, at_most, not_judged, refuse_contradictions, unjudged
+from master.calibrate.node_file import Part
+from master.calibrate.recording import NodeRecording, RecordingError
+from master.calibrate.six_position import SixFaces, ThreeTurns, check_tilt, fit_faces, fit_turns, turn_scale
+from master.calibrate.soundness import check_inertial, check_samples, filled, without_zeros
+from master.calibrate.still import (
+    Intervals,
+    interval_means,
+    motion_level,
+    still_intervals,
+    stillest_level,
+    variation,
+)
+
+_LONGEST_GAP_S = 0.05
+_CALM = 6.0
+"""Times the stillest, up to which a node rests."""
+_LEAST_CALM_M_S2 = 0.05
+_CLIP_WATCH = 40.0
+_COMPARED = "gyroscope's axes against gravity's turns"
+
+
+@dataclass(frozen=True, slots=True)
+class SixPositionOptions:
+    """What a person may choose."""
+
+    gravity_m_s2: float = 9.80665
+    turn_rad: float = 2.0 * np.pi
+    """Of each of the three turns."""
+    shortest_still_s: float = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class SixPositionCalibration:
+    """What was found, and how good it is."""
+
+    name: str
+    still: Intervals
+    accelerometer: SixFaces
+    gyroscope: ThreeTurns
+    notes: tuple[str, ...]
+    evidence: tuple[Evidence, ...]
+
+    def parts(self, day: date, recording: str) -> dict[Part, tuple[Array, Made]]:
+        """As `write_calibration` takes them."""
+        a, g = self.accelerometer, self.gyroscope
+
+        def made(unit: str, before: Array, after: Array, sigma: Array) -> Made:
+            first, then = float(np.mean(np.abs(before))), float(np.mean(np.abs(after)))
+            return Made(
+                date=day,
+                recording=recording,
+                unit=unit,
+                residual_before=first,
+                residual_after=then,
+                sigma=sigma.tolist(),
+            )
+
+        return {
+            "accelerometer": (a.affine, made("m/s²", a.before_m_s2, a.after_m_s2, a.sigma)),
+            "gyroscope": (g.affine, made("rad", g.before_rad, g.after_rad, g.sigma)),
+        }
+
+
+def calibrate_six_position(
+    recording: NodeRecording, options: SixPositionOptions = SixPositionOptions()
+) -> SixPositionCalibration:
+    """Find the maps of both sensors. Raises RecordingError when the recording does not determine them."""
+    recording = without_zeros(recording)
+    check_samples("accelerometer", recording.acc_m_s2)
+    check_samples("gyroscope", recording.gyr_rad_s)
+    rates = filled(recording.gyr_rad_s, round(_LONGEST_GAP_S * recording.rate_hz))
+    level = motion_level(rates, recording.rate_hz)
+    rest = stillest_level(level, floor=1.0 if recording.counts else 1e-3)
+    check_inertial(recording, level, _CLIP_WATCH * rest)
+    evidence = [] if recording.counts else [compare.known_unit(_median_norm(recording), options.gravity_m_s2)]
+    evidence += compare.ranges(recording, rates[level < 2.0 * rest])
+    refuse_contradictions(evidence)
+    still = _rests(recording, level / (_CALM * rest), options)
+    readings = interval_means(recording.acc_m_s2, still)
+    faces = fit_faces(readings, options.gravity_m_s2, counts=recording.counts)
+    evidence += refuse_contradictions([check_tilt(faces.tilt_rad)])
+    force = readings @ faces.affine[:, :3].T + faces.affine[:, 3]
+    scale = turn_scale(rates, still, force, recording.rate_hz, options.turn_rad) if recording.counts else 1.0
+    turns = fit_turns(scale * rates, still, force, recording.rate_hz, options.turn_rad)
+    evidence += refuse_contradictions([_axes(recording, scale * rates, faces, turns)])
+    to_reading = np.array([scale, scale, scale, 1.0])
+    turns = ThreeTurns(turns.affine * to_reading, turns.sigma * to_reading, turns.before_rad, turns.after_rad)
+    return SixPositionCalibration(
+        recording.name,
+        still,
+        faces,
+        turns,
+        (*recording.notes, *unjudged(evidence)),
+        tuple(evidence),
+    )
+
+
+def _rests(recording: NodeRecording, turning: Array, options: SixPositionOptions) -> Intervals:
+    """Rests (K, 2) by both sensors, for the gyro's level over its limit (T,)."""
+    acc = filled(recording.acc_m_s2, round(_LONGEST_GAP_S * recording.rate_hz))
+    moved = variation(acc, recording.rate_hz)
+    least = 2.0 if recording.counts else _LEAST_CALM_M_S2
+    shaking = moved / (_CALM * stillest_level(moved, floor=least / _CALM))
+    still = still_intervals(
+        np.maximum(turning, shaking), 1.0, recording.rate_hz, max(options.shortest_still_s, 1.0)
+    )
+    if len(still) < 6:
+        raise RecordingError(
+            f"{len(still)} rests of {options.shortest_still_s:g} s or more were found, at least 6 are "
+            "needed; lay the node on each of its six faces, then turn it about each axis from rest to rest"
+        )
+    return still
+
+
+def _axes(recording: NodeRecording, rates: Array, faces: SixFaces, turns: ThreeTurns) -> Evidence:
+    """The gyroscope's signs, which the turns alone do not tell, by how gravity moved meanwhile."""
+    force = recording.acc_m_s2 @ faces.affine[:, :3].T + faces.affine[:, 3]
+    found = carried(force, rates @ turns.affine[:, :3].T + turns.affine[:, 3], recording.rate_hz)
+    if found is not None and found.confused:
+        return at_most(
+            _COMPARED,
+            1.0 - found.explained / found.left_over,
+            0.0,
+            advice=f"the gyroscope does not explain how gravity turns: {compare.whose(found.axes)}. Correct "
+            "that in the driver, and record again",
+        )
+    if found is None or not found.told or not found.signs_told:
+        return not_judged(
+            _COMPARED,
+            "the node was not recorded while each of its axes turned gravity; record the way from face to "
+            "face, about all axes",
+        )
+    return agrees(_COMPARED, 0.0, 0.0)
+
+
+def _median_norm(recording: NodeRecording) -> float:
+    norms = np.linalg.norm(recording.acc_m_s2, axis=1)
+    return float(np.median(norms[np.isfinite(norms)]))
