@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from deploy.faults import body, link
+from deploy.faults import body, link, machine
 from deploy.faults.fault import Fault, Reaction
 from slave.guard import State
 
@@ -255,6 +255,34 @@ ROBOT = (
         ENGAGE,
         body.base_tilted,
         reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by=frozenset({"base"}),
+    ),
+    Fault(
+        "base falls",
+        "The base tips over at 100°/s, as an instrument of ten frames a second tells it.",
+        Reaction.HOLDS,
+        "Brakes all joints and stands, with the second frame beyond the limit.",
+        ENGAGE,
+        machine.base_falls,
+        reacts_s=0.1 + 0.2 + AT_ONCE_S, stands_s=0.1 + 0.2 + AT_ONCE_S + BRAKED_S,
+        held_by=frozenset({"base"}),
+    ),
+    Fault(
+        "attitude frames spoiled",
+        "Every fourth frame of the attitude instrument has one flipped bit; the base stands level.",
+        Reaction.GOES_ON,
+        "Follows. Of three frames in a row each angle's median counts.",
+        NOTHING,
+        machine.frames_spoiled,
+        ends=State.TRACK, strays_deg=0.1,
+    ),
+    Fault(
+        "second master at the drives",
+        "Another program sends SYNC on a bus of the drives.",
+        Reaction.HOLDS,
+        "Stops all drives by NMT, brakes and stands; names the second master by what it sends.",
+        "End the other program, then emergency stop and its reset with the key; then engage.",
+        machine.second_master,
+        reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by=frozenset({"drive"}),
     ),
 )  # fmt: skip
 
