@@ -112,6 +112,7 @@ def as_report(pair: HingePair, angle_rad: Array, sign: float, file: Path, rate_h
             "sigma_deg": [math.degrees(found.sigma1_rad), math.degrees(found.sigma2_rad)],
             "differs_deg": apart,
         },
+        "evidence": [pair.rates.as_report()],
         "condition": found.condition,
         "misfit_deg_s": math.degrees(found.misfit_rad_s),
         "bending_deg_s": math.degrees(found.bending_rad_s),
@@ -171,6 +172,9 @@ def _print(figures: dict[str, Any], console: Console) -> None:
         f"{figures['bending_deg_s']:.0f}°/s bending; "
         + ("no other answer" if rival is None else f"the next best answer costs {rival:.1f} times as much")
     )
+    for one in figures["evidence"]:
+        figure = one["advice"] if one["figure"] is None else f"{one['figure']:.0f} of {one['limit']:.0f}°"
+        console.print(f"{one['compared']}, low-passed: {one['verdict']}, {figure}")
     angle = figures["angle_deg"]
     console.print(
         f"angle {angle['lowest']:.1f} to {angle['highest']:.1f}°, median {angle['median']:.1f}°, "

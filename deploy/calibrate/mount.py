@@ -87,8 +87,17 @@ def mount(
                 "over the recording: mounting.png"
             )
     if found.refused:
-        lines = [f"{recording}: {name} is not written: {why}" for name, why in found.refused.items()]
-        raise TandemError("\n".join(lines))
+        raise TandemError("\n".join(f"{recording}: {line}" for line in refusals(found)))
+
+
+def refusals(found: Mounting) -> list[str]:
+    """A line for each reason, with the nodes that are not written for it."""
+    from deploy.calibrate.session import by_words
+
+    return [
+        f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not written: {why}"
+        for why, names in by_words(found.refused.items()).items()
+    ]
 
 
 def as_report(found: Mounting, recording: Path) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 The rates alone (paper C) leave the axes' relative sign open, and skin that shakes under a sensor can turn
 their answer far away: on a walking person's thigh by 80°, where the answer from rates, inclinations and
 accelerations together stays within 2° of the one that knows the stance. So the latter is the answer, and the
-former stands beside it.
+former stands beside it. Low-passed, the rates alone must not contradict it: what both are apart is in the
+stated uncertainty, and beyond a limit nothing is said.
 """
 
 from __future__ import annotations
@@ -14,18 +15,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.quaternion import heading_turn, to_matrix
-from master.calibrate.evidence import first_contradiction
+from master.calibrate.clock_lag import WORST_LAG_S, joint_lag
+from master.calibrate.evidence import Evidence, first_contradiction
 from master.calibrate.gauss_newton import tangents
 from master.calibrate.hinge import Hinge as FoundHinge
 from master.calibrate.hinge import PoorMotionError, again, check_moved, find_hinge
 from master.calibrate.joint_fit import JointFit, fit_joint
 from master.calibrate.oriented import bridged, moving, orient, rows_moving
+from master.calibrate.rates_alone import check_rates
 from master.calibrate.recording import NodeRecording
 from master.calibrate.unit_evidence import unit_evidence
 from master.fuse.hinge_angle import Hinge
 
 _LEAST_SAMPLES = 60
-_WORST_SIGMA_RAD = math.radians(4.0)
+_WORST_SIGMA_RAD = math.radians(10.0)
 _WORST_RIVAL = 1.15
 
 
@@ -37,6 +40,8 @@ class HingePair:
     """Axes from the rates alone (paper C), signs as the answer's."""
     fit: JointFit
     """The answer: axes, heading offset and joint centre from all readings together."""
+    rates: Evidence
+    """The answer's axes against the rates alone, low-passed as neighbours share them."""
     hinge: Hinge
     """What the fused angle needs of it. Angle 0 is the pose at the beginning."""
 
@@ -68,6 +73,15 @@ def find_hinge_pair(one: NodeRecording, two: NodeRecording) -> HingePair:
         near=[(first, second), (first, -second)],
     )
     assert fit.axes is not None
+    fit, rates = check_rates(fit, parent.some(rows), child.some(rows), spacing_s)
+    lag = joint_lag(parent, child, spacing_s)
+    if rates.contradicts:
+        raise PoorMotionError(f"the joint: {rates.advice}")
+    if lag is not None and abs(lag.seconds) > WORST_LAG_S:
+        raise PoorMotionError(
+            f"unit 2 comes {1e3 * lag.seconds:.0f} ms after unit 1; look at their clocks, and record again"
+        )
+    assert fit.axes is not None
     sigma = max(fit.axis_sigma_rad)
     if sigma > _WORST_SIGMA_RAD:
         raise PoorMotionError(f"its axis is only known to ± {math.degrees(sigma):.0f}°; {again('the joint')}")
@@ -85,7 +99,7 @@ def find_hinge_pair(one: NodeRecording, two: NodeRecording) -> HingePair:
         first, second, found.sigma1_rad, found.sigma2_rad, found.condition, found.misfit_rad_s,
         found.bending_rad_s, found.rival,
     )  # fmt: skip
-    return HingePair(signed, fit, hinge)
+    return HingePair(signed, fit, rates, hinge)
 
 
 def _named(unit: NodeRecording, name: str) -> NodeRecording:

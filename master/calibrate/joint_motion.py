@@ -12,6 +12,7 @@ from common.skeleton import Skeleton
 from master.calibrate.joint_fit import JointFit, fit_joint
 from master.calibrate.joint_residuals import Moving
 from master.calibrate.oriented import rows_moving
+from master.calibrate.rates_alone import check_rates
 
 _WORST_AXIS_RAD = math.radians(10.0)
 _WORST_OFFSET_RAD = math.radians(8.0)
@@ -57,8 +58,13 @@ def joint_motion(skeleton: Skeleton, i: int, parent: Moving, child: Moving, spac
     if len(rows) < _LEAST_SAMPLES:
         return JointMotion(entry.name, entry.parent, kind, None, f"it hardly moved; {ask}", False)
     fit = fit_joint(parent.some(rows), child.some(rows), axes, spacing_s)
+    rates = None
+    if kind == "hinge":
+        fit, rates = check_rates(fit, parent.some(rows), child.some(rows), spacing_s)
     refusal = None
-    if 0.5 * fit.steady.offset_change_rad > _WORST_OFFSET_RAD:
+    if rates is not None and rates.contradicts:
+        refusal = rates.advice
+    elif 0.5 * fit.steady.offset_change_rad > _WORST_OFFSET_RAD:
         refusal = (
             f"{_percent(fit.steady.change_share)} of the way through the motion the heading between both "
             f"changes by {math.degrees(fit.steady.offset_change_rad):.0f}°: {entry.name} or {entry.parent} "

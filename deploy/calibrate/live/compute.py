@@ -17,6 +17,7 @@ from deploy.calibrate import session as sessions
 from deploy.calibrate.live.guide import What
 from deploy.calibrate.live.run import Session
 from deploy.calibrate.mount import as_report, joints_table, nodes_table
+from deploy.calibrate.mount import refusals as mount_refusals
 from deploy.calibrate.mount_picture import draw_angles
 from deploy.calibrate.pictures import draw_inertial, draw_magnetic
 from deploy.calibrate.views import inertial_table, magnetic_table, notes
@@ -161,5 +162,5 @@ def _mount(
     if choice.pictures and mounting.nodes:
         draw_angles(nodes, config.skeleton, mounting, folder / "mounting.png")
     console.print(nodes_table(mounting), joints_table(mounting))
-    refusals += [f"mount: {name}: {why}" for name, why in mounting.refused.items()]
+    refusals += [f"mount: {line}" for line in mount_refusals(mounting)]
     return as_report(mounting, session.worn)

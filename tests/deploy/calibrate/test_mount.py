@@ -1,5 +1,6 @@
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from common.calibration import NodeCalibration
 from common.config import load_config
 from common.errors import TandemError
 from deploy.calibrate.mount import _times, mount
+from tests.master.calibrate.worn import wear
 
 
 @pytest.mark.parametrize("text", ["3", "1:2:3", "a:b", "-1:2", ":", "²:3", "5:2", "2:2", "1e3:2e3"])
@@ -30,9 +32,32 @@ def test_nodes_that_stood_still_are_refused_by_name_and_not_written(tmp_path: Pa
     up = np.tile([0.0, 0.0, 9.81], (500, 1))
     arrays = {f"{n}_{k}": v for n in ("chest", "head") for k, v in (("acc", up), ("gyr", noise))}
     np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(500), **arrays)
-    with pytest.raises(TandemError, match=r"head is not written: .*hardly moved; walk some steps"):
+    with pytest.raises(TandemError, match=r"chest, head are not written: .*hardly moved; walk some steps"):
         mount(tmp_path / "s.npz", out=tmp_path / "out")
     assert list((tmp_path / "out").glob("*.toml")) == []
+
+
+def test_evidence_that_contradicts_itself_writes_nothing_and_says_so_once(tmp_path: Path) -> None:
+    """Two nodes exchanged, and every gyroscope in °/s: exit with the cause, and no file."""
+    nodes = wear("nursing", 7).nodes
+    exchanged = nodes | {"left_forearm": nodes["right_hand"], "right_hand": nodes["left_forearm"]}
+    in_degrees = {n: replace(unit, gyr_rad_s=np.degrees(unit.gyr_rad_s)) for n, unit in nodes.items()}
+    cases = (
+        (exchanged, "left_forearm and right_hand seem to be exchanged"),
+        (in_degrees, "seems to read °/s"),
+    )
+    for number, (spoilt, said) in enumerate(cases):
+        out = tmp_path / str(number)
+        arrays = {f"{n}_acc": unit.acc_m_s2 for n, unit in spoilt.items()}
+        arrays |= {f"{n}_gyr": unit.gyr_rad_s for n, unit in spoilt.items()}
+        length = len(next(iter(arrays.values())))
+        np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(length), **arrays)
+        with pytest.raises(TandemError, match=said) as error:
+            mount(tmp_path / "s.npz", out=out, report=tmp_path / "report.json")
+        assert list(out.glob("*.toml")) == []
+        assert number or len(str(error.value).splitlines()) == 1
+        report = json.loads((tmp_path / "report.json").read_text("utf-8"))
+        assert any(e["verdict"] == "contradicts" for e in report["evidence"]["left_forearm"])
 
 
 @pytest.mark.recordings
