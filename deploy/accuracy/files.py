@@ -29,6 +29,13 @@ def files(
             callback=in_a_folder,
         ),
     ] = None,
+    align: Annotated[
+        bool,
+        typer.Option(
+            "--align",
+            help="Take one constant rotation each side (world, sensor) out of the truth, and print it.",
+        ),
+    ] = False,
     jobs: Annotated[
         int | None, typer.Option(help="Processes at once; one a core (at most 4) without it.", min=1)
     ] = None,
@@ -49,7 +56,7 @@ def files(
     if filter_ != "all" and filter_ not in FILTERS:
         raise typer.BadParameter(f"{filter_!r}: expected {', '.join(FILTERS)} or all", param_hint="--filter")
     console = Console()
-    judged = judge(recordings, FILTERS if filter_ == "all" else (filter_,), console, jobs)
+    judged = judge(recordings, FILTERS if filter_ == "all" else (filter_,), console, jobs, align=align)
     console.print(accuracy_of_files(judged.tree))
     if report is not None:
         write_json(report, judged.tree)

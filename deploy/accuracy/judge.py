@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from common.quaternion import Array
 from deploy.accuracy.broad import Errors, errors, score, with_heading_of
+from deploy.accuracy.frames import fit, hint
 from deploy.accuracy.online import Run, run_online
 from deploy.accuracy.picture import Panel
 from deploy.accuracy.recording import Trial, load_trial
@@ -38,10 +39,18 @@ class Judged:
     """One a recording."""
 
 
-def judge(paths: Sequence[Path], filters: Sequence[str], console: Console, jobs: int | None = None) -> Judged:
+def judge(
+    paths: Sequence[Path],
+    filters: Sequence[str],
+    console: Console,
+    jobs: int | None = None,
+    *,
+    align: bool = False,
+) -> Judged:
     """Read all recordings, then run each filter online over each, in `jobs` processes at once.
 
-    `jobs` None: one a core, unless there is little to do. Raises TandemError for a bad recording.
+    `align`: one constant rotation each side is taken out of the truth (`frames.fit`). `jobs` None: one a
+    core, unless there is little to do. Raises TandemError for a bad recording.
     """
     trials = {path: load_trial(path) for path in paths}
     samples = sum(len(trial.movement) for trial in trials.values()) * len(filters)
@@ -63,7 +72,7 @@ def judge(paths: Sequence[Path], filters: Sequence[str], console: Console, jobs:
                 us = run_online(trial.beginning(_TIMED), _filter(trial, name), _unheard).us_per_sample
                 runs[name] = Run(found[path, name], us)
                 progress.advance(timing)
-            figures, panel = of_trial(trial, runs)
+            figures, panel = of_trial(trial, runs, align=align)
             tree["files"][str(path)] = figures
             panels.append(panel)
     tree["mean"] = mean_over(tree["files"].values())
@@ -85,13 +94,13 @@ def _unheard(_: int) -> None:
     """Nobody waits for so little."""
 
 
-def of_trial(trial: Trial, runs: dict[str, Run]) -> tuple[dict[str, Any], Panel]:
+def of_trial(trial: Trial, runs: dict[str, Run], *, align: bool = False) -> tuple[dict[str, Any], Panel]:
     """One recording's figures and curves: against its truth, or against the first filter without one."""
     truth = trial.q_world_from_sensor
     of_filters: dict[str, dict[str, Any]] = {
         name: {"us_per_sample": run.us_per_sample} for name, run in runs.items()
     }
-    out = {
+    out: dict[str, Any] = {
         "rate_hz": trial.rate_hz,
         "samples": len(trial.movement),
         "dropped": int(trial.dropped.sum()),
@@ -104,7 +113,15 @@ def of_trial(trial: Trial, runs: dict[str, Run]) -> tuple[dict[str, Any], Panel]
     for name, run in runs.items():
         if truth is None and name == reference:
             continue
-        found = _errors(trial, run.q_world_from_sensor, truth, runs[reference].q_world_from_sensor)
+        of_run, q = truth, run.q_world_from_sensor
+        if truth is not None and align:
+            turned = fit(q, truth, trial.movement)
+            of_run = turned.applied(truth)
+            of_filters[name]["aligned"] = {"world": turned.world.tolist(), "sensor": turned.sensor.tolist()}
+            of_filters[name]["aligned_words"] = turned.words()
+        elif truth is not None and name == reference:
+            out["hint"] = hint(_same_heading(trial, q, truth), truth, trial.movement)
+        found = _errors(trial, q, of_run, runs[reference].q_world_from_sensor)
         figures = asdict(score(found, trial.movement))
         of_filters[name].update(figures if truth is not None else {f"from_{reference}": figures})
         for part in _PARTS:
@@ -116,17 +133,32 @@ def of_trial(trial: Trial, runs: dict[str, Run]) -> tuple[dict[str, Any], Panel]
 
 def _errors(trial: Trial, q: Array, truth: Array | None, reference: Array) -> Errors:
     against = reference if truth is None else truth
-    return errors(q if trial.has_magnetometer else with_heading_of(against, q, trial.movement), against)
+    return errors(_same_heading(trial, q, against), against)
 
 
-def mean_over(files: Any) -> dict[str, dict[str, float]]:
-    """Each filter's mean of the files' RMSE, °, over those with truth."""
-    rows: dict[str, list[list[float]]] = {}
+def _same_heading(trial: Trial, q: Array, against: Array) -> Array:
+    return q if trial.has_magnetometer else with_heading_of(against, q, trial.movement)
+
+
+def mean_over(files: Any) -> dict[str, dict[str, float | None]]:
+    """Each filter's mean of the files' RMSE, °, over those with truth; None where one of them has no figure.
+
+    A mean of the others would be better than the filter is.
+    """
+    keys = [f"{part}_deg" for part in _PARTS]
+    rows: dict[str, list[list[float | None]]] = {}
     for figures in files:
         for name, found in figures["filters"].items():
             if figures["truth"]:
-                rows.setdefault(name, []).append([found[f"{part}_deg"] for part in _PARTS])
+                rows.setdefault(name, []).append([found[key] for key in keys])
     return {
-        name: {f"{part}_deg": float(value) for part, value in zip(_PARTS, np.mean(row, axis=0), strict=True)}
+        name: {
+            f"{part}_deg": _mean(column) for part, column in zip(_PARTS, zip(*row, strict=True), strict=True)
+        }
         for name, row in rows.items()
     }
+
+
+def _mean(column: tuple[float | None, ...]) -> float | None:
+    known = [value for value in column if value is not None]
+    return float(np.mean(known)) if len(known) == len(column) else None

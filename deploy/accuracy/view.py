@@ -11,6 +11,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from deploy.accuracy.broad import LEAST_ESTIMATED
+
 _PARTS = ("total_deg", "heading_deg", "inclination_deg")
 
 
@@ -36,7 +38,7 @@ def accuracy_of_files(tree: Mapping[str, Any]) -> RenderableType:
 
 def _cells(found: Mapping[str, Any]) -> list[str]:
     figures = next((value for key, value in found.items() if key.startswith("from_")), found)
-    return [f"{figures[part]:.2f}" if part in figures else "–" for part in _PARTS]
+    return ["–" if figures.get(part) is None else f"{figures[part]:.2f}" for part in _PARTS]
 
 
 def _notes(figures: Mapping[str, Any]) -> list[str]:
@@ -47,4 +49,15 @@ def _notes(figures: Mapping[str, Any]) -> list[str]:
         notes.append("no magnetometer: headings set equal where the movement begins, then free")
     if figures["dropped"]:
         notes.append(f"{figures['dropped']} of {figures['samples']} samples dropped")
+    for name, found in figures["filters"].items():
+        share = next((part for key, part in found.items() if key.startswith("from_")), found).get("estimated")
+        if share is not None and share < 1.0:
+            withheld = (
+                ": too little for a figure" if share < LEAST_ESTIMATED else ", which is all the figure is of"
+            )
+            notes.append(f"{name} estimated {100.0 * share:.1f} % of the movement{withheld}")
+        if "aligned_words" in found:
+            notes.append(f"{name} aligned: {found['aligned_words']}")
+    if figures.get("hint"):
+        notes.append(f"the truth may be in another frame: {figures['hint']}")
     return notes
