@@ -32,6 +32,11 @@ from common.messages import (
 from common.metrics import MasterMetrics, SlaveMetrics, from_tree, to_tree
 
 VERSION = 3
+CONTROL_BYTES = 1100
+"""Of a command, a state, and whatever else the robot is controlled by. With the headers of IPv6, TCP, TLS and
+Zenoh a packet stays below 1280 bytes, which every path carries; many VPNs swallow larger ones silently."""
+_STATE_NUMBERS_BYTES = 200
+"""Of a state's numbers, kind and lengths."""
 MAX_PAYLOAD = 256 * 1024
 ANGLE_LIMIT_RAD = 4 * math.pi
 """No joint turns twice round; a larger angle is a fault, not a posture."""
@@ -88,7 +93,7 @@ def _pack_command(m: Command) -> tuple[Any, ...]:
     return (
         m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.solved_ns, s.put_ns,
         m.deadman_held, fields.pack_mask(m.valid), fields.pack_floats(m.position_rad, m.velocity_rad_s),
-        m.seen_frame, m.seen_ns, m.doubt[:MAX_DOUBT],
+        m.seen_frame, m.seen_ns, fields.shorten(m.doubt, MAX_DOUBT),
     )  # fmt: skip
 
 
@@ -115,11 +120,14 @@ def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
 def _pack_state(m: RobotState) -> tuple[Any, ...]:
     e = m.echo
     echo = None if e is None else (e.sequence, e.put_ns, e.received_ns, e.accepted_ns, e.written_ns)
+    reason = fields.shorten(m.reason, MAX_DOUBT)
+    mask, angles = fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad)
+    named = (m.robot, m.guard, reason, m.operator)
+    taken = _STATE_NUMBERS_BYTES + len(mask) + len(angles) + sum(len(name.encode("utf-8")) for name in named)
     return (
-        m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, m.reason[:MAX_TEXT], m.operator,
-        fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad), echo,
-        m.master_offset_ns, m.offset_bound_ns, _short_faults(m.faults), _pack_base(m.base), m.lease_id,
-        m.instance,
+        m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
+        m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
+        _pack_base(m.base), m.lease_id, m.instance,
     )  # fmt: skip
 
 
@@ -146,10 +154,6 @@ def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
         lease_id=fields.count(f[14]),
         instance=fields.count(f[15]),
     )
-
-
-def _short_faults(faults: dict[str, str]) -> dict[str, str]:
-    return {name: text[:MAX_TEXT] for name, text in faults.items()}
 
 
 def _pack_base(base: BaseAttitude | None) -> tuple[Any, ...] | None:
@@ -199,7 +203,8 @@ def _unpack_control_request(f: tuple[Any, ...], _: int) -> ControlRequest:
 
 
 def _pack_control_reply(m: ControlReply) -> tuple[Any, ...]:
-    return (m.done, m.guard, m.text[:MAX_TEXT], m.lease, m.challenge, m.instance, m.place[:MAX_TEXT])
+    text, place = fields.shorten(m.text, MAX_TEXT), fields.shorten(m.place, MAX_DOUBT)
+    return (m.done, m.guard, text, m.lease, m.challenge, m.instance, place)
 
 
 def _unpack_control_reply(f: tuple[Any, ...], _: int) -> ControlReply:

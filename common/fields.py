@@ -15,6 +15,11 @@ from common.quaternion import Array
 MAX_NAME = 64
 MAX_TEXT = 512
 MAX_DOUBT = 240
+MAX_NAMED = 120
+"""Bytes of what is said of one joint, where many may have something to say."""
+_OVERHEAD_BYTES = 6
+"""Of a name and a text in msgpack."""
+_OTHERS_BYTES = 30
 """Of a command, which must fit into one packet on every path."""
 MAX_ITEMS = 4096
 """Entries of one array or map."""
@@ -106,6 +111,29 @@ def texts(value: Any, most_key: int, most: int) -> dict[str, str]:
     if type(value) is not dict:
         raise CodecError(f"{short(value)} is not a map")
     return {text(key, most_key): text(item, most) for key, item in value.items()}
+
+
+def shorten(words: str, most_bytes: int) -> str:
+    """The text, cut where its UTF-8 would be longer than that."""
+    packed = words.encode("utf-8")
+    return words if len(packed) <= most_bytes else packed[:most_bytes].decode("utf-8", "ignore")
+
+
+def fit_texts(texts: dict[str, str], most_bytes: int) -> dict[str, str]:
+    """As many of the named texts as the bytes hold, in their order, and how many more there are.
+
+    Each is cut to MAX_NAMED bytes. None is left out silently: `others` counts them.
+    """
+    fitting: dict[str, str] = {}
+    room = most_bytes - _OTHERS_BYTES
+    for name, words in texts.items():
+        words = shorten(words, MAX_NAMED)
+        room -= len(name.encode("utf-8")) + len(words.encode("utf-8")) + _OVERHEAD_BYTES
+        if room < 0:
+            fitting["others"] = f"{len(texts) - len(fitting)} more"
+            break
+        fitting[name] = words
+    return fitting
 
 
 def length(fields: tuple[Any, ...], expected: int) -> None:

@@ -31,7 +31,7 @@ NETEM = "netem"
 def faithful(profile: Profile) -> bool:
     """Whether netem does all of the profile as the profile means it."""
     ways = (profile.ways.to_robot, profile.ways.to_operator)
-    return not any(way.jitter_ms or way.reorder_percent for way in ways)
+    return not any(way.jitter_ms or way.reorder_percent or way.largest_bytes for way in ways)
 
 
 def has_netem(run: Run) -> bool:

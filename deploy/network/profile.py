@@ -36,6 +36,8 @@ class Way(Section):
     reorder_ms: float = Field(20.0, gt=0, le=1000)
     duplicate_percent: float = Field(0.0, ge=0, le=50)
     """Of all packets: those arrive twice."""
+    largest_bytes: int | None = Field(None, ge=68, le=65_535)
+    """Of an IP packet: larger ones vanish without a word, as behind a tunnel whose ICMP is filtered."""
     rate_mbit: float | None = Field(None, gt=0, le=10_000)
     """Bits of IP packets per second; unset: as fast as the machine."""
     queue_ms: float = Field(100.0, gt=0, le=10_000)

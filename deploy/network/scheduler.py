@@ -14,7 +14,7 @@ from deploy.network.loss import Losses, gilbert_elliott
 from deploy.network.profile import Way
 
 P = TypeVar("P")
-LOSS, QUEUE, OUTAGE = "loss", "queue", "outage"
+LOSS, QUEUE, SIZE, OUTAGE = "loss", "queue", "size", "outage"
 """Why a packet is dropped: by chance, by a full queue, while nothing passes."""
 
 
@@ -30,7 +30,7 @@ class Counters:
     duplicated: int = 0
     reordered: int = 0
     """Held back so that others could pass."""
-    dropped: dict[str, int] = field(default_factory=lambda: dict.fromkeys((LOSS, QUEUE, OUTAGE), 0))
+    dropped: dict[str, int] = field(default_factory=lambda: dict.fromkeys((LOSS, QUEUE, SIZE, OUTAGE), 0))
 
 
 class PacketScheduler(Generic[P]):
@@ -74,6 +74,9 @@ class PacketScheduler(Generic[P]):
         counters.bytes += size
         if self.cut:
             counters.dropped[OUTAGE] += 1
+            return
+        if way.largest_bytes is not None and size > way.largest_bytes:
+            counters.dropped[SIZE] += 1
             return
         sent_ns = now_ns
         if self._ns_per_byte:

@@ -95,7 +95,7 @@ def test_the_link_is_cut_restored_and_changed_while_it_runs() -> None:
                 await network.measure(0.2)
             network.restore()
             assert (await network.measure(0.5)).to_robot.received == 100
-            assert network.counters().to_robot.dropped == {"loss": 0, "queue": 0, "outage": 40}
+            assert network.counters().to_robot.dropped == {"loss": 0, "queue": 0, "size": 0, "outage": 40}
             network.set(Profile.model_validate({"both": {"delay_ms": 40.0}}))
             measured = await network.measure(0.5)
             assert measured.to_operator.p50_ms == pytest.approx(40.0, abs=1.0)

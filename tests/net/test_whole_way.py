@@ -28,8 +28,10 @@ def test_the_robot_holds_in_an_outage_and_moves_again_only_when_engaged(on_this_
     async def story(_: Host) -> None:
         async with open_network(load_profile("4g")) as network, open_rig("tcp", network=network) as rig:
             await tracks(rig)
-            one_way = rig.observer.statistics["slave"]["one_way_ms"]
-            assert 15.0 < one_way["p50"] < 60.0
+            assert rig.observer.slave is not None
+            one_way_ms = rig.observer.slave.one_way_ms.p50
+            assert one_way_ms is not None
+            assert 15.0 < one_way_ms < 60.0
             await outage(rig, network)
             await until_tracking(rig)
             none_was_stale(rig)
@@ -46,7 +48,7 @@ async def tracks(rig: Rig) -> None:
     await until_tracking(rig)
     observer = rig.observer
     await rig.until(
-        lambda: observer.statistics.get("slave", {}).get("one_way_ms", {}).get("count", 0) > 12,
+        lambda: observer.slave is not None and observer.slave.one_way_ms.count > 12,
         10.0,
         "statistics",
     )
@@ -83,9 +85,10 @@ def none_was_stale(rig: Rig) -> None:
     ages_s = [to_s(echo.received_ns - echo.put_ns) for echo in echoes.values()]
     assert len(ages_s) > 10
     assert max(ages_s) < GuardConfig().max_age_s
-    guard = rig.observer.statistics["slave"]["guard"]
-    assert guard["losses"]["command"] >= 1
-    assert guard["received"] == guard["accepted"] + sum(guard["dropped"].values())
+    assert rig.observer.slave is not None
+    guard = rig.observer.slave.guard
+    assert guard.losses["command"] >= 1
+    assert guard.received == guard.accepted + sum(guard.dropped.values())
 
 
 def alive(rig: Rig) -> None:
