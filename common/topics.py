@@ -56,14 +56,18 @@ STOP = Topic("stop", "tandem/{robot}/stop", 0.0, 1.0, Priority.REAL_TIME, True, 
 """As CONTROL, but for whoever may only stop the robot or ask how it is: a key of its own, so that access
 control, which does not look into messages, can leave it to everybody."""
 CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 1.0, Priority.REAL_TIME, True, True, True)
+PATH = Topic("path", "tandem/{robot}/path", 0.0, 1.0, Priority.DATA_LOW, True, True, True)
+"""Questions of any size, answered by any size (`common.path_probe`): which does the way carry?"""
 STATISTICS = Topic("statistics", "tandem/{robot}/statistics", 1.0, 5.0, Priority.DATA_LOW, False, True, False)
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
 VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUND, False, True, False)
 TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
 FAULTS = Topic("faults", "tandem/{robot}/test/faults", 0.0, 1.0, Priority.DATA, True, True, False)
 
-TOPICS = {t.name: t for t in (COMMAND, STATE, CONTROL, STOP, CLOCK, STATISTICS, ALIVE, VIDEO, TRUTH, FAULTS)}
-QUESTIONS = (CONTROL.name, STOP.name, CLOCK.name, FAULTS.name)
+TOPICS = {
+    t.name: t for t in (COMMAND, STATE, CONTROL, STOP, CLOCK, PATH, STATISTICS, ALIVE, VIDEO, TRUTH, FAULTS)
+}
+QUESTIONS = (CONTROL.name, STOP.name, CLOCK.name, PATH.name, FAULTS.name)
 """Topics that are asked and answered; all others are published."""
 
 VIDEO_NAME = r"^[A-Za-z0-9_-]{1,32}$"

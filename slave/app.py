@@ -19,11 +19,12 @@ from common.messages import Statistics
 from common.metrics import OffsetMetrics, SlaveMetrics, Ticks, to_tree
 from common.notify import Notifier, open_notifier
 from common.pacing import TickGrid
+from common.path_probe import answer_probe
 from common.presence import Presence, place
 from common.realtime import enter_real_time
 from common.runtime import until_stopped
 from common.ticker import ticks
-from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, STOP, video
+from common.topics import CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, video
 from common.version import software
 from slave.attitude.open import open_base
 from slave.attitude.sensor import BaseSensor
@@ -70,6 +71,7 @@ class Slave:
         link.answer(CONTROL, self._on_control)
         link.answer(STOP, self._on_stop)
         link.answer(CLOCK, self._on_clock)
+        link.answer(PATH, lambda question, _: answer_probe(question))
         link.watch_presence(self._on_presence)
 
     async def run(self) -> None:

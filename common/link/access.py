@@ -11,7 +11,7 @@ from typing import Any
 
 from common.link_config import AccessConfig
 from common.roles import Role, common_name
-from common.topics import ALIVE, CLOCK, COMMAND, CONTROL, STATE, STATISTICS, STOP, TRUTH, VIDEO, Topic
+from common.topics import ALIVE, CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, TRUTH, VIDEO, Topic
 
 HEARD = (COMMAND, STATE, STATISTICS, TRUTH)
 """What an observer of a robot hears; `viewers` and operators see the video too."""
@@ -61,11 +61,13 @@ def _robot(table: _Table, access: AccessConfig, robot: str) -> None:
     video = _key(VIDEO, robot).rpartition("/")[0] + "/*"
     table.allow(me, ("publish",), [_key(STATE, robot), _key(STATISTICS, robot), video])
     table.allow(me, ("hear",), [_key(COMMAND, robot)])
-    table.allow(me, ("answer",), [_key(CONTROL, robot), _key(STOP, robot), _key(CLOCK, robot)])
+    table.allow(
+        me, ("answer",), [_key(CONTROL, robot), _key(STOP, robot), _key(CLOCK, robot), _key(PATH, robot)]
+    )
     table.allow(me, ("live",), [_alive(robot, "slave/**")])
     table.allow(operators, ("publish",), [_key(COMMAND, robot), _key(STATISTICS, robot), _key(TRUTH, robot)])
     table.allow(operators, ("hear",), [*(_key(topic, robot) for topic in HEARD), video])
-    table.allow(operators, ("ask",), [_key(CONTROL, robot), _key(CLOCK, robot)])
+    table.allow(operators, ("ask",), [_key(CONTROL, robot), _key(CLOCK, robot), _key(PATH, robot)])
     table.allow(operators, ("live",), [_alive(robot, "master/**")])
     table.allow([*observers, *viewers], ("hear",), [_key(topic, robot) for topic in HEARD])
     table.allow(viewers, ("hear",), [video])

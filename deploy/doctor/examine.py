@@ -16,6 +16,7 @@ from deploy.doctor.judge.devices import is_url, judge_camera, judge_latency, jud
 from deploy.doctor.judge.endpoints import judge_endpoint
 from deploy.doctor.judge.keys import judge_keys
 from deploy.doctor.judge.machine import judge_clock, judge_disk, judge_machine, judge_receive_buffer
+from deploy.doctor.judge.path import judge_path
 from deploy.doctor.judge.process import judge_memory_lock, judge_networks, judge_realtime
 from deploy.doctor.judge.robots import judge_robot
 from deploy.doctor.needs import GENERAL, Needs
@@ -25,6 +26,7 @@ from deploy.doctor.read.devices import egl_is_there, free_bytes, read_device, v4
 from deploy.doctor.read.endpoints import knock, try_to_listen
 from deploy.doctor.read.keys import read_keys
 from deploy.doctor.read.machine import read_machine
+from deploy.doctor.read.path import read_path
 from deploy.doctor.read.process import read_process
 from deploy.doctor.read.robots import read_robots
 from deploy.doctor.read.servos import ping_servos
@@ -103,7 +105,12 @@ async def others(needs: Needs) -> Sequence[Finding]:
         robots = await read_robots(needs.link, needs.robots, needs.operator)
     except LinkError as error:
         return [*found, fail("link", str(error), "mend [link] first")]
-    return [*found, *(finding for facts in robots for finding in judge_robot(facts, software()))]
+    found += [finding for facts in robots for finding in judge_robot(facts, software())]
+    reach = needs.link.model_copy(update={"listen": [], "access": None})
+    for facts in robots:
+        if facts.guard:
+            found += judge_path(await read_path(reach, facts.name))
+    return found
 
 
 def _software() -> Finding:

@@ -61,4 +61,7 @@ def _about() -> dict[str, str]:
         "zenoh": version("eclipse-zenoh"),
         "python": platform.python_version(),
         "kernel": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "congestion control": (
+            f"tcp, tls and ws: {CONGESTION_CONTROL}, set on both emulated hosts; quic: cubic, Zenoh's own; udp: none"
+        ),
     }

@@ -1,0 +1,25 @@
+"""A question of one size that asks for an answer of another: which sizes does the way to a robot carry? Pure.
+
+Some ways, such as tunnels whose ICMP is filtered, swallow large packets without a word. Then small messages
+pass, and a stream of large ones, such as video over tcp, stalls everything on the same connection.
+"""
+
+from __future__ import annotations
+
+from common.errors import CodecError
+
+_SIZE_BYTES = 4
+LARGEST_BYTES = 16_384
+"""No answer is larger, whatever is asked for."""
+
+
+def probe(question_bytes: int, answer_bytes: int) -> bytes:
+    """A question of so many bytes (4 at least) that asks for an answer of so many."""
+    return answer_bytes.to_bytes(_SIZE_BYTES, "big") + bytes(max(0, question_bytes - _SIZE_BYTES))
+
+
+def answer_probe(question: bytes) -> bytes:
+    """As many bytes as asked for. Raises CodecError where the question holds no size."""
+    if len(question) < _SIZE_BYTES:
+        raise CodecError(f"a probe of {len(question)} bytes, expected {_SIZE_BYTES} or more")
+    return bytes(min(int.from_bytes(question[:_SIZE_BYTES], "big"), LARGEST_BYTES))
