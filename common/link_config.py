@@ -81,6 +81,9 @@ class LinkConfig(Section):
     open_timeout_s: float = Field(default=1.0, ge=0.1, le=30.0)
     """How long opening a connection may take: some six round trips of the line. Over one that is slower no
     connection ever comes about; much longer than needed, it delays the return after an outage."""
+    tcp_congestion_control: str | None = Field(default=None, pattern=r"^[a-z0-9_-]{1,15}$")
+    """Of this process's tcp, tls and ws connections, such as `cubic`; unset: the host's. Set it on both
+    hosts: each decides how it sends."""
     tls: TlsConfig | None = None
     access: AccessConfig | None = None
     topics: dict[str, TopicConfig] = Field(default_factory=dict)

@@ -9,6 +9,7 @@ import re
 import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 
 import zenoh
 from zenoh.handlers import Callback
@@ -16,6 +17,7 @@ from zenoh.handlers import Callback
 from common.config import LinkConfig
 from common.errors import LinkError
 from common.link.certificates import check_keys
+from common.link.congestion import check_congestion_control, set_congestion_control
 from common.link.inbox import wake
 from common.link.link import Link
 from common.link.opening import open_zenoh
@@ -46,12 +48,22 @@ async def open_session(
     if not (config.listen or config.connect):
         raise LinkError("the link has no endpoint: set `listen` or `connect` under [link]")
     check_keys(config)
+    algorithm = config.tcp_congestion_control
+    if algorithm is not None:
+        check_congestion_control(algorithm)
     opened = await open_zenoh(config, mode, router_within_s, waits)
     session = Session(opened, asyncio.get_running_loop(), config.quality)
+    if algorithm is not None:
+        set_congestion_control(algorithm)  # what the listening sockets accept inherits it
+        session.watch_peers(partial(_choose_congestion, algorithm))
     try:
         yield session
     finally:
         await session.close()
+
+
+def _choose_congestion(algorithm: str, *_: object) -> None:
+    set_congestion_control(algorithm)
 
 
 @asynccontextmanager

@@ -15,7 +15,13 @@ from deploy.doctor.judge.can import judge_buses, judge_interfaces
 from deploy.doctor.judge.devices import is_url, judge_camera, judge_latency, judge_port
 from deploy.doctor.judge.endpoints import judge_endpoint
 from deploy.doctor.judge.keys import judge_keys
-from deploy.doctor.judge.machine import judge_clock, judge_disk, judge_machine, judge_receive_buffer
+from deploy.doctor.judge.machine import (
+    judge_clock,
+    judge_disk,
+    judge_machine,
+    judge_receive_buffer,
+    judge_tcp,
+)
 from deploy.doctor.judge.path import judge_path
 from deploy.doctor.judge.process import judge_memory_lock, judge_networks, judge_realtime
 from deploy.doctor.judge.robots import judge_robot
@@ -65,6 +71,7 @@ def host(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
         judge_realtime(needs.realtime_priority, process),
         judge_memory_lock(needs.realtime_priority, process, machine.swap_bytes),
         *judge_receive_buffer(needs.buses, machine),
+        *judge_tcp(machine),
         judge_clock(clock_is_synchronised()),
         judge_disk(str(options.recordings.absolute()), free_bytes(options.recordings)),
         *([judge_networks(process)] if needs.role == GENERAL else []),

@@ -108,27 +108,28 @@ def link_addresses(run: Run) -> Iterator[tuple[str, str, str]]:
     yield run.namespace(ROBOT), theirs, ours
 
 
-CONGESTION_CONTROL = "cubic"
-"""Of tcp on every emulated host: Linux's default. A namespace would inherit the machine's, and what one machine
-has decides how tcp fares on a long line (bbr: six silences a minute on 380 ms, reno and cubic none)."""
+CONGESTION_CONTROLS = ("cubic", "reno")
+"""Of tcp on every emulated host, the first that the kernel permits there. A namespace inherits the machine's,
+which decides how tcp fares on a long line: on 380 ms bbr is silent six times a minute, these never."""
+_PERMITTED = Path("/proc/sys/net/ipv4/tcp_allowed_congestion_control")
 
 
-def fix_congestion_control(namespace: str, algorithm: str = CONGESTION_CONTROL) -> None:
-    """Set it for a namespace. Raises NetworkError where the kernel lacks it."""
-    write = f"echo {algorithm} > /proc/sys/net/ipv4/tcp_congestion_control"
-    try:
-        ip("netns", "exec", namespace, "sh", "-c", write)
-    except NetworkError as error:
-        raise NetworkError(
-            f"this kernel has no tcp congestion control {algorithm!r} ({error}): `modprobe tcp_{algorithm}`"
-        ) from None
+def congestion_control() -> str:
+    """What emulated hosts use on this machine. Raises NetworkError where none is permitted."""
+    permitted = _PERMITTED.read_text("ascii").split()
+    chosen = next((name for name in CONGESTION_CONTROLS if name in permitted), None)
+    if chosen is None:
+        needed = " or ".join(CONGESTION_CONTROLS)
+        raise NetworkError(f"{_PERMITTED} permits {', '.join(permitted)}; add {needed}")
+    return chosen
 
 
 def make_host(run: Run, host: str, management: str, caller: str) -> None:
     """A namespace with loopback, multicast on it, and a veth to the caller. Raises NetworkError."""
     name, veth = run.namespace(host), f"{run.short}{host[0]}"
     ip("netns", "add", name)
-    fix_congestion_control(name)
+    choice = f"echo {congestion_control()} > /proc/sys/net/ipv4/tcp_congestion_control"
+    ip("netns", "exec", name, "sh", "-c", choice)
     ip("-n", name, "link", "set", "lo", "up", "multicast", "on")
     # python-can's udp_multicast: the suit's bus stays within its host
     ip("-n", name, "route", "add", MULTICAST, "dev", "lo")

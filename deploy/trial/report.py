@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from deploy.network.namespaces import congestion_control
 from deploy.output import writing
 from deploy.trial.document import as_html
 from deploy.trial.folder import Folder, as_json
@@ -62,6 +63,6 @@ def _about() -> dict[str, str]:
         "python": platform.python_version(),
         "kernel": f"{platform.system()} {platform.release()} {platform.machine()}",
         "congestion control": (
-            f"tcp, tls and ws: {CONGESTION_CONTROL}, set on both emulated hosts; quic: cubic, Zenoh's own; udp: none"
+            f"tcp, tls, ws: {congestion_control()}, set on both emulated hosts; quic: Zenoh's own; udp: none"
         ),
     }

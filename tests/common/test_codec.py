@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.codec import ANGLE_LIMIT_RAD, MAX_PAYLOAD, RATE_LIMIT_RAD_S, VERSION, decode, encode
+from common.codec import (
+    ANGLE_LIMIT_RAD,
+    CONTROL_BYTES,
+    MAX_PAYLOAD,
+    RATE_LIMIT_RAD_S,
+    VERSION,
+    decode,
+    encode,
+)
 from common.errors import CodecError
 from common.fields import MAX_DOUBT, MAX_NAME, MAX_TEXT
 from common.messages import (
@@ -339,3 +347,19 @@ def test_a_command_is_encoded_and_decoded_within_15_us() -> None:
     )
     best = min(timeit.repeat(lambda: decode(encode(command), Command, 25), number=100, repeat=300))
     assert best / 100 < 15e-6
+
+
+@given(st.dictionaries(names, texts, max_size=60), texts, names)
+def test_a_state_fits_in_a_packet_of_every_path(faults: dict[str, str], reason: str, name: str) -> None:
+    """With 25 joints, whatever there is to say of them; what is left out is counted."""
+    zeros, mask = np.zeros(25), np.ones(25, np.bool_)
+    most = 2**62
+    state = RobotState(
+        name, most, most, most, name, reason, name, mask, zeros, zeros,
+        CommandEcho(most, most, most, most, most), -most, most, faults, None, most, most,
+    )  # fmt: skip
+    payload = encode(state)
+    assert len(payload) <= CONTROL_BYTES
+    told = decode(payload, RobotState, 25).faults
+    if len(told) < len(faults) or "others" in told:
+        assert "more" in told["others"] or "others" in faults

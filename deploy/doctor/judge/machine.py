@@ -55,6 +55,22 @@ def judge_clock(synchronised: bool | None) -> Finding:
     return warn(check, "nothing sets this host's clock", advice)
 
 
+def judge_tcp(facts: MachineFacts) -> list[Finding]:
+    """How tcp shares a line, and whether it copes with a path that swallows large packets."""
+    if not facts.congestion_control:
+        return []
+    finds = "finds" if facts.mtu_probing else "does not find"
+    probing = f"{finds} a path's packet size by itself"
+    words = f"congestion control {facts.congestion_control}; {probing}"
+    if facts.congestion_control == "bbr":
+        advice = (
+            "on lines of some 200 ms and more bbr was measured to silence the link six times a minute: "
+            '`[link] tcp_congestion_control = "cubic"` on both hosts, or quic'
+        )
+        return [warn("tcp", words, advice)]
+    return [ok("tcp", words)]
+
+
 def _cores(facts: MachineFacts) -> Finding:
     words = f"{facts.cores} cores" + (f", {facts.isolated} isolated" if facts.isolated else "")
     if facts.cores < 2:

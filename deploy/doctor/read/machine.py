@@ -25,6 +25,10 @@ class MachineFacts:
     """Of the last minute."""
     receive_buffer_bytes: int
     """Most that a socket may ask for."""
+    congestion_control: str
+    """Of tcp, where nobody chose another."""
+    mtu_probing: bool
+    """Whether tcp finds out by itself that a path swallows large packets."""
     available_bytes: int
     swap_bytes: int
 
@@ -41,6 +45,8 @@ def read_machine(tree: Tree) -> MachineFacts:
         preemption=_preemption(tree),
         load=float((tree.text("/proc/loadavg") or "0").split()[0]),
         receive_buffer_bytes=tree.number("/proc/sys/net/core/rmem_max") or 0,
+        congestion_control=tree.text("/proc/sys/net/ipv4/tcp_congestion_control") or "",
+        mtu_probing=(tree.number("/proc/sys/net/ipv4/tcp_mtu_probing") or 0) > 0,
         available_bytes=_kilobytes(memory.get("MemAvailable", "")),
         swap_bytes=_kilobytes(memory.get("SwapTotal", "")),
     )

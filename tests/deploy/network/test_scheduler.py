@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from deploy.network.profile import Way
-from deploy.network.scheduler import LOSS, OUTAGE, QUEUE, PacketScheduler
+from deploy.network.scheduler import LOSS, OUTAGE, QUEUE, SIZE, PacketScheduler
 
 MS = 1_000_000
 FOR_EVER_NS = 10**15
@@ -168,7 +168,7 @@ def test_nothing_passes_while_it_is_cut() -> None:
     scheduler.cut = False
     scheduler.push(50 * MS, "after it", 100)
     assert scheduler.due(1000 * MS) == ["after it"]
-    assert scheduler.counters.dropped == {LOSS: 0, QUEUE: 0, OUTAGE: 3}
+    assert scheduler.counters.dropped == {LOSS: 0, QUEUE: 0, SIZE: 0, OUTAGE: 3}
 
 
 @settings(max_examples=20)
