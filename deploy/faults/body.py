@@ -12,7 +12,8 @@ from common.messages import Action, BaseAttitude
 from common.presence import Presence
 from common.quaternion import Array
 from deploy.faults.scene import Scene
-from master.suit.simulated.faults import FaultsConfig, Loss
+from master.suit.simulated.faults import FaultsConfig, Loss, Twin
+from master.suit.simulated.lies import Lie, LieKind
 from slave.guard.body import Body
 from slave.guard.tilt import base_loss
 from slave.servos.servos import EncoderReading
@@ -26,6 +27,37 @@ JOINT = "right_shoulder_pitch"
 def node_lost(scene: Scene) -> None:
     """A node of the moving arm answers no more."""
     scene.run.suit.faults.config = FaultsConfig(lose=[Loss(node=NODE)])
+    scene.undo = lambda: setattr(scene.run.suit.faults, "config", FaultsConfig())
+
+
+def _lies(scene: Scene, kind: LieKind, axis: int | None = None) -> None:
+    scene.run.suit.faults.config = FaultsConfig(lie=[Lie(node=NODE, kind=kind, axis=axis)])
+    scene.undo = lambda: setattr(scene.run.suit.faults, "config", FaultsConfig())
+
+
+def node_frozen(scene: Scene) -> None:
+    """A node of the moving arm repeats its last reading."""
+    _lies(scene, "frozen")
+
+
+def node_zero(scene: Scene) -> None:
+    """It reads zero on every axis, as after a reset."""
+    _lies(scene, "zero")
+
+
+def node_stuck(scene: Scene) -> None:
+    """One axis of its accelerometer stands."""
+    _lies(scene, "stuck", axis=0)
+
+
+def node_saturated(scene: Scene) -> None:
+    """One axis of its gyro is at the end of its range."""
+    _lies(scene, "saturated", axis=4)
+
+
+def two_suits(scene: Scene) -> None:
+    """A second suit on the same bus answers the same SYNCs with the same numbers."""
+    scene.run.suit.faults.config = FaultsConfig(twin=[Twin()])
     scene.undo = lambda: setattr(scene.run.suit.faults, "config", FaultsConfig())
 
 

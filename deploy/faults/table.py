@@ -197,6 +197,34 @@ SUIT = (
         ends=State.TRACK, concerns=body.joints_of_node, strays_deg=1.0, sway_deg=1.0,
         stands_s=0.1 + 0.08 + BRAKED_S,
     ),
+    # a liar is told by a command out of turn, which is fresher: the others follow a little closer
+    *(
+        Fault(
+            name,
+            done,
+            Reaction.HOLDS_JOINTS,
+            "Holds the joints that need the node; the others follow. The node is named with what is wrong.",
+            "Mend the node. Its joints come back slowly by themselves; until then nobody can engage.",
+            act,
+            ends=State.TRACK, concerns=body.joints_of_node, strays_deg=2.5, sway_deg=1.0,
+            stands_s=0.2 + BRAKED_S,
+        )
+        for name, done, act in (
+            ("sensor node frozen", "A node of the reaching arm repeats one reading.", body.node_frozen),
+            ("sensor node reads zero", "The node answers with zeros, as after a reset.", body.node_zero),
+            ("sensor axis stuck", "One axis of the node's accelerometer stands.", body.node_stuck),
+            ("sensor axis saturated", "One axis of its gyro is at its range's end.", body.node_saturated),
+        )
+    ),
+    Fault(
+        "second suit on the bus",
+        "Another suit answers the same SYNCs with the same node numbers.",
+        Reaction.HOLDS,
+        "Believes neither: brakes and stands. The log and `tandem status` name the nodes.",
+        "Take one suit off the bus, or give it other numbers. " + ENGAGE,
+        body.two_suits,
+        reacts_s=0.02 + NOTICED_S, stands_s=0.02 + 0.08 + BRAKED_S, held_by=frozenset({"valid"}),
+    ),
     Fault(
         "CAN bus of the suit off",
         "The bus between the suit and the master fails.",
