@@ -12,7 +12,7 @@ from common.presence import several_bear
 from common.stop import pack_stop, read_stop_answer
 from common.topics import CONTROL, STOP, Topic
 
-CHALLENGED = frozenset({Action.ENGAGE, Action.RESET})
+CHALLENGED = frozenset({Action.ENGAGE, Action.RESET, Action.HOME})
 """Requests that must not take effect late. To stop, claim, release or ask is harmless at any time."""
 
 

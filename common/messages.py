@@ -130,6 +130,8 @@ class Action(StrEnum):
     STATUS = "status"
     NAMESAKE = "namesake"
     """Another robot of this name answers too: its holder of the lease says so, and the robot holds."""
+    HOME = "home"
+    """Confirm, with the key, that the robot stands as it says, where nothing else can."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,11 +143,11 @@ class ControlRequest:
     operator: str
     """Who asks; `engage` and `disengage` are for the lease holder's name only."""
     key: str = ""
-    """The reset key, for `reset`; where the other is, for `namesake`."""
+    """The reset key, for `reset` and `home`; where the other is, for `namesake`."""
     clock: int = 0
     """For `claim`: the asker whose clock queries tell of the clock that stamps this master's commands."""
     challenge: int = 0
-    """For `engage` and `reset`: the one that the robot's last `status` gave. Else a late one would count."""
+    """For `engage`, `reset` and `home`: the one of the robot's last `status`. Else a late one would count."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import typer
 
 PANELS = {
     "Run": ("demo", "master", "slave", "suit", "router", "drives"),
-    "People": ("engage", "disengage", "estop", "reset", "status", "attitude", "video"),
+    "People": ("engage", "disengage", "estop", "reset", "home", "status", "attitude", "video"),
     "Set up": ("doctor", "servos", "calibrate", "keys", "record", "recording"),
     "Judge": ("trial", "soak", "faults", "bench", "accuracy", "network"),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
@@ -33,6 +34,7 @@ from slave.config import SlaveConfig
 from slave.guard.body import Body
 from slave.guard.states import State
 from slave.guard.tilt import base_loss
+from slave.last_known import EVERY_S, LastKnown, state_file
 from slave.pipeline import SlavePipeline
 from slave.servos import Servos, open_servos
 
@@ -49,14 +51,20 @@ class Slave:
         servos: Servos,
         base: BaseSensor | None = None,
         notifier: Notifier | None = None,
+        *,
+        last_known: LastKnown | None = None,
     ) -> None:
+        """`last_known`: where it is kept where the joints stand; None: nowhere."""
         self._config = config
         self._link = link
         self._servos = servos
         self._base = base
         self._notifier = notifier or Notifier()
         endpoints = own_endpoints(config.link)
-        self._pipeline = SlavePipeline(config, place=place(endpoints))
+        self._pipeline = SlavePipeline(
+            config, place=place(endpoints), last_known_rad=last_known.before_rad if last_known else None
+        )
+        self._last_known = last_known
         self._pipeline.tell = log.warning
         self._stopped = False
         self._ticks_expected = 0
@@ -82,6 +90,21 @@ class Slave:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._drive())
                 tasks.create_task(self._tell())
+                if self._last_known is not None:
+                    tasks.create_task(self._remember(self._last_known))
+
+    async def _remember(self, last_known: LastKnown) -> None:
+        """Keep where the joints stand, seldom, and only once it is known; in a thread, as disks stall."""
+        while True:
+            await asyncio.sleep(EVERY_S)
+            position_rad = self._pipeline.position_rad
+            if self._pipeline.guard.placed and last_known.due(position_rad):
+                await asyncio.to_thread(last_known.keep, position_rad.copy())
+
+    def remember_last(self) -> None:
+        """Keep it once more, at the end."""
+        if self._last_known is not None and self._pipeline.guard.placed:
+            self._last_known.keep(self._pipeline.position_rad.copy())
 
     async def _drive(self) -> None:
         loop = self._config.loop
@@ -183,7 +206,11 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
 
 async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
     notifier = open_notifier()
-    servos = open_servos(config.servos, config.skeleton, config.encoders)
+    last_known = None
+    if config.servos.remembers:
+        last_known = LastKnown(state_file(config.robot, os.environ), config.skeleton.joint_names)
+    before_rad = last_known.before_rad if last_known else None
+    servos = open_servos(config.servos, config.skeleton, config.encoders, before_rad)
     base = open_base(config.base)
     # after a simulator has been built, which takes long; before any thread starts, so that each has it
     enter_real_time(config.process.realtime_priority)
@@ -193,7 +220,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
         audit = Audit(config.link)
         async with open_session(config.link, waits=notifier.waits) as session:
             audit.attach(session)
-            slave = Slave(config, session.link(config.robot), servos, base, notifier)
+            slave = Slave(config, session.link(config.robot), servos, base, notifier, last_known=last_known)
             where = ", ".join(config.link.listen or config.link.connect)
             log.info("%s: waits for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
@@ -205,6 +232,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
                 await slave.run()
             finally:
                 notifier.stopping()
+                slave.remember_last()
                 write_figures(to_tree(replace(slave.metrics(), access=audit.metrics())))
     finally:
         servos.stop()

@@ -5,7 +5,7 @@ decode ▸ guard (gates) ▸ track ▸ limit ▸ servos ▸ encoders ▸ state
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -46,9 +46,18 @@ class SlavePipeline:
     """Guard, tracker and counters between ticks. `draw_token` makes the tokens of its leases."""
 
     def __init__(
-        self, config: SlaveConfig, draw_token: DrawToken = random_token, instance: int = 0, place: str = ""
+        self,
+        config: SlaveConfig,
+        draw_token: DrawToken = random_token,
+        instance: int = 0,
+        place: str = "",
+        *,
+        last_known_rad: Mapping[str, float] | None = None,
     ) -> None:
-        """`instance`: this process's number, drawn where it is 0; `place`: where it is, for people."""
+        """`instance`: this process's number, drawn where it is 0; `place`: where it is, for people.
+
+        `last_known_rad`: where the joints stood last, by joint.
+        """
         self.robot = config.robot
         self.instance = instance or draw_instance()
         self.place = place
@@ -63,6 +72,7 @@ class SlavePipeline:
             self.skeleton,
             config.guard,
             make_tracker(config.track, config.servos.bus_lag_s),
+            last_known_rad=(last_known_rad or {}) if config.servos.single_reading else None,
             draw_token=draw_token,
         )
         self.clock = SlaveExchange()
@@ -152,7 +162,9 @@ class SlavePipeline:
         self._reading, self._body = reading, body
         self._position_rad = self.encoders.position_rad(reading.counts)
         self.journeys.read(reading)
-        self._setpoint = self.guard.step(now_ns, self._position_rad, reading.valid, reading.read_ns, body)
+        self._setpoint = self.guard.step(
+            now_ns, self._position_rad, reading.valid, reading.read_ns, body, drive_rad=reading.drive_rad
+        )
         return self._setpoint
 
     def written(self, now_ns: int) -> None:

@@ -35,7 +35,14 @@ CREEP_RAD_S = math.radians(0.3)
 class UnbiddenMotion:
     """Watches J joints. Give it each reading once, with the span of the setpoints of the time just gone."""
 
-    def __init__(self, joint_names: Sequence[str]) -> None:
+    def __init__(self, joint_names: Sequence[str], still_rad: float = STILL_RAD, readings: int = 0) -> None:
+        """`still_rad`: how far a joint that has settled may be from where it settled.
+
+        Beyond, it must go on outwards in so many `readings` in a row: an encoder that lies has only jumped.
+        """
+        self._still_rad = still_rad
+        self._readings = readings
+        self._outwards: NDArray[np.int64] = np.zeros(len(joint_names), np.int64)
         joints = len(joint_names)
         self._names = tuple(joint_names)
         self._settled_ns: NDArray[np.int64] = np.full(joints, -1, np.int64)
@@ -78,23 +85,19 @@ class UnbiddenMotion:
         self._rests_rad = np.where(rested & np.isnan(self._rests_rad), position_rad, self._rests_rad)
         moved = position_rad - self._rests_rad
         # comparing a NaN says False: not at rest, or never heard
-        left = (np.abs(moved) > STILL_RAD) & heard
+        beyond = np.maximum(low - position_rad, position_rad - high)
+        off = np.where(np.isnan(moved), np.where(position_rad > high, beyond, -beyond), moved)
+        outwards = np.sign(off) * (position_rad - self._before_rad) > OUTWARD_RAD_S * dt_s
+        self._outwards = np.where(heard, np.where(outwards, self._outwards + 1, 0), self._outwards)
+        left = (np.abs(moved) > self._still_rad) & heard & (self._outwards >= self._readings)
         self._rests_rad += np.clip(moved, -CREEP_RAD_S * dt_s, CREEP_RAD_S * dt_s)
-        astray = self._astray(low, high, position_rad, dt_s) & heard
+        astray = (beyond > ASTRAY_RAD) & heard & (self._outwards >= max(1, self._readings))
         np.copyto(self._before_rad, position_rad, where=heard)
         self._before_ns = read_ns
         out: Mask = left | astray
         self.words = {}
         if out.any():
-            self._say(out, left, moved, np.maximum(low - position_rad, position_rad - high))
-        return out
-
-    def _astray(self, low: Array, high: Array, position_rad: Array, dt_s: float) -> Mask:
-        """Outside of the span now and before, and going on outwards."""
-        step = OUTWARD_RAD_S * dt_s
-        up = (self._before_rad > high + ASTRAY_RAD) & (position_rad > self._before_rad + step)
-        down = (self._before_rad < low - ASTRAY_RAD) & (position_rad < self._before_rad - step)
-        out: Mask = up | down
+            self._say(out, left, moved, beyond)
         return out
 
     def _say(self, out: Mask, left: Mask, moved: Array, beyond: Array) -> None:

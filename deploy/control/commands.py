@@ -1,4 +1,4 @@
-"""`tandem engage|disengage|estop|reset|status`: a person's acts, answered with what happened and why not."""
+"""`tandem engage|disengage|estop|reset|home|status`: a person's acts, and what came of them."""
 
 from __future__ import annotations
 
@@ -104,6 +104,29 @@ def reset(
     _act(Action.RESET, _named(reach(connect, robot, operator, master, certificate)), key)
 
 
+def home(
+    key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+    yes: Annotated[bool, typer.Option("--yes", help="You have looked at the robot already.")] = False,
+) -> None:
+    """Confirm that a robot stands as it says, where it has no second reading. It then holds there.
+
+    Look at the robot first. It tells which joints it means, and where each says it is.
+
+    Example: `tandem home --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
+    """
+    where = _named(reach(connect, robot, operator, master, certificate))
+    if not yes:
+        _act(Action.STATUS, where)
+        if not typer.confirm("Does the robot stand so?"):
+            raise TandemError("nothing was confirmed: the robot does not move")
+    _act(Action.HOME, where, key)
+
+
 def status(
     connect: Connect = None,
     robot: Robot = None,
@@ -137,7 +160,7 @@ def status(
     _run(tell)
 
 
-COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, status)
+COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, home, status)
 """In the order of the help."""
 
 

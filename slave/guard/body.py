@@ -17,6 +17,10 @@ class Body:
     namesake: str | None = None
     """Where another robot of the same name is, or None: nobody knows then which of the two he commands."""
 
+    def also(self, drives: Mapping[str, str]) -> Body:
+        """The same body, and what else is wrong with drives, by joint."""
+        return Body({**drives, **self.drives}, self.base) if drives else self
+
     @property
     def amiss(self) -> str | None:
         """The first thing that is wrong, in words, or None."""

@@ -45,6 +45,10 @@ class Controlled(Protocol):
         """See Guard."""
         ...
 
+    def home(self, now_ns: int) -> str | None:
+        """See Guard."""
+        ...
+
 
 class Control:
     """Answers requests. Anybody may stop; only the lease's holder may move; only the key resets.
@@ -80,6 +84,8 @@ class Control:
                 return self._reset(request, now_ns)
             case Action.NAMESAKE:
                 return self._reply(True, "holds while two bear its name")
+            case Action.HOME:
+                return self._home(request, now_ns)
             case Action.STATUS:
                 return replace(self._reply(True, guard.reason), challenge=self._challenges.issue(now_ns))
 
@@ -106,11 +112,21 @@ class Control:
             self._guard.disengage(now_ns, f"disengaged by {operator}")
         return self._reply(why is None, why or self._guard.reason)
 
+    def _home(self, request: ControlRequest, now_ns: int) -> ControlReply:
+        if not self._reset_key:
+            return self._reply(False, "no reset_key is configured in [guard]: set one at the robot")
+        why = self._wrong_key(request) or self._late(request, now_ns) or self._guard.home(now_ns)
+        return self._reply(why is None, why or "the joints count as standing where the robot says they do")
+
+    def _wrong_key(self, request: ControlRequest) -> str | None:
+        right = hmac.compare_digest(request.key.encode("utf-8", "replace"), self._reset_key)
+        return None if right else "wrong reset key"
+
     def _reset(self, request: ControlRequest, now_ns: int) -> ControlReply:
         if not self._reset_key:
             return self._reply(False, "no reset key is configured: restart the slave at the robot")
-        if not hmac.compare_digest(request.key.encode("utf-8", "replace"), self._reset_key):
-            return self._reply(False, "wrong reset key")
+        if wrong := self._wrong_key(request):
+            return self._reply(False, wrong)
         reason = f"reset by {request.operator or 'somebody'}; engage to move"
         why = self._late(request, now_ns) or self._guard.reset(now_ns, reason)
         return self._reply(why is None, why or "holds; engage to move")

@@ -24,6 +24,7 @@ from slave.guard.events import Change, Doubt, GuardCounters, Journal
 from slave.guard.lease import DrawToken, Lease, random_token
 from slave.guard.limit import SetpointLimiter
 from slave.guard.nearest import NearestPosture
+from slave.guard.placed import Placement
 from slave.guard.plausible import Plausibility
 from slave.guard.states import MOVING, Event, State, next_state
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES, EncoderLife, Signs, Watch, first_loss
@@ -53,6 +54,7 @@ class Guard:
         config: GuardConfig,
         tracker: Tracker,
         *,
+        last_known_rad: Mapping[str, float] | None = None,
         draw_token: DrawToken = random_token,
         gates: Sequence[Gate] = GATES,
         arrival_watches: Sequence[Watch] = ARRIVAL_WATCHES,
@@ -81,6 +83,10 @@ class Guard:
         self._control = Control(self, config.reset_key)
         self._encoders = EncoderLife(names, to_ns(config.encoder_timeout_s))
         self._plausible = Plausibility(names, skeleton.max_velocity_rad_s, config)
+        self._placement = Placement(
+            names, skeleton.lower_rad, skeleton.upper_rad, last_known_rad=last_known_rad
+        )
+        self._drive_rad: Array | None = None
         self._body = WELL
         self._nearest = NearestPosture(skeleton, limits)
         self._limiter = SetpointLimiter(names, limits)
@@ -148,13 +154,25 @@ class Guard:
         return verdict
 
     def step(
-        self, now_ns: int, position_rad: Array, encoder_valid: Mask, encoder_ns: int, body: Body = WELL
+        self,
+        now_ns: int,
+        position_rad: Array,
+        encoder_valid: Mask,
+        encoder_ns: int,
+        body: Body = WELL,
+        *,
+        drive_rad: Array | None = None,
     ) -> Setpoint:
-        """One turn of the servo loop: the encoders (J,) as read at `encoder_ns` in, the setpoint out."""
+        """One turn of the servo loop: the encoders (J,) as read at `encoder_ns` in, the setpoint out.
+
+        `drive_rad` (J,): the same angles by the drives' own encoders, where they tell them.
+        """
         dt_s = self._elapsed_s(now_ns)
-        self._body = body
         self._encoders.update(position_rad, encoder_valid, encoder_ns)
+        self._drive_rad = drive_rad
         self._doubt(now_ns, position_rad, encoder_valid, encoder_ns)
+        self._place(now_ns, position_rad, encoder_valid, encoder_ns)
+        self._body = body.also(self._placement.differ)
         self._watch(now_ns, self._watches)
         if not self._seated:
             return self._wait(now_ns, position_rad)
@@ -234,10 +252,24 @@ class Guard:
         if self._strayed():
             # nor to where an encoder says it is that is not believed
             self._limiter.seat(
-                np.where(self._plausible.doubted, self._limiter.position_rad, self._encoders.position_rad)
+                np.where(self._plausible.doubted, self._limiter.position_rad, self._stands_rad())
             )
         self._change(now_ns, Event.RESET, reason)
         return None
+
+    def home(self, now_ns: int) -> str | None:
+        """A person has looked at the robot: it stands as it says. Or why that does not count."""
+        if self._seated:
+            return "where every joint stands is known already"
+        silent = self._encoders.silence(now_ns)
+        if silent is None:
+            self._placement.confirm(self._encoders.position_rad)
+        return silent or self._placement.unplaced(self._encoders.position_rad)
+
+    @property
+    def placed(self) -> bool:
+        """Whether it is known where every joint stands."""
+        return self._seated and not self._placement.differ
 
     # the rest is the guard's own
 
@@ -265,6 +297,26 @@ class Guard:
         for joint in self._plausible.judge(position_rad, encoder_valid, encoder_ns, moving):
             self.counters.doubts[joint] += 1
             self.events.add(Doubt(now_ns, joint, self._plausible.words[joint]))
+
+    def _place(self, now_ns: int, position_rad: Array, encoder_valid: Mask, encoder_ns: int) -> None:
+        if self._seated and self._plausible.span is None:
+            return  # an old reading
+        good = encoder_valid & np.isfinite(position_rad)
+        # while the robot moves a joint astray is doubted and held first; one that goes on is stopped by force
+        among = self._plausible.doubted if self.state in MOVING else None
+        moves = self._placement.take(
+            encoder_ns, position_rad, good, drive_rad=self._drive_rad, span=self._plausible.span, among=among
+        )
+        if moves is not None and self.state is not State.ESTOP:
+            self.counters.losses["unbidden"] += 1
+            self.estop(now_ns, moves)
+
+    def _stands_rad(self) -> Array:
+        """Where to hold the joints: by the drives' own angles, where there are any, as they take setpoints.
+
+        Held at the encoders' angles they would walk there, by what the two differ.
+        """
+        return self._encoders.position_rad if self._drive_rad is None else self._drive_rad
 
     def _watch(self, now_ns: int, watches: Sequence[Watch]) -> None:
         self.lease.lapse(now_ns)
@@ -305,9 +357,13 @@ class Guard:
 
     def _wait(self, now_ns: int, position_rad: Array) -> Setpoint:
         """Before every joint has been read: no setpoint, only where the joints seem to stand."""
-        if self._encoders.silence(now_ns) is not None:
+        silent = self._encoders.silence(now_ns) is not None
+        unplaced = None if silent else self._placement.unplaced(self._encoders.position_rad)
+        if unplaced is not None and self.state is State.BOOT:
+            self.reason = unplaced
+        if silent or unplaced is not None:
             return Setpoint(position_rad.copy(), np.zeros_like(position_rad), ready=False)
-        self._limiter.seat(self._encoders.position_rad)
+        self._limiter.seat(self._stands_rad())
         self._seated = True
         self._change(now_ns, Event.ENCODERS_VALID, "waits for an operator to engage")
         return Setpoint(self._limiter.position_rad, self._limiter.velocity_rad_s)

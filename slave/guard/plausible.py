@@ -95,6 +95,8 @@ class Plausibility:
         self._heard_rad: Array = np.zeros(joints)
         self._score_s: Array = np.zeros(joints)
         self._calm = True
+        self.span: tuple[Array, Array] | None = None
+        """Lowest and highest setpoint (J,) that the newest reading was judged by; None: it was not judged."""
         self.doubted: Mask = np.zeros(joints, np.bool_)
         """(J,) read-only."""
         self.words: dict[str, str] = {}
@@ -116,12 +118,13 @@ class Plausibility:
         The same reading twice counts once, and one that is older than the lag is left to the encoders' watch.
         """
         stale = self._stepped_ns is None or self._stepped_ns - read_ns > self._lag_ns
+        self.span = None
         if stale or read_ns == self._read_ns:
             return []
         dt_s = min(max(to_s(read_ns - self._read_ns), 0.0), LONGEST_S)
         self._read_ns = read_ns
         good = valid & np.isfinite(position_rad)
-        low, high = self._past.span(read_ns)
+        low, high = self.span = self._past.span(read_ns)
         # not ahead and not behind, by more than the window; a NaN compares False and is not good anyway
         astray = (np.maximum(low - position_rad, position_rad - high) > self._window_rad) & good
         jumped = self._jumps(position_rad, good, read_ns)

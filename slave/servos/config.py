@@ -23,6 +23,16 @@ class ServosConfig(Section):
     dynamixel: DynamixelConfig | None = None
 
     @property
+    def single_reading(self) -> bool:
+        """Whether a joint's angle is read by nothing but its servo, so that nothing can contradict it."""
+        return self.backend == "dynamixel"
+
+    @property
+    def remembers(self) -> bool:
+        """Whether to keep on disk where the joints stood: a simulated robot begins anew each time."""
+        return self.backend != "mujoco"
+
+    @property
     def bus_lag_s(self) -> float:
         """How much later than at once a setpoint takes full effect on the way to the drives, on average."""
         # it waits half a SYNC period, and the drives take a whole one to go there in a straight line

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from common.errors import RobotError
 from common.skeleton import Skeleton
 from slave.encoders import EncoderConfig
@@ -9,8 +11,16 @@ from slave.servos.config import ServosConfig
 from slave.servos.servos import Servos
 
 
-def open_servos(config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfig) -> Servos:
-    """Servos that have not been started yet. Raises RobotError where they cannot be had."""
+def open_servos(
+    config: ServosConfig,
+    skeleton: Skeleton,
+    encoders: EncoderConfig,
+    last_known_rad: Mapping[str, float] | None = None,
+) -> Servos:
+    """Servos that have not been started yet; `last_known_rad`: where joints stood when last seen.
+
+    Raises RobotError where they cannot be had.
+    """
     match config.backend:
         case "mujoco":
             # imported here: a robot of metal needs no simulator
@@ -20,7 +30,7 @@ def open_servos(config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfi
         case "canopen":
             from slave.servos.canopen.servos import CanopenServos
 
-            return CanopenServos(config.canopen, skeleton, encoders=encoders)
+            return CanopenServos(config.canopen, skeleton, encoders=encoders, last_known_rad=last_known_rad)
         case "dynamixel":
             from slave.servos.dynamixel.servos import DynamixelServos
 

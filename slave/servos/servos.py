@@ -24,6 +24,8 @@ class EncoderReading:
     """(J,) 0..4095, raw: neither zero nor direction applied."""
     valid: Mask
     """(J,) False where the encoder does not answer or says it cannot be trusted."""
+    drive_rad: Array | None = None
+    """(J,) the joints' angles by the drives' own encoders at that time; None where they have none."""
 
 
 class Servos(Protocol):

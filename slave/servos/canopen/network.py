@@ -423,7 +423,9 @@ class DriveNetwork:
         words = self._answers.encoder
         flags = words & _FLAGS
         counts = (words & pdo.COUNT_BITS).astype(np.int64)
-        self.reading = EncoderReading(self._synced_ns, counts, self._answers.fresh & (flags == 0))
+        drive_rad = (self._answers.position - self._zero) / self._scale
+        valid = self._answers.fresh & (flags == 0)
+        self.reading = EncoderReading(self._synced_ns, counts, valid, drive_rad)
         if (flags != self._flags).any():
             self._flags = flags
             for drive, flag in zip(self._drives, flags.tolist(), strict=True):

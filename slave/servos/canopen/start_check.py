@@ -64,15 +64,13 @@ def _reference(place: Place) -> str:
     if place.last_known_rad is None:
         return (
             f"says {_deg(place.drive_rad)}, and nothing confirms it: its output encoder says nothing "
-            "that can be believed, and no last position is known; mend it, or look at the joint and confirm "
-            "with `tandem home`"
+            "that can be believed, and no last position is known; mend the encoder"
         )
     if abs(place.drive_rad - place.last_known_rad) <= LAST_KNOWN_RAD:
         return ""
     return (
         f"says {_deg(place.drive_rad)}, but the joint stood at {_deg(place.last_known_rad)} when it was last "
-        "known, and its output encoder says nothing that can be believed; look at the joint and confirm with "
-        "`tandem home`"
+        "known, and its output encoder says nothing that can be believed; mend the encoder"
     )
 
 

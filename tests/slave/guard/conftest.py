@@ -65,6 +65,8 @@ class Rig:
         self.encoder_delay_ns = 0
         self.body = WELL
         self.coupled = True
+        self.drive_off_rad: Array | None = None
+        """(J,) What the drives' own angles are off by; None: they tell none."""
         self.lies: dict[int, Callable[[float], float]] = {}
         """What an encoder shows for the true angle, where it lies."""
         self.target = self.measured.copy()
@@ -119,7 +121,11 @@ class Rig:
     def step(self, dt_ns: int = PERIOD_NS) -> Setpoint:
         self.now_ns += dt_ns
         read_ns = self.now_ns - self.encoder_delay_ns
-        setpoint = self.guard.step(self.now_ns, self.shown(), self.encoder_valid, read_ns, self.body)
+        shown = self.shown()
+        drive_rad = None if self.drive_off_rad is None else shown + self.drive_off_rad
+        setpoint = self.guard.step(
+            self.now_ns, shown, self.encoder_valid, read_ns, self.body, drive_rad=drive_rad
+        )
         if self.coupled and setpoint.ready:
             self.measured = setpoint.position_rad.copy()
         self.setpoints.append(setpoint)

@@ -363,6 +363,42 @@ def mended(make_rig: MakeRig) -> None:
     assert not rig.guard.doubts
 
 
+# joints that are not where they are said to be, or do not stay there
+
+
+@about("Agreement.judge")
+def drive_and_encoder_differ(make_rig: MakeRig) -> None:
+    rig = make_rig()
+    rig.drive_off_rad = np.zeros(rig.joints)
+    rig.step()
+    rig.to_track()
+    rig.drive_off_rad[ELBOW] = math.radians(2.1)
+    rig.run(0.02)
+    assert rig.guard.state is State.HOLD
+    assert not rig.ask(Action.ENGAGE).done
+
+
+@about("Placement.unplaced")
+def never_held_where_nobody_knows(make_rig: MakeRig) -> None:
+    rig = make_rig()
+    rig.measured = rig.measured.copy()
+    rig.measured[ELBOW] = rig.skeleton.upper_rad[ELBOW] + math.radians(8.1)
+    assert not rig.step().ready
+    assert rig.guard.state is State.BOOT
+
+
+@about("UnbiddenMotion.judge")
+def moves_by_itself(make_rig: MakeRig) -> None:
+    rig = make_rig().to_leased()
+    rig.run(0.6)
+    rig.coupled = False
+    rig.measured = rig.measured.copy()
+    for _ in range(10):  # 30 degrees a second for 50 ms
+        rig.measured[ELBOW] += math.radians(30.0) * 0.005
+        rig.step()
+    assert rig.guard.state is State.ESTOP
+
+
 # who may
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from slave import agreement, unbidden
 from slave.guard import (
     admit,
     align,
@@ -22,6 +23,7 @@ from slave.guard import (
     guard,
     lease,
     limit,
+    placed,
     plausible,
     states,
     tilt,
@@ -119,6 +121,9 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (plausible.Plausibility, "unsettled", nothing),
     (plausible.Plausibility, "trust", nothing),
     (plausible.Past, "span", lambda self, _: (self._low.min(0) - 9.0, self._high.max(0) + 9.0)),
+    (agreement.Agreement, "judge", nothing),
+    (placed.Placement, "unplaced", nothing),
+    (unbidden.UnbiddenMotion, "judge", lambda self, *_: np.zeros(len(self._names), np.bool_)),
     (guard.Guard, "_strayed", nothing),
     (guard.Guard, "_elapsed_s", unbounded_s),
     (guard.Guard, "_believed", lambda self: np.ones_like(self._valid)),

@@ -274,10 +274,10 @@ def test_each_check_at_its_boundary(sign: int) -> None:
     assert refusal(place(drive_rad=at + sign * 1e-9, encoder_rad=at), READY)
     blind = {"encoder_rad": None}
     assert not refusal(place(**blind, last_known_rad=0.5 + sign * (LAST_KNOWN_RAD - 1e-9)), READY)
-    assert "tandem home" in refusal(
+    assert "mend the encoder" in refusal(
         place(**blind, last_known_rad=0.5 + sign * (LAST_KNOWN_RAD + 1e-9)), READY
     )
-    assert "tandem home" in refusal(place(**blind), READY)
+    assert "mend the encoder" in refusal(place(**blind), READY)
 
 
 @pytest.mark.parametrize("bit", [VOLTAGE, REMOTE, LIMITED, FOLLOWS])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from slave.camera.config import CameraConfig
 from slave.config import SlaveConfig
 from slave.guard.body import Body
 from slave.guard.states import State
+from slave.last_known import LastKnown, save
 from slave.pipeline import SlavePipeline
 from slave.servos.config import ServosConfig
 from slave.servos.dynamixel.registers import TORQUE
@@ -110,6 +112,11 @@ def test_a_setpoint_that_is_none_is_refused(patient: Rig, wrong: Any) -> None:
         servos.write(wrong)
 
 
+def where(rig: Rig) -> dict[str, float]:
+    """Where the joints stand, as it is known from before."""
+    return dict(zip(rig.names, rig.start_rad.tolist(), strict=True))
+
+
 class DeafLink:
     def __init__(self) -> None:
         self.put = 0
@@ -124,11 +131,15 @@ class DeafLink:
 
     def answer(self, *_: object) -> None: ...
 
+    def watch_presence(self, *_: object) -> None: ...
+
 
 def test_a_bus_that_hangs_holds_up_no_tick_of_the_slave(
-    patient: Rig, monkeypatch: pytest.MonkeyPatch
+    patient: Rig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     rig = patient
+    file = tmp_path / "robot-1.json"
+    save(file, where(rig))
 
     async def given(grid: TickGrid) -> AsyncIterator[Due]:
         for tick in range(200):
@@ -140,7 +151,7 @@ def test_a_bus_that_hangs_holds_up_no_tick_of_the_slave(
     servos = DynamixelServos(rig.config, rig.skeleton, rig.encoder_config)
     servos.start()
     try:
-        slave = app.Slave(slave_config(rig), link, servos)
+        slave = app.Slave(slave_config(rig), link, servos, last_known=LastKnown(file, rig.names))
         # no servo answers while this is held; were a tick to wait for one, it would never be let go
         with rig.port.lock:
             asyncio.run(slave._drive())
@@ -159,7 +170,7 @@ class Session:
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
-        self.pipeline = SlavePipeline(slave_config(rig))
+        self.pipeline = SlavePipeline(slave_config(rig), last_known_rad=where(rig))
         self.sequence = 0
         self.lease = 0
         self.target = rig.start_rad.copy()

@@ -1,0 +1,126 @@
+"""Does each joint truly stand where it is said to, and stay there? Asked in every state, of every backend.
+
+Before the robot is held anywhere: each joint within its range, and its angle confirmed by a second reading:
+the drive's own beside the encoder's, or the last one that was known, or a person who looked. Then
+the two readings agree always, and whoever moves without a setpoint, or against it, is stopped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from common.messages import Mask
+from common.quaternion import Array
+from slave.agreement import READINGS as AGREEMENT_READINGS
+from slave.agreement import Agreement
+from slave.unbidden import UnbiddenMotion
+
+BEYOND_RAD = math.radians(8.0)
+"""A joint further than this beyond its range is not where its encoder says."""
+NEAR_RAD = math.radians(5.0)
+"""A joint that nobody turned while it was off stands within this of where it was."""
+STILL_RAD = math.radians(1.0)
+"""At the output, behind the gear's play, a joint that stands may be moved by so much."""
+READINGS = 2
+
+
+class Placement:
+    """Of J joints. `last_known_rad` None: every joint has a second reading, or is simulated."""
+
+    def __init__(
+        self,
+        joint_names: Sequence[str],
+        lower_rad: Array,
+        upper_rad: Array,
+        *,
+        last_known_rad: Mapping[str, float] | None = None,
+    ) -> None:
+        self._names = tuple(joint_names)
+        self._lower_rad, self._upper_rad = lower_rad, upper_rad
+        known = last_known_rad
+        self._known_rad = None if known is None else np.array([known.get(n, np.nan) for n in joint_names])
+        self._agreement = Agreement(joint_names)
+        self._motion = UnbiddenMotion(joint_names, STILL_RAD, READINGS)
+        self._first_rad: Array = np.full(len(self._names), np.nan)
+        self._read_ns: int | None = None
+        self._compared = 0
+
+    @property
+    def differ(self) -> Mapping[str, str]:
+        """Joints whose drive and encoder say different things, in words, by joint."""
+        return self._agreement.words
+
+    def take(
+        self,
+        read_ns: int,
+        position_rad: Array,
+        good: Mask,
+        *,
+        drive_rad: Array | None,
+        span: tuple[Array, Array] | None,
+        among: Mask | None = None,
+    ) -> str | None:
+        """Take a reading (J,) that is `good` (J,). Who moves unbidden, in words, or None.
+
+        `span` (J,) each: where the setpoint was lately, or None before there is any: then nothing may move.
+        Only joints `among` these (J,) count, where they are given. The same reading twice counts once.
+        """
+        if read_ns == self._read_ns:
+            return None
+        self._read_ns = read_ns
+        if drive_rad is not None:
+            self._agreement.judge(drive_rad, position_rad, good)
+            self._compared += 1
+        if span is None:
+            first = good & np.isnan(self._first_rad)
+            if first.any():
+                np.copyto(self._first_rad, position_rad, where=first)
+                self._motion.begin(read_ns, first, position_rad)
+            span = self._first_rad, self._first_rad
+        moves = self._motion.judge(read_ns, span, position_rad, good)
+        if among is not None:
+            moves = moves & among
+        if not moves.any():
+            return None
+        joint = self._names[int(moves.argmax())]
+        return f"{joint} {self._motion.words[joint]}"
+
+    def unplaced(self, position_rad: Array) -> str | None:
+        """Why the robot may not be held where its joints (J,) seem to stand, or None."""
+        if 0 < self._compared < AGREEMENT_READINGS:
+            return "compares the drives' angles with the encoders'"
+        for joint, words in self._agreement.words.items():
+            return f"{joint}: {words}"
+        beyond = np.maximum(self._lower_rad - position_rad, position_rad - self._upper_rad)
+        worst = int(beyond.argmax())
+        if beyond[worst] > BEYOND_RAD:
+            return (
+                f"{self._names[worst]} stands at {_deg(position_rad[worst])}, {_deg(beyond[worst])} beyond "
+                "its range: check its zero and its encoder, or turn it back by hand"
+            )
+        return self._unknown(position_rad)
+
+    def confirm(self, position_rad: Array) -> None:
+        """A person has looked: the joints (J,) stand where they are said to."""
+        if self._known_rad is not None:
+            self._known_rad = position_rad.copy()
+
+    def _unknown(self, position_rad: Array) -> str | None:
+        if self._known_rad is None:
+            return None
+        far = ~(np.abs(position_rad - self._known_rad) <= NEAR_RAD)
+        if not far.any():
+            return None
+        said = []
+        for j in np.flatnonzero(far).tolist():
+            known = self._known_rad[j]
+            before = "never known before" if np.isnan(known) else f"last known at {_deg(known)}"
+            said.append(f"{self._names[j]} says {_deg(position_rad[j])}, {before}")
+        return f"look at the robot, and confirm by `tandem home` that it stands so: {'; '.join(said)}"
+
+
+def _deg(angle_rad: float) -> str:
+    return f"{math.degrees(angle_rad):.1f}°"

@@ -1,0 +1,173 @@
+"""Each joint stands where it is said to, and stays there: in every state, whatever the backend."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.messages import Action
+from slave.agreement import WINDOW_RAD, Agreement
+from slave.guard import State
+from slave.guard.placed import BEYOND_RAD, NEAR_RAD
+from slave.unbidden import ASTRAY_RAD, STILL_RAD, UnbiddenMotion
+
+MakeRig = Callable[..., Any]
+KEY = "a key kept at the robot"
+ELBOW = 6
+ONE = np.ones(1, np.bool_)
+TICK = 5_000_000
+
+
+def run_away(rig: Any, rate_deg_s: float) -> float:
+    """Until it is stopped: seconds since the joint had moved by its play, 1 degree."""
+    rig.coupled = False
+    rig.measured = rig.measured.copy()
+    began_ns = rig.now_ns + round(1e9 / abs(rate_deg_s))
+    for i in range(400):
+        rig.measured[ELBOW] += math.radians(rate_deg_s) * 0.005
+        if i % 16 == 0 and rig.lease:
+            rig.send()
+        rig.step()
+        if rig.guard.state is State.ESTOP:
+            break
+    assert rig.guard.state is State.ESTOP
+    assert "by itself" in rig.guard.reason or "against" in rig.guard.reason
+    return (rig.now_ns - began_ns) / 1e9
+
+
+@pytest.mark.parametrize("rate_deg_s", [-30.0, 60.0, 300.0])
+@pytest.mark.parametrize("state", [State.BOOT, State.HOLD])
+def test_whoever_moves_while_nobody_is_engaged_is_stopped_within_50_ms(
+    make_rig: MakeRig, state: State, rate_deg_s: float
+) -> None:
+    rig = make_rig()
+    if state is State.BOOT:
+        rig.encoder_valid[0] = False  # it waits for another joint's encoder
+        rig.step()
+    else:
+        rig.to_leased().run(0.6)
+    assert run_away(rig, rate_deg_s) <= 0.05
+
+
+@pytest.mark.parametrize("rate_deg_s", [60.0, 300.0])
+def test_who_goes_on_although_it_is_held_is_stopped_by_force(make_rig: MakeRig, rate_deg_s: float) -> None:
+    rig = make_rig().to_track()
+    assert run_away(rig, rate_deg_s) <= 0.35
+
+
+def test_the_setpoint_is_seated_where_the_drives_say_and_does_not_walk(make_rig: MakeRig) -> None:
+    rig = make_rig()
+    rig.coupled = False
+    rig.drive_off_rad = np.full(rig.joints, 0.03)
+    rig.step()
+    rig.to_hold()
+    assert np.array_equal(rig.setpoints[-1].position_rad, rig.measured + 0.03)
+
+
+def test_a_robot_whose_drive_and_encoder_differ_at_the_start_is_not_held_anywhere(make_rig: MakeRig) -> None:
+    rig = make_rig()
+    rig.drive_off_rad = np.zeros(rig.joints)
+    rig.drive_off_rad[ELBOW] = -math.radians(40.0)
+    for _ in range(100):
+        # the first reading is forgiven, as a bit may flip: it must not be what the robot is seated by
+        assert not rig.step().ready
+    assert rig.guard.state is State.BOOT
+    assert "its output encoder" in rig.guard.reason
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_at_the_window_they_agree_and_just_beyond_they_do_not(sign: int) -> None:
+    for off, apart in ((WINDOW_RAD - 1e-9, False), (WINDOW_RAD + 1e-9, True)):
+        part = Agreement(["a"])
+        for _ in range(3):
+            said = part.judge(np.array([sign * off]), np.zeros(1), ONE)
+        assert said[0] == apart
+    assert list(part.words) == ["a"]
+    part.judge(np.zeros(1), np.zeros(1), ONE)
+    assert not part.words
+
+
+def test_an_angle_that_is_no_number_does_not_agree() -> None:
+    part = Agreement(["a"])
+    for _ in range(2):
+        said = part.judge(np.array([math.nan]), np.zeros(1), ONE)
+    assert said[0]
+
+
+@pytest.mark.parametrize("off_rad", [0.99 * STILL_RAD, 1.01 * STILL_RAD])
+def test_a_joint_that_stands_may_move_by_less_than_the_window(off_rad: float) -> None:
+    part = UnbiddenMotion(["a"])
+    part.begin(0, ONE, np.zeros(1))
+    still = np.zeros(1), np.zeros(1)
+    assert not part.judge(TICK, still, np.zeros(1), ONE)[0]
+    assert part.judge(2 * TICK, still, np.array([off_rad]), ONE)[0] == (off_rad > STILL_RAD)
+
+
+def test_what_sags_slowly_is_not_called_moving_and_what_creeps_on_faster_is() -> None:
+    for rate_deg_s, moves in ((0.2, False), (1.0, True)):
+        part = UnbiddenMotion(["a"])
+        part.begin(0, ONE, np.zeros(1))
+        seen = [
+            part.judge(i * TICK, (np.zeros(1), np.zeros(1)), np.radians([rate_deg_s * i * 0.005]), ONE)[0]
+            for i in range(1, 600)
+        ]
+        assert any(seen) == moves
+
+
+def test_a_joint_that_lags_within_the_span_s_margin_is_not_called_against() -> None:
+    part = UnbiddenMotion(["a"])
+    for i in range(1, 400):
+        high = 0.01 * i
+        span = np.array([high - 0.2]), np.array([high])
+        behind = np.array([high - 0.2 - 0.9 * ASTRAY_RAD])
+        assert not part.judge(i * TICK, span, behind, ONE)[0]
+
+
+# where a joint's angle is read by nothing but its servo
+
+
+def test_without_a_last_known_position_a_person_confirms(make_rig: MakeRig) -> None:
+    rig = make_rig(None, last_known_rad={})
+    for _ in range(10):
+        assert not rig.step().ready
+    assert rig.guard.state is State.BOOT
+    assert "`tandem home`" in rig.guard.reason
+    assert "left_elbow_pitch says" in rig.guard.reason
+    assert "never known before" in rig.guard.reason
+    assert not rig.ask(Action.HOME, key="wrong").done
+    assert not rig.ask(Action.HOME, key=KEY, challenge=1).done
+    rig.step()
+    assert rig.guard.state is State.BOOT
+    assert rig.ask(Action.HOME, key=KEY).done
+    rig.step()
+    assert rig.guard.state is State.HOLD
+    assert not rig.ask(Action.HOME, key=KEY).done
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_near_the_last_known_position_nobody_is_asked_and_just_beyond_it_somebody_is(
+    make_rig: MakeRig, sign: int
+) -> None:
+    for off, asked in ((NEAR_RAD - 1e-9, False), (NEAR_RAD + 1e-9, True)):
+        rig = make_rig()
+        known = dict(zip(rig.skeleton.joint_names, rig.measured.tolist(), strict=True))
+        known["neck_yaw"] += sign * off
+        rig = make_rig(None, last_known_rad=known)
+        rig.step()
+        assert (rig.guard.state is State.BOOT) == asked
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_little_beyond_its_range_a_joint_is_held_and_far_beyond_it_is_not(
+    make_rig: MakeRig, sign: int
+) -> None:
+    for beyond, held in ((BEYOND_RAD - 1e-9, True), (BEYOND_RAD + 1e-9, False)):
+        rig = make_rig()
+        rig.measured = rig.measured.copy()
+        end = rig.skeleton.upper_rad if sign > 0 else rig.skeleton.lower_rad
+        rig.measured[ELBOW] = end[ELBOW] + sign * beyond
+        assert rig.step().ready == held
