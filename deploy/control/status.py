@@ -88,12 +88,15 @@ class HeardOfAll:
 
     def __init__(self, link: Link) -> None:
         self._heard: dict[int, Heard] = {}
+        self._master: MasterMetrics | None = None
         link.subscribe(STATE, self._on_state)
         link.subscribe(STATISTICS, self._on_statistics)
 
     def of(self, instance: int) -> Heard:
         """What that one said."""
-        return self._heard.setdefault(instance, Heard())
+        if instance not in self._heard:
+            self._heard[instance] = Heard(master=self._master)
+        return self._heard[instance]
 
     def _on_state(self, payload: bytes, _: int) -> None:
         state = decode_state(payload)
@@ -109,6 +112,7 @@ class HeardOfAll:
             self.of(statistics.metrics.instance).take(metrics=statistics.metrics)
         else:
             # which of several robots it commands is not told: it is the operator's own affair
+            self._master = statistics.metrics
             for heard in self._heard.values():
                 heard.take(master=statistics.metrics)
 

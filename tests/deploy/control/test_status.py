@@ -6,7 +6,9 @@ import asyncio
 import io
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,8 +19,9 @@ from common.messages import BaseAttitude, RobotState
 from common.metrics import LeaseMetrics, Summary
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
+from common.topics import Topic
 from deploy.control.answer import Answer
-from deploy.control.status import Heard, as_tree, decode_state, status_table
+from deploy.control.status import Heard, HeardOfAll, as_tree, decode_state, status_table
 from tests.published import master_metrics, slave_metrics
 
 
@@ -125,3 +128,33 @@ def rendered(robots: dict[str, dict[str, object]]) -> str:
     out = io.StringIO()
     Console(file=out, width=80).print(status_table(robots))
     return out.getvalue()
+
+
+def test_one_of_two_of_a_name_is_shown_with_its_place() -> None:
+    answer = Answer("robot-1", True, "waits", "hold", 7, "room 1")
+    said = as_tree(answer, heard(), namesakes=1)
+    assert (said["instance"], said["place"], said["namesakes"]) == (7, "room 1", 1)
+    shown = rendered({"robot-1 00000007": said})
+    assert "another robot bears this name; this one is at room 1" in " ".join(shown.split())
+
+
+class Topics:
+    """A link that hands over what is said on it."""
+
+    def __init__(self) -> None:
+        self.hear: dict[str, Callable[[bytes, int], None]] = {}
+
+    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
+        self.hear[topic.name] = on_payload
+
+
+def test_what_two_of_a_name_say_is_not_mixed() -> None:
+    link: Any = Topics()
+    told = HeardOfAll(link)
+    for instance, reason in ((1, "one"), (2, "other"), (1, "one")):
+        link.hear["state"](encode(replace(state(), instance=instance, reason=reason)), 0)
+    assert [getattr(told.of(instance).state, "reason", None) for instance in (1, 2, 3)] == [
+        "one",
+        "other",
+        None,
+    ]

@@ -17,6 +17,7 @@ from common.link import Link, open_session
 from common.link_config import AccessConfig, TlsConfig
 from common.messages import ClockQuery, ClockReply, ControlReply, Statistics
 from common.metrics import Software
+from common.presence import several_bear
 from common.roles import Role
 from common.topics import CLOCK, STATISTICS, STOP
 from common.version import software
@@ -185,6 +186,9 @@ def test_a_robot_that_does_not_answer_or_in_another_schema() -> None:
     assert (silent.check, silent.verdict) == ("robot-1", Verdict.FAIL)
     [other] = judge_robot(RobotFacts("robot-1", "", "schema version 3, expected 2"), OURS)
     assert (other.check, other.verdict) == ("robot-1: versions", Verdict.FAIL)
+    [two] = judge_robot(RobotFacts("robot-1", "", several_bear("robot-1", ["room 1", "room 2"])), OURS)
+    assert (two.check, two.verdict) == ("robot-1: names", Verdict.FAIL)
+    assert "room 1 and room 2" in two.found
 
 
 def a_robot_answers(link: Link, software_: Software) -> None:
