@@ -257,7 +257,8 @@ class Estimator:
 
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes that are not believed, or not wholly, by their number."""
-        return {**self._bank.doubts(), **self._stance.doubts(self._liveness.settled)}
+        joints = self._heading.doubts() if isinstance(self._heading, OnlineHeadings) else {}
+        return {**joints, **self._bank.doubts(), **self._stance.doubts(self._liveness.settled)}
 
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""

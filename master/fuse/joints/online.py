@@ -11,7 +11,9 @@ from common.config import Section
 from common.messages import Mask
 from common.quaternion import Array, conjugate, heading_rad, heading_turn, multiply, rotate
 from common.skeleton import Skeleton
+from master.doubt import NodeDoubt, Weight
 from master.fuse.joints.constraints import JointConstraints
+from master.fuse.joints.contradicted import ContradictedJoints
 from master.fuse.joints.field import MagneticHeadings
 from master.fuse.joints.headings import Headings
 
@@ -65,6 +67,8 @@ class OnlineHeadings:
         self._config = config
         self._rate_hz = rate_hz
         self._joints = JointConstraints(skeleton)
+        self._contradicted = ContradictedJoints(len(self._joints))
+        self._names = skeleton.segment_names
         self._rows = np.arange(len(self._joints))
         self._field = MagneticHeadings(count, config.disturbance_memory_s)
         self._start = math.radians(config.start_sd_deg) ** 2
@@ -142,13 +146,28 @@ class OnlineHeadings:
         variance = math.radians(config.joint_sd_deg) ** 2
         foretold = variance + slope**2 * self._headings.variance_between(joints.child, joints.parent)
         trust = np.minimum(1.0, _LARGEST * np.sqrt(foretold) / np.maximum(np.abs(error), 1e-12))
-        trust[~(usable[joints.child] & usable[joints.parent])] = 0.0
+        both = usable[joints.child] & usable[joints.parent]
+        trust[~both] = 0.0
+        self._contradicted.add(error, both, dt_s)
         weight = trust * (dt_s / (2.0 * config.joint_memory_s) / variance)
         matrix = np.zeros((len(joints), len(usable)))
         matrix[rows, joints.child] = slope
         matrix[rows, joints.parent] = -slope
         weighted = matrix.T * weight
         return weighted @ matrix, -(weighted @ error)
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Nodes, by number, that keep turning as their joint cannot: what holds them may hold them wrong."""
+        joints, found = self._joints, self._contradicted
+        return {
+            int(joints.child[k]): NodeDoubt(
+                f"turns by {found.degrees(k):.0f}° against {self._names[joints.parent[k]]} about an axis "
+                "about which the joint cannot: its mounting, zero pose or heading is wrong, or it slipped. "
+                "Take the zero pose again, or `tandem calibrate mount`",
+                Weight.TOLD,
+            )
+            for k in np.flatnonzero(found.now).tolist()
+        }
 
     def _turn(self) -> None:
         self.turn = heading_turn(self._headings.theta_rad)
@@ -160,13 +179,20 @@ class OnlineHeadings:
 
     def snapshot(self) -> object:
         """The state, to be given to `restore`."""
-        return self._field.snapshot(), self._headings.snapshot(), self._held.copy(), self._ticks
+        return (
+            self._field.snapshot(),
+            self._headings.snapshot(),
+            self._held.copy(),
+            self._ticks,
+            (self._contradicted.snapshot()),
+        )
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
         if not isinstance(snapshot, tuple):
             raise TypeError("not a snapshot of these headings")
-        field, headings, held, self._ticks = snapshot
+        field, headings, held, self._ticks, contradicted = snapshot
+        self._contradicted.restore(contradicted)
         self._field.restore(field)
         self._headings.restore(headings)
         self._held = held.copy()
