@@ -103,6 +103,8 @@ class DriveNetwork:
         self._heard_ns = [0] * count
         self._down: dict[str, str] = {}
         self._stopping = False
+        self._commands = False
+        """Whether it has ever told a drive anything: before, another master may be the rightful one."""
         self._settled = False
         self._cycles = 0
         self._synced_ns = 0
@@ -126,7 +128,7 @@ class DriveNetwork:
         """Configure every drive afresh, then enable it; not while a second master speaks."""
         if not self._alone(now_ns):
             return
-        self._stopping = False
+        self._stopping, self._commands = False, True
         for i in range(len(self._drives)):
             self._start(i, now_ns, configure=True)
         self._tell()
@@ -223,7 +225,7 @@ class DriveNetwork:
 
     def _on_state(self, i: int, state: int, now_ns: int) -> None:
         drive = self._drives[i]
-        if self.second_master.buses and state == _OPERATIONAL:
+        if self._commands and self.second_master.buses and state == _OPERATIONAL:
             self._nmt(i, _STOP)  # the other has started it again
             return
         if drive.phase is Phase.CONFIGURING and state == _BOOTED:

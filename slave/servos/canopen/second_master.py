@@ -18,21 +18,24 @@ _LSS = 0x7E5
 """LSS master to its slaves (CiA 305)."""
 
 
-def master_s_frame(frame_id: int, nodes: Mapping[int, str], own_id: int) -> str | None:
-    """What a frame is that only the master of these nodes (id: joint) sends, in words; None for any other."""
+def master_s_frame(frame_id: int, nodes: Mapping[int, str], own_id: int) -> tuple[str, str] | None:
+    """What only the master of these nodes (id: joint) sends, and to which of them; None for any other frame.
+
+    In words; the second are empty for a frame to all.
+    """
     if frame_id == pdo.NMT:
-        return "NMT commands"
+        return "NMT commands", ""
     if frame_id == pdo.SYNC:
-        return "SYNC"
+        return "SYNC", ""
     if frame_id == _LSS:
-        return "LSS commands"
+        return "LSS commands", ""
     code, node = frame_id & 0x780, frame_id & 0x7F
     if code == pdo.HEARTBEAT and node == own_id:
-        return f"heartbeats with the slave's own node id {own_id}"
+        return f"heartbeats with the slave's own node id {own_id}", ""
     if code == pdo.SDO_REQUEST and node in nodes:
-        return f"SDO requests to node {node} ({nodes[node]})"
+        return "SDO requests to", f"node {node} ({nodes[node]})"
     if code in _RPDOS and node in nodes:
-        return f"targets (RPDO) for node {node} ({nodes[node]})"
+        return "targets (RPDO) for", f"node {node} ({nodes[node]})"
     return None
 
 
@@ -43,7 +46,8 @@ class SecondMaster:
         """`nodes`: by bus, then by node id, the joint."""
         self._nodes = nodes
         self._own_id = own_id
-        self._heard: dict[str, dict[str, None]] = {}
+        self._heard: dict[str, dict[str, list[str]]] = {}
+        """By bus, then by kind: the nodes that were spoken to."""
         self._last_ns: dict[str, int] = {}
         self.frames = 0
 
@@ -55,7 +59,10 @@ class SecondMaster:
             return False
         self.frames += 1
         self._last_ns[bus] = now_ns
-        self._heard.setdefault(bus, {}).setdefault(what)
+        kind, node = what
+        told = self._heard.setdefault(bus, {}).setdefault(kind, [])
+        if node and node not in told:
+            told.append(node)
         return True
 
     def speaks(self, now_ns: int) -> bool:
@@ -76,13 +83,17 @@ class SecondMaster:
         """Who it is, by what it sends, and what to do; empty where none was heard."""
         if not self._heard:
             return ""
-        parts = [f"bus {bus}: {_listed(list(kinds))}" for bus, kinds in self._heard.items()]
+        parts = [f"bus {bus}: {_listed(kinds)}" for bus, kinds in self._heard.items()]
         return (
             f"a second master is on {'; '.join(parts)}, not sent by this slave; end the other program "
             "(a second slave, a configuration tool), then start or reset"
         )
 
 
-def _listed(kinds: list[str], most: int = 3) -> str:
-    more = f" and {len(kinds) - most} more kinds of frames" if len(kinds) > most else ""
-    return ", ".join(kinds[:most]) + more
+def _listed(kinds: Mapping[str, list[str]]) -> str:
+    """SYNC and the like first, then kinds with the nodes they went to: the first, and how many more."""
+    said = [kind for kind, nodes in kinds.items() if not nodes]
+    for kind, nodes in kinds.items():
+        if nodes:
+            said.append(f"{kind} {nodes[0]}" + (f" and {len(nodes) - 1} more" if len(nodes) > 1 else ""))
+    return ", ".join(said)

@@ -78,6 +78,8 @@ class CanopenServos:
         self._buses: dict[str, CanBus] = {}
         self._setpoint: Array | None = None
         self._due_ns = 0
+        self._spoken = False
+        """Whether anything has been sent since the buses were opened."""
         self._answered = Durations()
         self._period = Durations()
         self._synced_ns = 0
@@ -101,6 +103,7 @@ class CanopenServos:
                 self._buses[config.name] = bus
                 self._check_load(config)
             self._listen()
+            self._spoken = True
             self._come_up()
         except BaseException:
             self.stop()
@@ -137,9 +140,10 @@ class CanopenServos:
 
     def stop(self) -> None:
         """Tell the drives to stop and stay, and close the buses."""
-        if self._buses:
+        if self._buses and self._spoken:
             self._network.stop()
             self._cycle()
+        self._spoken = False
         for bus in self._buses.values():
             bus.close_now()
         self._buses = {}
@@ -177,9 +181,9 @@ class CanopenServos:
         while self._clock() < until_ns:
             for bus in self._buses.values():
                 bus.read()
-            if other := self._network.second_master.words:
-                raise RobotError(f"{other}; nothing has been sent to the drives")
             time.sleep(_POLL_S)
+        if other := self._network.second_master.words:
+            raise RobotError(f"{other}; nothing has been sent to the drives")
 
     def _come_up(self) -> None:
         now_ns = self._clock()

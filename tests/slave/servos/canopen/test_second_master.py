@@ -115,3 +115,13 @@ def test_a_master_that_starts_the_drives_again_does_not_get_them(wired: Wired) -
     # what NMT lets through before the next heartbeat is stopped within it
     wired.run(0.3)
     assert all(drive.state is Power.QUICK_STOP for drive in wired.peer.drives)
+
+
+def test_one_that_has_not_begun_says_nothing_to_another_s_drives(wired: Wired) -> None:
+    late = DriveNetwork(wired.config, wired.skeleton)
+    for frame_id, data in ((0x080, b""), (0x701, b"\x05"), (0x201, b"\x0f\x00" + bytes(4))):
+        late.on_frame("left", frame_id, data, wired.now_ns)
+    assert late.outbox == []
+    late.start(wired.now_ns)
+    assert late.outbox == []
+    assert "SYNC, targets (RPDO) for node 1 (neck_yaw)" in late.second_master.words

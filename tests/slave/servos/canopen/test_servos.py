@@ -245,6 +245,36 @@ def test_a_second_start_takes_over_drives_that_hold(config: CanopenConfig, tmp_p
         uvloop.run(test())
 
 
+def test_a_second_slave_is_refused_and_the_first_does_not_notice(
+    config: CanopenConfig, tmp_path: Path
+) -> None:
+    async def test() -> None:
+        servos = CanopenServos(config, NURSING)
+        servos.start()
+        ticking = Ticking(servos)
+        await ticking.until(ticking.near)
+        loop = asyncio.get_running_loop()
+
+        def second() -> str:
+            async def start() -> str:
+                with pytest.raises(RobotError, match="second master") as raised:
+                    CanopenServos(config, NURSING).start()
+                return str(raised.value)
+
+            return asyncio.run(start())
+
+        refused = loop.run_in_executor(None, second)
+        await ticking.until(refused.done)
+        assert "nothing has been sent to the drives" in await refused
+        assert "SYNC" in await refused
+        assert dict(servos.faults()) == {}
+        assert servos._network.second_master.frames == 0
+        servos.stop()
+
+    with drives_on(config, tmp_path):
+        uvloop.run(test())
+
+
 def test_without_drives_the_start_says_what_to_do(config: CanopenConfig, tmp_path: Path) -> None:
     async def test() -> None:
         with pytest.raises(RobotError, match=r"25 of 25 drives do not start: .*start `tandem drives`"):
