@@ -8,6 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from common.clock import NS_PER_MS
+from common.messages import Action
 from deploy.following import SLOW, engaged, follow, moved
 from deploy.judge import Motion, motion
 from deploy.network.profile import Profile, Way, load_profile
@@ -95,3 +97,21 @@ def test_nor_does_it_take_a_setpoint_past_a_limit(there_and_back: VirtualRun) ->
     assert (rates <= skeleton.max_velocity_rad_s * 1.02 + 1e-3).all()
     assert (setpoints <= skeleton.upper_rad + 1e-6).all()
     assert (setpoints >= skeleton.lower_rad - 1e-6).all()
+
+
+@pytest.mark.timeout(300)
+def test_after_a_line_became_slow_for_good_the_robot_can_be_engaged_and_tracks() -> None:
+    """Seen: 20 ms one way became 190 ms; a minute later every command "may be 382 ms old", for good."""
+    run = engaged(World(one_way_ns=20 * NS_PER_MS))
+    run.run(5.0)
+    assert run.slave.guard.state == "track"
+    run.link.set(Profile.model_validate({"both": {"delay_ms": 190.0}}), run.now_ns)
+    run.run(62.0)
+    offset = run.slave.clock.estimator.estimate(run.slave_ns)
+    assert offset.trusted
+    assert offset.bound_ns < 80 * NS_PER_MS, "the exchange of before has aged, and is not forgotten"
+    if run.slave.guard.state == "hold":
+        assert run.ask(Action.ENGAGE).done
+    run.run(5.0, until=lambda: run.slave.guard.state == "track")
+    run.run(2.0)
+    assert run.slave.guard.state == "track"
