@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from common.messages import Mask
 from common.quaternion import Array
@@ -30,7 +29,11 @@ _STILL_S = 1.0
 _TURNING_RAD_S = math.radians(5.0)
 _LONGEST_STEP_S = 0.2
 
-_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+_ONE = np.eye(3)
+_SKEW = np.array(
+    [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], float
+)
+"""(3, 9): θ times this is the matrix, row by row, by which v becomes v × θ."""
 
 
 class GravityWatch:
@@ -39,8 +42,10 @@ class GravityWatch:
     def __init__(self, count: int, limit_deg: float, affine: Array | None = None) -> None:
         """`affine` (3, N, 3, 4) of accelerometer, gyro and magnetometer; None: as they come."""
         self._limit_cos = math.cos(math.radians(limit_deg)) if limit_deg < 180.0 else -2.0
-        self._affine = affine
-        self._memory = np.full((2, count, 3), np.nan)
+        # where no file calibrates, nothing is to be applied
+        as_they_come = affine is None or bool((affine[:2] == np.eye(3, 4)).all())
+        self._affine = None if as_they_come else affine
+        self._memory = np.full((count, 2, 3), np.nan)
         self._bias_rad_s = np.zeros((count, 3))
         self._quiet_mean = np.zeros((count, 3))
         self._quiet_s = np.zeros(count)
@@ -76,20 +81,20 @@ class GravityWatch:
         rate = gyr_rad_s if self._affine is None else _affine(self._affine[1], gyr_rad_s)
         turn = self._dt_s * (rate - self._bias_rad_s)
         memory = self._memory
-        anew = silent | np.isnan(memory[0, :, 0])
+        anew = silent | np.isnan(memory[:, 0, 0])
         if anew.any():
-            memory[:, anew] = acc[anew]
-        tilted = _cross(memory, turn)
-        memory += tilted
-        memory += 0.5 * _cross(tilted, turn)
-        shares = [[[1.0 - math.exp(-self._dt_s / tau)]] for tau in (SHORT_S, LONG_S)]
-        memory += np.array(shares) * (acc - memory)
-        self._compare(turn, tilted[1], anew)
+            memory[anew] = acc[anew, None]
+        # v R(ω dt), to second order in the turn of one step: some degrees
+        skew = np.matmul(turn, _SKEW).reshape(-1, 3, 3)
+        memory = self._memory = np.matmul(memory, _ONE + skew + 0.5 * np.matmul(skew, skew))
+        shares = [[1.0 - math.exp(-self._dt_s / tau)] for tau in (SHORT_S, LONG_S)]
+        memory += np.array(shares) * (acc[:, None] - memory)
+        self._compare(turn, anew)
 
-    def _compare(self, turn: Array, tilted: Array, anew: Mask) -> None:
-        short, long = self._memory
-        dot, ss, ll = (np.einsum("ni,ni->n", a, b) for a, b in ((short, long), (short, short), (long, long)))
-        cos = dot / np.sqrt(np.maximum(ss * ll, 1e-9))
+    def _compare(self, turn: Array, anew: Mask) -> None:
+        products = np.matmul(self._memory, self._memory.transpose(0, 2, 1))
+        long_squared = np.maximum(products[:, 1, 1], 1e-9)
+        cos = products[:, 0, 1] / np.sqrt(np.maximum(products[:, 0, 0], 1e-9) * long_squared)
         self._beyond = (self._beyond + 1) * ((cos < self._limit_cos) & ~anew)
         angle = np.sqrt(np.einsum("ni,ni->n", turn, turn))
         self.turned_rad = np.where(angle > _TURNING_RAD_S * self._dt_s, angle, 0.0)
@@ -98,16 +103,11 @@ class GravityWatch:
             return
         apart_deg = np.degrees(np.arccos(np.clip(cos, -1.0, 1.0)))
         self.worst_deg = np.where(fresh, apart_deg, np.maximum(self.worst_deg, apart_deg))
-        path_rad = np.sqrt(np.einsum("ni,ni->n", tilted, tilted) / np.maximum(ll, 1e-9))
+        tilted = np.cross(self._memory[:, 1], turn)
+        path_rad = np.sqrt(np.einsum("ni,ni->n", tilted, tilted) / long_squared)
         agrees = (apart_deg < _AGREES_DEG) & ~anew & ~fresh
         self._agreed_rad = (self._agreed_rad + path_rad * (self.turned_rad > 0.0)) * agrees
         self.contradicted = (self.contradicted | fresh) & ~(self._agreed_rad > _AGREED_RAD)
-
-
-def _cross(a: Array, b: Array) -> NDArray[np.float64]:
-    """A × b, the last axis of 3; np.cross takes eight times as long."""
-    out: NDArray[np.float64] = a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT]
-    return out
 
 
 def _affine(matrices: Array, readings: Array) -> Array:
