@@ -14,11 +14,14 @@ from common.clock import monotonic_ns
 from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link.inbox import wake
 from common.metrics import TopicCounters
+from common.stop import read_stop
 from common.throttle import Throttle
 from common.topics import Topic
 
 MAX_WAITING = 64
-"""Questions that may wait for the loop; more are turned away, so that a flood costs no memory."""
+"""Questions that may wait for the loop; more are turned away, so that a flood costs no memory.
+
+A stop is not turned away for a flood of other questions: as many again may wait."""
 _TIMED_OUT = "Timeout"
 """What Zenoh itself answers when the time is up."""
 
@@ -54,14 +57,15 @@ class Answerer:
             return
         self._counters.received += 1
         # each of the two counts has one writer, so their difference needs no lock
-        if self._arrived - self._done >= MAX_WAITING:
+        payload = b"" if query.payload is None else query.payload.to_bytes()
+        waiting = self._arrived - self._done
+        if waiting >= MAX_WAITING and not (waiting < 2 * MAX_WAITING and read_stop(payload) is not None):
             self._counters.refused += 1
             with query:
                 query.reply_err("busy")
             return
         self._arrived += 1
-        payload = query.payload
-        wake(self._loop, self._answer, query, b"" if payload is None else payload.to_bytes(), arrived_ns)
+        wake(self._loop, self._answer, query, payload, arrived_ns)
 
     def close(self) -> None:
         """Answer nothing from now on."""

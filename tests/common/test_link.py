@@ -20,6 +20,7 @@ from common.link import Link, Session, open_link, open_session
 from common.link.queries import MAX_WAITING, Answerer
 from common.link_config import TopicConfig
 from common.metrics import TopicCounters
+from common.stop import pack_stop
 from common.topics import CLOCK, COMMAND, CONTROL, STATE, Priority
 
 ROBOT = "robot-1"
@@ -275,10 +276,14 @@ def test_questions_wait_for_the_loop_only_up_to_a_limit() -> None:
         for query in queries:
             answerer.on_query(query)
         assert [q.refused for q in queries] == [""] * MAX_WAITING + ["busy"]
-        await until(lambda: counters.answered == MAX_WAITING)
+        stop: Any = Query()
+        stop.payload = SimpleNamespace(to_bytes=lambda: pack_stop(ROBOT, "anna"))
+        answerer.on_query(stop)
+        assert stop.refused == ""  # no flood keeps a person from stopping the robot
+        await until(lambda: counters.answered == MAX_WAITING + 1)
         assert counters.refused == 1
         answerer.on_query(queries[0])
-        await until(lambda: counters.answered == MAX_WAITING + 1)
+        await until(lambda: counters.answered == MAX_WAITING + 2)
 
     run(test)
 
