@@ -34,6 +34,8 @@ class FakeLink:
 
     def answer(self, *_: object) -> None: ...
 
+    def watch_presence(self, *_: object) -> None: ...
+
     def counters(self) -> dict[str, int]:
         return {}
 
