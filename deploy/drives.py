@@ -23,7 +23,9 @@ def drives(
         typer.Option(
             metavar="JOINT=FAULT@SECONDS",
             help="Let a drive fail so long after the first SYNC: over-current, over-temperature, "
-            "encoder-stuck, magnet-lost, parity, silent, restart, or none, which ends what lasts.",
+            "encoder-stuck, magnet-lost, parity, silent, restart, lost-turns, wrong-zero, wrong-gear, "
+            "reversed, double-id, encoder-zero, runs-away, not-following, limit-active, local, no-voltage, "
+            "warns, wrong-mode, position-stuck, or none, which ends what lasts.",
         ),
     ] = None,
     figures: Annotated[

@@ -1,8 +1,8 @@
 """Which joints move although nobody told them to, or against what they were told. Pure.
 
-A servo that has settled at a setpoint that stands must stay there. While its setpoint moves it follows late,
-but never leaves the span of the last setpoints far behind, outwards. Both are judged by distance, reading by
-reading: a joint that runs away at 30°/s is found before it has turned by a degree.
+Servos that have settled at setpoints that all stand must stay there. While setpoints move a servo follows
+late, but never leaves the span of the last setpoints far behind, outwards. Both are judged by distance,
+reading by reading: a joint that runs away at 30°/s is found before it has turned by a degree.
 """
 
 from __future__ import annotations
@@ -75,6 +75,9 @@ class UnbiddenMotion:
         dt_s = min(max((read_ns - self._before_ns) / NS_PER_S, 0.0), 0.1)
         middle = 0.5 * (low + high)
         stands = high - low < STANDS_RAD
+        if (heard & ~stands).any():
+            # joints that move shake those that stand: light ones by a degree
+            stands = np.zeros_like(stands)
         self._rests_rad = self._rests_rad + (middle - self._stands_rad)
         self._stands_rad = middle
         self._settled_ns = np.where(

@@ -14,12 +14,14 @@ from common.quaternion import Array
 from deploy.faults.scene import Scene
 from master.suit.simulated.faults import FaultsConfig, Loss, Twin
 from master.suit.simulated.lies import Lie, LieKind
+from slave.guard import State
 from slave.guard.body import Body
 from slave.guard.tilt import base_loss
 from slave.servos.servos import EncoderReading
 
 HOUR_NS = 3_600 * NS_PER_S
 NODE = "right_forearm"
+RUNS_AWAY_RAD_S = math.radians(60.0)
 JOINT = "right_shoulder_pitch"
 """In the middle of its reach when the fault comes."""
 
@@ -123,6 +125,32 @@ def encoder_stuck(scene: Scene) -> None:
         counts = reading.counts.copy()
         counts[joint] = shown[0]
         return replace(reading, counts=counts)
+
+    scene.run.troubles.read = read
+
+
+def drive_runs_away(scene: Scene) -> None:
+    """A drive turns its joint by 60°/s, whatever it is told, until it is stopped by force."""
+    joint, moved = scene.skeleton.joint_names.index(JOINT), [0.0]
+
+    def write(position_rad: Array) -> Array:
+        if scene.guard.state is not State.ESTOP:
+            moved[0] += RUNS_AWAY_RAD_S / scene.run.slave_config.loop.rate_hz
+        out: Array = position_rad.copy()
+        out[joint] += moved[0]
+        return out
+
+    scene.run.troubles.write = write
+
+
+def drive_lost_turns(scene: Scene) -> None:
+    """A drive's own angle is off by 40° from its output encoder's."""
+    joint, encoders = scene.skeleton.joint_names.index(JOINT), scene.encoders
+
+    def read(reading: EncoderReading) -> EncoderReading:
+        drive_rad = encoders.position_rad(reading.counts)
+        drive_rad[joint] -= math.radians(40.0)
+        return replace(reading, drive_rad=drive_rad)
 
     scene.run.troubles.read = read
 

@@ -74,7 +74,7 @@ class Scene:
         self.each_period: Callable[[], None] = lambda: None
         """What somebody does to the robot at the rate of commands, 12.5 Hz, from the fault on."""
         self._ticks = 0
-        self._encoders = Encoders(self.skeleton, config.encoders)
+        self.encoders = Encoders(self.skeleton, config.encoders)
         self._seen: list[_Seen] = []
         self.run.troubles.watch = self._watch
 
@@ -164,7 +164,7 @@ class Scene:
         return Course(
             at_s=np.array([to_s(row.now_ns - self.fault_ns) for row in rows]),
             setpoint_rad=np.array([row.setpoint.position_rad for row in rows]),
-            encoder_rad=np.array([self._encoders.position_rad(row.reading.counts) for row in rows]),
+            encoder_rad=np.array([self.encoders.position_rad(row.reading.counts) for row in rows]),
         )
 
     def asked(self) -> Asked:

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any
 
+import numpy as np
 import pytest
 
 import slave.guard.limit
 from deploy.faults.fault import Reaction
 from deploy.faults.table import FAULTS
 from deploy.faults.trial import run_trial
+from slave.agreement import Agreement
 from slave.guard import GATES, states
 from slave.guard.states import Event
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES
+from slave.unbidden import UnbiddenMotion
 
 TABLE = {fault.name: fault for fault in FAULTS}
 BARED = (
@@ -61,6 +64,18 @@ def test_the_rules_of_the_limiter_are_what_bounds_a_jump(monkeypatch: pytest.Mon
     kept = tuple(pair for pair in slave.guard.limit.RULES if str(pair[0]) not in fault.held_by)
     monkeypatch.setattr(slave.guard.limit, "RULES", kept)
     assert [word for word in run_trial(fault).wrong if "setpoint" in word]
+
+
+def test_a_drive_that_moves_by_itself_goes_on_without_the_watch(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(UnbiddenMotion, "judge", lambda self, *_: np.zeros(len(self._names), np.bool_))
+    assert run_trial(TABLE["drive moves by itself"]).wrong
+
+
+def test_drives_that_differ_from_encoders_go_on_without_the_comparison(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Agreement, "judge", lambda *_: None)
+    assert run_trial(TABLE["drive and output encoder differ"]).wrong
 
 
 def test_an_emergency_stop_fails_without_its_transition(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -118,6 +118,16 @@ def test_what_sags_slowly_is_not_called_moving_and_what_creeps_on_faster_is() ->
         assert any(seen) == moves
 
 
+def test_a_joint_that_is_shaken_by_one_that_moves_is_not_called_moving() -> None:
+    part = UnbiddenMotion(["stands", "moves"])
+    both = np.ones(2, np.bool_)
+    part.begin(0, both, np.zeros(2))
+    for i in range(1, 400):
+        high = np.array([0.0, 0.01 * i])
+        shaken = np.array([0.9 * ASTRAY_RAD * math.sin(0.1 * i), 0.01 * i])
+        assert not part.judge(i * TICK, (high - [0.0, 0.2], high), shaken, both).any()
+
+
 def test_a_joint_that_lags_within_the_span_s_margin_is_not_called_against() -> None:
     part = UnbiddenMotion(["a"])
     for i in range(1, 400):
