@@ -66,7 +66,8 @@ def mount(
 
     skeleton = load_skeleton(profile)
     make_folder(out)
-    nodes = calibrated(of_profile(load_recordings(recording), skeleton), out)
+    recorded = load_recordings(recording)
+    nodes = calibrated(of_profile(recorded, skeleton), out)
     between = None if stance is None else (float(stance.split(":")[0]), float(stance.split(":")[1]))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("joints", total=None)
@@ -81,6 +82,8 @@ def mount(
     if not as_json:
         console = Console()
         console.print(nodes_table(found), joints_table(found))
+        for note in dict.fromkeys(note for node in recorded.values() for note in node.notes):
+            console.print(note, style="yellow", highlight=False, markup=False)
         if found.nodes:
             console.print(
                 f"stance {found.stance_s[0]:.1f} to {found.stance_s[1]:.1f} s; written to {out}; angles "
