@@ -24,6 +24,9 @@ _FORGET = 0.8
 """Of the share of unsound readings, from one look to the next."""
 _WITHHELD_S, _SELDOM = 60.0, 16
 """For so long a doubted field does not count at all, then in one tick of so many."""
+_FIELD_LOOKS = 3
+_FIELD_S = _FIELD_LOOKS * PERIOD_S
+"""From one look at the fields to the next: they cost the most."""
 _TOLD_RAD_S = math.radians(2.0)
 """A bias larger than this is one that calibration should have taken off."""
 
@@ -62,6 +65,7 @@ class Front:
         """`q_inertial_from_sensor` gives the filter's newest orientations (n, 4)."""
         self._inertial = q_inertial_from_sensor
         self._field = FieldWatch(limits.field_change, count)
+        self._looks = 0
         self._any_field = limits.any_field
         self._hidden: Mask | None = None
         self._withheld_s = np.zeros(count)
@@ -75,6 +79,11 @@ class Front:
         self.corrected: Mask | None = None
         """(n,) whose bias was found with the readings taken last; None for nobody's. They lie still: gravity
         and field give their orientation, and what the filter made of the bias is to be forgotten."""
+
+    @property
+    def everybody(self) -> bool:
+        """Whether every node has a field in what was taken last, as far as that is told at no cost."""
+        return self.magnetic is self._sound.everybody
 
     @property
     def skipped(self) -> NDArray[np.int64]:
@@ -95,8 +104,11 @@ class Front:
         if gross.due(self._period_s if dt_s is None else dt_s):
             self.corrected = gross.look(gyr, acc, mag)
             self._count()
-            self._field.look(mag, self._sound.magnetic, self._inertial(), PERIOD_S)
-            self._withheld_s = np.where(self._field.doubted, self._withheld_s + PERIOD_S, 0.0)
+            self._looks += 1
+        if self._looks == _FIELD_LOOKS:
+            self._looks = 0
+            self._field.look(mag, self._sound.magnetic, self._inertial(), _FIELD_S)
+            self._withheld_s = np.where(self._field.doubted, self._withheld_s + _FIELD_S, 0.0)
             hidden = self._field.doubted if self._any_field else self._field.doubted | self._field.unusual
             self._hidden = hidden if hidden.any() else None
         self.magnetic = self._sound.magnetic
@@ -174,13 +186,14 @@ class Front:
             self._field.snapshot(),
             self._withheld_s.copy(),
             self._hidden,
+            self._looks,
         )
 
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
         if not isinstance(snapshot, tuple):
             raise TypeError("not a snapshot of this front")
-        sound, gross, field, withheld_s, self._hidden = snapshot
+        sound, gross, field, withheld_s, self._hidden, self._looks = snapshot
         self._field.restore(field)
         self._withheld_s = withheld_s.copy()
         self._sound.restore(sound)

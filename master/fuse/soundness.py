@@ -25,9 +25,9 @@ class Soundness:
     def __init__(self, count: int) -> None:
         self.skipped: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
         """(n,) ticks with a reading that was none."""
-        self._all: Mask = np.ones(count, dtype=np.bool_)
+        self.everybody: Mask = np.ones(count, dtype=np.bool_)
         self._none: Mask = np.zeros(count, dtype=np.bool_)
-        self.magnetic = self._all
+        self.magnetic = self.everybody
         """(n,) who has a field in what `take` gave last."""
         self.spoilt: Mask | None = None
         """(n,) who had a reading that was none in what `take` was given last; None for nobody."""
@@ -41,7 +41,7 @@ class Soundness:
             squares = _square(gyr), _square(acc), _square(mag)
         if squares[0] < _GYR_SQUARE and squares[1] < _ACC_SQUARE:
             if squares[2] < _MAG_SQUARE:
-                self.magnetic = self._all
+                self.magnetic = self.everybody
                 self._gyr[:] = gyr
                 return gyr, acc, mag
             if np.isnan(mag).all():

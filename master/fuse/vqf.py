@@ -66,11 +66,11 @@ class VqfFilter:
             bias = self._own_bias_rad_s()
             # the package takes the bias off again: (gyr' - bias) period = (gyr - bias) dt
             gyr_rad_s = bias + (gyr_rad_s - bias) * (dt_s / self._period_s)
-        magnetic = self._front.magnetic.tolist()
-        if all(magnetic):
+        if self._front.everybody:
             for vqf, gyr, acc, mag in zip(self._filters, gyr_rad_s, acc_m_s2, mag_ut, strict=True):
                 vqf.update(gyr, acc, mag)
             return
+        magnetic = self._front.magnetic.tolist()
         rows = zip(self._filters, gyr_rad_s, acc_m_s2, mag_ut, magnetic, strict=True)
         for vqf, gyr, acc, mag, nine_axis in rows:
             if nine_axis:
