@@ -25,8 +25,7 @@ _FORGET = 0.8
 _WITHHELD_S, _SELDOM = 60.0, 16
 """For so long a doubted field does not count at all, then in one tick of so many."""
 _FIELD_LOOKS = 3
-_FIELD_S = _FIELD_LOOKS * PERIOD_S
-"""From one look at the fields to the next: they cost the most."""
+"""Of the gyros' to one of the fields, which cost the most; where the front weighs every field itself, one."""
 _TOLD_RAD_S = math.radians(2.0)
 """A bias larger than this is one that calibration should have taken off."""
 
@@ -65,7 +64,7 @@ class Front:
         """`q_inertial_from_sensor` gives the filter's newest orientations (n, 4)."""
         self._inertial = q_inertial_from_sensor
         self._field = FieldWatch(limits.field_change, count)
-        self._looks = 0
+        self._looks, self._field_looks = 0, _FIELD_LOOKS if limits.any_field else 1
         self._any_field = limits.any_field
         self._hidden: Mask | None = None
         self._withheld_s = np.zeros(count)
@@ -105,10 +104,10 @@ class Front:
             self.corrected = gross.look(gyr, acc, mag)
             self._count()
             self._looks += 1
-        if self._looks == _FIELD_LOOKS:
-            self._looks = 0
-            self._field.look(mag, self._sound.magnetic, self._inertial(), _FIELD_S)
-            self._withheld_s = np.where(self._field.doubted, self._withheld_s + _FIELD_S, 0.0)
+        if self._looks == self._field_looks:
+            self._looks, field_s = 0, self._field_looks * PERIOD_S
+            self._field.look(mag, self._sound.magnetic, self._inertial(), field_s)
+            self._withheld_s = np.where(self._field.doubted, self._withheld_s + field_s, 0.0)
             hidden = self._field.doubted if self._any_field else self._field.doubted | self._field.unusual
             self._hidden = hidden if hidden.any() else None
         self.magnetic = self._sound.magnetic
