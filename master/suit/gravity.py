@@ -25,7 +25,9 @@ _AGREED_RAD = 2.0
 """A gyro that was not believed must carry gravity through so much turn, in agreement, to be so again."""
 _IN_A_ROW = 3
 _LARGEST_BIAS_RAD_S = math.radians(30.0)
-_STILL_S = 1.0
+_STILL_S = 1.5
+_STAYS: Array = np.repeat([0.25, math.radians(2.0)], 3)
+"""m/s², rad/s: how far a still node's readings may be from those with which its stillness began."""
 _TURNING_RAD_S = math.radians(5.0)
 _LONGEST_STEP_S = 0.2
 
@@ -49,6 +51,7 @@ class GravityWatch:
         self._bias_rad_s = np.zeros((count, 3))
         self._quiet_mean = np.zeros((count, 3))
         self._quiet_s = np.zeros(count)
+        self._quiet_since = np.zeros((count, 6))
         self._dt_s = 0.0
         self._beyond = np.zeros(count, np.int64)
         self._agreed_rad = np.zeros(count)
@@ -62,12 +65,21 @@ class GravityWatch:
         """Specific force (N, 3) after calibration."""
         return acc_m_s2 if self._affine is None else _affine(self._affine[0], acc_m_s2)
 
-    def learn_bias(self, quiet: Mask, gyr_rad_s: Array) -> None:
-        """What a gyro reads while its node is still is its bias, raw (N, 3); up to 30 °/s."""
+    def learn_bias(self, quiet: Mask, acc_m_s2: Array, gyr_rad_s: Array) -> None:
+        """What a gyro reads while its node is still is its bias, raw (N, 3); up to 30 °/s.
+
+        A slow, steady turn is quiet too: so gravity, calibrated (N, 3), must stay where it is as well.
+        """
+        if not quiet.any():
+            self._quiet_s[:] = 0.0
+            return
         rate = gyr_rad_s if self._affine is None else _affine(self._affine[1], gyr_rad_s)
-        share = np.where(quiet & (self._quiet_s > 0.0), 0.1, 1.0)[:, None]
+        now = np.concatenate([acc_m_s2, rate], axis=1)
+        same = quiet & (np.abs(now - self._quiet_since) < _STAYS).all(axis=1)
+        self._quiet_since = np.where(same[:, None], self._quiet_since, now)
+        share = np.where(same, 0.1, 1.0)[:, None]
         self._quiet_mean += share * (rate - self._quiet_mean)
-        self._quiet_s = (self._quiet_s + self._dt_s) * quiet
+        self._quiet_s = (self._quiet_s + self._dt_s) * same
         known = (self._quiet_s > _STILL_S) & (np.abs(self._quiet_mean).max(axis=1) < _LARGEST_BIAS_RAD_S)
         if known.any():
             self._bias_rad_s[known] = self._quiet_mean[known]

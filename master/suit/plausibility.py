@@ -207,7 +207,7 @@ class Plausibility:
         centre = self._gravity.calibrated_acc(0.5 * (low[:, _ACC] + high[:, _ACC]))
         norm = np.sqrt(np.einsum("ni,ni->n", centre, centre)) / _G_M_S2
         off = quiet & (np.abs(norm - 1.0) > self._config.gravity_share)
-        self._gravity.learn_bias(quiet, self._ring[self._row - 1][:, _GYR])
+        self._gravity.learn_bias(quiet, centre, self._ring[self._row - 1][:, _GYR])
         self._off_scale = (self._off_scale + 1) * off
         for node in np.flatnonzero(self._off_scale >= 3):
             found.setdefault(

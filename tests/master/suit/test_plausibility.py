@@ -188,3 +188,20 @@ def test_the_share_of_a_gyro_that_is_clipped(clipped: int, doubted: bool) -> Non
     counts = still_counts()[:400].copy()
     counts[200 : 200 + clipped, 4] = 32767
     assert bool(judged(counts)) == doubted
+
+
+def test_a_slow_steady_turn_is_no_bias() -> None:
+    """An arm raised at 20 °/s: steady enough to look like rest, but gravity goes through the node."""
+    from master.suit.protocol import SuitProtocol
+
+    rate = np.repeat(np.radians([0.0, 20.0, 0.0, -20.0, 0.0]), [600, 1000, 400, 1000, 600])
+    angle = np.cumsum(rate) / 200.0
+    none = np.zeros_like(rate)
+    truth = np.stack([9.81 * np.sin(angle), none, 9.81 * np.cos(angle), none, -rate, none], axis=1)
+    counts = truth / SuitProtocol.load().fd.scale[:6]
+    noise = np.random.default_rng(3).standard_normal((len(rate), 9)) * np.repeat([8.0, 0.8, 1.0], 3)
+    said = judged(np.rint(np.concatenate([counts, np.full((len(rate), 3), 300.0)], axis=1) + noise))
+    assert said == [] or "contradicts" in said[0]
+    turned = counts * [1, 1, 1, -1, -1, -1]
+    other = judged(np.rint(np.concatenate([turned, np.full((len(rate), 3), 300.0)], axis=1) + noise))
+    assert [bool(said), bool(other)].count(True) == 1, "one sign is right, the other contradicts gravity"
