@@ -34,6 +34,9 @@ from master.calibrate.sides import check_sides
 from master.calibrate.standing import find_stance, given_stance
 from master.calibrate.unit_evidence import unit_evidence
 
+_TURNED_RAD = math.radians(36.0)
+"""How far a limb may be turned in or out in the stance: a real person's arms are, by so much each."""
+_WORST_FACING_RAD = math.radians(25.0)
 _ALONE = "no neighbour of it is left to compare it with"
 
 
@@ -182,11 +185,29 @@ def _assemble(skeleton: Skeleton, suit: Oriented, stance: slice, joints: list[Jo
         if facing is None:
             refused.update({name: _why(name, joints) for name in island})
             continue
+        if not any(name in axes and other in axes for name, other in _other_side(skeleton).items()):
+            lone = any(name in axes for name in _other_side(skeleton))
+            facing = (facing[0], max(facing[1], _TURNED_RAD)) if lone else facing
         for name in island:
-            nodes[name] = _node(skeleton, name, q_stance[name], island, axes, facing, joints)
+            node = _node(skeleton, name, q_stance[name], island, axes, facing, joints)
+            if node.sigma_rad > _WORST_FACING_RAD:
+                refused[name] = (
+                    f"which way it faced is only known to ± {math.degrees(node.sigma_rad):.0f}°: a person's "
+                    "limb may be turned in or out. Bend elbows or knees of both sides ten times, and record again"
+                )
+            else:
+                nodes[name] = node
     limits = _seconds(stance, suit)
     joints = [_with_flexion(skeleton, suit, joint, nodes) for joint in joints]
     return Mounting({name: nodes[name] for name in suit.names if name in nodes}, refused, joints, limits, {})
+
+
+def _other_side(skeleton: Skeleton) -> dict[str, str]:
+    """Each segment of the left and the right that has its like on the other side."""
+    names = skeleton.segment_names
+    pairs = {n: n.replace("left_", "right_", 1) for n in names if n.startswith("left_")}
+    pairs = {left: right for left, right in pairs.items() if right in names}
+    return pairs | {right: left for left, right in pairs.items()}
 
 
 def _node(
@@ -207,6 +228,8 @@ def _node(
         source = parent if parent in island else None
     if source is None:
         mine, sigma, told_by = facing_rad, facing_sigma, "the limbs' mean"
+        if name in _other_side(skeleton):
+            sigma = max(sigma, _TURNED_RAD)
     else:
         weights = [1.0 / a.sigma_rad**2 for a in axes[source]]
         mine = facing_rad + sum(

@@ -280,3 +280,15 @@ def test_a_recording_of_a_moment_is_refused() -> None:
     nodes = {name: NodeRecording(name, 5.0, up, none) for name in ("left_upper_arm", "left_forearm")}
     with pytest.raises(PoorMotionError, match=r"0\.8 s are too short"):
         find_mounting(nodes, load_skeleton("nursing"), (0.0, 0.4))
+
+
+@pytest.mark.recordings
+def test_one_arm_alone_does_not_tell_how_the_trunk_or_the_other_arm_faces(recordings_folder: Path) -> None:
+    """This person's arms are turned in by 36° each: only both together face ahead."""
+    skeleton = load_skeleton("nursing")
+    there = load_recordings(recordings_folder / "human_full_body.npz")
+    nodes = {n: there[RECORDED_AS[n]] for n in skeleton.segment_names if n in RECORDED_AS}
+    del nodes["left_forearm"]
+    found = find_mounting(nodes, skeleton)
+    assert {"chest", "head", "left_upper_arm", "left_hand"} <= set(found.refused)
+    assert set(found.nodes) == {"right_upper_arm", "right_forearm", "right_hand"}
