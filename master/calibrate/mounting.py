@@ -193,7 +193,8 @@ def _assemble(skeleton: Skeleton, suit: Oriented, stance: slice, joints: list[Jo
             if node.sigma_rad > _WORST_FACING_RAD:
                 refused[name] = (
                     f"which way it faced is only known to ± {math.degrees(node.sigma_rad):.0f}°: a person's "
-                    "limb may be turned in or out. Bend elbows or knees of both sides ten times, and record again"
+                    "limb may be turned in or out. Bend elbows or knees of both sides ten times, and record "
+                    "again"
                 )
             else:
                 nodes[name] = node
