@@ -66,6 +66,17 @@ class Ticks(Metrics):
     missed: int
 
 
+@dataclass(frozen=True, slots=True)
+class HeapMetrics(Metrics):
+    """Memory that a process holds on to, beside which resident memory may hide a leak."""
+
+    bytes_in_use: int | None
+    """Allocated by C and not freed; None where the C library does not tell."""
+    python_blocks: int
+    """Objects of Python's own allocator."""
+    python_threads: int
+
+
 @dataclass(slots=True)
 class TopicCounters(Metrics):
     """Counters of one topic in one session; they only grow."""
@@ -171,6 +182,7 @@ class MasterMetrics(Metrics):
     """The master's process. A message to a robot tells of that robot alone."""
 
     software: Software
+    heap: HeapMetrics
     ticks: Ticks
     stages_ms: dict[str, Summary]
     frames_in_to_put_ms: Summary
@@ -274,6 +286,7 @@ class SlaveMetrics(Metrics):
     software: Software
     instance: int
     """A number that only this process bears."""
+    heap: HeapMetrics
     ticks: Ticks
     guard: GuardMetrics
     lease: LeaseMetrics | None

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from common.can.bus import CanBus
 from common.clock import monotonic_ns
-from common.heap import freeze_heap, reserve_heap
+from common.heap import freeze_heap, heap_in_use, reserve_heap
 from common.latency import Durations, StageTimes
 from common.launch import WriteFigures
 from common.link import Session, open_session
@@ -144,6 +144,7 @@ class Master:
     def _shared_metrics(self) -> MasterMetrics:
         return MasterMetrics(
             software=software(),
+            heap=heap_in_use(),
             ticks=Ticks(self._ticks_expected, self._ticks_missed),
             stages_ms=self._stages.summary(),
             frames_in_to_put_ms=self._frames_in_to_put.summary(),

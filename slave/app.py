@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from common.clock import monotonic_ns, to_ms
 from common.codec import encode
-from common.heap import freeze_heap, reserve_heap
+from common.heap import freeze_heap, heap_in_use, reserve_heap
 from common.launch import WriteFigures
 from common.link import Link, open_session
 from common.link.audit import Audit
@@ -179,6 +179,7 @@ class Slave:
         guard = pipeline.guard
         return SlaveMetrics(
             software=software(),
+            heap=heap_in_use(),
             instance=pipeline.instance,
             ticks=Ticks(self._ticks_expected, self._ticks_missed),
             guard=guard.counters.metrics(str(guard.state), guard.reason),

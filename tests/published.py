@@ -8,6 +8,7 @@ from common.metrics import (
     ArrivalCounts,
     CommandedMetrics,
     GuardMetrics,
+    HeapMetrics,
     LeaseHeld,
     MasterMetrics,
     OffsetMetrics,
@@ -22,6 +23,7 @@ from common.metrics import (
 )
 
 NOTHING = Summary(0)
+HEAP = HeapMetrics(20_000_000, 300_000, 5)
 SOFTWARE = Software("0.1.0", 3, "1.10.2", "3.11.7")
 
 
@@ -42,6 +44,7 @@ def master_metrics(robot: CommandedMetrics | None = None, **changes: Any) -> Mas
     """A master's, to one robot."""
     given: dict[str, Any] = {
         "software": SOFTWARE,
+        "heap": HEAP,
         "ticks": Ticks(0, 0),
         "stages_ms": {},
         "frames_in_to_put_ms": NOTHING,
@@ -74,6 +77,7 @@ def slave_metrics(**changes: Any) -> SlaveMetrics:
     """A robot's."""
     given: dict[str, Any] = {
         "software": SOFTWARE,
+        "heap": HEAP,
         "instance": 0,
         "ticks": Ticks(0, 0),
         "guard": guard_metrics(),

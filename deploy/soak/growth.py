@@ -19,7 +19,14 @@ BINS = 400
 """At most, over a whole soak; a bin holds its median."""
 NARROWEST_S = 5.0
 RSS_MB_H = 0.5
-"""Counts as nothing: 4 MB in 8 h. Resident memory comes in pages and in steps."""
+"""Counts as nothing: 4 MB in 8 h. Resident memory comes in pages and in steps, and what was touched at the
+start hides a leak of as much: so what is in use is judged beside it."""
+IN_USE_MB_H = 0.25
+"""Counts as nothing: 2 MB in 8 h."""
+BLOCKS_H = 4000.0
+"""Objects of Python: the same, of 64 bytes each."""
+PUBLISH = ("master", "slave")
+"""Processes that publish what they have in use."""
 DRIFT_MS_H = 0.125
 """Counts as nothing: 1 ms in 8 h."""
 MOVED_MS_H = 1.0
@@ -65,6 +72,21 @@ def memory(seen: Seen) -> list[Verdict]:
     return verdicts
 
 
+def in_use(seen: Seen) -> list[Verdict]:
+    """Memory that master and slave hold on to: bytes that C allocated, and objects of Python."""
+    everything = np.ones(len(seen.samples), np.bool_)
+    verdicts = []
+    for name in PUBLISH:
+        lives = _lives(seen, name)
+        for words, column, limit, unit in (
+            ("bytes in use", f"{name}_in_use_mb", IN_USE_MB_H, "MB/h"),
+            ("objects in use", f"{name}_blocks", BLOCKS_H, "/h"),
+        ):
+            title = f"{name}'s {words} grow"
+            verdicts.append(_not_above(seen, "memory", title, column, lives, everything, limit, unit))
+    return verdicts
+
+
 def handles(seen: Seen) -> list[Verdict]:
     """File descriptors and threads at the end of each life against those after its warm-up."""
     return [
@@ -74,7 +96,7 @@ def handles(seen: Seen) -> list[Verdict]:
     ]
 
 
-GROWTH = (drift, memory, handles)
+GROWTH = (drift, memory, in_use, handles)
 
 
 def stretches(

@@ -24,8 +24,8 @@ SEEN = (
     "link_lost", "link_out", "link_odd",
 )  # fmt: skip
 """What a row holds of the whole; those in ms are NaN in a second in which nothing was measured."""
-OF_PROCESS = ("life", "rss_mb", "fds", "threads", "cpu_s")
-"""And of each process: how often it has been started, and what it uses."""
+OF_PROCESS = ("life", "rss_mb", "fds", "threads", "cpu_s", "in_use_mb", "blocks")
+"""And of each process: how often it has been started, and what it uses; the last two if it publishes them."""
 FILE = "samples.csv"
 
 
@@ -70,6 +70,9 @@ class Samples:
         return self["at_s"]
 
     def __getitem__(self, name: str) -> Array:
+        """(N,) of one column; all NaN where the recording is of before it was kept."""
+        if name not in self.columns and name.endswith(("_in_use_mb", "_blocks")):
+            return np.full(len(self), np.nan)
         return self.columns[name]
 
     @property

@@ -12,7 +12,7 @@ from common.codec import decode
 from common.errors import CodecError
 from common.link import Link
 from common.messages import Command, RobotState, Statistics
-from common.metrics import MasterMetrics, SlaveMetrics, Summary
+from common.metrics import HeapMetrics, MasterMetrics, SlaveMetrics, Summary
 from common.skeleton import Skeleton
 from common.topics import COMMAND, STATE, STATISTICS
 from deploy.soak.counts import Additions
@@ -125,6 +125,7 @@ class Watch:
             self._on_slave(told.metrics)
 
     def _on_master(self, metrics: MasterMetrics) -> None:
+        self._on_heap("master", metrics.heap)
         # a message tells of the robot that it is sent to, and of no other
         (robot,) = metrics.robots.values()
         counters = {
@@ -136,7 +137,13 @@ class Watch:
         self._count("master", counters)
         self._mean("master", "round_trip", robot.round_trip_ms)
 
+    def _on_heap(self, role: str, heap: HeapMetrics) -> None:
+        self._row[f"{role}_blocks"] = float(heap.python_blocks)
+        if heap.bytes_in_use is not None:
+            self._row[f"{role}_in_use_mb"] = heap.bytes_in_use / 1e6
+
     def _on_slave(self, metrics: SlaveMetrics) -> None:
+        self._on_heap("slave", metrics.heap)
         commands = metrics.commands
         counters = {
             # one that comes after all is late and not lost any more: only the two together never shrink

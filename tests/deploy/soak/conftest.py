@@ -53,6 +53,8 @@ def make() -> Make:
         usual = {"sent": 12.5, "master_ticks": 200.0, "slave_ticks": 200.0, "one_way_p50_ms": 0.5}
         usual |= {f"{name}_life": 1.0 for name in PROCESSES}
         usual |= {f"{name}_{what}": 20.0 for name in PROCESSES for what in ("rss_mb", "fds", "threads")}
+        usual |= {f"{name}_in_use_mb": 20.0 for name in ("master", "slave")}
+        usual |= {f"{name}_blocks": 3e5 for name in ("master", "slave")}
         for name, value in {**usual, **columns}.items():
             table[name] = np.broadcast_to(value(at_s) if callable(value) else value, seconds).astype(float)
         samples = Samples(table)
