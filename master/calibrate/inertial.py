@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 
 import numpy as np
@@ -138,6 +138,9 @@ def calibrate_inertial(
     held = np.concatenate([rates[a:b] for a, b in still])
     noise = np.nanstd(held, axis=0) / np.sqrt(len(held))
     turned = gyr.fit_gyroscope(moves, still_rates, noise, scale, lambda share: progress(0.2 + 0.8 * share))
+    # the gyroscope's axes are the accelerometer's, which are not known exactly either
+    of_axes = float(fit.sigma[[1, 2, 4]].max()) / float(np.cbrt(np.linalg.det(fit.gain))) * scale
+    turned = replace(turned, gain_cov=turned.gain_cov + of_axes**2 * np.eye(gyr.UNKNOWNS))
     found = compare.found_gyroscope(turned, scale)
     # what does not fit, then what is not determined, then what is not plausible
     refuse_contradictions(found[:1])
