@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from common.arrivals import Arrivals
 from common.codec import decode, encode
 from common.control import OPEN
 from common.errors import CodecError
@@ -30,7 +31,6 @@ from common.offset import Offset, SlaveExchange
 from common.quaternion import Array
 from common.stop import StopAnswer, pack_stop_answer, read_stop
 from common.throttle import Throttle
-from slave.arrivals import Arrivals
 from slave.config import SlaveConfig
 from slave.encoders import Encoders
 from slave.guard import Guard, Setpoint

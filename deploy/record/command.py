@@ -30,6 +30,9 @@ def record(
         float, typer.Option(help="Then a new file begins, FILE-2.mcap and so on; 0: never.", min=0.0)
     ] = 60.0,
     seconds: Annotated[float | None, typer.Option(help="Stop by itself.", min=0.1)] = None,
+    may_miss: Annotated[
+        bool, typer.Option("--may-miss", help="End with 0 although numbered messages never came.")
+    ] = False,
     figures: Annotated[
         Path | None,
         typer.Option(help="Write what was counted, as JSON, when stopped.", callback=in_a_folder),
@@ -38,7 +41,7 @@ def record(
     """Record a live robot's commands, states and statistics, until Ctrl-C; it changes nothing.
 
     Commands are heard at an endpoint where the master listens (`[link] listen` in its file), or at a router;
-    states at the robot's.
+    states at the robot's. Ends with 1 where the disk failed, or messages are missing by their own numbers.
 
     Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
     """
@@ -48,7 +51,8 @@ def record(
     if out.suffix.lower() != ".mcap":
         raise TandemError(f"{out}: expected a name that ends in .mcap")
     each_s = 60.0 * minutes_per_file if minutes_per_file else None
-    options = RecordOptions(link_of(connect or (), link), robot, out, tuple(video or ()), seconds, each_s)
+    where = link_of(connect or (), link)
+    options = RecordOptions(where, robot, out, tuple(video or ()), seconds, each_s, may_miss=may_miss)
     console = Console(stderr=True)
 
     async def work(stop: asyncio.Event) -> None:
@@ -67,19 +71,19 @@ def recording(
     file: Annotated[Path, typer.Argument(help="An .mcap file of ours.")],
     as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
 ) -> None:
-    """Show what is in a recording: topics, rates, the longest silence, and whether it ends too early.
+    """Show what is in a recording: topics, rates, silences, what never came, and whether it ends early.
 
     Example: `tandem recording morning.mcap --json`
     """
     from deploy.record.contents import survey
-    from deploy.tables import plain_table
+    from deploy.tables import UNKNOWN, plain_table
 
     contents = survey(file)
     if as_json:
         typer.echo(json.dumps(contents.tree(), indent=2, ensure_ascii=False))
         return
     console = Console()
-    table = plain_table("topic", "messages", "rate Hz", "MB", "longest silence s")
+    table = plain_table("topic", "messages", "rate Hz", "MB", "longest silence s", "missing")
     for name, topic in contents.topics.items():
         table.add_row(
             name,
@@ -87,6 +91,7 @@ def recording(
             f"{topic.rate_hz:.1f}",
             f"{topic.size / 1e6:.2f}",
             f"{topic.longest_gap_s:.2f}",
+            UNKNOWN if topic.missing is None else str(topic.missing),
         )
     console.print(table)
     for key, value in contents.metadata.items():

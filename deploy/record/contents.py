@@ -8,6 +8,7 @@ from typing import Any
 
 from common.clock import to_s
 from common.recording import RecordingStream
+from deploy.record.missing import Missing
 
 
 @dataclass(slots=True)
@@ -22,6 +23,8 @@ class TopicContents:
     last_ns: int = 0
     longest_gap_s: float = 0.0
     """Between two messages."""
+    missing: int | None = None
+    """Messages that never came, by the numbers of those that did; None where they bear none."""
 
     def take(self, at_ns: int, size: int) -> None:
         """Count one message."""
@@ -59,6 +62,12 @@ def survey(path: Path) -> Contents:
     """Go through a file. Raises RecordingError where it is none of ours."""
     stream = RecordingStream(path)
     topics: dict[str, TopicContents] = {}
+    gaps: dict[str, Missing] = {}
     for entry in stream:
+        if entry.topic not in gaps:
+            gaps[entry.topic] = Missing(entry.topic.rpartition("/")[2])
+        gaps[entry.topic].take(entry.payload, entry.monotonic_ns)
         topics.setdefault(entry.topic, TopicContents()).take(entry.monotonic_ns, len(entry.payload))
+    for name, contents in topics.items():
+        contents.missing = gaps[name].count
     return Contents(stream.metadata or {}, topics, stream.cut)

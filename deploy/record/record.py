@@ -13,9 +13,11 @@ from common.config import LinkConfig, Section, load_config
 from common.errors import TandemError
 from common.launch import WriteFigures
 from common.link import Link, open_link
+from common.metrics import RecorderMetrics, to_tree
 from common.runtime import until_stopped
 from common.topics import COMMAND, STATE, STATISTICS, Topic, video
 from deploy.control.reach import reach
+from deploy.record.missing import Missing, missing_in_words
 from deploy.record.tape import Tape
 
 LIVE = (COMMAND, STATE, STATISTICS)
@@ -47,6 +49,8 @@ class RecordOptions:
     seconds: float | None = None
     each_s: float | None = None
     """How long one file lasts; None: there is one."""
+    may_miss: bool = False
+    """Whether a recording with numbered messages missing is still a good one."""
 
     @property
     def topics(self) -> tuple[Topic, ...]:
@@ -64,14 +68,29 @@ class Taken:
 
     since_ns: int
     counts: dict[str, int] = field(default_factory=dict)
+    gaps: dict[str, Missing] = field(default_factory=dict)
     size: int = 0
     """Bytes handed to the recording."""
+
+    def take(self, topic: Topic, key: str, payload: bytes, arrived_ns: int) -> None:
+        """Count one message."""
+        self.counts[topic.name] = self.counts.get(topic.name, 0) + 1
+        if key not in self.gaps:
+            self.gaps[key] = Missing(topic.name)
+        self.gaps[key].take(payload, arrived_ns)
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """Messages that never came, by key; a topic whose messages bear no number is left out."""
+        return {key: gaps.count for key, gaps in self.gaps.items() if gaps.count is not None}
 
     def words(self, tape: Tape, now_ns: int) -> str:
         """One line for people."""
         elapsed_s = max(1e-3, to_s(now_ns - self.since_ns))
         rates = ", ".join(f"{name} {count / elapsed_s:.1f} Hz" for name, count in self.counts.items())
         line = f"{elapsed_s:6.1f} s: {rates or 'nothing is heard yet'}, {self.size / 1e6:.1f} MB"
+        missing = missing_in_words(self.missing)
+        line += f"; MISSING: {missing}" if missing else ""
         return f"{line}; NOT WRITTEN: {tape.failed}" if tape.failed else line
 
 
@@ -84,7 +103,8 @@ async def record(
     """Record until `stop` is set or the time is over; what was recorded, in words.
 
     A disk that fails ends the writing, is said once, and is counted; hearing goes on. Raises LinkError and
-    RecordingError where it cannot start, TandemError in the end where the recording is not whole or empty.
+    RecordingError where it cannot start, TandemError in the end where the recording is not whole or empty:
+    whatever the sender numbered and the recording does not hold makes it so.
     """
     metadata = {
         "robot": options.robot,
@@ -98,13 +118,13 @@ async def record(
     try:
         async with open_link(options.link, options.robot) as link:
             for topic in options.topics:
-                link.subscribe(topic, partial(_take, tape, taken, options.name(topic), topic.name))
+                link.subscribe(topic, partial(_take, tape, taken, topic, options.name(topic)))
             await until_stopped(stop, _wait(options.seconds, tape, lambda: _tell(tape, taken, tell)))
     finally:
         await tape.close()
         overwritten = _overwritten(link)
-        write_figures({"recorded": dict(taken.counts), **tape.summary(), "overwritten": overwritten})
-    _check(options, tape, taken)
+        write_figures(to_tree(_metrics(tape, taken, overwritten)))
+    _check(options, tape, taken, overwritten)
     said = f"{options.out}: {taken.words(tape, monotonic_ns()).strip()}"
     if overwritten:
         said += f"; {overwritten} came too fast to be taken one by one"
@@ -113,8 +133,8 @@ async def record(
     return said
 
 
-def _take(tape: Tape, taken: Taken, key: str, name: str, payload: bytes, arrived_ns: int) -> None:
-    taken.counts[name] = taken.counts.get(name, 0) + 1
+def _take(tape: Tape, taken: Taken, topic: Topic, key: str, payload: bytes, arrived_ns: int) -> None:
+    taken.take(topic, key, payload, arrived_ns)
     if tape.put(key, payload, arrived_ns):
         taken.size += len(payload)
 
@@ -136,7 +156,22 @@ def _overwritten(link: Link | None) -> int:
     return 0 if link is None else sum(c.overwritten for c in link.counters().values())
 
 
-def _check(options: RecordOptions, tape: Tape, taken: Taken) -> None:
+def _metrics(tape: Tape, taken: Taken, overwritten: int) -> RecorderMetrics:
+    counters = tape.counters()
+    return RecorderMetrics(
+        recorded=dict(taken.counts),
+        files=[path.name for path in tape.files],
+        put=counters.put,
+        written=counters.written,
+        refused=counters.refused,
+        lost=counters.lost,
+        failed=counters.failed,
+        overwritten=overwritten,
+        missing=taken.missing,
+    )
+
+
+def _check(options: RecordOptions, tape: Tape, taken: Taken, overwritten: int) -> None:
     counters = tape.counters()
     if counters.failed:
         raise TandemError(
@@ -152,4 +187,11 @@ def _check(options: RecordOptions, tape: Tape, taken: Taken) -> None:
         raise TandemError(
             f"{options.out}: nothing was heard of {options.robot}: is it running, is that its name, and does "
             f"somebody listen at {', '.join(options.link.connect) or 'no endpoint'}?"
+        )
+    missing = missing_in_words(taken.missing)
+    if missing and not options.may_miss:
+        raise TandemError(
+            f"{options.out}: messages are missing by their own numbers: {missing} ({overwritten} of all came "
+            "while this recorder was busy; the rest never reached it). What came is in it and can be read; "
+            "record nearer to the robot, or on a host with less to do"
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 
 from common.clock import Clock, monotonic_ns, to_ns
@@ -83,7 +82,3 @@ class Tape:
         """Of all files that are closed."""
         put, refused = self._closed.put + self._refused, self._closed.refused + self._refused
         return RecorderCounters(put, self._closed.written, refused, self._closed.lost, self._closed.failed)
-
-    def summary(self) -> dict[str, object]:
-        """The counters as plain values."""
-        return {"files": [path.name for path in self.files], **asdict(self.counters())}

@@ -15,11 +15,13 @@ from typer.testing import CliRunner
 from common.config import LinkConfig
 from common.errors import ConfigError, RecordingError, TandemError
 from common.link import open_link
+from common.metrics import RecorderMetrics, from_tree
 from common.recording import Recorder, read_recording
 from common.topics import COMMAND, STATE, STATISTICS, video
 from deploy import cli
 from deploy.record.contents import survey
 from deploy.record.record import RecordOptions, link_of, record
+from tests.deploy.record.numbered import state
 
 ROBOT = "robot-1"
 
@@ -143,3 +145,34 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     path.write_text("something else")
     with pytest.raises(RecordingError, match="not an MCAP file"):
         survey(path)
+
+
+@pytest.mark.parametrize("may_miss", [False, True])
+def test_numbered_states_that_never_came_are_said_and_end_with_an_error(
+    tmp_path: Path, may_miss: bool
+) -> None:
+    async def test() -> None:
+        endpoint, stop, told = free_endpoint(), asyncio.Event(), list[str]()
+        figures: dict[str, Any] = {}
+        options = RecordOptions(LinkConfig(connect=[endpoint]), ROBOT, tmp_path / "a.mcap", may_miss=may_miss)
+        async with open_link(LinkConfig(listen=[endpoint]), ROBOT) as robot:
+            put = robot.publish(STATE)
+            recording = asyncio.create_task(record(options, stop, told.append, figures.update))
+            while not told or "state" not in told[-1]:
+                put(state(7))
+                await asyncio.sleep(0.01)
+            while "MISSING: " not in told[-1]:
+                put(state(2208))
+                await asyncio.sleep(0.01)
+            stop.set()
+            if may_miss:
+                assert "MISSING: 2200 of tandem/robot-1/state" in await recording
+            else:
+                with pytest.raises(
+                    TandemError, match=r"missing by their own numbers: 2200 of tandem/robot-1"
+                ):
+                    await recording
+        metrics = from_tree(RecorderMetrics, figures)
+        assert metrics.missing == {"tandem/robot-1/state": 2200}
+
+    run(test)

@@ -1,4 +1,4 @@
-"""Which commands of a lease arrived, by their numbers: lost on the way, out of order, come twice. Pure."""
+"""Which numbered messages arrived: lost on the way, out of order, come twice. Pure."""
 
 from __future__ import annotations
 

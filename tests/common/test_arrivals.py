@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.arrivals import REMEMBERED, Arrivals
 from common.metrics import ArrivalCounts
-from slave.arrivals import REMEMBERED, Arrivals
 
 
 def noted(*sequences: int, lease: int = 7) -> Arrivals:
