@@ -30,19 +30,22 @@ def run(
 ) -> None:
     """Run `main(stop)` under uvloop until it returns; whatever it raises passes through.
 
-    SIGINT, SIGTERM and SIGHUP set `stop`; SIGHUP does not where it came ignored, as from nohup, or where
-    `hangup_stops` is false: then it changes nothing. From then, or from the end of `main`, all must be over
-    within `shutdown_s`; else the process says what hangs and exits with EXIT_HUNG. A second signal ends it at
-    once with 128 + signal, but for SIGHUP: a terminal that closes sends several. For the main thread only.
+    SIGTERM, SIGINT and SIGHUP set `stop`. SIGINT and SIGHUP that the process inherited as ignored stay
+    ignored: nohup ignores SIGHUP, and a shell script ignores SIGINT for what it starts with `&`, so that a
+    Ctrl-C meant for the script does not stop a robot beside it. SIGTERM always works. `hangup_stops` false:
+    SIGHUP changes nothing. After a signal, or after the end of `main`, all must be over within `shutdown_s`;
+    else the process says what hangs and exits with EXIT_HUNG. A second signal ends it at once with
+    128 + signal, except SIGHUP: a terminal that closes sends several. For the main thread only.
     """
     shutdown = _Shutdown(shutdown_s)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     use_one_arena()
     freeze_heap()
-    handlers = {number: signal.signal(number, shutdown.on_signal) for number in _SIGNALS}
-    if (before := signal.getsignal(signal.SIGHUP)) is not signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, shutdown.on_hangup if hangup_stops else signal.SIG_IGN)
-        handlers[signal.SIGHUP] = before
+    on_hangup = shutdown.on_hangup if hangup_stops else signal.SIG_IGN
+    handlers = {signal.SIGTERM: signal.signal(signal.SIGTERM, shutdown.on_signal)}
+    for number, handler in ((signal.SIGINT, shutdown.on_signal), (signal.SIGHUP, on_hangup)):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            handlers[number] = signal.signal(number, handler)
     try:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             shutdown.loop = runner.get_loop()
@@ -50,8 +53,8 @@ def run(
         # leaving the runner waits for its tasks and threads: within the deadline too
     finally:
         shutdown.over.set()
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+        for number, before in handlers.items():
+            signal.signal(number, before)
 
 
 async def until_stopped(stop: asyncio.Event, work: Coroutine[Any, Any, None]) -> None:
@@ -63,9 +66,6 @@ async def until_stopped(stop: asyncio.Event, work: Coroutine[Any, Any, None]) ->
     stopping.cancel()
     with suppress(asyncio.CancelledError):
         await running
-
-
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 async def _main(main: Callable[[asyncio.Event], Awaitable[None]], shutdown: _Shutdown) -> None:

@@ -1,11 +1,15 @@
-"""What tests share: no example has a deadline, and a trial that the host itself spoilt is tried again."""
+"""What tests share: signals, children that are ended, and a host that may spoil a trial."""
 
 from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Awaitable, Callable
+import signal
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
 
+import psutil
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -44,6 +48,56 @@ def on_this_host() -> OnThisHost:
         pytest.skip(f"the host itself stood still in each of {TRIES} tries; last: {spoilt}")
 
     return run
+
+
+@pytest.fixture
+def default_signals() -> Iterator[None]:
+    """SIGINT, SIGTERM and SIGHUP as a terminal gives them, for this process and for what it starts.
+
+    Under nohup, in a script's background job and on many CI runners they come ignored or blocked, and
+    children inherit that. A test that sends one uses this fixture (tests/test_signals.py looks).
+    """
+    handlers = {signal.SIGINT: signal.default_int_handler} | dict.fromkeys(
+        (signal.SIGTERM, signal.SIGHUP), signal.SIG_DFL
+    )
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    blocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, handlers)
+    yield
+    signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+    for number, handler in before.items():
+        signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+@pytest.fixture(autouse=True)
+def no_child_is_left() -> Iterator[None]:
+    """A test that leaves a process running fails itself; the process is killed, so no other test fails."""
+    before = _children()
+    yield
+    left = [_ended_by_force(pid) for pid in _children() - before]
+    assert not any(left), f"left running, now killed: {'; '.join(filter(None, left))}"
+
+
+def _children() -> set[int]:
+    """Processes that any thread of this one started and nobody has waited for, by the kernel's own list."""
+    found: set[int] = set()
+    for file in Path("/proc/self/task").glob("*/children"):
+        with suppress(OSError):  # a thread that has just ended
+            found |= {int(pid) for pid in file.read_text().split()}
+    return found
+
+
+def _ended_by_force(pid: int) -> str:
+    """The command line of a process that still ran and is killed now; empty where it had ended."""
+    try:
+        process = psutil.Process(pid)
+        command = " ".join(process.cmdline())
+        # one that serves this process's own multiprocessing lives as long as it
+        if process.status() == psutil.STATUS_ZOMBIE or "multiprocessing" in command:
+            return ""
+        process.kill()
+    except psutil.NoSuchProcess:
+        return ""
+    return command or f"process {pid}"
 
 
 async def _spoilt(story: Story) -> str:

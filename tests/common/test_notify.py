@@ -225,11 +225,14 @@ def test_a_loop_that_hangs_falls_silent_and_its_stack_is_in_the_log(tmp_path: Pa
         with subprocess.Popen(
             [sys.executable, "-c", program], env=environment, stderr=subprocess.PIPE, text=True
         ) as child:
-            heard = [wire.recv(4096)]
-            while heard[-1] != b"STATUS=hangs":
-                heard.append(wire.recv(4096))
-            child.send_signal(signal.SIGABRT)
-            _, errors = child.communicate(timeout=60)
+            try:
+                heard = [wire.recv(4096)]
+                while heard[-1] != b"STATUS=hangs":
+                    heard.append(wire.recv(4096))
+                child.send_signal(signal.SIGABRT)
+                _, errors = child.communicate(timeout=60)
+            finally:
+                child.kill()
             assert child.returncode == -signal.SIGABRT
         assert heard[0] == b"READY=1\nWATCHDOG=1"
         assert b"WATCHDOG=1" in heard

@@ -8,7 +8,7 @@ import pytest
 
 from common.runtime import EXIT_HUNG
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
 
 HEAD = """
 import asyncio, os, signal, sys, threading, time
@@ -182,16 +182,22 @@ def test_a_terminal_that_closes_stops_in_order_however_often_it_says_so() -> Non
     assert (done.returncode, done.stdout, done.stderr) == (0, "cleaned up\nover\n", "")
 
 
-def test_a_hangup_that_nohup_ignores_stays_ignored() -> None:
-    body = """
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+@pytest.mark.parametrize("number", ["SIGHUP", "SIGINT"])
+def test_a_signal_that_was_inherited_as_ignored_stays_ignored_and_sigterm_stops(number: str) -> None:
+    done = process(
+        f"""
+        signal.signal(signal.{number}, signal.SIG_IGN)  # as nohup, or a script that starts it with &, does
 
         async def main(stop):
-            told(signal.SIGHUP)
+            told(signal.{number})
             await asyncio.sleep(0.02)
             assert not stop.is_set()
+            told()
+            await stop.wait()
+            print("cleaned up")
         """
-    assert process(body).returncode == 0
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "cleaned up\nover\n", "")
 
 
 def test_an_act_goes_on_though_the_terminal_closes() -> None:

@@ -158,6 +158,7 @@ def test_debug_shows_the_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
         cli.main()
 
 
+@pytest.mark.usefixtures("default_signals")
 def test_ctrl_c_in_a_demo_is_one_line(tandem: Tandem, monkeypatch: pytest.MonkeyPatch) -> None:
     async def story(_: object, stop: asyncio.Event, __: object) -> NoReturn:
         os.kill(os.getpid(), signal.SIGINT)

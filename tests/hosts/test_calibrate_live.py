@@ -16,7 +16,7 @@ from deploy.profiles import EXAMPLES
 from deploy.rig.endpoints import local_endpoints
 from master.calibrate.recording import load_recordings
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
 
 WORN = ("left_thigh", "left_shank")
 """Of the legs' seven nodes these two answer; the others are silent, and not waited for."""
@@ -40,15 +40,19 @@ TANDEM = (sys.executable, "-m", "deploy")
 
 
 @pytest.fixture
-def port(tmp_path: Path) -> Iterator[int]:
+def port(default_signals: None, tmp_path: Path) -> Iterator[int]:
     """The CAN port on which a suit answers."""
     port = local_endpoints("tcp", tmp_path).can_port
     file = tmp_path / "suit.toml"
     file.write_text(SUIT.format(port=port), "utf-8")
     suit = subprocess.Popen([*TANDEM, "suit", str(file)], stderr=subprocess.PIPE)
-    yield port
-    suit.send_signal(signal.SIGTERM)
-    suit.communicate(timeout=10.0)
+    try:
+        yield port
+        suit.send_signal(signal.SIGTERM)
+        suit.communicate(timeout=10.0)
+    finally:
+        suit.kill()
+        suit.communicate()
 
 
 def tandem(port: int, command: str, *options: str) -> list[str]:
@@ -79,13 +83,17 @@ def test_the_magnetometers_are_calibrated_from_the_bus(port: int, tmp_path: Path
 def test_what_was_recorded_stays_when_a_person_stops_early(port: int, tmp_path: Path) -> None:
     out = tmp_path / "calibration"
     live = subprocess.Popen(tandem(port, "live", "--out", str(out)), stderr=subprocess.PIPE, text=True)
-    assert live.stderr is not None
-    said = [next(live.stderr)]
-    while "1/5" not in said[-1]:
-        said.append(next(live.stderr))
-    time.sleep(1.0)
-    live.send_signal(signal.SIGINT)
-    rest = live.communicate(timeout=20.0)[1]
+    try:
+        assert live.stderr is not None
+        said = [next(live.stderr)]
+        while "1/5" not in said[-1]:
+            said.append(next(live.stderr))
+        time.sleep(1.0)
+        live.send_signal(signal.SIGINT)
+        rest = live.communicate(timeout=20.0)[1]
+    finally:
+        live.kill()
+        live.communicate()
     assert live.returncode == 1
     assert "stopped before the end; recorded so far:" in rest
     assert "Traceback" not in rest

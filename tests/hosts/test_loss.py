@@ -90,6 +90,7 @@ def test_killed_slave_is_told_by_the_master_and_resumes_only_when_engaged(on_thi
     on_this_host(story)
 
 
+@pytest.mark.usefixtures("default_signals")
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_each_process_stops_cleanly(on_this_host: OnThisHost, stop: signal.Signals) -> None:
     async def story(host: Host) -> None:

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 
 from deploy.soak.events import of_kind, read_events
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
 
 SOAK = [sys.executable, "-m", "deploy", "soak"]
 
@@ -63,14 +64,15 @@ def test_interrupted_it_still_writes_its_report_and_leaves_nobody_behind(tmp_pat
         followed(report, soak)
         os.killpg(soak.pid, signal.SIGINT)  # as a Ctrl-C in a terminal does
         said, _ = soak.communicate(timeout=60)
+        with pytest.raises(ProcessLookupError):
+            os.killpg(soak.pid, 0)
     finally:
-        soak.kill()
+        with suppress(ProcessLookupError):
+            os.killpg(soak.pid, signal.SIGKILL)
         soak.communicate()
     assert "interrupted" in said
     assert json.loads((report / "report.json").read_text())["ended"] == "interrupted"
     assert (report / "soak.png").stat().st_size > 1000
-    with pytest.raises(ProcessLookupError):
-        os.killpg(soak.pid, 0)
 
 
 def test_killed_it_is_judged_from_what_it_left(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from deploy.trial.remote.operator import run_remote_cell
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400), pytest.mark.usefixtures("default_signals")]
 
 
 def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(
@@ -56,8 +57,11 @@ def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(
             assert values["cpu_slave"] > 0.0
             assert values["flow_s"] is None
             assert "fetching what the robot said" in words
-        finally:
             server.send_signal(signal.SIGTERM)
-            assert await server.wait() == 0, (tmp_path / "serve.log").read_text("utf-8")
+            assert await asyncio.wait_for(server.wait(), 30) == 0, (tmp_path / "serve.log").read_text("utf-8")
+        finally:
+            with suppress(ProcessLookupError):
+                server.kill()
+            await server.wait()
 
     on_this_host(story)

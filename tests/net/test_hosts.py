@@ -6,6 +6,8 @@ import asyncio
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 import psutil
 import pytest
@@ -58,6 +60,8 @@ async def answers(host: Host, address: str) -> bytes:
         writer.close()
         return said
     finally:
+        with suppress(ProcessLookupError):
+            process.kill()
         await process.wait()
 
 
@@ -144,34 +148,38 @@ def test_an_error_within_leaves_nothing_behind() -> None:
     assert not any(run.name in each for each in [*namespaces(), *veths_of(run.name)])
 
 
-def started() -> tuple[subprocess.Popen[str], str]:
-    """A process that has opened a network, and the operator's namespace."""
+@contextmanager
+def started() -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A process that has opened a network, and the operator's namespace; it has ended afterwards."""
     process = subprocess.Popen([sys.executable, "-c", OPEN], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    return process, process.stdout.readline().strip()
+    try:
+        assert process.stdout is not None
+        yield process, process.stdout.readline().strip()
+    finally:
+        process.kill()
+        process.communicate(timeout=30)
 
 
+@pytest.mark.usefixtures("default_signals")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, signal.SIGINT])
 def test_a_caller_that_is_killed_leaves_nothing_behind(number: signal.Signals) -> None:
-    process, namespace = started()
-    assert namespace in namespaces()
-    process.send_signal(number)
-    # the janitor has inherited it: it ends when the janitor does
-    process.communicate(timeout=30)
+    with started() as (process, namespace):
+        assert namespace in namespaces()
+        process.send_signal(number)
+        # the janitor has inherited the output: it ends when the janitor does
+        process.communicate(timeout=30)
     assert namespace not in namespaces()
     assert not veths_of(namespace.rpartition("-")[0])
 
 
 def test_what_a_dead_run_left_is_removed_by_the_next() -> None:
-    process, namespace = started()
-    run = parse_run(namespace)
-    assert run is not None
-    assert run.name not in remove_dead()  # it lives
-    for child in psutil.Process(process.pid).children():
-        if "deploy.network.janitor" in child.cmdline():
-            child.kill()
-    process.kill()
-    process.communicate(timeout=30)
+    with started() as (process, namespace):
+        run = parse_run(namespace)
+        assert run is not None
+        assert run.name not in remove_dead()  # it lives
+        for child in psutil.Process(process.pid).children():
+            if "deploy.network.janitor" in child.cmdline():
+                child.kill()
     assert namespace in namespaces()
     assert run.name in remove_dead()
     assert namespace not in namespaces()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+from contextlib import suppress
 
 import pytest
 
@@ -51,12 +52,18 @@ def test_what_a_path_swallows_is_found(largest_bytes: int | None, found: tuple[i
                 assert robot.stdout is not None
                 assert await robot.stdout.readline() == b"here\n"
                 operator = await _start(network.operator, OPERATOR, endpoint)
-                said, _ = await asyncio.wait_for(operator.communicate(), 60)
+                try:
+                    said, _ = await asyncio.wait_for(operator.communicate(), 60)
+                finally:
+                    with suppress(ProcessLookupError):
+                        operator.kill()
+                    await operator.wait()
                 assert tuple(map(int, said.split())) == found
                 swallowed = network.counters().to_robot.dropped["size"]
                 assert (swallowed > 0) == (largest_bytes is not None)
             finally:
-                robot.kill()
+                with suppress(ProcessLookupError):
+                    robot.kill()
                 await robot.wait()
 
     asyncio.run(story())

@@ -21,7 +21,7 @@ from deploy.rig.host import Host
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.timeout(600), pytest.mark.usefixtures("default_signals")]
 TRIAL = (sys.executable, "-m", "deploy", "trial")
 PLAN = ("--transports", "tcp,unixsock-stream", "--profiles", "4g", "--strategies", "predict", "--repeat", "1",
         "--seconds", "8", "--outage", "1")  # fmt: skip
@@ -83,10 +83,13 @@ def test_an_interrupted_trial_writes_the_report_of_what_is_there(tmp_path: Path)
     with subprocess.Popen(
         [*TRIAL, *PLAN, "--report", str(folder)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as trial:
-        while not (folder / "plan.json").exists() and trial.poll() is None:
-            time.sleep(0.05)
-        trial.send_signal(signal.SIGINT)
-        out, err = trial.communicate(timeout=60)
+        try:
+            while not (folder / "plan.json").exists() and trial.poll() is None:
+                time.sleep(0.05)
+            trial.send_signal(signal.SIGINT)
+            out, err = trial.communicate(timeout=60)
+        finally:
+            trial.kill()
     assert trial.returncode == 1, out + err
     assert "the same command goes on" in err
     assert "Traceback" not in err

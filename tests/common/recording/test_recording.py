@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import io
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -70,11 +69,13 @@ def test_a_killed_process_loses_less_than_a_second(tmp_path: Path) -> None:
     writer = subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True)
     assert writer.stdout is not None
     said = []
-    for line in writer.stdout:
-        said.append([int(word) for word in line.split()])
-        if said[-1][1] - said[0][1] > 1_600_000_000:
-            break
-    writer.send_signal(signal.SIGKILL)
+    try:
+        for line in writer.stdout:
+            said.append([int(word) for word in line.split()])
+            if said[-1][1] - said[0][1] > 1_600_000_000:
+                break
+    finally:
+        writer.kill()
     said += [[int(word) for word in line.split()] for line in writer.stdout if line.count(" ") == 1]
     writer.wait()
     writer.stdout.close()

@@ -17,7 +17,7 @@ from common.link import open_link
 from common.stop import StopAnswer, pack_stop_answer
 from common.topics import STOP
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
 
 LATE_S = 1.0
 

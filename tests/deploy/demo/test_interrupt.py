@@ -7,10 +7,11 @@ import signal
 import socket
 import subprocess
 import sys
+from contextlib import suppress
 
 import pytest
 
-pytestmark = pytest.mark.hosts
+pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
 
 DEMO = """
 import functools, sys
@@ -40,9 +41,10 @@ def test_ctrl_c_ends_the_demo_and_its_processes_with_one_line() -> None:
             with call:
                 os.killpg(demo.pid, signal.SIGINT)
                 out, err = demo.communicate(timeout=30)
+            with pytest.raises(ProcessLookupError):
+                os.killpg(demo.pid, 0)
         finally:
-            demo.kill()
+            with suppress(ProcessLookupError):
+                os.killpg(demo.pid, signal.SIGKILL)
             demo.communicate()
     assert (demo.returncode, err) == (1, "tandem: interrupted: nothing was judged\n"), out
-    with pytest.raises(ProcessLookupError):
-        os.killpg(demo.pid, 0)

@@ -78,6 +78,7 @@ def test_it_gets_role_file_figures_and_overrides(tmp_path: Path) -> None:
     run(tmp_path, "here(); open(sys.argv[5], 'w').write(json.dumps({'argv': sys.argv[2:]}))", test)
 
 
+@pytest.mark.usefixtures("default_signals")
 def test_sigterm_ends_one_that_listens(tmp_path: Path) -> None:
     async def test(child: Child) -> None:
         child.check()
@@ -89,6 +90,7 @@ def test_sigterm_ends_one_that_listens(tmp_path: Path) -> None:
     run(tmp_path, program, test)
 
 
+@pytest.mark.usefixtures("default_signals")
 def test_one_that_ignores_sigterm_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(child_module, "STOP_S", 0.05)
 

@@ -24,14 +24,18 @@ def test_its_output_and_its_status_are_told(tmp_path: Path) -> None:
     asyncio.run(story())
 
 
+@pytest.mark.usefixtures("default_signals")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_one_that_is_sent_a_signal_ends_by_it(tmp_path: Path, number: signal.Signals) -> None:
     async def story() -> None:
         with (tmp_path / "log").open("wb") as log:
             process = Spawned(["sleep", "60"], log)
-        assert process.returncode is None
-        process.send_signal(number)
-        assert await process.wait() == -number
+        try:
+            assert process.returncode is None
+            process.send_signal(number)
+            assert await asyncio.wait_for(process.wait(), 10) == -number
+        finally:
+            process.kill()
 
     asyncio.run(story())
 
@@ -40,9 +44,11 @@ def test_a_wait_that_is_given_up_can_be_begun_again(tmp_path: Path) -> None:
     async def story() -> None:
         with (tmp_path / "log").open("wb") as log:
             process = Spawned(["sleep", "60"], log)
-        with pytest.raises(TimeoutError):
-            await asyncio.wait_for(process.wait(), 0.01)
-        process.kill()
+        try:
+            with pytest.raises(TimeoutError):
+                await asyncio.wait_for(process.wait(), 0.01)
+        finally:
+            process.kill()
         assert await process.wait() == -signal.SIGKILL
 
     asyncio.run(story())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-import signal
 import socket
 import subprocess
 import sys
@@ -113,18 +112,23 @@ def as_toml(config: CanopenConfig) -> str:
 @contextmanager
 def drives_process(file: Path) -> Iterator[None]:
     drives = subprocess.Popen([sys.executable, "-m", "deploy", "drives", str(file)], stderr=subprocess.PIPE)
+    assert drives.stderr is not None
+    # read on, or what it logs would fill the pipe and stop it
+    reading = threading.Thread(target=drives.stderr.read)
     try:
-        assert drives.stderr is not None
         while b"25 drives on" not in drives.stderr.readline():
             assert drives.poll() is None
-        # read on, or what it logs would fill the pipe and stop it
-        reading = threading.Thread(target=drives.stderr.read)
         reading.start()
         yield
     finally:
-        drives.send_signal(signal.SIGTERM)
-        drives.wait()
-        reading.join()
+        drives.terminate()
+        try:
+            drives.wait(30)
+        except subprocess.TimeoutExpired:
+            drives.kill()
+            drives.wait()
+        if reading.ident is not None:
+            reading.join()
         drives.stderr.close()
 
 
@@ -386,9 +390,11 @@ def kill_9(tmp_path: Path, dead_s: float) -> tuple[int, int, set[int]]:
     with drives_process(file):
         slave = subprocess.Popen([sys.executable, "-c", SLAVE, str(file)], stdout=subprocess.PIPE)
         assert slave.stdout is not None
-        for _ in range(200):
-            assert slave.stdout.readline() == b"moves\n"
-        slave.send_signal(signal.SIGKILL)
+        try:
+            for _ in range(200):
+                assert slave.stdout.readline() == b"moves\n"
+        finally:
+            slave.kill()
         killed_s = time.monotonic()
         slave.wait()
         slave.stdout.close()
