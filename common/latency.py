@@ -27,6 +27,7 @@ STAGES = (
 """Between neighbouring stamps of a Passage. Only `put→received` crosses from one clock to the other."""
 _LONGEST_US = 60_000_000
 _DIGITS = 3
+MOST_STEPS = 128
 MOST_RECENT = 256
 """Statistics tell what came in a second: a dozen, and more only where a link lets go what it held back."""
 
@@ -47,10 +48,26 @@ class Durations:
         if duration_ns < 0:
             self.clamped += 1
             duration_ns = 0
-        self.count += 1
-        self._sum_ns += duration_ns
+        self._take(duration_ns, 1)
+
+    def record_missing(self, longest_ns: int, interval_ns: int, count: int) -> None:
+        """Take `count` durations, the longest first and each `interval_ns` shorter than the one before.
+
+        So HdrHistogram's `record_corrected_value` fills in what was due while nothing came. Many are taken in
+        at most MOST_STEPS values of as many each: the servo loop must not wait for an hour's worth.
+        """
+        each = -(-count // MOST_STEPS)
+        for first in range(0, count, each):
+            many = min(each, count - first)
+            value_ns = longest_ns - first * interval_ns - (many - 1) * interval_ns // 2
+            self._take(max(0, value_ns), many)
+        self._max_ns = max(self._max_ns, longest_ns)
+
+    def _take(self, duration_ns: int, count: int) -> None:
+        self.count += count
+        self._sum_ns += count * duration_ns
         self._max_ns = max(self._max_ns, duration_ns)
-        self._histogram.record_value(min(round(duration_ns / 1000), _LONGEST_US))
+        self._histogram.record_value(min(round(duration_ns / 1000), _LONGEST_US), count)
 
     def merge(self, other: Durations) -> None:
         """Take all that another has taken."""
@@ -80,10 +97,9 @@ class Told(Durations):
         super().__init__()
         self._recent_us: deque[int] = deque(maxlen=MOST_RECENT)
 
-    def record(self, duration_ns: int) -> None:
-        """Take one duration."""
-        super().record(duration_ns)
-        self._recent_us.append(max(0, round(duration_ns / 1000)))
+    def _take(self, duration_ns: int, count: int) -> None:
+        super()._take(duration_ns, count)
+        self._recent_us.extend([round(duration_ns / 1000)] * min(count, MOST_RECENT))
 
     def take_recent(self) -> tuple[int, ...]:
         """Those since the last call in µs, the newest MOST_RECENT of them."""

@@ -242,6 +242,16 @@ class ArrivalCounts(Metrics):
 
 
 @dataclass(frozen=True, slots=True)
+class DueMetrics(Metrics):
+    """Commands of the lease's holder, by time: also those that nobody sent."""
+
+    expected: int
+    """Came, or should have come between two that did."""
+    missing: int
+    """Was not there when it was due and a newer came, lost or never sent; the late ones are among them."""
+
+
+@dataclass(frozen=True, slots=True)
 class OffsetMetrics(Metrics):
     """The master's clock minus the slave's."""
 
@@ -293,7 +303,11 @@ class SlaveMetrics(Metrics):
     stages_ms: dict[str, Summary]
     end_to_end_ms: Summary
     one_way_ms: Summary
+    """Of the commands that came."""
+    one_way_corrected_ms: Summary
+    """The same with every command that was due and did not come: how long the robot went without it."""
     commands: ArrivalCounts
+    due: DueMetrics
     early: int
     """One-way times below zero by the measured offset, taken as zero."""
     unmoved: int
@@ -306,6 +320,8 @@ class SlaveMetrics(Metrics):
     link: dict[str, TopicCounters]
     one_way_recent_us: tuple[int, ...] = ()
     """Each one-way time since the message before; in messages only, not in the file at the end."""
+    one_way_missing_recent_us: tuple[int, ...] = ()
+    """What `one_way_corrected_ms` took for each command that did not come; likewise in messages only."""
     access: AccessMetrics | None = None
     """In the file at the end only."""
 

@@ -122,6 +122,12 @@ class VirtualRun:
         while self.now_ns < end_ns and not until():
             self._step()
 
+    def stand_still(self, seconds: float) -> None:
+        """Both processes are stopped for so long: nobody ticks, puts or takes anything; time goes by."""
+        ticks = round(seconds * NS_PER_S / PERIOD_NS)
+        self.now_ns += ticks * PERIOD_NS
+        self._tick += ticks
+
     def ask(self, action: Action, key: str = "", operator: str | None = None) -> ControlReply:
         """Ask the robot now; as the master's operator unless told."""
         operator = self.master_config.operator.name if operator is None else operator

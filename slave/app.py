@@ -169,7 +169,11 @@ class Slave:
 
     async def _tell(self) -> None:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
-            metrics = replace(self.metrics(), one_way_recent_us=self._pipeline.one_way.take_recent())
+            metrics = replace(
+                self.metrics(),
+                one_way_recent_us=self._pipeline.one_way.take_recent(),
+                one_way_missing_recent_us=self._pipeline.due.recent.take_recent(),
+            )
             self._put_statistics(encode(Statistics(due.scheduled_ns, metrics)))
 
     def metrics(self) -> SlaveMetrics:
@@ -187,7 +191,9 @@ class Slave:
             stages_ms=pipeline.journeys.budget.summary(),
             end_to_end_ms=pipeline.journeys.budget.total(),
             one_way_ms=pipeline.one_way.summary(),
+            one_way_corrected_ms=pipeline.due.corrected.summary(),
             commands=pipeline.arrivals.metrics(),
+            due=pipeline.due.metrics(),
             early=pipeline.one_way.clamped,
             unmoved=pipeline.journeys.unmoved,
             offset=OffsetMetrics(to_ms(offset.offset_ns), to_ms(offset.bound_ns), offset.trusted),

@@ -32,6 +32,7 @@ from common.quaternion import Array
 from common.stop import StopAnswer, pack_stop_answer, read_stop
 from common.throttle import Throttle
 from slave.config import SlaveConfig
+from slave.due import Due
 from slave.encoders import Encoders
 from slave.guard import Guard, Setpoint
 from slave.guard.body import WELL, Body
@@ -79,6 +80,9 @@ class SlavePipeline:
         self.journeys = Journeys()
         self.one_way = Told()
         """From put to received, of every command of the lease's holder while the offset was trusted."""
+        self.due = Due()
+        """The same with the commands that were due and did not come."""
+        self._master_clock = 0
         self.arrivals = Arrivals()
         """Of the commands of the lease's holder, by their numbers."""
         self.undecodable: dict[str, int] = {}
@@ -105,8 +109,11 @@ class SlavePipeline:
         # another operator's stamps are of another clock
         if command.lease and command.lease == self.guard.lease.token:
             self.arrivals.note(command.lease, command.sequence)
+            put_ns, transit_ns = command.stamps.put_ns, None
             if offset.trusted:
-                self.one_way.record(offset.remote_ns(received_ns) - command.stamps.put_ns)
+                transit_ns = offset.remote_ns(received_ns) - put_ns
+                self.one_way.record(transit_ns)
+            self.due.note(self._master_clock, command.sequence, put_ns, transit_ns)
         if self.guard.on_command(command, received_ns, now_ns, offset).accepted:
             self.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
             if self.on_accepted is not None:
@@ -144,6 +151,7 @@ class SlavePipeline:
             self.namesakes.on_notice(request.key, now_ns)
         if request.action is Action.CLAIM and reply.done:
             self.clock.follow(request.clock)
+            self._master_clock = request.clock
             self.journeys.forget()
         return self._reply(reply)
 

@@ -7,6 +7,7 @@ from typing import Any
 from common.metrics import (
     ArrivalCounts,
     CommandedMetrics,
+    DueMetrics,
     GuardMetrics,
     HeapMetrics,
     LeaseHeld,
@@ -85,7 +86,9 @@ def slave_metrics(**changes: Any) -> SlaveMetrics:
         "stages_ms": {},
         "end_to_end_ms": NOTHING,
         "one_way_ms": NOTHING,
+        "one_way_corrected_ms": NOTHING,
         "commands": ArrivalCounts(0, 0, 0, 0),
+        "due": DueMetrics(0, 0),
         "early": 0,
         "unmoved": 0,
         "offset": OffsetMetrics(0.0, 0.0, trusted=False),

@@ -107,7 +107,29 @@ def commands(seen: Seen) -> list[Verdict]:
     oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
     most_ms = 1e3 * seen.network.get("max_age_s", AGE_MS / 1e3)
     verdicts.append(at_most("commands", "oldest that was acted on", oldest, most_ms, "ms", "put → accepted"))
-    return verdicts
+    return [_any_came(seen), *verdicts, _came_when_due(seen)]
+
+
+def _any_came(seen: Seen) -> Verdict:
+    """Without a single command all else here is true of nothing."""
+    sent, arrived = seen.sum("sent"), seen.sum("arrived")
+    note = f"the master sent {sent:.0f}, the robot took {arrived:.0f}"
+    none = float(sent == 0.0) + float(arrived == 0.0)
+    return at_most("commands", "sides that saw none at all", none, 0.0, note=note)
+
+
+def _came_when_due(seen: Seen) -> Verdict:
+    """By time, not by number: where both sides stand still together nothing is sent and nothing is lost."""
+    name = "due and never came, unexplained"
+    if np.isnan(seen.samples["due"]).all():
+        return at_most("commands", name, None, 0.0, note="the robot did not tell what was due")
+    due, all_ = seen.sum("due", seen.quiet), seen.sum("due")
+    # within a second one may come late that was counted in the second before
+    gone = max(0.0, seen.sum("gone", seen.quiet))
+    note = f"{gone:.0f} of {due:.0f}; {seen.sum('gone'):.0f} of {all_:.0f} in all"
+    return of_enough(
+        at_most("commands", name, gone if due else None, 0.0, note=note), due / all_ if all_ else 0.0
+    )
 
 
 def beyond_the_network(seen: Seen) -> float:

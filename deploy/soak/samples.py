@@ -18,7 +18,7 @@ from deploy.output import writing
 SEEN = (
     "one_way_n", "one_way_p50_ms", "one_way_max_ms", "written_p50_ms", "offset_bound_ms", "age_max_ms",
     "round_trip_n", "round_trip_ms", "end_to_end_n", "end_to_end_ms",
-    "sent", "arrived", "lost", "late", "repeated", "overwritten", "refused",
+    "sent", "arrived", "lost", "late", "repeated", "overwritten", "refused", "due", "gone",
     "master_ticks", "master_missed", "slave_ticks", "slave_missed",
     "times_lost", "states_missed", "undecodable", "strayed_deg", "host_still_ms",
     "link_lost", "link_out", "link_odd",
@@ -71,7 +71,7 @@ class Samples:
 
     def __getitem__(self, name: str) -> Array:
         """(N,) of one column; all NaN where the recording is of before it was kept."""
-        if name not in self.columns and name.endswith(("_in_use_mb", "_blocks")):
+        if name not in self.columns and (name in ("due", "gone") or name.endswith(("_in_use_mb", "_blocks"))):
             return np.full(len(self), np.nan)
         return self.columns[name]
 

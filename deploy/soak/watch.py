@@ -152,6 +152,9 @@ class Watch:
             "late": commands.late,
             "repeated": commands.repeated,
             "overwritten": metrics.link[COMMAND.name].overwritten,
+            "due": metrics.due.expected,
+            # a command that came late was not there when it was due, but has its own column
+            "gone": metrics.due.missing,
             "slave_ticks": metrics.ticks.expected,
             "slave_missed": metrics.ticks.missed,
             # while nobody holds the lease every command is refused, and nothing is wrong with that
@@ -159,6 +162,7 @@ class Watch:
         }
         added = {name: self._added["slave"].take(name, value) for name, value in counters.items()}
         added["lost"] = added.pop("missing") - added["late"]
+        added["gone"] -= added["late"]
         for name, count in added.items():
             self._add(name, count)
         self._mean("slave", "end_to_end", metrics.end_to_end_ms)

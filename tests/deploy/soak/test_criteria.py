@@ -57,6 +57,7 @@ def test_a_soak_in_which_nothing_went_wrong_fails_nothing(make: Make) -> None:
         ("late", "commands: out of order, unexplained"),
         ("repeated", "commands: twice, unexplained"),
         ("refused", "commands: refused by the guard, unexplained"),
+        ("gone", "commands: due and never came, unexplained"),
         ("times_lost", "loops: times the master lost the robot, unexplained"),
     ],
 )
@@ -303,8 +304,26 @@ def test_without_faults_and_commands_nothing_is_claimed(make: Make) -> None:
     verdicts = judged(seen)
     assert verdicts["commands: lost, unexplained"].status is Status.NOT_JUDGED
     assert verdicts["guard: holds on a fault, the slowest"].status is Status.NOT_JUDGED
-    assert not [v for v in verdicts.values() if v.status is Status.FAIL]
+    failed_ = [v.name for v in verdicts.values() if v.status is Status.FAIL]
+    assert failed_ == ["sides that saw none at all"]
 
 
 def test_a_soak_that_was_killed_in_its_start_is_judged_too(make: Make) -> None:
     assert judged(make(events=STORY[:1], seconds=2))
+
+
+@pytest.mark.parametrize("column", ["sent", "arrived"])
+def test_a_soak_that_saw_no_command_at_all_fails(make: Make, column: str) -> None:
+    assert "commands: sides that saw none at all" in failing(make(**{column: 0.0}))
+
+
+def test_both_sides_still_for_5_s_fail_though_no_number_is_missing(make: Make) -> None:
+    seen = make(sent=lambda at_s: np.where((at_s > 300) & (at_s <= 305), 0.0, 12.5), gone=at(306.0, 62.0))
+    verdict = judged(seen)["commands: due and never came, unexplained"]
+    assert (verdict.status, verdict.figure) == (Status.FAIL, 62.0)
+    assert judged(seen)["commands: lost, unexplained"].status is not Status.FAIL
+
+
+def test_what_was_due_is_not_judged_where_the_robot_does_not_tell(make: Make) -> None:
+    verdict = judged(make(due=np.nan, gone=np.nan))["commands: due and never came, unexplained"]
+    assert (verdict.status, verdict.figure) == (Status.NOT_JUDGED, None)

@@ -12,7 +12,7 @@ import pytest
 from common.clock import NS_PER_MS, NS_PER_S
 from common.codec import encode
 from common.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics
-from common.metrics import ArrivalCounts, MasterMetrics, SlaveMetrics, Summary, Ticks
+from common.metrics import ArrivalCounts, DueMetrics, MasterMetrics, SlaveMetrics, Summary, Ticks
 from common.skeleton import load_skeleton
 from deploy.soak.motion import Motion
 from deploy.soak.watch import FRESH_NS, Watch
@@ -132,8 +132,9 @@ def test_a_command_that_comes_after_all_is_not_lost_and_loses_no_others(heard: H
     commands = ArrivalCounts(arrived=100, lost=40, late=0, repeated=0)
     heard.statistics(slave_metrics(commands=commands))
     assert heard.watch.row()["lost"] == 40.0
-    heard.statistics(slave_metrics(commands=ArrivalCounts(101, 39, 1, 0)))
+    heard.statistics(slave_metrics(commands=ArrivalCounts(101, 39, 1, 0), due=DueMetrics(141, 40)))
     row = heard.watch.row()
+    assert (row["due"], row["gone"]) == (141.0, 39.0)
     assert (row["lost"], row["late"], row["arrived"]) == (-1.0, 1.0, 1.0)
 
 

@@ -1,0 +1,78 @@
+"""Commands that were due and did not come, by time: also those that nobody ever sent. Pure.
+
+Numbers alone do not tell of them. Where master and slave stand still together, no command is put, none is
+lost, and each that does come is as fast as ever: the seconds in between are in no percentile (coordinated
+omission). Here every command that was due enters the corrected figures, as HdrHistogram's
+`record_corrected_value` would have it, with how long the robot went without what that command had to say.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections import deque
+
+from common.latency import Durations, Told
+from common.metrics import DueMetrics
+from common.topics import COMMAND
+
+PERIODS = 15
+"""The period is the median of so many: a master may be set to another rate than usual."""
+EARLY = 0.25
+"""A command that comes this share of a period before the next is due makes that one not missing."""
+
+
+class Due:
+    """Follows the commands of one master after the other; another master's first begins anew."""
+
+    def __init__(self) -> None:
+        self.corrected = Durations()
+        """One way, of every command that came and of every one that was due and did not."""
+        self.recent = Told()
+        """Of those that did not come, to be told one by one."""
+        self.missing = 0
+        """Was not there when it was due and a newer came; one that comes later yet stays counted."""
+        self.came = 0
+        self._clock: int | None = None
+        self._put_ns = self._sequence = 0
+        self._transit_ns = 0
+        self._periods_ns: deque[int] = deque(maxlen=PERIODS)
+
+    def note(self, clock: int, sequence: int, put_ns: int, transit_ns: int | None) -> None:
+        """Take one command.
+
+        `clock` is the number of the master's clock, which outlasts a lease: whoever stood still has to claim
+        the robot anew. `transit_ns`: put to received; None while the offset is not trusted.
+        """
+        self.came += 1
+        if transit_ns is not None:
+            self._transit_ns = transit_ns
+            self.corrected.record(transit_ns)
+        if clock != self._clock:
+            self._clock = clock
+            self._periods_ns.clear()
+        elif sequence <= self._sequence or put_ns <= self._put_ns:
+            return
+        else:
+            self._gap(put_ns - self._put_ns, sequence - self._sequence)
+        self._put_ns, self._sequence = put_ns, sequence
+
+    def _gap(self, gap_ns: int, numbers: int) -> None:
+        period_ns = self.period_ns
+        missing = int(gap_ns / period_ns + EARLY) - 1
+        if missing > 0:
+            self.missing += missing
+            longest_ns = max(0, self._transit_ns) + gap_ns - period_ns
+            self.corrected.record_missing(longest_ns, period_ns, missing)
+            self.recent.record_missing(longest_ns, period_ns, missing)
+        self._periods_ns.append(gap_ns // numbers)
+
+    @property
+    def period_ns(self) -> int:
+        """Between two commands, as this master sends them."""
+        return (
+            round(statistics.median(self._periods_ns)) if self._periods_ns else round(1e9 / COMMAND.rate_hz)
+        )
+
+    def metrics(self) -> DueMetrics:
+        """The counts so far."""
+        return DueMetrics(expected=self.came + self.missing, missing=self.missing)

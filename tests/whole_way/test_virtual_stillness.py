@@ -1,0 +1,36 @@
+"""Both sides stand still together: no number is skipped, and yet nobody may call the link well."""
+
+from __future__ import annotations
+
+import pytest
+
+from deploy.following import engaged
+from deploy.virtual import VirtualRun, World
+
+STILL_S = 5.0
+
+
+@pytest.fixture(scope="module")
+def stood_still() -> VirtualRun:
+    run = engaged(World())
+    run.run(20.0)
+    assert run.slave.due.metrics().missing == 0
+    run.stand_still(STILL_S)
+    run.run(10.0)
+    return run
+
+
+def test_no_number_tells_of_it_and_time_does(stood_still: VirtualRun) -> None:
+    slave = stood_still.slave
+    assert slave.arrivals.metrics().lost == 0
+    assert slave.due.metrics().missing == pytest.approx(12.5 * STILL_S, abs=4)
+
+
+def test_the_raw_one_way_hides_it_and_the_corrected_one_shows_it(stood_still: VirtualRun) -> None:
+    slave = stood_still.slave
+    raw, corrected = slave.one_way.summary(), slave.due.corrected.summary()
+    assert raw.max is not None
+    assert raw.max < 10.0
+    assert corrected.max == pytest.approx(1e3 * STILL_S, abs=300.0)
+    assert corrected.p99 is not None
+    assert corrected.p99 > 4000.0
