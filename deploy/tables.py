@@ -24,12 +24,13 @@ UNKNOWN = "–"
 def latency_table(
     stages: Mapping[str, Stage],
     total: Stage | None = None,
-    one_way: Mapping[str, float | bool | None] | None = None,
+    one_way: Mapping[str, Any] | None = None,
 ) -> RenderableType:
     """The latency budget: one row a stage in the order they happen, means that add up, and a total row.
 
     `total` is the measured whole, for its percentiles (those of stages do not add up). `one_way` may hold
-    `bound` (ms) and `trusted`: how far the offset between the two clocks is known.
+    `bound` (ms) and `trusted`: how far the offset between the two clocks is known; and `p99`, `missing`,
+    `corrected`: one way of all commands that were due, beside that of those that came.
     """
     table = _table("latency budget, ms", "stage", "mean", "p50", "p99", "max", "count")
     for name, stage in stages.items():
@@ -39,12 +40,32 @@ def latency_table(
     count = min((stage.get("count", 0) for stage in stages.values()), default=0)
     sums = {"mean": mean, "count": count} if count else {}
     table.add_row("total", *_stage_cells({**(total or {}), **sums}), style="bold")
+    notes = [Text(MOVED_IS, "dim")] if "written→moved" in stages else []
     if one_way is None:
-        return table
+        return Group(table, *notes)
     bound = one_way.get("bound")
     if not one_way.get("trusted", bound is not None):
-        return Group(table, Text("one-way figures are not trusted: the clocks' offset is stale", "yellow"))
-    return Group(table, Text(f"one-way figures are known to ± {_number(bound, 3)} ms", "dim"))
+        known = Text("one-way figures are not trusted: the clocks' offset is stale", "yellow")
+    else:
+        known = Text(f"one-way figures are known to ± {_number(bound, 3)} ms", "dim")
+    return Group(table, *notes, known, *_due_notes(one_way))
+
+
+MOVED_IS = (
+    "written→moved ends at the first change of any encoder: the loop is closed. A robot that moves already "
+    "shows one at once, so it does not tell how soon the robot answers; the motion lag does"
+)
+
+
+def _due_notes(one_way: Mapping[str, Any]) -> list[Text]:
+    """The corrected figures beside the raw ones; nothing where they were not measured."""
+    corrected, missing = one_way.get("corrected"), one_way.get("missing")
+    if corrected is None or missing is None:
+        return []
+    p99, most = (_number(corrected.get(key), 2) for key in ("p99", "max"))
+    raw = f"one way p99 {_number(one_way.get('p99'), 2)} ms of the commands that came"
+    words = f"{raw}; {p99} ms, at most {most} ms, with the {missing} that were not there when they were due"
+    return [Text(words, "yellow" if missing else "dim")]
 
 
 def accuracy_table(judged: Accuracy) -> RenderableType:
@@ -143,7 +164,7 @@ def verdict_table(title: str, verdicts: Iterable[Verdict]) -> RenderableType:
         said = {
             True: Text("met", "green"),
             False: Text("missed", "bold red"),
-            None: Text("not known", "yellow"),
+            None: Text("not judged", "yellow"),
         }
         table.add_row(
             target.name,

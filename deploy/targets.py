@@ -38,6 +38,7 @@ _WHOLE_WAY = (
     Target("master, of one core", ("cpu_percent", "master"), 35.0, "%"),
     Target("master, memory", ("rss_mb", "master"), 150.0, "MB"),
     Target("last frame in → put, p99", ("frames_in_to_put_ms", "p99"), 3.0, "ms"),
+    Target("commands due that never came", ("commands", "missing"), 0),
     Target("motion lag", ("motion_lag_ms",), 25.0, "ms"),
     Target("same-instant RMSE / hold's", ("rmse_over_hold",), 0.333),
     Target("roughness", ("motion", "roughness"), 2.5),
@@ -61,7 +62,7 @@ DEMO = (
 
 HAND = (
     *_WHOLE_WAY,
-    Target("sampled → encoder moved, p99 (paper B)", ("end_to_end_ms", "p99"), 60.0, "ms"),
+    Target("one way p99 + motion lag (paper B)", ("one_way_plus_lag_ms",), 60.0, "ms"),
     Target("finger joint's RMSE, the worst (paper B)", ("worst_joint", "rmse_deg"), 1.0, "°"),
     Target("finger joint's error, the largest (paper B)", ("worst_joint", "max_deg"), 2.0, "°"),
 )
@@ -94,13 +95,25 @@ def verdicts(report: Mapping[str, object], targets: Iterable[Target]) -> list[Ve
 
 
 def _worst(report: object, path: tuple[str, ...]) -> float | None:
+    """The worse side's. A side that is in the report and has no figure leaves nothing to judge."""
     found = [_value(report, tuple(key.replace("*", side) for key in path)) for side in SIDES]
-    return max((value for value in found if value is not None), default=None)
+    if None in found:
+        return None
+    return max((value for value in found if isinstance(value, float)), default=None)
 
 
-def _value(report: object, path: tuple[str, ...]) -> float | None:
-    for key in path:
+class _Absent:
+    """Of a side that the robot does not have."""
+
+
+def _value(report: object, path: tuple[str, ...]) -> float | _Absent | None:
+    for i, key in enumerate(path):
         if not isinstance(report, Mapping):
             return None
+        if key not in report and i and key.startswith(SIDES):
+            return _ABSENT
         report = report.get(key)
     return float(report) if isinstance(report, int | float) and not isinstance(report, bool) else None
+
+
+_ABSENT = _Absent()

@@ -153,7 +153,12 @@ def as_tree(answer: Answer, heard: Heard, namesakes: int = 0) -> dict[str, Any]:
             "tool_face_deg": _degrees(base.tool_face_rad),
         },
         "offset_ms": _offset(state),
-        "latency_ms": {"one_way": figures.get("one_way_ms"), "end_to_end": figures.get("end_to_end_ms")},
+        "latency_ms": {
+            "one_way": figures.get("one_way_ms"),
+            "one_way_corrected": figures.get("one_way_corrected_ms"),
+            "end_to_end": figures.get("end_to_end_ms"),
+        },
+        "due": figures.get("due"),
         "ticks": figures.get("ticks"),
     }
 
@@ -198,6 +203,14 @@ def _words(one: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
     if one["namesakes"]:
         words.append((f"another robot bears this name; this one is at {one['place']}", "bold red"))
     words += [(f"{what}: {why}", "red") for what, why in (one["faults"] or {}).items()]
+    due = one["due"]
+    if due is not None and due["missing"]:
+        p99, corrected = (
+            (one["latency_ms"][key] or {}).get("p99") for key in ("one_way", "one_way_corrected")
+        )
+        missing = f"{due['missing']} of {due['expected']} commands were not there when they were due"
+        how = f"one way p99 {_number(p99, 1)} ms, {_number(corrected, 1)} ms with them"
+        words.append((f"{missing} ({how})", "yellow"))
     words += [(f"node {node}: {why}", "yellow") for node, why in (one["node_doubts"] or {}).items()]
     if one["encoders_invalid"]:
         words.append((f"encoders not heard: {one['encoders_invalid']}", "red"))

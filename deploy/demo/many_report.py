@@ -42,6 +42,10 @@ def make_many_report(
     for robot, one in robots.items():
         if one["in_track"] == 0.0:
             problems.append(f"{robot} never reached track")
+        if one["received"] is None:
+            problems.append(f"{robot} left no figures")
+        elif not one["received"]:
+            problems.append(f"no command reached {robot}: nothing of it was judged")
     if seen.problem:
         problems.append(seen.problem)
     master = rig.children["master"]
@@ -82,6 +86,8 @@ def _robot(observer: Observer, child: Child, truth: TruthSeries) -> dict[str, An
         "dropped": guard.dropped if guard else None,
         "losses": guard.losses if guard else None,
         "one_way_ms": tree_or_none(counted and counted.one_way_ms),
+        "one_way_corrected_ms": tree_or_none(counted and counted.one_way_corrected_ms),
+        "due": tree_or_none(counted and counted.due),
         "end_to_end_ms": tree_or_none(counted and counted.end_to_end_ms),
         "rmse_deg": moved.rmse_deg if moved else None,
         "motion_lag_ms": moved.lag_ms if moved else None,
@@ -115,6 +121,10 @@ def many_table(tree: Mapping[str, Any]) -> RenderableType:
     known = {robot: ticks["missed"] for robot, ticks in ours.items() if ticks}
     slowest = max(known, key=lambda robot: int(known[robot]), default="")
     loops = {"master": ticks, **({slowest: ours[slowest]} if slowest else {})}
+    gone = {name: due["missing"] for name, one in tree["robots"].items() if (due := one["due"]) is not None}
+    if any(gone.values()):
+        named = ", ".join(f"{name} {count}" for name, count in gone.items() if count)
+        text += f"; commands not there when they were due: {named}"
     return Group(table, Text(text, "dim"), ticks_text(loops, tree["host"]), holds_text(tree["holds"]))
 
 

@@ -82,6 +82,8 @@ def make_report(
     problems += [
         f"{role} left no figures" for role, one in (("master", master), ("slave", slave)) if one is None
     ]
+    if slave is not None and not slave.guard.received:
+        problems.append("no command reached the robot: nothing below was judged")
     if not observer.commands:
         problems.append("no command was observed: nothing below was judged")
     if "track" not in observer.guards_seen:
@@ -108,6 +110,7 @@ def make_report(
         "end_to_end_ms": tree_or_none(slave and slave.end_to_end_ms),
         "one_way_ms": _one_way(slave),
         "round_trip_ms": tree_or_none(of_robot and of_robot.round_trip_ms),
+        "one_way_plus_lag_ms": _answers_within(slave, moved_right),
         "motion_lag_ms": moved_right.lag_ms if moved_right else None,
         "motion": _motion(moved_right),
         "motion_by_strategy": _motion_by_strategy(compared),
@@ -157,18 +160,33 @@ def _commands(of_robot: CommandedMetrics | None, slave: SlaveMetrics | None) -> 
         "received": slave.guard.received if slave else None,
         "accepted": slave.guard.accepted if slave else None,
         "dropped": slave.guard.dropped if slave else None,
+        "due": slave.due.expected if slave else None,
+        "missing": max(0, slave.due.missing - slave.commands.late) if slave else None,
     }
 
 
 def _one_way(slave: SlaveMetrics | None) -> dict[str, Any]:
     if slave is None:
-        return {"p50": None, "p99": None, "bound": None, "trusted": False}
+        return {**dict.fromkeys(("p50", "p99", "corrected", "missing", "bound")), "trusted": False}
     return {
         "p50": slave.one_way_ms.p50,
         "p99": slave.one_way_ms.p99,
+        "corrected": to_tree(slave.one_way_corrected_ms),
+        "missing": slave.due.missing,
         "bound": slave.offset.bound_ms,
         "trusted": slave.offset.trusted,
     }
+
+
+def _answers_within(slave: SlaveMetrics | None, judged: Motion | None) -> float | None:
+    """How late the robot answers, in ms: the slowest of 100 commands, and how far the motion lags.
+
+    `end_to_end_ms` ends at the first change of any encoder, which a robot that moves already shows at once.
+    The lag holds a usual one-way time already, so this is rather too much than too little.
+    """
+    p99 = slave.one_way_corrected_ms.p99 if slave else None
+    lag_ms = judged.lag_ms if judged else None
+    return None if p99 is None or lag_ms is None else p99 + max(0.0, lag_ms)
 
 
 def _motion(judged: Motion | None) -> dict[str, float | None]:

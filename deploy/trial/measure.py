@@ -81,6 +81,7 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
     bound_ns = latest_bound_ns(judged.states)
     return {
         **_percentiles("one_way", _one_way_ms(judged)),
+        "one_way_corrected_p99_ms": _percentiles("all", _one_way_ms(judged, missing=True)).get("all_p99_ms"),
         "one_way_bound_ms": None if bound_ns is None else bound_ns / NS_PER_MS,
         **_percentiles("round_trip", _round_trip_ms(judged)),
         **_percentiles("age", ages),
@@ -90,10 +91,16 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
     }
 
 
-def _one_way_ms(judged: Recording) -> list[float]:
-    """Each one-way time that the slave published between its first message and its last."""
-    words = published(judged.told, SlaveMetrics)[1:]
-    return [us / 1000.0 for word in words for us in word.metrics.one_way_recent_us]
+def _one_way_ms(judged: Recording, missing: bool = False) -> list[float]:
+    """Each one-way time that the slave published between its first message and its last.
+
+    With the `missing`, also what it took for each command that was due and did not come.
+    """
+    all_ = [word.metrics for word in published(judged.told, SlaveMetrics)[1:]]
+    came = [us / 1000.0 for metrics in all_ for us in metrics.one_way_recent_us]
+    if not missing:
+        return came
+    return came + [us / 1000.0 for metrics in all_ for us in metrics.one_way_missing_recent_us]
 
 
 def _round_trip_ms(judged: Recording) -> list[float]:
@@ -130,14 +137,15 @@ def _accepted_percent(judged: Recording) -> float | None:
 
 
 def _delivered_percent(judged: Recording) -> float | None:
-    """Between the slave's first and last word: what came, of what was to come by the commands' numbers."""
+    """Between the slave's first and last word: what came, of what was due by numbers and by time."""
     told = published(judged.told, SlaveMetrics)
     if len(told) < 2:
         return None
     first, last = (told[i].metrics.commands for i in (0, -1))
+    due = told[-1].metrics.due.expected - told[0].metrics.due.expected
     came = (last.arrived - first.arrived) - (last.repeated - first.repeated)
     # one that was missing before the first word and came after it makes `lost` shrink
-    sent = came + max(0, last.lost - first.lost)
+    sent = max(came + max(0, last.lost - first.lost), due - (last.repeated - first.repeated))
     return 100.0 * came / sent if sent else None
 
 

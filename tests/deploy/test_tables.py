@@ -15,7 +15,7 @@ from deploy.tables import (
     strategies_table,
     verdict_table,
 )
-from deploy.targets import BENCH, DEMO, verdicts
+from deploy.targets import BENCH, DEMO, Target, verdicts
 
 NAMES = [
     *("neck_yaw", "neck_pitch", "waist_pitch"),
@@ -121,15 +121,15 @@ def test_the_live_view_shows_the_worst_joints_and_what_was_dropped() -> None:
     assert "nothing" in text(live_view(Live(0.0, "", "")))
 
 
-def test_verdicts_say_met_missed_and_not_known() -> None:
+def test_verdicts_say_met_missed_and_not_judged() -> None:
     report = {"ticks": {"missed": 1}, "cpu_percent": {"master": 35.0}, "motion": None, "eta_percent": True}
     lines = text(verdict_table("figures", verdicts(report, DEMO))).splitlines()
     said = {verdict.target.name: line.split()[-1] for verdict in verdicts(report, DEMO) for line in lines
             if line.strip().startswith(verdict.target.name)}  # fmt: skip
     assert said["capture ticks missed"] == "missed"
     assert said["master, of one core"] == "met"
-    assert said["roughness"] == "known"
-    assert said["η (Eq. 25)"] == "known"
+    assert said["roughness"] == "judged"
+    assert said["η (Eq. 25)"] == "judged"
 
 
 def test_the_worse_side_is_held_against_the_paper() -> None:
@@ -158,3 +158,19 @@ def test_nothing_is_wider_than_the_terminal_or_cut(width: int) -> None:
         assert max(map(len, table.splitlines())) <= width
     if width >= 80:
         assert all("…" not in table for table in shown[:5])
+
+
+def test_a_side_without_a_figure_is_not_judged_by_the_other() -> None:
+    target = Target("elbow", ("table_1", "*_elbow", "error_deg"), 1.0)
+    left, right = {"error_deg": 0.2}, {"error_deg": 0.4}
+
+    def value(table: dict[str, object]) -> float | None:
+        (verdict,) = verdicts({"table_1": table}, [target])
+        return verdict.value
+
+    assert value({"left_elbow": left, "right_elbow": right}) == 0.4
+    assert value({"left_elbow": left, "right_elbow": None}) is None
+    assert value({"left_elbow": left, "right_elbow": {}}) is None
+    # a robot with one arm only
+    assert value({"right_elbow": right}) == 0.4
+    assert value({}) is None

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from common.codec import encode
 from common.messages import BaseAttitude, RobotState
-from common.metrics import LeaseMetrics, Summary
+from common.metrics import DueMetrics, LeaseMetrics, Summary
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.topics import Topic
@@ -81,6 +81,20 @@ def test_with_a_lease_it_waits_for_the_master_s_figures_too() -> None:
     assert not told.all.is_set()
     told.take(master=master_metrics())
     assert told.all.is_set()
+
+
+def test_commands_that_were_due_and_did_not_come_are_said_beside_both_figures() -> None:
+    metrics = slave_metrics(
+        due=DueMetrics(1000, 62),
+        one_way_ms=Summary(938, p99=0.5),
+        one_way_corrected_ms=Summary(1000, p99=4200.0),
+    )
+    said = tree(Heard(state(), metrics))
+    assert said["due"] == {"expected": 1000, "missing": 62}
+    shown = " ".join(rendered({"robot-1": said}).split())
+    assert "62 of 1000 commands were not there when they were due" in shown
+    assert "one way p99 0.5 ms, 4200.0 ms with them" in shown
+    assert "due" not in rendered({"robot-1": tree(heard())})
 
 
 def test_a_robot_that_told_nothing_is_said_to_have_told_nothing() -> None:

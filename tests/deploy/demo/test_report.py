@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -12,14 +12,16 @@ import pytest
 from rich.console import Console
 
 from common.messages import Action
-from common.metrics import MasterMetrics, SlaveMetrics, Ticks
+from common.metrics import MasterMetrics, SlaveMetrics, Summary, Ticks
 from deploy.demo.report import Report, Seen, make_report
 from deploy.demo.run import DemoOptions
 from deploy.demo.view import print_report
 from deploy.judge import Trace
 from deploy.rig.rig import Rig
-from deploy.targets import BY_PROFILE, DEMO, verdicts
+from deploy.tables import verdict_table
+from deploy.targets import BENCH, BY_PROFILE, DEMO, verdicts
 from deploy.virtual import VirtualRun, World
+from slave.pipeline import SlavePipeline
 from tests.published import master_metrics, slave_metrics
 
 ENDED_WELL: dict[str, int | None] = {"master": 0, "suit": 0, "slave": 0}
@@ -28,6 +30,7 @@ ENDED_WELL: dict[str, int | None] = {"master": 0, "suit": 0, "slave": 0}
 @dataclass
 class FakeChild:
     role: str
+    slave: SlaveMetrics
     published: bool = True
     cpu_percent: float = 12.34
     rss_mb: float = 56.78
@@ -35,15 +38,31 @@ class FakeChild:
     def metrics(self, kind: type[MasterMetrics | SlaveMetrics]) -> MasterMetrics | SlaveMetrics | None:
         if not self.published:
             return None
-        ticks = Ticks(5, 0)
-        return master_metrics(ticks=ticks) if kind is MasterMetrics else slave_metrics(ticks=ticks)
+        if kind is SlaveMetrics:
+            return self.slave
+        return master_metrics(ticks=Ticks(5, 0), frames_in_to_put_ms=Summary(9, 1.0, 1.0, 1.5, 2.0))
+
+
+def told_by(slave: SlavePipeline) -> SlaveMetrics:
+    """What the slave of a run on the virtual clock would have published."""
+    budget, counters = slave.journeys.budget, slave.guard.counters
+    return slave_metrics(
+        ticks=Ticks(5, 0),
+        guard=counters.metrics(str(slave.guard.state), slave.guard.reason),
+        stages_ms=budget.summary(),
+        end_to_end_ms=budget.total(),
+        one_way_ms=slave.one_way.summary(),
+        one_way_corrected_ms=slave.due.corrected.summary(),
+        commands=slave.arrivals.metrics(),
+        due=slave.due.metrics(),
+    )
 
 
 def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
     observer = SimpleNamespace(
         trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen, video=None
     )
-    children = {role: FakeChild(role) for role in ENDED_WELL}
+    children = {role: FakeChild(role, told_by(run.slave)) for role in ENDED_WELL}
     return cast(Rig, SimpleNamespace(observer=observer, children=children))
 
 
@@ -163,4 +182,56 @@ def test_a_hand_s_report_has_its_five_joints_its_curves_and_paper_b_s_targets() 
 def test_every_profile_has_its_targets_and_the_nursing_robot_no_others_than_before() -> None:
     assert set(BY_PROFILE) == {"nursing", "hand", "lower_limb"}
     assert BY_PROFILE["nursing"] is DEMO
-    assert len(DEMO) == 13
+    assert len(DEMO) == 14
+
+
+@pytest.mark.parametrize("profile", sorted(BY_PROFILE))
+def test_every_target_s_path_leads_to_a_figure_in_a_real_report(profile: str) -> None:
+    """A renamed figure would not be missed otherwise: its target would only not be judged."""
+    report = make_report(DemoOptions(profile=profile), rig(followed(profile, 8.0), ["track"]), ENDED_WELL)
+    tree = json.loads(json.dumps(report.tree, allow_nan=False))
+    nowhere = [v.target.name for v in verdicts(tree, BY_PROFILE[profile]) if v.value is None]
+    assert nowhere == []
+
+
+def test_a_figure_that_is_missing_is_not_judged_and_neither_zero_nor_met() -> None:
+    for targets in (*BY_PROFILE.values(), BENCH):
+        for verdict in verdicts({}, targets):
+            assert (verdict.value, verdict.met) == (None, None)
+    assert "not judged" in shown_verdicts({})
+
+
+def shown_verdicts(tree: dict[str, object]) -> str:
+    out = io.StringIO()
+    Console(file=out, width=80).print(verdict_table("targets", verdicts(tree, DEMO)))
+    return out.getvalue()
+
+
+def test_a_run_in_which_no_command_reached_the_robot_failed(tracked: VirtualRun) -> None:
+    deaf = rig(tracked, ["track"])
+    child = cast(FakeChild, deaf.children["slave"])
+    child.slave = replace(child.slave, guard=replace(child.slave.guard, received=0))
+    assert make_report(DemoOptions(), deaf, ENDED_WELL).problems == [
+        "no command reached the robot: nothing below was judged"
+    ]
+
+
+def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
+    run = followed("nursing", 5.0)
+    run.stand_still(5.0)
+    run.run(5.0)
+    report = make_report(DemoOptions(), rig(run, ["track"]), ENDED_WELL)
+    verdict = {v.target.name: v for v in verdicts(report.tree, DEMO)}["commands due that never came"]
+    assert verdict.met is False
+    assert verdict.value == pytest.approx(62, abs=4)
+    assert "that were not there when they were due" in " ".join(text(report).split())
+    assert "it does not tell how soon the robot answers" in " ".join(text(report).split())
+
+
+def test_paper_b_s_60_ms_are_of_one_way_and_lag_and_fail_where_the_link_is_slow(report: Report) -> None:
+    tree = report.tree
+    lag_ms = max(0.0, tree["motion_lag_ms"])
+    assert tree["one_way_plus_lag_ms"] == pytest.approx(tree["one_way_ms"]["corrected"]["p99"] + lag_ms)
+    slow = {**tree, "one_way_plus_lag_ms": 61.0}
+    found = {v.target.name: v.met for v in verdicts(slow, BY_PROFILE["hand"])}
+    assert found["one way p99 + motion lag (paper B)"] is False

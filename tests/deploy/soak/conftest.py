@@ -50,7 +50,15 @@ def make() -> Make:
             name: np.full(seconds, np.nan) for name in header(PROCESSES) if name != "guard"
         }
         table["at_s"] = at_s
-        usual = {"sent": 12.5, "arrived": 12.5, "due": 12.5, "gone": 0.0, "master_ticks": 200.0, "slave_ticks": 200.0, "one_way_p50_ms": 0.5}
+        usual = {
+            "sent": 12.5,
+            "arrived": 12.5,
+            "due": 12.5,
+            "gone": 0.0,
+            "master_ticks": 200.0,
+            "slave_ticks": 200.0,
+            "one_way_p50_ms": 0.5,
+        }
         usual |= {f"{name}_life": 1.0 for name in PROCESSES}
         usual |= {f"{name}_{what}": 20.0 for name in PROCESSES for what in ("rss_mb", "fds", "threads")}
         usual |= {f"{name}_in_use_mb": 20.0 for name in ("master", "slave")}

@@ -10,11 +10,14 @@ import pytest
 
 from common.config import LinkConfig
 from common.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics, Truth
-from common.metrics import ArrivalCounts, Ticks
+from common.metrics import ArrivalCounts, DueMetrics, Ticks
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.trial.aftermath import aftermath
+from deploy.trial.cell import Status
+from deploy.trial.judge import judged
 from deploy.trial.measure import excerpt, measure, one_way_percentiles_ms
+from deploy.trial.plan import CellKey, Setup
 from deploy.trial.recording import Course, Outage, Recording, counts, on_masters_clock
 from slave.config import SlaveConfig
 from tests.published import commanded, guard_metrics, master_metrics, slave_metrics
@@ -128,6 +131,44 @@ def test_one_way_and_round_trip_are_of_the_judged_time() -> None:
     assert figures["one_way_p50_ms"] == figures["round_trip_p50_ms"] == pytest.approx(41.5)
     # one that the guard refuses for its age has taken its time all the same
     assert figures["one_way_p99_ms"] == figures["round_trip_p99_ms"] == pytest.approx(400.0, abs=11.0)
+
+
+def test_commands_that_were_due_and_never_came_are_in_the_figures() -> None:
+    """Both sides stood still for 5 s: every number came, and each that came was fast."""
+    told = [
+        Statistics(BEGIN_NS, slave_metrics(commands=ArrivalCounts(12, 0, 0, 0), due=DueMetrics(12, 0))),
+        Statistics(
+            BEGIN_NS + 10 * S,
+            slave_metrics(
+                commands=ArrivalCounts(75, 0, 0, 0),
+                due=DueMetrics(137, 62),
+                one_way_recent_us=(40_000,) * 63,
+                one_way_missing_recent_us=tuple(5_000_000 - 80_000 * n for n in range(62)),
+            ),
+        ),
+    ]
+    figures = measure(Course(replace(recording(), told=told), 0.3, shared_clock=True), CONFIG)
+    assert figures["delivered"] == pytest.approx(100.0 * 63 / 125)
+    assert figures["one_way_p99_ms"] == pytest.approx(40.0)
+    corrected = figures["one_way_corrected_p99_ms"]
+    assert corrected is not None
+    assert corrected > 4800.0
+
+
+@pytest.mark.parametrize("without", ["commands", "echoes"])
+def test_a_cell_without_a_single_command_failed(without: str) -> None:
+    heard = recording()
+    heard = (
+        replace(heard, commands=[])
+        if without == "commands"
+        else replace(heard, states=[replace(s, echo=None) for s in heard.states])
+    )
+    key = CellKey(Setup("tcp", "lan", "predict"), 0)
+    cell = judged(key, Course(heard, 0.3, shared_clock=True), CONFIG, {}, ())
+    assert cell.status is Status.FAILED
+    assert "no command was" in cell.why
+    whole = judged(key, Course(recording(), 0.3, shared_clock=True), CONFIG, {}, ())
+    assert whole.status is Status.DONE
 
 
 def test_without_a_shared_clock_nothing_is_called_true() -> None:
