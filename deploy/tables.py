@@ -180,7 +180,7 @@ def ticks_text(ours: Mapping[str, Mapping[str, int] | None], host: Mapping[str, 
     missed = ", ".join(f"{name} {_missed(ticks)}" for name, ticks in ours.items())
     if not host:
         return Text(f"ticks missed: {missed}; the host itself was not measured", "dim")
-    first = "" if host["priority"] else " (without real-time priority: beside our own load)"
+    first = "" if host["priority"] else " (without real-time priority: only steal excuses)"
     return Text(
         f"ticks missed: {missed}; by the host itself, of a bare loop{first}: {_missed(host['ticks'])}, "
         f"still for {host['longest_ms']:.0f} ms at most, {host['steal_percent']:.1f} % of its time stolen",
@@ -192,7 +192,7 @@ def holds_text(holds: Iterable[Mapping[str, Any]]) -> RenderableType:
     """Each time a robot held by itself and was engaged again, from a report's `holds`."""
     lines = [
         f"{row['robot']} held at {row['at_s']:.1f} s for "
-        f"{_number(row['lasted_s'], 1)} s: {row['reason']} (host stood still for {row['host_still_ms']} ms)"
+        f"{_number(row['lasted_s'], 1)} s: {row['reason']} ({row['host']})"
         for row in holds
     ]
     if not lines:

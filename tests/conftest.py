@@ -34,9 +34,9 @@ OnThisHost = Callable[[Story], None]
 def on_this_host() -> OnThisHost:
     """Runs a story of real processes beside a loop that does nothing but tick.
 
-    Where it fails and the host itself stood still meanwhile, nothing was shown, and it is tried again, up to
-    TRIES times in all; where it fails on a host that kept its time, it has failed. A host that spoilt every
-    try is told as the reason to skip.
+    Where it fails and the host is shown to have stood still meanwhile (deploy/rig/excuse.py), nothing was
+    shown, and it is tried again, up to TRIES times in all; else it has failed. A host that spoilt every try
+    is told as the reason to skip, and tests/skips.toml says how many such there may be.
     """
 
     def run(story: Story) -> None:
@@ -44,7 +44,7 @@ def on_this_host() -> OnThisHost:
             spoilt = asyncio.run(_spoilt(story))
             if not spoilt:
                 return
-            print(f"the host stood still, tried again: {spoilt}")  # noqa: T201
+            print(f"tried again: {spoilt}")  # noqa: T201
         pytest.skip(f"the host itself stood still in each of {TRIES} tries; last: {spoilt}")
 
     return run
@@ -107,7 +107,8 @@ async def _spoilt(story: Story) -> str:
         try:
             await story(host)
         except (AssertionError, TandemError) as error:
-            if not await host.spoilt(began_ns):
+            excuse = await host.excuse(began_ns)
+            if not excuse:
                 raise
-            return str(error) or repr(error)
+            return f"{excuse}; {str(error) or repr(error)}"
         return ""

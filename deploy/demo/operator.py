@@ -1,8 +1,8 @@
 """The demo's operator: sees that the robot holds, engages it anew by an act of his own, and gives up in time.
 
 The rule: the demo fails when a robot has held HOLDS times within HOLDS_WITHIN_S, or is not back in `track`
-BACK_S after it left. A hold that the host itself explains is printed like any other, but does not count to
-the first: in the WINDOW_S before it bare loops saw a core stand still for STILL_S or longer, in all.
+BACK_S after it left. A hold that the host itself explains (deploy/rig/excuse.py) is printed like any other,
+with the evidence, but does not count to the first.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from typing import Any
 
 from common.clock import to_ns, to_s
 from common.messages import RobotState
-from deploy.rig.host import STILL_S, WINDOW_S
+from deploy.rig.excuse import Lost
 
 HOLDS, HOLDS_WITHIN_S = 3, 20.0
 BACK_S = 20.0
 JUDGED_AFTER_S = 1.0
 
-HostStill = Callable[[int, int], float]
-"""For how long the host stood still between two times of its clock, s."""
+HostLost = Callable[[int], Lost]
+"""What the host lost just before a time of its clock, ns."""
 
 
 @dataclass(slots=True)
@@ -42,7 +42,7 @@ class Operator:
     """One robot's operator. Pure: states in, whether to engage and whether to give up out."""
 
     robot: str
-    host_still: HostStill
+    host_lost: HostLost
     holds: list[Hold] = field(default_factory=list)
     guard: str = "silent"
     reason: str = "not heard"
@@ -86,10 +86,7 @@ class Operator:
     def _in_words(self, hold: Hold) -> str:
         row = self.row(hold)
         blame = "counts" if row["counts"] else "does not count"
-        return (
-            f"out of track for {row['lasted_s']:.1f} s; before it held the host stood still for "
-            f"{row['host_still_ms']:.0f} ms: {blame}"
-        )
+        return f"out of track for {row['lasted_s']:.1f} s; {blame}: just before, {row['host']}"
 
     @property
     def tracks(self) -> bool:
@@ -115,14 +112,12 @@ class Operator:
             return f"{self.robot} did not track for {BACK_S:g} s: {self.guard} ({self.reason}){refused}"
         return None
 
-    def _still_s(self, hold: Hold) -> float:
-        return self.host_still(hold.began_ns - to_ns(WINDOW_S), hold.began_ns)
-
     def _counts(self, hold: Hold) -> bool:
-        return self._still_s(hold) < STILL_S
+        return not self.host_lost(hold.began_ns).explains_hold
 
     def row(self, hold: Hold) -> dict[str, Any]:
         """One of a report's `holds`."""
+        lost = self.host_lost(hold.began_ns)
         lasted_ns = None if hold.tracked_ns is None else hold.tracked_ns - hold.began_ns
         return {
             "robot": hold.robot,
@@ -130,6 +125,7 @@ class Operator:
             "was": hold.was,
             "reason": hold.reason,
             "lasted_s": None if lasted_ns is None else round(to_s(lasted_ns), 2),
-            "host_still_ms": round(1e3 * self._still_s(hold)),
+            "host_still_ms": round(1e3 * lost.excused_s),
+            "host": str(lost),
             "counts": self._counts(hold),
         }

@@ -34,7 +34,7 @@ class Tending:
         self._look = look
         self._say = say
         self._heard = dict.fromkeys(rig.observers, 0)
-        self.operators = [Operator(robot, host.lost_s) for robot in rig.observers]
+        self.operators = [Operator(robot, host.lost_before) for robot in rig.observers]
         self.problem = ""
 
     async def until_all_track(self) -> None:

@@ -27,6 +27,7 @@ from deploy.faults.scene import Scene
 from deploy.faults.stillness import Course, stillness
 from deploy.faults.trial import Outcome
 from deploy.profiles import NURSING, example
+from deploy.rig.excuse import Lost
 from deploy.rig.host import Host, watch_host
 from deploy.rig.rig import DRIVES, ROLES, Rig, drive_buses, open_rig
 from deploy.rig.tracking import until_tracking
@@ -126,14 +127,14 @@ async def run_process_trial(fault: ProcessFault, host: Host) -> Outcome:
             course = watch.course(begun_ns)
             await host.known(monotonic_ns())
             bound_ns = begun_ns + to_ns(fault.row.stands_s or 0.0)
-            lost_s = host.lost_s(begun_ns, bound_ns)
+            lost = host.lost(begun_ns, bound_ns)
             state = observer.guard if fault.alive else "gone"
             reason = observer.state.reason if fault.alive and observer.state else "the program does not run"
-    return _judge(fault, course, rig.skeleton, state, reason, lost_s)
+    return _judge(fault, course, rig.skeleton, state, reason, lost)
 
 
 async def tried(fault: ProcessFault) -> Outcome:
-    """Try it, and again where something was wrong and the host itself had stood still meanwhile.
+    """Try it, and again where something was wrong and the host is shown to have stood still meanwhile.
 
     Raises TandemError where the robot does not follow the operator when the fault is to come.
     """
@@ -143,10 +144,10 @@ async def tried(fault: ProcessFault) -> Outcome:
             try:
                 outcome = await run_process_trial(fault, host)
             except TandemError:
-                if not left or not await host.spoilt(began_ns):
+                if not left or not await host.excuse(began_ns):
                     raise
                 continue
-            if not outcome.wrong or not left or not await host.spoilt(began_ns):
+            if not outcome.wrong or not left or not await host.excuse(began_ns):
                 break
     return outcome
 
@@ -179,9 +180,9 @@ async def _following(rig: Rig) -> None:
 
 
 def _judge(
-    fault: ProcessFault, course: Course, skeleton: Skeleton, state: str, reason: str, lost_s: float
+    fault: ProcessFault, course: Course, skeleton: Skeleton, state: str, reason: str, lost: Lost
 ) -> Outcome:
-    """`lost_s`: for how long the host itself stood still from the fault to the row's bound."""
+    """`lost`: what the host lost from the fault to the row's bound."""
     measured = stillness(course, skeleton, np.ones(len(skeleton.joints), np.bool_))
     wrong = moved_beyond(course, skeleton)
     if course.at_s[-1] < WATCH_S - 0.3:
@@ -190,9 +191,9 @@ def _judge(
         wrong.append(f"the guard is in {state}, not in hold")
     if measured.standstill_s is None:
         wrong.append("still moves at the end of the trial")
-    elif fault.row.stands_s is not None and measured.standstill_s > fault.row.stands_s + lost_s:
+    elif fault.row.stands_s is not None and measured.standstill_s > fault.row.stands_s + lost.excused_s:
         late = f"stands after {measured.standstill_s:.3f} s, at most {fault.row.stands_s:g} s"
-        wrong.append(f"{late}, and {lost_s:.3f} s for which the host stood still")
+        wrong.append(f"{late}; meanwhile {lost}")
     return Outcome(fault.row, state, reason, None, measured, None, {}, tuple(wrong))
 
 

@@ -2,8 +2,8 @@
 
 `python -m deploy.rig.bare_loop` writes one JSON line when it starts, one for each time that it came late by
 a tick or more, and one a core four times a second; it ends when its standard input does. At real-time
-priority, where the host permits it, it comes before all programs of ours: what it misses then is the host's
-alone.
+priority, where the host permits it, it comes before all programs of tandem: what it misses then is the host's
+alone. Without it, only the steal that the kernel counts meanwhile is the host's (deploy/rig/excuse.py).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 import time
+from pathlib import Path
 
 from common.clock import NS_PER_S, monotonic_ns
 from common.pacing import TickGrid
@@ -42,13 +43,47 @@ def main() -> None:
 
 def _tick(core: int, grid: TickGrid) -> None:
     os.sched_setaffinity(0, {core})
+    before_ns = _stolen_ns(core)
+    late: dict[str, object] = {}
     while True:
         awaited_ns = grid.next_ns
         time.sleep(max(0, awaited_ns - monotonic_ns()) / NS_PER_S)
         now_ns = monotonic_ns()
         due = grid.due(now_ns)
-        if due is not None and (due.missed or due.tick % WORD_TICKS == 0):
-            _say({"core": core, "from_ns": awaited_ns, "until_ns": now_ns, "missed": due.missed})
+        word = due is not None and due.tick % WORD_TICKS == 0
+        if late or word:
+            # a tick after the stall: the kernel counts what was stolen only once it runs again
+            stolen_ns = _stolen_ns(core)
+            if late:
+                _say({**late, "stolen_ns": stolen_ns - before_ns})
+            before_ns, late = stolen_ns, {}
+        if due is not None and (due.missed or word):
+            told: dict[str, object] = {
+                "core": core,
+                "from_ns": awaited_ns,
+                "until_ns": now_ns,
+                "missed": due.missed,
+            }
+            if due.missed:
+                late = told
+            else:
+                _say(told)
+
+
+def stolen_ns(stat: str, core: int, ticks_per_s: int) -> int:
+    """What the machine beneath took of a core since boot, by `/proc/stat` (proc(5)); 0 where not told."""
+    for line in stat.splitlines():
+        name, *times = line.split()
+        if name == f"cpu{core}":
+            return int(times[7]) * NS_PER_S // ticks_per_s if len(times) > 7 else 0
+    return 0
+
+
+def _stolen_ns(core: int) -> int:
+    try:
+        return stolen_ns(Path("/proc/stat").read_text("ascii"), core, os.sysconf("SC_CLK_TCK"))
+    except OSError:
+        return 0
 
 
 def _say(line: dict[str, object]) -> None:

@@ -12,28 +12,13 @@ from typing import Any
 
 import psutil
 
-from common.clock import monotonic_ns, to_ns, to_s
+from common.clock import monotonic_ns, to_s
 from deploy.rig.bare_loop import PERIOD_NS
+from deploy.rig.excuse import Lost, Stall, lost, lost_before
 
 START_S = 10.0
 """A host on which a bare loop does not start within this long is not measured."""
 STOP_S = 1.0
-STILL_S = 0.05
-"""A host that stood still for so long within WINDOW_S may have made a guard hold: half of the shortest
-time-out by which one does, the encoders' 0.1 s. In one go or in pieces: what waited has to be made up for
-in between, by every process at once."""
-WINDOW_S = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class Stall:
-    """One core came back only at `until_ns`, awaited at `from_ns`; of this host's monotonic clock."""
-
-    core: int
-    from_ns: int
-    until_ns: int
-    missed: int
-    """Ticks of the bare loop."""
 
 
 @dataclass(slots=True)
@@ -46,7 +31,8 @@ class Host:
     began_ns: int = 0
     """When the loops began to tick; 0 where they did not."""
     priority: bool = False
-    """Whether they come before our own programs: if not, our own load may make them late too."""
+    """Whether they come before our own programs: if not, our own load may make them late too, and what was
+    late excuses only as far as it was stolen."""
     cpu_s: tuple[float, float] = (0.0, 0.0)
     """When they began, of all cores: time that the machine beneath took, and all time."""
 
@@ -60,7 +46,7 @@ class Host:
             self.began_ns, self.priority, self.cpu_s = told["origin_ns"], told["priority"], _cpu_s()
             self.known_ns = dict.fromkeys(told["cores"], self.began_ns)
             return
-        stall = Stall(**told)
+        stall = Stall(**told, priority=self.priority)
         self.known_ns[stall.core] = stall.until_ns
         if stall.missed:
             self.stalls.append(stall)
@@ -76,13 +62,16 @@ class Host:
         return to_s(max(0, max(spans, default=0)))
 
     def lost_s(self, since_ns: int, until_ns: int) -> float:
-        """For how long in all, between the two, some core stood still: what else happened may be so late."""
-        lost_ns, reached_ns = 0, since_ns
-        for stall in sorted(self.stalls, key=lambda stall: stall.from_ns):
-            end_ns = min(stall.until_ns, until_ns)
-            lost_ns += max(0, end_ns - max(stall.from_ns, reached_ns))
-            reached_ns = max(reached_ns, end_ns)
-        return to_s(lost_ns)
+        """For how long between the two the host is shown to have stood still: so late a result may be."""
+        return self.lost(since_ns, until_ns).excused_s
+
+    def lost(self, since_ns: int, until_ns: int) -> Lost:
+        """What the host lost between the two, with the evidence."""
+        return lost(self.stalls, since_ns, until_ns)
+
+    def lost_before(self, at_ns: int, since_ns: int = 0) -> Lost:
+        """What the host lost just before something happened."""
+        return lost_before(self.stalls, at_ns, since_ns)
 
     async def known(self, until_ns: int) -> None:
         """Wait until every core has told up to then; where nothing is measured, not at all."""
@@ -90,16 +79,20 @@ class Host:
             self._word.clear()
             await self._word.wait()
 
-    async def spoilt(self, since_ns: int) -> bool:
-        """Whether, from then to now, the host stood still for long enough to make a guard hold."""
+    async def excuse(self, since_ns: int) -> str:
+        """Why a trial from then to now does not count, with the evidence; empty where it counts.
+
+        The host is shown to have stood still, somewhere within it, for long enough to make a guard hold.
+        """
         now_ns = monotonic_ns()
         await self.known(now_ns)
         within = [stall.until_ns for stall in self.stalls if stall.until_ns >= since_ns]
-        return any(self.explains(min(until_ns, now_ns), since_ns) for until_ns in within)
+        found = (self.lost_before(min(until_ns, now_ns), since_ns) for until_ns in within)
+        return next((str(each) for each in found if each.explains_hold), "")
 
-    def explains(self, at_ns: int, since_ns: int = 0) -> bool:
-        """Whether it stood still for long enough, just before, to have made a guard hold at that time."""
-        return self.lost_s(max(since_ns, at_ns - to_ns(WINDOW_S)), at_ns) >= STILL_S
+    def explains(self, at_ns: int) -> bool:
+        """Whether it is shown to have stood still, just before, for long enough to make a guard hold then."""
+        return self.lost_before(at_ns).explains_hold
 
     @property
     def missed(self) -> int:

@@ -10,12 +10,11 @@ import numpy as np
 
 from common.messages import Mask
 from common.quaternion import Array
+from deploy.rig.excuse import STILL_S
 from deploy.soak.events import Event, of_kind
 from deploy.soak.samples import Samples
 from deploy.soak.windows import Window, explained, reason
 
-HOST_STILL_MS = 50.0
-"""Half of the guard's shortest time-out (its encoders', 0.1 s): a shorter stall explains no hold."""
 LOST_WITHIN_S = 1.5
 LOST_PACKETS = {"udp": 3, "quic-datagram": 3}
 """So many packets lost just before explain a hold. It takes three missed commands; on a stream, as all other
@@ -28,7 +27,7 @@ class Explained:
 
     faults: tuple[Window, ...]
     stalls: tuple[Window, ...]
-    """Of HOST_STILL_MS or longer."""
+    """What of them is shown to be the host's (deploy/rig/excuse.py), of STILL_S or longer."""
     network: tuple[Window, ...]
     """Seconds in which it lost packets, turned or doubled them, or let nothing pass."""
     lossy_s: tuple[float, ...]
@@ -73,11 +72,7 @@ def explanation(events: Sequence[Event], samples: Samples) -> Explained:
         number = fault.what.get("number")
         ends = [e.at_s for e in of_kind(events, "recovered") if e.what.get("number") == number]
         faults.append(Window(fault.at_s, ends[0] if ends else math.inf, str(fault.what.get("fault"))))
-    stalls = [
-        Window(e.what["from_s"], e.what["from_s"] + e.what["still_ms"] / 1e3, "the host stood still")
-        for e in of_kind(events, "still")
-        if e.what["still_ms"] >= HOST_STILL_MS
-    ]
+    stalls = [window for event in of_kind(events, "still") if (window := _excused(event)) is not None]
     own = tuple(faults)
     # what the robot does once it has left off by itself is of one cause; that it left is judged on its own
     for left in of_kind(events, "left"):
@@ -85,6 +80,15 @@ def explanation(events: Sequence[Event], samples: Samples) -> Explained:
         faults.append(Window(left.at_s, ends[0] if ends else math.inf, "after it left off"))
     last = [Window(e.at_s, math.inf, "end") for e in of_kind(events, "end")]
     return Explained((*own, *faults[len(own) :], *last), tuple(stalls), *_network(events, samples))
+
+
+def _excused(still: Event) -> Window | None:
+    """The end of a stall, as far as it is shown to be the host's; None where that is too short for a hold."""
+    # a soak that was recorded before the evidence was kept shows none
+    excused_s = still.what.get("excused_ms", 0.0) / 1e3
+    until_s = still.what["from_s"] + still.what["still_ms"] / 1e3
+    why = f"the host stood still: {still.what.get('evidence')}"
+    return Window(until_s - excused_s, until_s, why) if excused_s >= STILL_S else None
 
 
 def _network(events: Sequence[Event], samples: Samples) -> tuple[tuple[Window, ...], tuple[float, ...]]:

@@ -13,7 +13,7 @@ from typing import Any
 import psutil
 from rich.live import Live
 
-from common.clock import monotonic_ns, to_ns, to_s
+from common.clock import NS_PER_MS, monotonic_ns, to_ns, to_s
 from common.errors import TandemError
 from common.heap import freeze_heap, reserve_heap
 from common.messages import Action
@@ -203,15 +203,17 @@ class Soak:
             self._live.update(draw(self.progress, self._stage, self._log, row))
 
     def _stalls(self) -> float:
-        """The host's longest stall since the last look, ms; forgotten once told."""
+        """The longest stall since the last look that is shown to be the host's, ms; forgotten once told."""
         longest_s = 0.0
         for stall in self._host.stalls:
             still_s = to_s(stall.until_ns - stall.from_ns)
-            longest_s = max(longest_s, still_s)
+            longest_s = max(longest_s, to_s(stall.excused_ns))
             if still_s >= 0.02:
                 told = {
                     "from_s": round(self._log.at_s(stall.from_ns), 3),
                     "still_ms": round(1e3 * still_s, 1),
+                    "excused_ms": round(stall.excused_ns / NS_PER_MS, 1),
+                    "evidence": str(stall.evidence),
                 }
                 self._log.tell("still", told)
         self._host.stalls.clear()

@@ -7,10 +7,14 @@ import pytest
 
 from common.clock import to_ns
 from common.messages import RobotState
-from deploy.demo.operator import BACK_S, HOLDS_WITHIN_S, JUDGED_AFTER_S, HostStill, Operator
-from deploy.rig.host import STILL_S
+from deploy.demo.operator import BACK_S, HOLDS_WITHIN_S, JUDGED_AFTER_S, HostLost, Operator
+from deploy.rig.excuse import STILL_S, Evidence, Lost
 
 LATE_S = JUDGED_AFTER_S + 0.1
+
+
+def lost(still_s: float) -> HostLost:
+    return lambda at_ns: Lost(still_s, still_s, Evidence.PRIORITY)
 
 
 def state(at_s: float, guard: str, reason: str = "because") -> RobotState:
@@ -18,9 +22,12 @@ def state(at_s: float, guard: str, reason: str = "because") -> RobotState:
     return RobotState("r", 1, to_ns(at_s), 1, guard, reason, "nurse-1", valid, zeros, zeros, None, 0, 1)
 
 
-def operator(host_still: HostStill = lambda since_ns, until_ns: 0.0) -> Operator:
+KEPT_ITS_TIME = lost(0.0)
+
+
+def operator(host_lost: HostLost = KEPT_ITS_TIME) -> Operator:
     """His robot is engaged at 1 s and tracks at 2 s."""
-    one = Operator("robot-1", host_still)
+    one = Operator("robot-1", host_lost)
     one.begin(0)
     assert one.see([state(0.5, "hold")]) == []
     assert one.wants_to_engage
@@ -45,7 +52,7 @@ def test_a_hold_is_said_engaged_again_and_kept() -> None:
     [hold] = one.holds
     assert one.row(hold) == {
         "robot": "robot-1", "at_s": 5.0, "was": "track", "reason": "no encoder",
-        "lasted_s": 2.0, "host_still_ms": 0, "counts": True,
+        "lasted_s": 2.0, "host_still_ms": 0, "host": "the host kept its time", "counts": True,
     }  # fmt: skip
 
 
@@ -67,20 +74,37 @@ def test_three_holds_within_twenty_seconds_are_too_many(last_s: float, fails: bo
     assert (why == "robot-1 held 3 times within 20 s, last: because") is fails
 
 
-@pytest.mark.parametrize(("still_s", "counts"), [(STILL_S, False), (STILL_S - 0.001, True)])
-def test_a_hold_counts_unless_the_host_stood_still_for_long_enough_before_it(
-    still_s: float, counts: bool
+@pytest.mark.parametrize(
+    ("found", "counts", "said"),
+    [
+        (
+            Lost(STILL_S, STILL_S, Evidence.PRIORITY),
+            False,
+            "does not count: just before, the host stood still",
+        ),
+        (Lost(STILL_S, STILL_S, Evidence.STEAL), False, "50 ms: /proc/stat shows steal"),
+        (Lost(STILL_S - 0.001, STILL_S, Evidence.STEAL), True, "counts: just before, the host stood still"),
+        (Lost(0.0, 1.0, Evidence.NONE), True, "not excused: neither real-time priority nor steal"),
+    ],
+)
+def test_a_hold_counts_unless_the_host_is_shown_to_have_stood_still_before_it(
+    found: Lost, counts: bool, said: str
 ) -> None:
-    asked: list[tuple[int, int]] = []
+    asked: list[int] = []
 
-    def host_still(since_ns: int, until_ns: int) -> float:
-        asked.append((since_ns, until_ns))
-        return still_s
+    def host_lost(at_ns: int) -> Lost:
+        asked.append(at_ns)
+        return found
 
-    one = operator(host_still)
+    one = operator(host_lost)
+    one.see([state(2.9, "hold")])
+    [line] = one.see([state(2.95, "track")])
+    assert said in line
+    one.holds.clear()
+    asked.clear()
     holds(one, 3.0, 4.0, 5.0, 6.0)
     assert (one.gives_up(to_ns(6.0 + LATE_S)) is not None) is counts
-    assert asked[0] == (to_ns(2.5), to_ns(3.0))
+    assert asked[0] == to_ns(3.0)
     assert [one.row(hold)["counts"] for hold in one.holds] == [counts] * 4
 
 
@@ -93,7 +117,7 @@ def test_what_the_host_says_a_second_late_is_waited_for() -> None:
 
 @pytest.mark.parametrize("still_s", [0.0, 1.0])
 def test_a_robot_that_does_not_come_back_is_given_up_whatever_the_host_did(still_s: float) -> None:
-    one = operator(lambda since_ns, until_ns: still_s)
+    one = operator(lost(still_s))
     one.see([state(3.0, "hold", "no command")])
     one.refused = "still braking"
     assert one.gives_up(to_ns(3.0 + BACK_S)) is None
@@ -102,13 +126,13 @@ def test_a_robot_that_does_not_come_back_is_given_up_whatever_the_host_did(still
 
 
 def test_going_to_and_fro_between_hold_and_align_is_no_way_back() -> None:
-    one = operator(lambda since_ns, until_ns: 1.0)
+    one = operator(lost(1.0))
     one.see([state(3.0 + t, guard) for t in range(20) for guard in ("hold", "align")])
     assert one.gives_up(to_ns(3.1 + BACK_S)) is not None
 
 
 def test_a_robot_that_is_never_heard_or_stopped_by_a_person_is_given_up() -> None:
-    one = Operator("robot-1", lambda since_ns, until_ns: 0.0)
+    one = Operator("robot-1", lost(0.0))
     one.begin(to_ns(1.0))
     assert one.gives_up(to_ns(1.0 + BACK_S)) is None
     assert one.gives_up(to_ns(1.1 + BACK_S)) == "robot-1 did not track for 20 s: silent (not heard)"

@@ -9,7 +9,7 @@ import os
 import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S, monotonic_ns
-from deploy.rig.bare_loop import PERIOD_NS
+from deploy.rig.bare_loop import PERIOD_NS, stolen_ns
 from deploy.rig.host import Host, watch_host
 
 
@@ -81,9 +81,33 @@ def test_a_loop_s_word_that_it_ticks_is_no_stall() -> None:
     assert host.known_ns == {0: 1140 * NS_PER_MS, 1: 8 * NS_PER_S}
 
 
+def test_without_priority_only_what_was_stolen_excuses() -> None:
+    host = Host()
+    host.hear(json.dumps({"cores": [0], "origin_ns": NS_PER_S, "priority": False}))
+    stall = {"core": 0, "from_ns": 2 * NS_PER_S, "until_ns": 3 * NS_PER_S, "missed": 200}
+    host.hear(json.dumps({**stall, "stolen_ns": 0}))
+    host.end()
+    assert not host.explains(3 * NS_PER_S)
+    assert asyncio.run(host.excuse(NS_PER_S)) == ""
+    host.hear(json.dumps({**stall, "stolen_ns": 50 * NS_PER_MS}))
+    host.end()
+    assert host.explains(3 * NS_PER_S)
+    assert asyncio.run(host.excuse(NS_PER_S)) == "the host stood still for 50 ms: /proc/stat shows steal"
+
+
 def test_a_host_that_was_not_measured_excuses_nothing() -> None:
     assert Host().figures(NS_PER_S) == {}
     assert Host().stood_still_s(0, NS_PER_S) == 0.0
+    assert not Host().explains(NS_PER_S)
+
+
+@pytest.mark.parametrize(("core", "stolen_ms"), [(0, 120), (1, 0), (10, 70), (2, 0), (3, 0)])
+def test_steal_is_read_by_core(core: int, stolen_ms: int) -> None:
+    stat = (
+        "cpu  9 9 9 9 9 9 9 99 0 0\ncpu0 1 2 3 4 5 6 7 12 8 9\ncpu1 1 2 3 4 5 6 7 0 8 9\ncpu3 1 2 3 4\n"
+        "cpu10 1 2 3 4 5 6 7 7 8 9\nintr 5 0\n"
+    )
+    assert stolen_ns(stat, core, 100) == stolen_ms * NS_PER_MS
 
 
 @pytest.mark.hosts
@@ -96,5 +120,6 @@ def test_real_loops_tick_on_every_core_and_end_with_the_block() -> None:
         return host
 
     host = asyncio.run(story())
+    assert all(stall.priority is host.priority for stall in host.stalls)
     assert {stall.core for stall in host.stalls} <= os.sched_getaffinity(0)
     assert all(stall.until_ns - stall.from_ns >= PERIOD_NS and stall.missed > 0 for stall in host.stalls)

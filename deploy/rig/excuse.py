@@ -1,0 +1,107 @@
+"""When a stall of the host excuses a failure: the one rule, pure.
+
+A core that came back late may have been taken by the host, or kept busy by tandem itself. Only the first
+excuses a failure, so it must be shown: the reference loop had real-time priority, above all programs of
+tandem, and then the whole stall is the host's; or `/proc/stat` shows steal, and then as much of the stall as
+was stolen. Without either, a failure stays a failure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from common.clock import to_ns, to_s
+
+STILL_S = 0.05
+"""A host that stood still for so long within WINDOW_S may have made a guard hold: half of the shortest
+time-out by which one does, the encoders' 0.1 s. In one go or in pieces: what waited has to be made up for
+in between, by every process at once."""
+WINDOW_S = 0.5
+
+
+class Evidence(StrEnum):
+    """What shows that a stall was the host's; the text is printed."""
+
+    PRIORITY = "the reference loop had real-time priority"
+    STEAL = "/proc/stat shows steal"
+    NONE = "neither real-time priority nor steal"
+
+
+@dataclass(frozen=True, slots=True)
+class Stall:
+    """One core came back only at `until_ns`, awaited at `from_ns`; of this host's monotonic clock."""
+
+    core: int
+    from_ns: int
+    until_ns: int
+    missed: int
+    """Ticks of the reference loop."""
+    stolen_ns: int = 0
+    """Steal of this core since the loop last read it, at most 0.25 s before the stall; to 10 ms."""
+    priority: bool = False
+    """Whether the loop had real-time priority."""
+
+    @property
+    def evidence(self) -> Evidence:
+        """What shows that it was the host's."""
+        if self.priority:
+            return Evidence.PRIORITY
+        return Evidence.STEAL if self.stolen_ns > 0 else Evidence.NONE
+
+    @property
+    def excused_ns(self) -> int:
+        """How much of it excuses: all, what was stolen, or nothing; the end of the stall counts."""
+        lasted_ns = self.until_ns - self.from_ns
+        return lasted_ns if self.evidence is Evidence.PRIORITY else min(lasted_ns, self.stolen_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """What a host lost between two times."""
+
+    excused_s: float
+    """For how long in all some core stood still by the host's fault: so late a result may be."""
+    still_s: float
+    """The same, whoever's fault it was."""
+    evidence: Evidence
+
+    @property
+    def explains_hold(self) -> bool:
+        """Whether a guard may have held for it."""
+        return self.excused_s >= STILL_S
+
+    def __str__(self) -> str:
+        """In words, with the evidence."""
+        if self.excused_s > 0.0:
+            return f"the host stood still for {1e3 * self.excused_s:.0f} ms: {self.evidence}"
+        if self.still_s > 0.0:
+            return f"a core came back {1e3 * self.still_s:.0f} ms late, not excused: {self.evidence}"
+        return "the host kept its time"
+
+
+def lost(stalls: Iterable[Stall], since_ns: int, until_ns: int) -> Lost:
+    """What was lost between the two times, each moment counted once."""
+    near = [stall for stall in stalls if stall.from_ns < until_ns and stall.until_ns > since_ns]
+    excused = [(stall.until_ns - stall.excused_ns, stall.until_ns) for stall in near]
+    shown = {stall.evidence for stall, span in zip(near, excused, strict=True) if span[1] > span[0]}
+    return Lost(
+        _union_s(excused, since_ns, until_ns),
+        _union_s(((stall.from_ns, stall.until_ns) for stall in near), since_ns, until_ns),
+        next((each for each in Evidence if each in shown), Evidence.NONE),
+    )
+
+
+def lost_before(stalls: Iterable[Stall], at_ns: int, since_ns: int = 0) -> Lost:
+    """What was lost in the WINDOW_S before something happened, but not before `since_ns`."""
+    return lost(stalls, max(since_ns, at_ns - to_ns(WINDOW_S)), at_ns)
+
+
+def _union_s(spans: Iterable[tuple[int, int]], since_ns: int, until_ns: int) -> float:
+    total_ns, reached_ns = 0, since_ns
+    for from_ns, to_ns_ in sorted(spans):
+        end_ns = min(to_ns_, until_ns)
+        total_ns += max(0, end_ns - max(from_ns, reached_ns))
+        reached_ns = max(reached_ns, end_ns)
+    return to_s(total_ns)
