@@ -56,6 +56,10 @@ class Due:
             self._gap(put_ns - self._put_ns, sequence - self._sequence)
         self._put_ns, self._sequence = put_ns, sequence
 
+    def forget(self) -> None:
+        """The master gave the robot back: until it claims it again nothing is due."""
+        self._clock = None
+
     def _gap(self, gap_ns: int, numbers: int) -> None:
         period_ns = self.period_ns
         missing = int(gap_ns / period_ns + EARLY) - 1

@@ -153,6 +153,8 @@ class SlavePipeline:
             self.clock.follow(request.clock)
             self._master_clock = request.clock
             self.journeys.forget()
+        if request.action is Action.RELEASE and reply.done:
+            self.due.forget()
         return self._reply(reply)
 
     def _reply(self, reply: ControlReply) -> bytes:

@@ -59,6 +59,11 @@ class Seen:
         values = self.samples[column]
         return float(np.nansum(values if of is None else values[of]))
 
+    def told(self, column: str, of: Mask | None = None) -> float | None:
+        """The same; None where no sample holds it: what nobody told is no zero."""
+        values = self.samples[column]
+        return None if np.isnan(values).all() else self.sum(column, of)
+
     @property
     def recovered(self) -> list[Mapping[str, Any]]:
         """What is told of each fault once it is over."""
@@ -97,7 +102,9 @@ def commands(seen: Seen) -> list[Verdict]:
         counted = column == "lost" and seen.options.get("transport") in DATAGRAMS
         judged = seen.quiet | (seen.network_alone if counted else False)
         sent = seen.sum("sent", judged)
-        figure = seen.sum(column, seen.quiet) + (beyond_the_network(seen) if counted else 0.0)
+        figure = seen.told(column, seen.quiet)
+        if figure is not None and counted:
+            figure += beyond_the_network(seen)
         note = f"{seen.sum(column):.0f} in all; {sent:.0f} of {all_:.0f} were sent outside of what explains"
         if column == "lost":
             note += f"; {seen.sum('overwritten'):.0f} waited too long in the slave itself"
@@ -221,15 +228,14 @@ def loops(seen: Seen) -> list[Verdict]:
     quiet = seen.quiet & ~(np.nan_to_num(seen.samples["host_still_ms"]) > 0.0)
     verdicts = []
     for name in ("master", "slave"):
-        ticks, missed = seen.sum(f"{name}_ticks", quiet), seen.sum(f"{name}_missed", quiet)
-        verdicts.append(
-            at_most(
-                "loops", f"ticks the {name} missed, unexplained", 100.0 * missed / ticks if ticks else None,
-                MISSED_SHARE, "%",
-                f"{missed:.0f} of {ticks:.0f}; {seen.sum(f'{name}_missed'):.0f} in all",
-            )
-        )  # fmt: skip
-    lost, words = seen.sum("times_lost", seen.quiet), f"{seen.sum('times_lost'):.0f} in all"
+        ticks, missed = seen.sum(f"{name}_ticks", quiet), seen.told(f"{name}_missed", quiet)
+        share, note = None, "nobody told"
+        if missed is not None and ticks:
+            share = 100.0 * missed / ticks
+            note = f"{missed:.0f} of {ticks:.0f}; {seen.sum(f'{name}_missed'):.0f} in all"
+        what = f"ticks the {name} missed, unexplained"
+        verdicts.append(at_most("loops", what, share, MISSED_SHARE, "%", note))
+    lost = seen.told("times_lost", seen.quiet)
     verdicts.append(
         at_most(
             "loops",

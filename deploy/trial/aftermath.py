@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
+from common.messages import CommandEcho
 from common.metrics import SlaveMetrics
 from deploy.trial.recording import Outage, Recording, counts, echoes, published
 
@@ -15,13 +18,9 @@ TELLS_NS = 20 * NS_PER_MS
 
 
 def aftermath(after: Recording, outage: Outage, max_age_s: float) -> dict[str, float | None]:
-    """The outage's figures; `after` is what was heard from the cut on."""
+    """The outage's figures; `after` is what was heard from the cut on. None: nobody can tell."""
     states = after.states
-    sampled_ns = {c.sequence: c.stamps.sampled_ns for c in after.commands}
     accepted = {n: e for n, e in echoes(states).items() if e.accepted_ns > outage.back_ns}
-    stale = sum(
-        e.accepted_ns - sampled_ns[n] > to_ns(max_age_s) for n, e in accepted.items() if n in sampled_ns
-    )
     until_ns = outage.act_ns if outage.act_ns is not None else max((s.sent_ns for s in states), default=0)
     noticed_ns = outage.cut_ns + to_ns(LEFT_S)
     alone = any(s.guard in MOVING for s in states if noticed_ns < s.sent_ns < until_ns)
@@ -32,16 +31,27 @@ def aftermath(after: Recording, outage: Outage, max_age_s: float) -> dict[str, f
     moved = bool(states) and states[0].guard in MOVING
     held_ns = next((s.sent_ns for s in states if moved and s.guard == "hold"), None)
     flow_ns = min((e.accepted_ns for e in accepted.values()), default=None)
-    refused = counts(after).get("dropped", {})
+    told = len(published(after.told, SlaveMetrics)) > 1
     return {
         "held_s": None if held_ns is None else (held_ns - outage.cut_ns) / NS_PER_S,
         "flow_s": None if flow_ns is None else (flow_ns - outage.back_ns) / NS_PER_S,
-        "stale_accepted": float(stale + _stale_unseen(after, outage, max_age_s)),
-        "stale_refused": float(refused.get("age", 0)),
-        "moved_alone": float(alone),
+        "stale_accepted": _stale_accepted(after, outage, max_age_s, accepted) if told and states else None,
+        "stale_refused": float(counts(after).get("dropped", {}).get("age", 0)) if told else None,
+        "moved_alone": float(alone) if states else None,
         "ready_s": None if outage.ready_ns is None else (outage.ready_ns - outage.back_ns) / NS_PER_S,
         "track_again_s": (again_ns[0] - act_ns) / NS_PER_S if again_ns and act_ns is not None else None,
     }
+
+
+def _stale_accepted(
+    after: Recording, outage: Outage, max_age_s: float, accepted: Mapping[int, CommandEcho]
+) -> float | None:
+    """None where a command was accepted that the recording does not hold: its age is not known."""
+    sampled_ns = {c.sequence: c.stamps.sampled_ns for c in after.commands}
+    if not accepted.keys() <= sampled_ns.keys():
+        return None
+    seen = sum(e.accepted_ns - sampled_ns[n] > to_ns(max_age_s) for n, e in accepted.items())
+    return float(seen + _stale_unseen(after, outage, max_age_s))
 
 
 def _stale_unseen(after: Recording, outage: Outage, max_age_s: float) -> int:

@@ -18,9 +18,8 @@ def judged(
 
     A course in which no command was heard, or none was accepted, failed: its figures are true of nothing.
     """
-    if not course.judged.commands or not echoes(course.judged.states):
-        seen = "was heard" if not course.judged.commands else "was accepted"
-        why = f"no command {seen} in the judged time: nothing to judge"
+    why = _nothing_to_judge(course)
+    if why:
         return Cell(key, Status.FAILED, why, remarks=(*course.remarks, *remarks), settings=settings)
     return Cell(
         key=key,
@@ -32,3 +31,14 @@ def judged(
         one_way_ms=one_way_percentiles_ms(course.judged),
         excerpt=excerpt(course.judged, config),
     )
+
+
+def _nothing_to_judge(course: Course) -> str:
+    """Why, in words; empty where there is something."""
+    if not course.judged.commands:
+        return "no command was heard in the judged time: nothing to judge"
+    if not echoes(course.judged.states):
+        return "no command was accepted in the judged time: nothing to judge"
+    if course.after is not None and not course.after.states:
+        return "nothing was heard of the robot after the outage: nobody can tell what it did"
+    return ""

@@ -178,12 +178,14 @@ def _guard(judged: Recording) -> dict[str, float | None]:
     if not states:
         return {}
     left = sum(before.guard == "track" != after.guard for before, after in pairwise(states))
+    # a kind that is not in it did not grow; without two words nobody can tell
+    told = len(published(judged.told, SlaveMetrics)) > 1
     counted = counts(judged)
     return {
         "tracked": 100.0 * sum(s.guard == "track" for s in states) / len(states),
         "holds": float(left),
-        "refused": float(sum(counted.get("dropped", {}).values())),
-        "clamps": float(sum(counted.get("clamps", {}).values())),
+        "refused": float(sum(counted.get("dropped", {}).values())) if told else None,
+        "clamps": float(sum(counted.get("clamps", {}).values())) if told else None,
     }
 
 

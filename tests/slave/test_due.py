@@ -77,6 +77,13 @@ def test_another_master_s_clock_begins_anew_and_the_same_one_s_new_lease_does_no
     assert due.metrics().missing == 10
 
 
+def test_nothing_is_due_of_a_robot_that_was_given_back() -> None:
+    due = followed(*grid(1, 2, 3))
+    due.forget()
+    due.note(1, 4, 1000 * PERIOD_NS, ONE_WAY_NS)
+    assert due.metrics().missing == 0
+
+
 def test_a_gap_counts_although_the_offset_is_no_longer_trusted_after_it() -> None:
     due = followed(*grid(1, 2, 3))
     due.note(1, 4, 14 * PERIOD_NS, None)

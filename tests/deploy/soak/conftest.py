@@ -59,6 +59,8 @@ def make() -> Make:
             "slave_ticks": 200.0,
             "one_way_p50_ms": 0.5,
         }
+        told = ("lost", "late", "repeated", "refused", "times_lost", "master_missed", "slave_missed")
+        usual |= dict.fromkeys(told, 0.0)
         usual |= {f"{name}_life": 1.0 for name in PROCESSES}
         usual |= {f"{name}_{what}": 20.0 for name in PROCESSES for what in ("rss_mb", "fds", "threads")}
         usual |= {f"{name}_in_use_mb": 20.0 for name in ("master", "slave")}

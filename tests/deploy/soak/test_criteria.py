@@ -332,3 +332,18 @@ def test_both_sides_still_for_5_s_fail_though_no_number_is_missing(make: Make) -
 def test_what_was_due_is_not_judged_where_the_robot_does_not_tell(make: Make) -> None:
     verdict = judged(make(due=np.nan, gone=np.nan))["commands: due and never came, unexplained"]
     assert (verdict.status, verdict.figure) == (Status.NOT_JUDGED, None)
+
+
+@pytest.mark.parametrize(
+    ("column", "name"),
+    [
+        ("lost", "commands: lost, unexplained"),
+        ("refused", "commands: refused by the guard, unexplained"),
+        ("times_lost", "loops: times the master lost the robot, unexplained"),
+        ("master_missed", "loops: ticks the master missed, unexplained"),
+    ],
+)
+def test_what_nobody_told_is_not_judged_and_no_zero(make: Make, column: str, name: str) -> None:
+    assert judged(make())[name].status is Status.PASS
+    verdict = judged(make(**{column: np.nan}))[name]
+    assert (verdict.status, verdict.figure) == (Status.NOT_JUDGED, None)

@@ -171,6 +171,28 @@ def test_a_cell_without_a_single_command_failed(without: str) -> None:
     assert whole.status is Status.DONE
 
 
+def test_a_robot_that_was_not_heard_after_the_outage_is_not_called_safe() -> None:
+    outage = Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS)
+    deaf = aftermath(replace(after(0.6), states=[]), outage, 0.3)
+    assert (deaf["moved_alone"], deaf["stale_accepted"]) == (None, None)
+    course = Course(recording(), 0.3, shared_clock=True, after=replace(after(0.6), states=[]), outage=outage)
+    cell = judged(CellKey(Setup("tcp", "lan", "predict"), 0), course, CONFIG, {}, ())
+    assert cell.status is Status.FAILED
+
+
+def test_ages_that_nobody_knows_are_not_fresh() -> None:
+    outage = Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS)
+    assert aftermath(after(0.6), outage, 0.3)["stale_accepted"] == 0.0
+    assert aftermath(replace(after(0.6), commands=[]), outage, 0.3)["stale_accepted"] is None
+    untold = aftermath(replace(after(0.6), told=[]), outage, 0.3)
+    assert (untold["stale_accepted"], untold["stale_refused"]) == (None, None)
+
+
+def test_what_the_slave_did_not_tell_is_no_zero() -> None:
+    figures = measure(Course(replace(recording(), told=[]), 0.3, shared_clock=True), CONFIG)
+    assert (figures["refused"], figures["clamps"], figures["delivered"]) == (None, None, None)
+
+
 def test_without_a_shared_clock_nothing_is_called_true() -> None:
     figures = measure(Course(recording(), max_age_s=0.3, shared_clock=False), CONFIG)
     assert figures.get("true_one_way_p50_ms") is None
