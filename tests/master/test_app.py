@@ -25,6 +25,8 @@ class FakeLink:
 
     def subscribe(self, *_: object) -> None: ...
 
+    def watch_presence(self, *_: object) -> None: ...
+
     def counters(self) -> dict[str, dict[str, int]]:
         return {}
 
