@@ -1,4 +1,4 @@
-"""What tests share: signals, children that are ended, and a host that may spoil a trial."""
+"""What tests share: signals, children that are ended, a host that may spoil a trial, and a count of skips."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from hypothesis import HealthCheck, settings
 from common.clock import monotonic_ns
 from common.errors import TandemError
 from deploy.rig.host import Host, watch_host
+
+from .skips import counted, read_allowed, too_many
 
 # how long an example takes is the machine's affair; and a change is judged by the same examples each time
 settings.register_profile(
@@ -112,3 +114,43 @@ async def _spoilt(story: Story) -> str:
                 raise
             return f"{excuse}; {str(error) or repr(error)}"
         return ""
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """In CI a whole run fails where more tests skipped than tests/skips.toml allows."""
+    if _skips_wrong(session.config) and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Print how many tests of a whole run skipped, by reason, and what of it is too much."""
+    if not _whole(config):
+        return
+    for line in counted(_skipped(config)):
+        terminalreporter.write_line(line)
+    for line in _skips_wrong(config):
+        terminalreporter.write_line(f"tests/skips.toml: {line}", red=True)
+
+
+def _whole(config: pytest.Config) -> bool:
+    """Whether the whole suite is run; the benches are always apart."""
+    option = config.option
+    return (
+        config.args_source is pytest.Config.ArgsSource.TESTPATHS
+        and option.markexpr in ("", "not bench")
+        and not option.keyword
+        and not option.collectonly
+    )
+
+
+def _skipped(config: pytest.Config) -> list[str]:
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    reports = reporter.stats.get("skipped", []) if reporter is not None else []
+    return [str(report.longrepr[2]).removeprefix("Skipped: ") for report in reports]
+
+
+def _skips_wrong(config: pytest.Config) -> list[str]:
+    if not os.environ.get("CI") or not _whole(config):
+        return []
+    return too_many(_skipped(config), read_allowed(Path(__file__).with_name("skips.toml")), os.environ)
