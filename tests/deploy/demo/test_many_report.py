@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -33,6 +34,7 @@ COUNTED = slave_metrics(
     one_way_ms=Summary(140, p99=1.25),
     end_to_end_ms=Summary(140, p99=30.5),
 )
+WELL = master_metrics()
 
 
 def state(guard: str) -> RobotState:
@@ -40,10 +42,16 @@ def state(guard: str) -> RobotState:
     return RobotState("r", 1, 1, 1, guard, "", "nurse-1", valid, zeros, zeros, None, 0, 1)
 
 
-def report(lost_by: int = 0, ended: dict[str, int] | None = None, problem: str = "") -> ManyReport:
+def report(
+    lost_by: int = 0,
+    ended: dict[str, int] | None = None,
+    problem: str = "",
+    counted_last: SlaveMetrics | None = COUNTED,
+    master: MasterMetrics | None = WELL,
+) -> ManyReport:
     """Of a run in which robot 1 was engaged first, and one robot was in `track` for half of the time only."""
 
-    def child(counted: MasterMetrics | SlaveMetrics) -> SimpleNamespace:
+    def child(counted: MasterMetrics | SlaveMetrics | None) -> SimpleNamespace:
         return SimpleNamespace(metrics=lambda kind: counted, cpu_percent=12.34, rss_mb=98.76)
 
     def observer(number: int) -> SimpleNamespace:
@@ -57,7 +65,8 @@ def report(lost_by: int = 0, ended: dict[str, int] | None = None, problem: str =
     numbers = range(1, ROBOTS + 1)
     slaves = [slave_name(n) for n in numbers]
     observers = {robot_name(n): observer(n) for n in numbers}
-    children = {name: child(COUNTED) for name in slaves} | {"master": child(master_metrics())}
+    children = {name: child(COUNTED) for name in slaves} | {"master": child(master)}
+    children[slaves[-1]] = child(counted_last)
     rig = SimpleNamespace(
         slaves=slaves, observers=observers, observer=observers["robot-1"], children=children
     )
@@ -88,6 +97,13 @@ def test_only_what_follows_the_first_tracking_counts_as_left() -> None:
 
 def test_a_robot_that_never_tracked_is_a_problem() -> None:
     assert report(lost_by=-2).problems == ["robot-2 never reached track"]
+
+
+def test_a_process_without_figures_and_a_robot_without_commands_are_problems() -> None:
+    assert report(counted_last=None).problems == ["robot-8 left no figures"]
+    deaf = replace(COUNTED, guard=replace(COUNTED.guard, received=0))
+    assert report(counted_last=deaf).problems == ["no command reached robot-8: nothing of it was judged"]
+    assert report(master=None).problems == ["the master left no figures"]
 
 
 def test_the_table_has_a_row_each_and_fits() -> None:

@@ -222,6 +222,14 @@ def test_a_run_in_which_no_command_reached_the_robot_failed(tracked: VirtualRun)
     ]
 
 
+def test_a_run_in_which_no_command_was_observed_failed(tracked: VirtualRun) -> None:
+    deaf = rig(tracked, ["track"])
+    deaf.observer.commands = []
+    assert make_report(DemoOptions(), deaf, ENDED_WELL).problems == [
+        "no command was observed: nothing below was judged"
+    ]
+
+
 def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
     run = followed("nursing", 5.0)
     run.stand_still(5.0)

@@ -1,0 +1,3 @@
+"""A made-up soak, as the soak's own tests have it."""
+
+from tests.deploy.soak.conftest import make as make

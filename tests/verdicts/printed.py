@@ -1,0 +1,144 @@
+"""Every verdict that tandem prints, read from the code that prints it, by command."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from common.errors import TandemError
+from deploy.soak.criteria import CRITERIA
+from deploy.soak.events import Event
+from deploy.soak.growth import GROWTH
+from deploy.targets import BENCH, BY_PROFILE
+from deploy.trial.targets import LIMITS, Judged
+from tests.deploy.soak.conftest import FAULT, PROCESSES, STORY, Make
+
+ROOT = Path(__file__).parents[2]
+ENDED = (
+    *STORY,
+    Event(200.0, "recording", {"after": "kill", "readable": True, "lost_s": 0.1, "why_not": ""}),
+    Event(210.0, "recording", {"after": "disk full", "readable": True, "lived": True, "said": 1}),
+    Event(599.0, "end", {"status": {"master": 0}, "how": "it ran its time", "error": False}),
+)
+"""A soak in which each criterion has something to judge."""
+
+
+def printed(make: Make) -> set[tuple[str, str]]:
+    """Command and verdict. What stands for a value in a message is `…`; of a soak, PROCESS and FAULT."""
+    return {
+        *(("demo", target.name) for targets in BY_PROFILE.values() for target in targets),
+        *(("demo", words) for words in texts("deploy/demo/report.py", "make_report", _is_problem)),
+        *(("demo", words) for words in texts("deploy/demo/operator.py", "gives_up", _is_return)),
+        *(
+            ("demo --robots", words)
+            for words in texts("deploy/demo/many_report.py", "make_many_report", _is_problem)
+        ),
+        *(("bench", target.name) for target in BENCH),
+        *(("soak", name) for name in soak_names(make)),
+        *(("trial", Judged(limit, None, None, (), 0).words) for limit in LIMITS),
+        *(("trial", words) for words in texts("deploy/trial/judge.py", "_nothing_to_judge", _is_return)),
+        *(("faults", words) for words in fault_words()),
+        *(("accuracy", words) for words in texts("deploy/accuracy/view.py", "_notes", _is_note)),
+        *(("record", _first_words(text)) for text in texts("deploy/record/record.py", "_check", _is_raised)),
+    }
+
+
+def soak_names(make: Make) -> set[str]:
+    """With the process or the fault that a name holds left open."""
+    found = {f"{v.group}: {v.name}" for of in (*CRITERIA, *GROWTH) for v in of(make(events=ENDED))}
+    processes = "|".join(PROCESSES)
+    return {
+        re.sub(rf": ({processes})\b|\bthe (master|slave) missed", _process, name).replace(
+            str(FAULT["fault"]), "FAULT"
+        )
+        for name in found
+    }
+
+
+def _process(found: re.Match[str]) -> str:
+    return ": PROCESS" if found[1] else "the PROCESS missed"
+
+
+def fault_words() -> set[str]:
+    """Of a row of the fault matrix: what should not have been."""
+    file = "deploy/faults/trial.py"
+    return {
+        *texts(file, "_judge", lambda node: isinstance(node, ast.JoinedStr)),
+        *texts(file, "_state_amiss", _is_return),
+        *texts(file, "_stillness_amiss", _is_return),
+        *texts("deploy/faults/limits.py", "asked_beyond", _is_argument),
+        *texts("deploy/faults/limits.py", "moved_beyond", _is_argument),
+    }
+
+
+def texts(file: str, function: str, wanted: Callable[[ast.AST], bool]) -> set[str]:
+    """The messages within a function that stand where `wanted` says. TandemError where there is none."""
+    tree = ast.parse((ROOT / file).read_text("utf-8"))
+    bodies = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name == function]
+    found = {
+        _template(text)
+        for body in bodies
+        for node in ast.walk(body)
+        if wanted(node)
+        for text in _messages(node)
+    }
+    found = {words for words in found if " " in words}
+    if not found:
+        raise TandemError(f"{file}: {function} holds no message any more: mend tests/verdicts/printed.py")
+    return found
+
+
+def _messages(node: ast.AST) -> list[ast.expr]:
+    if isinstance(node, ast.JoinedStr):
+        return [node]
+    if isinstance(node, ast.Constant):
+        return [node] if isinstance(node.value, str) and " " in node.value else []
+    # a test or a loop around a message holds words that are none
+    children = (
+        [node.value] if isinstance(node, ast.Return) and node.value else list(ast.iter_child_nodes(node))
+    )
+    if isinstance(node, ast.ListComp):
+        children = [node.elt]
+    return [text for child in children for text in _messages(child)]
+
+
+def _template(text: ast.expr) -> str:
+    if isinstance(text, ast.JoinedStr):
+        parts = [part.value if isinstance(part, ast.Constant) else "…" for part in text.values]
+        return "".join(map(str, parts))
+    return str(text.value) if isinstance(text, ast.Constant) else ""
+
+
+def _first_words(text: str) -> str:
+    """Of a message that begins with a file's name and goes on with what to do."""
+    return text.removeprefix("…: ").partition(": ")[0]
+
+
+def _is_problem(node: ast.AST) -> bool:
+    if isinstance(node, ast.Assign):
+        return any(isinstance(t, ast.Name) and t.id == "problems" for t in node.targets)
+    if isinstance(node, ast.AugAssign):
+        return isinstance(node.target, ast.Name) and node.target.id == "problems"
+    return _appends(node, "problems")
+
+
+def _is_note(node: ast.AST) -> bool:
+    return _appends(node, "notes")
+
+
+def _appends(node: ast.AST, to: str) -> bool:
+    return isinstance(node, ast.Call) and ast.unparse(node.func) == f"{to}.append"
+
+
+def _is_return(node: ast.AST) -> bool:
+    return isinstance(node, ast.Return)
+
+
+def _is_argument(node: ast.AST) -> bool:
+    return isinstance(node, ast.Call) and ast.unparse(node.func) == "_beyond"
+
+
+def _is_raised(node: ast.AST) -> bool:
+    return isinstance(node, ast.Raise)
