@@ -225,6 +225,10 @@ class EkfFilter:
         """Gyro biases (n, 3)."""
         return self._front.with_offset(self._state.bias.copy())
 
+    def undecided(self) -> Mask:
+        """(n,) whose rate may be a bias that is not learnt."""
+        return self._front.undecided()
+
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes whose gyros want a calibration, by number."""
         return self._front.doubts()

@@ -17,7 +17,7 @@ from common.messages import Mask
 from common.quaternion import Array, conjugate, from_rotation_vector, heading_rad, multiply, rotate
 from common.skeleton import Skeleton
 from master.calibrate.affine import ACC, GYR, MAG, Calibration, apply, load_calibration
-from master.doubt import NodeDoubt
+from master.doubt import NodeDoubt, Weight
 from master.fuse.ekf import EkfConfig
 from master.fuse.filter import FilterBank, FilterName
 from master.fuse.filters import makers
@@ -249,7 +249,9 @@ class Estimator:
     def _stand(self, mag_ut: Array) -> None:
         """One tick of the stance."""
         rate = self._rate_of_sensors()
-        done = self._stance.add(self._oriented(rate), self._liveness.settled, rate)
+        # a finger's unit with a bias of 20°/s would refuse the whole suit's pose for ever
+        believed = self._liveness.settled & ~self._bank.undecided()
+        done = self._stance.add(self._oriented(rate), believed, rate)
         # apart: the heading of a mounting found now is the magnetometer's own
         for nodes in (done & self._mounted, done & ~self._mounted):
             if nodes.any():
@@ -258,7 +260,11 @@ class Estimator:
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes that are not believed, or not wholly, by their number."""
         joints = self._heading.doubts() if isinstance(self._heading, OnlineHeadings) else {}
-        return {**joints, **self._bank.doubts(), **self._stance.doubts(self._liveness.settled)}
+        filters = self._bank.doubts()
+        asked = self._liveness.settled.copy()
+        # of a node whose joints are invalid anyhow no pose helps, and the others need not wait for it
+        asked[[node for node, doubt in filters.items() if doubt.weight >= Weight.INVALID]] = False
+        return {**joints, **filters, **self._stance.doubts(asked)}
 
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""

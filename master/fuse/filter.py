@@ -38,6 +38,9 @@ class OrientationFilter(Protocol):
     def bias_rad_s(self) -> Array:
         """What the filter takes for the gyros' bias, (n, 3): the true rate is the reading minus this."""
 
+    def undecided(self) -> Mask:
+        """(n,) whose steady rate may be a bias that is not learnt, so that it says nothing of a motion."""
+
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes that the filter does not, or not wholly, believe, by their number."""
 
@@ -98,6 +101,13 @@ class FilterBank:
         out = np.empty((self._count, 3))
         for rows, part in self._parts:
             out[rows] = part.bias_rad_s()
+        return out
+
+    def undecided(self) -> Mask:
+        """(N,) whose rate may be a bias that is not learnt."""
+        out = np.zeros(self._count, dtype=np.bool_)
+        for rows, part in self._parts:
+            out[rows] = part.undecided()
         return out
 
     def doubts(self) -> dict[int, NodeDoubt]:

@@ -141,6 +141,10 @@ class Front:
         """The whole bias (n, 3): what the filter says it is, and what was taken off before it."""
         return bias_rad_s + self._gross.offset_rad_s if self._gross.some else bias_rad_s
 
+    def undecided(self) -> Mask:
+        """(n,) whose rate may be a bias that is not learnt."""
+        return self._gross.undecided()
+
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes whose gyros want a calibration, by number."""
         out = {}

@@ -31,6 +31,8 @@ _STEADY_LOOKS = 12
 """Further looks for which a turn about the vertical must stay as steady as no person turns, 2.4 s."""
 _TURNS_RAD_S = math.radians(1.5)
 """Gravity or field turning faster than this: no rest."""
+_FEWEST_LOOKS = 3
+"""With a rate so steady over so many looks a node may have a bias that is yet to be told from a turn."""
 _GYR, _ACC, _MAG = slice(0, 3), slice(3, 6), slice(6, 9)
 
 
@@ -74,6 +76,21 @@ class GrossBias:
     def beyond_rad_s(self) -> Array:
         """(n,) rate at rest that is too large to be learnt; 0 where there is none."""
         return self._state.beyond_rad_s
+
+    def undecided(self) -> Mask:
+        """(n,) who reads a large and steady rate: a bias that is yet to be learnt, or is too large for it.
+
+        Such a node may also turn as steadily as a machine. It says nothing of how its wearer moves.
+        """
+        ring = self._state.ring
+        looks = np.isfinite(ring[:, :, :6]).all(axis=2)
+        count = looks.sum(axis=0)
+        seen = np.where(looks[..., None], ring[:, :, :6], 0.0)
+        mean = seen.sum(axis=0) / np.maximum(count, 1)[:, None]
+        off = np.abs(np.where(looks[..., None], seen - mean, 0.0)).max(axis=0)
+        still = (off[:, _GYR].max(axis=1) < _NEAR_RAD_S) & (off[:, _ACC].max(axis=1) < _NEAR_M_S2)
+        large = np.abs(mean[:, _GYR] - self._state.offset).max(axis=1) > self._reach
+        return np.asarray((count >= _FEWEST_LOOKS) & still & large)
 
     def due(self, dt_s: float) -> bool:
         """One tick passes; True where it is time to `look`."""

@@ -108,6 +108,10 @@ class MahonyFilter:
         """Gyro biases (n, 3): the integral with its sign turned."""
         return self._front.with_offset(-self._integral)
 
+    def undecided(self) -> Mask:
+        """(n,) whose rate may be a bias that is not learnt."""
+        return self._front.undecided()
+
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes whose gyros want a calibration, by number."""
         return self._front.doubts()

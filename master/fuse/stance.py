@@ -6,7 +6,8 @@ itself is taken: a stopgap, because a six-axis node's own heading is arbitrary, 
 askew the axes found here may be turned about the vertical.
 
 A pose is refused, and asked for again, if any node turns during it, or if a segment whose sensor's mounting
-is known leans from upright: a bent waist or elbow. It is taken of all nodes together or not at all. What
+is known leans from upright: a bent waist or elbow. It is then refused for all nodes that were taking it. A
+node whose gyro is not to be believed yet takes no part: it neither refuses nor delays the others' pose. What
 cannot be noticed: how a segment stands whose mounting is not known, and what is turned about the vertical.
 """
 
@@ -95,14 +96,16 @@ class Stance:
         side = np.where(np.sum(self._sum * q_world_from_sensor, axis=-1) < 0.0, -1.0, 1.0)
         self._sum[taking] += (side[:, None] * q_world_from_sensor)[taking]
         self._taken[taking] += 1
-        if (self._taken[taking] < self._ticks).any():
-            return np.zeros_like(taking)
+        done = taking & (self._taken >= self._ticks)
+        if not done.any():
+            return done
+        # of who came later too: whoever leans, the operator does not stand in the zero pose
         leaning = self._lean(taking & self._mounted)
         if leaning:
             self._refuse(leaning, taking)
             return np.zeros_like(taking)
-        self._conclude(taking)
-        return taking
+        self._conclude(done)
+        return done
 
     def _motion(self, q: Array, taking: Mask, rate_rad_s: Array | None) -> dict[int, str]:
         """Who turns, by node, the fastest first."""
@@ -166,7 +169,9 @@ class Stance:
         if not waiting.any():
             return {}
         out = {
-            node: NodeDoubt(f"zero pose refused: {why}", Weight.REFUSED) for node, why in self.reasons.items()
+            node: NodeDoubt(f"zero pose refused: {why}", Weight.REFUSED)
+            for node, why in self.reasons.items()
+            if settled[node]
         }
         rest = NodeDoubt("waits for the zero pose: stand upright, arms hanging, and still", Weight.REFUSED)
         return out | {node: rest for node in np.flatnonzero(waiting).tolist() if node not in out}

@@ -106,6 +106,10 @@ class VqfFilter:
             state["gyrQuat"], state["accQuat"], state["delta"] = kept
             vqf.state = state
 
+    def undecided(self) -> Mask:
+        """(n,) whose rate may be a bias that is not learnt."""
+        return self._front.undecided()
+
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes whose gyros want a calibration, by number."""
         return self._front.doubts()

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, multiply, rotate
+from master.calibrate.affine import identity
 from master.doubt import Weight
+from master.fuse.estimator import EstimationConfig, Estimator
 from master.fuse.filter import OrientationFilter
 from master.fuse.filters import makers
 from master.fuse.vqf import VqfConfig
 
-from .test_estimator import FIELD_UT, GRAVITY, attitudes
+from .test_estimator import FIELD_UT, GRAVITY, Node, attitudes, seen_by
 
 RATE_HZ = 200.0
 NAMES = ("vqf", "mahony", "ekf")
@@ -114,3 +116,40 @@ def test_it_goes_on_from_a_snapshot(name: str) -> None:
     for each in (filter_, other):
         run(each, bias, 1.0, field=True, turn=np.zeros((1, 3)))
     assert np.array_equal(other.q_world_from_sensor(), filter_.q_world_from_sensor())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_until_it_is_learnt_a_steady_rate_is_undecided_and_beyond_the_setting_for_ever(name: str) -> None:
+    filter_, still = makers(RATE_HZ)[name](3), np.zeros((3, 3))
+    biases = np.array([[0.0, 12.0, 0.0], [0.0, 0.0, 25.0], [0.5, 0.0, 0.0]])
+    run(filter_, biases, 1.0, field=True, turn=still)
+    assert filter_.undecided().tolist() == [True, True, False]
+    run(filter_, biases, 3.0, field=True, turn=still)
+    assert filter_.undecided().tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_person_who_turns_is_not_undecided(name: str) -> None:
+    filter_ = makers(RATE_HZ)[name](1)
+    for tick in range(400):
+        rate = np.radians(25.0 + 5.0 * np.sin(2.0 * np.pi * tick / RATE_HZ)) * upright(1, 1.0)
+        filter_.update(rate, GRAVITY[None] * np.ones((1, 3)), np.full((1, 3), np.nan))
+        assert not filter_.undecided().any()
+
+
+@pytest.mark.parametrize(("deg_s", "weight"), [(12.0, Weight.REFUSED), (25.0, Weight.INVALID)])
+def test_a_node_with_a_gross_bias_does_not_keep_the_others_from_their_zero_pose(
+    deg_s: float, weight: Weight
+) -> None:
+    config = EstimationConfig(settle_s=1.0, stance_s=1.5)
+    estimator = Estimator(config, [Node()] * 3, RATE_HZ, identity(3))
+    noise, bias = np.random.default_rng(2), np.zeros((3, 3))
+    bias[1, 0] = np.radians(deg_s)
+    for tick in range(1400):
+        if tick == 520:
+            # 0.1 s after settling and the pose; the bias of 12°/s has just been learnt
+            assert estimator.posture().valid.tolist() == [True, False, True]
+            assert estimator.doubts()[1].weight is weight
+        estimator.update(seen_by(attitudes(3), bias + 0.002 * noise.normal(size=(3, 3))))
+    assert estimator.posture().valid.tolist() == [True, deg_s < 20.0, True]
+    assert all(doubt.weight < Weight.REFUSED for doubt in estimator.doubts().values())

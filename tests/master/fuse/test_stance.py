@@ -200,3 +200,12 @@ def test_a_node_that_comes_later_needs_the_whole_pose_again() -> None:
     for _ in range(4):
         stance.add(leaning(0.0), ALL, STILL)
     assert stance.known.all()
+
+
+def test_who_begins_later_does_not_delay_the_others_but_refuses_for_them_if_it_leans() -> None:
+    first = np.array([True, True, False])
+    for deg, known in ((0.0, [True, True, False]), (20.0, [False, False, False])):
+        stance = Stance(MOUNTED, 4, 0.0, ALL)
+        for tick in range(4):
+            stance.add(leaning(deg, node=2), first if tick < 2 else ALL, STILL)
+        assert stance.known.tolist() == known
