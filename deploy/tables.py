@@ -102,7 +102,9 @@ def motion_table(judged: Motion | None) -> RenderableType:
     """Moved against truth: each joint that moved, the worst first, then over all."""
     if judged is None:
         return Text(
-            "moved against truth: not enough data (was the robot in track, and did it move?)", "yellow"
+            "moved against truth: not enough data (was the robot in track, did it move, "
+            "were 95 % of each encoder's readings valid?)",
+            "yellow",
         )
     table = _table("moved against truth", "joint", "RMSE °", "aligned °", "roughness")
     for name, joint in sorted(judged.joints.items(), key=lambda item: -item[1].rmse_deg):
@@ -286,17 +288,22 @@ def live_view(live: Live, worst: int = 5) -> RenderableType:
     return Group(head, lines, table)
 
 
-def _joints_table(judged: Accuracy) -> Table:
-    table = _table("solved against truth, whole run", "joint", "mean abs °", "RMSE °", "bias °", "largest °")
+def _joints_table(judged: Accuracy) -> RenderableType:
+    heads = ("mean abs °", "RMSE °", "bias °", "largest °", "estimated %")
+    table = _table("solved against truth, whole run", "joint", *heads)
     for name, joint in judged.joints.items():
-        if joint is None:
-            table.add_row(name, *[UNKNOWN] * 4)
-        else:
-            table.add_row(name, *_joint_cells(joint))
+        cells = [UNKNOWN] * 4 if joint is None else _joint_cells(joint)
+        share = judged.estimated.get(name)
+        table.add_row(name, *cells, _number(None if share is None else 100.0 * share, 1))
     if judged.overall is not None:
         table.add_section()
         table.add_row("all joints", *_joint_cells(judged.overall), style="bold")
-    return table
+    if not judged.withheld:
+        return table
+    words = (
+        f"not judged, estimated for less than 95 %: {', '.join(judged.withheld)}; nor any figure over them"
+    )
+    return Group(table, Text(words, "yellow"))
 
 
 def _joint_cells(joint: JointAccuracy) -> list[str]:

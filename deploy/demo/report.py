@@ -16,6 +16,7 @@ from common.skeleton.synergy import synergy_positions
 from deploy.demo.baseline import MOST_S, Comparison, arrivals, compare
 from deploy.demo.curves import Curves, curves
 from deploy.judge import Accuracy, Motion, SolvedSeries, TruthSeries, accuracy, motion
+from deploy.judge.estimated import LEAST_ESTIMATED
 from deploy.profiles import example
 from deploy.rig.rig import ROBOT, Rig
 from master.suit.simulated.config import SuitConfig
@@ -117,6 +118,9 @@ def make_report(
         "motion_by_strategy_is": REPLAYED,
         "rmse_over_hold": compared.rmse_over_hold if compared else None,
         "accuracy": _accuracy(solved_right),
+        "estimated": dict(solved_right.estimated),
+        "estimated_fast": dict(solved_right.estimated_fast),
+        "encoders_read": dict(moved_right.read) if moved_right else {},
         "worst_joint": _worst_joint(solved_right),
         "synergies": _synergies(truth, solved, skeleton),
         "eta_percent": solved_right.eta_percent,
@@ -213,7 +217,7 @@ def _accuracy(judged: Accuracy) -> dict[str, dict[str, float] | None]:
 def _worst_joint(judged: Accuracy) -> dict[str, float]:
     """The largest figures of any joint, which need not be one and the same joint's."""
     rows = [row for row in judged.joints.values() if row is not None]
-    if not rows:
+    if not rows or any(share < LEAST_ESTIMATED for share in judged.estimated.values()):
         return {}
     return {key: max(getattr(row, key) for row in rows) for key in ("mae_deg", "rmse_deg", "max_deg")}
 

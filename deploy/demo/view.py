@@ -62,7 +62,7 @@ def print_report(report: Report, console: Console) -> None:
     console.print(latency_table(tree["stages_ms"], tree["end_to_end_ms"], tree["one_way_ms"]))
     if tree["video"]:
         console.print(video_table(tree["video"]))
-    if report.accuracy.overall is None:
+    if not any(report.accuracy.estimated.values()):
         console.print(Text("no truth to judge by: a recording has none", "yellow"))
     else:
         console.print(accuracy_table(report.accuracy), motion_table(report.motion))

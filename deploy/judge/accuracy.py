@@ -2,17 +2,22 @@
 
 The paper first shifts its solved angles by one 80 ms step, to take out the lag against its reference. Nothing
 is shifted here: rows are matched by capture tick, so a lag of the estimate counts as an error.
+
+What was not estimated does not make a figure better: for an angle that is invalid or no number the error of
+the last valid one counts, or the joint's largest where that is larger. Below LEAST_ESTIMATED a figure is
+withheld.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from common.messages import Mask
 from common.quaternion import Array
+from deploy.judge.estimated import LEAST_ESTIMATED, after_beginning, charged, heard_share
 from deploy.judge.paper import STEP_TICKS, TABLE_1
 from deploy.judge.trace import SolvedSeries, Ticks, TruthSeries
 
@@ -63,7 +68,10 @@ class FastAccuracy:
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """How well the angles were solved. What there was not enough data for is None."""
+    """How well the angles were solved. What there was not enough data for is None.
+
+    So is what was estimated for too small a share, and every figure over several joints of which one was.
+    """
 
     joints: Mapping[str, JointAccuracy | None]
     overall: JointAccuracy | None
@@ -72,56 +80,96 @@ class Accuracy:
     eta_percent_by_side: Mapping[str, float | None]
     eta_joints: Mapping[str, int]
     """How many of the five joints had a fast period, and so stand in that side's η."""
+    estimated: Mapping[str, float] = field(default_factory=dict)
+    """By joint, the share of its samples with truth that were estimated, its beginning left out."""
+    estimated_fast: Mapping[str, float] = field(default_factory=dict)
+    """The same over the fast periods, of the joints that had any."""
+
+    @property
+    def withheld(self) -> list[str]:
+        """Joints that were estimated for too small a share of the run or of their fast periods."""
+        fast = self.estimated_fast
+        return [n for n, share in self.estimated.items() if min(share, fast.get(n, 1.0)) < LEAST_ESTIMATED]
+
+    def _fast_rows(self, names: Sequence[str]) -> list[FastAccuracy]:
+        """Of those joints; empty where one of them is withheld, because the others' figure may be better."""
+        if any(self.estimated_fast.get(name, 1.0) < LEAST_ESTIMATED for name in names):
+            return []
+        return [row for name in names if (row := self.fast.get(name)) is not None]
 
     @property
     def eta_percent(self) -> float | None:
-        """The worse side's η."""
+        """The worse side's η; None where one side's is withheld."""
+        if any(share < LEAST_ESTIMATED for share in self.estimated_fast.values()):
+            return None
         return max((eta for eta in self.eta_percent_by_side.values() if eta is not None), default=None)
 
     @property
     def fast_mae_deg(self) -> float | None:
         """Mean absolute error over all fast periods, beside η because η averages signed errors."""
-        rows = [row for row in self.fast.values() if row is not None]
+        rows = self._fast_rows(list(self.fast))
         return _mean([row.error_deg for row in rows], [row.samples for row in rows])
 
     @property
     def fast_rmse_deg(self) -> float | None:
         """Root mean square error over all fast periods."""
-        rows = [row for row in self.fast.values() if row is not None]
+        rows = self._fast_rows(list(self.fast))
         square = _mean([row.rmse_deg**2 for row in rows], [row.samples for row in rows])
         return None if square is None else square**0.5
 
     def worse(self, joint: str) -> FastAccuracy | None:
         """The side with the larger mean error of one of Table 1's joints."""
-        rows = [row for side in SIDES if (row := self.fast.get(f"{side}_{joint}")) is not None]
+        rows = self._fast_rows([f"{side}_{joint}" for side in SIDES])
         return max(rows, key=lambda row: row.error_deg, default=None)
 
     def mean_error_deg(self, joint: str) -> float | None:
         """Mean error of one of Table 1's joints over both sides, by samples."""
-        rows = [row for side in SIDES if (row := self.fast.get(f"{side}_{joint}")) is not None]
+        rows = self._fast_rows([f"{side}_{joint}" for side in SIDES])
         return _mean([row.error_deg for row in rows], [row.samples for row in rows])
 
 
 def accuracy(truth: TruthSeries, solved: SolvedSeries, joint_names: Sequence[str]) -> Accuracy:
-    """Judge the solved angles, row by row of equal tick. Invalid and non-finite entries count nowhere.
+    """Judge the solved angles, row by row of equal tick.
 
     `joint_names` (J,) are in the order of the columns. Poor data raises nothing: what it cannot tell is None.
+    Until a joint is first valid, for at most BEGIN_TICKS, its filters settle and its zero pose is taken.
     """
     ticks, t_row, s_row = np.intersect1d(truth.tick, solved.tick, return_indices=True)
     true_deg = _degrees(truth.position_rad[t_row], np.ones_like(solved.valid[s_row]))
-    error_deg = _degrees(solved.position_rad[s_row], solved.valid[s_row]) - true_deg
+    solved_deg = _degrees(solved.position_rad[s_row], solved.valid[s_row])
+    known = np.isfinite(solved_deg) & np.isfinite(true_deg)
+    asked = np.isfinite(true_deg) & after_beginning(ticks, known)
+    error_deg = charged(true_deg, solved_deg, asked)
+    heard = heard_share(solved.tick)
+    shares = [_share(known[:, j], asked[:, j], heard) for j in range(len(joint_names))]
     column = {name: i for i, name in enumerate(joint_names)}
     table_1 = [name for side in SIDES for joint in TABLE_1 if (name := f"{side}_{joint}") in column]
-    fast = {name: _fast(ticks, true_deg[:, column[name]], error_deg[:, column[name]]) for name in table_1}
+    fast, fast_shares = {}, {}
+    for name in table_1:
+        j = column[name]
+        periods = fast_periods(ticks, true_deg[:, j], asked[:, j])
+        if periods:
+            rows = np.concatenate([np.arange(p.start, p.stop) for p in periods])
+            fast_shares[name] = _share(known[rows, j], asked[rows, j], heard)
+        enough = fast_shares.get(name, 0.0) >= LEAST_ESTIMATED and known[:, j].sum() >= MIN_SAMPLES
+        fast[name] = _fast(periods, true_deg[:, j], error_deg[:, j]) if enough else None
+    judged = [share >= LEAST_ESTIMATED for share in shares]
     by_side = {
         side: [row for joint in TABLE_1 if (row := fast.get(f"{side}_{joint}")) is not None] for side in SIDES
     }
+    short = {name.split("_")[0] for name, share in fast_shares.items() if share < LEAST_ESTIMATED}
     return Accuracy(
-        joints={name: _whole(error_deg[:, i]) for name, i in column.items()},
-        overall=_whole(error_deg.ravel()),
+        joints={
+            name: _whole(error_deg[:, i], known[:, i]) if judged[i] else None for name, i in column.items()
+        },
+        overall=_whole(error_deg.ravel(), known.ravel()) if all(judged) else None,
         fast=fast,
-        eta_percent_by_side={side: _eta_percent(rows) for side, rows in by_side.items()},
+        eta_percent_by_side={
+            side: None if side in short else _eta_percent(rows) for side, rows in by_side.items()
+        },
         eta_joints={side: len(rows) for side, rows in by_side.items()},
+        estimated=dict(zip(joint_names, shares, strict=True)),
+        estimated_fast=fast_shares,
     )
 
 
@@ -147,12 +195,18 @@ def _degrees(angle_rad: Array, valid: Mask) -> Array:
     return np.degrees(np.where(valid & np.isfinite(angle_rad), angle_rad, np.nan))
 
 
-def _whole(error_deg: Array) -> JointAccuracy | None:
+def _share(known: Mask, asked: Mask, heard: float) -> float:
+    """Estimated samples as a share of those asked for, lost commands included."""
+    return heard * float(np.count_nonzero(known & asked)) / max(1, int(np.count_nonzero(asked)))
+
+
+def _whole(error_deg: Array, known: Mask) -> JointAccuracy | None:
+    samples = int(np.count_nonzero(known))
     error_deg = error_deg[np.isfinite(error_deg)]
-    if len(error_deg) < MIN_SAMPLES:
+    if samples < MIN_SAMPLES:
         return None
     return JointAccuracy(
-        samples=len(error_deg),
+        samples=samples,
         mae_deg=float(np.mean(np.abs(error_deg))),
         rmse_deg=float(np.sqrt(np.mean(error_deg**2))),
         bias_deg=float(np.mean(error_deg)),
@@ -160,13 +214,7 @@ def _whole(error_deg: Array) -> JointAccuracy | None:
     )
 
 
-def _fast(ticks: Ticks, true_deg: Array, error_deg: Array) -> FastAccuracy | None:
-    usable = np.isfinite(error_deg)
-    if np.count_nonzero(usable) < MIN_SAMPLES:
-        return None
-    periods = fast_periods(ticks, true_deg, usable)
-    if not periods:
-        return None
+def _fast(periods: Sequence[slice], true_deg: Array, error_deg: Array) -> FastAccuracy:
     errors = np.concatenate([error_deg[p] for p in periods])
     lengths = [len(error_deg[p]) for p in periods]
     # each period by itself: pooled, the error of reaching out would cancel that of drawing back

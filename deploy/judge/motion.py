@@ -2,6 +2,9 @@
 
 Four figures. Same-instant RMSE: what the patient sees. Motion lag: by how much the robot is late (positive)
 or early. Aligned RMSE: what is left when the lag is taken out. Roughness: see `roughness.py`.
+
+A reading that is missing counts as its joint's largest error. Where less than LEAST_ESTIMATED of a moving
+joint's readings are valid nothing is judged: the figure of the other joints would be better than it was.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import numpy as np
 from common.clock import NS_PER_MS, to_ns
 from common.messages import Mask
 from common.quaternion import Array
+from deploy.judge.estimated import LEAST_ESTIMATED, charged_with_largest
 from deploy.judge.roughness import accelerations
 from deploy.judge.trace import MovedSeries, Nanoseconds, TruthSeries
 
@@ -30,6 +34,10 @@ SEARCH_MS = (-100, 500)
 _COARSE_MS = 10
 _FINE_NS = NS_PER_MS / 10
 _GOLDEN = (5**0.5 - 1) / 2
+
+
+_Read = tuple[Mapping[str, float], Mask]
+"""The share of valid readings by joint, and (T, J) where a reading was asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +64,8 @@ class Motion:
     aligned_rmse_deg: float | None
     roughness: float | None
     """RMS acceleration of the robot over the operator's; None where no stretch is long enough."""
+    read: Mapping[str, float]
+    """By moving joint, the share of its readings that were valid."""
 
 
 def motion(truth: TruthSeries, moved: MovedSeries, joint_names: Sequence[str]) -> Motion | None:
@@ -71,20 +81,23 @@ def motion(truth: TruthSeries, moved: MovedSeries, joint_names: Sequence[str]) -
     robot_rad = np.where(moved.valid[counted], moved.position_rad[counted], np.nan)
     # one set of samples for every shift, or a shift could win by losing the hard ones
     shifts_ns = np.arange(SEARCH_MS[0], SEARCH_MS[1] + 1, _COARSE_MS) * NS_PER_MS
-    usable = np.isfinite(robot_rad)
+    asked = np.ones_like(robot_rad, np.bool_)
     for edge_ns in (int(shifts_ns[0]), 0, int(shifts_ns[-1])):
-        usable &= np.isfinite(at_shift(truth, at_ns, edge_ns))
-    usable &= ~_spans_gap(truth.sampled_ns, at_ns, int(shifts_ns[0]), int(shifts_ns[-1]))[:, None]
-    usable[:, ~_moving(at_shift(truth, at_ns, 0), usable)] = False
-    columns = np.flatnonzero(np.count_nonzero(usable, axis=0) >= MIN_SAMPLES)
-    if len(columns) == 0:
+        asked &= np.isfinite(at_shift(truth, at_ns, edge_ns))
+    asked &= ~_spans_gap(truth.sampled_ns, at_ns, int(shifts_ns[0]), int(shifts_ns[-1]))[:, None]
+    asked[:, ~_moving(at_shift(truth, at_ns, 0), asked)] = False
+    columns = np.flatnonzero(np.count_nonzero(asked, axis=0) >= MIN_SAMPLES)
+    usable = asked & np.isfinite(robot_rad)
+    read = usable[:, columns].sum(axis=0) / asked[:, columns].sum(axis=0)
+    if len(columns) == 0 or read.min() < LEAST_ESTIMATED:
         return None
     truth = TruthSeries(truth.tick, truth.sampled_ns, truth.position_rad[:, columns])
     robot_rad = np.where(usable, robot_rad, np.nan)[:, columns]
-    rows = np.isfinite(robot_rad).any(axis=1)
-    at_ns, robot_rad = at_ns[rows], robot_rad[rows]
+    rows = asked[:, columns].any(axis=1)
+    at_ns, robot_rad, asked = at_ns[rows], robot_rad[rows], asked[rows][:, columns]
     lag_ns = _lag_ns(truth, at_ns, robot_rad, shifts_ns)
-    return _figures(truth, at_ns, robot_rad, lag_ns, [joint_names[int(c)] for c in columns])
+    shares = {joint_names[int(c)]: float(share) for c, share in zip(columns, read, strict=True)}
+    return _figures(truth, at_ns, robot_rad, lag_ns, (shares, asked))
 
 
 def at_shift(truth: TruthSeries, at_ns: Nanoseconds, shift_ns: int) -> Array:
@@ -103,11 +116,18 @@ def at_shift(truth: TruthSeries, at_ns: Nanoseconds, shift_ns: int) -> Array:
 
 
 def _figures(
-    truth: TruthSeries, at_ns: Nanoseconds, robot_rad: Array, lag_ns: int | None, names: Sequence[str]
+    truth: TruthSeries,
+    at_ns: Nanoseconds,
+    robot_rad: Array,
+    lag_ns: int | None,
+    read: _Read,
 ) -> Motion:
+    shares, asked = read
     now_rad = at_shift(truth, at_ns, 0)
-    error = np.degrees(robot_rad - now_rad)
-    aligned = None if lag_ns is None else np.degrees(robot_rad - at_shift(truth, at_ns, lag_ns))
+    error = charged_with_largest(np.degrees(robot_rad - now_rad), asked)
+    aligned = None
+    if lag_ns is not None:
+        aligned = charged_with_largest(np.degrees(robot_rad - at_shift(truth, at_ns, lag_ns)), asked)
     robot, operator = accelerations(at_ns, robot_rad, np.where(np.isnan(robot_rad), np.nan, now_rad), GAP_S)
     joints = {
         name: JointMotion(
@@ -115,7 +135,7 @@ def _figures(
             aligned_rmse_deg=None if aligned is None else _rms(aligned[:, j]),
             roughness=_ratio(robot[:, j], operator[:, j]),
         )
-        for j, name in enumerate(names)
+        for j, name in enumerate(shares)
     }
     return Motion(
         joints=joints,
@@ -124,6 +144,7 @@ def _figures(
         lag_ms=None if lag_ns is None else lag_ns / NS_PER_MS,
         aligned_rmse_deg=None if aligned is None else _rms(aligned),
         roughness=_ratio(robot, operator),
+        read=shares,
     )
 
 

@@ -83,7 +83,7 @@ class GrossBias:
         Such a node may also turn as steadily as a machine. It says nothing of how its wearer moves.
         """
         ring = self._state.ring
-        looks = np.isfinite(ring[:, :, :6]).all(axis=2)
+        looks: Mask = np.logical_and.reduce(np.isfinite(ring[:, :, :6]), axis=2)
         count = looks.sum(axis=0)
         seen = np.where(looks[..., None], ring[:, :, :6], 0.0)
         mean = seen.sum(axis=0) / np.maximum(count, 1)[:, None]

@@ -14,7 +14,7 @@ from common.skeleton import load_skeleton
 from deploy.accuracy.papers.figures import Figure
 from deploy.accuracy.papers.units import SESSION, calibrate
 from deploy.judge import Accuracy, accuracy
-from deploy.judge.accuracy import SIDES
+from deploy.judge.accuracy import SIDES, FastAccuracy
 from deploy.judge.paper import ETA_PERCENT, TABLE_1
 from deploy.virtual import VirtualRun, World
 from master.calibrate.node_file import write_calibration
@@ -71,10 +71,8 @@ def own_calibration(seed: int, seconds: float = SECONDS, session: TrayConfig = S
 
 def judge(judged: Accuracy) -> list[Figure]:
     """A run's figures, one value a side where there are two: the paper measured one arm."""
-    rows = {
-        joint: [row for side in SIDES if (row := judged.fast.get(f"{side}_{joint}")) is not None]
-        for joint in TABLE_1
-    }
+    # one arm's figure must not stand for two where the other's is withheld
+    rows = {joint: [] if judged.worse(joint) is None else _sides(judged, joint) for joint in TABLE_1}
     names = {joint: joint.replace("_", " ") for joint in TABLE_1}
     errors = [
         Figure(
@@ -90,7 +88,8 @@ def judge(judged: Accuracy) -> list[Figure]:
         Figure(f"{names[joint]}, share of the step", "", tuple(row.ratio for row in rows[joint]), paper.ratio)
         for joint, paper in TABLE_1.items()
     ]
-    etas = tuple(eta for eta in judged.eta_percent_by_side.values() if eta is not None)
+    by_side = judged.eta_percent_by_side.values()
+    etas = () if judged.eta_percent is None else tuple(eta for eta in by_side if eta is not None)
     return [
         *errors,
         *shares,
@@ -98,6 +97,10 @@ def judge(judged: Accuracy) -> list[Figure]:
         Figure("beside η: mean absolute error", "°", _known(judged.fast_mae_deg)),
         Figure("beside η: RMSE", "°", _known(judged.fast_rmse_deg)),
     ]
+
+
+def _sides(judged: Accuracy, joint: str) -> list[FastAccuracy]:
+    return [row for side in SIDES if (row := judged.fast.get(f"{side}_{joint}")) is not None]
 
 
 def _known(value: float | None) -> tuple[float, ...]:

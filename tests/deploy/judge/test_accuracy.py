@@ -88,15 +88,78 @@ def test_the_worse_arm_stands_for_both(run: Any) -> None:
     assert judged.mean_error_deg("shoulder_roll") is None
 
 
-def test_invalid_entries_count_nowhere(run: Any) -> None:
+def figures(judged: Any, joint: str) -> dict[str, Any]:
+    row, fast = judged.joints[joint], judged.fast[joint]
+    return {
+        "mae": row.mae_deg, "rmse": row.rmse_deg, "max": row.max_deg, "all": judged.overall.rmse_deg,
+        "fast": fast.error_deg, "fast rmse": fast.rmse_deg, "fast all": judged.fast_rmse_deg,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("how", ["nan", "infinite", "invalid"])
+def test_one_angle_that_is_missing_makes_no_figure_better(run: Any, how: str) -> None:
+    solved, truth, joint = run.solved(), run.truth(), "left_elbow_pitch"
+    solved.position_rad[:] += np.radians(0.4) * np.random.default_rng(1).standard_normal((250, 4))
+    error = np.abs(solved.position_rad[:, 1] - truth.position_rad[::16, 1])
+    whole = figures(accuracy(truth, solved, run.names), joint)
+    # of the largest itself nobody knows how large it was
+    for row in sorted({*range(1, 250, 4)} - {int(np.argmax(error))}):
+        position, valid = solved.position_rad.copy(), solved.valid.copy()
+        position[row, 1] = {"nan": np.nan, "infinite": np.inf, "invalid": position[row, 1]}[how]
+        valid[row, 1] = how != "invalid"
+        spoilt = figures(
+            accuracy(truth, replace(solved, position_rad=position, valid=valid), run.names), joint
+        )
+        assert all(spoilt[name] >= before for name, before in whole.items()), row
+
+
+@pytest.mark.parametrize(("missing", "judged"), [(12, True), (13, False)])
+def test_below_95_percent_a_figure_and_all_over_it_are_withheld(run: Any, missing: int, judged: bool) -> None:
     solved = run.solved()
-    solved.position_rad[100:120, 1] = 3.0
-    solved.valid[100:120, 1] = False
-    solved.position_rad[130, 2] = np.nan
-    judged = accuracy(run.truth(), solved, run.names)
-    assert judged.overall is not None
-    assert judged.overall.rmse_deg == 0.0
-    assert judged.overall.samples == 4 * len(solved.tick) - 21
+    # of 250, and all of them within the rests: the fast periods are whole
+    still = np.flatnonzero(np.mod(solved.tick * 0.005, 3.0) > 2.6)[:missing]
+    solved.valid[still, 1] = False
+    found = accuracy(run.truth(), solved, run.names)
+    assert found.estimated["left_elbow_pitch"] == 1.0 - missing / 250
+    assert (found.joints["left_elbow_pitch"] is not None) == judged
+    assert (found.overall is not None) == judged
+    assert found.withheld == ([] if judged else ["left_elbow_pitch"])
+    assert found.joints["left_shoulder_pitch"] is not None
+    assert found.fast["left_elbow_pitch"] is not None
+
+
+def test_fast_periods_that_were_not_estimated_withhold_eta_and_the_worse_side(run: Any) -> None:
+    solved, truth = run.solved(error_rad=0.01), run.truth()
+    true_deg = np.degrees(truth.position_rad[::16, 2]).astype(np.float64)
+    periods = fast_periods(solved.tick, true_deg, np.ones(250, np.bool_))
+    rows = np.concatenate([np.arange(p.start, p.stop) for p in periods])
+    solved.position_rad[rows[:: len(rows) // 12], 2] = np.nan
+    found = accuracy(truth, solved, run.names)
+    assert found.estimated_fast["right_shoulder_pitch"] < 0.95
+    assert found.fast["right_shoulder_pitch"] is None
+    assert found.eta_percent_by_side["left"] is not None
+    assert (found.eta_percent, found.eta_percent_by_side["right"]) == (None, None)
+    assert found.worse("shoulder_pitch") is None
+    assert found.mean_error_deg("shoulder_pitch") is None
+    assert found.fast_mae_deg is None
+
+
+@pytest.mark.parametrize(("rows", "counted"), [(10, 0), (63, 0), (64, 1), (76, 13)])
+def test_until_a_joint_is_first_valid_it_settles_but_for_5_s_at_most(
+    run: Any, rows: int, counted: int
+) -> None:
+    solved = run.solved()
+    solved.valid[:rows] = False
+    found = accuracy(run.truth(), solved, run.names)
+    assert found.estimated["neck_yaw"] == pytest.approx(1.0 - counted / (250 - rows + counted))
+
+
+def test_commands_that_never_came_were_not_estimated(run: Any) -> None:
+    s, kept = run.solved(), np.r_[0:100, 120:250]
+    fewer = replace(s, tick=s.tick[kept], position_rad=s.position_rad[kept], valid=s.valid[kept])
+    found = accuracy(run.truth(), fewer, run.names)
+    assert found.estimated["neck_yaw"] == pytest.approx(230 / 250)
+    assert found.overall is None
 
 
 def test_commands_without_truth_are_left_out(run: Any) -> None:
