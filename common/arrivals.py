@@ -24,7 +24,7 @@ class Arrivals:
         """Came after a newer one."""
         self.repeated = 0
         """Came again."""
-        self._lease = 0
+        self._lease: int | None = None
         self._newest = 0
         self._missing: set[int] = set()
 

@@ -143,6 +143,8 @@ class RobotHeard(Metrics):
     silent: bool
     times_lost: int
     undecodable: int
+    missing: int
+    """States that never came, by their numbers."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -209,7 +209,9 @@ def _missed(ticks: Mapping[str, int] | None) -> str:
 
 _BENCH_ROWS = (
     ("loop lateness, idle, µs", ("loop", "idle", "late_us")),
+    ("the same with the missed ticks, µs", ("loop", "idle", "corrected_us")),
     ("loop lateness, busy core, µs", ("loop", "busy", "late_us")),
+    ("that with the missed ticks, µs", ("loop", "busy", "corrected_us")),
     ("receive + decode, 36 nodes, CPU µs", ("capture", "nodes_36", "cpu_us")),
     ("receive + decode, 8 classic, CPU µs", ("capture", "nodes_8_classic", "cpu_us")),
     ("answers in, 36 nodes, µs", ("capture", "nodes_36", "answers_us")),

@@ -158,7 +158,12 @@ class CommandedRobot:
         return CommandedMetrics(
             commands_sent=self._writer.sent,
             round_trip_ms=watch.round_trip.summary(),
-            robot=RobotHeard(watch.silent(monotonic_ns()), watch.times_lost, self._undecodable),
+            robot=RobotHeard(
+                silent=watch.silent(monotonic_ns()),
+                times_lost=watch.times_lost,
+                undecodable=self._undecodable,
+                missing=watch.arrivals.lost,
+            ),
             lease=LeaseHeld(bool(self._lease.token), self._lease.answer),
             video=self.video.metrics(),
             link=self._link.counters(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from common.arrivals import Arrivals
 from common.clock import to_ns
 from common.latency import RoundTrip
 from common.messages import RobotState
@@ -14,6 +15,8 @@ class RobotWatch:
     def __init__(self) -> None:
         self.state: RobotState | None = None
         self.round_trip = RoundTrip()
+        self.arrivals = Arrivals()
+        """Of the states, by their numbers; a robot that starts anew begins its count anew."""
         self._heard_ns = 0
         self._echoed = 0
         self._was_silent = True
@@ -25,6 +28,7 @@ class RobotWatch:
         `ours`: whether this master holds the lease. Else the echoes are of another's commands.
         """
         self.state = state
+        self.arrivals.note(state.instance, state.sequence)
         self._heard_ns = arrived_ns
         echo = state.echo
         if ours and echo is not None and echo.sequence != self._echoed:

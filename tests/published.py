@@ -33,7 +33,7 @@ def commanded(**changes: Any) -> CommandedMetrics:
     given: dict[str, Any] = {
         "commands_sent": 0,
         "round_trip_ms": NOTHING,
-        "robot": RobotHeard(silent=False, times_lost=0, undecodable=0),
+        "robot": RobotHeard(silent=False, times_lost=0, undecodable=0, missing=0),
         "lease": LeaseHeld(held=True, answer="granted"),
         "video": VideoReceived(0, 0, 0),
         "link": {},

@@ -106,6 +106,7 @@ def make_report(
         "host": seen.host,
         "holds": seen.holds,
         "commands": _commands(of_robot, slave),
+        "states_missing": of_robot.robot.missing if of_robot else None,
         "stages_ms": trees(slave.stages_ms if slave else {}),
         "frames_in_to_put_ms": tree_or_none(master and master.frames_in_to_put_ms),
         "end_to_end_ms": tree_or_none(slave and slave.end_to_end_ms),

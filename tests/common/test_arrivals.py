@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,6 +25,11 @@ def test_a_gap_is_lost_a_late_one_is_not_and_the_same_again_is_a_repetition() ->
     assert noted(1, 2, 5).metrics() == ArrivalCounts(3, 2, 0, 0)
     assert noted(1, 2, 5, 4).metrics() == ArrivalCounts(4, 1, 1, 0)
     assert noted(1, 2, 5, 4, 4, 5, 1).metrics() == ArrivalCounts(7, 1, 1, 3)
+
+
+@pytest.mark.parametrize("lease", [0, 1])
+def test_the_first_of_all_begins_the_count_whatever_its_lease(lease: int) -> None:
+    assert noted(500, 501, lease=lease).metrics() == ArrivalCounts(2, 0, 0, 0)
 
 
 def test_a_new_lease_begins_anew() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,6 +27,13 @@ def test_silence_begins_just_after_the_time_out_whatever_the_sender_stamps() -> 
     watch.on_state(state(sent_ns=SLAVE_AHEAD_NS), 1000)
     assert not watch.silent(1000 + TIMEOUT_NS)
     assert watch.silent(1001 + TIMEOUT_NS)
+
+
+def test_states_that_never_came_are_counted_by_their_numbers_and_a_new_robot_s_begin_anew() -> None:
+    watch = RobotWatch()
+    for instance, sequence in ((1, 40), (1, 41), (1, 2242), (2, 1), (2, 2), (2, 4), (2, 3)):
+        watch.on_state(replace(state(), instance=instance, sequence=sequence), 0)
+    assert watch.arrivals.lost == 2200
 
 
 def test_people_are_told_once_a_change() -> None:
