@@ -249,7 +249,10 @@ class Guard:
             return silent or "not every encoder has been read yet"
         if not self._limiter.at_rest:
             return "still braking"
-        if self._strayed():
+        if self._drive_rad is not None:
+            # a drive that is switched on stays where it stands, by its own angle: the setpoint is there
+            self._limiter.seat(self._drive_rad)
+        elif self._strayed():
             # nor to where an encoder says it is that is not believed
             self._limiter.seat(
                 np.where(self._plausible.doubted, self._limiter.position_rad, self._stands_rad())
@@ -302,10 +305,13 @@ class Guard:
         if self._seated and self._plausible.span is None:
             return  # an old reading
         good = encoder_valid & np.isfinite(position_rad)
-        # while the robot moves a joint astray is doubted and held first; one that goes on is stopped by force
-        among = self._plausible.doubted if self.state in MOVING else None
         moves = self._placement.take(
-            encoder_ns, position_rad, good, drive_rad=self._drive_rad, span=self._plausible.span, among=among
+            encoder_ns,
+            position_rad,
+            good,
+            drive_rad=self._drive_rad,
+            span=self._plausible.span,
+            under_way=self.state in MOVING,
         )
         if moves is not None and self.state is not State.ESTOP:
             self.counters.losses["unbidden"] += 1

@@ -12,11 +12,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from common.clock import NS_PER_MS
 from common.messages import Mask
 from common.quaternion import Array
 from slave.agreement import READINGS as AGREEMENT_READINGS
 from slave.agreement import Agreement
-from slave.unbidden import UnbiddenMotion
+from slave.unbidden import Patience, UnbiddenMotion
 
 BEYOND_RAD = math.radians(8.0)
 """A joint further than this beyond its range is not where its encoder says."""
@@ -25,6 +26,8 @@ NEAR_RAD = math.radians(5.0)
 STILL_RAD = math.radians(1.0)
 """At the output, behind the gear's play, a joint that stands may be moved by so much."""
 READINGS = 2
+PATIENCE = Patience(plain_ns=20 * NS_PER_MS, shaken_ns=80 * NS_PER_MS)
+"""An arm that brakes at its limits throws a light wrist outwards for 56 ms; else nobody is astray at all."""
 
 
 class Placement:
@@ -43,7 +46,7 @@ class Placement:
         known = last_known_rad
         self._known_rad = None if known is None else np.array([known.get(n, np.nan) for n in joint_names])
         self._agreement = Agreement(joint_names)
-        self._motion = UnbiddenMotion(joint_names, STILL_RAD, READINGS)
+        self._motion = UnbiddenMotion(joint_names, STILL_RAD, readings=READINGS, patience=PATIENCE)
         self._first_rad: Array = np.full(len(self._names), np.nan)
         self._read_ns: int | None = None
         self._compared = 0
@@ -61,12 +64,12 @@ class Placement:
         *,
         drive_rad: Array | None,
         span: tuple[Array, Array] | None,
-        among: Mask | None = None,
+        under_way: bool = False,
     ) -> str | None:
         """Take a reading (J,) that is `good` (J,). Who moves unbidden, in words, or None.
 
         `span` (J,) each: where the setpoint was lately, or None before there is any: then nothing may move.
-        Only joints `among` these (J,) count, where they are given. The same reading twice counts once.
+        `under_way`: somebody is engaged. The same reading twice counts once.
         """
         if read_ns == self._read_ns:
             return None
@@ -80,9 +83,7 @@ class Placement:
                 np.copyto(self._first_rad, position_rad, where=first)
                 self._motion.begin(read_ns, first, position_rad)
             span = self._first_rad, self._first_rad
-        moves = self._motion.judge(read_ns, span, position_rad, good)
-        if among is not None:
-            moves = moves & among
+        moves = self._motion.judge(read_ns, span, position_rad, good, under_way=under_way)
         if not moves.any():
             return None
         joint = self._names[int(moves.argmax())]

@@ -399,6 +399,15 @@ def moves_by_itself(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.ESTOP
 
 
+@about("UnbiddenMotion._for_long")
+def moves_against_its_setpoint(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    began_ns, begins_rad = rig.now_ns, rig.measured[ELBOW]
+    rig.lies[ELBOW] = lambda _: float(begins_rad + 1e-9 * (rig.now_ns - began_ns))  # 1 rad/s
+    rig.run(0.11)  # 60 ms until it is astray, and 50
+    assert rig.guard.state is State.ESTOP
+
+
 # who may
 
 

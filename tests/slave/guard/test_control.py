@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 from common.messages import Action
@@ -189,3 +190,19 @@ def test_reset_leaves_a_little_sag_alone(rig: Any) -> None:
 
 def test_the_key_is_not_shown_with_the_configuration(rig: Any) -> None:
     assert KEY not in repr(rig.config)
+
+
+@pytest.mark.parametrize("turned_rad", [0.0, -0.02, 0.09, 0.5])
+def test_reset_holds_a_joint_whose_drive_tells_its_angle_exactly_there(rig: Any, turned_rad: float) -> None:
+    """A drive that is switched on stays where it is: a setpoint elsewhere would make it walk there."""
+    rig.drive_off_rad = np.full(rig.joints, 0.01)
+    rig.step()
+    rig.to(State.HOLD)
+    rig.guard.estop(rig.now_ns)
+    rig.coupled = False
+    rig.measured = rig.measured.copy()
+    rig.measured[6] += turned_rad
+    rig.run(0.1)
+    assert rig.ask(Action.RESET, key=KEY).done
+    assert np.array_equal(rig.step().position_rad, rig.measured + 0.01)
+    assert rig.guard.state is State.HOLD

@@ -124,6 +124,7 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (agreement.Agreement, "judge", nothing),
     (placed.Placement, "unplaced", nothing),
     (unbidden.UnbiddenMotion, "judge", lambda self, *_: np.zeros(len(self._names), np.bool_)),
+    (unbidden.UnbiddenMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_)),
     (guard.Guard, "_strayed", nothing),
     (guard.Guard, "_elapsed_s", unbounded_s),
     (guard.Guard, "_believed", lambda self: np.ones_like(self._valid)),

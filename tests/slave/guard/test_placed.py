@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.clock import NS_PER_MS
 from common.messages import Action
 from slave.agreement import WINDOW_RAD, Agreement
 from slave.guard import State
-from slave.guard.placed import BEYOND_RAD, NEAR_RAD
-from slave.unbidden import ASTRAY_RAD, STILL_RAD, UnbiddenMotion
+from slave.guard.placed import BEYOND_RAD, NEAR_RAD, PATIENCE, READINGS
+from slave.unbidden import ASTRAY_RAD, SHAKEN_NS, SHAKES_RAD, STILL_RAD, UnbiddenMotion
 
 MakeRig = Callable[..., Any]
 KEY = "a key kept at the robot"
@@ -53,10 +54,121 @@ def test_whoever_moves_while_nobody_is_engaged_is_stopped_within_50_ms(
     assert run_away(rig, rate_deg_s) <= 0.05
 
 
-@pytest.mark.parametrize("rate_deg_s", [60.0, 300.0])
-def test_who_goes_on_although_it_is_held_is_stopped_by_force(make_rig: MakeRig, rate_deg_s: float) -> None:
-    rig = make_rig().to_track()
-    assert run_away(rig, rate_deg_s) <= 0.35
+def stopped_after_s(rig: Any, state: State, rate_deg_s: float, wander_rad_s: float) -> float:
+    """An elbow runs away in a robot that moves: seconds from when that is evident until it is stopped."""
+    if state is State.ALIGN:
+        rig.target = rig.target + 0.8  # so that it has not arrived
+    rig.to(state).run(0.1)
+    began_ns, begins_rad = rig.now_ns, rig.measured[ELBOW]
+    rig.lies[ELBOW] = lambda _: float(begins_rad + math.radians(rate_deg_s) * (rig.now_ns - began_ns) * 1e-9)
+    evident_ns = 0
+    for i in range(200):
+        rig.target = rig.target + wander_rad_s * 0.005
+        if i % 16 == 0:
+            rig.send()
+        rig.step()
+        lately = [setpoint.position_rad[ELBOW] for setpoint in rig.setpoints[-22:-1]]
+        shown = rig.shown()[ELBOW]
+        if not evident_ns and max(min(lately) - shown, shown - max(lately)) > ASTRAY_RAD:
+            evident_ns = rig.now_ns
+        if rig.guard.state is State.ESTOP:
+            assert "against its setpoint" in rig.guard.reason
+            return (rig.now_ns - evident_ns) / 1e9
+        assert rig.guard.state in (State.ALIGN, State.TRACK)
+    return math.inf
+
+
+@pytest.mark.parametrize("rate_deg_s", [-300.0, -30.0, 60.0, 300.0])
+@pytest.mark.parametrize("wander_rad_s", [0.0, -0.3])
+@pytest.mark.parametrize("state", [State.ALIGN, State.TRACK])
+def test_whoever_moves_against_its_setpoint_while_the_robot_moves_is_stopped_within_50_ms(
+    make_rig: MakeRig, state: State, rate_deg_s: float, wander_rad_s: float
+) -> None:
+    assert 0.0 <= stopped_after_s(make_rig(), state, rate_deg_s, wander_rad_s) <= 0.05
+
+
+def test_without_the_patience_s_end_it_would_run_on(
+    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(UnbiddenMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_))
+    assert stopped_after_s(make_rig(), State.TRACK, 60.0, 0.0) == math.inf
+
+
+def sag(rig: Any, by_rad: float, within_s: float) -> None:
+    """An arm takes up a load: it sags ever more slowly."""
+    rig.to_track()
+    began_ns = rig.now_ns
+    rig.lies[ELBOW] = lambda true: (
+        true - by_rad * (1.0 - math.exp(-(rig.now_ns - began_ns) * 1e-9 / within_s))
+    )
+    rig.run(2.0)
+
+
+@pytest.mark.parametrize("within_s", [0.02, 0.1, 0.5])
+def test_an_arm_that_sags_under_a_load_while_it_follows_is_not_stopped(
+    make_rig: MakeRig, within_s: float
+) -> None:
+    rig = make_rig()
+    sag(rig, 0.99 * ASTRAY_RAD, within_s)
+    assert rig.guard.state is State.TRACK
+    assert not rig.guard.counters.losses
+
+
+def test_called_settled_while_it_follows_a_sagging_arm_would_be_stopped(
+    make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judge = UnbiddenMotion.judge
+    monkeypatch.setattr(UnbiddenMotion, "judge", lambda *args, **_: judge(*args))
+    rig = make_rig()
+    rig.to_track().run(0.5)
+    began_ns = rig.now_ns
+    rig.lies[ELBOW] = lambda true: true - min(0.05, 0.5e-9 * (rig.now_ns - began_ns))
+    rig.run(0.3)
+    assert rig.guard.state is State.ESTOP
+
+
+def out_for(ms: int, width_rad: float, lately_ms: int = 0) -> bool:
+    """Whether a wrist that goes outwards for so long is called against its setpoint.
+
+    `width_rad`: of the arm's setpoint, until `lately_ms` before.
+    """
+    part = UnbiddenMotion(["arm", "wrist"], readings=READINGS, patience=PATIENCE)
+    both, zeros = np.ones(2, np.bool_), np.zeros(2)
+    fast = np.array([width_rad, 0.0])
+    part.judge(NS_PER_MS, (zeros, fast), zeros, both)
+    begins_ns = (1 + lately_ms) * NS_PER_MS
+    out = False
+    for i in range(ms + 1):
+        arm_is = (zeros, zeros + [0.01, 0.0])
+        wrist = np.array([0.0, ASTRAY_RAD + 1e-9 + 0.002 * i])
+        out |= bool(part.judge(begins_ns + i * NS_PER_MS, arm_is, wrist, both)[1])
+    return out
+
+
+@pytest.mark.parametrize(
+    ("width_rad", "lately_ms", "may_ns"),
+    [
+        (SHAKES_RAD - 1e-9, 1, PATIENCE.plain_ns),
+        (SHAKES_RAD + 1e-9, 1, PATIENCE.shaken_ns),
+        (SHAKES_RAD + 1e-9, SHAKEN_NS // NS_PER_MS, PATIENCE.plain_ns),
+    ],
+)
+def test_who_is_thrown_by_others_is_given_longer_and_no_longer_than_that(
+    width_rad: float, lately_ms: int, may_ns: int
+) -> None:
+    # the first reading beyond may be the second one outwards
+    ms = may_ns // NS_PER_MS
+    assert not out_for(ms - 1, width_rad, lately_ms)
+    assert out_for(ms + 1, width_rad, lately_ms)
+
+
+def test_no_joint_is_thrown_by_itself() -> None:
+    part = UnbiddenMotion(["a"], readings=READINGS, patience=PATIENCE)
+    low, high = np.zeros(1), np.full(1, 2.0 * SHAKES_RAD)
+    out = [
+        part.judge(i * NS_PER_MS, (low, high), high + ASTRAY_RAD + 0.002 * i, ONE)[0] for i in range(1, 30)
+    ]
+    assert any(out)
 
 
 def test_the_setpoint_is_seated_where_the_drives_say_and_does_not_walk(make_rig: MakeRig) -> None:
