@@ -130,9 +130,11 @@ def _came_when_due(seen: Seen) -> Verdict:
     name = "due and never came, unexplained"
     if np.isnan(seen.samples["due"]).all():
         return at_most("commands", name, None, 0.0, note="the robot did not tell what was due")
-    due, all_ = seen.sum("due", seen.quiet), seen.sum("due")
+    # what was due and did not come is why a robot leaves off, so that it did explains nothing here
+    judged = ~in_windows(seen.samples.at_s, seen.explained.causes)
+    due, all_ = seen.sum("due", judged), seen.sum("due")
     # within a second one may come late that was counted in the second before
-    gone = max(0.0, seen.sum("gone", seen.quiet))
+    gone = max(0.0, seen.sum("gone", judged))
     note = f"{gone:.0f} of {due:.0f}; {seen.sum('gone'):.0f} of {all_:.0f} in all"
     return of_enough(
         at_most("commands", name, gone if due else None, 0.0, note=note), due / all_ if all_ else 0.0

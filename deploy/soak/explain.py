@@ -16,6 +16,8 @@ from deploy.soak.samples import Samples
 from deploy.soak.windows import Window, explained, reason
 
 LOST_WITHIN_S = 1.5
+LEFT_OFF = "after it left off"
+"""Explains what the robot does then, and not why it left off."""
 LOST_PACKETS = {"udp": 3, "quic-datagram": 3}
 """So many packets lost just before explain a hold. It takes three missed commands; on a stream, as all other
 transports are, one packet holds up those behind it until it is sent again, 0.2 s later or more (RTO)."""
@@ -37,6 +39,11 @@ class Explained:
     def all(self) -> tuple[Window, ...]:
         """All of them."""
         return (*self.faults, *self.stalls, *self.network)
+
+    @property
+    def causes(self) -> tuple[Window, ...]:
+        """Those that may be why the robot left off."""
+        return tuple(window for window in self.all if window.why != LEFT_OFF)
 
     def still_s(self, from_s: float, until_s: float) -> float:
         """The longest of the host's stalls within a span, as far as it lies there."""
@@ -77,7 +84,7 @@ def explanation(events: Sequence[Event], samples: Samples) -> Explained:
     # what the robot does once it has left off by itself is of one cause; that it left is judged on its own
     for left in of_kind(events, "left"):
         ends = [e.at_s for e in of_kind(events, "recovered") if e.at_s > left.at_s]
-        faults.append(Window(left.at_s, ends[0] if ends else math.inf, "after it left off"))
+        faults.append(Window(left.at_s, ends[0] if ends else math.inf, LEFT_OFF))
     last = [Window(e.at_s, math.inf, "end") for e in of_kind(events, "end")]
     return Explained((*own, *faults[len(own) :], *last), tuple(stalls), *_network(events, samples))
 

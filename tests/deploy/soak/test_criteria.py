@@ -329,6 +329,15 @@ def test_both_sides_still_for_5_s_fail_though_no_number_is_missing(make: Make) -
     assert judged(seen)["commands: lost, unexplained"].status is not Status.FAIL
 
 
+def test_that_the_robot_left_off_explains_no_command_that_was_due(make: Make) -> None:
+    left = Event(305.5, "left", {"guard": "hold", "reason": "no command"})
+    seen = make(events=(*STORY, left), gone=at(306.0, 62.0))
+    assert judged(seen)["commands: due and never came, unexplained"].status is Status.FAIL
+    assert judged(make(events=(*STORY, left), lost=at(306.0)))["commands: lost, unexplained"].figure == 0.0
+    in_a_fault = make(gone=at(104.0, 62.0))
+    assert judged(in_a_fault)["commands: due and never came, unexplained"].status is Status.PASS
+
+
 def test_what_was_due_is_not_judged_where_the_robot_does_not_tell(make: Make) -> None:
     verdict = judged(make(due=np.nan, gone=np.nan))["commands: due and never came, unexplained"]
     assert (verdict.status, verdict.figure) == (Status.NOT_JUDGED, None)
