@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import psutil
 import pytest
 
 from common.clock import to_ns
+from common.metrics import CameraMetrics
 from deploy.rig.host import Host
 from deploy.rig.rig import ROLES, Rig, open_rig
 from deploy.rig.tracking import until_tracking
@@ -28,9 +29,8 @@ def camera_process(rig: Rig) -> psutil.Process:
     return camera
 
 
-def ages(video: dict[str, Any]) -> int:
-    count: int = video.get("action_to_observation_ms", {}).get("count", 0)
-    return count
+def ages(video: CameraMetrics | None) -> int:
+    return 0 if video is None else video.action_to_observation_ms.count
 
 
 def test_a_camera_killed_while_the_robot_tracks_is_a_word_in_the_state_and_nothing_else(
