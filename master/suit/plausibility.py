@@ -23,6 +23,7 @@ from common.config import Section
 from common.messages import Mask
 from common.quaternion import Array
 from master.doubt import NodeDoubt, Weight
+from master.suit.chance import RepeatChance
 from master.suit.gravity import GravityWatch
 from master.suit.poll import Sweep
 
@@ -41,9 +42,11 @@ _MOVES_M_S2 = 0.4
 _QUIET_M_S2, _QUIET_RAD_S = 1.0, math.radians(5.0)
 """Within the window: the node is still enough for its accelerometer to show gravity alone."""
 _MAG_TURN_RAD = 1.0
-_LIVELY_COUNTS = 3.5
-"""A sensor of which an axis goes farther than this within the window has noise of 0.8 counts or more, or
-moves: then one of its axes repeats for `axis_s` by chance less than once in 10¹⁰ windows."""
+_LIVELY_COUNTS = 5.5
+"""A sensor of which an axis goes farther than this within the window moves, or has noise of a count or more, of
+which an axis repeats for `axis_s` by chance less than once a year. Below, `chance` decides."""
+_CONCLUDED = 25
+"""Judgements (0.5 s) from one look at the noise of the axes to the next."""
 
 
 class PlausibilityConfig(Section):
@@ -56,8 +59,10 @@ class PlausibilityConfig(Section):
     """An accelerometer or a gyro that repeats all three axes for so long is frozen. The recordings: 0.01."""
     axis_s: float = Field(default=0.16, ge=0.05, le=5.0)
     """One axis that stands for so long while the sensor's others move is stuck. The recordings: 0.035."""
-    still_axis_s: float = Field(default=0.5, ge=0.1, le=30.0)
-    """The same where the others are quiet too: a gyro whose noise is below a count repeats by chance."""
+    still_axis_s: float = Field(default=2.0, ge=0.1, le=30.0)
+    """Where the others are quiet too, an axis is stuck when it stands longer than by chance once a year, by its
+    own noise: 0.16 s at 1 count, 0.2 at 0.9, 0.26 at 0.75, 0.5 at 0.5, above 1.4 at 0.3. An axis so quiet that this would
+    take longer than `still_axis_s` is judged only while its node moves."""
     magnetometer_s: float = Field(default=1.0, ge=0.1, le=60.0)
     """A magnetometer (most are slower than the nodes' rate) that stands for so long while its node turns by a
     radian is stuck: it is not used, and the node goes on without it. In the recordings: 0.06."""
@@ -92,7 +97,10 @@ class Plausibility:
         self._blank_sum = _BLANK_COUNTS * float(scale[0])
         self._top = 32767.0 * scale[:6] * (1.0 - 1e-9)
         self._axis_blocks = self._blocks(config.axis_s, rate_hz)
-        self._still_blocks = self._blocks(config.still_axis_s, rate_hz)
+        self._chance = RepeatChance(count, rate_hz, scale[:6], config.still_axis_s * rate_hz)
+        self._chance_blocks = self._blocks_of(self._chance.samples, self._axis_blocks)
+        self._frozen_blocks = self._blocks_of(self._chance.all_three, 1)
+        self._judgements = 0
         self._mag_blocks = self._blocks(config.magnetometer_s, rate_hz)
         self._stood = np.zeros((count, 9), np.int64)
         """Judgements in a row in which a channel did not move."""
@@ -111,6 +119,10 @@ class Plausibility:
 
     def _blocks(self, seconds: float, rate_hz: float) -> int:
         return max(1, math.ceil((seconds * rate_hz - self._rows) / BLOCK) + 1)
+
+    def _blocks_of(self, samples: NDArray[np.int64], least: int) -> NDArray[np.int64]:
+        # of n equal readings the first is no repeat
+        return np.maximum(least, -((self._rows - 1 - samples) // BLOCK) + 1)
 
     def doubts(self) -> dict[int, NodeDoubt]:
         """What is wrong with which node, by its index."""
@@ -144,16 +156,23 @@ class Plausibility:
         span = high - low
         heard = 2 * self._fresh.sum(axis=0) >= self._rows
         same = (span == 0.0) & heard[:, None]
-        self._stood = (self._stood + 1) * same
+        # a missed window repeats the reading before it, which is no evidence
+        whole = self._fresh[self._block()].all(axis=0)
+        self._stood = (self._stood + whole[:, None]) * same
         dt_s, self._judged_ns = 1e-9 * (now_ns - self._judged_ns), now_ns
         found: dict[int, str] = {}
         if not self._config.noise_free:
+            self._learn_noise(same, span)
             self._find_repeats(same, span, found)
         self._find_clipped(low, high, found)
         self._find_wrong_gravity(low, high, span, heard, found)
-        block = slice(self._row - BLOCK if self._row else self._rows - BLOCK, self._row or self._rows)
-        self._follow_gravity(block, dt_s, found)
+        self._follow_gravity(self._block(), dt_s, found)
         self._settle(found, now_ns)
+
+    def _block(self) -> slice:
+        """The ticks since the last judgement."""
+        end = self._row or self._rows
+        return slice(end - BLOCK, end)
 
     def _follow_gravity(self, block: slice, dt_s: float, found: dict[int, str]) -> None:
         mean = self._ring[block].mean(axis=0)
@@ -174,19 +193,36 @@ class Plausibility:
     def _find_repeats(self, same: Mask, span: Array, found: dict[int, str]) -> None:
         if not same[:, :6].any():
             return
-        repeats: Mask = np.logical_and.reduce(same[:, :6].reshape(-1, 2, 3), axis=2)
+        stood = self._stood[:, :6].reshape(-1, 2, 3).min(axis=2)
+        repeats: Mask = (stood > 0) & (stood >= self._frozen_blocks)
         newest = self._ring[self._row - 1]
         for node in np.flatnonzero(repeats.any(axis=1)):
             found[int(node)] = _frozen_words(newest[node] / self._scale, repeats[node])
-        wide = span[:, :6] > _LIVELY_COUNTS * self._scale[:6]
-        lively = np.logical_or.reduce(wide.reshape(-1, 2, 3), axis=2)
-        # a gyro turns about one axis alone at times; then gravity moves through the accelerometer
-        lively[:, 1] |= span[:, _ACC].max(axis=1) > _MOVES_M_S2
-        needed = np.repeat(np.where(lively, self._axis_blocks, self._still_blocks), 3, axis=1)
+        needed = np.where(self._lively(span), self._axis_blocks, self._chance_blocks)
         stuck = self._stood[:, :6] >= needed
         for node in np.flatnonzero(stuck.any(axis=1)):
             axes = np.flatnonzero(stuck[node])
             found.setdefault(int(node), f"{_axes(axes)} stuck at {_values(newest[node], axes)}")
+
+    def _lively(self, span: Array) -> Mask:
+        """(N, 6) axes whose sensor moves or has much noise."""
+        wide = span[:, :6] > _LIVELY_COUNTS * self._scale[:6]
+        lively = wide.copy()
+        lively[:, :3] |= (wide[:, 0] | wide[:, 1] | wide[:, 2])[:, None]
+        # a gyro turns about one axis alone at times; then gravity moves through the accelerometer
+        moves = span[:, _ACC].max(axis=1) > _MOVES_M_S2
+        lively[:, 3:] |= (wide[:, 3] | wide[:, 4] | wide[:, 5] | moves)[:, None]
+        return lively
+
+    def _learn_noise(self, same: Mask, span: Array) -> None:
+        """A window in `_rows`, so that each reading is seen about once, and a pause between them never."""
+        self._judgements += 1
+        if self._judgements * BLOCK % self._rows == 0:
+            self._chance.learn(self._ring[..., :6], ~(self._lively(span) | same[:, :6]))
+        if self._judgements % _CONCLUDED == 0:
+            self._chance.conclude()
+            self._chance_blocks = self._blocks_of(self._chance.samples, self._axis_blocks)
+            self._frozen_blocks = self._blocks_of(self._chance.all_three, 1)
 
     def _find_clipped(self, low: Array, high: Array, found: dict[int, str]) -> None:
         ends = (high[:, :6] >= self._top) | (low[:, :6] <= -self._top)
