@@ -45,6 +45,8 @@ _MAG_TURN_RAD = 1.0
 _LIVELY_COUNTS = 5.5
 """A sensor of which an axis goes farther than this within the window moves, or has noise of a count or more, of
 which an axis repeats for `axis_s` by chance less than once a year. Below, `chance` decides."""
+_NOISE_COUNTS = 12.5
+"""An axis that goes farther within the window is no axis at rest whose noise could be learnt."""
 _CONCLUDED = 25
 """Judgements (0.5 s) from one look at the noise of the axes to the next."""
 
@@ -61,7 +63,7 @@ class PlausibilityConfig(Section):
     """One axis that stands for so long while the sensor's others move is stuck. The recordings: 0.035."""
     still_axis_s: float = Field(default=2.0, ge=0.1, le=30.0)
     """Where the others are quiet too, an axis is stuck when it stands longer than by chance once a year, by its
-    own noise: 0.16 s at 1 count, 0.2 at 0.9, 0.26 at 0.75, 0.5 at 0.5, above 1.4 at 0.3. An axis so quiet that this would
+    own noise: 0.16 s at 1 count, 0.2 at 0.9, 0.23 at 0.75, 0.35 at 0.6, 0.55 at 0.5. An axis so quiet that this would
     take longer than `still_axis_s` is judged only while its node moves."""
     magnetometer_s: float = Field(default=1.0, ge=0.1, le=60.0)
     """A magnetometer (most are slower than the nodes' rate) that stands for so long while its node turns by a
@@ -218,7 +220,12 @@ class Plausibility:
         """A window in `_rows`, so that each reading is seen about once, and a pause between them never."""
         self._judgements += 1
         if self._judgements * BLOCK % self._rows == 0:
-            self._chance.learn(self._ring[..., :6], ~(self._lively(span) | same[:, :6]))
+            # noise spreads far, but goes nowhere
+            half = self._rows // 2
+            drift = np.abs(self._ring[half:, :, :6].mean(axis=0) - self._ring[:half, :, :6].mean(axis=0))
+            rests = (span[:, :6] < _NOISE_COUNTS * self._scale[:6]) & (drift < 2.0 * self._scale[:6])
+            rests &= (span[:, _ACC].max(axis=1) < _MOVES_M_S2)[:, None]
+            self._chance.learn(self._ring[..., :6], rests & ~same[:, :6])
         if self._judgements % _CONCLUDED == 0:
             self._chance.conclude()
             self._chance_blocks = self._blocks_of(self._chance.samples, self._axis_blocks)

@@ -50,13 +50,13 @@ def test_nodes_at_rest_are_believed_however_quiet_their_gyros(sigma: float) -> N
     ("sigma", "within_s"), [(1.5, 0.2), (1.0, 0.2), (0.9, 0.22), (0.75, 0.3), (0.5, 0.7)]
 )
 def test_a_stuck_axis_at_rest_is_told_as_soon_as_its_noise_permits(sigma: float, within_s: float) -> None:
-    counts = rest(sigma, nodes=36, ticks=1100)
-    counts[800:, :, 4] = counts[799, :, 4]
+    counts = rest(sigma, nodes=36, ticks=2300)
+    counts[2000:, :, 4] = counts[1999, :, 4]
     told = said(counts)
     assert {node for _, node, _ in told} == set(range(36))
     assert all("gyroscope y is stuck" in words for *_, words in told)
-    assert min(tick for tick, *_ in told) > 800
-    assert max(tick for tick, *_ in told) <= 800 + 200 * within_s
+    assert min(tick for tick, *_ in told) > 2000
+    assert max(tick for tick, *_ in told) <= 2000 + 200 * within_s
 
 
 @pytest.mark.parametrize("sigma", [0.3, 0.5, 0.8, 1.2])
