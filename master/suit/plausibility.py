@@ -62,9 +62,9 @@ class PlausibilityConfig(Section):
     axis_s: float = Field(default=0.16, ge=0.05, le=5.0)
     """One axis that stands for so long while the sensor's others move is stuck. The recordings: 0.035."""
     still_axis_s: float = Field(default=2.0, ge=0.1, le=30.0)
-    """Where the others are quiet too, an axis is stuck when it stands longer than by chance once a year, by its
-    own noise: 0.16 s at 1 count, 0.2 at 0.9, 0.23 at 0.75, 0.35 at 0.6, 0.55 at 0.5. An axis so quiet that this would
-    take longer than `still_axis_s` is judged only while its node moves."""
+    """Where the others are quiet too, an axis is stuck when it stands longer than by chance once a year, by
+    its own noise: 0.16 s at 1 count, 0.2 at 0.9, 0.23 at 0.75, 0.35 at 0.6, 0.55 at 0.5. An axis so quiet that
+    this would take longer than `still_axis_s` is judged only while its node moves."""
     magnetometer_s: float = Field(default=1.0, ge=0.1, le=60.0)
     """A magnetometer (most are slower than the nodes' rate) that stands for so long while its node turns by a
     radian is stuck: it is not used, and the node goes on without it. In the recordings: 0.06."""
