@@ -43,8 +43,8 @@ _QUIET_M_S2, _QUIET_RAD_S = 1.0, math.radians(5.0)
 """Within the window: the node is still enough for its accelerometer to show gravity alone."""
 _MAG_TURN_RAD = 1.0
 _LIVELY_COUNTS = 5.5
-"""A sensor of which an axis goes farther than this within the window moves, or has noise of a count or more, of
-which an axis repeats for `axis_s` by chance less than once a year. Below, `chance` decides."""
+"""A sensor of which an axis goes farther than this within the window moves, or has noise of a count or more,
+of which an axis repeats for `axis_s` by chance less than once a year. Below, `chance` decides."""
 _NOISE_COUNTS = 12.5
 """An axis that goes farther within the window is no axis at rest whose noise could be learnt."""
 _CONCLUDED = 25
@@ -63,8 +63,8 @@ class PlausibilityConfig(Section):
     """One axis that stands for so long while the sensor's others move is stuck. The recordings: 0.035."""
     still_axis_s: float = Field(default=2.0, ge=0.1, le=30.0)
     """Where the others are quiet too, an axis is stuck when it stands longer than by chance once a year, by
-    its own noise: 0.16 s at 1 count, 0.2 at 0.9, 0.23 at 0.75, 0.35 at 0.6, 0.55 at 0.5. An axis so quiet that
-    this would take longer than `still_axis_s` is judged only while its node moves."""
+    its own noise: 0.16 s at 1 count, 0.2 at 0.9, 0.23 at 0.75, 0.35 at 0.6, 0.55 at 0.5. An axis so quiet
+    that this would take longer than `still_axis_s` is judged only while its node moves."""
     magnetometer_s: float = Field(default=1.0, ge=0.1, le=60.0)
     """A magnetometer (most are slower than the nodes' rate) that stands for so long while its node turns by a
     radian is stuck: it is not used, and the node goes on without it. In the recordings: 0.06."""
