@@ -159,7 +159,7 @@ class Plausibility:
         heard = 2 * self._fresh.sum(axis=0) >= self._rows
         same = (span == 0.0) & heard[:, None]
         # a missed window repeats the reading before it, which is no evidence
-        whole = self._fresh[self._block()].all(axis=0)
+        whole: Mask = np.logical_and.reduce(self._fresh[self._block()], axis=0)
         self._stood = (self._stood + whole[:, None]) * same
         dt_s, self._judged_ns = 1e-9 * (now_ns - self._judged_ns), now_ns
         found: dict[int, str] = {}
