@@ -71,7 +71,8 @@ class RepeatChance:
         self.samples: NDArray[np.int64] = np.full((count, 6), NEVER)
         """(N, 6) how often an axis repeats before it is stuck, where its sensor is quiet."""
         self.all_three: NDArray[np.int64] = np.zeros((count, 2), np.int64)
-        """(N, 2) the same for all three axes of a sensor at once; 0 where none was ever quiet."""
+        """(N, 2) the same for all three axes of a sensor at once; 0 for a gyro that was never quiet, and for
+        accelerometers, whose noise is counts in every unit there is."""
 
     def learn(self, block: Array, quiet: Mask) -> None:
         """Neighbouring readings (T, N, 6) in SI, of axes (N, 6) that rest and do not stand."""
@@ -88,6 +89,7 @@ class RepeatChance:
         with np.errstate(divide="ignore"):
             three = 1.0 / (1.0 / samples).reshape(-1, 2, 3).sum(axis=2)
         quiet = self._seen.reshape(-1, 2, 3).min(axis=2) > 0.0
+        quiet[:, 0] = False
         self.all_three = np.where(quiet, _whole(three), 0)
 
     def sigma_counts(self) -> Array:

@@ -15,6 +15,7 @@ from deploy import cli
 from deploy.doctor.finding import Verdict, fail, ok, warn, worst
 from deploy.doctor.needs import Camera, needs_of
 from deploy.doctor.view import as_table, as_tree, in_words
+from master.suit.protocol import SHIPPED_DBC, SuitProtocol
 
 EXAMPLES = Path(cli.__file__).parent / "examples"
 
@@ -24,6 +25,18 @@ def test_a_master_s_file_tells_buses_robots_and_name() -> None:
     assert (needs.role, needs.robots, needs.certified_as) == ("master", ("robot-1",), "operator:nurse-1")
     assert [(need.bus.name, need.nodes, need.rate_hz) for need in needs.buses] == [("suit", 36, 200)]
     assert needs.realtime_priority == 20
+
+
+def test_a_master_whose_dbc_gives_two_messages_one_identifier_is_told_before_the_suit_is_worn(
+    tmp_path: Path,
+) -> None:
+    text = SHIPPED_DBC.read_text("utf-8")
+    line = next(line for line in text.splitlines() if line.startswith("BO_ ") and " SYNC:" in line)
+    number = SuitProtocol.load().answer_format(fd=True).parts[0].base_id + 5
+    crowded = tmp_path / "crowded.dbc"
+    crowded.write_text(text.replace(f" {line.split()[1]} ", f" {number} "), "utf-8")
+    with pytest.raises(ConfigError, match=f"{number:#x}.*NODE_SAMPLE of node 5 and SYNC"):
+        needs_of(EXAMPLES / "master.toml", [f'capture.dbc="{crowded}"'])
 
 
 def test_a_slave_s_file_tells_its_ports_and_camera() -> None:
