@@ -11,9 +11,13 @@ from common.clock import NS_PER_S
 from common.messages import Action, BaseAttitude
 from common.presence import Presence
 from common.quaternion import Array
+from common.skeleton import load_skeleton
 from deploy.faults.scene import Scene
+from deploy.faults.setting import Setting
+from deploy.profiles import NURSING
 from master.suit.simulated.faults import FaultsConfig, Loss, Twin
 from master.suit.simulated.lies import Lie, LieKind
+from master.suit.simulated.motion import Motion, parse_motion
 from slave.guard import State
 from slave.guard.body import Body
 from slave.guard.tilt import base_loss
@@ -55,6 +59,33 @@ def node_stuck(scene: Scene) -> None:
 def node_saturated(scene: Scene) -> None:
     """One axis of its gyro is at the end of its range."""
     _lies(scene, "saturated", axis=4)
+
+
+def nothing(_: Scene) -> None:
+    """All that is amiss has been so from the beginning, by the row's setting."""
+
+
+def leaning() -> Motion:
+    """An operator who stands bowed by 25°."""
+    moves = "".join(
+        f"[[move]]\nstart_s = {start_s}\nduration_s = 1.0\nto_deg = {{ neck_yaw = {deg} }}\n"
+        for start_s, deg in ((30.0, 10), (40.0, 0))
+    )
+    text = f"period_s = 60.0\n[rest_deg]\nwaist_pitch = 25\n{moves}"
+    return parse_motion(text, load_skeleton(NURSING), source="leaning")
+
+
+def leans(scene: Scene) -> None:
+    """Somebody asks to engage who has leaned all the time."""
+    scene.run.run(1.4)
+    scene.refuses_to_engage("zero pose refused: leaned by 25°")
+
+
+LEANS = Setting(mounted=True, master=("estimation.stance_s=1.0",), motion=leaning)
+GROSS_BIAS = Setting(lead_s=4.0, suit=(f'faults.lie=[{{node="{NODE}",kind="biased_gyro",offset=12.0}}]',))
+IRON = Setting(
+    lead_s=20.0, suit=(f'faults.lie=[{{node="{NODE}",kind="magnetised",offset=15.0,from_s=6.0}}]',)
+)
 
 
 def two_suits(scene: Scene) -> None:

@@ -11,6 +11,7 @@ from slave.guard import State
 
 if TYPE_CHECKING:
     from deploy.faults.scene import Scene
+    from deploy.faults.setting import Setting
 
 
 class Reaction(StrEnum):
@@ -45,6 +46,8 @@ class Fault:
     begins: State = State.TRACK
     ends: State = State.HOLD
     """The guard's state afterwards."""
+    setting: Setting | None = None
+    """What differs from the usual scene from its beginning on; None: nothing."""
     reacts_s: float | None = None
     """The guard must have reached `ends` by then; None where it goes on."""
     stands_s: float | None = None

@@ -16,6 +16,7 @@ from common.errors import TandemError
 from common.messages import Action, Command
 from common.skeleton import load_skeleton
 from deploy.faults.limits import Asked
+from deploy.faults.setting import Later, Setting, files
 from deploy.faults.stillness import Course
 from deploy.profiles import NURSING
 from deploy.virtual import VirtualRun, World
@@ -49,14 +50,16 @@ def reach() -> Motion:
 class Scene:
     """One run up to the fault, and beyond. `guard_options` may take gates and watches out of the guard."""
 
-    def __init__(self, **guard_options: Any) -> None:
-        self.run = VirtualRun(
-            World(
-                start_ns=UP_NS,
-                motion=reach(),
-                overrides={"slave": [f'guard.reset_key="{RESET_KEY}"']},
-            )
-        )
+    def __init__(self, setting: Setting | None = None, **guard_options: Any) -> None:
+        setting = setting or Setting()
+        self._begins_s = setting.lead_s
+        with files(setting) as master:
+            overrides = {
+                "slave": [f'guard.reset_key="{RESET_KEY}"'], "suit": list(setting.suit), "master": master,
+            }  # fmt: skip
+            usual = reach() if setting.motion is None else setting.motion()
+            motion: Motion = Later(usual, setting.lead_s) if setting.lead_s else usual
+            self.run = VirtualRun(World(start_ns=UP_NS, motion=motion, overrides=overrides))
         config = self.run.slave_config
         self.skeleton = config.skeleton
         self.run.slave.guard = Guard(
@@ -91,15 +94,15 @@ class Scene:
 
     @property
     def elapsed_s(self) -> float:
-        """Since the operator began."""
-        return to_s(self.run.now_ns - UP_NS)
+        """Since the operator began, the setting's lead left out."""
+        return to_s(self.run.now_ns - UP_NS) - self._begins_s
 
     def to(self, state: State) -> None:
         """Bring the robot to a state. Raises TandemError where it does not get there."""
         if state is State.BOOT:
             blind = np.zeros(len(self.skeleton.joints), np.bool_)
             self.run.troubles.read = lambda reading: EncoderReading(reading.read_ns, reading.counts, blind)
-        self.run.run(ENGAGED_S)
+        self.run.run(self._begins_s + ENGAGED_S)
         if state in (State.ALIGN, State.TRACK):
             if state is State.ALIGN:  # once the operator has reached, so that there is some way to go
                 self.run.run(REACHING_S)
@@ -141,6 +144,12 @@ class Scene:
         """Ask for what must be refused."""
         if self.run.ask(action, operator=operator).done:
             self.granted.append(str(action))
+
+    def refuses_to_engage(self, words: str) -> None:
+        """The operator asks to engage, and is to be refused in these words."""
+        reply = self.run.ask(Action.ENGAGE)
+        if reply.done or words not in reply.text:
+            self.granted.append(f"engage ({reply.text or 'done'}), which was to be refused for: {words}; it")
 
     def newest(self) -> Command:
         """The master's last command."""

@@ -217,6 +217,36 @@ SUIT = (
         )
     ),
     Fault(
+        "zero pose of somebody who leans",
+        "The suit is put on, and the operator stands bowed by 25° where the zero pose is to be taken.",
+        Reaction.HOLDS,
+        "Refuses to engage, and says which segment leaned by how much. It stands.",
+        "Stand upright, arms hanging, and still for `stance_s`; then engage.",
+        body.leans,
+        begins=State.HOLD, setting=body.LEANS, stands_s=AT_ONCE_S,
+    ),
+    # compared with an operator who stood for less long before, which alone makes 3° of difference
+    Fault(
+        "gyro with a gross bias",
+        "A gyro of the reaching arm has read 12 °/s too much on each axis since it was put on; the operator "
+        "stood still for 5 s before engaging.",
+        Reaction.GOES_ON,
+        "Follows: the bias was learnt at rest. The node is named with its rate; beyond "
+        "`rest_bias_limit_deg_s` its joints would be held, or engage refused.",
+        "Calibrate the node (`tandem calibrate imu`).",
+        body.nothing,
+        ends=State.TRACK, setting=body.GROSS_BIAS, strays_deg=5.0,
+    ),
+    Fault(
+        "iron at a magnetometer while it is worn",
+        "Iron sticks to a node of the reaching arm: 15 µT more on each axis, for 16 s before.",
+        Reaction.GOES_ON,
+        "Follows. The node's gyro keeps its heading; `tandem status` names the node.",
+        "Take the iron away, or calibrate the node (`tandem calibrate mag`).",
+        body.nothing,
+        ends=State.TRACK, setting=body.IRON, strays_deg=5.0,
+    ),
+    Fault(
         "second suit on the bus",
         "Another suit answers the same SYNCs with the same node numbers.",
         Reaction.HOLDS,

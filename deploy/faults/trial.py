@@ -39,7 +39,7 @@ class Outcome:
 
 def run_trial(fault: Fault, **guard_options: Any) -> Outcome:
     """Try it, on a guard with some gates or watches taken out where `guard_options` says so."""
-    scene = Scene(**guard_options)
+    scene = Scene(fault.setting, **guard_options)
     scene.to(fault.begins)
     scene.begin()
     fault.act(scene)

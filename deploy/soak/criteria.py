@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from common.messages import Mask
+from common.quaternion import Array
 from deploy.soak.events import Event, of_kind
 from deploy.soak.explain import LOST_PACKETS, Explained, unexplained_lefts
 from deploy.soak.samples import Samples
-from deploy.soak.verdict import Status, Verdict, at_most, of_enough
+from deploy.soak.verdict import Status, Verdict, at_most, of_enough, of_most
 from deploy.soak.windows import explained as in_windows
 
 HOLD_S = 0.2 + 0.08
@@ -113,8 +114,14 @@ def commands(seen: Seen) -> list[Verdict]:
     ages = seen.samples["age_max_ms"]
     oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
     most_ms = 1e3 * seen.network.get("max_age_s", AGE_MS / 1e3)
-    verdicts.append(at_most("commands", "oldest that was acted on", oldest, most_ms, "ms", "put → accepted"))
+    aged = at_most("commands", "oldest that was acted on", oldest, most_ms, "ms", "put → accepted")
+    verdicts.append(of_most(aged, _known_share(ages, seen.quiet & (seen.samples["sent"] > 0.0))))
     return [_any_came(seen), *verdicts, _came_when_due(seen)]
+
+
+def _known_share(values: Array, asked: Mask) -> float:
+    """Of the samples (N,) asked for, those that hold a figure; 1 where none was asked for."""
+    return float(np.isfinite(values[asked]).mean()) if asked.any() else 1.0
 
 
 def _any_came(seen: Seen) -> Verdict:

@@ -40,11 +40,16 @@ class Motion:
             return
         if self._held_ns is None:
             self._held_ns = state.sent_ns
-        if state.sent_ns - self._held_ns < BRAKES_S * NS_PER_S or not state.encoder_valid.all():
+        known = state.encoder_valid
+        if state.sent_ns - self._held_ns < BRAKES_S * NS_PER_S or not known.any():
             return
         if self._rest_rad is None:
-            self._rest_rad = state.position_rad
-        strayed_rad = float(np.abs(state.position_rad - self._rest_rad).max())
+            self._rest_rad = np.full_like(state.position_rad, np.nan)
+        # one encoder that does not answer must not hide what the other joints do
+        self._rest_rad = np.where(known & np.isnan(self._rest_rad), state.position_rad, self._rest_rad)
+        way_rad = np.abs(state.position_rad - self._rest_rad)[known]
+        # an angle that is called valid and is no number may be anywhere
+        strayed_rad = float(np.where(np.isfinite(way_rad), way_rad, np.inf).max())
         self._strayed_rad = max(self._strayed_rad or 0.0, strayed_rad)
 
     def forget(self) -> None:

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import Any
 
+from deploy.judge.estimated import LEAST_ESTIMATED
 from deploy.soak.trend import Slope
 
 LEAST_SHARE = 0.2
@@ -54,6 +55,15 @@ def of_enough(verdict: Verdict, share: float) -> Verdict:
     words = f"only {100.0 * share:.0f} % of it was outside of what explains"
     note = f"{words}; {verdict.note}" if verdict.note else words
     return replace(verdict, status=Status.NOT_JUDGED, note=note)
+
+
+def of_most(verdict: Verdict, share: float) -> Verdict:
+    """Not judged instead of passed, where the figure is known for less than LEAST_ESTIMATED of the time."""
+    if verdict.status is not Status.PASS or share >= LEAST_ESTIMATED:
+        return verdict
+    words = f"known for only {100.0 * share:.0f} % of the samples"
+    note = f"{words}; {verdict.note}" if verdict.note else words
+    return replace(verdict, status=Status.NOT_JUDGED, figure=None, note=note)
 
 
 def not_above(

@@ -65,7 +65,9 @@ FIGURES = (
            "RMS acceleration of the robot over the operator's; 1 is as smooth as the operator"),
     Figure("eta_percent", "η", "%", 2, MOTION,
            "the paper's dynamic error (Eq. 25) of the solved angles, the worse arm; the network has no "
-           "part in it"),
+           "part in it; withheld below 95 % estimated"),
+    Figure("estimated", "estimated", "%", 1, MOTION,
+           "share of the joints' angles that were estimated, of the joint with the least"),
     Figure("tracked", "tracked", "%", 1, GUARD, "share of the judged time in which the robot followed"),
     Figure("holds", "holds", "", 0, GUARD,
            "times that the guard left track during the judged time; the operator then engaged again"),

@@ -154,7 +154,10 @@ def _motion(judged: Recording, config: SlaveConfig) -> dict[str, float | None]:
     truth, moved = trace.truth(), trace.moved()
     followed = motion(truth, moved, trace.joint_names)
     solved = accuracy(truth, trace.solved(), trace.joint_names)
-    figures: dict[str, float | None] = {"eta_percent": solved.eta_percent}
+    figures: dict[str, float | None] = {
+        "eta_percent": solved.eta_percent,
+        "estimated": 100.0 * min(solved.estimated.values()) if len(truth.tick) else None,
+    }
     if followed is None:
         return figures
     return figures | {

@@ -293,6 +293,7 @@ class Guard:
         return Signs(
             now_ns, self.lease.token != 0, self._command_ns, somebody_ns, self._command_timeout_ns,
             self._refusal, self._encoders, self._plausible.too_many(), self._body,
+            doubt=self._operator_doubt,
         )  # fmt: skip
 
     def _doubt(self, now_ns: int, position_rad: Array, encoder_valid: Mask, encoder_ns: int) -> None:

@@ -66,6 +66,8 @@ class Signs:
     implausible: str | None
     """More encoders than may be do not agree with the setpoint."""
     body: Body
+    doubt: str = ""
+    """Why the master would have nobody engage, empty where it would."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +95,7 @@ def _command(signs: Signs) -> str | None:
 
 def _valid(signs: Signs) -> str | None:
     if signs.somebody_ns is None:
-        return "no joint has been valid yet"
+        return "no joint has been valid yet" + (f": {signs.doubt}" if signs.doubt else "")
     age_ns = abs(signs.now_ns - signs.somebody_ns)
     if age_ns <= signs.command_timeout_ns:
         return None

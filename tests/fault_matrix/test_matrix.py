@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import slave.guard.limit
+from common.errors import TandemError
 from deploy.faults.fault import Reaction
 from deploy.faults.table import FAULTS
 from deploy.faults.trial import run_trial
@@ -76,6 +78,25 @@ def test_drives_that_differ_from_encoders_go_on_without_the_comparison(
 ) -> None:
     monkeypatch.setattr(Agreement, "judge", lambda *_: None)
     assert run_trial(TABLE["drive and output encoder differ"]).wrong
+
+
+@pytest.mark.parametrize(
+    ("name", "without"),
+    [
+        ("zero pose of somebody who leans", "estimation.stance_lean_deg=80.0"),
+        ("gyro with a gross bias", "estimation.vqf.rest_bias=false"),
+        ("iron at a magnetometer while it is worn", "estimation.vqf.field_change=0.0"),
+    ],
+)
+def test_a_row_of_the_estimate_fails_without_its_setting(name: str, without: str) -> None:
+    fault = TABLE[name]
+    assert fault.setting is not None
+    bared = replace(fault, setting=replace(fault.setting, master=(*fault.setting.master, without)))
+    try:
+        wrong = run_trial(bared).wrong
+    except TandemError as error:
+        wrong = (str(error),)
+    assert wrong
 
 
 def test_an_emergency_stop_fails_without_its_transition(monkeypatch: pytest.MonkeyPatch) -> None:

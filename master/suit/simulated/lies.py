@@ -12,6 +12,8 @@
 | `swapped_gyro` | its x and y exchanged |
 | `rescaled` | the unit started anew with another range: accelerometer and gyro by `factor` |
 | `self_test` | the self-test left on: a constant force on each axis of both (some 0.5 g and 30 °/s) |
+| `biased_gyro` | a gyro that reads `offset` °/s more on each axis: a shock, cold, or never calibrated |
+| `magnetised` | a magnetometer with iron stuck to it: `offset` µT more on each axis, turning with it |
 | `frozen_mag`, `overflow_mag` | the magnetometer alone: one reading for ever; −4096 on one axis (HMC5883L) |
 """
 
@@ -31,7 +33,7 @@ from master.suit.simulated.span import Span
 
 LieKind = Literal[
     "frozen", "zero", "ones", "stuck", "dead_gyro", "saturated", "flipped_gyro", "swapped_gyro", "rescaled",
-    "self_test", "frozen_mag", "overflow_mag",
+    "self_test", "biased_gyro", "magnetised", "frozen_mag", "overflow_mag",
 ]  # fmt: skip
 _ACC, _GYR, _MAG = slice(0, 3), slice(3, 6), slice(6, 9)
 _SELF_TEST_M_S2, _SELF_TEST_RAD_S = 5.0, math.radians(30.0)
@@ -47,6 +49,8 @@ class Lie(Span):
     """Accelerometer 0–2, gyro 3–5, magnetometer 6–8, for the kinds that concern one axis."""
     factor: float = Field(default=2.0, gt=0.0, le=16.0)
     """For `rescaled`."""
+    offset: float = Field(default=20.0, ge=-1000.0, le=1000.0)
+    """For `biased_gyro` °/s, for `magnetised` µT."""
 
 
 class Lies:
@@ -97,11 +101,20 @@ class Lies:
         elif lie.kind == "self_test":
             force = np.repeat([_SELF_TEST_M_S2, _SELF_TEST_RAD_S], 3) / self._scale[:6]
             out[:6] = np.clip(np.rint(now[:6] + force), -32767, 32767)
+        elif lie.kind == "biased_gyro":
+            out[_GYR] = _more(now[_GYR], math.radians(lie.offset) / self._scale[_GYR])
+        elif lie.kind == "magnetised":
+            out[_MAG] = _more(now[_MAG], lie.offset / self._scale[_MAG])
         elif lie.kind == "frozen_mag":
             out[_MAG] = held[_MAG]
         else:
             out[_one(lie, 6)] = MAG_OVERFLOW
         return out
+
+
+def _more(counts: Counts, offset: Array) -> Array:
+    """Counts with an offset, as far as the range goes."""
+    return np.clip(np.rint(counts + offset), -32767, 32767)
 
 
 def _one(lie: Lie, default: int) -> int:

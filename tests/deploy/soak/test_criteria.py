@@ -356,3 +356,19 @@ def test_what_nobody_told_is_not_judged_and_no_zero(make: Make, column: str, nam
     assert judged(make())[name].status is Status.PASS
     verdict = judged(make(**{column: np.nan}))[name]
     assert (verdict.status, verdict.figure) == (Status.NOT_JUDGED, None)
+
+
+@pytest.mark.parametrize(
+    ("unknown", "status"), [(0, Status.PASS), (0.04, Status.PASS), (0.06, Status.NOT_JUDGED)]
+)
+def test_an_age_that_was_known_for_less_than_95_percent_is_no_pass(
+    make: Make, unknown: float, status: Status
+) -> None:
+    gone = round(600 * unknown)
+    seen = make(age_max_ms=lambda at_s: np.where(abs(at_s - 300.5) < 0.5 * gone, np.nan, 20.0))
+    verdict = judged(seen)["commands: oldest that was acted on"]
+    assert (verdict.status, verdict.figure) == (status, 20.0 if status is Status.PASS else None)
+    late = make(
+        events=(), age_max_ms=lambda at_s: np.where(abs(at_s - 300.5) < 0.5 * gone, np.nan, AGE_MS + 1.0)
+    )
+    assert judged(late)["commands: oldest that was acted on"].status is Status.FAIL

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -207,3 +208,18 @@ def test_another_process_s_robot_stands_elsewhere_and_that_is_no_motion() -> Non
 
 def test_of_a_robot_that_follows_nothing_is_said() -> None:
     assert motion(*at_50_hz(2.0, "track", lambda t: t)).take_strayed() is None
+
+
+@pytest.mark.parametrize(("spoil", "strayed_rad"), [("silent", 0.5), ("nan", math.inf)])
+def test_a_joint_that_is_not_read_hides_no_other_and_one_read_as_no_number_may_be_anywhere(
+    spoil: str, strayed_rad: float
+) -> None:
+    seen = Motion(SKELETON)
+    for sequence in range(100):
+        state = replace(STATE, sequence=sequence, sent_ns=sequence * NS_PER_S // 50, guard="hold")
+        angles, valid = np.zeros(JOINTS), np.ones(JOINTS, np.bool_)
+        angles[1] = 0.5 * (sequence > 60)
+        if sequence > 50:
+            angles[0], valid[0] = np.nan, spoil == "nan"
+        seen.see(replace(state, position_rad=angles, setpoint_rad=angles, encoder_valid=valid))
+    assert seen.take_strayed() == strayed_rad
