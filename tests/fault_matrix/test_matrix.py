@@ -69,7 +69,7 @@ def test_the_rules_of_the_limiter_are_what_bounds_a_jump(monkeypatch: pytest.Mon
 
 
 def test_a_drive_that_moves_by_itself_goes_on_without_the_watch(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(UnbiddenMotion, "judge", lambda self, *_: np.zeros(len(self._names), np.bool_))
+    monkeypatch.setattr(UnbiddenMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_))
     assert run_trial(TABLE["drive moves by itself"]).wrong
 
 

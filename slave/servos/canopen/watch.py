@@ -16,10 +16,12 @@ from slave.agreement import Agreement
 from slave.encoders import Encoders
 from slave.servos.canopen.start_check import CHECKED_SYNCS, Place, refusal
 from slave.servos.canopen.status_bits import BAD_SYNCS, GOOD, WARNING, WATCHED, amiss
-from slave.unbidden import STILL_RAD, UnbiddenMotion
+from slave.unbidden import STILL_RAD, Patience, UnbiddenMotion
 
-_SPAN_NS = 160 * NS_PER_MS
+_SPAN_NS = 120 * NS_PER_MS
 """How late a drive may follow."""
+_PATIENCE = Patience(plain_ns=0, shaken_ns=80 * NS_PER_MS)
+"""SYNCs are 20 ms apart, and answers are judged before the next one: there is no time to wait for another."""
 _REFUSED_SYNCS = 10
 """A drive that may not be enabled for so many SYNCs has failed."""
 _MOVES_SYNCS = 100
@@ -80,7 +82,7 @@ class DriveWatch:
         self._restless = [0] * joints
         self._anchor_rad: Array = np.full(joints, np.nan)
         self._bad_bits: NDArray[np.int64] = np.zeros(joints, np.int64)
-        self._motion = UnbiddenMotion(joint_names)
+        self._motion = UnbiddenMotion(joint_names, patience=_PATIENCE)
         self._agreement = Agreement(joint_names)
         self._targets_rad: Array = np.zeros((max(2, _SPAN_NS // period_ns), joints))
         self._row = 0

@@ -1,4 +1,4 @@
-"""The simulated robot's own encoders under setpoints flung about at their limits: none is doubted."""
+"""The simulated robot's encoders under setpoints flung about at their limits: none is doubted or stopped."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from common.skeleton import load_skeleton
 from slave.encoders import Encoders
 from slave.guard import GuardConfig
 from slave.guard.limit import SetpointLimiter
+from slave.guard.placed import Placement
 from slave.guard.plausible import Plausibility
 from slave.servos.simulated import SimulatedRobot
 
@@ -22,6 +23,7 @@ def test_a_joint_flung_to_and_fro_at_its_limits_is_believed(profile: str) -> Non
     robot = SimulatedRobot(skeleton, position_rad=target)
     limiter, encoders = SetpointLimiter(names, limits), Encoders(skeleton)
     part = Plausibility(names, skeleton.max_velocity_rad_s, config)
+    placement = Placement(names, skeleton.lower_rad, skeleton.upper_rad)
     limiter.seat(target)
     part.note(0, target)
     held = np.zeros(len(names), np.bool_)
@@ -34,6 +36,10 @@ def test_a_joint_flung_to_and_fro_at_its_limits_is_believed(profile: str) -> Non
         reading = robot.read()
         shown = encoders.position_rad(reading.counts)
         assert not part.judge(shown, reading.valid, reading.read_ns, moving=True), part.words
+        moves = placement.take(
+            reading.read_ns, shown, reading.valid, drive_rad=None, span=part.span, under_way=True
+        )
+        assert part.span is None or moves is None
         limiter.step(
             now_ns, 0.005, target, np.zeros_like(target), held,
             limits.max_velocity_rad_s, limits.max_acceleration_rad_s2,

@@ -123,7 +123,7 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (plausible.Past, "span", lambda self, _: (self._low.min(0) - 9.0, self._high.max(0) + 9.0)),
     (agreement.Agreement, "judge", nothing),
     (placed.Placement, "unplaced", nothing),
-    (unbidden.UnbiddenMotion, "judge", lambda self, *_: np.zeros(len(self._names), np.bool_)),
+    (unbidden.UnbiddenMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_)),
     (unbidden.UnbiddenMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_)),
     (guard.Guard, "_strayed", nothing),
     (guard.Guard, "_elapsed_s", unbounded_s),

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from slave.encoders import EncoderConfig
+from slave.guard import GuardConfig
+from slave.guard.limit import SetpointLimiter
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drive import Drive
@@ -14,6 +16,7 @@ from slave.servos.canopen.simulated.peer import DrivePeer
 from slave.servos.canopen.start_check import LAST_KNOWN_RAD, SLACK_RAD, Place, refusal
 from slave.servos.canopen.status_bits import FOLLOWS, GOOD, LIMITED, REMOTE, VOLTAGE, amiss
 from slave.servos.canopen.watch import DriveWatch
+from slave.unbidden import ASTRAY_RAD
 from tests.slave.servos.canopen.conftest import Wired
 
 ELBOW = "left_elbow_pitch"
@@ -125,6 +128,49 @@ def test_a_drive_that_moves_by_itself_in_hold_is_stopped_within_50_ms(rest_s: fl
     assert moved_deg(wired, "right_elbow_pitch") < 0.5
 
 
+def stopped_after_s(wired: Wired, elbow_rad_s: float, others_rad_s: float) -> float:
+    """A drive runs away at 60 degrees a second while setpoints move: from when it is evident to its stop."""
+    wired.up()
+    rate = np.full(25, others_rad_s)
+    rate[wired.index(ELBOW)] = elbow_rad_s
+    wired.setpoint = wired.read_rad()
+    wired.run(0.5)  # until the drives have joined it
+    sent = [wired.setpoint[wired.index(ELBOW)]]
+    evident_ns = 0
+    for i in range(150):
+        if i == 50:
+            wired.happen(ELBOW, Fault.RUNS_AWAY)
+        wired.setpoint = wired.setpoint + rate * 0.004
+        sent.append(wired.setpoint[wired.index(ELBOW)])
+        wired.run(0.004)
+        stands, lately = wired.positions[-1][wired.index(ELBOW)], sent[-31:]
+        if not evident_ns and max(min(lately) - stands, stands - max(lately)) > ASTRAY_RAD:
+            evident_ns = wired.now_ns
+        if ELBOW in wired.network.faults:
+            assert "against its setpoint" in wired.network.faults[ELBOW]
+            assert list(wired.network.faults) == [ELBOW]
+            # the drive may be found out before, at the margin
+            return max(wired.now_ns - evident_ns, 0) / 1e9 if evident_ns else 0.0
+    return np.inf
+
+
+@pytest.mark.parametrize("elbow_rad_s", [0.0, 0.1, -0.1, -0.5, -1.0])
+def test_a_drive_that_moves_against_its_setpoint_in_align_and_track_is_stopped_within_50_ms(
+    elbow_rad_s: float,
+) -> None:
+    wired = standing(20.0)
+    assert stopped_after_s(wired, elbow_rad_s, 0.2) <= 0.05
+    wired.run(1.0)
+    assert wired.peer.drives[wired.index(ELBOW)].state is Power.QUICK_STOP
+
+
+def test_without_the_astray_window_a_drive_moves_on_against_its_setpoint(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("slave.unbidden.ASTRAY_RAD", 9.0)
+    assert stopped_after_s(standing(20.0), -0.1, 0.2) == np.inf
+
+
 @pytest.mark.parametrize(
     "fault", [Fault.REVERSED, Fault.WRONG_GEAR, Fault.ENCODER_ZERO, Fault.POSITION_STUCK]
 )
@@ -213,6 +259,38 @@ def test_a_release_checks_again() -> None:
     wired.run(1.0)
     assert "its output encoder" in wired.network.faults[ELBOW]
     assert moved_deg(wired) < 0.5
+
+
+def flung() -> Wired:
+    """One joint after the other is sent to and fro as fast as the guard lets it."""
+    wired = standing(20.0)
+    wired.up()
+    skeleton, limits = wired.skeleton, GuardConfig().limits(wired.skeleton)
+    limiter = SetpointLimiter(skeleton.joint_names, limits)
+    limiter.seat(wired.read_rad())
+    rng, target = np.random.default_rng(3), limiter.position_rad.copy()
+    for i in range(1, 3000):
+        if i % 60 == 1:
+            joint = rng.integers(25)
+            target[joint] = rng.uniform(skeleton.lower_rad[joint], skeleton.upper_rad[joint])
+        limiter.step(
+            i * 4_000_000, 0.004, target, np.zeros(25), np.zeros(25, np.bool_),
+            limits.max_velocity_rad_s, limits.max_acceleration_rad_s2,
+        )  # fmt: skip
+        wired.setpoint = limiter.position_rad
+        wired.run(0.004)
+    return wired
+
+
+def test_drives_that_are_sent_to_and_fro_at_their_limits_are_believed() -> None:
+    assert dict(flung().network.faults) == {}
+
+
+def test_without_the_patience_a_wrist_thrown_by_its_arm_would_be_stopped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("slave.servos.canopen.watch._PATIENCE", None)
+    assert "against its setpoint" in flung().network.faults["right_wrist_yaw"]
 
 
 # without what holds it off, each comes true
