@@ -68,6 +68,8 @@ class GravityWatch:
     def learn_bias(self, quiet: Mask, acc_m_s2: Array, gyr_rad_s: Array) -> None:
         """What a gyro reads while its node is still is its bias, raw (N, 3); up to 30 °/s.
 
+        To be called at every second `update`.
+
         A slow, steady turn is quiet too: so gravity, calibrated (N, 3), must stay where it is as well.
         """
         if not quiet.any():
@@ -77,9 +79,9 @@ class GravityWatch:
         now = np.concatenate([acc_m_s2, rate], axis=1)
         same = quiet & (np.abs(now - self._quiet_since) < _STAYS).all(axis=1)
         self._quiet_since = np.where(same[:, None], self._quiet_since, now)
-        share = np.where(same, 0.1, 1.0)[:, None]
+        share = np.where(same, 0.19, 1.0)[:, None]
         self._quiet_mean += share * (rate - self._quiet_mean)
-        self._quiet_s = (self._quiet_s + self._dt_s) * same
+        self._quiet_s = (self._quiet_s + 2.0 * self._dt_s) * same
         known = (self._quiet_s > _STILL_S) & (np.abs(self._quiet_mean).max(axis=1) < _LARGEST_BIAS_RAD_S)
         if known.any():
             self._bias_rad_s[known] = self._quiet_mean[known]
