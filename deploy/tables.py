@@ -222,6 +222,7 @@ _BENCH_ROWS = (
     ("the same with mahony, µs", ("pipeline", "nodes_36_mahony", "fuse_us")),
     ("the same with ekf, µs", ("pipeline", "nodes_36_ekf", "fuse_us")),
     ("solve 25 joints, µs", ("pipeline", "solve_us")),
+    ("judge whether 36 nodes lie, µs a tick", ("pipeline", "believe_us")),
     ("solve beyond the robot's limits, µs", ("pipeline", "solve_beyond_us")),
     ("encode + decode, µs", ("pipeline", "codec_us")),
     ("one way, tandem, µs", ("link", "one_way_us", "tandem")),

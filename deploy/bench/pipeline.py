@@ -20,7 +20,8 @@ from master.fuse.estimator import EstimationConfig, Estimator
 from master.fuse.filter import FilterName
 from master.solve.solver import JointSolver
 from master.suit.nodes import NodeConfig
-from master.suit.poll import Poll
+from master.suit.plausibility import BLOCK, Plausibility, PlausibilityConfig
+from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol
 
 BUS = "suit"
@@ -45,6 +46,7 @@ def pipeline(seconds: float) -> dict[str, Any]:
         "nodes_8": ticks(0.1 * seconds, 8),
         "nodes_36_mahony": ticks(0.15 * seconds, 36, filter_name="mahony"),
         "nodes_36_ekf": ticks(0.15 * seconds, 36, filter_name="ekf"),
+        "believe_us": believe(0.05 * seconds, 36),
         "solve_us": solve(0.1 * seconds),
         "solve_beyond_us": solve(0.05 * seconds, beyond=True),
         "codec_us": codec(0.15 * seconds),
@@ -69,6 +71,22 @@ def ticks(seconds: float, count: int, fd: bool = True, filter_name: FilterName =
             decode_ns.append(decoded)
             fuse_ns.append(fused)
     return {"decode_us": spread_us(decode_ns), "fuse_us": spread_us(fuse_ns)}
+
+
+def believe(seconds: float, count: int) -> dict[str, Any]:
+    """µs a tick to judge whether that many nodes lie, at rest; over the two ways a judgement takes turns."""
+    scale = SuitProtocol.load().fd.scale
+    watch = Plausibility(PlausibilityConfig(), count, RATE_HZ, scale)
+    rest = np.array([0.0, 0.0, 9.81, 0.0, 0.0, 0.0, 0.0, 20.0, -43.0])
+    noise = np.repeat([0.04, 0.02, 0.3], 3) * np.random.default_rng(0).normal(size=(64, count, 9))
+    readings = np.rint((rest + noise) / scale) * scale
+    yes, no = np.ones(count, np.bool_), np.zeros(count, np.bool_)
+    sweeps = itertools.cycle(
+        Sweep(tick, round((tick + 1) * 1e9 / RATE_HZ), 0, r[:, :3], r[:, 3:6], r[:, 6:], yes, no)
+        for tick, r in zip(range(4096), itertools.cycle(readings), strict=False)
+    )
+    rows = itertools.cycle(readings)
+    return time_calls(lambda: watch.take(next(sweeps), next(rows), no), seconds, batch=2 * BLOCK)
 
 
 def answers(protocol: SuitProtocol, count: int, tick: int, fd: bool) -> list[Frame]:
