@@ -76,6 +76,18 @@ LOWER_LIMB = (
 
 BY_PROFILE = {"nursing": DEMO, "hand": HAND, "lower_limb": LOWER_LIMB}
 
+CANOPEN = (
+    Target("robot, of one core", ("cpu_percent", "slave"), 25.0, "%"),
+    Target("SYNC → all positions, p99", ("servos", "times_ms", "sync_to_positions", "p99"), 5.0, "ms"),
+)
+"""What any profile's demo with CANopen drives is held against as well."""
+
+
+def of_demo(profile: str, servos: str) -> tuple[Target, ...]:
+    """What a demo is held against."""
+    return BY_PROFILE[profile] + (CANOPEN if servos == "canopen" else ())
+
+
 BENCH = (
     Target("fuse + filter, 36 nodes", ("pipeline", "nodes_36", "fuse_us", "median"), 200.0, "µs"),
     Target("the same with ekf", ("pipeline", "nodes_36_ekf", "fuse_us", "median"), 400.0, "µs"),

@@ -22,7 +22,7 @@ from deploy.tables import (
     verdict_table,
     video_table,
 )
-from deploy.targets import BY_PROFILE, verdicts
+from deploy.targets import of_demo, verdicts
 
 
 def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
@@ -75,7 +75,9 @@ def print_report(report: Report, console: Console) -> None:
     shown = None if report.curves is None else in_terminal(report.curves)
     if shown is not None:
         console.print(shown)
-    console.print(verdict_table("targets", verdicts(tree, BY_PROFILE[tree["options"]["profile"]])))
+    options = tree["options"]
+    targets = of_demo(options["profile"], options["servos"])
+    console.print(verdict_table("targets", verdicts(tree, targets)))
 
 
 def _errors_deg(rig: Rig) -> dict[str, float]:

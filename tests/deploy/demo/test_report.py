@@ -19,7 +19,7 @@ from deploy.demo.view import print_report
 from deploy.judge import Trace
 from deploy.rig.rig import Rig
 from deploy.tables import verdict_table
-from deploy.targets import BENCH, BY_PROFILE, DEMO, verdicts
+from deploy.targets import BENCH, BY_PROFILE, DEMO, of_demo, verdicts
 from deploy.virtual import VirtualRun, World
 from slave.pipeline import SlavePipeline
 from tests.published import master_metrics, slave_metrics
@@ -249,3 +249,17 @@ def test_paper_b_s_60_ms_are_of_one_way_and_lag_and_fail_where_the_link_is_slow(
     slow = {**tree, "one_way_plus_lag_ms": 61.0}
     found = {v.target.name: v.met for v in verdicts(slow, BY_PROFILE["hand"])}
     assert found["one way p99 + motion lag (paper B)"] is False
+
+
+@pytest.mark.parametrize(("p99_ms", "core_percent", "met"), [(5.0, 25.0, True), (5.1, 25.1, False)])
+def test_with_canopen_drives_their_answers_and_the_robot_s_core_are_judged_too(
+    p99_ms: float, core_percent: float, met: bool
+) -> None:
+    tree = {
+        "cpu_percent": {"slave": core_percent},
+        "servos": {"times_ms": {"sync_to_positions": {"p99": p99_ms}}},
+    }
+    found = {v.target.name: v.met for v in verdicts(tree, of_demo("nursing", "canopen"))}
+    assert found["SYNC → all positions, p99"] is met
+    assert found["robot, of one core"] is met
+    assert of_demo("nursing", "simulated") == DEMO
