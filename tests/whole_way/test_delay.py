@@ -10,7 +10,7 @@ import pytest
 
 from common.clock import NS_PER_MS
 from common.messages import Action
-from deploy.following import SLOW, engaged, follow, moved
+from deploy.following import SETTLE_S, SLOW, engaged, follow, moved
 from deploy.judge import Motion, motion
 from deploy.network.profile import Profile, Way, load_profile
 from deploy.virtual import VirtualRun, World
@@ -112,6 +112,7 @@ def test_after_a_line_became_slow_for_good_the_robot_can_be_engaged_and_tracks()
     assert offset.bound_ns < 80 * NS_PER_MS, "the exchange of before has aged, and is not forgotten"
     if run.slave.guard.state == "hold":
         assert run.ask(Action.ENGAGE).done
-    run.run(5.0, until=lambda: run.slave.guard.state == "track")
+    # the operator moves all the while: until a calm moment of the motion the robot only comes nearer
+    run.run(SETTLE_S, until=lambda: run.slave.guard.state == "track")
     run.run(2.0)
     assert run.slave.guard.state == "track"
