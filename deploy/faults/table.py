@@ -239,7 +239,7 @@ SUIT = (
     ),
     Fault(
         "iron at a magnetometer while it is worn",
-        "Iron sticks to a node of the reaching arm: 15 µT more on each axis, from 14 s before the trial begins.",
+        "Iron sticks to a node of the reaching arm: 15 µT more on each axis, since 14 s before the trial.",
         Reaction.GOES_ON,
         "Follows. The node's gyro keeps its heading; `tandem status` names the node.",
         "Take the iron away, or calibrate the node (`tandem calibrate mag`).",
