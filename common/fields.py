@@ -16,7 +16,7 @@ MAX_NAME = 64
 MAX_TEXT = 512
 MAX_DOUBT = 240
 MAX_NAMED = 120
-"""Bytes of what is said of one joint, where many may have something to say."""
+"""Bytes of the words for one joint, so that the words for many joints fit in one message."""
 _OVERHEAD_BYTES = 6
 """Of a name and a text in msgpack."""
 _OTHERS_BYTES = 30

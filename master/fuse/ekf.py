@@ -21,7 +21,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from common.messages import Mask
@@ -33,8 +32,7 @@ from common.quaternion import (
     multiply,
     to_matrix,
 )
-from master.doubt import NodeDoubt
-from master.fuse.front import Front, FrontSection, Limits
+from master.fuse.front import BehindFront, Front, FrontSection, Limits
 from master.fuse.mahony import begun_anew, initial_orientation
 from master.fuse.rest import Rest, RestState
 
@@ -98,7 +96,7 @@ class _State:
     started: Mask
 
 
-class EkfFilter:
+class EkfFilter(BehindFront):
     """An `OrientationFilter` of n nodes: prediction, two measurement updates, and one more at rest."""
 
     def __init__(self, config: EkfConfig, rate_hz: float, count: int) -> None:
@@ -224,24 +222,6 @@ class EkfFilter:
     def bias_rad_s(self) -> Array:
         """Gyro biases (n, 3)."""
         return self._front.with_offset(self._state.bias.copy())
-
-    def undecided(self) -> Mask:
-        """(n,) whose rate may be a bias that is not learnt."""
-        return self._front.undecided()
-
-    def doubts(self) -> dict[int, NodeDoubt]:
-        """Nodes whose gyros want a calibration, by number."""
-        return self._front.doubts()
-
-    @property
-    def spoilt(self) -> Mask | None:
-        """(n,) who had a reading that was none in the last update; None for nobody."""
-        return self._front.spoilt
-
-    @property
-    def skipped(self) -> NDArray[np.int64]:
-        """(n,) ticks with a reading that was none."""
-        return self._front.skipped
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""

@@ -202,3 +202,27 @@ class Front:
         self._sound.restore(sound)
         self._gross.restore(gross)
         self._ticks, self._seen = 0, self._sound.skipped.copy()
+
+
+class BehindFront:
+    """What each filter reports of its front."""
+
+    _front: Front
+
+    def undecided(self) -> Mask:
+        """(n,) nodes whose rate may be a bias that is not learnt yet."""
+        return self._front.undecided()
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Nodes whose gyros need a calibration, by number."""
+        return self._front.doubts()
+
+    @property
+    def spoilt(self) -> Mask | None:
+        """(n,) nodes whose last update held an unusable reading; None where no node's did."""
+        return self._front.spoilt
+
+    @property
+    def skipped(self) -> NDArray[np.int64]:
+        """(n,) ticks with an unusable reading."""
+        return self._front.skipped

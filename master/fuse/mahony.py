@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from common.messages import Mask
 from common.quaternion import Array, conjugate, cross, heading_rad, heading_turn, multiply, to_matrix
-from master.doubt import NodeDoubt
-from master.fuse.front import Front, FrontSection, Limits
+from master.fuse.front import BehindFront, Front, FrontSection, Limits
 
 _REACH_RAD_S = np.radians(0.5)
 """Its integral learns slowly, and about the vertical not at all without a magnetometer."""
@@ -45,7 +43,7 @@ class _Snapshot:
     front: object
 
 
-class MahonyFilter:
+class MahonyFilter(BehindFront):
     """An `OrientationFilter` of n nodes with proportional-integral feedback."""
 
     def __init__(self, config: MahonyConfig, rate_hz: float, count: int) -> None:
@@ -107,24 +105,6 @@ class MahonyFilter:
     def bias_rad_s(self) -> Array:
         """Gyro biases (n, 3): the integral with its sign turned."""
         return self._front.with_offset(-self._integral)
-
-    def undecided(self) -> Mask:
-        """(n,) whose rate may be a bias that is not learnt."""
-        return self._front.undecided()
-
-    def doubts(self) -> dict[int, NodeDoubt]:
-        """Nodes whose gyros want a calibration, by number."""
-        return self._front.doubts()
-
-    @property
-    def spoilt(self) -> Mask | None:
-        """(n,) who had a reading that was none in the last update; None for nobody."""
-        return self._front.spoilt
-
-    @property
-    def skipped(self) -> NDArray[np.int64]:
-        """(n,) ticks with a reading that was none."""
-        return self._front.skipped
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from vqf import VQF
 
 from common.messages import Mask
 from common.quaternion import Array
-from master.doubt import NodeDoubt
-from master.fuse.front import Front, FrontSection, Limits
+from master.fuse.front import BehindFront, Front, FrontSection, Limits
 
 _REACH_RAD_S = np.radians(1.9)
 """Just below the package's `biasClip` of 2 °/s, beyond which it takes no rest for one."""
@@ -31,7 +29,7 @@ class VqfConfig(FrontSection):
     """Leave out a magnetic field whose strength or dip is not the usual one."""
 
 
-class VqfFilter:
+class VqfFilter(BehindFront):
     """An `OrientationFilter` of n `vqf.VQF` objects (C++, about 1 µs an update).
 
     The package knows one period only. An update of another `dt_s` turns by the true angle, the bias
@@ -105,24 +103,6 @@ class VqfFilter:
             state = vqf.state
             state["gyrQuat"], state["accQuat"], state["delta"] = kept
             vqf.state = state
-
-    def undecided(self) -> Mask:
-        """(n,) whose rate may be a bias that is not learnt."""
-        return self._front.undecided()
-
-    def doubts(self) -> dict[int, NodeDoubt]:
-        """Nodes whose gyros want a calibration, by number."""
-        return self._front.doubts()
-
-    @property
-    def spoilt(self) -> Mask | None:
-        """(n,) who had a reading that was none in the last update; None for nobody."""
-        return self._front.spoilt
-
-    @property
-    def skipped(self) -> NDArray[np.int64]:
-        """(n,) ticks with a reading that was none."""
-        return self._front.skipped
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
