@@ -45,7 +45,7 @@ class Echo:
             if left := sent.get(key, 0):
                 sent[key] = left - 1
                 return True
-        # this process stood still: its old echoes come now, and what was sent then is forgotten
+        # this process stalled: echoes of frames that it has forgotten may arrive now
         return now_ns < self._blind_until_ns
 
     def _notice_pause(self, now_ns: int) -> None:

@@ -134,7 +134,7 @@ async def run_process_trial(fault: ProcessFault, host: Host) -> Outcome:
 
 
 async def tried(fault: ProcessFault) -> Outcome:
-    """Try it, and again where something was wrong and the host is shown to have stood still meanwhile.
+    """Try it. Try again if it failed while the host itself is shown to have stalled.
 
     Raises TandemError where the robot does not follow the operator when the fault is to come.
     """

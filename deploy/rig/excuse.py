@@ -62,7 +62,7 @@ class Lost:
     """What a host lost between two times."""
 
     excused_s: float
-    """For how long in all some core stood still by the host's fault: so late a result may be."""
+    """Total stall that was the host's fault: a result may be late by this much."""
     still_s: float
     """The same, whoever's fault it was."""
     evidence: Evidence
