@@ -11,29 +11,29 @@ from typing import Annotated, Any, Literal
 import typer
 from rich.console import Console
 
-from common.config import load_config
+from common.config.load import load_config
 from common.errors import TandemError
-from common.logs import flush_log, in_words, start_log
-from common.runtime import run as run_until_stopped
-from common.streams import lost_output, secure
-from deploy.accuracy.commands import app as accuracy_app
-from deploy.attitude.command import attitude
+from common.process.logs import flush_log, in_words, start_log
+from common.process.runtime import run as run_until_stopped
+from common.process.streams import lost_output, secure
 from deploy.calibrate.commands import app as calibrate_app
-from deploy.control.commands import COMMANDS as OPERATORS_ACTS
-from deploy.control.teller import acted
-from deploy.doctor.command import doctor
-from deploy.drives import drives
-from deploy.faults.command import faults
-from deploy.keys.commands import app as keys_app
-from deploy.network.command import app as network_app
-from deploy.output import in_a_folder, write_json
-from deploy.panels import arrange
-from deploy.record.command import record, recording
-from deploy.router.command import router
-from deploy.servos import servos
-from deploy.soak.command import soak
-from deploy.trial.command import app as trial_app
-from deploy.video import video
+from deploy.experiments.accuracy.commands import app as accuracy_app
+from deploy.experiments.faults.command import faults
+from deploy.experiments.soak.command import soak
+from deploy.experiments.trial.command import app as trial_app
+from deploy.ops.attitude.command import attitude
+from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
+from deploy.ops.control.teller import acted
+from deploy.ops.doctor.command import doctor
+from deploy.ops.keys.commands import app as keys_app
+from deploy.ops.record.command import record, recording
+from deploy.ops.router.command import router
+from deploy.ops.servos import servos
+from deploy.ops.video import video
+from deploy.report.output import in_a_folder, write_json
+from deploy.report.panels import arrange
+from deploy.sim.drives.process import drives
+from deploy.sim.network.command import app as network_app
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -129,8 +129,8 @@ def suit(config: ConfigFile, set_: Overrides = None, figures: Figures = None) ->
 
     Example: `tandem suit deploy/examples/suit.toml --set 'motion="sweep"'`
     """
-    from deploy.suit import run
-    from master.suit.simulated.config import SuitConfig
+    from deploy.sim.suit.config import SuitConfig
+    from deploy.sim.suit.process import run
 
     checked = load_config(config, SuitConfig, set_ or ())
     run_until_stopped(lambda stop: run(checked, stop, _write_figures(figures)))
@@ -175,9 +175,9 @@ def demo(
 
     Example: `tandem demo --profile hand --seconds 20 --report report.json --plots fingers.png`
     """
-    from deploy.demo.draw_curves import as_png
-    from deploy.demo.run import DemoOptions, run_demo
-    from deploy.demo.view import print_report
+    from deploy.experiments.demo.draw_curves import as_png
+    from deploy.experiments.demo.run import DemoOptions, run_demo
+    from deploy.experiments.demo.view import print_report
 
     console = Console()
     options = DemoOptions(
@@ -186,7 +186,7 @@ def demo(
     )  # fmt: skip
 
     if robots > 1:
-        from deploy.demo.many import show_many
+        from deploy.experiments.demo.many import show_many
 
         run_until_stopped(lambda stop: show_many(options, robots, stop, console, report))
         return
@@ -214,7 +214,7 @@ def bench(
 
     Example: `tandem bench --report bench.json`
     """
-    from deploy.bench.run import bench as measure
+    from deploy.experiments.bench.run import bench as measure
 
     figures = measure(quick=quick, console=Console())
     if report is not None:

@@ -2,7 +2,7 @@
 
 import sys
 
-from common.launch import launch
+from common.process.launch import launch
 from master.app import run
 from master.config import MasterConfig
 

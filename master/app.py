@@ -8,24 +8,24 @@ from dataclasses import replace
 
 from common.can.bus import CanBus
 from common.clock import monotonic_ns
-from common.heap import freeze_heap, heap_in_use, reserve_heap
-from common.latency import Durations, StageTimes
-from common.launch import WriteFigures
+from common.latency.stages import Durations, StageTimes
 from common.link import Session, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
-from common.metrics import MasterMetrics, Ticks, to_tree
-from common.notify import Notifier, open_notifier
-from common.pacing import TickGrid
-from common.realtime import enter_real_time
-from common.runtime import until_stopped
-from common.ticker import ticks
-from common.topics import STATISTICS
-from common.version import software
+from common.metrics.published import MasterMetrics, Ticks, to_tree
+from common.process.heap import freeze_heap, heap_in_use, reserve_heap
+from common.process.launch import WriteFigures
+from common.process.notify import Notifier, open_notifier
+from common.process.pacing import TickGrid
+from common.process.realtime import enter_real_time
+from common.process.runtime import until_stopped
+from common.process.ticker import ticks
+from common.wire.topics import STATISTICS
+from common.wire.version import software
 from master.config import MasterConfig
-from master.doubt import DoubtLog, as_figures
 from master.pipeline import MasterPipeline, Solved
 from master.robot import CommandedRobot
+from master.suit.doubt import DoubtLog, as_figures
 from master.suit.protocol import SuitProtocol
 from master.suit.silence import BusSigns, SilenceWatch
 

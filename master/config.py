@@ -7,11 +7,12 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from common.can.config import BusConfig
-from common.config import LinkConfig, RelativePath, Section
+from common.config.section import RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
-from common.realtime import ProcessConfig
+from common.link.config import LinkConfig
+from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
-from master.fuse.estimator import EstimationConfig
+from master.orientation.estimator import EstimationConfig
 from master.suit.nodes import NodeConfig, wiring_mistakes
 from master.suit.plausibility import PlausibilityConfig
 

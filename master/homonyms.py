@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from common.clock import to_ns
-from common.messages import Action, ControlRequest
-from common.namesakes import NOTICE_S
-from common.presence import Presence, several_bear
+from common.link.namesakes import NOTICE_S
+from common.wire.messages import Action, ControlRequest
+from common.wire.presence import Presence, several_bear
 
 HEARD_S = 0.5
 """A robot that was not heard for so long counts no more: one that starts anew takes longer than that."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from common.clock import to_ns
-from common.lease import lease_id
-from common.messages import Action, ControlReply, ControlRequest, RobotState
+from common.wire.lease import lease_id
+from common.wire.messages import Action, ControlReply, ControlRequest, RobotState
 
 RETRY_S = 0.25
 """Between two claims: a restarted master waits out the lease of its predecessor (1 s)."""

@@ -13,14 +13,14 @@ import numpy as np
 
 from common.can.frame import Frame
 from common.clock import to_s
-from common.messages import Command, CommandStamps, Mask
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from common.wire.messages import Command, CommandStamps, Mask
 from master.config import MasterConfig
-from master.doubt import Doubts, NodeDoubt, Weight, refusal, together
-from master.fuse.estimator import Estimator
-from master.solve.beyond import BeyondReach
-from master.solve.solver import JointSolver
+from master.joint_angles.beyond import BeyondReach
+from master.joint_angles.solver import JointSolver
+from master.orientation.estimator import Estimator
+from master.suit.doubt import Doubts, NodeDoubt, Weight, refusal, together
 from master.suit.nodes import NodeConfig
 from master.suit.plausibility import Plausibility
 from master.suit.poll import Poll, Sweep

@@ -10,23 +10,23 @@ from contextlib import suppress
 from dataclasses import replace
 
 from common.clock import monotonic_ns, to_ns
-from common.codec import decode, encode
+from common.clock_sync import MasterExchange
 from common.errors import CodecError, LinkError
-from common.instance import draw_instance
 from common.link import Link
-from common.messages import ClockReply, ControlReply, RobotState, Statistics
-from common.metrics import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
-from common.offset import MasterExchange
-from common.pacing import TickGrid
-from common.presence import Presence
-from common.throttle import Throttle
-from common.ticker import ticks
-from common.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
+from common.metrics.published import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
+from common.process.pacing import TickGrid
+from common.process.throttle import Throttle
+from common.process.ticker import ticks
+from common.wire.codec import decode, encode
+from common.wire.instance import draw_instance
+from common.wire.messages import ClockReply, ControlReply, RobotState, Statistics
+from common.wire.presence import Presence
+from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
 from master.homonyms import Homonyms
 from master.lease import LeaseKeeper
+from master.picture import VideoWatch
 from master.pipeline import CommandWriter, Solved
 from master.robot_watch import RobotWatch
-from master.video import VideoWatch
 
 log = logging.getLogger("tandem.master")
 

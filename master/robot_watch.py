@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from common.arrivals import Arrivals
 from common.clock import to_ns
-from common.latency import RoundTrip
-from common.messages import RobotState
-from common.topics import STATE
+from common.latency.arrivals import Arrivals
+from common.latency.stages import RoundTrip
+from common.wire.messages import RobotState
+from common.wire.topics import STATE
 
 
 class RobotWatch:

@@ -2,7 +2,7 @@
 
 import sys
 
-from common.launch import launch
+from common.process.launch import launch
 from slave.app import run
 from slave.config import SlaveConfig
 

@@ -10,23 +10,23 @@ from contextlib import nullcontext
 from dataclasses import replace
 
 from common.clock import monotonic_ns, to_ms
-from common.codec import encode
-from common.heap import freeze_heap, heap_in_use, reserve_heap
-from common.launch import WriteFigures
 from common.link import Link, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
-from common.messages import Statistics
-from common.metrics import OffsetMetrics, SlaveMetrics, Ticks, to_tree
-from common.notify import Notifier, open_notifier
-from common.pacing import TickGrid
-from common.path_probe import answer_probe
-from common.presence import Presence, place
-from common.realtime import enter_real_time
-from common.runtime import until_stopped
-from common.ticker import ticks
-from common.topics import CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, video
-from common.version import software
+from common.metrics.published import OffsetMetrics, SlaveMetrics, Ticks, to_tree
+from common.process.heap import freeze_heap, heap_in_use, reserve_heap
+from common.process.launch import WriteFigures
+from common.process.notify import Notifier, open_notifier
+from common.process.pacing import TickGrid
+from common.process.realtime import enter_real_time
+from common.process.runtime import until_stopped
+from common.process.ticker import ticks
+from common.wire.codec import encode
+from common.wire.messages import Statistics
+from common.wire.path_probe import answer_probe
+from common.wire.presence import Presence, place
+from common.wire.topics import CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, video
+from common.wire.version import software
 from slave.attitude.open import open_base
 from slave.attitude.sensor import BaseSensor
 from slave.camera.feed import CameraFeed, open_feed

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from common.config import LinkConfig, Section
+from common.config.section import Section
 from common.errors import ConfigError, ConfigMistake
-from common.realtime import ProcessConfig
+from common.link.config import LinkConfig
+from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from slave.attitude.config import BaseConfig
 from slave.camera.config import CameraConfig
-from slave.encoders import EncoderConfig
+from slave.encoders.counts import EncoderConfig
 from slave.guard.config import GuardConfig
 from slave.servos.config import ServosConfig
 from slave.track.config import TrackConfig

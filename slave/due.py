@@ -11,9 +11,9 @@ from __future__ import annotations
 import statistics
 from collections import deque
 
-from common.latency import Durations, Told
-from common.metrics import DueMetrics
-from common.topics import COMMAND
+from common.latency.stages import Durations, Told
+from common.metrics.published import DueMetrics
+from common.wire.topics import COMMAND
 
 PERIODS = 15
 """The period is the median of so many: a master may be set to another rate than usual."""

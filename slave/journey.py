@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from common.latency import LatencyBudget, Passage
-from common.messages import Command, CommandEcho
-from common.offset import Offset
+from common.clock_sync import Offset
+from common.latency.stages import LatencyBudget, Passage
+from common.wire.messages import Command, CommandEcho
 from slave.servos.servos import EncoderReading
 
 MOVED_COUNTS = 2

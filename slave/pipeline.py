@@ -10,14 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from common.arrivals import Arrivals
-from common.codec import decode, encode
-from common.control import OPEN
+from common.clock_sync import Offset, SlaveExchange
 from common.errors import CodecError
-from common.instance import draw_instance
-from common.latency import Told
-from common.lease import lease_id
-from common.messages import (
+from common.latency.arrivals import Arrivals
+from common.latency.stages import Told
+from common.link.namesakes import Namesakes
+from common.process.throttle import Throttle
+from common.quaternion import Array
+from common.wire.codec import decode, encode
+from common.wire.control import OPEN
+from common.wire.instance import draw_instance
+from common.wire.lease import lease_id
+from common.wire.messages import (
     Action,
     BaseAttitude,
     ClockQuery,
@@ -26,14 +30,10 @@ from common.messages import (
     ControlRequest,
     RobotState,
 )
-from common.namesakes import Namesakes
-from common.offset import Offset, SlaveExchange
-from common.quaternion import Array
-from common.stop import StopAnswer, pack_stop_answer, read_stop
-from common.throttle import Throttle
+from common.wire.stop import StopAnswer, pack_stop_answer, read_stop
 from slave.config import SlaveConfig
 from slave.due import Due
-from slave.encoders import Encoders
+from slave.encoders.counts import Encoders
 from slave.guard import Guard, Setpoint
 from slave.guard.body import WELL, Body
 from slave.guard.lease import DrawToken, random_token

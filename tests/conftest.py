@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, settings
 
 from common.clock import monotonic_ns
 from common.errors import TandemError
-from deploy.rig.host import Host, watch_host
+from deploy.harness.host import Host, watch_host
 
 from .skips import counted, read_allowed, too_many
 
@@ -36,7 +36,7 @@ OnThisHost = Callable[[Story], None]
 def on_this_host() -> OnThisHost:
     """Runs a story of real processes beside a loop that does nothing but tick.
 
-    Where it fails and the host is shown to have stood still meanwhile (deploy/rig/excuse.py), nothing was
+    Where it fails and the host is shown to have stood still meanwhile (deploy/harness/excuse.py), nothing was
     shown, and it is tried again, up to TRIES times in all; else it has failed. A host that spoilt every try
     is told as the reason to skip, and tests/skips.toml says how many such there may be.
     """

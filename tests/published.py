@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from common.metrics import (
+from common.metrics.published import (
     ArrivalCounts,
     CommandedMetrics,
     DueMetrics,

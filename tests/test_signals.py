@@ -20,8 +20,8 @@ os.execv(sys.executable, [sys.executable, "-m", "pytest", "-q", "-p", "no:cachep
 """
 SLICE = (
     "common/test_runtime.py",
-    "deploy/rig/test_spawn.py",
-    "deploy/demo/test_interrupt.py",
+    "deploy/harness/test_spawn.py",
+    "deploy/experiments/demo/test_interrupt.py",
     "deploy/test_cli.py::test_ctrl_c_in_a_demo_is_one_line",
     "net/test_hosts.py::test_a_caller_that_is_killed_leaves_nothing_behind",
 )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from common.config import Section
+from common.config.section import Section
 from common.errors import ConfigMistake
 
 

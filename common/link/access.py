@@ -9,9 +9,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from common.link_config import AccessConfig
-from common.roles import Role, common_name
-from common.topics import ALIVE, CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, TRUTH, VIDEO, Topic
+from common.link.config import AccessConfig
+from common.link.roles import Role, common_name
+from common.wire.topics import (
+    ALIVE,
+    CLOCK,
+    COMMAND,
+    CONTROL,
+    PATH,
+    STATE,
+    STATISTICS,
+    STOP,
+    TRUTH,
+    VIDEO,
+    Topic,
+)
 
 HEARD = (COMMAND, STATE, STATISTICS, TRUTH)
 """What an observer of a robot hears; `viewers` and operators see the video too."""

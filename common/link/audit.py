@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 from collections import Counter
 
-from common.config import LinkConfig
 from common.link.access import named
+from common.link.config import LinkConfig
 from common.link.listening import hear_refusals
 from common.link.refusals import Refusals
 from common.link.session import Session
-from common.metrics import AccessMetrics
+from common.metrics.published import AccessMetrics
 
 log = logging.getLogger("tandem.access")
 

@@ -6,9 +6,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from common.config import LinkConfig
 from common.errors import LinkError
-from common.link_config import TlsConfig
+from common.link.config import LinkConfig, TlsConfig
 
 if TYPE_CHECKING:
     from cryptography import x509

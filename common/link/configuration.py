@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from common.config import LinkConfig
-from common.endpoint import for_zenoh
 from common.link.access import access_control
-from common.link_config import TlsConfig
+from common.link.config import LinkConfig, TlsConfig
+from common.link.endpoint import for_zenoh
 
 
 def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, Any]:

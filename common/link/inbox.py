@@ -10,9 +10,9 @@ import zenoh
 
 from common.clock import monotonic_ns
 from common.errors import CodecError
-from common.mailbox import Mailbox
-from common.metrics import TopicCounters
-from common.throttle import Throttle
+from common.metrics.published import TopicCounters
+from common.process.mailbox import Mailbox
+from common.process.throttle import Throttle
 
 log = logging.getLogger(__name__)
 

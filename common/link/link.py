@@ -15,10 +15,10 @@ from common.link.inbox import Inbox, wake
 from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
 from common.link.waiting import count_peers, wait_for_peer
-from common.metrics import TopicCounters
-from common.presence import Presence, present
-from common.throttle import Throttle
-from common.topics import ALIVE, Topic
+from common.metrics.published import TopicCounters
+from common.process.throttle import Throttle
+from common.wire.presence import Presence, present
+from common.wire.topics import ALIVE, Topic
 
 CONNECT_TIMEOUT_S = 3.0
 

@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import zenoh
 
-from common.config import LinkConfig
 from common.errors import LinkError
+from common.link.config import LinkConfig
 from common.link.configuration import zenoh_configuration
 
 RETRY_S = 0.5

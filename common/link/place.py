@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import psutil
 
-from common.config import LinkConfig
+from common.link.config import LinkConfig
 
 _EVERYWHERE = ("0.0.0.0", "[::]", "*")
 _MOST = 3

@@ -9,8 +9,8 @@ import zenoh
 from zenoh.handlers import Callback
 
 from common.link.inbox import wake
-from common.presence import Presence, read_presence
-from common.topics import ALIVE
+from common.wire.presence import Presence, read_presence
+from common.wire.topics import ALIVE
 
 
 def watch_presence(

@@ -13,10 +13,10 @@ from zenoh.handlers import Callback
 from common.clock import monotonic_ns
 from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link.inbox import wake
-from common.metrics import TopicCounters
-from common.stop import read_stop
-from common.throttle import Throttle
-from common.topics import Topic
+from common.metrics.published import TopicCounters
+from common.process.throttle import Throttle
+from common.wire.stop import read_stop
+from common.wire.topics import Topic
 
 MAX_WAITING = 64
 """Questions that may wait for the loop; more are turned away, so that a flood costs no memory.

@@ -12,8 +12,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 from common.clock import to_ns
-from common.metrics import RefusalMetrics
-from common.throttle import Throttle
+from common.metrics.published import RefusalMetrics
+from common.process.throttle import Throttle
 
 REPEAT_S = 10.0
 """What keeps being refused is said once in so long."""

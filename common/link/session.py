@@ -14,17 +14,17 @@ from functools import partial
 import zenoh
 from zenoh.handlers import Callback
 
-from common.config import LinkConfig
 from common.errors import LinkError
 from common.link.certificates import check_keys
+from common.link.config import LinkConfig
 from common.link.congestion import check_congestion_control, set_congestion_control
 from common.link.inbox import wake
 from common.link.link import Link
 from common.link.opening import open_zenoh
 from common.link.presence import watch_presence
 from common.link.waiting import count_peers
-from common.presence import Presence
-from common.topics import ALIVE, Topic
+from common.wire.presence import Presence
+from common.wire.topics import ALIVE, Topic
 
 CLOSE_TIMEOUT_S = 1.0
 _ROBOT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")

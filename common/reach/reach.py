@@ -26,7 +26,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from common.messages import Mask
 from common.quaternion import Array
 from common.reach.chart import Group, make_chart
 from common.reach.nearest import (
@@ -41,6 +40,7 @@ from common.reach.nearest import (
     tensor,
 )
 from common.skeleton import Skeleton
+from common.wire.messages import Mask
 
 NOMINAL_S = 0.08
 """From one posture to the next, where nobody says."""

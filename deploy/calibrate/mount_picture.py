@@ -9,11 +9,11 @@ import numpy as np
 
 from common.quaternion import IDENTITY, Array
 from common.skeleton import Skeleton
-from deploy.output import writing
+from deploy.report.output import writing
 from master.calibrate.mounting import Mounting, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import NodeRecording
-from master.solve.decomposition import JointAngles
+from master.joint_angles.decomposition import JointAngles
 
 _PICTURE_HZ = 20.0
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from deploy.output import in_a_folder
+from deploy.report.output import in_a_folder
 
 RecordingFile = Annotated[
     Path,

@@ -27,8 +27,8 @@ def record(
 
     Example: `tandem calibrate record deploy/examples/master.toml --out session.mcap --seconds 300`
     """
-    from common.config import load_config
-    from common.runtime import run as run_until_stopped
+    from common.config.load import load_config
+    from common.process.runtime import run as run_until_stopped
     from master.config import MasterConfig
 
     checked = load_config(config, MasterConfig, set_ or ())
@@ -41,8 +41,8 @@ async def _record(
     import numpy as np
 
     from common.errors import TandemError
-    from common.realtime import enter_real_time
-    from common.runtime import until_stopped
+    from common.process.realtime import enter_real_time
+    from common.process.runtime import until_stopped
     from deploy.calibrate import capture as shared
     from master.suit.poll import Sweep
 

@@ -12,10 +12,10 @@ from typing import Any, Generic, Protocol, TypeVar
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from common.calibration import Made
+from common.config.sensor_calibration import Made
 from common.errors import TandemError
 from common.quaternion import Array
-from deploy.output import write_json
+from deploy.report.output import write_json
 from master.calibrate.node_file import Part, write_calibration
 from master.calibrate.recording import NodeRecording, load_recordings
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 _RUN = 2
 """So many equal largest readings in a row are no coincidence while the reading is noisy."""

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import RecordingError
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 _FAR = 3.0
 """Half ranges from the middle: what lies further off is no reading of the same field."""

@@ -17,7 +17,7 @@ from common.quaternion import Array, conjugate, heading_turn, multiply, rotate, 
 from common.skeleton import Skeleton
 from master.calibrate.joint_motion import JointMotion, zero_axes
 from master.calibrate.oriented import Oriented
-from master.solve.angles import intrinsic_angles
+from master.joint_angles.angles import intrinsic_angles
 
 _LEVEL = 0.5
 """Sine of the steepest axis that still has a heading."""

@@ -25,7 +25,7 @@ from master.calibrate.oriented import bridged, moving, orient, rows_moving
 from master.calibrate.rates_alone import check_rates
 from master.calibrate.recording import NodeRecording
 from master.calibrate.unit_evidence import unit_evidence
-from master.fuse.hinge_angle import Hinge
+from master.orientation.hinge_angle import Hinge
 
 _LEAST_SAMPLES = 60
 _WORST_SIGMA_RAD = math.radians(10.0)

@@ -8,7 +8,7 @@ from datetime import date
 
 import numpy as np
 
-from common.calibration import Made
+from common.config.sensor_calibration import Made
 from common.quaternion import Array
 from master.calibrate import accelerometer as acc
 from master.calibrate import gyroscope as gyr

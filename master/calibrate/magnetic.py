@@ -8,7 +8,7 @@ from datetime import date
 import numpy as np
 from numpy.typing import NDArray
 
-from common.calibration import Made
+from common.config.sensor_calibration import Made
 from common.quaternion import Array
 from master.calibrate.alignment import Alignment, UndeterminedError, align_magnetometer
 from master.calibrate.codes import clean

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from common.calibration import Made, NodeCalibration
-from common.config import load_config
+from common.config.load import load_config
+from common.config.sensor_calibration import Made, NodeCalibration
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.skeleton.full_body import RECORDED_AS

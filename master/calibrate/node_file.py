@@ -14,8 +14,8 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Array as TomlArray
 from tomlkit.items import Table
 
-from common.calibration import Made, NodeCalibration
-from common.config import check_config, load_config
+from common.config.load import check_config, load_config
+from common.config.sensor_calibration import Made, NodeCalibration
 from common.errors import ConfigError, ConfigMistake, TandemError
 from common.quaternion import Array
 

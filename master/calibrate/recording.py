@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import RecordingError as RecordingError
-from common.npz import Arrays, read_arrays
 from common.quaternion import Array
+from common.recording.npz import Arrays, read_arrays
 from master.calibrate.stamps import Grid, lay_out
 
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 5.0, 20_000.0

@@ -18,7 +18,7 @@ from master.calibrate.evidence import Evidence, at_most, not_judged
 from master.calibrate.facing import limits_of
 from master.calibrate.joint_motion import JointMotion
 from master.calibrate.oriented import Oriented
-from master.solve.angles import intrinsic_angles
+from master.joint_angles.angles import intrinsic_angles
 
 _WORST_RAD = math.radians(0.5)
 """Mean excess over the limits by which the other side must be better, and less than half of it."""

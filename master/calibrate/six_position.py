@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 from master.calibrate.carried import AXES
 from master.calibrate.evidence import Evidence, at_most
 from master.calibrate.recording import RecordingError

@@ -7,7 +7,7 @@ from datetime import date
 
 import numpy as np
 
-from common.calibration import Made
+from common.config.sensor_calibration import Made
 from common.quaternion import Array
 from master.calibrate import inertial_evidence as compare
 from master.calibrate.carried import carried

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 from master.calibrate.recording import NodeRecording, RecordingError
 
 _MOST_MISSING = 0.1

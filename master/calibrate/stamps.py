@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import RecordingError
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 _EVEN = 0.25
 """Steps this near to whole periods need no repair."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 
 def covariance(jacobian: Array, residuals: Array, freedom: int, *, least_variance: float = 0.0) -> Array:

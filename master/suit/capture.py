@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.clock import monotonic_ns
-from common.pacing import TickGrid
-from common.ticker import ticks
+from common.process.pacing import TickGrid
+from common.process.ticker import ticks
 from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol

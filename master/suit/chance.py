@@ -19,8 +19,8 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 _below = np.vectorize(NormalDist().cdf, otypes=[np.float64])
 """Share of a normal distribution below. scipy's would cost the master 26 MB, for a table made once."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from common.messages import Mask
-from master.doubt import NodeDoubt, Weight
+from common.wire.messages import Mask
+from master.suit.doubt import NodeDoubt, Weight
 
 NOTICED = 3
 """Windows with two different answers, or SYNCs of another master, within `WITHIN` ticks."""

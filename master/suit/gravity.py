@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 SHORT_S, LONG_S = 0.8, 3.0
 _AGREES_DEG = 15.0

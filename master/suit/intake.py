@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from common.messages import Mask
+from common.wire.messages import Mask
 from master.suit.health import Counts, NodeCounters
 from master.suit.layout import Raw
 from master.suit.protocol import READINGS, AnswerFormat, Status

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from pydantic import Field
 
 from common.can.config import BusConfig, names_used_twice
-from common.config import RelativePath, Section
+from common.config.section import RelativePath, Section
 from common.errors import ConfigMistake
-from master.fuse.filter import FilterName
+from master.orientation.filter import FilterName
 
 
 class NodeConfig(Section):

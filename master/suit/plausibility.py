@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from common.clock import to_ns
-from common.config import Section
-from common.messages import Mask
+from common.config.section import Section
 from common.quaternion import Array
-from master.doubt import NodeDoubt, Weight
+from common.wire.messages import Mask
 from master.suit.chance import RepeatChance
+from master.suit.doubt import NodeDoubt, Weight
 from master.suit.gravity import GravityWatch
 from master.suit.poll import Sweep
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from common.can.bus import BusCounters
 from common.can.frame import Frame
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 from master.suit.clash import Clashes
 from master.suit.health import BusHealth, NodeCounters, NodeHealth
 from master.suit.intake import Intake, Place

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from common.messages import Mask
+from common.wire.messages import Mask
 
 
 class Presence:

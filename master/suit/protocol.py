@@ -33,7 +33,7 @@ MAG_OVERFLOW = -4096
 """What the HMC5883L writes for an axis that overflowed (its data sheet, "Data Output X Registers")."""
 LARGEST_ID = 0x7FF
 TICK_MASK = 0xFFFF_FFFF
-SHIPPED_DBC = Path(__file__).parents[2] / "deploy" / "suit.dbc"
+SHIPPED_DBC = Path(__file__).with_name("suit.dbc")
 """The description that comes with tandem."""
 
 

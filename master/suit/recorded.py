@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import RecordingError
-from common.messages import Mask
 from common.recording import read_recording
+from common.wire.messages import Mask
 from master.suit.poll import Sweep
 
 TOPIC = "suit/readings"

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from common.messages import BaseAttitude
 from common.quaternion import Array, cross
+from common.wire.messages import BaseAttitude
 from slave.attitude.angles import up_in_instrument, wrapped
 from slave.attitude.attitude import near_vertical
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from common.config import RelativePath, Section
+from common.config.section import RelativePath, Section
 from common.errors import ConfigMistake
 from slave.attitude.base import Axis
 

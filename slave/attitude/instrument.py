@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.calibration import NodeCalibration
+from common.config.sensor_calibration import NodeCalibration
 from common.quaternion import Array
 from slave.attitude.attitude import Attitude, attitude
 from slave.attitude.smooth import Smoother

@@ -15,8 +15,8 @@ import serial
 
 from common.clock import Clock, monotonic_ns
 from common.errors import RobotError
-from common.messages import BaseAttitude
-from common.throttle import Throttle
+from common.process.throttle import Throttle
+from common.wire.messages import BaseAttitude
 from slave.attitude.attitude import turned
 from slave.attitude.base import base_attitude, less
 from slave.attitude.config import BaseConfig

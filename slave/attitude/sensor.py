@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from common.messages import BaseAttitude
+from common.wire.messages import BaseAttitude
 
 
 class BaseSensor(Protocol):

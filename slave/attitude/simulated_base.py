@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from common.calibration import NodeCalibration
 from common.clock import NS_PER_S, Clock, monotonic_ns, to_ns
-from common.config import load_config
-from common.messages import BaseAttitude
+from common.config.load import load_config
+from common.config.sensor_calibration import NodeCalibration
 from common.quaternion import Array, from_axis_angle, multiply
+from common.wire.messages import BaseAttitude
 from slave.attitude.angles import orientation
 from slave.attitude.base import Axis, base_attitude, less
 from slave.attitude.config import BaseConfig

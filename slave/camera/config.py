@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from common.config import Section
-from common.topics import VIDEO_NAME
+from common.config.section import Section
+from common.wire.topics import VIDEO_NAME
 
 
 class CameraConfig(Section):

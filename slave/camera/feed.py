@@ -12,13 +12,13 @@ from collections.abc import Callable
 from typing import Protocol
 
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns, to_s
+from common.clock_sync import Offset
 from common.errors import CodecError, RobotError
-from common.latency import Durations
-from common.messages import Command
-from common.metrics import CameraMetrics
-from common.offset import Offset
+from common.latency.stages import Durations
+from common.metrics.published import CameraMetrics
 from common.quaternion import Array
-from common.video import VideoFrame, encode_frame
+from common.wire.messages import Command
+from common.wire.video import VideoFrame, encode_frame
 from slave.camera.config import CameraConfig
 from slave.camera.pipe import Reply, Request
 from slave.camera.process import CameraProcess, NeverError

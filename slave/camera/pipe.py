@@ -14,7 +14,7 @@ import numpy as np
 
 from common.errors import CodecError
 from common.quaternion import Array
-from common.video import MAX_JPEG
+from common.wire.video import MAX_JPEG
 
 REQUEST = struct.Struct("<QII")
 REPLY = struct.Struct("<BQHHI")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import dataclass
 
-from common.latency import Durations
-from common.messages import Command
-from common.offset import Offset
+from common.clock_sync import Offset
+from common.latency.stages import Durations
+from common.wire.messages import Command
 
 _KEPT = 256
 """Pictures that are remembered: 20 s of them at the usual rate."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.clock import to_ms
-from common.messages import Command
-from common.offset import Offset
+from common.clock_sync import Offset
+from common.wire.messages import Command
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock import to_ns
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 from slave.guard.config import GuardConfig
-from slave.guard.limit import Limits
+from slave.limit.limit import Limits
 
 
 def within(error_rad: Array, window_rad: float) -> Mask:

@@ -9,10 +9,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from common.config import Section
+from common.config.section import Section
 from common.errors import ConfigMistake
 from common.skeleton import Joint, Skeleton
-from slave.guard.limit import Limits
+from slave.limit.limit import Limits
 
 _Limit = Annotated[float | None, Field(allow_inf_nan=False)]
 

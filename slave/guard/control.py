@@ -6,7 +6,7 @@ import hmac
 from dataclasses import replace
 from typing import Protocol
 
-from common.messages import Action, ControlReply, ControlRequest
+from common.wire.messages import Action, ControlReply, ControlRequest
 from slave.guard.challenge import Challenges
 from slave.guard.engage import holder_only
 from slave.guard.lease import Lease

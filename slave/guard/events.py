@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from common.metrics import GuardMetrics
+from common.metrics.published import GuardMetrics
 
 
 class Rule(StrEnum):

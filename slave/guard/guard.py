@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.clock import to_ns, to_s
+from common.clock_sync import Offset
 from common.errors import ConfigError
-from common.messages import Command, ControlReply, ControlRequest, Mask
-from common.offset import Offset
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from common.wire.messages import Command, ControlReply, ControlRequest, Mask
 from slave.guard.admit import DEADMAN, GATES, Gate, Situation, Verdict, admit
 from slave.guard.align import Alignment, Rejoin
 from slave.guard.body import WELL, Body
@@ -22,12 +22,12 @@ from slave.guard.control import Control
 from slave.guard.engage import Readiness, refusal
 from slave.guard.events import Change, Doubt, GuardCounters, Journal
 from slave.guard.lease import DrawToken, Lease, random_token
-from slave.guard.limit import SetpointLimiter
-from slave.guard.nearest import NearestPosture
 from slave.guard.placed import Placement
 from slave.guard.plausible import Plausibility
 from slave.guard.states import MOVING, Event, State, next_state
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES, EncoderLife, Signs, Watch, first_loss
+from slave.limit.limit import SetpointLimiter
+from slave.limit.nearest import NearestPosture
 from slave.track import Target, Tracker
 
 

@@ -6,8 +6,8 @@ import secrets
 from collections.abc import Callable
 
 from common.clock import to_s
-from common.lease import lease_id
-from common.metrics import LeaseMetrics
+from common.metrics.published import LeaseMetrics
+from common.wire.lease import lease_id
 
 DrawToken = Callable[[], int]
 """Gives a new token, 1 to 2⁶³ - 1, that nobody can guess. Tests pass a counter."""

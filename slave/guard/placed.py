@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from common.clock import NS_PER_MS
-from common.messages import Mask
 from common.quaternion import Array
-from slave.agreement import READINGS as AGREEMENT_READINGS
-from slave.agreement import Agreement
-from slave.unbidden import Patience, UnbiddenMotion
+from common.wire.messages import Mask
+from slave.encoders.agreement import READINGS as AGREEMENT_READINGS
+from slave.encoders.agreement import Agreement
+from slave.encoders.unbidden import Patience, UnbiddenMotion
 
 BEYOND_RAD = math.radians(8.0)
 """A joint further than this beyond its range is not where its encoder says."""

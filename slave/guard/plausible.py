@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock import to_ns, to_s
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 from slave.guard.config import GuardConfig
 
 BUCKETS = 8

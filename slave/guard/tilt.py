@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from common.clock import to_ns, to_s
-from common.messages import BaseAttitude
+from common.wire.messages import BaseAttitude
 from slave.guard.config import GuardConfig
 
 

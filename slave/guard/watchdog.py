@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock import to_s
-from common.messages import Mask
 from common.quaternion import Array
+from common.wire.messages import Mask
 from slave.guard.body import Body
 
 _NEVER_NS = -(1 << 62)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from common.config import Section
+from common.config.section import Section
 from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
-from slave.encoders import EncoderConfig
+from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.dynamixel.config import DynamixelConfig
 

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 
 from common.clock import Clock, monotonic_ns, to_s
 from common.errors import RobotError
-from common.metrics import ServoMetrics
+from common.metrics.published import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.encoders import EncoderConfig
+from slave.encoders.counts import EncoderConfig
 from slave.servos.servos import EncoderReading
 from slave.servos.simulated import CYCLE_NS, SimulatedRobot
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from common.errors import RobotError
 from common.skeleton import Skeleton
-from slave.encoders import EncoderConfig
+from slave.encoders.counts import EncoderConfig
 from slave.servos.config import ServosConfig
 from slave.servos.servos import Servos
 

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from common.messages import Mask
-from common.metrics import ServoMetrics
+from common.metrics.published import ServoMetrics
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 
 @dataclass(frozen=True, slots=True)

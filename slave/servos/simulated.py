@@ -10,7 +10,7 @@ import numpy as np
 from common.clock import to_ns
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.encoders import EncoderConfig, Encoders
+from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.model import STEP_S, build_model, leader, unit_rates
 from slave.servos.servos import EncoderReading
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from common.config import Section
+from common.config.section import Section
 from slave.track.hold import Hold
 from slave.track.interpolate import Interpolate
 from slave.track.predict import Predict

@@ -15,7 +15,7 @@ import numpy as np
 
 from common.clock import to_ns
 from common.quaternion import Array
-from slave.guard.limit import Limits, SetpointLimiter
+from slave.limit.limit import Limits, SetpointLimiter
 from slave.track.config import TrackConfig, make_tracker
 from slave.track.tracker import Tracker
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from deploy.trial.folder import Folder
-from deploy.trial.report import HTML, write
-from tests.deploy.trial.made_up import PLAN, cells
+from deploy.experiments.trial.folder import Folder
+from deploy.experiments.trial.report import HTML, write
+from tests.deploy.experiments.trial.made_up import PLAN, cells
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium here: apt install chromium")

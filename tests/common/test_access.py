@@ -8,8 +8,8 @@ import pytest
 import zenoh
 
 from common.link.access import access_control, named
-from common.link_config import AccessConfig
-from common.presence import Presence
+from common.link.config import AccessConfig
+from common.wire.presence import Presence
 
 ACCESS = AccessConfig(
     operators={"anna": ["r1", "r2"], "ben": ["r2"]},

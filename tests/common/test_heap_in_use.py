@@ -6,7 +6,7 @@ import ctypes
 
 import pytest
 
-from common.heap import heap_in_use, reserve_heap
+from common.process.heap import heap_in_use, reserve_heap
 
 
 def test_a_leak_shows_at_once_in_spite_of_the_reserve() -> None:

@@ -14,11 +14,23 @@ MAY_IMPORT = {
     "deploy": {"common", "master", "slave", "deploy"},
 }
 PURE = [
-    "common/codec.py", "common/fields.py", "common/messages.py", "common/pacing.py", "common/mailbox.py",
-    "common/latency.py", "common/offset/estimator.py", "common/offset/exchange.py", "common/quaternion.py",
-    "common/kinematics.py", "common/reach/nearest.py", "common/reach/chart.py", "common/reach/reach.py",
-    "common/topics.py", "common/throttle.py", "common/endpoint.py",
-]  # fmt: skip
+    "common/wire/codec.py",
+    "common/wire/fields.py",
+    "common/wire/messages.py",
+    "common/process/pacing.py",
+    "common/process/mailbox.py",
+    "common/latency/stages.py",
+    "common/clock_sync/estimator.py",
+    "common/clock_sync/exchange.py",
+    "common/quaternion.py",
+    "common/skeleton/kinematics.py",
+    "common/reach/nearest.py",
+    "common/reach/chart.py",
+    "common/reach/reach.py",
+    "common/wire/topics.py",
+    "common/process/throttle.py",
+    "common/link/endpoint.py",
+]
 RIM = {"asyncio", "zenoh", "can", "time", "socket", "uvloop", "mujoco", "serial"}
 
 

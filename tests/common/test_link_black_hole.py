@@ -10,10 +10,10 @@ NAMESPACE = ["unshare", "--map-root-user", "--net"]
 PROGRAM = """
 import asyncio, subprocess, sys
 from common.clock import monotonic_ns
-from common.config import LinkConfig
+from common.link.config import LinkConfig
 from common.link import open_link
-from common.runtime import run
-from common.topics import COMMAND
+from common.process.runtime import run
+from common.wire.topics import COMMAND
 
 ENDPOINT = sys.argv[1] + "/127.0.0.1:7447"
 

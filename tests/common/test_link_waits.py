@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import zenoh
 
-from common.config import LinkConfig
 from common.errors import LinkError
 from common.link import opening
-from common.notify import STARTS_WITHIN_S
+from common.link.config import LinkConfig
+from common.process.notify import STARTS_WITHIN_S
 
 ROUTER = "tcp/127.0.0.1:1"
 

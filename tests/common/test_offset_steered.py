@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from common.clock import NS_PER_S
-from common.offset import ANY_CLOCKS, RAW_CLOCKS, OffsetEstimator, RateLaw
+from common.clock_sync import ANY_CLOCKS, RAW_CLOCKS, OffsetEstimator, RateLaw
 
 MS = 1_000_000
 BETWEEN_NS = NS_PER_S // 4

@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 
 from common.errors import TandemError
 from deploy import cli
-from deploy.demo import run as demo_run
-from deploy.panels import PANELS
+from deploy.experiments.demo import run as demo_run
+from deploy.report.panels import PANELS
 
 EXAMPLES = Path(cli.__file__).parent / "examples"
 COMMANDS = sorted(str(command.name or command.callback.__name__) for command in cli.app.registered_commands)  # type: ignore[union-attr]
@@ -57,7 +57,7 @@ def test_every_command_stands_under_a_heading_once() -> None:
     groups = [str(group.name) for group in cli.app.registered_groups]
     placed = [name for names in PANELS.values() for name in names]
     assert len(placed) == len(set(placed))
-    assert {*COMMANDS, *groups} <= set(placed)  # a new command: give it a place in deploy/panels.py
+    assert {*COMMANDS, *groups} <= set(placed)  # a new command: give it a place in deploy/report/panels.py
     help_text = CliRunner().invoke(cli.app, ["--help"], terminal_width=100, env={"NO_COLOR": "1"}).output
     headings = re.findall(r"╭─ ([A-Z][a-z ]+?) ─", help_text)
     assert [heading for heading in headings if heading != "Options"] == list(PANELS)

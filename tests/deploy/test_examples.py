@@ -10,15 +10,15 @@ from typing import Any
 import pytest
 import yaml
 
-from common.config import load_config
-from common.runtime import SHUTDOWN_S
+from common.config.load import load_config
+from common.link.router import RouterConfig
+from common.process.runtime import SHUTDOWN_S
 from deploy import cli
-from deploy.control.reach import reach
-from deploy.panels import PANELS
-from deploy.router.config import RouterConfig
-from deploy.router.run import zenohd_configuration
+from deploy.client.reach import reach
+from deploy.ops.router.run import zenohd_configuration
+from deploy.report.panels import PANELS
+from deploy.sim.suit.config import SuitConfig
 from master.config import MasterConfig
-from master.suit.simulated.config import SuitConfig
 from slave.config import SlaveConfig
 
 DEPLOY = Path(cli.__file__).parent
@@ -31,7 +31,7 @@ SITE = EXAMPLES / "site"
 
 
 def compose() -> dict[str, Any]:
-    tree: dict[str, Any] = yaml.safe_load((DEPLOY / "compose.yaml").read_text("utf-8"))
+    tree: dict[str, Any] = yaml.safe_load((DEPLOY / "ops" / "compose.yaml").read_text("utf-8"))
     return tree
 
 
@@ -96,7 +96,7 @@ def test_containers_get_what_the_units_get_and_no_more() -> None:
         assert service["read_only"] is True
         assert float(service["stop_grace_period"].removesuffix("s")) > SHUTDOWN_S
         if name in units:
-            unit = (DEPLOY / "systemd" / units[name]).read_text("utf-8")
+            unit = (DEPLOY / "ops" / "systemd" / units[name]).read_text("utf-8")
             [priority] = re.findall(r"^LimitRTPRIO=(\d+)$", unit, re.MULTILINE)
             assert service["ulimits"]["rtprio"] == int(priority)
             assert service["mem_limit"] == service["memswap_limit"]  # as MemorySwapMax=0

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-import slave.guard.limit
+import slave.limit.limit
 from common.errors import TandemError
-from deploy.faults.fault import Reaction
-from deploy.faults.table import FAULTS
-from deploy.faults.trial import run_trial
-from slave.agreement import Agreement
+from deploy.experiments.faults.fault import Reaction
+from deploy.experiments.faults.table import FAULTS
+from deploy.experiments.faults.trial import run_trial
+from slave.encoders.agreement import Agreement
+from slave.encoders.unbidden import UnbiddenMotion
 from slave.guard import GATES, states
 from slave.guard.states import Event
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES
-from slave.unbidden import UnbiddenMotion
 
 TABLE = {fault.name: fault for fault in FAULTS}
 BARED = (
@@ -27,7 +27,7 @@ BARED = (
     "master's clock an hour back",
 )  # fmt: skip
 """Of the rows with a protection to take away; more would say no more, and each takes a second."""
-RULES = {str(rule) for rule, _ in slave.guard.limit.RULES}
+RULES = {str(rule) for rule, _ in slave.limit.limit.RULES}
 
 
 def without(names: Collection[str]) -> dict[str, Any]:
@@ -63,8 +63,8 @@ def test_the_row_fails_without_its_protection(name: str) -> None:
 def test_the_rules_of_the_limiter_are_what_bounds_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
     fault = TABLE["valid but impossible jump"]
     assert not [word for word in run_trial(fault).wrong if "setpoint" in word]
-    kept = tuple(pair for pair in slave.guard.limit.RULES if str(pair[0]) not in fault.held_by)
-    monkeypatch.setattr(slave.guard.limit, "RULES", kept)
+    kept = tuple(pair for pair in slave.limit.limit.RULES if str(pair[0]) not in fault.held_by)
+    monkeypatch.setattr(slave.limit.limit, "RULES", kept)
     assert [word for word in run_trial(fault).wrong if "setpoint" in word]
 
 

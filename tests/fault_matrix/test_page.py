@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import common
-from deploy.faults.document import BEGIN, END, within_page, words
-from deploy.faults.processes import PROCESS_FAULTS
-from deploy.faults.table import FAULTS
+from deploy.experiments.faults.document import BEGIN, END, within_page, words
+from deploy.experiments.faults.processes import PROCESS_FAULTS
+from deploy.experiments.faults.table import FAULTS
 
 ROOT = Path(common.__file__).parents[1]
 PAGE = ROOT / "docs" / "when-something-fails.md"

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from deploy.faults.processes import PROCESS_FAULTS, ProcessFault, tried
+from deploy.experiments.faults.processes import PROCESS_FAULTS, ProcessFault, tried
 
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
 

@@ -7,9 +7,9 @@ import pytest
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from deploy.faults.limits import Asked, asked_beyond, moved_beyond
-from deploy.faults.stillness import SPEED_ERROR_RAD_S, STILL_RAD, Course, stillness
-from slave.encoders import RAD_PER_COUNT
+from deploy.experiments.faults.limits import Asked, asked_beyond, moved_beyond
+from deploy.measure.stillness import SPEED_ERROR_RAD_S, STILL_RAD, Course, stillness
+from slave.encoders.counts import RAD_PER_COUNT
 
 SKELETON = load_skeleton("nursing")
 JOINTS = len(SKELETON.joints)

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.codec import VERSION, decode, encode
 from common.errors import CodecError
-from common.messages import (
+from common.wire.codec import VERSION, decode, encode
+from common.wire.messages import (
     Action,
     ClockQuery,
     ClockReply,

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from deploy.profiles import EXAMPLES
-from deploy.rig.endpoints import local_endpoints
+from deploy.examples.profiles import EXAMPLES
+from deploy.harness.endpoints import local_endpoints
 from master.calibrate.recording import load_recordings
 
 pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]

@@ -9,10 +9,10 @@ import psutil
 import pytest
 
 from common.clock import to_ns
-from common.metrics import CameraMetrics
-from deploy.rig.host import Host
-from deploy.rig.rig import ROLES, Rig, open_rig
-from deploy.rig.tracking import until_tracking
+from common.metrics.published import CameraMetrics
+from deploy.harness.host import Host
+from deploy.harness.rig import ROLES, Rig, open_rig
+from deploy.harness.tracking import until_tracking
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost

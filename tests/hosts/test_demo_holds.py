@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from deploy.demo import operator as rule
-from deploy.demo.tend import Tending
-from deploy.rig.host import Host
-from deploy.rig.rig import ROLES, Rig, open_rig
+from deploy.harness import operator as rule
+from deploy.harness.host import Host
+from deploy.harness.rig import ROLES, Rig, open_rig
+from deploy.harness.tend import Tending
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from common.clock import to_ns
-from common.messages import RobotState
-from common.metrics import SlaveMetrics
-from deploy.rig.host import Host
-from deploy.rig.rig import ROLES, Rig, open_rig
-from deploy.rig.tracking import until_tracking
+from common.metrics.published import SlaveMetrics
+from common.wire.messages import RobotState
+from deploy.harness.host import Host
+from deploy.harness.rig import ROLES, Rig, open_rig
+from deploy.harness.tracking import until_tracking
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from common.messages import Action, RobotState
 from common.quaternion import Array
-from deploy.rig.host import Host
-from deploy.rig.rig import Rig, open_rig
-from deploy.rig.tracking import until_tracking
+from common.wire.messages import Action, RobotState
+from deploy.harness.host import Host
+from deploy.harness.rig import Rig, open_rig
+from deploy.harness.tracking import until_tracking
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost

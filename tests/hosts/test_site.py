@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from common.roles import Role
+from common.link.roles import Role
 from deploy import cli
-from deploy.keys.folder import stem, write_pair
-from deploy.keys.make import new_authority, new_identity
-from deploy.network.namespaces import why_not
-from deploy.network.network import Host, open_network
-from deploy.rig.child import Child
-from deploy.rig.host import Host as ThisHost
+from deploy.certificates.folder import stem, write_pair
+from deploy.certificates.make import new_authority, new_identity
+from deploy.harness.child import Child
+from deploy.harness.host import Host as ThisHost
+from deploy.sim.network.namespaces import why_not
+from deploy.sim.network.network import Host, open_network
+from master.suit.protocol import SHIPPED_DBC
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
@@ -39,7 +40,7 @@ def a_site(folder: Path, robot_at: str) -> None:
     """The files of `deploy/examples/site`, with the robot's true address, and the keys that they name."""
     for file in (DEPLOY / "examples" / "site").glob("*.toml"):
         (folder / file.name).write_text(file.read_text("utf-8").replace("192.168.7.2", robot_at), "utf-8")
-    shutil.copy(DEPLOY / "suit.dbc", folder)
+    shutil.copy(SHIPPED_DBC, folder)
     now, valid, keys = datetime.now(UTC), timedelta(days=365), folder / "keys"
     keys.mkdir()
     authority = new_authority("test", now, valid)

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from deploy.soak.events import of_kind, read_events
+from deploy.experiments.soak.events import of_kind, read_events
 
 pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
 

@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 import uvloop
 
-from common.config import LinkConfig
 from common.link import open_link
-from common.topics import STATE
-from deploy.rig.spawn import Spawned
+from common.link.config import LinkConfig
+from common.wire.topics import STATE
+from deploy.harness.spawn import Spawned
 
 pytestmark = pytest.mark.hosts
 
@@ -25,9 +25,9 @@ STARTS = 150
 FLOOD = """
 import asyncio, sys
 import uvloop
-from common.config import LinkConfig
+from common.link.config import LinkConfig
 from common.link import open_link
-from common.topics import STATE
+from common.wire.topics import STATE
 
 async def main():
     async with open_link(LinkConfig(connect=[sys.argv[1]]), "robot-1") as link:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from common.endpoint import SECURE, TRANSPORTS
-from common.metrics import AccessMetrics, MasterMetrics, SlaveMetrics
+from common.link.endpoint import SECURE, TRANSPORTS
+from common.metrics.published import AccessMetrics, MasterMetrics, SlaveMetrics
 from common.skeleton import load_skeleton
-from deploy.rig.host import Host
-from deploy.rig.keys import MASTER, access_override
-from deploy.rig.rig import ROBOT, ROLES, Rig, open_rig
-from deploy.rig.tracking import until_tracking
+from deploy.harness.host import Host
+from deploy.harness.keys import MASTER, access_override
+from deploy.harness.rig import ROBOT, ROLES, Rig, open_rig
+from deploy.harness.tracking import until_tracking
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from deploy.rig.endpoints import free_port
-from deploy.rig.host import Host
-from deploy.trial.cell import Status
-from deploy.trial.plan import CellKey, Plan, Setup
-from deploy.trial.remote.operator import run_remote_cell
+from deploy.experiments.trial.cell import Status
+from deploy.experiments.trial.plan import CellKey, Plan, Setup
+from deploy.experiments.trial.remote.operator import run_remote_cell
+from deploy.harness.endpoints import free_port
+from deploy.harness.host import Host
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost

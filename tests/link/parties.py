@@ -16,13 +16,12 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback
 
-from common.config import LinkConfig
+from common.link.config import LinkConfig, TlsConfig
 from common.link.configuration import zenoh_configuration
-from common.link_config import TlsConfig
-from common.roles import Role
-from common.topics import COMMAND, STATE, VIDEO, Topic
-from deploy.keys.folder import stem, write_pair
-from deploy.keys.make import Pair, new_authority, new_identity
+from common.link.roles import Role
+from common.wire.topics import COMMAND, STATE, VIDEO, Topic
+from deploy.certificates.folder import stem, write_pair
+from deploy.certificates.make import Pair, new_authority, new_identity
 
 ROBOT = "robot-1"
 DAY = timedelta(days=1)

@@ -9,13 +9,15 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from common.config import LinkConfig, Section, load_config
+from common.config.load import load_config
+from common.config.section import Section
 from common.errors import ConfigMistake
 from common.link import open_session
 from common.link.audit import Audit
-from common.metrics import to_tree
-from common.runtime import run
-from common.topics import COMMAND, CONTROL, STATE, STOP, VIDEO
+from common.link.config import LinkConfig
+from common.metrics.published import to_tree
+from common.process.runtime import run
+from common.wire.topics import COMMAND, CONTROL, STATE, STOP, VIDEO
 
 
 class RobotFile(Section):

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from common.config import LinkConfig
-from common.endpoint import SECURE
 from common.link import open_link
+from common.link.config import LinkConfig
 from common.link.configuration import zenoh_configuration
-from common.roles import Role
-from common.topics import STATE
-from deploy.keys.folder import read_authority, stem, write_pair
-from deploy.keys.make import new_authority, new_identity
+from common.link.endpoint import SECURE
+from common.link.roles import Role
+from common.wire.topics import STATE
+from deploy.certificates.folder import read_authority, stem, write_pair
+from deploy.certificates.make import new_authority, new_identity
 from tests.link.parties import DAY, HERE, ROBOT, free_port, make_keys, tls
 
 STATES = 20

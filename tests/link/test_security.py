@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from common.config import LinkConfig
-from common.endpoint import SECURE
-from common.topics import CONTROL, STOP
+from common.link.config import LinkConfig
+from common.link.endpoint import SECURE
+from common.wire.topics import CONTROL, STOP
 from tests.link.parties import (
     ROBOT,
     Party,

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from common.config import load_config
-from common.notify import Notifier
-from common.pacing import Due, TickGrid
-from common.topics import Topic
+from common.config.load import load_config
+from common.process.notify import Notifier
+from common.process.pacing import Due, TickGrid
+from common.wire.topics import Topic
 from master import app
 from master.config import MasterConfig
 

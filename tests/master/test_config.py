@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from common.config import load_config
+from common.config.load import load_config
 from common.errors import ConfigError
 from master.config import MasterConfig
 
@@ -81,6 +81,6 @@ def test_a_missing_node_and_a_missing_deadman_are_named() -> None:
 def load_text(text: str) -> MasterConfig:
     import tomllib
 
-    from common.config import check_config
+    from common.config.load import check_config
 
     return check_config(EXAMPLE, tomllib.loads(text), MasterConfig)

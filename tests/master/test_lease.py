@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from common.clock import NS_PER_S, to_ns
-from common.lease import lease_id
-from common.messages import Action, ControlReply, RobotState
+from common.wire.lease import lease_id
+from common.wire.messages import Action, ControlReply, RobotState
 from master.lease import GRACE_S, RETRY_S, LeaseKeeper
 
 

@@ -11,17 +11,17 @@ import pytest
 from numpy.typing import NDArray
 
 from common.clock import NS_PER_MS, NS_PER_S
-from common.config import load_config
-from common.messages import Mask
+from common.config.load import load_config
+from common.wire.messages import Mask
+from deploy.sim.suit.config import SuitConfig
+from deploy.sim.suit.motion import load_motion
+from deploy.sim.suit.suit import SimulatedSuit, build_suit
 from master.config import MasterConfig
-from master.doubt import NodeDoubt, Weight
 from master.pipeline import MOST_BRIDGED, CommandWriter, MasterPipeline, Solved, bridged
+from master.suit.doubt import NodeDoubt, Weight
 from master.suit.protocol import SuitProtocol
-from master.suit.simulated.config import SuitConfig
-from master.suit.simulated.motion import load_motion
-from master.suit.simulated.suit import SimulatedSuit, build_suit
 
-EXAMPLES = Path(__file__).parents[2] / "deploy" / "examples"
+EXAMPLES = Path(__file__).parents[2] / "deploy/examples"
 PERIOD_NS = 5 * NS_PER_MS
 
 

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from common.clock import monotonic_ns
-from common.codec import VERSION, decode, encode
-from common.config import load_config
-from common.lease import lease_id
-from common.messages import (
+from common.config.load import load_config
+from common.metrics.published import MasterMetrics
+from common.wire.codec import VERSION, decode, encode
+from common.wire.lease import lease_id
+from common.wire.messages import (
     Action,
     ClockQuery,
     ClockReply,
@@ -27,9 +28,8 @@ from common.messages import (
     RobotState,
     Statistics,
 )
-from common.metrics import MasterMetrics
-from common.presence import Presence
-from common.topics import CLOCK, CONTROL, STATE, Topic
+from common.wire.presence import Presence
+from common.wire.topics import CLOCK, CONTROL, STATE, Topic
 from master.app import Master
 from master.config import MasterConfig
 from master.pipeline import Solved

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS, to_ns
-from common.messages import CommandEcho, RobotState
-from common.metrics import Summary
-from common.topics import STATE
+from common.metrics.published import Summary
+from common.wire.messages import CommandEcho, RobotState
+from common.wire.topics import STATE
 from master.robot_watch import RobotWatch
 
 TIMEOUT_NS = to_ns(STATE.timeout_s)

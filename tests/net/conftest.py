@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.network.namespaces import why_not
+from deploy.sim.network.namespaces import why_not
 
 HERE = Path(__file__).parent
 

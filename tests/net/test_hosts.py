@@ -13,9 +13,9 @@ import psutil
 import pytest
 
 from common.errors import NetworkError
-from deploy.network import Profile, load_profile, open_network
-from deploy.network.host import Host
-from deploy.network.namespaces import ip, parse_run, remove_dead
+from deploy.sim.network import Profile, load_profile, open_network
+from deploy.sim.network.host import Host
+from deploy.sim.network.namespaces import ip, parse_run, remove_dead
 
 ANSWER = """
 import socket, sys
@@ -29,7 +29,7 @@ socket.create_connection((sys.argv[1], 7000), 2.0)
 """
 OPEN = """
 import asyncio, sys
-from deploy.network import open_network
+from deploy.sim.network import open_network
 async def main():
     async with open_network("lan") as network:
         print(network.operator.namespace, flush=True)
@@ -178,7 +178,7 @@ def test_what_a_dead_run_left_is_removed_by_the_next() -> None:
         assert run is not None
         assert run.name not in remove_dead()  # it lives
         for child in psutil.Process(process.pid).children():
-            if "deploy.network.janitor" in child.cmdline():
+            if "deploy.sim.network.janitor" in child.cmdline():
                 child.kill()
     assert namespace in namespaces()
     assert run.name in remove_dead()

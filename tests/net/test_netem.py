@@ -8,10 +8,10 @@ import json
 import pytest
 
 from common.errors import NetworkError
-from deploy.network import Network, Profile, load_profile, open_network, profile_names
-from deploy.network.figures import Measured
-from deploy.network.namespaces import LINK, ip, make_host, new_run, remove
-from deploy.network.netem import has_netem
+from deploy.sim.network import Network, Profile, load_profile, open_network, profile_names
+from deploy.sim.network.figures import Measured
+from deploy.sim.network.namespaces import LINK, ip, make_host, new_run, remove
+from deploy.sim.network.netem import has_netem
 
 MIXED = Profile.model_validate(
     {

@@ -8,18 +8,18 @@ from contextlib import suppress
 
 import pytest
 
-from deploy.network import Profile, open_network
-from deploy.network.host import Host
-from deploy.network.namespaces import why_not
+from deploy.sim.network import Profile, open_network
+from deploy.sim.network.host import Host
+from deploy.sim.network.namespaces import why_not
 
 pytestmark = [pytest.mark.net, pytest.mark.skipif(bool(why_not()), reason=str(why_not()))]
 
 ROBOT = """
 import asyncio, sys
-from common.config import LinkConfig
+from common.link.config import LinkConfig
 from common.link import open_session
-from common.path_probe import answer_probe
-from common.topics import PATH
+from common.wire.path_probe import answer_probe
+from common.wire.topics import PATH
 async def main():
     async with open_session(LinkConfig(listen=[sys.argv[1]])) as session:
         session.link("robot-1").answer(PATH, lambda question, _: answer_probe(question))
@@ -29,8 +29,8 @@ asyncio.run(main())
 """
 OPERATOR = """
 import asyncio, sys
-from common.config import LinkConfig
-from deploy.doctor.read.path import read_path
+from common.link.config import LinkConfig
+from deploy.ops.doctor.read.path import read_path
 facts = asyncio.run(read_path(LinkConfig(connect=[sys.argv[1]]), "robot-1", (1100, 1350)))
 print(facts.there_bytes, facts.back_bytes, flush=True)
 """

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from deploy.soak.events import of_kind, read_events
+from deploy.experiments.soak.events import of_kind, read_events
 
 
 @pytest.mark.timeout(200)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from deploy.rig.host import Host
+from deploy.harness.host import Host
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from common.clock import monotonic_ns, to_ns, to_s
-from deploy.network import Network, load_profile, open_network
-from deploy.rig.host import Host
-from deploy.rig.rig import ROLES, Rig, open_rig
-from deploy.rig.tracking import until_tracking
+from deploy.harness.host import Host
+from deploy.harness.rig import ROLES, Rig, open_rig
+from deploy.harness.tracking import until_tracking
+from deploy.sim.network import Network, load_profile, open_network
 from slave.guard.config import GuardConfig
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.codec import decode
-from common.config import LinkConfig
-from common.messages import Statistics
-from common.metrics import ServoMetrics
-from common.notify import Notifier
-from common.pacing import Due, TickGrid
-from common.topics import Topic
+from common.link.config import LinkConfig
+from common.metrics.published import ServoMetrics
+from common.process.notify import Notifier
+from common.process.pacing import Due, TickGrid
+from common.wire.codec import decode
+from common.wire.messages import Statistics
+from common.wire.topics import Topic
 from slave import app
 from slave.config import SlaveConfig
 from slave.servos import EncoderReading

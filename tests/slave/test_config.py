@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from common.config import load_config
+from common.config.load import load_config
 from common.errors import ConfigError
 from slave.config import SlaveConfig
 

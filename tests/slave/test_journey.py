@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS
-from common.messages import Command, CommandStamps
-from common.offset import NEVER_MEASURED, Offset
+from common.clock_sync import NEVER_MEASURED, Offset
+from common.wire.messages import Command, CommandStamps
 from slave.journey import MOVED_COUNTS, Journeys
 from slave.servos.servos import EncoderReading
 

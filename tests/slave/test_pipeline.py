@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S
-from common.codec import VERSION, decode, encode
-from common.config import LinkConfig
-from common.control import read_reply
+from common.clock_sync import MasterExchange
 from common.errors import CodecError
-from common.messages import (
+from common.link.config import LinkConfig
+from common.wire.codec import VERSION, decode, encode
+from common.wire.control import read_reply
+from common.wire.messages import (
     Action,
     ClockQuery,
     ClockReply,
@@ -22,8 +23,7 @@ from common.messages import (
     ControlRequest,
     RobotState,
 )
-from common.offset import MasterExchange
-from common.stop import pack_stop, read_stop_answer
+from common.wire.stop import pack_stop, read_stop_answer
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline
 from slave.servos.servos import EncoderReading

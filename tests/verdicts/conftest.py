@@ -1,3 +1,3 @@
 """A made-up soak, as the soak's own tests have it."""
 
-from tests.deploy.soak.conftest import make as make
+from tests.deploy.experiments.soak.conftest import make as make

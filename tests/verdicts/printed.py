@@ -8,12 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from common.errors import TandemError
-from deploy.soak.criteria import CRITERIA
-from deploy.soak.events import Event
-from deploy.soak.growth import GROWTH
-from deploy.targets import BENCH, BY_PROFILE
-from deploy.trial.targets import LIMITS, Judged
-from tests.deploy.soak.conftest import FAULT, PROCESSES, STORY, Make
+from deploy.experiments.soak.criteria import CRITERIA
+from deploy.experiments.soak.events import Event
+from deploy.experiments.soak.growth import GROWTH
+from deploy.experiments.trial.targets import LIMITS, Judged
+from deploy.measure.targets import BENCH, BY_PROFILE
+from tests.deploy.experiments.soak.conftest import FAULT, PROCESSES, STORY, Make
 
 ROOT = Path(__file__).parents[2]
 ENDED = (
@@ -29,19 +29,28 @@ def printed(make: Make) -> set[tuple[str, str]]:
     """Command and verdict. What stands for a value in a message is `…`; of a soak, PROCESS and FAULT."""
     return {
         *(("demo", target.name) for targets in BY_PROFILE.values() for target in targets),
-        *(("demo", words) for words in texts("deploy/demo/report.py", "make_report", _is_problem)),
-        *(("demo", words) for words in texts("deploy/demo/operator.py", "gives_up", _is_return)),
+        *(
+            ("demo", words)
+            for words in texts("deploy/experiments/demo/report.py", "make_report", _is_problem)
+        ),
+        *(("demo", words) for words in texts("deploy/harness/operator.py", "gives_up", _is_return)),
         *(
             ("demo --robots", words)
-            for words in texts("deploy/demo/many_report.py", "make_many_report", _is_problem)
+            for words in texts("deploy/experiments/demo/many_report.py", "make_many_report", _is_problem)
         ),
         *(("bench", target.name) for target in BENCH),
         *(("soak", name) for name in soak_names(make)),
         *(("trial", Judged(limit, None, None, (), 0).words) for limit in LIMITS),
-        *(("trial", words) for words in texts("deploy/trial/judge.py", "_nothing_to_judge", _is_return)),
+        *(
+            ("trial", words)
+            for words in texts("deploy/experiments/trial/judge.py", "_nothing_to_judge", _is_return)
+        ),
         *(("faults", words) for words in fault_words()),
-        *(("accuracy", words) for words in texts("deploy/accuracy/view.py", "_notes", _is_note)),
-        *(("record", _first_words(text)) for text in texts("deploy/record/record.py", "_check", _is_raised)),
+        *(("accuracy", words) for words in texts("deploy/experiments/accuracy/view.py", "_notes", _is_note)),
+        *(
+            ("record", _first_words(text))
+            for text in texts("deploy/ops/record/record.py", "_check", _is_raised)
+        ),
     }
 
 
@@ -63,13 +72,13 @@ def _process(found: re.Match[str]) -> str:
 
 def fault_words() -> set[str]:
     """Of a row of the fault matrix: what should not have been."""
-    file = "deploy/faults/trial.py"
+    file = "deploy/experiments/faults/trial.py"
     return {
         *texts(file, "_judge", lambda node: isinstance(node, ast.JoinedStr)),
         *texts(file, "_state_amiss", _is_return),
         *texts(file, "_stillness_amiss", _is_return),
-        *texts("deploy/faults/limits.py", "asked_beyond", _is_argument),
-        *texts("deploy/faults/limits.py", "moved_beyond", _is_argument),
+        *texts("deploy/experiments/faults/limits.py", "asked_beyond", _is_argument),
+        *texts("deploy/experiments/faults/limits.py", "moved_beyond", _is_argument),
     }
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.deploy.soak.conftest import Make
+from tests.deploy.experiments.soak.conftest import Make
 from tests.verdicts.printed import ROOT, printed
 
 PAGE = ROOT / "docs" / "verdicts.md"

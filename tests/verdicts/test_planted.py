@@ -11,14 +11,11 @@ import pytest
 
 from common.errors import TandemError
 from common.recording import RecorderCounters
-from deploy.faults.fault import Fault
-from deploy.faults.scene import Scene
-from deploy.faults.stillness import stillness
-from deploy.faults.table import FAULTS
-from deploy.faults.trial import _judge, _stillness_amiss, run_trial
-from deploy.judge.accuracy import SIDES
-from deploy.record.record import RecordOptions, Taken, _check
-from deploy.soak.growth import (
+from deploy.experiments.faults.fault import Fault
+from deploy.experiments.faults.scene import Scene
+from deploy.experiments.faults.table import FAULTS
+from deploy.experiments.faults.trial import _judge, _stillness_amiss, run_trial
+from deploy.experiments.soak.growth import (
     BLOCKS_H,
     DRIFT_MS_H,
     IN_USE_MB_H,
@@ -29,15 +26,18 @@ from deploy.soak.growth import (
     in_use,
     memory,
 )
-from deploy.soak.verdict import Status
-from deploy.targets import BENCH, BY_PROFILE, Target, verdicts
-from deploy.trial.cell import Cell
-from deploy.trial.cell import Status as CellStatus
-from deploy.trial.plan import CellKey, Setup
-from deploy.trial.spread import Row
-from deploy.trial.targets import LIMITS, Limit, judge
+from deploy.experiments.trial.cell import Cell
+from deploy.experiments.trial.cell import Status as CellStatus
+from deploy.experiments.trial.plan import CellKey, Setup
+from deploy.experiments.trial.spread import Row
+from deploy.experiments.trial.targets import LIMITS, Limit, judge
+from deploy.measure.accuracy import SIDES
+from deploy.measure.stillness import stillness
+from deploy.measure.targets import BENCH, BY_PROFILE, Target, verdicts
+from deploy.measure.verdict import Status
+from deploy.ops.record.record import RecordOptions, Taken, _check
 from slave.guard import State
-from tests.deploy.soak.conftest import STORY, Make
+from tests.deploy.experiments.soak.conftest import STORY, Make
 
 LONG = 3600
 TARGETS = {f"{name}: {t.name}": (ts, t) for name, ts in {**BY_PROFILE, "bench": BENCH}.items() for t in ts}

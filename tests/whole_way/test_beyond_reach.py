@@ -10,9 +10,9 @@ import pytest
 from common.clock import NS_PER_S
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from deploy.following import engaged
-from deploy.virtual import VirtualRun, World
-from master.suit.simulated.minimum_jerk import MinimumJerkMotion, Move
+from deploy.experiments.following import engaged
+from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, Move
+from deploy.sim.world.whole_way import VirtualRun, World
 
 SKELETON = load_skeleton("nursing")
 NAMES = SKELETON.joint_names

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS
-from common.messages import Action
-from deploy.following import SETTLE_S, SLOW, engaged, follow, moved
-from deploy.judge import Motion, motion
-from deploy.network.profile import Profile, Way, load_profile
-from deploy.virtual import VirtualRun, World
+from common.wire.messages import Action
+from deploy.experiments.following import SETTLE_S, SLOW, engaged, follow, moved
+from deploy.measure import Motion, motion
+from deploy.sim.network.profile import Profile, Way, load_profile
+from deploy.sim.world.whole_way import VirtualRun, World
 
 ROUND_S = 16.0
 """Of the operator's motion."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from common.messages import Action
-from deploy.following import engaged
-from deploy.virtual import VirtualRun, World
+from common.wire.messages import Action
+from deploy.experiments.following import engaged
+from deploy.sim.world.whole_way import VirtualRun, World
 
 NODE = "right_forearm"
 HELD = {"right_elbow_pitch", "right_elbow_roll", "right_wrist_yaw"}

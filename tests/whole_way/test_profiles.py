@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from common.messages import Action
 from common.skeleton.synergy import synergy_positions
-from deploy.judge import Accuracy, Motion, accuracy, motion
-from deploy.virtual import VirtualRun, World
-from slave.guard.limit import Limits
+from common.wire.messages import Action
+from deploy.measure import Accuracy, Motion, accuracy, motion
+from deploy.sim.world.whole_way import VirtualRun, World
+from slave.limit.limit import Limits
 
 STANCE = {"master": ["estimation.stance_s=1.0"]}
 

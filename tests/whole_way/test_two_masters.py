@@ -6,10 +6,10 @@ import itertools
 from dataclasses import dataclass, field
 
 from common.clock import NS_PER_S, to_ns
-from common.codec import decode, encode
-from common.config import load_config
-from common.messages import ControlReply, RobotState
-from deploy.profiles import example
+from common.config.load import load_config
+from common.wire.codec import decode, encode
+from common.wire.messages import ControlReply, RobotState
+from deploy.examples.profiles import example
 from master.lease import GRACE_S, LeaseKeeper
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline

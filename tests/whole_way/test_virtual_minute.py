@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from common.codec import encode
-from common.messages import Action
-from deploy.following import engaged, follow
-from deploy.judge import Motion, accuracy
-from deploy.judge.paper import ETA_PERCENT, TABLE_1
-from deploy.virtual import VirtualRun, World
+from common.wire.codec import encode
+from common.wire.messages import Action
+from deploy.experiments.following import engaged, follow
+from deploy.measure import Motion, accuracy
+from deploy.measure.paper import ETA_PERCENT, TABLE_1
+from deploy.sim.world.whole_way import VirtualRun, World
 
 
 def judged_motion(strategy: str, seconds: float) -> Motion:

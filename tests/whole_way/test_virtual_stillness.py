@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from deploy.following import engaged
-from deploy.virtual import VirtualRun, World
+from deploy.experiments.following import engaged
+from deploy.sim.world.whole_way import VirtualRun, World
 
 STILL_S = 5.0
 

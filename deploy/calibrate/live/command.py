@@ -45,9 +45,9 @@ def live(
 
     Example: `tandem calibrate live deploy/examples/master.toml --out calibration --what imu,mag`
     """
-    from common.config import load_config
+    from common.config.load import load_config
     from common.errors import TandemError
-    from common.runtime import run as run_until_stopped
+    from common.process.runtime import run as run_until_stopped
     from deploy.calibrate.live.compute import Choice, compute
     from deploy.calibrate.live.guide import GuideOptions
     from deploy.calibrate.live.run import LiveSession, Session

@@ -21,7 +21,7 @@ from deploy.calibrate.mount import refusals as mount_refusals
 from deploy.calibrate.mount_picture import draw_angles
 from deploy.calibrate.pictures import draw_inertial, draw_magnetic
 from deploy.calibrate.views import inertial_table, magnetic_table, notes
-from deploy.output import writing
+from deploy.report.output import writing
 from master.calibrate.inertial import InertialCalibration, InertialOptions, calibrate_inertial
 from master.calibrate.magnetic import MagneticCalibration, MagneticOptions, calibrate_magnetic
 from master.calibrate.magnetic_axes import Hemisphere

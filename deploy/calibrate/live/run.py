@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.live import Live
 
 from common.errors import TandemError
+from common.process.runtime import until_stopped
 from common.quaternion import Array
 from common.recording import Recorder
-from common.runtime import until_stopped
 from deploy.calibrate import capture as shared
 from deploy.calibrate.live.guide import Guide, GuideOptions, StepName, View
 from deploy.calibrate.live.screen import line, screen

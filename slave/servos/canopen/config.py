@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pydantic import Field
 
 from common.can.config import BusConfig, names_used_twice
-from common.config import Section
+from common.config.section import Section
 from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
 from slave.servos.canopen.load import bits_per_s, told_bitrate, too_much

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock import NS_PER_MS, NS_PER_S
-from common.messages import Mask
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.encoders import EncoderConfig, Encoders
+from common.wire.messages import Mask
+from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import ENABLED_BITS, SHUTDOWN, STATE_BITS
 from slave.servos.canopen.config import CanopenConfig, limits_rad

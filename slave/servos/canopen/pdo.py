@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from common.messages import Mask
+from common.wire.messages import Mask
 
 NMT, SYNC, EMERGENCY, TPDO1, RPDO1 = 0x000, 0x080, 0x080, 0x180, 0x200
 SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x580, 0x600, 0x700

@@ -20,11 +20,11 @@ from common.can.frame import Frame
 from common.can.state import Controller, ask_kernel
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
 from common.errors import RobotError
-from common.latency import Durations
-from common.metrics import ServoMetrics
+from common.latency.stages import Durations
+from common.metrics.published import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.encoders import EncoderConfig
+from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.load import WELL, too_much
 from slave.servos.canopen.network import DriveNetwork, Outgoing, period_ns

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from slave.agreement import WINDOW_RAD
+from slave.encoders.agreement import WINDOW_RAD
 from slave.servos.canopen.status_bits import amiss
 
 CHECKED_SYNCS = 5

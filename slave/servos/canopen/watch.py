@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock import NS_PER_MS
-from common.messages import Mask
 from common.quaternion import Array
-from slave.agreement import Agreement
-from slave.encoders import Encoders
+from common.wire.messages import Mask
+from slave.encoders.agreement import Agreement
+from slave.encoders.counts import Encoders
+from slave.encoders.unbidden import STILL_RAD, Patience, UnbiddenMotion
 from slave.servos.canopen.start_check import CHECKED_SYNCS, Place, refusal
 from slave.servos.canopen.status_bits import BAD_SYNCS, GOOD, WARNING, WATCHED, amiss
-from slave.unbidden import STILL_RAD, Patience, UnbiddenMotion
 
 _SPAN_NS = 120 * NS_PER_MS
 """How late a drive may follow."""

@@ -7,10 +7,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from common.config import Section
+from common.config.section import Section
 from common.errors import ConfigMistake
 from common.skeleton import Skeleton
-from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT, EncoderConfig
+from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT, EncoderConfig
 from slave.servos.dynamixel.registers import GOAL_POSITION, HEALTH, PRESENT_POSITION
 
 WATCHDOG_UNIT_S = 0.02

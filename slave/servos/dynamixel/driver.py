@@ -11,7 +11,7 @@ from common.clock import Clock, to_ns, to_s
 from common.errors import RobotError
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT, Counts, EncoderConfig, Encoders
+from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT, Counts, EncoderConfig, Encoders
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
 from slave.servos.dynamixel.config import WATCHDOG_UNIT_S, DynamixelConfig

@@ -9,10 +9,10 @@ import numpy as np
 
 from common.clock import Clock, monotonic_ns, to_s
 from common.errors import RobotError
-from common.metrics import ServoMetrics
+from common.metrics.published import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.encoders import EncoderConfig
+from slave.encoders.counts import EncoderConfig
 from slave.servos.dynamixel.config import DynamixelConfig
 from slave.servos.dynamixel.driver import Driver
 from slave.servos.dynamixel.port import Port

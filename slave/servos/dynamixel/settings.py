@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.skeleton import Skeleton
-from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT, Encoders
+from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT, Encoders
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.config import WATCHDOG_UNIT_S, DynamixelConfig
 from slave.servos.dynamixel.registers import Register

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from common.skeleton import Skeleton
-from slave.encoders import EncoderConfig, Encoders
+from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
 from slave.servos.dynamixel.config import DynamixelConfig

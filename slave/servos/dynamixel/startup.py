@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT
+from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
 from slave.servos.dynamixel.lasting import HOW, Difference, differences, in_words

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from common.calibration import NodeCalibration
-from common.config import load_config
+from common.config.load import load_config
+from common.config.sensor_calibration import NodeCalibration
 from common.errors import TandemError
 from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate, to_matrix
 from deploy import cli

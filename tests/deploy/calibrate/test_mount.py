@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import typer
 
-from common.calibration import NodeCalibration
-from common.config import load_config
+from common.config.load import load_config
+from common.config.sensor_calibration import NodeCalibration
 from common.errors import TandemError
 from deploy.calibrate.mount import _times, mount
 from tests.master.calibrate.worn import wear

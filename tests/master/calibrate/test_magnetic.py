@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
+from deploy.sim.suit.imperfections import Imperfections
 from master.calibrate.magnetic import calibrate_magnetic
 from master.calibrate.recording import NodeRecording, RecordingError
-from master.suit.simulated.imperfections import Imperfections
 
 RATE_HZ = 50.0
 FIELD_UT = 49.0

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.calibration import NodeCalibration
-from common.config import load_config
+from common.config.load import load_config
+from common.config.sensor_calibration import NodeCalibration
 from common.errors import TandemError
 from common.quaternion import IDENTITY, Array, angle_between, conjugate, rotate
 from common.skeleton import Skeleton, load_skeleton
@@ -22,8 +22,8 @@ from master.calibrate.mounting import Mounting, find_mounting, posture
 from master.calibrate.mounting_files import calibrated, write_mounting
 from master.calibrate.oriented import orient
 from master.calibrate.recording import NodeRecording, load_recordings
-from master.fuse.hinge_angle import HingeAngleConfig, hinge_angles
-from master.solve.decomposition import JointAngles
+from master.joint_angles.decomposition import JointAngles
+from master.orientation.hinge_angle import HingeAngleConfig, hinge_angles
 from tests.master.calibrate.worn import FINGERS, RATE_HZ, Worn, wear
 
 

@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.calibration import Made, NodeCalibration
-from common.config import load_config
+from common.config.load import load_config
+from common.config.sensor_calibration import Made, NodeCalibration
 from common.errors import ConfigError, TandemError
 from common.quaternion import Array
-from master.calibrate.affine import ACC, load_calibration
 from master.calibrate.node_file import write_calibration
+from master.orientation.affine import ACC, load_calibration
 
 MADE = Made(date=date(2026, 11, 22), recording="session.npz", unit="m/s²", residual_after=0.00113)
 MAP: Array = np.array([[1.1, 0.01, 0.0, 0.2], [0.0, 0.9, 0.02, -0.1], [0.0, 0.0, 1.0, 1.0 / 3.0]])

@@ -15,8 +15,8 @@ from common.skeleton.full_body import RECORDED_AS
 from master.calibrate.mounting import find_mounting, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import load_recordings
-from master.fuse.hinge_angle import HingeAngle, HingeAngleConfig, hinge_of
-from master.solve.decomposition import JointAngles
+from master.joint_angles.decomposition import JointAngles
+from master.orientation.hinge_angle import HingeAngle, HingeAngleConfig, hinge_of
 
 pytestmark = pytest.mark.recordings
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from common.quaternion import Array, from_axis_angle
 from common.skeleton import Skeleton, load_skeleton
+from deploy.sim.suit.imperfections import Imperfections
+from deploy.sim.suit.sensors import IdealSensors, earth_field_ut
 from master.calibrate.recording import NodeRecording
-from master.suit.simulated.imperfections import Imperfections
-from master.suit.simulated.sensors import IdealSensors, earth_field_ut
 
 RATE_HZ = 100.0
 STILL_S, MOVING_S = 3.0, 20.0

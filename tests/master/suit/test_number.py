@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.messages import Mask
+from common.wire.messages import Mask
 from master.suit.nodes import NodeConfig
 from master.suit.number import EPOCH, number_of, tick_of
 from master.suit.poll import Poll

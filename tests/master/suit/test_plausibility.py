@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from master.doubt import Weight
+from deploy.sim.suit.lies import LieKind
+from master.suit.doubt import Weight
 from master.suit.plausibility import Plausibility, PlausibilityConfig
-from master.suit.simulated.lies import LieKind
 from tests.master.test_pipeline import Bench
 
 NODE = "right_forearm"

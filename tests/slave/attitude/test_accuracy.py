@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from common.calibration import NodeCalibration
+from common.config.sensor_calibration import NodeCalibration
 from common.quaternion import Array, conjugate, rotate
 from slave.attitude.angles import (
     azimuth_rad,

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.config import load_config
+from common.config.load import load_config
 from common.errors import ConfigError
 from common.quaternion import conjugate, from_axis_angle, multiply, rotate
 from slave.attitude.angles import gravity_tool_face_rad, inclination_rad, orientation

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.codec import decode
-from common.config import LinkConfig
-from common.messages import BaseAttitude, RobotState
-from common.metrics import ServoMetrics
-from common.pacing import Due, TickGrid
-from common.topics import Topic
+from common.link.config import LinkConfig
+from common.metrics.published import ServoMetrics
+from common.process.pacing import Due, TickGrid
+from common.wire.codec import decode
+from common.wire.messages import BaseAttitude, RobotState
+from common.wire.topics import Topic
 from slave import app
 from slave.config import SlaveConfig
 from slave.servos import EncoderReading

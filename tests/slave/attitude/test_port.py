@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from common.errors import RobotError
-from common.messages import BaseAttitude
+from common.wire.messages import BaseAttitude
 from slave.attitude import port as port_module
 from slave.attitude.config import BaseConfig
 from slave.attitude.frame import FrameAngles, encode

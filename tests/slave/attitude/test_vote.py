@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_S
-from common.messages import BaseAttitude
+from common.wire.messages import BaseAttitude
 from slave.attitude.config import BaseConfig
 from slave.attitude.frame import FrameAngles, FrameParser, decode, encode
 from slave.attitude.port import of_frame

@@ -15,7 +15,7 @@ import pytest
 
 from common.clock import monotonic_ns
 from common.errors import RobotError
-from common.video import VideoFrame, decode_frame
+from common.wire.video import VideoFrame, decode_frame
 from slave.camera import feed as feed_module
 from slave.camera.config import CameraConfig
 from slave.camera.feed import CameraFeed

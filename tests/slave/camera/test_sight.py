@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from common.messages import Command, CommandStamps
-from common.offset import Offset
+from common.clock_sync import Offset
+from common.wire.messages import Command, CommandStamps
 from slave.camera.sight import Sight
 
 MS = 1_000_000

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.control import CHALLENGED
-from common.messages import Action, Command, CommandStamps, ControlReply, ControlRequest
-from common.offset import Offset
+from common.clock_sync import Offset
 from common.quaternion import Array
 from common.skeleton import load_skeleton
+from common.wire.control import CHALLENGED
+from common.wire.messages import Action, Command, CommandStamps, ControlReply, ControlRequest
 from slave.guard import Guard, GuardConfig, Setpoint, State, Verdict
 from slave.guard.body import WELL
 from slave.track import Target
@@ -105,7 +105,7 @@ class Rig:
         robot: str = ROBOT,
         challenge: int | None = None,
     ) -> ControlReply:
-        """Ask in the way of `common.control`, or with a challenge of one's own."""
+        """Ask in the way of `common.wire.control`, or with a challenge of one's own."""
         request = ControlRequest(robot, action, operator, key, challenge=challenge or 0)
         if challenge is None and action in CHALLENGED:
             given = self.guard.on_control(replace(request, action=Action.STATUS), self.now_ns).challenge

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from common.messages import Action, BaseAttitude
-from common.offset import Offset
+from common.clock_sync import Offset
+from common.wire.messages import Action, BaseAttitude
 from slave.guard import GuardConfig, State, tilt
 from slave.guard.body import Body
 

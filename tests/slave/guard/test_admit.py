@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.clock import to_ns
-from common.messages import Action, Command
+from common.wire.messages import Action, Command
 from slave.guard import GATES, State
 
 MakeRig = Callable[..., Any]

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from common.messages import Action
+from common.wire.messages import Action
 from slave.guard import State
 from slave.guard.challenge import KEPT, TIMEOUT_NS, Challenges
 

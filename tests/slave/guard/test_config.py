@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.config import check_config
+from common.config.load import check_config
 from common.errors import ConfigError
 from common.skeleton import load_skeleton
 from slave.guard import Guard, GuardConfig

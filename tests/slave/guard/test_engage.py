@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.messages import Action
+from common.wire.messages import Action
 from slave.guard import State, engage
 from slave.guard.body import Body
 

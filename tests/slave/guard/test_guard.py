@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.messages import Action
+from common.wire.messages import Action
 from slave.guard import GuardConfig, State
 from slave.guard.events import Change, Clamp
 from slave.track import Target

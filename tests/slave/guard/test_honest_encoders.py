@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from common.skeleton import load_skeleton
-from slave.encoders import Encoders
+from slave.encoders.counts import Encoders
 from slave.guard import GuardConfig
-from slave.guard.limit import SetpointLimiter
 from slave.guard.placed import Placement
 from slave.guard.plausible import Plausibility
+from slave.limit.limit import SetpointLimiter
 from slave.servos.simulated import SimulatedRobot
 
 PERIOD_NS = 5_000_000

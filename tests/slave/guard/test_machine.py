@@ -15,7 +15,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from common.messages import Action
+from common.wire.messages import Action
 from slave.guard import State
 from slave.guard.body import WELL, Body
 from slave.guard.states import MOVING

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from slave import agreement, unbidden
+from slave.encoders import agreement, unbidden
 from slave.guard import (
     admit,
     align,
@@ -22,13 +22,13 @@ from slave.guard import (
     engage,
     guard,
     lease,
-    limit,
     placed,
     plausible,
     states,
     tilt,
     watchdog,
 )
+from slave.limit import limit
 
 from .scenarios import SCENARIOS
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS
-from common.messages import Action
-from slave.agreement import WINDOW_RAD, Agreement
+from common.wire.messages import Action
+from slave.encoders.agreement import WINDOW_RAD, Agreement
+from slave.encoders.unbidden import ASTRAY_RAD, SHAKEN_NS, SHAKES_RAD, STILL_RAD, UnbiddenMotion
 from slave.guard import State
 from slave.guard.placed import BEYOND_RAD, NEAR_RAD, PATIENCE, READINGS
-from slave.unbidden import ASTRAY_RAD, SHAKEN_NS, SHAKES_RAD, STILL_RAD, UnbiddenMotion
 
 MakeRig = Callable[..., Any]
 KEY = "a key kept at the robot"

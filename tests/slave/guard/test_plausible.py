@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.messages import Action
 from common.skeleton import load_skeleton
+from common.wire.messages import Action
 from slave.guard import GuardConfig, State
 from slave.guard.body import WELL
 from slave.guard.plausible import JUMP_SLACK_RAD, Past, Plausibility

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from common.messages import BaseAttitude
+from common.wire.messages import BaseAttitude
 from slave.guard import GuardConfig
 from slave.guard.tilt import base_loss
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from common.kinematics import orientations, origins
 from common.quaternion import Array, angle_between
 from common.skeleton import load_skeleton
+from common.skeleton.kinematics import orientations, origins
 from slave.servos.model import STEP_S, build_model, leader, unit_rates
 
 SKELETON = load_skeleton("nursing")

@@ -7,7 +7,7 @@ import pytest
 
 from common.errors import RobotError
 from common.skeleton import load_skeleton
-from slave.encoders import EncoderConfig
+from slave.encoders.counts import EncoderConfig
 from slave.servos import open_servos
 from slave.servos.config import ServosConfig
 from slave.servos.mujoco import MujocoServos

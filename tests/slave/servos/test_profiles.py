@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from common.kinematics import orientations, origins
 from common.quaternion import Array, angle_between
 from common.skeleton import Skeleton, load_skeleton
+from common.skeleton.kinematics import orientations, origins
 from slave.servos.model import STEP_S, build_model, leader, unit_rates
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from common.skeleton import load_skeleton
-from slave.encoders import RAD_PER_COUNT, EncoderConfig, Encoders
+from slave.encoders.counts import RAD_PER_COUNT, EncoderConfig, Encoders
 from slave.servos.simulated import CYCLE_NS, MOST_CYCLES, SimulatedRobot
 from slave.track.config import SERVO_LAG_S
 

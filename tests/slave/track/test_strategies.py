@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.config import check_config
+from common.config.load import check_config
 from common.errors import ConfigError
 from slave.servos.config import ServosConfig
 from slave.track import Tracker

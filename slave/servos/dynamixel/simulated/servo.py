@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from slave.encoders import COUNTS_PER_TURN, RAD_PER_COUNT
+from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.registers import Register
 

@@ -13,7 +13,7 @@ from common.errors import ConfigError, TandemError
 from deploy import cli
 from deploy.calibrate.live import run as live_run
 from deploy.calibrate.live.guide import GuideOptions
-from deploy.profiles import EXAMPLES
+from deploy.examples.profiles import EXAMPLES
 
 
 def run(line: str) -> None:

@@ -11,10 +11,10 @@ from common.can.config import BusConfig
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.calibrate.live.guide import Guide, GuideOptions
+from deploy.sim.suit.config import SuitConfig
+from deploy.sim.suit.suit import _wearer
+from deploy.sim.suit.tray import TrayConfig
 from master.suit.nodes import NodeConfig
-from master.suit.simulated.config import SuitConfig
-from master.suit.simulated.suit import _wearer
-from master.suit.simulated.tray import TrayConfig
 
 RATE_HZ = 50.0
 HAND = load_skeleton("hand")

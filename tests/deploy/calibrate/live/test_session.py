@@ -13,8 +13,8 @@ import pytest
 from rich.console import Console
 from scipy.spatial.transform import Rotation
 
-from common.calibration import NodeCalibration
-from common.config import load_config
+from common.config.load import load_config
+from common.config.sensor_calibration import NodeCalibration
 from common.errors import TandemError
 from common.quaternion import Array, from_rotation_vector
 from deploy.calibrate.live.command import parts
@@ -22,12 +22,12 @@ from deploy.calibrate.live.compute import Choice, compute, inherit
 from deploy.calibrate.live.guide import GuideOptions, What
 from deploy.calibrate.live.run import LiveSession, free_name
 from deploy.calibrate.live.screen import line, screen
-from deploy.profiles import EXAMPLES
+from deploy.examples.profiles import EXAMPLES
+from deploy.sim.suit.config import SuitConfig
+from deploy.sim.suit.imperfections import Imperfections
+from deploy.sim.suit.suit import Wearer, _wearer
 from master.config import MasterConfig
 from master.suit.poll import Sweep
-from master.suit.simulated.config import SuitConfig
-from master.suit.simulated.imperfections import Imperfections
-from master.suit.simulated.suit import Wearer, _wearer
 
 SEED = 7
 RATE_HZ = 50

@@ -10,11 +10,11 @@ import pytest
 from common.clock import NS_PER_MS
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from slave.encoders import EncoderConfig, Encoders
+from deploy.sim.drives.faults import Fault
+from deploy.sim.drives.peer import DrivePeer
+from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.network import DriveNetwork, period_ns
-from slave.servos.canopen.simulated.faults import Fault
-from slave.servos.canopen.simulated.peer import DrivePeer
 
 STEP_NS = 4 * NS_PER_MS
 

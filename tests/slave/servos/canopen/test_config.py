@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from common.skeleton import load_skeleton
-from slave.encoders import EncoderConfig
+from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig, DriveConfig
 from slave.servos.config import ServosConfig
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from slave.encoders import EncoderConfig
+from deploy.sim.drives.faults import Fault
+from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
-from slave.servos.canopen.simulated.faults import Fault
 from tests.slave.servos.canopen.conftest import Wired
 
 ELBOW = "left_elbow_pitch"

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from deploy.sim.drives.machine import after, statusword
+from deploy.sim.drives.node import EDS, _Wire
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import _PATTERNS, FAULT_RESET, Power, power, towards_enabled
 from slave.servos.canopen.emergency import emergency
 from slave.servos.canopen.sdo import Read, Write, answer, request
-from slave.servos.canopen.simulated.machine import after, statusword
-from slave.servos.canopen.simulated.node import EDS, _Wire
 
 QUICK = settings(max_examples=60, deadline=None, derandomize=True)
 

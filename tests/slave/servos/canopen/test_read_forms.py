@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from common.clock import NS_PER_MS
+from deploy.sim.drives.traits import ReadForm
 from slave.servos.canopen.sdo import ABORTS, Answer, Exchange, More, Read, Write, answer
-from slave.servos.canopen.simulated.traits import ReadForm
 from tests.slave.servos.canopen.conftest import Wired
 
 TYPE = Read(0x1000, 0, 0xFFFF, 402, "a CiA 402 drive")

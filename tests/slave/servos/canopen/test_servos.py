@@ -23,18 +23,18 @@ import uvloop
 from common.can.config import BusConfig
 from common.can.interface import open_bus
 from common.clock import to_ns
-from common.config import LinkConfig
 from common.errors import BusError, RobotError
+from common.link.config import LinkConfig
 from common.skeleton import load_skeleton
-from deploy.rig.host import Host
+from deploy.harness.host import Host
+from deploy.sim.drives.app import run as run_drives
+from deploy.sim.drives.faults import DEMAND, Fault
+from deploy.sim.drives.node import EDS
 from slave.config import SlaveConfig
-from slave.encoders import Encoders
+from slave.encoders.counts import Encoders
 from slave.servos import open_servos
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.servos import CanopenServos
-from slave.servos.canopen.simulated.app import run as run_drives
-from slave.servos.canopen.simulated.faults import DEMAND, Fault
-from slave.servos.canopen.simulated.node import EDS
 from slave.servos.config import ServosConfig
 
 NURSING = load_skeleton("nursing")
@@ -340,9 +340,9 @@ SLAVE = """
 import asyncio, sys, uvloop
 import numpy as np
 from pathlib import Path
-from common.config import load_config
+from common.config.load import load_config
 from common.skeleton import load_skeleton
-from deploy.rig.host import Host
+from deploy.harness.host import Host
 from slave.config import SlaveConfig
 from slave.servos.canopen.servos import CanopenServos
 config = load_config(Path(sys.argv[1]), SlaveConfig)

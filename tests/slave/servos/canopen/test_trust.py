@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from slave.encoders import EncoderConfig
+from deploy.sim.drives.faults import Fault
+from deploy.sim.drives.peer import DrivePeer
+from slave.encoders.counts import EncoderConfig
+from slave.encoders.unbidden import ASTRAY_RAD
 from slave.guard import GuardConfig
-from slave.guard.limit import SetpointLimiter
+from slave.limit.limit import SetpointLimiter
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drive import Drive
-from slave.servos.canopen.simulated.faults import Fault
-from slave.servos.canopen.simulated.peer import DrivePeer
 from slave.servos.canopen.start_check import LAST_KNOWN_RAD, SLACK_RAD, Place, refusal
 from slave.servos.canopen.status_bits import FOLLOWS, GOOD, LIMITED, REMOTE, VOLTAGE, amiss
 from slave.servos.canopen.watch import DriveWatch
-from slave.unbidden import ASTRAY_RAD
 from tests.slave.servos.canopen.conftest import Wired
 
 ELBOW = "left_elbow_pitch"
@@ -167,7 +167,7 @@ def test_a_drive_that_moves_against_its_setpoint_in_align_and_track_is_stopped_w
 def test_without_the_astray_window_a_drive_moves_on_against_its_setpoint(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("slave.unbidden.ASTRAY_RAD", 9.0)
+    monkeypatch.setattr("slave.encoders.unbidden.ASTRAY_RAD", 9.0)
     assert stopped_after_s(standing(20.0), -0.1, 0.2) == np.inf
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS
+from deploy.sim.drives.faults import Fault
+from deploy.sim.drives.machine import after, statusword
 from slave.servos.canopen.cia402 import DISABLE_VOLTAGE, ENABLE, FAULT_RESET, Power, power, towards_enabled
-from slave.servos.canopen.simulated.faults import Fault
-from slave.servos.canopen.simulated.machine import after, statusword
 from tests.slave.servos.canopen.conftest import Wired
 
 ELBOW = "left_elbow_pitch"

@@ -11,7 +11,7 @@ import pytest
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from slave.encoders import EncoderConfig, Encoders
+from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.dynamixel.config import DynamixelConfig
 from slave.servos.dynamixel.driver import Driver
 from slave.servos.dynamixel.simulated.bus import SimulatedBus

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from common.config import load_config
+from common.config.load import load_config
 from common.errors import ConfigError
 from slave.config import SlaveConfig
-from slave.encoders import Encoders
+from slave.encoders.counts import Encoders
 from slave.servos import open_servos
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.servos import DynamixelServos

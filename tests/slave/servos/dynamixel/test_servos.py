@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_S
-from common.codec import decode, encode
-from common.config import LinkConfig
-from common.control import read_reply
+from common.clock_sync import MasterExchange
 from common.errors import RobotError
-from common.messages import Action, ClockReply, Command, CommandStamps, ControlReply, ControlRequest
-from common.offset import MasterExchange
-from common.pacing import Due, TickGrid
+from common.link.config import LinkConfig
+from common.process.pacing import Due, TickGrid
+from common.wire.codec import decode, encode
+from common.wire.control import read_reply
+from common.wire.messages import Action, ClockReply, Command, CommandStamps, ControlReply, ControlRequest
 from slave import app
 from slave.camera.config import CameraConfig
 from slave.config import SlaveConfig

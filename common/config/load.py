@@ -1,0 +1,92 @@
+"""TOML files into checked models; a mistake names file, key, value and what was expected."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from common.config.section import Section
+from common.errors import NOT_SET, ConfigError, ConfigMistake
+
+Model = TypeVar("Model", bound=Section)
+
+
+def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -> Model:
+    """Read and check a TOML file before anything is opened.
+
+    `overrides` are `section.key=value` with the value in TOML, and win over the file.
+    Raises ConfigError, one line a mistake.
+    """
+    try:
+        table = tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise _mistake(path, "file", str(path), f"a readable file ({error.strerror})") from None
+    except UnicodeDecodeError as error:
+        raise _mistake(path, "file", path.name, f"UTF-8 text ({error.reason})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise _mistake(path, "file", path.name, f"valid TOML ({error})") from None
+    for override in overrides:
+        _override(table, override)
+    return check_config(path, table, model)
+
+
+def check_config(path: Path, table: dict[str, Any], model: type[Model]) -> Model:
+    """The checked model of a table that was read from `path`."""
+    try:
+        checked = model.model_validate(table, context={"folder": path.parent})
+    except ValidationError as error:
+        mistakes = [
+            ConfigMistake(
+                ".".join(map(str, e["loc"])) or "file",
+                NOT_SET if e["type"] == "missing" else e["input"],
+                _expected(e["type"], e["msg"]),
+            )
+            for e in error.errors()
+        ]
+        raise ConfigError(path, mistakes) from None
+    contradictions = checked.mistakes()
+    if contradictions:
+        raise ConfigError(path, contradictions)
+    return checked
+
+
+def _override(table: dict[str, Any], text: str) -> None:
+    key, equals, value = text.partition("=")
+    if not equals:
+        raise _mistake("--set", "--set", text, "section.key=value")
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        raise _mistake(
+            "--set", key, value, "a TOML value; texts need quotes, as in 'robot=\"robot-2\"'"
+        ) from None
+    *sections, last = key.strip().split(".")
+    place: Any = table
+    for section in sections:
+        if isinstance(place, list) and section.isdigit() and int(section) < len(place):
+            place = place[int(section)]
+        elif isinstance(place, dict):
+            place = place.setdefault(section, {})
+        else:
+            raise _mistake("--set", key, value, f"{section} to be in the file")
+    if not isinstance(place, dict):
+        raise _mistake("--set", key, value, "a key of a table")
+    place[last] = parsed
+
+
+def _mistake(path: Path | str, key: str, value: object, expected: str) -> ConfigError:
+    return ConfigError(path, [ConfigMistake(key, value, expected)])
+
+
+def _expected(kind: str, message: str) -> str:
+    if kind == "extra_forbidden":
+        return "no such key (is it misspelt?)"
+    if kind == "missing":
+        return "this key to be set"
+    for lead in ("Input should be ", "Value error, expected ", "Value error, "):
+        message = message.removeprefix(lead)
+    return message

@@ -1,0 +1,51 @@
+"""Which numbered messages arrived: lost on the way, out of order, come twice. Pure."""
+
+from __future__ import annotations
+
+from common.metrics.published import ArrivalCounts
+
+REMEMBERED = 256
+"""A missing number may still come this many numbers later (20 s) and is then late, not lost."""
+
+
+class Arrivals:
+    """Counts since start. It looks before the gates do, so that what the guard refuses is not called lost.
+
+    A number that is missing when a newer one comes is lost, whoever lost it: the network, or this process,
+    which keeps only the newest that waits (`link.command.overwritten` counts those). Where it comes after all
+    it was late, and not lost.
+    """
+
+    def __init__(self) -> None:
+        self.arrived = 0
+        """All of them."""
+        self.lost = 0
+        self.late = 0
+        """Came after a newer one."""
+        self.repeated = 0
+        """Came again."""
+        self._lease: int | None = None
+        self._newest = 0
+        self._missing: set[int] = set()
+
+    def note(self, lease: int, sequence: int) -> None:
+        """Take one command of the live lease; the first of a lease begins its count."""
+        self.arrived += 1
+        if lease != self._lease:
+            self._lease, self._newest = lease, sequence
+            self._missing.clear()
+        elif sequence > self._newest:
+            self.lost += sequence - self._newest - 1
+            self._missing.update(range(max(self._newest + 1, sequence - REMEMBERED), sequence))
+            self._missing = {number for number in self._missing if number >= sequence - REMEMBERED}
+            self._newest = sequence
+        elif sequence in self._missing:
+            self._missing.remove(sequence)
+            self.lost -= 1
+            self.late += 1
+        else:
+            self.repeated += 1
+
+    def metrics(self) -> ArrivalCounts:
+        """The counts so far."""
+        return ArrivalCounts(self.arrived, self.lost, self.late, self.repeated)

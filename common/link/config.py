@@ -1,0 +1,136 @@
+"""`[link]`: where a session listens and connects, its keys, who may do what, and how topics travel."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from common.config.section import RelativePath, Section
+from common.errors import ConfigMistake
+from common.link.endpoint import SECURE, check_endpoint, transport_of
+from common.wire.topics import QUESTIONS, TOPICS, Priority, Topic
+
+Endpoint = Annotated[str, AfterValidator(check_endpoint)]
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,47}$"
+Name = Annotated[str, Field(pattern=NAME)]
+"""Of a robot, a person or a router, as in its certificate. 48 characters, so that a role fits before it."""
+
+
+class TlsConfig(Section):
+    """`[link.tls]`: this host's certificate and key, and the authority that it trusts."""
+
+    ca: RelativePath
+    """The authority's certificate: whoever has none from it is refused."""
+    certificate: RelativePath
+    key: RelativePath
+
+
+class AccessConfig(Section):
+    """`[link.access]`: who may do what, by the names in the certificates. The same lines fit every host."""
+
+    operators: dict[Name, list[Name]] = Field(default_factory=dict)
+    """Each operator's robots: who may command them, and see what they see."""
+    observers: dict[Name, list[Name]] = Field(default_factory=dict)
+    """Each observer's robots: who hears commands, states and statistics, but sees no video."""
+    viewers: dict[Name, list[Name]] = Field(default_factory=dict)
+    """Each viewer's robots: an observer who sees their video too."""
+    routers: list[Name] = Field(default_factory=list)
+    """Through whom all of this may pass. A router enforces these rules towards everybody else."""
+
+    @property
+    def robots(self) -> list[str]:
+        """Every robot that anybody has something to do with, in the order of the file."""
+        tables = (self.operators, self.observers, self.viewers)
+        return list(dict.fromkeys(robot for table in tables for robots in table.values() for robot in robots))
+
+
+class TopicConfig(Section):
+    """`[link.topics.NAME]`: quality of service of one topic, where it shall not be the table's."""
+
+    reliable: bool | None = None
+    """Whether a lost message is sent again: a live one is better replaced by the next."""
+    priority: Annotated[Priority | None, Field(strict=False)] = None
+    express: bool | None = None
+    """Never waits to be sent together with others."""
+    congestion: Literal["drop", "block"] = "drop"
+
+    @model_validator(mode="after")
+    def _never_blocks(self) -> Self:
+        if self.congestion == "block":
+            raise ValueError(
+                'expected congestion = "drop": with "block" an outage of 5 s was measured to freeze '
+                "the servo loop for 5 s; drop loses what is old anyway"
+            )
+        return self
+
+    def over(self, topic: Topic) -> Topic:
+        """The topic with these values in place of its own."""
+        return topic.with_quality(self.reliable, self.priority, self.express)
+
+
+class LinkConfig(Section):
+    """`[link]`: Zenoh endpoints, such as `tcp/192.168.7.2:7447`, `tls/…`, `quic/…`, `unixsock-stream/…`."""
+
+    listen: list[Endpoint] = Field(default_factory=list)
+    """Where other sessions may connect to this one."""
+    connect: list[Endpoint] = Field(default_factory=list)
+    """Which sessions to connect to; they may start later, or again."""
+    mode: Literal["peer", "client"] = "peer"
+    """`peer`: directly to each other. `client`: through the routers at `connect`, the first that answers."""
+    open_timeout_s: float = Field(default=1.0, ge=0.1, le=30.0)
+    """How long opening a connection may take: some six round trips of the line. Over one that is slower no
+    connection ever comes about; much longer than needed, it delays the return after an outage."""
+    tcp_congestion_control: str | None = Field(default=None, pattern=r"^[a-z0-9_-]{1,15}$")
+    """Of this process's tcp, tls and ws connections, such as `cubic`; unset: the host's. Set it on both
+    hosts: each decides how it sends."""
+    tls: TlsConfig | None = None
+    access: AccessConfig | None = None
+    topics: dict[str, TopicConfig] = Field(default_factory=dict)
+
+    def quality(self, topic: Topic) -> Topic:
+        """The topic as it shall travel here."""
+        override = self.topics.get(topic.name)
+        return topic if override is None else override.over(topic)
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """Keys that do not fit each other; what of the installed Zenoh cannot work as asked."""
+        return [*self._mode_mistakes(), *self._security_mistakes(), *self._topic_mistakes()]
+
+    def _mode_mistakes(self) -> list[ConfigMistake]:
+        if self.mode == "client" and self.listen:
+            return [
+                ConfigMistake("link.listen", self.listen, 'nothing with mode = "client": it only connects')
+            ]
+        if self.mode == "client" and not self.connect:
+            return [ConfigMistake("link.connect", self.connect, "a router's endpoint with mode = 'client'")]
+        return []
+
+    def _security_mistakes(self) -> list[ConfigMistake]:
+        ends = [("listen", e) for e in self.listen] + [("connect", e) for e in self.connect]
+        secure = [(key, e) for key, e in ends if transport_of(e) in SECURE]
+        open_ends = [(key, e) for key, e in ends if transport_of(e) not in SECURE]
+        if secure and self.tls is None:
+            where, end = secure[0]
+            what = "the keys for it under [link.tls]: ca, certificate, key (make them with `tandem keys`)"
+            return [ConfigMistake(f"link.{where}", end, what)]
+        if self.access is not None and self.tls is None:
+            what = "[link.tls] beside it: certificates tell who somebody is"
+            return [ConfigMistake("link.access", "…", what)]
+        if self.access is not None:
+            what = f"one of {', '.join(SECURE)}, as there is [link.access]: elsewhere nobody proves who he is"
+            return [ConfigMistake(f"link.{key}", end, what) for key, end in open_ends]
+        return []
+
+    def _topic_mistakes(self) -> list[ConfigMistake]:
+        adjustable = [name for name in TOPICS if name != "alive"]
+        found = [
+            ConfigMistake(f"link.topics.{name}", "…", f"one of the topics {', '.join(adjustable)}")
+            for name in self.topics
+            if name not in adjustable
+        ]
+        for name in QUESTIONS:
+            if name in self.topics and self.topics[name].reliable is False:
+                what = "true: a question and its answer are always reliable"
+                found.append(ConfigMistake(f"link.topics.{name}.reliable", False, what))
+        return found

@@ -1,0 +1,278 @@
+"""Messages as msgpack arrays that begin with kind and schema version, checked on arrival.
+
+Pure: bytes in, messages out. The only error it raises is CodecError.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import msgpack
+
+from common.errors import CodecError
+from common.metrics.published import MasterMetrics, SlaveMetrics, from_tree, to_tree
+from common.wire import fields
+from common.wire.fields import MAX_DOUBT, MAX_ITEMS, MAX_NAME, MAX_TEXT
+from common.wire.messages import (
+    Action,
+    BaseAttitude,
+    ClockQuery,
+    ClockReply,
+    Command,
+    CommandEcho,
+    CommandStamps,
+    ControlReply,
+    ControlRequest,
+    Message,
+    RobotState,
+    Statistics,
+    Truth,
+)
+
+VERSION = 3
+CONTROL_BYTES = 1100
+"""Of a command, a state, and whatever else the robot is controlled by. With the headers of IPv6, TCP, TLS and
+Zenoh a packet stays below 1280 bytes, which every path carries; many VPNs swallow larger ones silently."""
+_STATE_NUMBERS_BYTES = 200
+"""Of a state's numbers, kind and lengths."""
+MAX_PAYLOAD = 256 * 1024
+ANGLE_LIMIT_RAD = 4 * math.pi
+"""No joint turns twice round; a larger angle is a fault, not a posture."""
+RATE_LIMIT_RAD_S = 100.0
+_POSTURE = (ANGLE_LIMIT_RAD, RATE_LIMIT_RAD_S)
+_ANGLES = (ANGLE_LIMIT_RAD, ANGLE_LIMIT_RAD)
+
+_METRICS: dict[str, type[MasterMetrics | SlaveMetrics]] = {"master": MasterMetrics, "slave": SlaveMetrics}
+"""What statistics hold, by the role of the process that sends them."""
+_ROLES = {kind: role for role, kind in _METRICS.items()}
+
+_pack = msgpack.Packer(autoreset=True).pack
+_unpack = msgpack.unpackb
+_Decoded = TypeVar("_Decoded")
+
+
+def encode(message: Message) -> bytes:
+    """The message's bytes. CodecError where it holds what no message of its kind can carry."""
+    try:
+        kind, pack = _ENCODERS[type(message)]
+        out: bytes = _pack((kind, VERSION, *pack(message)))
+    except Exception as error:
+        raise CodecError(f"{type(message).__name__} cannot be encoded: {error}") from error
+    return out
+
+
+def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
+    """The message of the expected kind with `joints` joints; CodecError says what is wrong with it."""
+    name, unpack = _DECODERS[kind]
+    if len(payload) > MAX_PAYLOAD:
+        raise CodecError(f"{len(payload)} bytes, expected at most {MAX_PAYLOAD}")
+    try:
+        array = _unpack(payload, use_list=False, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
+    except Exception as error:  # msgpack raises ValueError, TypeError and its own family on garbage
+        raise CodecError(f"not msgpack: {type(error).__name__}") from None
+    if type(array) is not tuple or len(array) < 2:
+        raise CodecError("not an array")
+    if array[0] != name:
+        raise CodecError(f"kind {fields.short(array[0])}, expected {name}")
+    if type(array[1]) is not int or array[1] != VERSION:
+        raise CodecError(
+            f"schema version {fields.short(array[1])}, expected {VERSION}: the other side runs another "
+            "version of tandem, install the same on both hosts"
+        )
+    message: _Decoded = unpack(array[2:], joints)
+    return message
+
+
+# one pair of functions a message, in the order of messages.py
+
+
+def _pack_command(m: Command) -> tuple[Any, ...]:
+    s = m.stamps
+    return (
+        m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.solved_ns, s.put_ns,
+        m.deadman_held, fields.pack_mask(m.valid), fields.pack_floats(m.position_rad, m.velocity_rad_s),
+        m.seen_frame, m.seen_ns, fields.shorten(m.doubt, MAX_DOUBT),
+    )  # fmt: skip
+
+
+def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
+    fields.length(f, 14)
+    lease, sequence, tick, sampled_ns, frames_in_ns, solved_ns, put_ns = fields.counts(f[1:8])
+    position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
+    return Command(
+        fields.text(f[0], MAX_NAME),
+        lease,
+        sequence,
+        tick,
+        CommandStamps(sampled_ns, frames_in_ns, solved_ns, put_ns),
+        fields.flag(f[8]),
+        fields.mask(f[9], joints),
+        position_rad,
+        velocity_rad_s,
+        fields.count(f[11]),
+        fields.count(f[12]),
+        fields.text(f[13], MAX_DOUBT),
+    )
+
+
+def _pack_state(m: RobotState) -> tuple[Any, ...]:
+    e = m.echo
+    echo = None if e is None else (e.sequence, e.put_ns, e.received_ns, e.accepted_ns, e.written_ns)
+    reason = fields.shorten(m.reason, MAX_DOUBT)
+    mask, angles = fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad)
+    named = (m.robot, m.guard, reason, m.operator)
+    taken = _STATE_NUMBERS_BYTES + len(mask) + len(angles) + sum(len(name.encode("utf-8")) for name in named)
+    return (
+        m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
+        m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
+        _pack_base(m.base), m.lease_id, m.instance,
+    )  # fmt: skip
+
+
+def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
+    fields.length(f, 16)
+    sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
+    position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
+    return RobotState(
+        robot=fields.text(f[0], MAX_NAME),
+        sequence=sequence,
+        sent_ns=sent_ns,
+        encoder_ns=encoder_ns,
+        guard=fields.text(f[4], MAX_NAME),
+        reason=fields.text(f[5], MAX_TEXT),
+        operator=fields.text(f[6], MAX_NAME),
+        encoder_valid=fields.mask(f[7], joints),
+        position_rad=position_rad,
+        setpoint_rad=setpoint_rad,
+        echo=_unpack_echo(f[9]),
+        master_offset_ns=fields.signed(f[10]),
+        offset_bound_ns=fields.signed(f[11]),
+        faults=fields.texts(f[12], MAX_NAME, MAX_TEXT),
+        base=_unpack_base(f[13]),
+        lease_id=fields.count(f[14]),
+        instance=fields.count(f[15]),
+    )
+
+
+def _pack_base(base: BaseAttitude | None) -> tuple[Any, ...] | None:
+    if base is None:
+        return None
+    return (base.measured_ns, base.inclination_rad, base.azimuth_rad, base.tool_face_rad, base.tilt_rad)
+
+
+def _unpack_base(value: object) -> BaseAttitude | None:
+    if value is None:
+        return None
+    if not isinstance(value, tuple):
+        raise CodecError("base is not an array")
+    fields.length(value, 5)
+    azimuth, tool_face = value[2:4]
+    return BaseAttitude(
+        fields.count(value[0]),
+        fields.number(value[1], 0.0, math.pi),
+        None if azimuth is None else fields.number(azimuth, 0.0, math.tau),
+        None if tool_face is None else fields.number(tool_face, 0.0, math.tau),
+        fields.number(value[4], 0.0, math.pi),
+    )
+
+
+def _unpack_echo(value: object) -> CommandEcho | None:
+    if value is None:
+        return None
+    if not isinstance(value, tuple):
+        raise CodecError("echo is not an array")
+    fields.length(value, 5)
+    return CommandEcho(*fields.counts(value))
+
+
+def _pack_control_request(m: ControlRequest) -> tuple[Any, ...]:
+    return (m.robot, m.action.value, m.operator, m.key, m.clock, m.challenge)
+
+
+def _unpack_control_request(f: tuple[Any, ...], _: int) -> ControlRequest:
+    fields.length(f, 6)
+    try:
+        action = Action(fields.text(f[1], MAX_NAME))
+    except ValueError:
+        raise CodecError(f"action {fields.short(f[1])}, expected one of {', '.join(Action)}") from None
+    operator, key = fields.text(f[2], MAX_NAME), fields.text(f[3], MAX_TEXT)
+    robot = fields.text(f[0], MAX_NAME)
+    return ControlRequest(robot, action, operator, key, fields.count(f[4]), fields.count(f[5]))
+
+
+def _pack_control_reply(m: ControlReply) -> tuple[Any, ...]:
+    text, place = fields.shorten(m.text, MAX_TEXT), fields.shorten(m.place, MAX_DOUBT)
+    return (m.done, m.guard, text, m.lease, m.challenge, m.instance, place)
+
+
+def _unpack_control_reply(f: tuple[Any, ...], _: int) -> ControlReply:
+    fields.length(f, 7)
+    guard, text = fields.text(f[1], MAX_NAME), fields.text(f[2], MAX_TEXT)
+    lease, challenge, instance = fields.counts(f[3:6])
+    place = fields.text(f[6], MAX_TEXT)
+    return ControlReply(fields.flag(f[0]), guard, text, lease, challenge, instance=instance, place=place)
+
+
+def _pack_clock_query(m: ClockQuery) -> tuple[Any, ...]:
+    return (m.asked_ns, m.last_asked_ns, m.last_heard_ns, m.asker)
+
+
+def _unpack_clock_query(f: tuple[Any, ...], _: int) -> ClockQuery:
+    fields.length(f, 4)
+    return ClockQuery(*fields.counts(f))
+
+
+def _pack_clock_reply(m: ClockReply) -> tuple[Any, ...]:
+    return (m.asked_ns, m.received_ns, m.replied_ns, m.instance)
+
+
+def _unpack_clock_reply(f: tuple[Any, ...], _: int) -> ClockReply:
+    fields.length(f, 4)
+    return ClockReply(*fields.counts(f))
+
+
+def _pack_statistics(m: Statistics) -> tuple[Any, ...]:
+    return (_ROLES[type(m.metrics)], m.sent_ns, to_tree(m.metrics))
+
+
+def _unpack_statistics(f: tuple[Any, ...], _: int) -> Statistics:
+    fields.length(f, 3)
+    role = fields.text(f[0], MAX_NAME)
+    kind = _METRICS.get(role)
+    if kind is None:
+        raise CodecError(f"statistics of {fields.short(role)}, expected one of {', '.join(_METRICS)}")
+    return Statistics(fields.count(f[1]), from_tree(kind, f[2]))
+
+
+def _pack_truth(m: Truth) -> tuple[Any, ...]:
+    return (m.tick, m.sampled_ns, fields.pack_floats(m.position_rad, m.velocity_rad_s))
+
+
+def _unpack_truth(f: tuple[Any, ...], joints: int) -> Truth:
+    fields.length(f, 3)
+    position_rad, velocity_rad_s = fields.floats(f[2], joints, _POSTURE)
+    return Truth(fields.count(f[0]), fields.count(f[1]), position_rad, velocity_rad_s)
+
+
+_ENCODERS: dict[type, tuple[str, Callable[[Any], tuple[Any, ...]]]] = {
+    Command: ("command", _pack_command),
+    RobotState: ("state", _pack_state),
+    ControlRequest: ("control", _pack_control_request),
+    ControlReply: ("controlled", _pack_control_reply),
+    ClockQuery: ("clock", _pack_clock_query),
+    ClockReply: ("clocked", _pack_clock_reply),
+    Statistics: ("statistics", _pack_statistics),
+    Truth: ("truth", _pack_truth),
+}
+_DECODERS: dict[type, tuple[str, Callable[[tuple[Any, ...], int], Any]]] = {
+    Command: ("command", _unpack_command),
+    RobotState: ("state", _unpack_state),
+    ControlRequest: ("control", _unpack_control_request),
+    ControlReply: ("controlled", _unpack_control_reply),
+    ClockQuery: ("clock", _unpack_clock_query),
+    ClockReply: ("clocked", _unpack_clock_reply),
+    Statistics: ("statistics", _unpack_statistics),
+    Truth: ("truth", _unpack_truth),
+}

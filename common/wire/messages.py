@@ -1,0 +1,217 @@
+"""What travels between the two sides. Times are ns of the sender's own monotonic clock unless named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.metrics.published import MasterMetrics, SlaveMetrics
+from common.quaternion import Array
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class CommandStamps:
+    """When a command passed each station on the master, ns of the master's clock."""
+
+    sampled_ns: int
+    """SYNC sent: the nodes sample on it."""
+    frames_in_ns: int
+    """Last frame of the deciding tick arrived, or its window closed."""
+    solved_ns: int
+    """Joint angles known."""
+    put_ns: int
+    """Handed to the link."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """The operator's posture, master → slave, 12.5 Hz."""
+
+    robot: str
+    lease: int
+    """Token of the lease that the slave granted this master; 0 where it has none."""
+    sequence: int
+    """Counts up by one within a lease."""
+    tick: int
+    """Capture tick that decided it; the suit's truth carries the same number."""
+    stamps: CommandStamps
+    deadman_held: bool
+    valid: Mask
+    """(J,) False where a joint's nodes are lost: the slave holds just those."""
+    position_rad: Array
+    velocity_rad_s: Array
+    seen_frame: int = 0
+    """Number of the newest video frame that the operator had seen when he moved so; 0 where there is none."""
+    seen_ns: int = 0
+    """When that frame arrived, ns of the master's clock; 0 where there is none."""
+    doubt: str = ""
+    """Why nobody should engage on this posture, in words (a zero pose that was not taken, a node that lies);
+    empty where the operator's side has nothing against it."""
+
+
+@dataclass(frozen=True, slots=True)
+class CommandEcho:
+    """The stamps of the newest accepted command, sent back so that round trips close on one clock."""
+
+    sequence: int
+    put_ns: int
+    """Master's clock."""
+    received_ns: int
+    """Slave's clock, as all that follow."""
+    accepted_ns: int
+    written_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class BaseAttitude:
+    """How the robot's base stands (paper D), from its own accelerometer and magnetometer."""
+
+    measured_ns: int
+    """Slave's clock."""
+    inclination_rad: float
+    """Of the base's axis from the vertical, 0 to π."""
+    azimuth_rad: float | None
+    """True azimuth of the axis's horizontal projection, 0 to 2π; None where it has no direction."""
+    tool_face_rad: float | None
+    """Rotation about the axis itself, 0 to 2π; None where neither gravity nor field tells it."""
+    tilt_rad: float
+    """Of the base from level, 0 to π: whatever its axis is, this is what it falls over by."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """What the robot does, slave → master, 50 Hz."""
+
+    robot: str
+    sequence: int
+    sent_ns: int
+    encoder_ns: int
+    """When the encoders were read."""
+    guard: str
+    """Name of the guard's state."""
+    reason: str
+    """Why the guard is there, in words."""
+    operator: str
+    """Who holds the lease, empty where nobody does."""
+    encoder_valid: Mask
+    position_rad: Array
+    """(J,) measured by the encoders."""
+    setpoint_rad: Array
+    """(J,) last written to the servos."""
+    echo: CommandEcho | None
+    master_offset_ns: int
+    """Master's clock minus the slave's, as the slave measured it."""
+    offset_bound_ns: int
+    """Half-width of its bound; negative where the offset is not trusted."""
+    faults: dict[str, str] = field(default_factory=dict)
+    """What is wrong with the robot's body, in words: by joint, or `base`, `camera`."""
+    base: BaseAttitude | None = None
+    """None where the base carries no sensor, or it has never answered."""
+    lease_id: int = 0
+    """Which lease it is (`wire.lease.lease_id`): two masters may bear one name. 0 where there is none."""
+    instance: int = 0
+    """Which process says so (`common.wire.instance`): two robots may bear one name by mistake."""
+
+
+class Action(StrEnum):
+    """What a person or a master can ask of a robot."""
+
+    CLAIM = "claim"
+    RELEASE = "release"
+    ENGAGE = "engage"
+    DISENGAGE = "disengage"
+    ESTOP = "estop"
+    RESET = "reset"
+    STATUS = "status"
+    NAMESAKE = "namesake"
+    """Another robot of this name answers too: its holder of the lease says so, and the robot holds."""
+    HOME = "home"
+    """Confirm, with the key, that the robot stands as it says, where nothing else can."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlRequest:
+    """A question to the slave that must be answered."""
+
+    robot: str
+    action: Action
+    operator: str
+    """Who asks; `engage` and `disengage` are for the lease holder's name only."""
+    key: str = ""
+    """The reset key, for `reset` and `home`; where the other is, for `namesake`."""
+    clock: int = 0
+    """For `claim`: the asker whose clock queries tell of the clock that stamps this master's commands."""
+    challenge: int = 0
+    """For `engage`, `reset` and `home`: the one of the robot's last `status`. Else a late one would count."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlReply:
+    """What happened, and why not."""
+
+    done: bool
+    guard: str
+    text: str
+    lease: int = 0
+    """The token granted, for `claim`."""
+    challenge: int = 0
+    """For `status`: what an `engage` or `reset` must quote soon, once."""
+    instance: int = 0
+    """Which process answers (`common.wire.instance`): two robots may bear one name by mistake."""
+    place: str = ""
+    """Where that process is, in words: host and endpoints."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockQuery:
+    """Master → slave. Carries the end of the last exchange, so that the slave can measure too."""
+
+    asked_ns: int
+    """t1, master's clock."""
+    last_asked_ns: int = 0
+    """t1 of the exchange before, 0 where there was none."""
+    last_heard_ns: int = 0
+    """t4 of the exchange before."""
+    asker: int = 0
+    """A number that only this asker uses; 0 where it has none."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockReply:
+    """Slave → master."""
+
+    asked_ns: int
+    """t1, returned."""
+    received_ns: int
+    """t2, slave's clock."""
+    replied_ns: int
+    """t3, slave's clock."""
+    instance: int = 0
+    """Whose clock it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """What one process counted and measured, 1 Hz, for tables and reports."""
+
+    sent_ns: int
+    metrics: MasterMetrics | SlaveMetrics
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The simulated operator's true joint angles: for judging, never read by either pipeline."""
+
+    tick: int
+    sampled_ns: int
+    """Suit's clock."""
+    position_rad: Array
+    velocity_rad_s: Array
+
+
+Message = Command | RobotState | ControlRequest | ControlReply | ClockQuery | ClockReply | Statistics | Truth

@@ -1,0 +1,50 @@
+"""The number that a message bears, and who counts it, without decoding the rest. Pure.
+
+Who records does not know how many joints a robot has, and need not: a gap shows in the numbers alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgpack
+
+from common.errors import CodecError
+from common.wire.codec import MAX_PAYLOAD, VERSION
+from common.wire.fields import MAX_ITEMS
+from common.wire.video import decode_frame
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """One message among those of its stream."""
+
+    stream: int
+    """Who counts: the lease of a command, the process of a state; 0 where there is only one count."""
+    value: int
+
+
+_PLACES = {"command": (3, 4), "state": (17, 3)}
+"""Where stream and number stand in the array of a message, by its kind; `common.wire.codec` packs it so."""
+
+
+def number_of(payload: bytes) -> Number | None:
+    """The number of a command, a state or a picture. None where the payload bears none, or cannot be read."""
+    if payload[:4] == b"TVID":
+        try:
+            return Number(0, decode_frame(payload).number)
+        except CodecError:
+            return None
+    if len(payload) > MAX_PAYLOAD:
+        return None
+    try:
+        array = msgpack.unpackb(payload, use_list=False, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
+    except Exception:  # as in the codec: garbage raises whatever it likes
+        return None
+    if type(array) is not tuple or len(array) < 2 or array[0] not in _PLACES or array[1] != VERSION:
+        return None
+    places = _PLACES[array[0]]
+    if len(array) <= max(places):
+        return None
+    stream, value = (array[place] for place in places)
+    return Number(stream, value) if type(stream) is int and type(value) is int else None

@@ -1,0 +1,79 @@
+"""One table of all topics: key, rate, time-out and quality of service; liveness follows from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+
+class Priority(StrEnum):
+    """Names as Zenoh has them."""
+
+    REAL_TIME = "real_time"
+    INTERACTIVE_HIGH = "interactive_high"
+    INTERACTIVE_LOW = "interactive_low"
+    DATA_HIGH = "data_high"
+    DATA = "data"
+    DATA_LOW = "data_low"
+    BACKGROUND = "background"
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A key expression with `{robot}` to fill in, and how it travels."""
+
+    name: str
+    key: str
+    rate_hz: float
+    """Nominal rate; 0 where it is sent on demand."""
+    timeout_s: float
+    """Silence after which it counts as dead; 0 where silence means nothing."""
+    priority: Priority
+    reliable: bool
+    drop: bool
+    """Under congestion drop rather than block: a `put` must never stall the loop."""
+    express: bool
+    """Never batched."""
+
+    def key_for(self, robot: str) -> str:
+        """The key of one robot."""
+        return self.key.format(robot=robot)
+
+    def with_quality(self, reliable: bool | None, priority: Priority | None, express: bool | None) -> Topic:
+        """The same topic, travelling otherwise where a value is given."""
+        return replace(
+            self,
+            reliable=self.reliable if reliable is None else reliable,
+            priority=self.priority if priority is None else priority,
+            express=self.express if express is None else express,
+        )
+
+
+COMMAND = Topic("command", "tandem/{robot}/command", 12.5, 0.2, Priority.REAL_TIME, False, True, True)
+STATE = Topic("state", "tandem/{robot}/state", 50.0, 0.2, Priority.INTERACTIVE_HIGH, False, True, True)
+CONTROL = Topic("control", "tandem/{robot}/control", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
+STOP = Topic("stop", "tandem/{robot}/stop", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
+"""As CONTROL, but for whoever may only stop the robot or ask how it is: a key of its own, so that access
+control, which does not look into messages, can leave it to everybody."""
+CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 1.0, Priority.REAL_TIME, True, True, True)
+PATH = Topic("path", "tandem/{robot}/path", 0.0, 1.0, Priority.DATA_LOW, True, True, True)
+"""Questions of any size, answered by any size (`common.wire.path_probe`): which does the way carry?"""
+STATISTICS = Topic("statistics", "tandem/{robot}/statistics", 1.0, 5.0, Priority.DATA_LOW, False, True, False)
+ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
+VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUND, False, True, False)
+TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
+FAULTS = Topic("faults", "tandem/{robot}/test/faults", 0.0, 1.0, Priority.DATA, True, True, False)
+
+TOPICS = {
+    t.name: t for t in (COMMAND, STATE, CONTROL, STOP, CLOCK, PATH, STATISTICS, ALIVE, VIDEO, TRUTH, FAULTS)
+}
+QUESTIONS = (CONTROL.name, STOP.name, CLOCK.name, PATH.name, FAULTS.name)
+"""Topics that are asked and answered; all others are published."""
+
+VIDEO_NAME = r"^[A-Za-z0-9_-]{1,32}$"
+"""What a camera may be called."""
+
+
+def video(camera: str) -> Topic:
+    """The pictures of one camera; its rate is whatever the link bears."""
+    return replace(VIDEO, key=f"tandem/{{robot}}/video/{camera}")

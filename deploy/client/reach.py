@@ -1,0 +1,64 @@
+"""Which robots a person means, where they are, in whose name he asks: from options or the master's file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from common.config.load import check_config, load_config
+from common.errors import TandemError
+from common.link.config import LinkConfig
+from common.link.endpoint import SECURE, transport_of
+from deploy.certificates import AUTHORITY
+from deploy.client.certificate import tls_beside
+from master.config import MasterConfig
+
+ROUTER_S = 5.0
+"""How long a person's question waits for a router that does not answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """Endpoints to connect to, robots by name, and who asks."""
+
+    link: LinkConfig
+    robots: tuple[str, ...]
+    """Empty where nobody named any."""
+    operator: str = ""
+
+
+def reach(
+    connect: Sequence[str] | None,
+    robots: Sequence[str] | None,
+    operator: str = "",
+    master: Path | None = None,
+    certificate: Path | None = None,
+) -> Reach:
+    """What the command line says; what it leaves out comes from the master's file, where one is named.
+
+    Keys, access through a router and quality of service are the file's; a `certificate` is a person's own.
+    Raises ConfigError for a file or an endpoint that is none, TandemError where no endpoint is known.
+    """
+    file = None if master is None else load_config(master, MasterConfig)
+    endpoints = list(connect or (file.link.connect if file else ()))
+    if not endpoints:
+        raise TandemError(
+            "where is the robot? Name its endpoint by --connect, or the master's file by --master"
+        )
+    if file is None and certificate is None and any(transport_of(each) in SECURE for each in endpoints):
+        raise TandemError(
+            f"{', '.join(endpoints)}: who are you there? Name your certificate by --certificate (its .key "
+            f"and {AUTHORITY}.pem beside it; `tandem keys` makes them), or the master's file by --master"
+        )
+    link = _link_of(file, endpoints, certificate)
+    named = dict.fromkeys(robots or (file.commanded if file else ()))
+    return Reach(link, tuple(named), operator or (file.operator.name if file else ""))
+
+
+def _link_of(file: MasterConfig | None, endpoints: list[str], certificate: Path | None) -> LinkConfig:
+    asked = {"connect": endpoints, **tls_beside(certificate)}
+    if file is not None:
+        # who only asks stands behind no door, and lets nobody in: the rules are for the others' doors
+        asked = {**file.link.model_dump(exclude={"listen", "access"}), **asked}
+    return check_config(Path("command line"), asked, LinkConfig)

@@ -1,0 +1,182 @@
+"""`tandem accuracy hinge`: a hinge joint from two units' recording (paper C)."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from common.quaternion import Array
+from deploy.calibrate.options import AsJson, ReportFile
+from deploy.report.output import in_a_folder, writing
+
+if TYPE_CHECKING:
+    from master.calibrate.hinge_pair import HingePair
+    from master.calibrate.recording import NodeRecording
+
+
+def hinge(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="npz with gyr1 gyr2 rad/s, acc1 acc2 m/s², (T, 3), and rate_hz.",
+            dir_okay=False,
+        ),
+    ],
+    report: ReportFile = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Write the angle as PNG.", dir_okay=False, callback=in_a_folder)
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print a hinge joint's axes in both units' frames, how well they are known, and its angle.
+
+    The units may sit anyhow on the two segments; there is no magnetometer. Angle 0 is the pose at the
+    beginning, and the axes' sign is the one by which the joint bends farther to the positive side.
+
+    Example: `tandem accuracy hinge knee.npz --report knee.json --picture knee.png`
+    """
+    from deploy.calibrate.session import tell_machines
+    from master.calibrate.hinge_pair import find_hinge_pair, without_gaps
+    from master.orientation.hinge_angle import HingeAngleConfig, hinge_angles
+
+    one, two = load_pair(file)
+    pair = find_hinge_pair(one, two)
+    one, two = without_gaps(one), without_gaps(two)
+    track = hinge_angles(
+        HingeAngleConfig(), pair.hinge, one.rate_hz, one.gyr_rad_s, one.acc_m_s2, two.gyr_rad_s, two.acc_m_s2
+    )
+    # the axes' common sign means nothing yet: let the joint bend to the positive side
+    sign = 1.0 if track.angle_rad.max() >= -track.angle_rad.min() else -1.0
+    angle = sign * track.angle_rad
+    figures = as_report(pair, angle, sign, file, one.rate_hz)
+    tell_machines(figures, report, to_stdout=as_json)
+    if picture is not None:
+        draw(angle, track.deviation_rad, one.rate_hz, picture)
+    if not as_json:
+        _print(figures, Console())
+
+
+def load_pair(path: Path) -> tuple[NodeRecording, NodeRecording]:
+    """Two units of one file. Raises RecordingError naming file, array and what was expected."""
+    from common.errors import RecordingError
+    from common.recording.npz import read_arrays
+    from master.calibrate.recording import NodeRecording
+
+    arrays = read_arrays(path)
+    missing = [k for k in ("gyr1", "acc1", "gyr2", "acc2", "rate_hz") if k not in arrays]
+    if missing:
+        there = ", ".join(sorted(arrays)[:8]) or "nothing"
+        raise RecordingError(f"{path}: has no {', '.join(missing)}; it has {there}")
+    if arrays["rate_hz"].size != 1 or arrays["rate_hz"].dtype.kind not in "fiu":
+        raise RecordingError(f"{path}: rate_hz is {arrays['rate_hz']!r}; expected one number, Hz")
+    rate_hz = float(arrays["rate_hz"].reshape(()))
+    if not 20.0 <= rate_hz <= 10_000.0:
+        raise RecordingError(f"{path}: rate_hz = {rate_hz:g}; expected 20 to 10000 Hz")
+    shapes = {key: arrays[key].shape for key in ("gyr1", "acc1", "gyr2", "acc2")}
+    first = shapes["gyr1"]
+    for key, shape in shapes.items():
+        if shape != first or shape[1:] != (3,) or not shape[0] or arrays[key].dtype.kind not in "fiu":
+            raise RecordingError(
+                f"{path}: {key} is {arrays[key].dtype} of shape {shape}; expected numbers (T, 3), all alike"
+            )
+    gyr1, acc1, gyr2, acc2 = (arrays[key].astype(np.float64) for key in ("gyr1", "acc1", "gyr2", "acc2"))
+    return NodeRecording("unit 1", rate_hz, acc1, gyr1), NodeRecording("unit 2", rate_hz, acc2, gyr2)
+
+
+def as_report(pair: HingePair, angle_rad: Array, sign: float, file: Path, rate_hz: float) -> dict[str, Any]:
+    """Everything found, for machines."""
+    found, fit = pair.found, pair.fit
+    assert fit.axes is not None
+    rival = min(fit.rival, fit.axis_rival)
+    degrees = np.degrees(angle_rad)
+    speed = np.degrees(np.gradient(angle_rad, 1.0 / rate_hz))
+    apart = [
+        math.degrees(math.acos(min(1.0, abs(float(a @ b)))))
+        for a, b in zip((found.axis1, found.axis2), fit.axes, strict=True)
+    ]
+    return {
+        "file": file.name,
+        "duration_s": len(angle_rad) / rate_hz,
+        "axis1": (sign * fit.axes[0]).tolist(),
+        "axis2": (sign * fit.axes[1]).tolist(),
+        "sigma_deg": [math.degrees(s) for s in fit.axis_sigma_rad],
+        "rates_alone": {
+            "axis1": (sign * found.axis1).tolist(),
+            "axis2": (sign * found.axis2).tolist(),
+            "sigma_deg": [math.degrees(found.sigma1_rad), math.degrees(found.sigma2_rad)],
+            "differs_deg": apart,
+        },
+        "evidence": [pair.rates.as_report()],
+        "condition": found.condition,
+        "misfit_deg_s": math.degrees(found.misfit_rad_s),
+        "bending_deg_s": math.degrees(found.bending_rad_s),
+        "next_best_answer_cost_ratio": rival if math.isfinite(rival) else None,
+        "lever1_m": pair.hinge.lever1_m.tolist(),
+        "lever2_m": pair.hinge.lever2_m.tolist(),
+        "angle_deg": {
+            "lowest": float(degrees.min()),
+            "median": float(np.median(degrees)),
+            "highest": float(degrees.max()),
+            "fastest_deg_s": float(np.max(np.abs(speed))),
+        },
+    }
+
+
+def draw(angle_rad: Array, deviation_rad: Array, rate_hz: float, path: Path) -> None:
+    """Write the PNG: the angle over time with its standard deviation."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.0, 3.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    time_s, angle, spread = (
+        np.arange(len(angle_rad)) / rate_hz,
+        np.degrees(angle_rad),
+        np.degrees(deviation_rad),
+    )
+    axes.fill_between(time_s, angle - spread, angle + spread, alpha=0.3)
+    axes.plot(time_s, angle, linewidth=0.8)
+    axes.set_xlabel("s")
+    axes.set_ylabel("hinge angle, °")
+    axes.grid(alpha=0.3)
+    with writing(path):
+        figure.savefig(path, dpi=110, format="png")
+
+
+def _print(figures: dict[str, Any], console: Console) -> None:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=f"hinge, {figures['duration_s']:.0f} s", box=box.SIMPLE_HEAD)
+    for head in ("unit", "axis x", "y", "z", "± °", "rates alone differ °"):
+        table.add_column(head, justify="right")
+    for i in (0, 1):
+        axis = figures[f"axis{i + 1}"]
+        table.add_row(
+            str(i + 1),
+            *(f"{x:.4f}" for x in axis),
+            f"{figures['sigma_deg'][i]:.2f}",
+            f"{figures['rates_alone']['differs_deg'][i]:.2f}",
+        )
+    console.print(table)
+    rival = figures["next_best_answer_cost_ratio"]
+    console.print(
+        f"conditioning {figures['condition']:.1f}; misfit {figures['misfit_deg_s']:.1f}°/s of "
+        f"{figures['bending_deg_s']:.0f}°/s bending; "
+        + ("no other answer" if rival is None else f"the next best answer costs {rival:.1f} times as much")
+    )
+    for one in figures["evidence"]:
+        figure = one["advice"] if one["figure"] is None else f"{one['figure']:.0f} of {one['limit']:.0f}°"
+        console.print(f"{one['compared']}, low-passed: {one['verdict']}, {figure}")
+    angle = figures["angle_deg"]
+    console.print(
+        f"angle {angle['lowest']:.1f} to {angle['highest']:.1f}°, median {angle['median']:.1f}°, "
+        f"fastest {angle['fastest_deg_s']:.0f}°/s"
+    )

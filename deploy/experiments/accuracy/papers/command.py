@@ -1,0 +1,70 @@
+"""`tandem accuracy papers`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from deploy.report.output import in_a_folder, write_json
+
+
+def papers(
+    seeds: Annotated[int, typer.Option(help="Seeds 1 to N, each with sensors of its own.", min=1)] = 5,
+    only: Annotated[
+        str | None, typer.Option(metavar="KEYS", help="Experiments to run, such as `A,C`; all without it.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
+    ] = None,
+    strict: Annotated[bool, typer.Option(help="Exit with status 1 where a target is missed.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(help="Processes at once; one a core (at most 4) without it.", min=1)
+    ] = None,
+) -> None:
+    """Repeat the papers' experiments on the simulated suit, beside the papers' figures.
+
+    Example: `tandem accuracy papers --seeds 5 --only A,B --report papers.json`
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from deploy.experiments.accuracy.papers.experiments import EXPERIMENTS
+    from deploy.experiments.accuracy.papers.figures import Figure, gather
+    from deploy.experiments.accuracy.papers.run import run_all
+    from deploy.experiments.accuracy.papers.table import experiment_table, experiment_tree
+
+    keys = [key.strip() for key in (only or "").split(",") if key.strip()]
+    known = [experiment.key for experiment in EXPERIMENTS]
+    unknown = [key for key in keys if key.lower() not in (k.lower() for k in known)]
+    if unknown:
+        raise typer.BadParameter(f"there is no {', '.join(unknown)}; there are {', '.join(known)}")
+    wanted = [e for e in EXPERIMENTS if not keys or e.key.lower() in (k.lower() for k in keys)]
+    found: dict[str, dict[int, list[Figure]]] = {experiment.key: {} for experiment in wanted}
+    console = Console()
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("experiments × seeds", total=len(wanted) * seeds)
+        for experiment, seed, figures in run_all(wanted, range(1, seeds + 1), jobs):
+            found[experiment.key][seed] = figures
+            progress.advance(task)
+    trees: dict[str, Any] = {}
+    missed = 0
+    for experiment in wanted:
+        rows = gather(dict(sorted(found[experiment.key].items())))
+        missed += sum(row.met is False for row in rows)
+        trees[experiment.key] = experiment_tree(experiment, rows)
+        console.print(experiment_table(experiment, rows))
+    console.print(
+        f"{seeds} seeds; targets missed: {missed}" if missed else f"{seeds} seeds; every target met"
+    )
+    if report is not None:
+        write_json(report, {"seeds": seeds, "missed": missed, "experiments": trees})
+    if strict and missed:
+        raise typer.Exit(1)

@@ -1,0 +1,24 @@
+"""Run experiments over seeds, on several cores where there are; each seed is a run of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from deploy.experiments.accuracy.papers.figures import Experiment, Figure
+from deploy.harness.workers import Tell, jobs_here, run_each
+
+Done = tuple[Experiment, int, list[Figure]]
+
+
+def run_all(
+    experiments: Sequence[Experiment], seeds: Sequence[int], jobs: int | None = None
+) -> Iterator[Done]:
+    """Every experiment with every seed, as they finish. `jobs` None: one a core; 1: in this process."""
+    work = [(experiment, seed) for experiment in experiments for seed in seeds]
+    for (experiment, seed), figures in run_each(_run, work, jobs or jobs_here()):
+        yield experiment, seed, figures
+
+
+def _run(work: tuple[Experiment, int], _: Tell) -> list[Figure]:
+    experiment, seed = work
+    return experiment.run(seed)

@@ -1,0 +1,128 @@
+"""All benches, one after another, then percent of a core and the verdicts. Open this file first."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from common.wire.topics import COMMAND
+from deploy.experiments.bench.capture import capture
+from deploy.experiments.bench.link import link
+from deploy.experiments.bench.loop import RATE_HZ, loop
+from deploy.experiments.bench.transports import transports
+from deploy.experiments.bench.worker import BenchError, in_worker
+from deploy.measure.tables import bench_table, verdict_table
+from deploy.measure.targets import BENCH, verdicts
+from deploy.measure.timing import total
+
+QUICK = 0.12
+"""Share of the time that each bench gets in quick mode."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Bench:
+    name: str
+    path: tuple[str, ...]
+    """Where its figures stand in the report."""
+    seconds: float
+    measure: Callable[[float], Any]
+
+
+BENCHES = (
+    _Bench("loop, idle and beside a busy core", ("loop",), 12.0, loop),
+    _Bench("capture, 36 FD nodes", ("capture", "nodes_36"), 5.0, lambda s: capture(s, 36, fd=True)),
+    _Bench(
+        "capture, 8 classic nodes", ("capture", "nodes_8_classic"), 3.0, lambda s: capture(s, 8, fd=False)
+    ),
+    _Bench("the master's steps", ("pipeline",), 10.0, lambda s: in_worker("pipeline:pipeline", s)),
+    _Bench("link beside Zenoh and UDP", ("link",), 12.0, link),
+    _Bench("link over each transport", ("transports",), 12.0, transports),
+    _Bench("robot", ("robot",), 2.0, lambda s: in_worker("robot:robot", s)),
+)
+
+
+def bench(quick: bool, console: Console) -> dict[str, Any]:
+    """Run all benches and print their tables: below 60 s, or 15 s when quick, on a machine at rest.
+
+    The report is plain JSON values: a key a bench, `core_percent`, `verdicts`, `machine` and `failed`.
+    A bench that fails leaves its reason under `failed`, and the others go on.
+    """
+    report: dict[str, Any] = {"machine": machine(), "quick": quick, "failed": {}}
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("bench", total=sum(b.seconds for b in BENCHES))
+        for each in BENCHES:
+            progress.update(task, description=each.name)
+            try:
+                figures = each.measure(each.seconds * (QUICK if quick else 1.0))
+            except BenchError as error:
+                report["failed"][each.name] = str(error)
+                figures = {}
+            _put(report, each.path, figures)
+            progress.advance(task, each.seconds)
+    report["core_percent"] = core_percent(report)
+    judged = verdicts(report, BENCH)
+    report["verdicts"] = [
+        {"figure": v.target.name, "value": v.value, "at_most": v.target.limit, "met": v.met} for v in judged
+    ]
+    console.print(bench_table(report))
+    console.print(verdict_table("is this machine good enough?", judged))
+    for name, reason in report["failed"].items():
+        console.print(Text(f"{name}: {reason}", "bold red"))
+    return report
+
+
+def machine() -> dict[str, Any]:
+    """What was measured on, and how busy it was before."""
+    return {
+        "cores": os.cpu_count(),
+        "system": f"{platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "load": round(os.getloadavg()[0], 2),
+    }
+
+
+def core_percent(report: dict[str, Any]) -> dict[str, float | None]:
+    """Percent of one core, from the benches' medians: the master by its steps, the simulated robot, both.
+
+    None where a bench did not give its part.
+    """
+    a_command = total((_median(report, "pipeline", "solve_us"), _median(report, "pipeline", "codec_us")))
+
+    def master(heard: str, nodes: str) -> float | None:
+        a_tick = total(
+            (_median(report, "capture", heard, "cpu_us"), _median(report, "pipeline", nodes, "fuse_us"))
+        )
+        if a_tick is None or a_command is None:
+            return None
+        return round(1e-4 * (RATE_HZ * a_tick + COMMAND.rate_hz * a_command), 2)
+
+    of_36, robot = master("nodes_36", "nodes_36"), report["robot"].get("core_percent")
+    return {
+        "master_36_nodes": of_36,
+        "master_8_classic_nodes": master("nodes_8_classic", "nodes_8"),
+        "robot": robot,
+        "total": total((of_36, robot)),
+    }
+
+
+def _median(report: dict[str, Any], *path: str) -> float | None:
+    figures: Any = report
+    for key in path:
+        figures = figures.get(key, {})
+    median: float | None = figures.get("median")
+    return median
+
+
+def _put(report: dict[str, Any], path: tuple[str, ...], figures: Any) -> None:
+    *above, last = path
+    for key in above:
+        report = report.setdefault(key, {})
+    report[last] = figures

@@ -1,0 +1,101 @@
+"""Each joint's angle and angular velocity over a run, as in paper B's Fig. 14: encoders beside the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.clock import to_s
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from deploy.measure import MovedSeries, TruthSeries
+from deploy.measure.motion import GAP_S
+from deploy.measure.roughness import CUTOFF_HZ, GRID_S, low_pass
+from deploy.measure.trace import Nanoseconds
+
+LEAST_S = 1.0
+"""Less than this of tracking is not drawn."""
+SIDES = ("left_", "right_")
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """Angles and angular velocities on the grid, (K, J) each; NaN where there is nothing to go by."""
+
+    angle_deg: Array
+    rate_deg_s: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Joints that belong in one plot: those of a finger, or one joint of both sides."""
+
+    title: str
+    joints: tuple[int, ...]
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """What to draw of a run."""
+
+    time_s: Array
+    """(K,) from the beginning of the first stretch in `track`, every GRID_S."""
+    robot: Course
+    """What the encoders showed."""
+    operator: Course | None
+    """The truth; None where nobody knows it."""
+    groups: tuple[Group, ...]
+
+
+def curves(truth: TruthSeries, moved: MovedSeries, skeleton: Skeleton) -> Curves | None:
+    """From a run whose stamps are of one clock (one host); None where it hardly tracked."""
+    tracked_ns = moved.encoder_ns[moved.tracking]
+    if len(tracked_ns) == 0 or to_s(int(tracked_ns.max() - tracked_ns.min())) < LEAST_S:
+        return None
+    begin_ns, end_ns = int(tracked_ns.min()), int(tracked_ns.max())
+    time_s = np.arange(0.0, to_s(end_ns - begin_ns), GRID_S)
+    known = moved.tracking & moved.valid.all(axis=1)
+    robot = _course(time_s, moved.encoder_ns[known] - begin_ns, moved.position_rad[known])
+    operator = None
+    if len(truth.sampled_ns) > 1:
+        operator = _course(time_s, truth.sampled_ns - begin_ns, truth.position_rad)
+    return Curves(time_s, robot, operator, groups(skeleton))
+
+
+def groups(skeleton: Skeleton) -> tuple[Group, ...]:
+    """The joints of each synergy together; without synergies, those that differ only by their side."""
+    names = skeleton.joint_names
+    together: dict[str, list[str]] = {s.name: list(s.drives) for s in skeleton.synergies}
+    if not together:
+        for name in names:
+            side = next((side for side in SIDES if name.startswith(side)), "")
+            together.setdefault(name.removeprefix(side), []).append(name)
+    return tuple(
+        Group(
+            title=title.replace("_", " "),
+            joints=tuple(names.index(member) for member in members),
+            labels=tuple(_label(member, title) for member in members),
+        )
+        for title, members in together.items()
+    )
+
+
+def _label(member: str, title: str) -> str:
+    """What a joint's name says beyond its group's."""
+    rest = member.removeprefix(title).removesuffix(title).strip("_")
+    return rest or member
+
+
+def _course(time_s: Array, at_ns: Nanoseconds, position_rad: Array) -> Course:
+    """On the grid; velocities through the filter that roughness is judged by, as encoders have steps."""
+    order = np.argsort(at_ns, kind="stable")
+    at_s, position_deg = to_s(1) * at_ns[order], np.degrees(position_rad[order])
+    angle = np.column_stack([np.interp(time_s, at_s, joint) for joint in position_deg.T])
+    rate = np.gradient(low_pass(angle, 1.0 / GRID_S, CUTOFF_HZ), GRID_S, axis=0)
+    after = np.clip(np.searchsorted(at_s, time_s), 1, len(at_s) - 1)
+    in_gap = at_s[after] - at_s[after - 1] > GAP_S
+    beyond = (time_s < at_s[0] - GAP_S) | (time_s > at_s[-1] + GAP_S)
+    angle[in_gap | beyond] = rate[in_gap | beyond] = np.nan
+    return Course(angle, np.asarray(rate))

@@ -1,0 +1,88 @@
+"""What a person sees of a demo: the live view while it runs, the tables when it is over."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.text import Text
+
+from deploy.experiments.demo.draw_curves import in_terminal
+from deploy.experiments.demo.report import Report, trees
+from deploy.harness.rig import Rig
+from deploy.measure.tables import (
+    Live,
+    accuracy_table,
+    holds_text,
+    latency_table,
+    live_view,
+    motion_table,
+    strategies_table,
+    synergy_table,
+    ticks_text,
+    verdict_table,
+    video_table,
+)
+from deploy.measure.targets import of_demo, verdicts
+
+
+def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
+    """The live view of a running rig."""
+    observer = rig.observer
+    master, slave = observer.master, observer.slave
+    state = observer.state
+    reason = state.reason if state else "not heard"
+    if not observer.ready and observer.guard == "hold":
+        reason = observer.waiting_for()
+    video = slave.video if slave else None
+    usage = {f"{role} CPU %": child.cpu_percent for role, child in rig.children.items()}
+    view = live_view(
+        Live(
+            elapsed_s=elapsed_s,
+            guard=observer.guard,
+            reason=reason,
+            rates_hz=observer.rates_hz,
+            stages=trees(slave.stages_ms if slave else {}),
+            joint_error_deg=_errors_deg(rig),
+            drops={
+                **({"ticks missed": master.ticks.missed} if master else {}),
+                "by the host": host_missed,
+                **(slave.guard.dropped if slave else {}),
+            },
+        )
+    )
+    words = [f"{name} {value:.0f}" for name, value in usage.items()]
+    if video:
+        words.append(video.fault or f"video {video.fps:.0f} Hz, {video.kb_s:.0f} kB/s")
+    return Group(view, Text("   ".join(words), "dim"))
+
+
+def print_report(report: Report, console: Console) -> None:
+    """Latency budget, accuracy beside the paper's, motion, curves, and the targets met or missed."""
+    tree = report.tree
+    console.print(latency_table(tree["stages_ms"], tree["end_to_end_ms"], tree["one_way_ms"]))
+    if tree["video"]:
+        console.print(video_table(tree["video"]))
+    if not any(report.accuracy.estimated.values()):
+        console.print(Text("no truth to judge by: a recording has none", "yellow"))
+    else:
+        console.print(accuracy_table(report.accuracy), motion_table(report.motion))
+    if report.comparison is not None:
+        console.print(strategies_table(report.comparison.as_run, report.comparison.replayed))
+    if tree["synergies"]:
+        console.print(synergy_table(tree["synergies"]))
+    console.print(ticks_text({"master": tree["ticks"], "robot": tree["slave_ticks"]}, tree["host"]))
+    console.print(holds_text(tree["holds"]))
+    shown = None if report.curves is None else in_terminal(report.curves)
+    if shown is not None:
+        console.print(shown)
+    options = tree["options"]
+    targets = of_demo(options["profile"], options["servos"])
+    console.print(verdict_table("targets", verdicts(tree, targets)))
+
+
+def _errors_deg(rig: Rig) -> dict[str, float]:
+    truth, state = rig.observer.truth, rig.observer.state
+    if truth is None or state is None:
+        return {}
+    errors = np.degrees(state.position_rad - truth.position_rad)
+    return dict(zip(rig.observer.trace.joint_names, errors.tolist(), strict=True))

@@ -1,0 +1,63 @@
+"""Whether a limit of the joints was broken: by what was asked of the drives, or by what the encoders show."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from deploy.measure.stillness import SPEED_ERROR_RAD_S, Course, speeds
+
+SERVO_SHARE = 0.05
+"""By how much a servo may pass a setpoint that goes at the limit: 4.3 % for a second order at damping √½."""
+STOP_RAD = math.radians(3.0)
+"""The mechanical stops stand this far outside the position limits. A joint that stands at its limit is shaken
+beyond it when its neighbours brake (a finger by 1°); the stop it must not reach."""
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The guard's setpoints, one row a step, in the guard's own time."""
+
+    step_s: Array
+    """(T - 1,) from one row to the next, as the guard counts it."""
+    position_rad: Array
+    """(T, J)"""
+    velocity_rad_s: Array
+    """(T, J)"""
+
+
+def asked_beyond(asked: Asked, skeleton: Skeleton) -> list[str]:
+    """Limits that setpoints broke, the worst joint of each; exact."""
+    step_s = asked.step_s[:, None]
+    fastest, hardest = skeleton.max_velocity_rad_s * step_s, skeleton.max_acceleration_rad_s2 * step_s
+    moved, gained = np.diff(asked.position_rad, axis=0), np.diff(asked.velocity_rad_s, axis=0)
+    lower, upper = skeleton.lower_rad, skeleton.upper_rad
+    return [
+        *_beyond("setpoint's position", asked.position_rad, lower, upper, skeleton),
+        *_beyond("setpoint's speed", moved, -fastest, fastest, skeleton),
+        *_beyond("setpoint's acceleration", gained, -hardest, hardest, skeleton),
+    ]
+
+
+def moved_beyond(course: Course, skeleton: Skeleton) -> list[str]:
+    """Limits that the joints themselves broke, the worst of each, servos and encoders allowed for."""
+    fastest = skeleton.max_velocity_rad_s * (1.0 + SERVO_SHARE) + SPEED_ERROR_RAD_S
+    lower, upper = skeleton.lower_rad - STOP_RAD, skeleton.upper_rad + STOP_RAD
+    speed = speeds(course.at_s, course.encoder_rad)
+    return [
+        *_beyond("encoder's position", course.encoder_rad, lower, upper, skeleton),
+        *_beyond("encoder's speed", speed, -fastest, fastest, skeleton),
+    ]
+
+
+def _beyond(what: str, values: Array, lower: Array, upper: Array, skeleton: Skeleton) -> list[str]:
+    over = np.maximum(values - upper, lower - values).max(axis=0)
+    worst = int(over.argmax())
+    if over[worst] <= _ROUNDING:
+        return []
+    return [f"the {what} of {skeleton.joint_names[worst]} passed its limit by {over[worst]:.3g}"]

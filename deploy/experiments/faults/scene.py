@@ -1,0 +1,202 @@
+"""The stage of a trial: a robot follows a reaching operator on a virtual clock, and all of it is seen."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from common.clock import NS_PER_S, to_s
+from common.errors import TandemError
+from common.skeleton import load_skeleton
+from common.wire.messages import Action, Command
+from deploy.examples.profiles import NURSING
+from deploy.experiments.faults.limits import Asked
+from deploy.experiments.faults.setting import Later, Setting, files
+from deploy.measure.stillness import Course
+from deploy.sim.suit.motion import Motion, parse_motion
+from deploy.sim.world.whole_way import VirtualRun, World
+from slave.encoders.counts import Encoders
+from slave.guard import Guard, Setpoint, State
+from slave.servos.servos import EncoderReading
+from slave.track.config import make_tracker
+
+RESET_KEY = "kept at the robot"
+UP_NS = 7_200 * NS_PER_S
+"""The hosts have been up for two hours: their clocks can be set back by one."""
+TODAYS_TOKENS = 1_000_001
+"""Tokens are random in a real robot; here those of another run's leases must differ too."""
+ENGAGED_S = 1.1
+"""Into the operator's motion: he stands still, every joint and the clocks' offset are known."""
+REACHING_S = 2.1
+"""In the middle of the reach."""
+TRIAL_S = 2.0
+BEFORE_S = 0.2
+"""How much of the course before the fault is kept."""
+
+
+@cache
+def reach() -> Motion:
+    """Both arms and the head at once, joints of the right arm twice as fast as those of paper A's nurse."""
+    text = resources.files(__package__).joinpath("reach.toml").read_text("utf-8")
+    return parse_motion(text, load_skeleton(NURSING), source="reach.toml")
+
+
+class Scene:
+    """One run up to the fault, and beyond. `guard_options` may take gates and watches out of the guard."""
+
+    def __init__(self, setting: Setting | None = None, **guard_options: Any) -> None:
+        setting = setting or Setting()
+        self._begins_s = setting.lead_s
+        with files(setting) as master:
+            overrides = {
+                "slave": [f'guard.reset_key="{RESET_KEY}"'], "suit": list(setting.suit), "master": master,
+            }  # fmt: skip
+            usual = reach() if setting.motion is None else setting.motion()
+            motion: Motion = Later(usual, setting.lead_s) if setting.lead_s else usual
+            self.run = VirtualRun(World(start_ns=UP_NS, motion=motion, overrides=overrides))
+        config = self.run.slave_config
+        self.skeleton = config.skeleton
+        self.run.slave.guard = Guard(
+            config.robot, self.skeleton, config.guard, make_tracker(config.track),
+            draw_token=itertools.count(TODAYS_TOKENS).__next__, **guard_options,
+        )  # fmt: skip
+        self.foul = 0
+        """Commands that should never have been accepted, and were."""
+        self.granted: list[str] = []
+        """Requests that should never have been granted, and were."""
+        self.fault_ns = 0
+        self.dropped_before: Counter[str] = Counter()
+        self.undo: Callable[[], None] = lambda: None
+        """Ends the fault."""
+        self.each_period: Callable[[], None] = lambda: None
+        """What somebody does to the robot at the rate of commands, 12.5 Hz, from the fault on."""
+        self._ticks = 0
+        self.encoders = Encoders(self.skeleton, config.encoders)
+        self._seen: list[_Seen] = []
+        self.run.troubles.watch = self._watch
+
+    def _watch(self, reading: EncoderReading, setpoint: Setpoint) -> None:
+        self._seen.append(_Seen(self.run.now_ns, self.run.slave_ns, self.guard.state, reading, setpoint))
+        self._ticks += 1
+        if self._ticks % self.run.master_config.capture.decimation == 0:
+            self.each_period()
+
+    @property
+    def guard(self) -> Guard:
+        """The robot's."""
+        return self.run.slave.guard
+
+    @property
+    def elapsed_s(self) -> float:
+        """Since the operator began, the setting's lead left out."""
+        return to_s(self.run.now_ns - UP_NS) - self._begins_s
+
+    def to(self, state: State) -> None:
+        """Bring the robot to a state. Raises TandemError where it does not get there."""
+        if state is State.BOOT:
+            blind = np.zeros(len(self.skeleton.joints), np.bool_)
+            self.run.troubles.read = lambda reading: EncoderReading(reading.read_ns, reading.counts, blind)
+        self.run.run(self._begins_s + ENGAGED_S)
+        if state in (State.ALIGN, State.TRACK):
+            if state is State.ALIGN:  # once the operator has reached, so that there is some way to go
+                self.run.run(REACHING_S)
+            self.engage()
+        if state is State.TRACK:
+            self.run.run(REACHING_S - self.elapsed_s)
+        elif state is State.ALIGN:
+            self.run.run(0.6)
+        elif state is State.ESTOP:
+            self.run.ask(Action.ESTOP)
+            self.run.run(0.2)
+        if self.guard.state is not state:
+            raise TandemError(f"the trial cannot begin: {self.guard.state}, {self.guard.reason}")
+
+    def engage(self) -> None:
+        """As the operator. Raises TandemError where the robot refuses."""
+        reply = self.run.ask(Action.ENGAGE)
+        if not reply.done:
+            raise TandemError(f"the trial cannot begin: {reply.text}")
+
+    def begin(self) -> None:
+        """From now on it counts as after the fault."""
+        self.fault_ns = self.run.now_ns
+        self.dropped_before = self.refused()
+
+    def command(self, payload: bytes) -> None:
+        """A foul command reaches the robot now."""
+        before = self.guard.counters.accepted
+        self.run.on_command(payload)
+        self.foul += self.guard.counters.accepted - before
+
+    def command_decoded(self, command: Command) -> None:
+        """The same, had the codec let it pass."""
+        now_ns = self.run.slave_ns
+        offset = self.run.slave.clock.estimator.estimate(now_ns)
+        self.foul += self.guard.on_command(command, now_ns, now_ns, offset).accepted
+
+    def ask(self, action: Action, operator: str) -> None:
+        """Ask for what must be refused."""
+        if self.run.ask(action, operator=operator).done:
+            self.granted.append(str(action))
+
+    def refuses_to_engage(self, words: str) -> None:
+        """The operator asks to engage, and is to be refused in these words."""
+        reply = self.run.ask(Action.ENGAGE)
+        if reply.done or words not in reply.text:
+            self.granted.append(f"engage ({reply.text or 'done'}), which was to be refused for: {words}; it")
+
+    def newest(self) -> Command:
+        """The master's last command."""
+        return self.run.commands[-1]
+
+    def refused(self) -> Counter[str]:
+        """Commands refused so far, by gate; `codec` for those that could not be read."""
+        return self.guard.counters.dropped + Counter(codec=self.run.slave.undecodable.get("command", 0))
+
+    def state_reached_s(self, state: State) -> float | None:
+        """When the guard was in a state to stay, after the fault; None where it is not at the end."""
+        since = None
+        for row in self._seen:
+            if row.now_ns >= self.fault_ns:
+                since = None if row.state is not state else row.now_ns if since is None else since
+        return None if since is None else to_s(since - self.fault_ns)
+
+    def course(self) -> Course:
+        """From shortly before the fault to now."""
+        rows = self._recent()
+        return Course(
+            at_s=np.array([to_s(row.now_ns - self.fault_ns) for row in rows]),
+            setpoint_rad=np.array([row.setpoint.position_rad for row in rows]),
+            encoder_rad=np.array([self.encoders.position_rad(row.reading.counts) for row in rows]),
+        )
+
+    def asked(self) -> Asked:
+        """What the guard asked of the drives meanwhile, in its own time."""
+        rows = self._recent()
+        steps_s = np.diff([row.slave_ns for row in rows]) / NS_PER_S
+        return Asked(
+            step_s=np.clip(steps_s, 0.0, self.run.slave_config.guard.max_step_s),
+            position_rad=np.array([row.setpoint.position_rad for row in rows]),
+            velocity_rad_s=np.array([row.setpoint.velocity_rad_s for row in rows]),
+        )
+
+    def _recent(self) -> list[_Seen]:
+        return [row for row in self._seen if row.now_ns >= self.fault_ns - round(BEFORE_S * NS_PER_S)]
+
+
+class _Seen(NamedTuple):
+    """One tick of the robot."""
+
+    now_ns: int
+    """True time."""
+    slave_ns: int
+    """By its own clock."""
+    state: State
+    reading: EncoderReading
+    setpoint: Setpoint

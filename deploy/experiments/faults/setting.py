@@ -1,0 +1,63 @@
+"""What differs from the usual scene of a trial: another suit or posture, more time before."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from common.config.sensor_calibration import Made
+from common.quaternion import IDENTITY, Array
+from common.skeleton import load_skeleton
+from deploy.examples.profiles import NURSING
+from deploy.sim.suit.motion import Motion
+from master.calibrate.node_file import write_calibration
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What differs from the usual scene."""
+
+    lead_s: float = 0.0
+    """So much longer the operator stands still at first; a multiple of the 0.08 s between two commands."""
+    suit: tuple[str, ...] = ()
+    """Overrides of the suit's example file."""
+    master: tuple[str, ...] = ()
+    """Overrides of the master's."""
+    mounted: bool = False
+    """How each node sits is known, so that a lean from the zero pose can be told."""
+    motion: Callable[[], Motion] | None = None
+    """Of the operator, None for the usual reach."""
+
+
+class Later:
+    """A motion that begins later: until then its first posture."""
+
+    def __init__(self, motion: Motion, lead_s: float) -> None:
+        self._motion, self._lead_s = motion, lead_s
+        self.period_s = motion.period_s + lead_s
+
+    def state(self, t_s: ArrayLike) -> tuple[Array, Array, Array]:
+        """Angles, rates and accelerations at that time."""
+        return self._motion.state(np.maximum(0.0, np.asarray(t_s) - self._lead_s))
+
+
+@contextmanager
+def files(setting: Setting) -> Iterator[list[str]]:
+    """The overrides of the master's file, and meanwhile the calibrations that they name."""
+    if not setting.mounted:
+        yield list(setting.master)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "straight.toml"
+        made = Made(date=date.today(), recording="none: straight by construction", unit="rad")
+        write_calibration(file, {"mounting": (IDENTITY, made)})
+        names = load_skeleton(NURSING).segment_names
+        yield [*setting.master, *(f"nodes.{name}.calibration={json.dumps(str(file))}" for name in names)]

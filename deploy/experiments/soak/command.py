@@ -1,0 +1,148 @@
+"""`tandem soak`."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import tempfile
+from contextlib import AsyncExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from common.errors import TandemError
+from common.process.runtime import run as run_until_stopped
+from common.process.runtime import until_stopped
+
+if TYPE_CHECKING:
+    from deploy.experiments.soak.events import Event
+    from deploy.experiments.soak.judge import Judged
+    from deploy.experiments.soak.options import SoakOptions
+
+REPORT_S = 60.0
+"""How long stopping, judging and drawing may take after a Ctrl-C."""
+
+
+def soak(
+    duration: Annotated[str, typer.Option(help="How long the robot is to follow: 8h, 30m, 90s.")] = "10m",
+    transport: Annotated[str, typer.Option(help="tcp udp tls quic quic-datagram ws unixsock-stream")] = "tcp",
+    profile: Annotated[
+        str | None,
+        typer.Option(help="Two hosts made here, and a network between them: 4g, wifi …, or a file."),
+    ] = None,
+    router: Annotated[bool, typer.Option("--router", help="Master and robot meet at a router.")] = False,
+    faults: Annotated[
+        str, typer.Option(help="all, none, or names with commas; `--faults help` lists them.")
+    ] = "all",
+    every: Annotated[
+        float | None,
+        typer.Option(help="Mean seconds between faults; else each kind comes twice.", min=5.0),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of the plan: the same seed, the same faults.")] = 1,
+    report: Annotated[
+        Path | None, typer.Option(help="A new folder for what is seen.", file_okay=False)
+    ] = None,
+    judge: Annotated[
+        Path | None,
+        typer.Option(help="Run nothing: judge the report of a killed soak.", exists=True),
+    ] = None,
+) -> None:
+    """Run the whole way for hours with faults, and judge what it lost, how it came back and what grew.
+
+    Example: `tandem soak --duration 30m --faults all --report soak-1`
+    """
+    from deploy.experiments.soak.faults import FAULTS, chosen
+    from deploy.experiments.soak.judge import judge as judge_folder
+    from deploy.experiments.soak.options import SoakOptions, seconds
+    from deploy.measure.tables import plain_table
+
+    console = Console()
+    if faults == "help":
+        table = plain_table("fault", "what is done")
+        for fault in FAULTS.values():
+            table.add_row(fault.name, fault.words)
+        console.print(table)
+        return
+    if judge is not None:
+        _tell(judge_folder(judge), judge, console)
+        return
+    options = SoakOptions(
+        seconds(duration), transport, profile, router, faults=tuple(chosen(faults)), every_s=every, seed=seed
+    )
+    with tempfile.TemporaryDirectory(prefix="tandem-soak-") as temporary:
+        from deploy.experiments.soak.run import folder_for
+
+        folder = folder_for(report, Path(temporary))
+        run_until_stopped(lambda stop: _soak(options, folder, stop, console), shutdown_s=REPORT_S)
+        _tell(judge_folder(folder), folder if report is not None else None, console)
+
+
+def _tell(judged: Judged, folder: Path | None, console: Console) -> None:
+    from deploy.experiments.soak.report import write_report
+    from deploy.experiments.soak.view import verdicts_table
+    from deploy.measure.verdict import Status, failed
+
+    if folder is not None:
+        write_report(judged, folder)
+    console.print(verdicts_table(judged.verdicts))
+    counts = ", ".join(f"{judged.count(status)} {status}" for status in Status)
+    console.print(f"{judged.ended}; {counts}" + (f"; report: {folder}/report.html" if folder else ""))
+    wrong = failed(judged.verdicts)
+    if wrong:
+        raise TandemError("the soak failed: " + "; ".join(f"{v.group}: {v.name}" for v in wrong))
+
+
+def _say(event: Event, console: Console) -> None:
+    """In a log file, where no table is redrawn, each fault and what came of it is a line."""
+    from deploy.experiments.soak.view import HIDDEN, line
+
+    if not console.is_terminal and event.kind not in HIDDEN:
+        console.print(line(event), soft_wrap=True)
+
+
+async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console: Console) -> None:
+    """Run it; whatever happens, its files are whole and say how it ended."""
+    from rich.live import Live
+
+    from deploy.experiments.soak.log import SoakLog
+    from deploy.experiments.soak.run import SOAK, Soak
+    from deploy.experiments.soak.stage import Stage
+    from deploy.experiments.soak.watch import Watch
+    from deploy.harness.host import watch_host
+    from deploy.harness.link_settings import needed_age_s, open_timeout_s
+    from deploy.harness.rig import open_rig
+    from deploy.sim.network import open_network
+
+    async with AsyncExitStack() as stack:
+        host = await stack.enter_async_context(watch_host())
+        network = None
+        if options.profile is not None:
+            network = await stack.enter_async_context(open_network(options.profile, seed=options.seed))
+        # over a long line a robot with the default limit would take no command at all
+        slave, master = [], []
+        if network is not None:
+            master = [f"link.open_timeout_s={open_timeout_s(network.profile)}"]
+            slave = [*master, f"guard.max_age_s={needed_age_s(network.profile)}"]
+        overrides = {"slave": slave, "master": master}
+        rigging = open_rig(options.transport, overrides, routed=options.router, network=network)
+        rig = await stack.enter_async_context(rigging)
+        log: SoakLog | None = None
+        watch = Watch(rig.skeleton, lambda kind, what: log.tell(kind, what) if log else None)
+        stage = Stage(rig, watch, lambda kind, what: log.tell(kind, what) if log else None)
+        log = SoakLog(folder, [*stage.names, SOAK], on_event=lambda event: _say(event, console))
+        stack.callback(log.close)
+        watch.listen(rig.link())
+        how, error = "interrupted", False
+        live = stack.enter_context(Live(console=console, refresh_per_second=2, transient=True))
+        try:
+            await until_stopped(stop, Soak(options, stage, log, host, live).run())
+            how = "interrupted" if stop.is_set() else "it ran its time"
+        except TandemError as wrong:
+            how, error = str(wrong), True
+        finally:
+            log.tell("end", {"how": how, "error": error, "status": await stage.close()})
+            for child in stage.children.values():
+                if child.log.exists():
+                    shutil.copy(child.log, folder / child.log.name)

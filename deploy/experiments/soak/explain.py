@@ -1,0 +1,118 @@
+"""From the events of a soak to the windows in which things may go wrong. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.quaternion import Array
+from common.wire.messages import Mask
+from deploy.experiments.soak.events import Event, of_kind
+from deploy.experiments.soak.samples import Samples
+from deploy.experiments.soak.windows import Window, explained, reason
+from deploy.harness.excuse import STILL_S
+
+LOST_WITHIN_S = 1.5
+LEFT_OFF = "after it left off"
+"""Explains what the robot does then, and not why it left off."""
+LOST_PACKETS = {"udp": 3, "quic-datagram": 3}
+"""So many packets lost just before explain a hold. It takes three missed commands; on a stream, as all other
+transports are, one packet holds up those behind it until it is sent again, 0.2 s later or more (RTO)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """Spans with a reason: faults until the robot follows again, the host's stalls, the network's losses."""
+
+    faults: tuple[Window, ...]
+    stalls: tuple[Window, ...]
+    """What of them is shown to be the host's (deploy/harness/excuse.py), of STILL_S or longer."""
+    network: tuple[Window, ...]
+    """Seconds in which it lost packets, turned or doubled them, or let nothing pass."""
+    lossy_s: tuple[float, ...]
+    """Middles of seconds in which it lost enough for a hold."""
+
+    @property
+    def all(self) -> tuple[Window, ...]:
+        """All of them."""
+        return (*self.faults, *self.stalls, *self.network)
+
+    @property
+    def causes(self) -> tuple[Window, ...]:
+        """Those that may be why the robot left off."""
+        return tuple(window for window in self.all if window.why != LEFT_OFF)
+
+    def still_s(self, from_s: float, until_s: float) -> float:
+        """The longest of the host's stalls within a span, as far as it lies there."""
+        spans = (min(w.until_s, until_s) - max(w.from_s, from_s) for w in self.stalls)
+        return max(0.0, max(spans, default=0.0))
+
+    def accounts_for_hold(self, at_s: float) -> bool:
+        """Whether the host stood still, or the network lost enough, right before the robot held."""
+        return any(window.includes(at_s) for window in self.stalls) or any(
+            abs(lossy_s - at_s) <= LOST_WITHIN_S for lossy_s in self.lossy_s
+        )
+
+    def accounted(self, at_s: Array) -> Mask:
+        """(N,) times at which a hold would be put down to the host or the network."""
+        near = np.zeros(len(at_s), np.bool_)
+        if self.lossy_s:
+            middles_s = np.sort(np.asarray(self.lossy_s))
+            next_ = np.searchsorted(middles_s, at_s)
+            before_s = at_s - middles_s[np.maximum(next_ - 1, 0)]
+            after_s = middles_s[np.minimum(next_, len(middles_s) - 1)] - at_s
+            near = np.minimum(np.abs(before_s), np.abs(after_s)) <= LOST_WITHIN_S
+        return near | explained(at_s, self.stalls)
+
+    def why(self, at_s: float) -> str:
+        """The reason of something that was seen then; empty where it has none."""
+        return reason(at_s, self.all)
+
+
+def explanation(events: Sequence[Event], samples: Samples) -> Explained:
+    """Read the windows off a soak's files. What begins and never ends lasts to the end."""
+    faults = [Window(0.0, _first(events, "follows"), "start")]
+    for fault in of_kind(events, "fault"):
+        number = fault.what.get("number")
+        ends = [e.at_s for e in of_kind(events, "recovered") if e.what.get("number") == number]
+        faults.append(Window(fault.at_s, ends[0] if ends else math.inf, str(fault.what.get("fault"))))
+    stalls = [window for event in of_kind(events, "still") if (window := _excused(event)) is not None]
+    own = tuple(faults)
+    # what the robot does once it has left off by itself is of one cause; that it left is judged on its own
+    for left in of_kind(events, "left"):
+        ends = [e.at_s for e in of_kind(events, "recovered") if e.at_s > left.at_s]
+        faults.append(Window(left.at_s, ends[0] if ends else math.inf, LEFT_OFF))
+    last = [Window(e.at_s, math.inf, "end") for e in of_kind(events, "end")]
+    return Explained((*own, *faults[len(own) :], *last), tuple(stalls), *_network(events, samples))
+
+
+def _excused(still: Event) -> Window | None:
+    """The end of a stall, as far as it is shown to be the host's; None where that is too short for a hold."""
+    # a soak that was recorded before the evidence was kept shows none
+    excused_s = still.what.get("excused_ms", 0.0) / 1e3
+    until_s = still.what["from_s"] + still.what["still_ms"] / 1e3
+    why = f"the host stood still: {still.what.get('evidence')}"
+    return Window(until_s - excused_s, until_s, why) if excused_s >= STILL_S else None
+
+
+def _network(events: Sequence[Event], samples: Samples) -> tuple[tuple[Window, ...], tuple[float, ...]]:
+    lost, out, odd = (np.nan_to_num(samples[f"link_{what}"]) for what in ("lost", "out", "odd"))
+    at_s, gone = samples.at_s, lost + out
+    windows = [Window(end_s - 1.0, end_s, "the network") for end_s in at_s[gone + odd > 0.0].tolist()]
+    begun = of_kind(events, "begin")
+    enough = LOST_PACKETS.get(str(begun[0].what.get("transport")) if begun else "", 1)
+    padded = np.pad(gone, 1)
+    near = padded[:-2] + gone + padded[2:]
+    return tuple(windows), tuple((at_s[(near >= enough) & (gone > 0.0)] - 0.5).tolist())
+
+
+def unexplained_lefts(events: Sequence[Event], explained: Explained) -> list[Event]:
+    """When the robot left off, and neither fault, host nor network accounts for it."""
+    return [left for left in of_kind(events, "left") if not explained.accounts_for_hold(left.at_s)]
+
+
+def _first(events: Sequence[Event], kind: str) -> float:
+    return next((event.at_s for event in events if event.kind == kind), math.inf)

@@ -1,0 +1,223 @@
+"""The faults a soak knows: what is done, how long it lasts, what the robot must then do."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from common.errors import ConfigError, ConfigMistake, TandemError
+from deploy.experiments.soak import clock_step
+from deploy.experiments.soak import recorder as recording
+from deploy.experiments.soak.stage import Stage
+from deploy.harness.rig import ROUTER
+
+STEPS_S = (60, 3_600, 86_400, 2_592_000)
+"""By how much a clock may be stepped: a minute, an hour, a day, a month."""
+FILLS_S = 8.0
+"""A small disk is full by then."""
+
+
+@dataclass(slots=True)
+class Case:
+    """One fault as it happens: where, with what luck, and what is to be said of it."""
+
+    stage: Stage
+    draw: random.Random
+    told: dict[str, Any]
+    """Goes into the fault's event."""
+    kept: dict[str, Any]
+    """What the fault's end needs of its begin."""
+
+
+Act = Callable[[Case], Awaitable[None]]
+
+
+async def _needs_nothing(_: Stage) -> str:
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One kind. After `begin` it lasts for a while, then `end` undoes it."""
+
+    name: str
+    words: str
+    begin: Act
+    end: Act
+    lasts_s: tuple[float, float] = (1.2, 2.5)
+    """Long enough to see the robot stand."""
+    ends_process: bool = False
+    """Some process dies of it; not in the calm part."""
+    holds: bool = False
+    """The robot must hold, and not move until it is engaged anew."""
+    lives: bool = True
+    """The robot goes on to be heard, so that its reaction can be seen."""
+    notices_s: float = 0.0
+    """How long the master needs to see it, and the robot to be told: its own times count from then."""
+    flow_s: float | None = None
+    """Once it is undone, commands must flow again within this; None: they never stop."""
+    needs: Callable[[Stage], Awaitable[str]] = _needs_nothing
+    """Empty where this host and this rig can do it; else why not."""
+
+    @property
+    def asks(self) -> dict[str, Any]:
+        """What it asks of the robot, for its events: they are judged by what stands there."""
+        return {
+            "holds": self.holds, "heard": self.lives, "notices_s": self.notices_s,
+            "flow_limit_s": self.flow_s,
+        }  # fmt: skip
+
+
+async def _kill(name: str, case: Case) -> None:
+    case.kept["ended_ns"] = await case.stage.kill(name)
+
+
+async def _start(name: str, case: Case) -> None:
+    await case.stage.start(name)
+
+
+async def _start_stepped(name: str, case: Case) -> None:
+    case.told["step_s"] = step_s = case.draw.choice(STEPS_S)
+    await case.stage.start(name, clock_step.through(step_s))
+
+
+async def _restart_recorder(case: Case) -> None:
+    await case.stage.look_at_recording("kill", ended_ns=case.kept["ended_ns"])
+    await case.stage.start(recording.NAME)
+
+
+async def _lose_node(case: Case) -> None:
+    nodes = case.stage.rig.skeleton.segment_names
+    case.told["node"] = node = case.draw.choice(nodes)
+    await case.stage.tell_suit(f'lose = [{{ node = "{node}" }}]')
+
+
+async def _find_node(case: Case) -> None:
+    await case.stage.tell_suit("")
+
+
+async def _fill_disk(case: Case) -> None:
+    stage = case.stage
+    await stage.stop(recording.NAME)
+    await stage.look_at_recording("stop")
+    try:
+        case.told["disk"] = await stage.recorder.start_on_small_disk()
+    except TandemError:  # the fault does not come about; the recorder goes on as before it
+        await stage.recorder.disk.remove()
+        await stage.start(recording.NAME)
+        raise
+    case.kept["life"] = stage.recorder.child.lifetime
+    stage.meant.add(recording.NAME)
+
+
+async def _free_disk(case: Case) -> None:
+    stage = case.stage
+    child, said = stage.recorder.child, stage.recorder.complaints()
+    # one that ended is started again by whoever looks after the processes: that one met no full disk
+    lived = child.running and child.lifetime == case.kept["life"]
+    status = await stage.stop(recording.NAME)
+    await stage.look_at_recording("disk full", lived=lived, said=said, status=status)
+    await stage.recorder.disk.remove()
+    await stage.start(recording.NAME)
+
+
+async def _cut(case: Case) -> None:
+    if case.stage.rig.network is not None:
+        case.stage.rig.network.cut()
+
+
+async def _restore(case: Case) -> None:
+    if case.stage.rig.network is not None:
+        case.stage.rig.network.restore()
+
+
+async def _has_network(stage: Stage) -> str:
+    return "" if stage.rig.network is not None else "needs a network between two hosts: --profile"
+
+
+async def _has_router(stage: Stage) -> str:
+    return "" if ROUTER in stage.children else "there is no router in between: --router"
+
+
+async def _can_step(_: Stage) -> str:
+    return await clock_step.why_not()
+
+
+RESTART_S = 15.0
+"""A process that was killed is back by then: it starts, its clock and lease are settled, filters too."""
+SUIT_LOST_S = 0.1
+"""`capture.lost_after` at `capture.rate_hz`: until then the master takes a node for one that is late."""
+LINK_S = 1.5
+"""An outage's own target (issue 5): commands flow again so soon after the link is back."""
+
+
+def _killed(name: str, lives: bool, flow_s: float | None, notices_s: float = 0.0) -> Fault:
+    return Fault(
+        f"{name}-kill", f"the {name} is killed (kill -9) and started again",
+        partial(_kill, name), partial(_start, name),
+        ends_process=True, holds=True, lives=lives, notices_s=notices_s, flow_s=flow_s,
+    )  # fmt: skip
+
+
+def _stepped(name: str, lives: bool) -> Fault:
+    return Fault(
+        f"{name}-clock", f"the {name} is killed and comes back with its clock stepped, as after a reboot",
+        partial(_kill, name), partial(_start_stepped, name),
+        ends_process=True, holds=True, lives=lives, flow_s=RESTART_S, needs=_can_step,
+    )  # fmt: skip
+
+
+FAULTS: Mapping[str, Fault] = {
+    fault.name: fault
+    for fault in (
+        _killed("master", lives=True, flow_s=RESTART_S),
+        _killed("slave", lives=False, flow_s=RESTART_S),
+        # commands go on, but with no valid joint they are nobody's
+        _killed("suit", lives=True, flow_s=None, notices_s=SUIT_LOST_S),
+        Fault(
+            "recorder-kill", "the recorder is killed (kill -9) and started again",
+            partial(_kill, recording.NAME), _restart_recorder, ends_process=True,
+        ),
+        _stepped("master", lives=True),
+        _stepped("slave", lives=False),
+        Fault(
+            "outage", "nothing passes between the two hosts for some seconds", _cut, _restore, (3.0, 7.0),
+            holds=True, flow_s=LINK_S, needs=_has_network,
+        ),
+        Fault(
+            "router-restart", "the router is killed (kill -9) and started again",
+            partial(_kill, ROUTER), partial(_start, ROUTER),
+            ends_process=True, holds=True, lives=False, flow_s=RESTART_S, needs=_has_router,
+        ),
+        Fault("node-loss", "one of the suit's nodes falls silent", _lose_node, _find_node, (2.0, 6.0)),
+        Fault(
+            "disk-full", "the recorder's disk fills up", _fill_disk, _free_disk,
+            (FILLS_S, FILLS_S), ends_process=True,
+        ),
+    )
+}  # fmt: skip
+"""By name, as `--faults` has them."""
+
+
+def chosen(text: str) -> list[str]:
+    """The names that `all`, `none` or a list with commas means. Raises ConfigError for one that is none."""
+    if text == "none":
+        return []
+    names = list(FAULTS) if text == "all" else [name.strip() for name in text.split(",")]
+    mistakes = [
+        ConfigMistake("--faults", name, f"all, none or some of {', '.join(FAULTS)}")
+        for name in names
+        if name not in FAULTS
+    ]
+    if mistakes:
+        raise ConfigError("soak", mistakes)
+    return list(dict.fromkeys(names))
+
+
+async def possible(names: Iterable[str], stage: Stage) -> tuple[list[str], dict[str, str]]:
+    """Which of them can be done here, and why the others cannot."""
+    why = {name: await FAULTS[name].needs(stage) for name in names}
+    return [name for name in why if not why[name]], {name: words for name, words in why.items() if words}

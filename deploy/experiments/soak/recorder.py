@@ -1,0 +1,141 @@
+"""The recorder's process within a soak: a new file each time, looked at once it is closed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from common.clock import monotonic_ns, to_s
+from common.errors import TandemError
+from common.link.config import LinkConfig
+from deploy.harness.child import Child
+from deploy.harness.spawn import finished
+
+NAME = "recorder"
+FULL_BYTES = 40 * 1024
+"""A disk of this size is full after about 4 s: commands, states and statistics are 10 kB/s, compressed."""
+ENDS_HERE = "the recording ends here"
+"""What the recorder logs, once, when its disk fails."""
+
+
+class Recorder:
+    """Starts and ends `tandem record` of one robot. Files lie in `folder` and are deleted when looked at."""
+
+    def __init__(self, child: Child, folder: Path, link: LinkConfig, robot: str) -> None:
+        """`link`: where the commands and the states are heard."""
+        self.child = child
+        self._folder = folder
+        self._link = folder / f"{NAME}.toml"
+        self._link.write_text(_toml(link), "utf-8")
+        # the soak's own faults make messages miss; what matters there is judged from the robot's figures
+        self._arguments = [
+            "--link",
+            str(self._link),
+            "--robot",
+            robot,
+            "--minutes-per-file",
+            "1",
+            "--may-miss",
+        ]
+        self._number = 0
+        self._said_before = 0
+        self.file = folder / "none.mcap"
+        self.disk = SmallDisk(folder / "full")
+
+    async def start(self, through: Sequence[str] = (), folder: Path | None = None) -> None:
+        """Record into a new file."""
+        self._number += 1
+        self._said_before = len(self.child.said()) if self.child.log.exists() else 0
+        self.file = (folder or self._folder) / f"recording-{self._number:04}.mcap"
+        await self.child.run([*self._arguments, "--out", str(self.file)], through)
+
+    async def start_on_small_disk(self) -> str:
+        """Record onto a disk that will be full soon; how it was made so."""
+        where, through, how = await self.disk.make()
+        await self.start(through, where)
+        return how
+
+    def complaints(self) -> int:
+        """How often this process said that its disk failed."""
+        return self.child.said()[self._said_before :].count(ENDS_HERE)
+
+    async def look(self, ended_ns: int | None = None) -> Mapping[str, Any]:
+        """What is in the last file of a process that has ended; all are deleted. `ended_ns`: when it died."""
+        files = sorted(
+            self.file.parent.glob(f"{self.file.stem}*.mcap"), key=lambda file: file.stat().st_mtime
+        )
+        contents = await _contents(files[-1] if files else self.file)
+        size_mb = sum(file.stat().st_size for file in files) / 1e6
+        for file in files:
+            file.unlink()
+        topics = contents.get("topics", {})
+        last_ns = max((topic["last_ns"] for topic in topics.values()), default=None)
+        lost_s = None if ended_ns is None or last_ns is None else max(0.0, to_s(ended_ns - last_ns))
+        return {
+            "readable": bool(topics),
+            "messages": sum(topic["count"] for topic in topics.values()),
+            "size_mb": round(size_mb, 3),
+            "cut": contents.get("cut", ""),
+            "lost_s": None if lost_s is None else round(lost_s, 3),
+            "why_not": contents.get("error", ""),
+        }
+
+    async def kill(self) -> int:
+        """End it without a warning; when, by this host's clock."""
+        at_ns = monotonic_ns()
+        await self.child.kill()
+        return at_ns
+
+
+def _toml(link: LinkConfig) -> str:
+    import tomlkit
+
+    tree = link.model_dump(mode="json", exclude_defaults=True, exclude={"listen"})
+    return tomlkit.dumps({"link": tree})
+
+
+class SmallDisk:
+    """A file system of its own where the host permits it, else a limit on the size of the process's files."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._mounted = False
+
+    async def make(self) -> tuple[Path, tuple[str, ...], str]:
+        """Where to write, what to run the process through, and in words what it is. Raises TandemError."""
+        self._folder.mkdir(exist_ok=True)
+        size = f"size={FULL_BYTES // 1024}k"
+        if await _succeeds("mount", "-t", "tmpfs", "-o", size, "tmpfs", str(self._folder)):
+            self._mounted = True
+            return self._folder, (), f"a file system of {FULL_BYTES // 1024} KiB"
+        if shutil.which("prlimit"):
+            limit = ("prlimit", f"--fsize={FULL_BYTES}", "--")
+            return self._folder, limit, f"a limit of {FULL_BYTES // 1024} KiB a file (nothing may be mounted)"
+        raise TandemError("a disk cannot be filled here: nothing may be mounted, and there is no `prlimit`")
+
+    async def remove(self) -> None:
+        """May be called at any time."""
+        if self._mounted:
+            self._mounted = not await _succeeds("umount", str(self._folder))
+        with suppress(OSError):
+            self._folder.rmdir()
+
+
+async def _contents(file: Path) -> Mapping[str, Any]:
+    """Looked at in a process of its own: a long recording must cost the soak neither memory nor time."""
+    nice = ("nice", "-n", "15") if shutil.which("nice") else ()
+    _, out, err = await finished([*nice, sys.executable, "-m", "deploy", "recording", str(file), "--json"])
+    try:
+        contents: Mapping[str, Any] = json.loads(out)
+    except ValueError:
+        return {"error": err.decode("utf-8", "replace").strip()}
+    return contents
+
+
+async def _succeeds(*command: str) -> bool:
+    return shutil.which(command[0]) is not None and (await finished(command))[0] == 0

@@ -1,0 +1,256 @@
+"""The story of a soak: start, follow, one fault after the other, each time engage again, stop."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import random
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+from rich.live import Live
+
+from common.clock import NS_PER_MS, monotonic_ns, to_ns, to_s
+from common.errors import TandemError
+from common.process.heap import freeze_heap, reserve_heap
+from common.process.pacing import TickGrid
+from common.process.ticker import ticks
+from common.wire.messages import Action
+from deploy.experiments.soak import recorder as recording
+from deploy.experiments.soak.faults import FAULTS, Case, Fault, possible
+from deploy.experiments.soak.link import LinkLosses, nature
+from deploy.experiments.soak.log import SoakLog
+from deploy.experiments.soak.operator import Operator
+from deploy.experiments.soak.options import SoakOptions
+from deploy.experiments.soak.schedule import Planned, distance_s, schedule
+from deploy.experiments.soak.stage import Stage
+from deploy.experiments.soak.view import draw
+from deploy.harness.child import usage
+from deploy.harness.host import Host
+
+SOAK = "soak"
+"""The name of this process among those that are watched."""
+HEARD_S = 30.0
+LOOK_S = 0.05
+STEADY_S = 3.0
+"""The robot follows at least so long between two faults."""
+MOST_ENDS = 5
+"""A process that ends by itself more often is not started again."""
+
+
+@dataclass(slots=True)
+class Progress:
+    """Where the soak is, for the screen."""
+
+    duration_s: float
+    began_s: float | None = None
+    """When the robot first followed, seconds of the soak."""
+    planned: list[Planned] = field(default_factory=list)
+    next: int = 0
+    busy: str = "starting"
+    """What is being done; empty while nothing is."""
+
+
+class Soak:
+    """One soak on a stage. `run` returns when the time is over; it may be cancelled at any moment."""
+
+    def __init__(self, options: SoakOptions, stage: Stage, log: SoakLog, host: Host, live: Live) -> None:
+        self._options = options
+        self._stage = stage
+        self._log = log
+        self._host = host
+        self._live = live
+        self._operator = Operator(stage)
+        self._ends: dict[str, int] = {}
+        self._self = psutil.Process()
+        self._losses = LinkLosses(stage.rig.network)
+        self.progress = Progress(options.duration_s)
+
+    async def run(self) -> None:
+        """Raises TandemError where it cannot even begin, or a process ends again and again."""
+        sampling = asyncio.create_task(self._sample())
+        telling = asyncio.create_task(self._story())
+        try:
+            done, _ = await asyncio.wait({sampling, telling}, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            for task in (sampling, telling):
+                task.cancel()
+                with suppress(asyncio.CancelledError, TandemError):
+                    await task
+
+    async def _story(self) -> None:
+        kinds, left_out = await possible(self._options.faults, self._stage)
+        every_s = self._options.every_s or distance_s(self._options.duration_s, len(kinds))
+        network = self._stage.rig.network
+        begun = {**self._options.tree(), "every_s": every_s, "faults": kinds, "left_out": left_out}
+        self._log.tell("begin", begun | ({"network": nature(network.profile)} if network else {}))
+        await self._start()
+        enders = [name for name in kinds if FAULTS[name].ends_process]
+        planned = schedule(self._options.duration_s, kinds, enders, every_s, self._options.seed)
+        began_s = self._log.now_s
+        self.progress.began_s, self.progress.planned = began_s, planned
+        self.progress.busy = ""
+        self._log.tell("follows", {"planned": len(planned)})
+        freeze_heap()
+        reserve_heap()
+        for number, one in enumerate(planned):
+            await self._tend(began_s + one.at_s)
+            self.progress.next = number + 1
+            await self._bring(FAULTS[one.fault], number)
+        await self._tend(began_s + self._options.duration_s)
+        await self._end()
+
+    async def _start(self) -> None:
+        stage = self._stage
+        for name in (*stage.rig.slaves, "suit"):
+            await stage.start(name)
+        await self._until(lambda: stage.watch.heard(monotonic_ns()), "word from the robot")
+        # the master last: processes that still start would take the time of its first ticks
+        await stage.start("master")
+        await stage.start(recording.NAME)
+        recovery = await self._operator.recover(monotonic_ns())
+        if not recovery.done:
+            waiting = stage.rig.observer.waiting_for()
+            raise TandemError(f"the robot never followed: {recovery.refused or waiting}")
+
+    async def _until(self, reached: Any, what: str) -> None:
+        deadline_ns = monotonic_ns() + to_ns(HEARD_S)
+        while not reached():
+            if monotonic_ns() > deadline_ns:
+                words = {n: c.last_words() for n, c in self._stage.children.items() if c.log.exists()}
+                raise TandemError(f"no {what} within {HEARD_S:g} s: {words}")
+            await asyncio.sleep(LOOK_S)
+
+    async def _tend(self, until_s: float) -> None:
+        """Let it run; a robot that leaves off by itself is noted, and engaged again."""
+        steady_s = self._log.now_s + STEADY_S
+        while self._log.now_s < max(until_s, min(steady_s, until_s + STEADY_S)):
+            if not self._operator.follows and not await self._soon():
+                await self._recover_unplanned()
+                steady_s = self._log.now_s + STEADY_S
+            await asyncio.sleep(LOOK_S)
+
+    async def _soon(self) -> bool:
+        """Whether it follows again at once: a late command is not worth a word."""
+        for _ in range(10):
+            await asyncio.sleep(LOOK_S)
+            if self._operator.follows:
+                return True
+        return False
+
+    async def _recover_unplanned(self) -> None:
+        watch, state = self._stage.watch, self._stage.watch.state
+        guard = watch.guard(monotonic_ns())
+        self._log.tell(
+            "left", {"guard": guard, "reason": state.reason if state else "", "known": watch.known()}
+        )
+        self.progress.busy = "the robot left off by itself"
+        recovery = await self._operator.recover(monotonic_ns())
+        self._log.tell("recovered", {"fault": "", "number": -1, **recovery.tree()})
+        self.progress.busy = ""
+
+    async def _bring(self, fault: Fault, number: int) -> None:
+        """One fault from its begin until the robot follows again."""
+        watch, log = self._stage.watch, self._log
+        self.progress.busy = fault.words
+        case = Case(self._stage, random.Random(f"{self._options.seed} {number}"), {}, {})
+        lasts_s = case.draw.uniform(*fault.lasts_s)
+        figures: dict[str, Any] = {"fault": fault.name, "number": number, **fault.asks}
+        figures["begun_s"] = round(log.now_s, 3)
+        log.tell("fault", {**figures, "lasts_s": round(lasts_s, 3)})
+        begun_ns = monotonic_ns()
+        robot_ns = watch.motion.newest_ns() + begun_ns - watch.state_ns
+        try:
+            await fault.begin(case)
+            await asyncio.sleep(lasts_s)
+            if fault.lives:
+                figures["held_s"] = _since(begun_ns, watch.held_ns)
+                figures["stands_s"] = watch.motion.standstill_s(robot_ns) if fault.holds else None
+            await fault.end(case)
+        except TandemError as error:
+            figures["failed"] = str(error)
+        undone_ns = monotonic_ns()
+        log.tell("undone", {**figures, **case.told})
+        recovery = await self._operator.recover(undone_ns)
+        log.tell("recovered", {**figures, **case.told, **recovery.tree()})
+        self.progress.busy = ""
+
+    async def _end(self) -> None:
+        self.progress.busy = "stopping"
+        with suppress(TandemError):
+            await self._stage.rig.control(Action.DISENGAGE)
+
+    # what is looked at once a second
+
+    async def _sample(self) -> None:
+        async for _ in ticks(TickGrid(monotonic_ns() + to_ns(1.0), to_ns(1.0))):
+            row = self._stage.watch.row()
+            row |= {"host_still_ms": self._stalls(), **self._losses.row()}
+            for name, (life, used) in self._stage.usage().items():
+                row |= _columns(name, life, used)
+            used_here = usage(self._self)
+            row |= _columns(SOAK, 1, used_here) if used_here else {}
+            strayed_rad = self._stage.watch.motion.take_strayed()
+            if strayed_rad is not None:
+                row["strayed_deg"] = math.degrees(strayed_rad)
+            self._log.sample(row)
+            await self._look_after_processes()
+            self._live.update(draw(self.progress, self._stage, self._log, row))
+
+    def _stalls(self) -> float:
+        """The longest stall since the last look that is shown to be the host's, ms; forgotten once told."""
+        longest_s = 0.0
+        for stall in self._host.stalls:
+            still_s = to_s(stall.until_ns - stall.from_ns)
+            longest_s = max(longest_s, to_s(stall.excused_ns))
+            if still_s >= 0.02:
+                told = {
+                    "from_s": round(self._log.at_s(stall.from_ns), 3),
+                    "still_ms": round(1e3 * still_s, 1),
+                    "excused_ms": round(stall.excused_ns / NS_PER_MS, 1),
+                    "evidence": str(stall.evidence),
+                }
+                self._log.tell("still", told)
+        self._host.stalls.clear()
+        return 1e3 * longest_s
+
+    async def _look_after_processes(self) -> None:
+        for name in self._stage.ended():
+            child = self._stage.children[name]
+            self._log.tell("ended", {"process": name, "words": child.last_words()})
+            self._ends[name] = self._ends.get(name, 0) + 1
+            if self._ends[name] > MOST_ENDS:
+                raise TandemError(f"the {name} ends again and again: {child.last_words()}")
+            await self._stage.start(name)
+
+
+def _since(begun_ns: int, at_ns: int) -> float | None:
+    return round(to_s(at_ns - begun_ns), 3) if at_ns > begun_ns else None
+
+
+def _columns(name: str, life: int, used: Any) -> dict[str, float | str]:
+    return {
+        f"{name}_life": float(life),
+        f"{name}_rss_mb": used.rss_mb,
+        f"{name}_fds": float(used.fds),
+        f"{name}_threads": float(used.threads),
+        f"{name}_cpu_s": used.cpu_s,
+    }
+
+
+def folder_for(report: Path | None, temporary: Path) -> Path:
+    """Where a soak writes: the folder that was asked for, which must be empty, or a temporary one."""
+    if report is None:
+        return temporary
+    try:
+        report.mkdir(parents=True, exist_ok=True)
+        if any(report.iterdir()):
+            raise TandemError(f"{report}: is not empty; name a new folder, so that no soak is written over")
+    except OSError as error:
+        raise TandemError(f"{report}: cannot be a report's folder ({error.strerror})") from None
+    return report

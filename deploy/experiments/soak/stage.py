@@ -1,0 +1,93 @@
+"""The running whole way of a soak: suit, master, slave, recorder; what can be done to it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from common.clock import monotonic_ns
+from common.errors import LinkError, TandemError
+from common.wire.topics import FAULTS
+from deploy.experiments.soak import recorder as recording
+from deploy.experiments.soak.recorder import Recorder
+from deploy.experiments.soak.watch import Tell, Watch
+from deploy.harness.child import Child, Usage
+from deploy.harness.rig import ROBOT, Rig
+
+
+class Stage:
+    """The processes by name, and which of them are meant to run."""
+
+    def __init__(self, rig: Rig, watch: Watch, tell: Tell) -> None:
+        self.rig = rig
+        self.watch = watch
+        self.tell = tell
+        child = Child("record", rig.folder, name=recording.NAME)
+        self.recorder = Recorder(child, rig.folder, rig.endpoints.observing, ROBOT)
+        self.children: dict[str, Child] = {**rig.children, recording.NAME: child}
+        self.meant = {name for name, child in self.children.items() if child.running}
+        """Processes that nobody has ended; a router runs already."""
+
+    @property
+    def names(self) -> list[str]:
+        """Of all processes, in the order in which they are shown."""
+        return sorted(self.children, key=lambda name: (name == recording.NAME, name))
+
+    async def start(self, name: str, through: Sequence[str] = ()) -> None:
+        """Start a process, or again."""
+        self.watch.restarted(name)
+        if name == recording.NAME:
+            await self.recorder.start(through)
+        else:
+            await self.rig.start(name, through)
+        self.meant.add(name)
+        self.tell("started", {"process": name, "life": self.children[name].lifetime})
+
+    async def kill(self, name: str) -> int:
+        """End it as a crash would; when, by this host's clock."""
+        self.meant.discard(name)
+        at_ns = monotonic_ns()
+        await self.children[name].kill()
+        return at_ns
+
+    async def stop(self, name: str) -> int | None:
+        """Ask it to end; its exit status."""
+        self.meant.discard(name)
+        return await self.children[name].stop()
+
+    async def tell_suit(self, faults: str) -> None:
+        """Give the suit's nodes these faults, as TOML. Raises TandemError where it does not take them."""
+        for _ in range(3):
+            try:
+                await self.rig.link().ask(FAULTS, faults.encode())
+            except LinkError as error:
+                refused = error
+                await asyncio.sleep(0.2)
+            else:
+                return
+        raise TandemError(f"the suit does not take its faults: {refused}")
+
+    def ended(self) -> list[str]:
+        """Processes that ended by themselves since the last look; they are not meant to run any more."""
+        gone = [name for name in sorted(self.meant) if not self.children[name].running]
+        self.meant.difference_update(gone)
+        return gone
+
+    def usage(self) -> Mapping[str, tuple[int, Usage]]:
+        """Which life each running process is in, and what it uses."""
+        used = {name: (child.lifetime, child.usage) for name, child in self.children.items()}
+        return {name: (life, use) for name, (life, use) in used.items() if use is not None}
+
+    async def look_at_recording(self, what: str, **more: Any) -> None:
+        """Say what is in the file of the recorder that has just ended."""
+        told = await self.recorder.look(more.pop("ended_ns", None))
+        self.tell("recording", {"after": what, **told, **more})
+
+    async def close(self) -> dict[str, int | None]:
+        """End all, the master first; exit statuses."""
+        statuses = {recording.NAME: await self.stop(recording.NAME)}
+        self.meant.clear()
+        statuses |= await self.rig.stop()
+        await self.recorder.disk.remove()
+        return statuses

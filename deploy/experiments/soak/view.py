@@ -1,0 +1,111 @@
+"""What a person sees of a soak: where it is, how the robot and the processes do; in the end the verdicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Group, RenderableType
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from deploy.experiments.soak.events import Event
+from deploy.experiments.soak.options import in_words
+from deploy.measure.tables import GUARD_STYLE, UNKNOWN, plain_table
+from deploy.measure.verdict import Status, Verdict
+
+if TYPE_CHECKING:
+    from deploy.experiments.soak.log import SoakLog
+    from deploy.experiments.soak.run import Progress
+    from deploy.experiments.soak.stage import Stage
+
+STYLES = {Status.PASS: "green", Status.FAIL: "bold red", Status.NOT_JUDGED: "yellow"}
+HIDDEN = ("begin", "started", "guard", "lease", "joints", "undone", "still")
+"""Events that say little to who watches."""
+
+
+def draw(progress: Progress, stage: Stage, log: SoakLog, row: Mapping[str, float | str]) -> RenderableType:
+    """The live view."""
+    guard = str(row.get("guard", "")) or "silent"
+    head = Text.assemble(
+        "robot ", (guard, GUARD_STYLE.get(guard, "")), "   one way ", _figure(row, "one_way_p50_ms", " ms"),
+        "   round trip ", _figure(row, "round_trip_ms", " ms"),
+        f"   lost {_figure(row, 'lost')}   missed ticks {_figure(row, 'master_missed')}"
+        f" + {_figure(row, 'slave_missed')}",
+    )  # fmt: skip
+    table = plain_table("process", "life", "RSS MB", "descriptors", "threads")
+    for name in [*stage.names, "soak"]:
+        figures = [_figure(row, f"{name}_{what}") for what in ("life", "rss_mb", "fds", "threads")]
+        table.add_row(name, *figures)
+    newest = [line(event) for event in log.newest if event.kind not in HIDDEN]
+    return Group(_bar(progress, log.now_s), head, table, *newest[-4:])
+
+
+def _bar(progress: Progress, now_s: float) -> RenderableType:
+    if progress.began_s is None:
+        return Text(f"{in_words(now_s)}: {progress.busy}", "bold")
+    gone_s = now_s - progress.began_s
+    left = in_words(progress.duration_s - gone_s)
+    words = progress.busy or "following"
+    if not progress.busy and progress.next < len(progress.planned):
+        coming = progress.planned[progress.next]
+        words = f"{coming.fault} in {in_words(coming.at_s - gone_s)}"
+    line = Table.grid(padding=(0, 2))
+    faults = f"fault {progress.next} of {len(progress.planned)}"
+    line.add_row(
+        ProgressBar(progress.duration_s, gone_s, width=24), f"{left} left", faults, Text(words, "bold")
+    )
+    return line
+
+
+def line(event: Event) -> Text:
+    """One event, as a line."""
+    what = ", ".join(
+        f"{key} {value}" for key, value in event.what.items() if value not in (None, "", False, True)
+    )
+    return Text(f"{event.at_s:8.1f} s  {event.kind}  {what}", "dim", overflow="ellipsis", no_wrap=True)
+
+
+def verdicts_table(verdicts: Sequence[Verdict]) -> RenderableType:
+    """One row a criterion, by group; then those that were not judged, reason by reason."""
+    table = plain_table("criterion", "figure", "at most", "", "")
+    table.columns[-1].justify = "left"
+    table.columns[-1].no_wrap = False
+    group = ""
+    unjudged: dict[str, list[str]] = {}
+    for verdict in verdicts:
+        if verdict.status is Status.NOT_JUDGED:
+            unjudged.setdefault(verdict.note, []).append(verdict.name)
+            continue
+        if verdict.group != group:
+            group = verdict.group
+            table.add_section()
+        table.add_row(
+            Text.assemble((f"{verdict.group}: ", "dim"), verdict.name),
+            number(verdict.figure, verdict.unit),
+            number(verdict.limit, verdict.unit),
+            Text(str(verdict.status), STYLES[verdict.status]),
+            Text(verdict.note, "dim"),
+        )
+    style = STYLES[Status.NOT_JUDGED]
+    return Group(table, *(_unjudged(why, names, style) for why, names in unjudged.items()))
+
+
+def _unjudged(why: str, names: Sequence[str], style: str) -> Text:
+    return Text.assemble(
+        ("not judged: ", style), "; ".join(names), (f" ({why or 'nothing was measured'})", "dim")
+    )
+
+
+def number(value: float | None, unit: str = "") -> str:
+    """For people: three digits, and the unit."""
+    return UNKNOWN if value is None else f"{value:.3g} {unit}".rstrip()
+
+
+def _figure(row: Mapping[str, Any], name: str, unit: str = "") -> str:
+    value = row.get(name)
+    if not isinstance(value, float | int) or math.isnan(value):
+        return UNKNOWN
+    return f"{value:.0f}{unit}" if float(value).is_integer() else f"{value:.2f}{unit}"

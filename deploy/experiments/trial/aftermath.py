@@ -1,0 +1,85 @@
+"""What became of the robot in the scripted outage and after it. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from common.clock import NS_PER_MS, NS_PER_S, to_ns
+from common.metrics.published import SlaveMetrics
+from common.wire.messages import CommandEcho
+from deploy.experiments.trial.recording import Outage, Recording, counts, echoes, published
+
+MOVING = ("align", "track")
+LEFT_S = 0.5
+"""After the cut for longer than this, a robot that still moves has not noticed: its time-out is 0.2 s."""
+
+TELLS_NS = 20 * NS_PER_MS
+"""The slave counts for its statistics at most so long after the time they bear."""
+
+
+def aftermath(after: Recording, outage: Outage, max_age_s: float) -> dict[str, float | None]:
+    """The outage's figures; `after` is what was heard from the cut on. None: nobody can tell."""
+    states = after.states
+    accepted = {n: e for n, e in echoes(states).items() if e.accepted_ns > outage.back_ns}
+    until_ns = outage.act_ns if outage.act_ns is not None else max((s.sent_ns for s in states), default=0)
+    noticed_ns = outage.cut_ns + to_ns(LEFT_S)
+    alone = any(s.guard in MOVING for s in states if noticed_ns < s.sent_ns < until_ns)
+    act_ns = outage.act_ns
+    tracks_ns = [s.sent_ns for s in states if s.guard == "track"]
+    again_ns = [at_ns for at_ns in tracks_ns if act_ns is not None and at_ns > act_ns]
+    # a robot that held before the cut did not hold for it
+    moved = bool(states) and states[0].guard in MOVING
+    held_ns = next((s.sent_ns for s in states if moved and s.guard == "hold"), None)
+    flow_ns = min((e.accepted_ns for e in accepted.values()), default=None)
+    told = len(published(after.told, SlaveMetrics)) > 1
+    return {
+        "held_s": None if held_ns is None else (held_ns - outage.cut_ns) / NS_PER_S,
+        "flow_s": None if flow_ns is None else (flow_ns - outage.back_ns) / NS_PER_S,
+        "stale_accepted": _stale_accepted(after, outage, max_age_s, accepted) if told and states else None,
+        "stale_refused": float(counts(after).get("dropped", {}).get("age", 0)) if told else None,
+        "moved_alone": float(alone) if states else None,
+        "ready_s": None if outage.ready_ns is None else (outage.ready_ns - outage.back_ns) / NS_PER_S,
+        "track_again_s": (again_ns[0] - act_ns) / NS_PER_S if again_ns and act_ns is not None else None,
+    }
+
+
+def _stale_accepted(
+    after: Recording, outage: Outage, max_age_s: float, accepted: Mapping[int, CommandEcho]
+) -> float | None:
+    """None where a command was accepted that the recording does not hold: its age is not known."""
+    sampled_ns = {c.sequence: c.stamps.sampled_ns for c in after.commands}
+    if not accepted.keys() <= sampled_ns.keys():
+        return None
+    seen = sum(e.accepted_ns - sampled_ns[n] > to_ns(max_age_s) for n, e in accepted.items())
+    return float(seen + _stale_unseen(after, outage, max_age_s))
+
+
+def _stale_unseen(after: Recording, outage: Outage, max_age_s: float) -> int:
+    """How many that no state echoed were accepted stale, at the least.
+
+    Of a burst between two states only the last is echoed. That there were others the slave's counter tells,
+    not which: they are taken to be the freshest that they can have been, accepted as early as they can.
+    """
+    unseen = _accepted_unseen(after)
+    sampled_ns = {c.sequence: c.stamps.sampled_ns for c in after.commands}
+    newest, before_ns = min(sampled_ns, default=0) - 1, outage.back_ns
+    youngest_ns: list[int] = []
+    for state in sorted(after.states, key=lambda s: s.sent_ns):
+        if state.echo is not None:
+            if state.echo.accepted_ns > outage.back_ns:
+                between = range(newest + 1, state.echo.sequence)
+                youngest_ns += [before_ns - sampled_ns[n] for n in between if n in sampled_ns]
+            newest = state.echo.sequence
+        before_ns = max(state.sent_ns, outage.back_ns)
+    return sum(age_ns > to_ns(max_age_s) for age_ns in sorted(youngest_ns)[:unseen])
+
+
+def _accepted_unseen(after: Recording) -> int:
+    """Accepted by the slave's counter and echoed by no state, between its first word and its last."""
+    told = [(s.sent_ns, s.metrics.guard.accepted) for s in published(after.told, SlaveMetrics)]
+    if len(told) < 2:
+        return 0
+    (from_ns, before), (until_ns, accepted) = told[0], told[-1]
+    found = echoes(after.states).values()
+    seen = sum(from_ns < e.accepted_ns <= until_ns + TELLS_NS for e in found)
+    return max(0, accepted - before - seen)

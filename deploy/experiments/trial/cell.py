@@ -1,0 +1,109 @@
+"""What one cell found, to JSON and back: a file of its own as soon as it is there. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from common.errors import TandemError
+from deploy.experiments.trial.figures import FIGURES, Values, rounded
+from deploy.experiments.trial.plan import CellKey, Setup
+
+VERSION = 1
+
+
+class Status(StrEnum):
+    """How a cell ended."""
+
+    DONE = "done"
+    IMPOSSIBLE = "impossible"
+    """It cannot be run at all: a transport that does not cross hosts."""
+    FAILED = "failed"
+    """It was run and came to nothing; the next run tries it again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Excerpt:
+    """A few seconds of one joint, to be looked at."""
+
+    joint: str
+    at_s: Sequence[float]
+    """(T,)"""
+    operator_deg: Sequence[float]
+    """(T,) true."""
+    robot_deg: Sequence[float]
+    """(T,) by its encoder."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One run of a setup, and what came of it."""
+
+    key: CellKey
+    status: Status
+    why: str = ""
+    """Where it is not done."""
+    values: Values = field(default_factory=dict)
+    remarks: Sequence[str] = ()
+    """What happened on the way, in words: a hold and its reason."""
+    settings: Mapping[str, str] = field(default_factory=dict)
+    """What was set for this profile over the example files."""
+    counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    """The guard's events in the judged time: dropped by gate, losses, clamps by rule."""
+    one_way_ms: Sequence[float] = ()
+    """Percentiles 0, 1 … 100 of the true one-way of accepted commands."""
+    excerpt: Excerpt | None = None
+
+    @property
+    def settled(self) -> bool:
+        """Whether another try would tell nothing new."""
+        return self.status is not Status.FAILED
+
+    def tree(self) -> dict[str, Any]:
+        """As JSON has it, rounded."""
+        setup, excerpt = self.key.setup, self.excerpt
+        return {
+            "version": VERSION,
+            "transport": setup.transport,
+            "profile": setup.profile,
+            "strategy": setup.strategy,
+            "repetition": self.key.repetition,
+            "status": str(self.status),
+            "why": self.why,
+            "figures": rounded(self.values),
+            "remarks": list(self.remarks),
+            "settings": dict(self.settings),
+            "counts": {name: dict(count) for name, count in self.counts.items()},
+            "one_way_ms": [round(v, 2) for v in self.one_way_ms],
+            "excerpt": None
+            if excerpt is None
+            else {
+                "joint": excerpt.joint,
+                "at_s": [round(v, 3) for v in excerpt.at_s],
+                "operator_deg": [round(v, 2) for v in excerpt.operator_deg],
+                "robot_deg": [round(v, 2) for v in excerpt.robot_deg],
+            },
+        }
+
+    @classmethod
+    def of_tree(cls, tree: dict[str, Any]) -> Cell:
+        """Back from JSON. Raises TandemError where it is none of this version's."""
+        try:
+            if tree["version"] != VERSION:
+                raise TandemError(f"a cell of version {tree['version']}, this tandem reads {VERSION}")
+            setup = Setup(tree["transport"], tree["profile"], tree["strategy"])
+            return cls(
+                key=CellKey(setup, int(tree["repetition"])),
+                status=Status(tree["status"]),
+                why=tree["why"],
+                values={f.name: tree["figures"].get(f.name) for f in FIGURES},
+                remarks=tuple(tree["remarks"]),
+                settings=tree["settings"],
+                counts=tree["counts"],
+                one_way_ms=tuple(tree["one_way_ms"]),
+                excerpt=None if tree["excerpt"] is None else Excerpt(**tree["excerpt"]),
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise TandemError(f"not a cell of a trial ({error!r})") from None

@@ -1,0 +1,41 @@
+"""What a person may choose on the command line, checked before anything is started."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import get_args
+
+from common.errors import ConfigError, ConfigMistake
+from common.link.endpoint import TRANSPORTS
+from deploy.sim.network import load_profile, profile_names
+from slave.track.config import TrackConfig
+
+ALL = "all"
+
+
+def strategies() -> list[str]:
+    """Those that a slave knows."""
+    return list(get_args(TrackConfig.model_fields["strategy"].annotation))
+
+
+KNOWN: dict[str, Callable[[], Sequence[str]]] = {
+    "--transports": lambda: TRANSPORTS,
+    "--profiles": profile_names,
+    "--strategies": strategies,
+}
+
+
+def choose(option: str, text: str) -> tuple[str, ...]:
+    """The names in a comma-separated text, each once; `all` is all there are. Raises ConfigError."""
+    known = list(KNOWN[option]())
+    names = list(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
+    if names == [ALL]:
+        return tuple(known)
+    if not names:
+        raise ConfigError("trial", [ConfigMistake(option, text, f"{ALL}, or some of {', '.join(known)}")])
+    for name in names:
+        if option == "--profiles":
+            load_profile(name)  # of a file of one's own too
+        elif name not in known:
+            raise ConfigError("trial", [ConfigMistake(option, name, f"some of {', '.join(known)}")])
+    return tuple(names)

@@ -1,0 +1,203 @@
+"""`tandem trial`: which transport suits which care task over which network."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from common.errors import NetworkError, TandemError
+from common.process.runtime import run as run_until_stopped
+
+if TYPE_CHECKING:
+    from deploy.experiments.trial.plan import Plan
+    from deploy.experiments.trial.progress import Progress
+    from deploy.experiments.trial.run import RunCell
+
+app = typer.Typer(invoke_without_command=True, no_args_is_help=False, rich_markup_mode="markdown")
+
+Tasks = Annotated[
+    Path | None,
+    typer.Option(
+        help="What each care task needs (TOML), instead of the project's.", exists=True, dir_okay=False
+    ),
+]
+SHORTEST_OUTAGE_S = 1.0
+"""A robot need not hold for a shorter one, so that nothing could be said of how it came back."""
+STOP_S = 30.0
+"""From a Ctrl-C until the cell's processes and hosts are gone."""
+
+
+@app.callback()
+def trial(
+    context: typer.Context,
+    transports: Annotated[str, typer.Option(help="Comma-separated, or `all`.")] = "tcp,udp",
+    profiles: Annotated[
+        str, typer.Option(help="Networks: names, or TOML files of your own, comma-separated, or `all`.")
+    ] = "4g",
+    strategies: Annotated[
+        str, typer.Option(help="hold, interpolate, predict; comma-separated, or `all`.")
+    ] = ("hold,predict"),
+    repeat: Annotated[int, typer.Option(help="How often each setup is run.", min=1, max=100)] = 3,
+    seconds: Annotated[float, typer.Option(help="Judged in each cell.", min=3.0, max=3600.0)] = 20.0,
+    outage: Annotated[
+        float,
+        typer.Option(
+            help="Seconds without a link, after the judged time, at least 1; 0: none.", min=0.0, max=60.0
+        ),
+    ] = 2.0,
+    motion: Annotated[str, typer.Option(help="The simulated operator's: bottle, sweep.")] = "bottle",
+    seed: Annotated[int, typer.Option(help="Of sensors' errors, network and order.")] = 1,
+    router: Annotated[bool, typer.Option("--router", help="The two sides meet at a router.")] = False,
+    max_age: Annotated[
+        float, typer.Option(help="The guard's age limit in s; 0: what the network needs.", min=0.0, max=2.0)
+    ] = 0.0,
+    report: Annotated[Path, typer.Option(help="The report's folder.", file_okay=False)] = Path("trial"),
+    tasks: Tasks = None,
+    remote: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ENDPOINT",
+            help="The robot is on another host, where `tandem trial serve` runs: its endpoint, such as "
+            "tcp/ROBOT_HOST:7440. The network is the real one, and `--profiles` only its name in the report.",
+        ),
+    ] = None,
+    link: Annotated[
+        Path | None,
+        typer.Option(
+            help="With --remote and a secure transport: the master's file whose `[link.tls]` has the keys.",
+            exists=True,
+            dir_okay=False,
+        ),
+    ] = None,
+) -> None:
+    """Run each transport over each network with each tracking strategy, and say which suits a task.
+
+    Each cell is a fresh master and robot on two hosts (network namespaces; needs root) with an emulated link,
+    the same motion, then an outage. Every cell is repeated. The folder gets `report.html`, `report.json` and
+    `cells.csv`; run the same command again to go on after a Ctrl-C.
+
+    Example: `tandem trial --transports tcp,udp,quic --profiles lan,4g --repeat 3 --report trial`
+    """
+    if context.invoked_subcommand is not None:
+        return
+    from deploy.experiments.trial.choice import choose
+    from deploy.experiments.trial.plan import Plan
+
+    if 0.0 < outage < SHORTEST_OUTAGE_S:
+        raise TandemError(f"--outage {outage:g}: expected 0, or {SHORTEST_OUTAGE_S:g} s or longer")
+    networks = (profiles,) if remote else choose("--profiles", profiles)
+    plan = Plan(
+        transports=choose("--transports", transports), profiles=networks,
+        strategies=choose("--strategies", strategies), repeat=repeat, seconds=seconds,
+        outage_s=0.0 if remote else outage, robot="nursing", motion=motion, seed=seed, router=router,
+        max_age_s=max_age, hosts=remote or "namespaces",
+    )  # fmt: skip
+    if remote is None:
+        _run_here(plan, report, tasks)
+    else:
+        _run_remote(plan, report, tasks, link)
+
+
+@app.command()
+def serve(
+    config: Annotated[
+        Path | None,
+        typer.Argument(help="The robot's own TOML file; without it, the simulated robot.", exists=True),
+    ] = None,
+    listen: Annotated[str, typer.Option(help="Where the operator's host asks.")] = "tcp/0.0.0.0:7440",
+    address: Annotated[str, typer.Option(help="On which the slaves listen.")] = "0.0.0.0",
+    port: Annotated[int, typer.Option(help="And at which port.", min=1, max=65535)] = 7447,
+    max_age: Annotated[
+        float,
+        typer.Option(
+            help="The most that the guard's age limit may be set to from afar, s.", min=0.05, max=2.0
+        ),
+    ] = 1.0,
+) -> None:
+    """Serve a trial on the robot's host: start a fresh slave for each cell that the operator's host asks for.
+
+    Whoever reaches the endpoint can start a slave and engage the robot: use it on a network you trust, or
+    listen at tls/… with keys in the robot's file.
+
+    Example: `tandem trial serve slave.toml --listen tcp/0.0.0.0:7440`
+    """
+    from deploy.examples.profiles import example
+    from deploy.experiments.trial.remote.serve import ServeOptions
+    from deploy.experiments.trial.remote.serve import serve as serve_trial
+
+    options = ServeOptions(config or example("slave"), listen, address, port, max_age)
+    run_until_stopped(lambda stop: serve_trial(options, stop), STOP_S)
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(help="A trial's report folder.", exists=True, file_okay=False)],
+    tasks: Tasks = None,
+) -> None:
+    """Build the report again from the cells that are in the folder, with other weights if you like.
+
+    Example: `tandem trial report trial --tasks my-tasks.toml`
+    """
+    _finish(folder, tasks, Console())
+
+
+def _run_here(plan: Plan, path: Path, tasks: Path | None) -> None:
+    from deploy.experiments.trial.stage import run_cell
+    from deploy.sim.network.namespaces import why_not
+
+    reason = why_not()
+    if reason is not None:
+        raise NetworkError(f"{reason}; with the robot on another host, no such rights are needed: --remote")
+    _run(plan, path, tasks, run_cell)
+
+
+def _run_remote(plan: Plan, path: Path, tasks: Path | None, link: Path | None) -> None:
+    from dataclasses import replace
+    from functools import partial
+
+    from common.config.load import load_config
+    from deploy.experiments.trial.remote.operator import run_remote_cell
+    from master.config import MasterConfig
+    from slave.guard.config import GuardConfig
+
+    tls = None if link is None else load_config(link, MasterConfig).link.tls
+    plan = replace(plan, max_age_s=plan.max_age_s or GuardConfig().max_age_s)
+    _run(plan, path, tasks, partial(run_remote_cell, tls=tls))
+
+
+def _run(plan: Plan, path: Path, tasks: Path | None, run_cell: RunCell) -> None:
+    from deploy.experiments.trial.folder import Folder
+    from deploy.experiments.trial.run import run_trial
+    from deploy.experiments.trial.tasks import TASKS, load_tasks
+
+    console, folder = Console(), Folder(path)
+    load_tasks(tasks or TASKS)  # its mistakes now, not after an hour
+    progress: Progress | None = None
+
+    async def work(stop: asyncio.Event) -> None:
+        nonlocal progress
+        progress = await run_trial(plan, folder, run_cell, stop, console)
+
+    run_until_stopped(work, STOP_S)
+    # after the loop: neither a signal nor the shutdown's deadline cuts the report short
+    _finish(path, tasks, console)
+    if progress is not None and progress.done < progress.total:
+        left = progress.total - progress.done
+        raise TandemError(f"interrupted with {left} cells to go: the same command goes on with them")
+    if progress is not None and progress.failed:
+        raise TandemError(f"{progress.failed} cells failed: the same command tries them again")
+
+
+def _finish(path: Path, tasks: Path | None, console: Console) -> None:
+    from deploy.experiments.trial.folder import Folder
+    from deploy.experiments.trial.report import HTML, write
+    from deploy.experiments.trial.tasks import TASKS
+    from deploy.experiments.trial.view import print_findings
+
+    findings = write(Folder(path), tasks or TASKS)
+    print_findings(findings, console)
+    console.print(f"\nreport: {path / HTML}", highlight=False, soft_wrap=True)

@@ -1,0 +1,124 @@
+"""The report for people: one HTML file that opens offline. Pure: the template is filled, nothing is read."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from deploy.experiments.trial.figures import BY_NAME, FIGURES, Figure, printed
+from deploy.experiments.trial.plan import Plan
+from deploy.experiments.trial.plots import Plot
+from deploy.experiments.trial.ranking import Ranking
+from deploy.experiments.trial.spread import Row, Spread
+from deploy.experiments.trial.targets import Judged
+
+GROUPS = {
+    "latency": "One way",
+    "trip": "Round trip, age and delivery",
+    "motion": "Motion",
+    "guard": "Guard",
+    "outage": "Outage",
+    "cost": "Cost",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    title: str
+    figures: Sequence[Figure]
+    """Its columns: those that some setup has."""
+
+
+def as_html(
+    plan: Plan,
+    rows: Sequence[Row],
+    ranks: Sequence[Ranking],
+    judged: Sequence[Judged],
+    plots: Sequence[Plot],
+    about: dict[str, str],
+) -> str:
+    """The whole page; texts are escaped by the template."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("deploy.experiments.trial", "."),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {"cell": _cell, "spread": _range, "image": _image, "plain": _plain}
+    expected = len(plan.cells())
+    finished = sum(cell.settled for row in rows for cell in row.cells)
+    return environment.get_template("report.html.jinja").render(
+        plan=plan,
+        about=about,
+        rows=rows,
+        tables=_tables(rows),
+        tasks=_by_task(ranks),
+        judged=judged,
+        plots=plots,
+        incomplete=None if finished >= expected else f"{finished} of {expected} cells are there",
+        failed=sum(len(row.failed) for row in rows),
+        not_run=[row for row in rows if row.why_not],
+        remarks=[(cell.key, remark) for row in rows for cell in row.cells for remark in cell.remarks],
+        settings=_settings(rows),
+        busy=_busy(rows),
+        names=BY_NAME,
+    )
+
+
+def _tables(rows: Sequence[Row]) -> list[_Table]:
+    measured = {name for row in rows for name in row.spreads}
+    tables = []
+    for group, title in GROUPS.items():
+        figures = [f for f in FIGURES if f.group == group and f.name in measured]
+        if figures:
+            tables.append(_Table(title, figures))
+    return tables
+
+
+def _by_task(ranks: Sequence[Ranking]) -> list[list[Ranking]]:
+    """Rankings of one task together, in the tasks' order."""
+    names = dict.fromkeys(r.task.name for r in ranks)
+    return [[r for r in ranks if r.task.name == name] for name in names]
+
+
+def _settings(rows: Sequence[Row]) -> dict[str, dict[str, str]]:
+    """By network, what was set over the example files."""
+    found: dict[str, dict[str, str]] = {}
+    for row in rows:
+        for cell in row.cells:
+            found.setdefault(row.setup.profile, {}).update(cell.settings)
+    return {profile: settings for profile, settings in found.items() if settings}
+
+
+def _busy(rows: Sequence[Row]) -> float | None:
+    """The worst share of missed ticks, where it is large enough to distrust the figures."""
+    worst = max(
+        (row.spreads["ticks_missed"].high for row in rows if "ticks_missed" in row.spreads), default=0.0
+    )
+    return worst if worst > 2.0 else None
+
+
+def _cell(row: Row, name: str) -> str:
+    return printed(name, row.median(name))
+
+
+def _range(row: Row, name: str) -> str:
+    """The repeats' range, empty where it says no more than the median does."""
+    spread: Spread | None = row.spreads.get(name)
+    if spread is None or spread.count < 2:
+        return ""
+    low, high = printed(name, spread.low), printed(name, spread.high)
+    return "" if low == high else f"{low} … {high}"
+
+
+def _image(plot: Plot) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(plot.svg.encode("utf-8")).decode("ascii")
+
+
+def _plain(value: Any) -> str:
+    return f"{value:g}"

@@ -1,0 +1,44 @@
+"""A course into a cell: its figures, its pictures' data, its remarks. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from deploy.experiments.trial.cell import Cell, Status
+from deploy.experiments.trial.measure import excerpt, measure, one_way_percentiles_ms
+from deploy.experiments.trial.plan import CellKey
+from deploy.experiments.trial.recording import Course, counts, echoes
+from slave.config import SlaveConfig
+
+
+def judged(
+    key: CellKey, course: Course, config: SlaveConfig, settings: Mapping[str, str], remarks: Sequence[str]
+) -> Cell:
+    """`config` is the slave's, for its limits; `remarks` come after the course's own.
+
+    A course in which no command was heard, or none was accepted, failed: its figures are true of nothing.
+    """
+    why = _nothing_to_judge(course)
+    if why:
+        return Cell(key, Status.FAILED, why, remarks=(*course.remarks, *remarks), settings=settings)
+    return Cell(
+        key=key,
+        status=Status.DONE,
+        values=measure(course, config),
+        remarks=(*course.remarks, *remarks),
+        settings=settings,
+        counts=counts(course.judged),
+        one_way_ms=one_way_percentiles_ms(course.judged),
+        excerpt=excerpt(course.judged, config),
+    )
+
+
+def _nothing_to_judge(course: Course) -> str:
+    """Why, in words; empty where there is something."""
+    if not course.judged.commands:
+        return "no command was heard in the judged time: nothing to judge"
+    if not echoes(course.judged.states):
+        return "no command was accepted in the judged time: nothing to judge"
+    if course.after is not None and not course.after.states:
+        return "nothing was heard of the robot after the outage: nobody can tell what it did"
+    return ""

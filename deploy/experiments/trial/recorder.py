@@ -1,0 +1,28 @@
+"""Keeps what the observer hears, stretch by stretch."""
+
+from __future__ import annotations
+
+from common.wire.messages import Command, RobotState, Statistics, Truth
+from deploy.experiments.trial.recording import Recording
+from deploy.harness.observer import Heard
+
+
+class Recorder:
+    """Every message since the last `take`."""
+
+    def __init__(self) -> None:
+        self._heard: list[Heard] = []
+
+    def hear(self, message: Heard) -> None:
+        """Keep one."""
+        self._heard.append(message)
+
+    def take(self) -> Recording:
+        """All of them by kind, in the order they came; then it begins anew."""
+        heard, self._heard = self._heard, []
+        return Recording(
+            commands=[m for m in heard if isinstance(m, Command)],
+            states=[m for m in heard if isinstance(m, RobotState)],
+            truth=[m for m in heard if isinstance(m, Truth)],
+            told=[m for m in heard if isinstance(m, Statistics)],
+        )

@@ -1,0 +1,135 @@
+"""What was heard of one cell, and what happened when. Pure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Generic, TypeVar
+
+from common.metrics.published import GuardMetrics, MasterMetrics, SlaveMetrics
+from common.skeleton import Skeleton
+from common.wire.messages import Command, CommandEcho, RobotState, Statistics, Truth
+from deploy.measure import Trace
+
+_Metrics = TypeVar("_Metrics", MasterMetrics, SlaveMetrics)
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Messages of a stretch of time, all stamps of one clock: that of the master."""
+
+    commands: Sequence[Command]
+    states: Sequence[RobotState]
+    truth: Sequence[Truth]
+    told: Sequence[Statistics]
+    """Once a second, from each process; each counts from its start."""
+
+    def trace(self, skeleton: Skeleton) -> Trace:
+        """To be judged by."""
+        trace = Trace(skeleton.joint_names)
+        for messages in (self.truth, self.commands, self.states):
+            for message in messages:
+                trace.add(message)
+        return trace
+
+
+@dataclass(frozen=True, slots=True)
+class Outage:
+    """The scripted outage after the judged time, ns of the master's clock."""
+
+    cut_ns: int
+    back_ns: int
+    """The link carries again."""
+    ready_ns: int | None
+    """The operator may engage; None where that did not come."""
+    act_ns: int | None
+    """The operator engages."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A whole cell: judged time, then the outage where there was one."""
+
+    judged: Recording
+    max_age_s: float
+    """The guard's limit."""
+    shared_clock: bool
+    """Whether both sides' stamps are of one machine's clock, so that one-way figures can be checked."""
+    after: Recording | None = None
+    """From the cut on."""
+    outage: Outage | None = None
+    cpu_percent: dict[str, float] = field(default_factory=dict)
+    """By process, over the judged time."""
+    up_bytes_s: float | None = None
+    """On the wire, operator to robot."""
+    down_bytes_s: float | None = None
+    remarks: tuple[str, ...] = ()
+
+
+def on_masters_clock(states: Iterable[RobotState]) -> list[RobotState]:
+    """States of a robot with a clock of its own, moved by the offset that it had measured then.
+
+    Only those whose offset was trusted: the others' stamps cannot be compared with the operator's.
+    """
+    moved = []
+    for state in states:
+        if state.offset_bound_ns < 0:
+            continue
+        ahead_ns, echo = state.master_offset_ns, state.echo
+        if echo is not None:
+            echo = replace(
+                echo,
+                received_ns=echo.received_ns + ahead_ns,
+                accepted_ns=echo.accepted_ns + ahead_ns,
+                written_ns=echo.written_ns + ahead_ns if echo.written_ns else 0,
+            )
+        moved.append(
+            replace(
+                state, sent_ns=state.sent_ns + ahead_ns, encoder_ns=state.encoder_ns + ahead_ns, echo=echo
+            )
+        )
+    return moved
+
+
+def latest_bound_ns(states: Sequence[RobotState]) -> int | None:
+    """The widest bound of a trusted offset among them."""
+    return max((s.offset_bound_ns for s in states if s.offset_bound_ns >= 0), default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Published(Generic[_Metrics]):
+    """What one process published, and when, ns of its own clock."""
+
+    sent_ns: int
+    metrics: _Metrics
+
+
+def published(told: Iterable[Statistics], kind: type[_Metrics]) -> list[Published[_Metrics]]:
+    """Of one process, in the order of their sending."""
+    found = [Published(s.sent_ns, s.metrics) for s in told if isinstance(s.metrics, kind)]
+    return sorted(found, key=lambda one: one.sent_ns)
+
+
+def echoes(states: Sequence[RobotState]) -> dict[int, CommandEcho]:
+    """The last echo of each accepted command, by its number: the one with its time of writing."""
+    return {s.echo.sequence: s.echo for s in states if s.echo is not None}
+
+
+def counts(heard: Recording) -> dict[str, dict[str, int]]:
+    """The guard's events between the slave's first and last word, by kind and name, if any."""
+    told = published(heard.told, SlaveMetrics)
+    if not told:
+        return {}
+    first, last = (_counted(told[i].metrics.guard) for i in (0, -1))
+    grown = {kind: Counter(last[kind]) - Counter(first[kind]) for kind in last}
+    return {kind: dict(sorted(count.items())) for kind, count in grown.items() if count}
+
+
+def _counted(guard: GuardMetrics) -> dict[str, dict[str, int]]:
+    return {
+        "dropped": guard.dropped,
+        "losses": guard.losses,
+        "clamps": guard.clamps,
+        "doubts": guard.doubts,
+    }

@@ -1,0 +1,239 @@
+"""The operator's host in a trial on separate hosts: suit and master here, the robot over there asked for."""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from common.clock import monotonic_ns, to_ns, to_s
+from common.config.load import load_config
+from common.errors import LinkError, TandemError
+from common.link import Link, open_link, open_session
+from common.link.config import LinkConfig, TlsConfig
+from common.link.endpoint import SECURE
+from common.skeleton import Skeleton, load_skeleton
+from common.wire.codec import decode
+from common.wire.messages import RobotState, Statistics
+from deploy.examples.profiles import example
+from deploy.experiments.trial.attention import Attention
+from deploy.experiments.trial.cell import Cell, Status
+from deploy.experiments.trial.judge import judged
+from deploy.experiments.trial.plan import CellKey, Plan
+from deploy.experiments.trial.recorder import Recorder
+from deploy.experiments.trial.recording import Course, on_masters_clock
+from deploy.experiments.trial.remote import talk
+from deploy.harness.endpoints import Endpoints, free_port
+from deploy.harness.link_settings import why_impossible
+from deploy.harness.rig import OPERATOR, ROBOT, Rig
+from slave.config import SlaveConfig
+
+START_S = 30.0
+ENGAGE_S = 3.0
+ALIGN_S = 25.0
+LOOK_S = 0.2
+
+
+class Partner:
+    """The robot's host, asked over the link."""
+
+    def __init__(self, link: Link, stop: asyncio.Event) -> None:
+        self._link = link
+        self._stop = stop
+
+    async def look(self) -> talk.Answer:
+        """How it stands there. Raises TandemError."""
+        return await self._ask(talk.Look())
+
+    async def do(self, request: talk.Request) -> talk.Answer:
+        """Ask for something and wait until it is over. Raises TandemError where it did not come about."""
+        answer = await self._ask(request)
+        while answer.busy:
+            await asyncio.sleep(LOOK_S)
+            answer = await self.look()
+        if answer.fault:
+            raise TandemError(f"the robot's host: {answer.fault}")
+        return answer
+
+    async def until(self, reached: Callable[[talk.Answer], bool], timeout_s: float, what: str) -> talk.Answer:
+        """Look until something is so. Raises TandemError when it does not come, or the slave is gone."""
+        deadline_ns = monotonic_ns() + to_ns(timeout_s)
+        while True:
+            answer = await self.look()
+            if answer.fault:
+                raise TandemError(f"the robot's host: {answer.fault}")
+            if reached(answer):
+                return answer
+            if monotonic_ns() > deadline_ns:
+                raise TandemError(f"no {what} within {timeout_s:g} s: {answer.guard}, {answer.reason}")
+            await asyncio.sleep(LOOK_S)
+
+    async def kept(self, skeleton: Skeleton) -> tuple[list[RobotState], list[Statistics]]:
+        """What the robot said while it was recorded, its own clock's stamps. Raises TandemError."""
+        states: list[RobotState] = []
+        told: list[Statistics] = []
+        while True:
+            page = await self._ask(talk.Page(first=len(states)))
+            states += [decode(payload, RobotState, len(skeleton.joints)) for payload in page.states]
+            told += [decode(payload, Statistics) for payload in page.told]
+            if len(states) >= page.total or not page.states:
+                return states, told
+
+    async def _ask(self, request: talk.Request) -> talk.Answer:
+        if self._stop.is_set():
+            raise TandemError("interrupted")
+        answer = talk.read_answer(await self._link.ask(talk.TALK, talk.pack(request)))
+        if not answer.taken:
+            raise TandemError(f"the robot's host: {answer.fault}")
+        return answer
+
+
+async def run_remote_cell(
+    plan: Plan,
+    key: CellKey,
+    stop: asyncio.Event,
+    tell: Callable[[str], None],
+    tls: TlsConfig | None = None,
+) -> Cell:
+    """One cell over a real network. What goes wrong is its result; only an interruption raises TandemError.
+
+    `tls`: this host's keys, for the secure transports.
+    """
+    reason = why_impossible(key.setup)
+    if reason is None and key.setup.transport in SECURE and tls is None:
+        reason = "no keys: name a file with [link.tls] by --link, and one over there (see `tandem keys`)"
+    if reason is not None:
+        return Cell(key, Status.IMPOSSIBLE, reason)
+    slave = [f'track.strategy="{key.setup.strategy}"', f"guard.max_age_s={plan.max_age_s}"]
+    config = load_config(example("slave", plan.robot), SlaveConfig, slave)
+    settings = {"guard.max_age_s": f"{plan.max_age_s:g}"}
+    try:
+        async with open_link(LinkConfig(connect=[plan.hosts], tls=tls), ROBOT) as link:
+            await link.connected(talk.TALK)
+            partner = Partner(link, stop)
+            try:
+                course = await _play(plan, key, partner, tell, tls)
+            finally:
+                await _farewell(link)
+    except TandemError as error:
+        if stop.is_set():
+            raise TandemError("interrupted") from None
+        return Cell(key, Status.FAILED, str(error), settings=settings)
+    tell("judging")
+    return await asyncio.to_thread(judged, key, course, config, settings, ())
+
+
+async def _farewell(link: Link) -> None:
+    """Stop the slave over there, also where all is over here; it stops by itself where nobody asks."""
+    try:
+        await link.ask(talk.TALK, talk.pack(talk.Stop()))
+    except LinkError:
+        return
+
+
+async def _play(
+    plan: Plan, key: CellKey, partner: Partner, tell: Callable[[str], None], tls: TlsConfig | None
+) -> Course:
+    skeleton = load_skeleton(plan.robot)
+    tell("starting the robot over there")
+    request = talk.Start(transport=key.setup.transport, strategy=key.setup.strategy, max_age_s=plan.max_age_s)
+    there = await partner.do(request)
+    robot = f"{key.setup.transport}/{robots_host(plan.hosts)}:{there.port}"
+    async with _operators_rig(plan, key, robot, tls) as rig:
+        recorder = Recorder()
+        rig.observer.listeners.append(recorder.hear)
+        for name in ("suit", "master"):
+            await rig.start(name)
+        await rig.until(lambda: rig.observer.command is not None, START_S, "command of the master")
+        await partner.until(lambda a: a.taking and _whole(rig), START_S, "readiness of the robot")
+        tell("aligning")
+        await _engage(partner)
+        await partner.until(lambda a: a.guard == "track", ALIGN_S, "track")
+        tell(f"following for {plan.seconds:g} s")
+        remarks = await _follow(plan, partner, rig, recorder)
+        heard = recorder.take()
+        answer = await partner.do(talk.Take())
+        for child in rig.children.values():
+            child.measure()
+        cpu = {"master": rig.children["master"].cpu_percent, "slave": answer.cpu_percent}
+        tell("fetching what the robot said")
+        states, told = await partner.kept(skeleton)
+    judged_time = replace(heard, states=on_masters_clock(states), told=[*heard.told, *told])
+    return Course(judged_time, plan.max_age_s, shared_clock=False, cpu_percent=cpu, remarks=tuple(remarks))
+
+
+async def _follow(plan: Plan, partner: Partner, rig: Rig, recorder: Recorder) -> list[str]:
+    """Let it run; where the robot holds, the operator engages again as soon as that is possible."""
+    attention = Attention()
+    await partner.do(talk.Record())
+    recorder.take()
+    for child in rig.children.values():
+        child.measure(first=True)
+    began_ns = monotonic_ns()
+    while (at_s := to_s(monotonic_ns() - began_ns)) < plan.seconds:
+        for name in ("suit", "master"):
+            rig.children[name].check()
+        answer = await partner.look()
+        if answer.fault:
+            raise TandemError(f"the robot's host: {answer.fault}")
+        if attention.look(at_s, answer.guard, answer.reason, answer.taking):
+            refusal = ""
+            try:
+                await _engage(partner)
+            except TandemError as error:
+                refusal = str(error)
+            attention.acted(at_s, refusal)
+        await asyncio.sleep(LOOK_S)
+    return attention.remarks
+
+
+async def _engage(partner: Partner) -> None:
+    """The operator's act, again where it is refused: the robot knows a delay later what is known here."""
+    deadline_ns = monotonic_ns() + to_ns(ENGAGE_S)
+    while True:
+        try:
+            await partner.do(talk.Engage(operator=OPERATOR))
+            return
+        except TandemError:
+            if monotonic_ns() > deadline_ns:
+                raise
+        await asyncio.sleep(LOOK_S)
+
+
+def _whole(rig: Rig) -> bool:
+    command = rig.observer.command
+    return command is not None and bool(command.valid.all())
+
+
+def robots_host(endpoint: str) -> str:
+    """`192.168.7.2` of `tcp/192.168.7.2:7440`."""
+    return endpoint.partition("/")[2].partition("?")[0].rpartition(":")[0]
+
+
+def _keys(tls: TlsConfig | None) -> list[str]:
+    if tls is None:
+        return []
+    files = {"ca": tls.ca, "certificate": tls.certificate, "key": tls.key}
+    return [f'link.tls.{name}="{path.resolve()}"' for name, path in files.items()]
+
+
+@asynccontextmanager
+async def _operators_rig(plan: Plan, key: CellKey, robot: str, tls: TlsConfig | None) -> AsyncIterator[Rig]:
+    """Suit and master here, watched on loopback; the master connects to the robot over there."""
+    ends = Endpoints(
+        (robot,), f"tcp/127.0.0.1:{free_port('tcp')}", f"tcp/127.0.0.1:{free_port('tcp')}", free_port("udp")
+    )
+    overrides = {
+        "suit": [f"seed={plan.seed_of(key)}", f'motion="{plan.motion}"'],
+        "master": ["estimation.stance_s=1.0", *_keys(tls if key.setup.transport in SECURE else None)],
+    }
+    async with AsyncExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-")))
+        watching = LinkConfig(listen=[ends.observer], connect=[ends.master])
+        session = await stack.enter_async_context(open_session(watching))
+        rig = Rig(folder, ends, overrides, session, plan.robot)
+        stack.push_async_callback(rig.stop)
+        yield rig

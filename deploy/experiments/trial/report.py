@@ -1,0 +1,68 @@
+"""From a folder's cells to its report: `report.html`, `report.json`, `cells.csv`. Run again, equal files."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from deploy.experiments.trial.document import as_html
+from deploy.experiments.trial.folder import Folder, as_json
+from deploy.experiments.trial.machine import as_csv, tree
+from deploy.experiments.trial.plan import Plan
+from deploy.experiments.trial.plots import plots
+from deploy.experiments.trial.ranking import Ranking, rankings
+from deploy.experiments.trial.spread import Row, rows
+from deploy.experiments.trial.targets import Judged, judge
+from deploy.experiments.trial.tasks import TASKS, load_tasks
+from deploy.report.output import writing
+from deploy.sim.network.namespaces import congestion_control
+
+HTML, JSON, CSV = "report.html", "report.json", "cells.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What a folder's cells say."""
+
+    plan: Plan
+    rows: list[Row]
+    rankings: list[Ranking]
+    judged: list[Judged]
+
+
+def find(folder: Folder, tasks: Path = TASKS) -> Findings:
+    """Read and judge the cells. Raises TandemError where there is no trial, ConfigError for the tasks."""
+    plan = folder.plan()
+    found = rows(plan, folder.cells().values())
+    return Findings(plan, found, rankings(load_tasks(tasks), found), judge(found, outage=plan.outage_s > 0.0))
+
+
+def write(folder: Folder, tasks: Path = TASKS) -> Findings:
+    """Write the three files. Raises TandemError where the disk does not let them."""
+    f, about = find(folder, tasks), _about()
+    texts = {
+        HTML: as_html(f.plan, f.rows, f.rankings, f.judged, plots(f.rows), about),
+        JSON: as_json(tree(f.plan, f.rows, f.rankings, f.judged, about)),
+        CSV: as_csv(cell for row in f.rows for cell in row.cells),
+    }
+    for name, text in texts.items():
+        with writing(folder.path / name):
+            (folder.path / name).write_text(text, "utf-8")
+    return f
+
+
+def _about() -> dict[str, str]:
+    now = datetime.datetime.now(datetime.UTC)
+    return {
+        "written": now.strftime("%Y-%m-%d %H:%M UTC"),
+        "tandem": version("tandem"),
+        "zenoh": version("eclipse-zenoh"),
+        "python": platform.python_version(),
+        "kernel": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "congestion control": (
+            f"tcp, tls, ws: {congestion_control()}, set on both emulated hosts; quic: Zenoh's own; udp: none"
+        ),
+    }

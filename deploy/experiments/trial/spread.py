@@ -1,0 +1,77 @@
+"""Repeats of one setup into a median and a spread. Pure."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from deploy.experiments.trial.cell import Cell, Status
+from deploy.experiments.trial.figures import FIGURES
+from deploy.experiments.trial.plan import Plan, Setup
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """One figure over the repeats that measured it: with so few of them, all there is to say of them."""
+
+    median: float
+    low: float
+    high: float
+    count: int
+
+    def overlaps(self, other: Spread) -> bool:
+        """Whether the repeats of the two lie among each other: the figure does not tell them apart."""
+        return self.low <= other.high and other.low <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A setup over its repeats."""
+
+    setup: Setup
+    cells: Sequence[Cell]
+    """Those there are, in the order of their repetitions."""
+    spreads: Mapping[str, Spread]
+    """By figure; none where no repeat measured it."""
+
+    @property
+    def done(self) -> Sequence[Cell]:
+        """Those that measured."""
+        return [cell for cell in self.cells if cell.status is Status.DONE]
+
+    @property
+    def failed(self) -> Sequence[Cell]:
+        """Those that were run and came to nothing."""
+        return [cell for cell in self.cells if cell.status is Status.FAILED]
+
+    @property
+    def why_not(self) -> list[str]:
+        """Why repeats are missing, each reason once."""
+        return list(dict.fromkeys(cell.why for cell in self.cells if cell.status is not Status.DONE))
+
+    def median(self, name: str) -> float | None:
+        """Of one figure."""
+        spread = self.spreads.get(name)
+        return None if spread is None else spread.median
+
+
+def spread(values: Iterable[float | None]) -> Spread | None:
+    """None where no value is known."""
+    known = [value for value in values if value is not None]
+    return Spread(statistics.median(known), min(known), max(known), len(known)) if known else None
+
+
+def rows(plan: Plan, cells: Iterable[Cell]) -> list[Row]:
+    """A row a setup of the plan, in its order."""
+    by_setup: dict[Setup, list[Cell]] = {setup: [] for setup in plan.setups()}
+    for cell in sorted(cells, key=lambda c: c.key.repetition):
+        if cell.key.setup in by_setup:
+            by_setup[cell.key.setup].append(cell)
+    return [_row(setup, group) for setup, group in by_setup.items()]
+
+
+def _row(setup: Setup, cells: Sequence[Cell]) -> Row:
+    done = [cell for cell in cells if cell.status is Status.DONE]
+    found = {f.name: spread(cell.values.get(f.name) for cell in done) for f in FIGURES}
+    return Row(setup, cells, {name: s for name, s in found.items() if s is not None})

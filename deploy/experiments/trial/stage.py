@@ -1,0 +1,189 @@
+"""One cell: two hosts and their link, a fresh master and slave on them, the motion, the outage."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from common.clock import monotonic_ns, to_ns, to_s
+from common.config.load import load_config
+from common.errors import TandemError
+from common.wire.messages import Action
+from deploy.examples.profiles import example
+from deploy.experiments.trial.attention import Attention
+from deploy.experiments.trial.cell import Cell, Status
+from deploy.experiments.trial.judge import judged
+from deploy.experiments.trial.plan import CellKey, Plan
+from deploy.experiments.trial.recorder import Recorder
+from deploy.experiments.trial.recording import Course, Outage, Recording
+from deploy.harness.link_settings import max_age_s, open_timeout_s, why_impossible
+from deploy.harness.rig import ROUTER, Rig, open_rig
+from deploy.sim.network import Network, load_profile, open_network
+from slave.config import SlaveConfig
+
+START_S = 30.0
+"""Processes up, filters settled, clock trusted, lease held."""
+ENGAGE_S = 3.0
+ALIGN_S = 25.0
+TOLD_S = 1.6
+"""Statistics come once a second: after this each process has told them once more."""
+RETURN_S = 15.0
+"""Of the operator's readiness after an outage."""
+WATCH_S = 0.6
+"""Before the operator's act: does the robot move by itself?"""
+LOOK_S = 0.1
+
+
+async def run_cell(plan: Plan, key: CellKey, stop: asyncio.Event, tell: Callable[[str], None]) -> Cell:
+    """Run it and judge it. What goes wrong in it is its result; only an interruption raises TandemError."""
+    reason = why_impossible(key.setup)
+    if reason is not None:
+        return Cell(key, Status.IMPOSSIBLE, reason)
+    profile = load_profile(key.setup.profile)
+    age_s = max_age_s(plan, profile)
+    opening = f"link.open_timeout_s={open_timeout_s(profile)}"
+    overrides = _overrides(plan, key, age_s, opening)
+    config = load_config(example("slave", plan.robot), SlaveConfig, overrides["slave"])
+    settings = {"guard.max_age_s": f"{age_s:g}"}
+    try:
+        async with (
+            open_network(profile, seed=plan.seed_of(key)) as network,
+            open_rig(key.setup.transport, overrides, plan.robot, routed=plan.router, network=network) as rig,
+        ):
+            course = await _Story(plan, rig, network, stop, tell).play(age_s)
+            tell("stopping")
+            statuses = await rig.stop()
+    except TandemError as error:
+        if stop.is_set():  # a Ctrl-C reaches the processes too: that they end is then no failure
+            raise TandemError("interrupted") from None
+        return Cell(key, Status.FAILED, str(error), settings=settings)
+    ended = tuple(f"the {name} ended with status {status}" for name, status in statuses.items() if status)
+    tell("judging")
+    return await asyncio.to_thread(judged, key, course, config, settings, ended)
+
+
+def _overrides(plan: Plan, key: CellKey, age_s: float, opening: str) -> dict[str, list[str]]:
+    return {
+        "suit": [f"seed={plan.seed_of(key)}", f'motion="{plan.motion}"'],
+        # the simulated operator begins in the zero pose: zeroed there, as the paper's reference was
+        "master": ["estimation.stance_s=1.0", opening],
+        "slave": [f'track.strategy="{key.setup.strategy}"', f"guard.max_age_s={age_s}", opening],
+    }
+
+
+class _Story:
+    """What is done with a rig over a network, one step after the other."""
+
+    def __init__(
+        self, plan: Plan, rig: Rig, network: Network, stop: asyncio.Event, tell: Callable[[str], None]
+    ) -> None:
+        self._plan = plan
+        self._rig = rig
+        self._network = network
+        self._stop = stop
+        self._tell = tell
+        self._recorder = Recorder()
+        self._remarks: list[str] = []
+        rig.observer.listeners.append(self._recorder.hear)
+
+    async def play(self, max_age_s: float) -> Course:
+        """All of it. Raises TandemError."""
+        await self._to_track()
+        judged, cpu_percent, up, down = await self._judged_time()
+        after, outage = None, None
+        if self._plan.outage_s:
+            after, outage = await self._outage()
+        return Course(
+            judged=judged,
+            max_age_s=max_age_s,
+            shared_clock=True,
+            after=after,
+            outage=outage,
+            cpu_percent=cpu_percent,
+            up_bytes_s=up,
+            down_bytes_s=down,
+            remarks=tuple(self._remarks),
+        )
+
+    async def _to_track(self) -> None:
+        rig, observer = self._rig, self._rig.observer
+        self._tell("starting")
+        for name in rig.children:
+            if name not in ("master", ROUTER):  # a router runs already
+                await rig.start(name)
+        # the master last: processes that still start would take the time of its first ticks
+        await rig.until(lambda: observer.state is not None, START_S, "word from the robot", self._look)
+        await rig.start("master")
+        await rig.until(lambda: observer.ready, START_S, "readiness", self._look)
+        self._tell("aligning")
+        await self._engage()
+        await rig.until(lambda: observer.guard == "track", ALIGN_S, "track", self._look)
+
+    async def _judged_time(self) -> tuple[Recording, dict[str, float], float, float]:
+        self._tell(f"following for {self._plan.seconds:g} s")
+        children = self._rig.children
+        self._recorder.take()
+        for child in children.values():
+            child.measure(first=True)
+        before, began_ns = self._network.counters(), monotonic_ns()
+        await self._follow(began_ns, began_ns + to_ns(self._plan.seconds))
+        after, seconds = self._network.counters(), to_s(monotonic_ns() - began_ns)
+        for child in children.values():
+            child.measure()
+        used = {name: child.cpu_percent for name, child in children.items() if name != "suit"}
+        up = (after.to_robot.bytes - before.to_robot.bytes) / seconds
+        down = (after.to_operator.bytes - before.to_operator.bytes) / seconds
+        return self._recorder.take(), used, up, down
+
+    async def _follow(self, began_ns: int, until_ns: int) -> None:
+        """Let it run; where the robot holds, the operator engages again as soon as that is possible."""
+        observer, attention = self._rig.observer, Attention(self._remarks)
+        while monotonic_ns() < until_ns:
+            self._look()
+            at_s = to_s(monotonic_ns() - began_ns)
+            reason = observer.state.reason if observer.state is not None else ""
+            if attention.look(at_s, observer.guard, reason, observer.ready):
+                refusal = ""
+                try:
+                    await self._engage()
+                except TandemError as error:
+                    refusal = str(error)
+                attention.acted(at_s, refusal)
+            await asyncio.sleep(LOOK_S)
+
+    async def _outage(self) -> tuple[Recording, Outage]:
+        rig, observer = self._rig, self._rig.observer
+        self._tell(f"outage of {self._plan.outage_s:g} s")
+        cut_ns = monotonic_ns()
+        await self._network.outage(self._plan.outage_s)
+        back_ns = monotonic_ns()
+        self._tell("waiting for commands to flow again")
+        ready_ns = act_ns = None
+        try:
+            await rig.until(lambda: observer.ready, RETURN_S, "readiness after the outage", self._look)
+            ready_ns = monotonic_ns()
+            await asyncio.sleep(WATCH_S)
+            act_ns = monotonic_ns()
+            await self._engage()
+            await rig.until(lambda: observer.guard == "track", ALIGN_S, "track after the outage", self._look)
+        except TandemError as error:
+            self._look()
+            self._remarks.append(str(error))
+        await asyncio.sleep(TOLD_S)
+        return self._recorder.take(), Outage(cut_ns, back_ns, ready_ns, act_ns)
+
+    async def _engage(self) -> None:
+        """The operator's act, again where it is refused: the robot knows a delay later what is known here."""
+        deadline_ns = monotonic_ns() + to_ns(ENGAGE_S)
+        while not (reply := await self._rig.control(Action.ENGAGE)).done:
+            if monotonic_ns() > deadline_ns:
+                raise TandemError(f"engage was refused: {reply.text}")
+            self._look()
+            await asyncio.sleep(LOOK_S)
+
+    def _look(self) -> None:
+        """Fail early. Raises TandemError."""
+        if self._stop.is_set():
+            raise TandemError("interrupted")
+        for child in self._rig.children.values():
+            child.check()

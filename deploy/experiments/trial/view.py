@@ -1,0 +1,66 @@
+"""What a person sees in the terminal when a trial is over: the setups, the targets, the tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from deploy.experiments.trial.figures import BY_NAME, printed
+from deploy.experiments.trial.report import Findings
+from deploy.experiments.trial.spread import Row
+from deploy.experiments.trial.targets import Judged
+from deploy.measure.tables import plain_table
+
+SHOWN = ("one_way_p50_ms", "one_way_bound_ms", "rmse_deg", "rmse_over_hold", "roughness", "flow_s")
+
+
+def print_findings(findings: Findings, console: Console) -> None:
+    """Medians, then what was to be reached, then what suits which task."""
+    console.print(_table(findings.rows))
+    for row in findings.rows:
+        if not row.done:
+            why = "; ".join(row.why_not) or "not run yet"
+            console.print(Text.assemble((f"{row.setup.profile}, {row.setup.name}: ", "dim"), (why, "yellow")))
+    failed = sum(len(row.failed) for row in findings.rows)
+    if failed:
+        console.print(Text(f"{failed} failed: run, and came to nothing", "bold red"))
+    for judged in findings.judged:
+        console.print(_target(judged))
+    profile = ""
+    for ranking in sorted(findings.rankings, key=lambda r: r.profile):
+        if ranking.profile != profile:
+            profile = ranking.profile
+            console.print(Text(f"\nover {profile}", "bold"))
+        console.print(Text.assemble((f"{ranking.task.title}: ", "cyan"), ranking.verdict, "."))
+
+
+def _table(rows: Iterable[Row]) -> Table:
+    """A section a network; at home in 80 columns."""
+    heads = [f"{BY_NAME[n].title}{', ' + BY_NAME[n].unit if BY_NAME[n].unit else ''}" for n in SHOWN]
+    table = plain_table("", *heads)
+    table.columns[0].no_wrap = True
+    for column in table.columns[1:]:
+        column.no_wrap = False
+    profile = ""
+    for row in rows:
+        if row.setup.profile != profile:
+            profile = row.setup.profile
+            table.add_section()
+            table.add_row(Text(profile, "bold"))
+        table.add_row(
+            f"  {row.setup.transport} {row.setup.strategy}",
+            *(printed(name, row.median(name)) for name in SHOWN),
+        )
+    return table
+
+
+def _target(judged: Judged) -> Text:
+    words = f"{judged.words}: {judged.measured}, at most {judged.limit.at_most:g}"
+    if judged.met:
+        return Text.assemble(("met     ", "green"), words)
+    reasons = [f"{s.profile} {s.name}" for s in judged.missed[:4]]
+    reasons += [f"{judged.failed} failed"] if judged.failed else []
+    return Text.assemble(("missed  ", "bold red"), words, (f"  ({', '.join(reasons)})", "dim"))

@@ -1,0 +1,167 @@
+"""A process of a rig: started, measured, killed, started again, stopped by SIGTERM, its last words kept."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import psutil
+
+from common.errors import TandemError
+from common.metrics.published import from_tree
+from deploy.harness.spawn import Spawned
+
+_Metrics = TypeVar("_Metrics")
+
+STOP_S = 5.0
+"""Grace between SIGTERM and SIGKILL: above the processes' own shutdown deadline."""
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What a process uses now."""
+
+    rss_mb: float
+    fds: int
+    threads: int
+    cpu_s: float
+    """User and system time since its start."""
+
+
+class Child:
+    """One `tandem ROLE FILE` process. Its log and its figures lie in the run's folder."""
+
+    def __init__(
+        self,
+        role: str,
+        folder: Path,
+        tandem: Sequence[str] = (sys.executable, "-m", "deploy"),
+        name: str | None = None,
+    ) -> None:
+        """`name`: of one among several with the same role."""
+        self.role = role
+        self.name = name or role
+        self._tandem = tandem
+        self.log = folder / f"{self.name}.log"
+        self.figures_file = folder / f"{self.name}.figures.json"
+        self._process: Spawned | None = None
+        self._usage: psutil.Process | None = None
+        self._cpu_from = (0.0, 0.0)
+        self._cpu_to = (0.0, 0.0)
+        self.rss_mb = 0.0
+        self.lifetime = 0
+        """How often it has been started."""
+
+    async def start(self, config: Path, overrides: Sequence[str], through: Sequence[str] = ()) -> None:
+        """Start it; its output goes to the log. `through`: a command that becomes it, such as `unshare`."""
+        arguments = [str(config), "--figures", str(self.figures_file)]
+        for override in overrides:
+            arguments += ["--set", override]
+        await self.run(arguments, through)
+
+    async def run(self, arguments: Sequence[str], through: Sequence[str] = ()) -> None:
+        """Start `tandem ROLE` with these arguments."""
+        self.lifetime += 1
+        with self.log.open("ab") as log:
+            self._process = Spawned([*through, *self._tandem, self.role, *arguments], log)
+        self._usage = psutil.Process(self._process.pid)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has been started and has not ended."""
+        return self._process is not None and self._process.returncode is None
+
+    @property
+    def usage(self) -> Usage | None:
+        """What it uses now; None where it does not run."""
+        return usage(self._usage) if self._usage is not None and self.running else None
+
+    def check(self) -> None:
+        """Raise TandemError with the process's last words if it has ended."""
+        process = self._process
+        if process is not None and process.returncode is not None:
+            raise TandemError(f"the {self.name} ended with status {process.returncode}: {self.last_words()}")
+
+    def measure(self, first: bool = False) -> None:
+        """Take a sample of CPU time and memory; `first` begins the period that `cpu_percent` covers."""
+        if self._usage is None or self._process is None or self._process.returncode is not None:
+            return
+        try:
+            with self._usage.oneshot():
+                times, self.rss_mb = self._usage.cpu_times(), self._usage.memory_info().rss / 1e6
+        except psutil.Error:  # it has just ended: `check` will tell
+            return
+        self._cpu_to = (asyncio.get_running_loop().time(), times.user + times.system)
+        if first:
+            self._cpu_from = self._cpu_to
+
+    @property
+    def cpu_percent(self) -> float:
+        """Percent of one core over the measured period."""
+        wall = self._cpu_to[0] - self._cpu_from[0]
+        return 100.0 * (self._cpu_to[1] - self._cpu_from[1]) / wall if wall > 0 else 0.0
+
+    async def kill(self) -> None:
+        """End it without a warning, as a crash would."""
+        if self._process is not None and self._process.returncode is None:
+            self._process.kill()
+            await self._process.wait()
+
+    def send(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        if self._process is not None and self._process.returncode is None:
+            self._process.send_signal(number)
+
+    async def stop(self, by: signal.Signals = signal.SIGTERM) -> int | None:
+        """Ask it to stop, kill it if it does not, and return its exit status."""
+        process = self._process
+        if process is None:
+            return None
+        if process.returncode is None:
+            process.send_signal(by)
+            try:
+                await asyncio.wait_for(process.wait(), STOP_S)
+            except TimeoutError:
+                await self.kill()
+        return process.returncode
+
+    def metrics(self, kind: type[_Metrics]) -> _Metrics | None:
+        """What the process counted, written when it stopped; None if it could not.
+
+        Raises CodecError where the file holds something else.
+        """
+        try:
+            tree = json.loads(self.figures_file.read_text("utf-8"))
+        except (OSError, ValueError):
+            return None
+        return from_tree(kind, tree)
+
+    def said(self) -> str:
+        """Everything it has logged so far."""
+        return self.log.read_text("utf-8", errors="replace")
+
+    def last_words(self) -> str:
+        """The end of its log."""
+        lines = self.said().strip().splitlines()
+        return " | ".join(lines[-3:]) or "it said nothing"
+
+
+def usage(process: psutil.Process) -> Usage | None:
+    """What a process uses now; None where it has just ended."""
+    try:
+        with process.oneshot():
+            times = process.cpu_times()
+            return Usage(
+                process.memory_info().rss / 1e6,
+                process.num_fds(),
+                process.num_threads(),
+                times.user + times.system,
+            )
+    except psutil.Error:
+        return None

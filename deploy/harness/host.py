@@ -1,0 +1,158 @@
+"""When the host itself stood still: a virtual machine may lose its cores, and no program of ours can help."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import psutil
+
+from common.clock import monotonic_ns, to_s
+from deploy.harness.bare_loop import PERIOD_NS
+from deploy.harness.excuse import Lost, Stall, lost, lost_before
+
+START_S = 10.0
+"""A host on which a bare loop does not start within this long is not measured."""
+STOP_S = 1.0
+
+
+@dataclass(slots=True)
+class Host:
+    """What the bare loops have told so far. Where they do not run, nothing is known and nothing excused."""
+
+    stalls: list[Stall] = field(default_factory=list)
+    known_ns: dict[int, int] = field(default_factory=dict)
+    """Up to when each core has told."""
+    began_ns: int = 0
+    """When the loops began to tick; 0 where they did not."""
+    priority: bool = False
+    """Whether they come before our own programs: if not, our own load may make them late too, and what was
+    late excuses only as far as it was stolen."""
+    cpu_s: tuple[float, float] = (0.0, 0.0)
+    """When they began, of all cores: time that the machine beneath took, and all time."""
+
+    _word: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def hear(self, line: str) -> None:
+        """Take one line of the loops' output."""
+        self._word.set()
+        told: dict[str, Any] = json.loads(line)
+        if "origin_ns" in told:
+            self.began_ns, self.priority, self.cpu_s = told["origin_ns"], told["priority"], _cpu_s()
+            self.known_ns = dict.fromkeys(told["cores"], self.began_ns)
+            return
+        stall = Stall(**told, priority=self.priority)
+        self.known_ns[stall.core] = stall.until_ns
+        if stall.missed:
+            self.stalls.append(stall)
+
+    def end(self) -> None:
+        """Nothing more will be told: nobody waits for a word."""
+        self.known_ns.clear()
+        self._word.set()
+
+    def stood_still_s(self, since_ns: int, until_ns: int) -> float:
+        """The longest that any one core stood still without a break, as far as it lies between the two."""
+        spans = (min(s.until_ns, until_ns) - max(s.from_ns, since_ns) for s in reversed(self.stalls))
+        return to_s(max(0, max(spans, default=0)))
+
+    def lost_s(self, since_ns: int, until_ns: int) -> float:
+        """For how long between the two the host is shown to have stood still: so late a result may be."""
+        return self.lost(since_ns, until_ns).excused_s
+
+    def lost(self, since_ns: int, until_ns: int) -> Lost:
+        """What the host lost between the two, with the evidence."""
+        return lost(self.stalls, since_ns, until_ns)
+
+    def lost_before(self, at_ns: int, since_ns: int = 0) -> Lost:
+        """What the host lost just before something happened."""
+        return lost_before(self.stalls, at_ns, since_ns)
+
+    async def known(self, until_ns: int) -> None:
+        """Wait until every core has told up to then; where nothing is measured, not at all."""
+        while min(self.known_ns.values(), default=until_ns) < until_ns:
+            self._word.clear()
+            await self._word.wait()
+
+    async def excuse(self, since_ns: int) -> str:
+        """Why a trial from then to now does not count, with the evidence; empty where it counts.
+
+        The host is shown to have stood still, somewhere within it, for long enough to make a guard hold.
+        """
+        now_ns = monotonic_ns()
+        await self.known(now_ns)
+        within = [stall.until_ns for stall in self.stalls if stall.until_ns >= since_ns]
+        found = (self.lost_before(min(until_ns, now_ns), since_ns) for until_ns in within)
+        return next((str(each) for each in found if each.explains_hold), "")
+
+    def explains(self, at_ns: int) -> bool:
+        """Whether it is shown to have stood still, just before, for long enough to make a guard hold then."""
+        return self.lost_before(at_ns).explains_hold
+
+    @property
+    def missed(self) -> int:
+        """Ticks that the worst core's loop missed."""
+        counts: dict[int, int] = {}
+        for stall in self.stalls:
+            counts[stall.core] = counts.get(stall.core, 0) + stall.missed
+        return max(counts.values(), default=0)
+
+    def figures(self, now_ns: int) -> dict[str, Any]:
+        """For a report; {} where nothing was measured."""
+        if not self.began_ns:
+            return {}
+        return {
+            "ticks": {"expected": max(0, now_ns - self.began_ns) // PERIOD_NS, "missed": self.missed},
+            "longest_ms": round(1e3 * self.stood_still_s(self.began_ns, now_ns), 1),
+            "priority": self.priority,
+            "steal_percent": round(self._steal_percent(), 1),
+        }
+
+    def _steal_percent(self) -> float:
+        steal_s, all_s = (now - before for now, before in zip(_cpu_s(), self.cpu_s, strict=True))
+        return 100.0 * steal_s / all_s if all_s > 0.0 else 0.0
+
+
+def _cpu_s() -> tuple[float, float]:
+    times = psutil.cpu_times()
+    return getattr(times, "steal", 0.0), sum(times[:8])
+
+
+@asynccontextmanager
+async def watch_host() -> AsyncIterator[Host]:
+    """Bare loops on every core while the block runs; the Host fills as they tell."""
+    host = Host()
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "deploy.harness.bare_loop",
+        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
+    )  # fmt: skip
+    stdin, stdout = process.stdin, process.stdout
+    assert stdin is not None
+    assert stdout is not None
+    begun = asyncio.Event()
+
+    async def listen() -> None:
+        while line := await stdout.readline():
+            host.hear(line.decode())
+            begun.set()
+        host.end()
+        begun.set()
+
+    listening = asyncio.ensure_future(listen())
+    try:
+        with suppress(TimeoutError):
+            await asyncio.wait_for(begun.wait(), START_S)
+        yield host
+    finally:
+        stdin.close()
+        try:
+            await asyncio.wait_for(listening, STOP_S)
+        except TimeoutError:
+            with suppress(ProcessLookupError):
+                process.kill()
+        await process.wait()

@@ -1,0 +1,53 @@
+"""What a network needs set over the example files, and which setups cannot be run at all. Pure."""
+
+from __future__ import annotations
+
+import math
+
+from common.link.config import LinkConfig
+from deploy.experiments.trial.plan import Plan, Setup
+from deploy.sim.network import Profile
+from slave.guard.config import GuardConfig
+
+STEP_S = 0.05
+MARGIN_S = 0.05
+"""For what a command waits before it is put, and for a busy machine."""
+WANDERS = 4.0
+"""Standard deviations of jitter that a command may be late by and still be taken."""
+
+
+def max_age_s(plan: Plan, profile: Profile) -> float:
+    """The guard's age limit: as asked for, or what the network needs."""
+    return plan.max_age_s or needed_age_s(profile)
+
+
+def needed_age_s(profile: Profile) -> float:
+    """The guard's age limit: the default where commands can keep it, or what they need.
+
+    The guard adds the offset's bound, half the least round trip, to a command's age. Over a long line that
+    alone is beyond the default, and a robot that takes no command would tell nothing about the line.
+    """
+    to_robot, to_operator = profile.ways.to_robot, profile.ways.to_operator
+    bound_ms = 0.5 * (to_robot.delay_ms + to_operator.delay_ms)
+    needed_s = 1e-3 * (to_robot.delay_ms + bound_ms + WANDERS * to_robot.jitter_ms) + MARGIN_S
+    default_s = GuardConfig().max_age_s
+    if needed_s <= default_s:
+        return default_s
+    return round(STEP_S * math.ceil(needed_s / STEP_S - 1e-9), 3)
+
+
+def open_timeout_s(profile: Profile) -> float:
+    """`[link] open_timeout_s`: the default where that is six round trips, or what six round trips take."""
+    needed_s = 6e-3 * (profile.ways.to_robot.delay_ms + profile.ways.to_operator.delay_ms)
+    default_s = LinkConfig().open_timeout_s
+    return default_s if needed_s <= default_s else math.ceil(2.0 * needed_s) / 2.0
+
+
+def why_impossible(setup: Setup) -> str | None:
+    """Why this setup cannot be run between two hosts; None where it can."""
+    if setup.transport == "unixsock-stream":
+        return (
+            "a unix socket is a file on one machine: it does not cross hosts, and between namespaces it "
+            "would pass the emulated link by"
+        )
+    return None

@@ -1,0 +1,150 @@
+"""Watches a run from outside: hears commands, states, truth and statistics, and changes nothing."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from common.clock import to_ns, to_s
+from common.errors import CodecError
+from common.link import Link
+from common.metrics.published import CameraMetrics, MasterMetrics, SlaveMetrics
+from common.skeleton import Skeleton
+from common.wire.codec import decode
+from common.wire.messages import Command, RobotState, Statistics, Truth
+from common.wire.topics import COMMAND, STATE, STATISTICS, TRUTH
+from deploy.measure import Trace
+
+Heard = Command | RobotState | Statistics | Truth
+
+RATE_OVER_NS = 900_000_000
+"""A rate is taken over at least this long: statistics come once a second, give or take a late tick."""
+
+
+class Observer:
+    """Keeps the newest of each message and, while recording, all that judging needs."""
+
+    def __init__(self, link: Link, skeleton: Skeleton) -> None:
+        self._joints = len(skeleton.joints)
+        self.trace = Trace(skeleton.joint_names)
+        self.recording = False
+        self.command: Command | None = None
+        self.state: RobotState | None = None
+        self.truth: Truth | None = None
+        self.master: MasterMetrics | None = None
+        self.slave: SlaveMetrics | None = None
+        self.undecodable = 0
+        """Messages that could not be read: of another version, or broken."""
+        self.guards_seen: list[str] = []
+        self.states: list[RobotState] = []
+        """While recording."""
+        self.commands: list[Command] = []
+        """While recording."""
+        self.video: CameraMetrics | None = None
+        """What the robot last counted of its camera while recording; None where it has none."""
+        self.listeners: list[Callable[[Heard], None]] = []
+        """Each is called with every message, whether recording or not."""
+        self._known_from = -1
+        """Number of the command since which every joint was known; -1: one is not."""
+        self._news = asyncio.Event()
+        self._marks: dict[str, tuple[int, int]] = {}
+        self.rates_hz: dict[str, float] = {}
+        """By the senders' own numbers and clocks: this side hears only the newest of what waits."""
+        link.subscribe(COMMAND, lambda payload, _: self._take(payload, Command))
+        link.subscribe(STATE, lambda payload, _: self._take(payload, RobotState))
+        link.subscribe(TRUTH, lambda payload, _: self._take(payload, Truth))
+        link.subscribe(STATISTICS, lambda payload, _: self._take(payload, Statistics))
+
+    def _take(self, payload: bytes, kind: type[Heard]) -> None:
+        try:
+            message = decode(payload, kind, self._joints)
+        except CodecError:
+            self.undecodable += 1
+            return
+        for listener in self.listeners:
+            listener(message)
+        if isinstance(message, Statistics):
+            self._take_metrics(message)
+            return
+        if isinstance(message, Command):
+            self.command = message
+            if not message.valid.all():
+                self._known_from = -1
+            elif self._known_from < 0 or message.sequence < self._known_from:
+                self._known_from = message.sequence
+            self._rate("commands", message.sequence, message.stamps.put_ns)
+        elif isinstance(message, RobotState):
+            self.state = message
+            self._rate("states", message.sequence, message.sent_ns)
+            if self.guards_seen[-1:] != [message.guard]:
+                self.guards_seen.append(message.guard)
+        else:
+            self.truth = message
+        if self.recording:
+            self.trace.add(message)
+            if isinstance(message, RobotState):
+                self.states.append(message)
+            elif isinstance(message, Command):
+                self.commands.append(message)
+        self._news.set()
+
+    def _take_metrics(self, message: Statistics) -> None:
+        if isinstance(message.metrics, MasterMetrics):
+            self.master, ticks = message.metrics, message.metrics.ticks
+            self._rate("capture", ticks.expected - ticks.missed, message.sent_ns)
+        else:
+            self.slave = message.metrics
+            if self.recording:
+                self.video = self.slave.video
+
+    def _rate(self, name: str, count: int, at_ns: int) -> None:
+        before, since_ns = self._marks.get(name, (0, 0))
+        if not since_ns or count < before:  # the first, or the sender has started again
+            self._marks[name] = (count, at_ns)
+        elif at_ns - since_ns >= RATE_OVER_NS:
+            self.rates_hz[name] = (count - before) / to_s(at_ns - since_ns)
+            self._marks[name] = (count, at_ns)
+
+    async def news(self) -> None:
+        """Wait for the next message."""
+        self._news.clear()
+        await self._news.wait()
+
+    @property
+    def guard(self) -> str:
+        """The guard's state as last told."""
+        return self.state.guard if self.state else "not heard"
+
+    @property
+    def sent_ns(self) -> int:
+        """When the newest state was sent, robot's clock; 0 before any."""
+        return self.state.sent_ns if self.state else 0
+
+    @property
+    def ready(self) -> bool:
+        """Whether engaging makes sense: every joint known, and the robot takes the master's commands."""
+        command, state = self.command, self.state
+        if command is None or state is None or state.echo is None or state.guard != "hold":
+            return False
+        taken_ns = state.sent_ns - state.echo.received_ns
+        # the robot has it later than this observer, who may be nearer to the master
+        known = 0 <= self._known_from <= state.echo.sequence
+        return known and taken_ns < to_ns(2.0 / COMMAND.rate_hz)
+
+    def waiting_for(self) -> str:
+        """What is missing until `ready`, in words."""
+        command, state = self.command, self.state
+        if state is None:
+            return "the robot is not heard"
+        if command is None:
+            return "the master sends no commands"
+        if not command.valid.all():
+            names = [n for n, ok in zip(self.trace.joint_names, command.valid, strict=True) if not ok]
+            return f"{len(names)} joints are not known yet ({', '.join(names[:3])} …)"
+        if command.lease == 0:
+            return "the master does not hold the robot's lease"
+        if state.offset_bound_ns < 0:
+            return "the clock offset is not trusted yet"
+        if not self.ready and state.guard == "hold":
+            return "the robot takes no command yet"
+        return f"the guard is in {state.guard}: {state.reason}"

@@ -1,9 +1,0 @@
-"""Hosts on one machine, and a link between them that behaves as a real network does."""
-
-from deploy.network.host import Host as Host
-from deploy.network.network import Network as Network
-from deploy.network.network import open_network as open_network
-from deploy.network.profile import Profile as Profile
-from deploy.network.profile import Way as Way
-from deploy.network.profile import load_profile as load_profile
-from deploy.network.profile import profile_names as profile_names

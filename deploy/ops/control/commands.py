@@ -1,0 +1,221 @@
+"""`tandem engage|disengage|estop|reset|home|status`: a person's acts, and what came of them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Coroutine, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from common.errors import LinkError, TandemError
+from common.process.runtime import run as run_until_stopped
+from common.wire.messages import Action
+from deploy.client.certificate import Certificate
+from deploy.client.reach import Reach, reach
+from deploy.ops.control.teller import Say, telling
+
+Connect = Annotated[list[str] | None, typer.Option(help="A robot's endpoint; may be given several times.")]
+Robot = Annotated[list[str] | None, typer.Option(help="A robot's name; may be given several times.")]
+Operator = Annotated[str, typer.Option(help="Your name, as in the master's file.")]
+MasterFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--master", help="The master's TOML file: endpoints, robots, operator from there.", dir_okay=False
+    ),
+]
+
+
+def engage(
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """Let robots follow: each moves slowly to the operator's posture, then tracks.
+
+    Example: `tandem engage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
+    """
+    _act(Action.ENGAGE, _holder(connect, robot, operator, master, certificate))
+
+
+def disengage(
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """Let robots hold where they are.
+
+    Example: `tandem disengage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
+    """
+    _act(Action.DISENGAGE, _holder(connect, robot, operator, master, certificate))
+
+
+def estop(
+    connect: Connect = None,
+    robot: Robot = None,
+    all_: Annotated[
+        bool, typer.Option("--all", help="Every robot that is reached at the endpoints.")
+    ] = False,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """Stop robots now. Anyone may. It is repeated until each has acknowledged it; a reset ends it.
+
+    Example: `tandem estop --connect tcp/192.168.7.2:7447 --connect tcp/192.168.7.3:7447 --all`
+    """
+    from deploy.ops.control.stop import stop_robots
+
+    where = reach(connect, robot, operator, master, certificate)
+    if not (all_ or where.robots):
+        raise TandemError("which robot? Name it by --robot, or stop every one by --all")
+
+    async def tell(say: Say) -> None:
+        try:
+            said = await stop_robots(where, all_, lambda answer: say(answer.line))
+        except LinkError as error:
+            raise TandemError(f"NOBODY IS STOPPED BY THIS: {error}. Stop it at the robot itself") from None
+        failed = [answer for answer in said if not answer.done]
+        if failed:
+            raise TandemError("NOT EVERY ROBOT IS STOPPED: " + "; ".join(answer.line for answer in failed))
+
+    _carry_out(tell)
+
+
+def reset(
+    key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """Leave an emergency stop: the robot then holds, it does not move.
+
+    Example: `tandem reset --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
+    """
+    _act(Action.RESET, _named(reach(connect, robot, operator, master, certificate)), key)
+
+
+def home(
+    key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+    yes: Annotated[bool, typer.Option("--yes", help="You have looked at the robot already.")] = False,
+) -> None:
+    """Confirm that a robot stands as it says, where it has no second reading. It then holds there.
+
+    Look at the robot first. It tells which joints it means, and where each says it is.
+
+    Example: `tandem home --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
+    """
+    where = _named(reach(connect, robot, operator, master, certificate))
+    if not yes:
+        _act(Action.STATUS, where)
+        if not typer.confirm("Does the robot stand so?"):
+            raise TandemError("nothing was confirmed: the robot does not move")
+    _act(Action.HOME, where, key)
+
+
+def status(
+    connect: Connect = None,
+    robot: Robot = None,
+    master: MasterFile = None,
+    certificate: Certificate = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+) -> None:
+    """Ask robots what they do: guard, why, who commands, faults, base, offset, latency.
+
+    Example: `tandem status --connect tcp/192.168.7.2:7447 --robot robot-1 --json`
+    """
+    from deploy.client.status import ask_status, status_table
+
+    where = _named(reach(connect, robot, master=master, certificate=certificate))
+
+    async def tell() -> None:
+        robots = await ask_status(where)
+        if as_json:
+            typer.echo(json.dumps(robots, indent=2, ensure_ascii=False))
+        else:
+            Console().print(status_table(robots))
+        silent = [f"{name} {one['reason']}" for name, one in robots.items() if not one["answers"]]
+        silent += [
+            f"{name}: another robot bears this name; this one is at {one['place']}"
+            for name, one in robots.items()
+            if one["namesakes"]
+        ]
+        if silent:
+            raise TandemError("; ".join(silent))
+
+    _run(tell)
+
+
+COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, home, status)
+"""In the order of the help."""
+
+
+def _act(action: Action, where: Reach, key: str = "") -> None:
+    from deploy.client.ask import ask_robots
+
+    async def tell(say: Say) -> None:
+        answers = await ask_robots(where, action, key)
+        for answer in answers:
+            if answer.guard:
+                say(answer.line)
+        silent = [f"{a.robot} {a.text}" for a in answers if not a.guard]
+        refused = [f"{a.robot}: {action} was refused: {a.text}" for a in answers if a.guard and not a.done]
+        if silent or refused:
+            raise TandemError("\n".join([*silent, *refused]))
+
+    _carry_out(tell)
+
+
+def _named(where: Reach) -> Reach:
+    if not where.robots:
+        raise TandemError("which robot? Name it by --robot, or the master's file by --master")
+    return where
+
+
+def _holder(
+    connect: Sequence[str] | None,
+    robot: Sequence[str] | None,
+    operator: str,
+    master: Path | None,
+    certificate: Path | None,
+) -> Reach:
+    where = _named(reach(connect, robot, operator, master, certificate))
+    if not where.operator:
+        raise TandemError("who are you? Give your name by --operator, or the master's file by --master")
+    return where
+
+
+def _carry_out(act: Callable[[Say], Coroutine[Any, Any, None]]) -> None:
+    """Run an act to its end, whatever becomes of the terminal: closed, full, paused."""
+    with telling() as say:
+        _run(lambda: act(say), hangup_stops=False)
+
+
+def _run(work: Callable[[], Coroutine[Any, Any, None]], hangup_stops: bool = True) -> None:
+    """Run it; a Ctrl-C ends it, and says that it is not known what the robot did."""
+
+    async def main(stop: asyncio.Event) -> None:
+        working = asyncio.create_task(work())
+        stopping = asyncio.create_task(stop.wait())
+        await asyncio.wait({working, stopping}, return_when=asyncio.FIRST_COMPLETED)
+        stopping.cancel()
+        if working.done():
+            return working.result()
+        working.cancel()
+        raise TandemError("interrupted: whether the robot heard it is not known")
+
+    run_until_stopped(main, hangup_stops=hangup_stops)

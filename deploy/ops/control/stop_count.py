@@ -1,0 +1,65 @@
+"""Which robots of one name have acknowledged a stop, and which have not. Pure."""
+
+from __future__ import annotations
+
+from common.wire.presence import Presence, several_bear
+from common.wire.stop import StopAnswer
+from deploy.client.answer import Answer
+
+
+class StopCount:
+    """Counts by instance: each that shows itself must acknowledge, and at least one must."""
+
+    def __init__(self, robot: str, within_s: float) -> None:
+        self._robot = robot
+        self._within_s = within_s
+        self._shown: dict[int, Presence] = {}
+        self._stopped: dict[int | str, Answer] = {}
+        """By instance; by session, where the robot is of schema 2 and has no instance number."""
+
+    def expect(self, presence: Presence) -> None:
+        """A process of this name showed itself. One that goes again is not known to be stopped."""
+        if presence.instance:
+            self._shown[presence.instance] = presence
+
+    def on_answer(self, answer: StopAnswer, session: str) -> Answer | None:
+        """Take an answer; what to tell, where it is an acknowledgement that is new."""
+        who = answer.instance or session
+        if not answer.stopped or who in self._stopped:
+            return None
+        shown = self._shown.get(answer.instance)
+        place = shown.words if shown is not None and self._several else ""
+        told = Answer(self._robot, True, answer.text, answer.guard, answer.instance, place)
+        self._stopped[who] = told
+        return told
+
+    @property
+    def complete(self) -> bool:
+        """Whether somebody has acknowledged, and everybody who showed himself has."""
+        return bool(self._stopped) and not self._silent()
+
+    def answers(self) -> list[Answer]:
+        """One a process: stopped, or not."""
+        return [*self._stopped.values(), *self.failures()]
+
+    def failures(self) -> list[Answer]:
+        """Those who were asked, or showed themselves, and did not acknowledge."""
+        text = f"NOT STOPPED by this: no answer within {self._within_s:g} s. Stop it at the robot itself"
+        silent = [
+            Answer(self._robot, False, text, instance=each.instance, place=each.words)
+            for each in self._silent()
+        ]
+        return silent if silent or self._stopped else [Answer(self._robot, False, text)]
+
+    def namesakes(self) -> str | None:
+        """What to say where several robots bear the name."""
+        if not self._several:
+            return None
+        return several_bear(self._robot, [each.words for each in self._shown.values()] or ["unknown places"])
+
+    @property
+    def _several(self) -> bool:
+        return len(self._shown.keys() | self._stopped.keys()) > 1
+
+    def _silent(self) -> list[Presence]:
+        return [presence for number, presence in self._shown.items() if number not in self._stopped]

@@ -1,0 +1,126 @@
+"""All checks of a host, in the order of the report: facts are read, then judged. Open this file first."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from common.errors import LinkError
+from common.wire.version import software
+from deploy.ops.doctor.judge.can import judge_buses, judge_interfaces
+from deploy.ops.doctor.judge.devices import is_url, judge_camera, judge_latency, judge_port
+from deploy.ops.doctor.judge.endpoints import judge_endpoint
+from deploy.ops.doctor.judge.finding import Finding, fail, ok
+from deploy.ops.doctor.judge.keys import judge_keys
+from deploy.ops.doctor.judge.machine import (
+    judge_clock,
+    judge_disk,
+    judge_machine,
+    judge_receive_buffer,
+    judge_tcp,
+)
+from deploy.ops.doctor.judge.needs import GENERAL, Needs
+from deploy.ops.doctor.judge.path import judge_path
+from deploy.ops.doctor.judge.process import judge_memory_lock, judge_networks, judge_realtime
+from deploy.ops.doctor.judge.robots import judge_robot
+from deploy.ops.doctor.read.can import ask_ip, read_can
+from deploy.ops.doctor.read.clock import clock_is_synchronised
+from deploy.ops.doctor.read.devices import egl_is_there, free_bytes, read_device, v4l2_is_there
+from deploy.ops.doctor.read.endpoints import knock, try_to_listen
+from deploy.ops.doctor.read.keys import read_keys
+from deploy.ops.doctor.read.machine import read_machine
+from deploy.ops.doctor.read.path import read_path
+from deploy.ops.doctor.read.process import read_process
+from deploy.ops.doctor.read.robots import read_robots
+from deploy.ops.doctor.read.servos import ping_servos
+from deploy.ops.doctor.read.tree import Tree
+from slave.servos.dynamixel.port import Port
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What a person asked for beside the file."""
+
+    recordings: Path = Path()
+    """Where recordings are to be written."""
+    reach: bool = True
+    """Whether to ask the other hosts."""
+
+
+async def examine(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
+    """Every finding; at most some seconds, most of them for robots that do not answer."""
+    found = [_software(), *host(needs, options, tree), *devices(needs, tree), *keys(needs)]
+    if needs.servos is not None and read_device(tree, needs.servos.port).usable:
+        port = Port if options.reach else None
+        pinged = await asyncio.to_thread(ping_servos, needs.servos, tree, port)
+        found.append(judge_latency(pinged, needs.servos.reply_timeout_s))
+    found += [judge_endpoint(try_to_listen(endpoint)) for endpoint in needs.link.listen]
+    if options.reach:
+        found += await others(needs)
+    return found
+
+
+def host(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
+    """The machine and what the process may do on it."""
+    machine, process = read_machine(tree), read_process(tree)
+    return [
+        *judge_machine(machine),
+        judge_realtime(needs.realtime_priority, process),
+        judge_memory_lock(needs.realtime_priority, process, machine.swap_bytes),
+        *judge_receive_buffer(needs.buses, machine),
+        *judge_tcp(machine),
+        judge_clock(clock_is_synchronised()),
+        judge_disk(str(options.recordings.absolute()), free_bytes(options.recordings)),
+        *([judge_networks(process)] if needs.role == GENERAL else []),
+    ]
+
+
+def devices(needs: Needs, tree: Tree) -> list[Finding]:
+    """Buses, serial ports, camera."""
+    ports = {port: None if is_url(port) else read_device(tree, port) for port in needs.serial_ports}
+    camera = read_device(tree, needs.camera_device)
+    interfaces = read_can(tree, ask_ip())
+    return [
+        *(judge_interfaces(interfaces) if needs.role == GENERAL else judge_buses(needs.buses, interfaces)),
+        *(judge_port(port, device) for port, device in ports.items()),
+        *(
+            [judge_camera(needs.camera, camera, egl_is_there(), v4l2_is_there())]
+            if needs.role == "slave"
+            else []
+        ),
+    ]
+
+
+def keys(needs: Needs) -> list[Finding]:
+    """Of the link; nothing where no file says how it is reached."""
+    if needs.role in (GENERAL, "suit"):
+        return []
+    tls = needs.link.tls
+    return judge_keys(needs, None if tls is None else read_keys(tls, datetime.now(UTC)))
+
+
+async def others(needs: Needs) -> Sequence[Finding]:
+    """Whom this host connects to, and the robots that it commands."""
+    knocked = await asyncio.gather(*(knock(endpoint) for endpoint in needs.link.connect))
+    found = [judge_endpoint(facts) for facts in knocked]
+    if not needs.robots:
+        return found
+    try:
+        robots = await read_robots(needs.link, needs.robots, needs.operator)
+    except LinkError as error:
+        return [*found, fail("link", str(error), "mend [link] first")]
+    found += [finding for facts in robots for finding in judge_robot(facts, software())]
+    reach = needs.link.model_copy(update={"listen": [], "access": None})
+    for facts in robots:
+        if facts.guard:
+            found += judge_path(await read_path(reach, facts.name))
+    return found
+
+
+def _software() -> Finding:
+    ours = software()
+    words = f"tandem {ours.tandem}, schema {ours.schema}, Zenoh {ours.zenoh}, Python {ours.python}"
+    return ok("software", words)

@@ -1,0 +1,138 @@
+"""What a host needs for its role, taken from its TOML file: the rest of the doctor knows no file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from common.can.config import BusConfig
+from common.config.load import load_config
+from common.errors import TandemError
+from common.link.config import LinkConfig
+from common.link.roles import Role, common_name
+from common.link.router import RouterConfig
+from deploy.sim.suit.config import SuitConfig
+from master.config import MasterConfig
+from master.suit.protocol import SuitProtocol
+from slave.config import SlaveConfig
+from slave.servos.dynamixel.config import DynamixelConfig
+
+GENERAL = "host"
+"""The role where no file is given."""
+
+
+class Camera(StrEnum):
+    """Where a slave's pictures come from."""
+
+    OFF = "off"
+    DRAWN = "robot"
+    V4L2 = "v4l2"
+
+
+@dataclass(frozen=True, slots=True)
+class BusNeed:
+    """One CAN bus and what goes over it."""
+
+    bus: BusConfig
+    nodes: int = 0
+    """Sensor nodes that answer each tick; 0 where others hang on it."""
+    rate_hz: float = 0.0
+    drives: int = 0
+    """Of a robot, each told and asked at every SYNC …"""
+    bits_per_s: float = 0.0
+    """… and what they put on the bus, heartbeats included."""
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """Of one host."""
+
+    role: str = GENERAL
+    buses: tuple[BusNeed, ...] = ()
+    realtime_priority: int = 0
+    serial_ports: tuple[str, ...] = ()
+    servos: DynamixelConfig | None = None
+    """Those on a serial bus, which is one of the ports."""
+    camera: Camera = Camera.OFF
+    camera_device: str = ""
+    link: LinkConfig = field(default_factory=LinkConfig)
+    robots: tuple[str, ...] = ()
+    """Whom it commands."""
+    operator: str = ""
+    certified_as: str = ""
+    """The common name that its certificate should have; empty where none is known."""
+
+
+def needs_of(path: Path, overrides: Sequence[str] = ()) -> Needs:
+    """From a master's, slave's, suit's or router's file, told apart by its keys. Raises ConfigError."""
+    keys = _keys(path)
+    if "capture" in keys or "operator" in keys:
+        return _of_master(load_config(path, MasterConfig, overrides))
+    if "buses" in keys or "motion" in keys:
+        return _of_suit(load_config(path, SuitConfig, overrides))
+    if keys <= set(RouterConfig.model_fields):
+        return _of_router(load_config(path, RouterConfig, overrides))
+    return _of_slave(load_config(path, SlaveConfig, overrides))
+
+
+def _keys(path: Path) -> set[str]:
+    try:
+        return set(tomllib.loads(path.read_text("utf-8")))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise TandemError(f"{path}: expected a readable TOML file ({reason})") from None
+
+
+def _of_master(config: MasterConfig) -> Needs:
+    fd = {bus.name: bus.fd for bus in config.capture.buses}
+    SuitProtocol.load(config.capture.dbc).check_identifiers(list(config.nodes.values()), fd)
+    nodes = Counter(node.bus for node in config.nodes.values())
+    return Needs(
+        role="master",
+        buses=tuple(BusNeed(bus, nodes[bus.name], config.capture.rate_hz) for bus in config.capture.buses),
+        realtime_priority=config.process.realtime_priority,
+        link=config.link,
+        robots=tuple(config.commanded),
+        operator=config.operator.name,
+        certified_as=common_name(Role.OPERATOR, config.operator.name),
+    )
+
+
+def _of_slave(config: SlaveConfig) -> Needs:
+    servos, ports = config.servos, []
+    if servos.backend == "dynamixel" and servos.dynamixel is not None:
+        ports.append(servos.dynamixel.port)
+    if config.base.source == "serial":
+        ports.append(config.base.port)
+    return Needs(
+        role="slave",
+        buses=_of_drives(config) if servos.backend == "canopen" else (),
+        servos=servos.dynamixel if servos.backend == "dynamixel" else None,
+        realtime_priority=config.process.realtime_priority,
+        serial_ports=tuple(ports),
+        camera=Camera(config.camera.source),
+        camera_device=config.camera.device,
+        link=config.link,
+        certified_as=common_name(Role.ROBOT, config.robot),
+    )
+
+
+def _of_drives(config: SlaveConfig) -> tuple[BusNeed, ...]:
+    canopen = config.servos.canopen
+    loads = canopen.load(config.skeleton)
+    return tuple(
+        BusNeed(bus, rate_hz=canopen.sync_hz, drives=loads[bus.name][0], bits_per_s=loads[bus.name][1])
+        for bus in canopen.buses
+    )
+
+
+def _of_suit(config: SuitConfig) -> Needs:
+    return Needs(role="suit", buses=tuple(map(BusNeed, config.buses)))
+
+
+def _of_router(config: RouterConfig) -> Needs:
+    return Needs(role="router", link=config.link, certified_as=common_name(Role.ROUTER, config.name))

@@ -1,0 +1,71 @@
+"""Whether a robot is reached, fast enough for its guard, and runs the same software. Pure."""
+
+from __future__ import annotations
+
+from statistics import median
+
+from common.metrics.published import Software
+from deploy.ops.doctor.judge.finding import Finding, fail, ok, warn
+from deploy.ops.doctor.read.robots import RobotFacts
+from slave.guard.config import GuardConfig
+
+OLDEST_MS = 1000.0 * GuardConfig().max_age_s
+"""A command older than that is refused by a guard as it is shipped."""
+_NAMESAKES = "robots bear the name"
+_SCHEMA = "schema version"
+"""In the words of the codec, where the two sides' messages differ."""
+
+
+def judge_robot(facts: RobotFacts, ours: Software) -> list[Finding]:
+    """Reached, time, clock, versions; only the first where it did not answer."""
+    name = facts.name
+    if not facts.guard:
+        if _SCHEMA in facts.text:
+            return [fail(f"{name}: versions", facts.text, "install the same tandem on both hosts")]
+        if _NAMESAKES in facts.text:
+            return [fail(f"{name}: names", facts.text, "until then nobody can engage either of them")]
+        return [fail(name, facts.text, "on its host: `tandem doctor` with its own file, and its log")]
+    reached = ok(name, f"answers: {facts.guard}: {facts.text}")
+    return [reached, _time(facts), *_clock(facts), _versions(facts, ours)]
+
+
+def _time(facts: RobotFacts) -> Finding:
+    check = f"{facts.name}: round trip"
+    trips = facts.round_trips_ms
+    if not trips:
+        return fail(check, "none of the exchanges was answered", "the link is too slow, or loses too much")
+    middle = median(trips)
+    lost = facts.asked - len(trips)
+    words = f"{min(trips):.2f} / {middle:.2f} / {max(trips):.2f} ms (least, median, most of {len(trips)})"
+    words += f", {lost} lost" if lost else ""
+    advice = f"a command older than {OLDEST_MS:g} ms is refused: use a shorter way, or a faster network"
+    if middle / 2 > OLDEST_MS:
+        return fail(check, words, advice)
+    if max(trips) / 2 > OLDEST_MS / 2 or lost:
+        return warn(check, words, f"{advice}; `tandem trial` compares transports")
+    return ok(check, words)
+
+
+def _clock(facts: RobotFacts) -> list[Finding]:
+    if not facts.round_trips_ms:
+        return []
+    words = f"offset {facts.offset_ms:+.3f} ms ± {facts.bound_ms:.3f} ms: measured, so the two need not agree"
+    return [ok(f"{facts.name}: clock", words)]
+
+
+def _versions(facts: RobotFacts, ours: Software) -> Finding:
+    check = f"{facts.name}: versions"
+    theirs = facts.software
+    if theirs is None:
+        advice = "it runs an older tandem, or its statistics may not be heard: see [link.access]"
+        return warn(check, "the robot does not tell its own", advice)
+    parts = {
+        "tandem": (theirs.tandem, ours.tandem),
+        "schema": (theirs.schema, ours.schema),
+        "zenoh": (theirs.zenoh, ours.zenoh),
+    }
+    other = [f"{part} {there} there, {here} here" for part, (there, here) in parts.items() if there != here]
+    if not other:
+        return ok(check, ", ".join(f"{part} {here}" for part, (_, here) in parts.items()) + " on both")
+    judge = fail if theirs.schema != ours.schema else warn
+    return judge(check, "; ".join(other), "install the same tandem on both hosts")

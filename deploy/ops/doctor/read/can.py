@@ -1,0 +1,77 @@
+"""CAN interfaces: what /sys/class/net shows of them, and the bit rates, which only netlink (`ip`) tells."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from dataclasses import dataclass
+from typing import Any
+
+from deploy.ops.doctor.read.tree import Tree
+
+CAN_TYPE = 280
+"""ARPHRD_CAN."""
+FD_MTU = 72
+"""An interface with this much room for a frame carries CAN FD."""
+_IFF_UP = 1
+_IP_TIMEOUT_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class CanInterface:
+    """One interface as the kernel has it."""
+
+    name: str
+    up: bool
+    fd: bool
+    bitrate: int = 0
+    """0 where it is not known: a virtual bus has none."""
+    data_bitrate: int = 0
+    state: str = ""
+    """The controller's, such as ERROR-ACTIVE or BUS-OFF; empty where it is not known."""
+
+
+def read_can(tree: Tree, ip_json: str | None) -> dict[str, CanInterface]:
+    """By name. `ip_json`: what `ip -details -json link show` prints, None where it could not be asked."""
+    details = _details(ip_json)
+    return {
+        name: _interface(tree, name, details.get(name, {}))
+        for name in tree.names("/sys/class/net")
+        if tree.number(f"/sys/class/net/{name}/type") == CAN_TYPE
+    }
+
+
+def ask_ip() -> str | None:
+    """What `ip` tells of all interfaces; None where there is no such program, or it fails."""
+    program = shutil.which("ip", path="/usr/sbin:/sbin:/usr/bin:/bin")
+    if program is None:
+        return None
+    try:
+        asked = subprocess.run(
+            [program, "-details", "-json", "link", "show"],
+            capture_output=True, text=True, timeout=_IP_TIMEOUT_S, check=False,
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return asked.stdout if asked.returncode == 0 else None
+
+
+def _interface(tree: Tree, name: str, details: dict[str, Any]) -> CanInterface:
+    flags = tree.text(f"/sys/class/net/{name}/flags") or "0"
+    return CanInterface(
+        name,
+        up=bool(int(flags, 16) & _IFF_UP),
+        fd=tree.number(f"/sys/class/net/{name}/mtu") == FD_MTU,
+        bitrate=int(details.get("bittiming", {}).get("bitrate", 0)),
+        data_bitrate=int(details.get("data_bittiming", {}).get("bitrate", 0)),
+        state=str(details.get("state", "")),
+    )
+
+
+def _details(ip_json: str | None) -> dict[str, dict[str, Any]]:
+    try:
+        links = json.loads(ip_json or "[]")
+    except ValueError:
+        return {}
+    return {link.get("ifname", ""): link.get("linkinfo", {}).get("info_data", {}) for link in links}

@@ -1,0 +1,48 @@
+"""The report: a table for people, a tree for machines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from deploy.ops.doctor.judge.finding import Finding, Verdict, worst
+
+_STYLE = {Verdict.OK: "green", Verdict.WARN: "yellow", Verdict.FAIL: "bold red"}
+
+
+def as_table(findings: Sequence[Finding]) -> Table:
+    """One row a finding; what to do stands below what was found."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("check", overflow="fold")
+    table.add_column("", no_wrap=True)
+    table.add_column("found, and what to do", overflow="fold")
+    for finding in findings:
+        style = _STYLE[finding.verdict]
+        words = Text(finding.found)
+        if finding.advice:
+            words.append(f"\n→ {finding.advice}", "dim" if finding.verdict is Verdict.OK else style)
+        table.add_row(Text(finding.check), Text(finding.verdict, style), words)
+    return table
+
+
+def as_tree(role: str, findings: Sequence[Finding]) -> dict[str, Any]:
+    """Plain JSON values."""
+    return {
+        "role": role,
+        "verdict": str(worst(findings)),
+        "checks": [
+            {"check": f.check, "verdict": str(f.verdict), "found": f.found, "do": f.advice or None}
+            for f in findings
+        ],
+    }
+
+
+def in_words(role: str, findings: Sequence[Finding]) -> str:
+    """The end of the report, one line."""
+    counts = {verdict: sum(f.verdict is verdict for f in findings) for verdict in Verdict}
+    worse = [f"{counts[v]} {v}" for v in (Verdict.FAIL, Verdict.WARN) if counts[v]]
+    return f"{role}: {', '.join([*worse, f'{counts[Verdict.OK]} ok'])}"

@@ -1,0 +1,154 @@
+"""`tandem keys authority|make|show`: the files that tls and quic ask for under [link.tls]."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from common.link.config import NAME
+from common.link.roles import Role, role_of
+from deploy.certificates import AUTHORITY, KeysError
+
+if TYPE_CHECKING:
+    from deploy.certificates.folder import Shown
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="Make the certificates by which hosts prove who they are, and see when they expire.\n\n"
+    "First `tandem keys authority keys`, then one `tandem keys make keys ROLE:NAME` a host.",
+)
+SOON_DAYS = 30
+MOST_DAYS = 36_500.0
+Folder = Annotated[Path, typer.Argument(help="Where the authority's files lie.", file_okay=False)]
+
+
+@app.command()
+def authority(
+    folder: Folder,
+    name: Annotated[str, typer.Option(help="Whose authority it is.")] = "tandem",
+    days: Annotated[float, typer.Option(help="Until it expires.", min=1.0, max=MOST_DAYS)] = 3650.0,
+) -> None:
+    """Make a private authority: ca.pem goes to every host, ca.key stays here, offline.
+
+    Example: `tandem keys authority keys --name "Clinic North"`
+    """
+    # cryptography takes a tenth of a second to load, for which an e-stop must not wait
+    from deploy.certificates.folder import write_pair
+    from deploy.certificates.make import new_authority
+
+    if not 1 <= len(name) <= 64:
+        raise KeysError(f"--name {name!r}: expected 1 to 64 characters")
+    made = new_authority(name, datetime.now(UTC), timedelta(days=days))
+    certificate, key = write_pair(folder, AUTHORITY, made)
+    console = Console()
+    console.print(f"{certificate}: copy it to every host", highlight=False)
+    console.print(f"{key}: whoever has it can make anybody's certificate; keep it off the network")
+
+
+@app.command()
+def make(
+    folder: Folder,
+    who: Annotated[
+        str, typer.Argument(metavar="ROLE:NAME", help="operator:…, robot:…, observer:… or router:…")
+    ],
+    host: Annotated[
+        list[str] | None,
+        typer.Option(help="Address or name under which others connect to it; may be given several times."),
+    ] = None,
+    days: Annotated[float, typer.Option(help="Until it expires.", min=0.001, max=MOST_DAYS)] = 365.0,
+) -> None:
+    """Make a certificate and its key, of the folder's authority. It never overwrites one.
+
+    To renew one, move the old files away and make it again: the names in [link.access] stay the same.
+
+    Example: `tandem keys make keys robot:robot-1 --host 192.168.7.2 --host robot-1.local`
+    """
+    from deploy.certificates.folder import read_authority, stem, write_pair
+    from deploy.certificates.make import new_identity
+
+    role, name = _role_and_name(who)
+    try:
+        made = new_identity(
+            read_authority(folder), role, name, host or [], datetime.now(UTC), timedelta(days=days)
+        )
+    except ValueError as error:
+        raise KeysError(str(error)) from None
+    certificate, key = write_pair(folder, stem(role, name), made)
+    console = Console()
+    console.print("For the host's file:\n", highlight=False)
+    lines = (
+        "[link.tls]", f'ca = "{AUTHORITY}.pem"', f'certificate = "{certificate.name}"', f'key = "{key.name}"'
+    )  # fmt: skip
+    console.print(Text("\n".join(lines)))
+    if not host:
+        console.print(Text("\nWithout --host it can connect to others, but nobody to it.", "yellow"))
+
+
+@app.command()
+def show(
+    paths: Annotated[list[Path], typer.Argument(help="Certificates, or folders of them.", exists=True)],
+    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+) -> None:
+    """Show whose certificates these are, for which addresses, and when they expire.
+
+    It ends with status 1 where one has expired.
+
+    Example: `tandem keys show keys`
+    """
+    from deploy.certificates.folder import shown
+
+    now = datetime.now(UTC)
+    found = list(shown(paths))
+    if as_json:
+        print(json.dumps([_tree(each, now) for each in found], indent=2))  # noqa: T201
+    else:
+        Console().print(_table(found, now))
+    if any(each.days_left(now) <= 0 for each in found):
+        raise KeysError("expired: move the old files away and make new ones with `tandem keys make`")
+
+
+def _role_and_name(who: str) -> tuple[Role, str]:
+    try:
+        role, name = role_of(who)
+    except ValueError:
+        roles = ", ".join(f"{role}:NAME" for role in Role)
+        raise KeysError(f"{who!r}: expected one of {roles}") from None
+    if not re.fullmatch(NAME, name):  # else [link.access] could not name it
+        raise KeysError(
+            f"{who!r}: expected a name of at most 48 letters and digits, after the first '_', '.' and '-' too"
+        )
+    return role, name
+
+
+def _tree(each: Shown, now: datetime) -> dict[str, object]:
+    return {
+        "file": str(each.file),
+        "common_name": each.common_name,
+        "authority": each.authority,
+        "hosts": list(each.hosts),
+        "ends": each.ends.isoformat(),
+        "days_left": round(each.days_left(now), 3),
+    }
+
+
+def _table(found: list[Shown], now: datetime) -> Table:
+    table = Table()
+    for column in ("file", "role and name", "hosts", "expires", "days left"):
+        table.add_column(column)
+    for each in found:
+        days = each.days_left(now)
+        style = "red" if days <= 0 else "yellow" if days < SOON_DAYS else ""
+        who = f"authority {each.common_name}" if each.authority else each.common_name
+        cells = (each.file.name, who, ", ".join(each.hosts) or "–", f"{each.ends:%Y-%m-%d %H:%M} UTC")
+        left = "expired" if days <= 0 else f"{days:.0f}"
+        table.add_row(*(Text(cell) for cell in cells), Text(left, style))
+    return table

@@ -1,0 +1,100 @@
+"""`tandem record` and `tandem recording`."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from common.errors import TandemError
+from common.process.runtime import run as run_until_stopped
+from deploy.report.output import in_a_folder, write_json
+
+
+def record(
+    robot: Annotated[str, typer.Option(help="The robot's name.")],
+    out: Annotated[Path, typer.Option(help="New .mcap file.", dir_okay=False, callback=in_a_folder)],
+    connect: Annotated[
+        list[str] | None, typer.Option(help="An endpoint; may be given several times.")
+    ] = None,
+    link: Annotated[
+        Path | None,
+        typer.Option(help="Or a TOML file whose [link] says where, and with which keys.", dir_okay=False),
+    ] = None,
+    video: Annotated[list[str] | None, typer.Option(help="Also the pictures of this camera: `head`.")] = None,
+    minutes_per_file: Annotated[
+        float, typer.Option(help="Then a new file begins, FILE-2.mcap and so on; 0: never.", min=0.0)
+    ] = 60.0,
+    seconds: Annotated[float | None, typer.Option(help="Stop by itself.", min=0.1)] = None,
+    may_miss: Annotated[
+        bool, typer.Option("--may-miss", help="End with 0 although numbered messages never came.")
+    ] = False,
+    figures: Annotated[
+        Path | None,
+        typer.Option(help="Write what was counted, as JSON, when stopped.", callback=in_a_folder),
+    ] = None,
+) -> None:
+    """Record a live robot's commands, states and statistics, until Ctrl-C; it changes nothing.
+
+    Commands are heard at an endpoint where the master listens (`[link] listen` in its file), or at a router;
+    states at the robot's. Ends with 1 where the disk failed, or messages are missing by their own numbers.
+
+    Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
+    """
+    from deploy.ops.record.record import RecordOptions, link_of
+    from deploy.ops.record.record import record as record_until
+
+    if out.suffix.lower() != ".mcap":
+        raise TandemError(f"{out}: expected a name that ends in .mcap")
+    each_s = 60.0 * minutes_per_file if minutes_per_file else None
+    where = link_of(connect or (), link)
+    options = RecordOptions(where, robot, out, tuple(video or ()), seconds, each_s, may_miss=may_miss)
+    console = Console(stderr=True)
+
+    async def work(stop: asyncio.Event) -> None:
+        def write(tree: dict[str, object]) -> None:
+            if figures is not None:
+                write_json(figures, tree)
+
+        with console.status("waiting for the robot") as status:
+            said = await record_until(options, stop, status.update, write)
+        console.print(said, highlight=False)
+
+    run_until_stopped(work)
+
+
+def recording(
+    file: Annotated[Path, typer.Argument(help="An .mcap file of ours.")],
+    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+) -> None:
+    """Show what is in a recording: topics, rates, silences, what never came, and whether it ends early.
+
+    Example: `tandem recording morning.mcap --json`
+    """
+    from deploy.measure.tables import UNKNOWN, plain_table
+    from deploy.ops.record.contents import survey
+
+    contents = survey(file)
+    if as_json:
+        typer.echo(json.dumps(contents.tree(), indent=2, ensure_ascii=False))
+        return
+    console = Console()
+    table = plain_table("topic", "messages", "rate Hz", "MB", "longest silence s", "missing")
+    for name, topic in contents.topics.items():
+        table.add_row(
+            name,
+            str(topic.count),
+            f"{topic.rate_hz:.1f}",
+            f"{topic.size / 1e6:.2f}",
+            f"{topic.longest_gap_s:.2f}",
+            UNKNOWN if topic.missing is None else str(topic.missing),
+        )
+    console.print(table)
+    for key, value in contents.metadata.items():
+        console.print(f"{key}: {value}", highlight=False)
+    if contents.cut:
+        console.print(f"[yellow]{contents.cut}: what is before that is shown", highlight=False)

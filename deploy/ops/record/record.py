@@ -1,0 +1,199 @@
+"""Hears one robot's topics and puts them into a recording, as they came: bytes and time of arrival."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from common.clock import monotonic_ns, to_s
+from common.config.load import load_config
+from common.config.section import Section
+from common.errors import TandemError
+from common.link import Link, open_link
+from common.link.config import LinkConfig
+from common.metrics.published import RecorderMetrics, to_tree
+from common.process.launch import WriteFigures
+from common.process.runtime import until_stopped
+from common.wire.topics import COMMAND, STATE, STATISTICS, Topic, video
+from deploy.client.reach import reach
+from deploy.ops.record.missing import Missing, missing_in_words
+from deploy.ops.record.tape import Tape
+
+LIVE = (COMMAND, STATE, STATISTICS)
+"""What is always recorded."""
+TELL_S = 0.5
+
+
+class ObserverConfig(Section):
+    """The TOML file of one who only looks on."""
+
+    link: LinkConfig
+
+
+def link_of(connect: Sequence[str], file: Path | None) -> LinkConfig:
+    """Where to listen in: the endpoints, or the file's `[link]`. Raises ConfigError, TandemError."""
+    if file is not None:
+        return load_config(file, ObserverConfig).link
+    return reach(connect, None).link
+
+
+@dataclass(frozen=True, slots=True)
+class RecordOptions:
+    """What the command line chose."""
+
+    link: LinkConfig
+    robot: str
+    out: Path
+    cameras: tuple[str, ...] = ()
+    seconds: float | None = None
+    each_s: float | None = None
+    """How long one file lasts; None: there is one."""
+    may_miss: bool = False
+    """Whether a recording with numbered messages missing is still a good one."""
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """The topics to hear; a camera's is named after it."""
+        return (*LIVE, *map(video, self.cameras))
+
+    def name(self, topic: Topic) -> str:
+        """What a topic is called in the file: its key."""
+        return topic.key_for(self.robot)
+
+
+@dataclass(slots=True)
+class Taken:
+    """What has been heard since the start, by topic name."""
+
+    since_ns: int
+    counts: dict[str, int] = field(default_factory=dict)
+    gaps: dict[str, Missing] = field(default_factory=dict)
+    size: int = 0
+    """Bytes handed to the recording."""
+
+    def take(self, topic: Topic, key: str, payload: bytes, arrived_ns: int) -> None:
+        """Count one message."""
+        self.counts[topic.name] = self.counts.get(topic.name, 0) + 1
+        if key not in self.gaps:
+            self.gaps[key] = Missing(topic.name)
+        self.gaps[key].take(payload, arrived_ns)
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """Messages that never came, by key; a topic whose messages bear no number is left out."""
+        return {key: gaps.count for key, gaps in self.gaps.items() if gaps.count is not None}
+
+    def words(self, tape: Tape, now_ns: int) -> str:
+        """One line for people."""
+        elapsed_s = max(1e-3, to_s(now_ns - self.since_ns))
+        rates = ", ".join(f"{name} {count / elapsed_s:.1f} Hz" for name, count in self.counts.items())
+        line = f"{elapsed_s:6.1f} s: {rates or 'nothing is heard yet'}, {self.size / 1e6:.1f} MB"
+        missing = missing_in_words(self.missing)
+        line += f"; MISSING: {missing}" if missing else ""
+        return f"{line}; NOT WRITTEN: {tape.failed}" if tape.failed else line
+
+
+async def record(
+    options: RecordOptions,
+    stop: asyncio.Event,
+    tell: Callable[[str], None],
+    write_figures: WriteFigures = lambda _: None,
+) -> str:
+    """Record until `stop` is set or the time is over; what was recorded, in words.
+
+    A disk that fails ends the writing, is said once, and is counted; hearing goes on. Raises LinkError and
+    RecordingError where it cannot start, TandemError in the end where the recording is not whole or empty:
+    whatever the sender numbered and the recording does not hold makes it so.
+    """
+    metadata = {
+        "robot": options.robot,
+        "topics": " ".join(options.name(topic) for topic in options.topics),
+        "payload": "msgpack, see common/wire/codec.py",
+        "connect": " ".join([*options.link.connect, *options.link.listen]),
+    }
+    tape = Tape(options.out, metadata, options.each_s)
+    taken = Taken(monotonic_ns())
+    link: Link | None = None
+    try:
+        async with open_link(options.link, options.robot) as link:
+            for topic in options.topics:
+                link.subscribe(topic, partial(_take, tape, taken, topic, options.name(topic)))
+            await until_stopped(stop, _wait(options.seconds, tape, lambda: _tell(tape, taken, tell)))
+    finally:
+        await tape.close()
+        overwritten = _overwritten(link)
+        write_figures(to_tree(_metrics(tape, taken, overwritten)))
+    _check(options, tape, taken, overwritten)
+    said = f"{options.out}: {taken.words(tape, monotonic_ns()).strip()}"
+    if overwritten:
+        said += f"; {overwritten} came too fast to be taken one by one"
+    if COMMAND.name not in taken.counts:
+        said += "; no commands: connect to where the master listens too"
+    return said
+
+
+def _take(tape: Tape, taken: Taken, topic: Topic, key: str, payload: bytes, arrived_ns: int) -> None:
+    taken.take(topic, key, payload, arrived_ns)
+    if tape.put(key, payload, arrived_ns):
+        taken.size += len(payload)
+
+
+async def _wait(seconds: float | None, tape: Tape, each: Callable[[], None]) -> None:
+    loop = asyncio.get_running_loop()
+    end_s = None if seconds is None else loop.time() + seconds
+    while end_s is None or loop.time() < end_s:
+        each()
+        await tape.turn()
+        await asyncio.sleep(TELL_S if end_s is None else max(0.0, min(TELL_S, end_s - loop.time())))
+
+
+def _tell(tape: Tape, taken: Taken, tell: Callable[[str], None]) -> None:
+    tell(f"recording, {taken.words(tape, monotonic_ns())} (Ctrl-C ends it)")
+
+
+def _overwritten(link: Link | None) -> int:
+    return 0 if link is None else sum(c.overwritten for c in link.counters().values())
+
+
+def _metrics(tape: Tape, taken: Taken, overwritten: int) -> RecorderMetrics:
+    counters = tape.counters()
+    return RecorderMetrics(
+        recorded=dict(taken.counts),
+        files=[path.name for path in tape.files],
+        put=counters.put,
+        written=counters.written,
+        refused=counters.refused,
+        lost=counters.lost,
+        failed=counters.failed,
+        overwritten=overwritten,
+        missing=taken.missing,
+    )
+
+
+def _check(options: RecordOptions, tape: Tape, taken: Taken, overwritten: int) -> None:
+    counters = tape.counters()
+    if counters.failed:
+        raise TandemError(
+            f"{options.out}: the recording ended early: {counters.failed}; {counters.written} messages are "
+            f"in it and can be read, {counters.refused + counters.lost} are not. Make room and record again"
+        )
+    if counters.refused + counters.lost:
+        raise TandemError(
+            f"{options.out}: the disk was too slow for {counters.refused + counters.lost} of {counters.put} "
+            "messages; they are missing"
+        )
+    if not taken.counts:
+        raise TandemError(
+            f"{options.out}: nothing was heard of {options.robot}: is it running, is that its name, and does "
+            f"somebody listen at {', '.join(options.link.connect) or 'no endpoint'}?"
+        )
+    missing = missing_in_words(taken.missing)
+    if missing and not options.may_miss:
+        raise TandemError(
+            f"{options.out}: messages are missing by their own numbers: {missing} ({overwritten} of all came "
+            "while this recorder was busy; the rest never reached it). What came is in it and can be read; "
+            "record nearer to the robot, or on a host with less to do"
+        )

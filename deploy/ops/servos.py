@@ -1,0 +1,73 @@
+"""`tandem servos`: what servos on a serial bus keep without power, and what they must; see --write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from common.config.load import load_config
+from common.errors import TandemError
+
+if TYPE_CHECKING:
+    from slave.servos.dynamixel.setup import Looked, SetUp
+
+
+def servos(
+    config: Annotated[Path, typer.Argument(help="The slave's TOML file.")],
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
+    ] = None,
+    write: Annotated[
+        bool, typer.Option("--write", help="Replace what differs, in memory that lasts without power.")
+    ] = False,
+) -> None:
+    """Look at every servo of a serial bus: whether it answers, how soon, and what it keeps that must differ.
+
+    Without --write nothing that lasts is written. With it, only where no servo is refused. Status 1 where a
+    slave would not start.
+
+    Example: `tandem servos slave.toml --write`
+    """
+    from slave.config import SlaveConfig
+    from slave.servos.dynamixel.latency import too_late
+    from slave.servos.dynamixel.setup import set_up
+
+    checked = load_config(config, SlaveConfig, list(set_ or ()))
+    bus = checked.servos.dynamixel
+    if checked.servos.backend != "dynamixel" or bus is None:
+        raise TandemError(f'{config}: servos.backend is "{checked.servos.backend}": expected "dynamixel"')
+    found = set_up(bus, checked.skeleton, checked.encoders, write)
+    Console().print(as_table(found))
+    late = too_late(bus.port, found.quickest_s, bus.reply_timeout_s)
+    trouble = [in_words(looked) for looked in found.servos if looked.wrong]
+    left = sum(bool(looked.different) and not looked.written for looked in found.servos)
+    if left and not trouble:
+        trouble.append(f"{left} servos keep what must be replaced: once more with --write")
+    trouble += [late] if late else []
+    if trouble:
+        raise TandemError("; ".join(trouble))
+
+
+def as_table(found: SetUp) -> Table:
+    """One row a servo."""
+    table = Table("joint", "id", "found", title=f"quickest answer {1e3 * found.quickest_s:.1f} ms")
+    for looked in found.servos:
+        said = [difference.words for difference in looked.different]
+        if looked.written:
+            said = [
+                f"{words.partition(', must')[0].replace(' is ', ' was ')}, is {d.wanted} now"
+                for words, d in zip(said, looked.different, strict=True)
+            ]
+        words = "\n".join([*said, *([looked.wrong] if looked.wrong else [])]) or "as it must be"
+        table.add_row(looked.servo.joint, str(looked.servo.id), Text(words))
+    return table
+
+
+def in_words(looked: Looked) -> str:
+    """A servo that cannot be used."""
+    return f"{looked.servo.joint} (id {looked.servo.id}): {looked.wrong}"

@@ -1,0 +1,64 @@
+"""The simulated drives on real buses: the only file here that knows of the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import can
+
+from common.can.bus import CanBus
+from common.can.config import BusConfig
+from common.can.deaf import open_deaf_to
+from common.can.frame import Frame
+from common.clock import monotonic_ns
+from common.process.heap import freeze_heap
+from common.process.pacing import TickGrid
+from common.process.realtime import enter_real_time
+from common.process.runtime import until_stopped
+from common.process.ticker import ticks
+from deploy.sim.drives.faults import Planned
+from deploy.sim.drives.peer import DrivePeer
+from slave.config import SlaveConfig
+from slave.servos.canopen.pdo import TPDO1
+from slave.servos.simulated import CYCLE_NS
+
+log = logging.getLogger("tandem.drives")
+
+
+def _open(config: BusConfig) -> can.BusABC:
+    return open_deaf_to(config, TPDO1)
+
+
+async def run(config: SlaveConfig, stop: asyncio.Event, faults: Sequence[Planned] = ()) -> dict[str, object]:
+    """Be the drives that a slave's file names, until `stop` is set; returns what was counted.
+
+    Raises BusError where a bus cannot be opened.
+    """
+    canopen = config.servos.canopen
+    buses: dict[str, CanBus] = {}
+
+    def send(bus: str, frame_id: int, data: bytes) -> None:
+        if bus in buses:
+            buses[bus].send(Frame(frame_id, data, False))
+
+    peer = DrivePeer(canopen, config.skeleton, config.encoders, send, monotonic_ns(), faults)
+    enter_real_time(config.process.realtime_priority)
+
+    async def move() -> None:
+        async for _ in ticks(TickGrid(monotonic_ns(), CYCLE_NS)):
+            peer.advance(monotonic_ns())
+
+    try:
+        for bus in canopen.buses:
+            buses[bus.name] = CanBus(bus, peer.on_frame, opener=_open)
+            buses[bus.name].open()
+        freeze_heap()
+        where = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in canopen.buses)
+        log.info("%d drives on %s", len(peer.drives), where)
+        await until_stopped(stop, move())
+    finally:
+        await asyncio.gather(*(bus.close() for bus in buses.values()))
+    return {**asdict(peer.counters), "buses": {name: bus.summary() for name, bus in buses.items()}}

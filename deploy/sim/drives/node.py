@@ -1,0 +1,334 @@
+"""One simulated CiA 402 drive: a CANopen node whose dictionary comes from `drive.eds`.
+
+The `canopen` library answers NMT and SDO (expedited and segmented). SYNC, PDOs and heartbeats, which come
+thousands of times a minute, are done here.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import canopen
+from canopen.sdo.exceptions import SdoAbortedError
+
+from common.clock import NS_PER_MS
+from deploy.sim.drives.faults import CODES, DEMAND, Fault
+from deploy.sim.drives.machine import after, statusword
+from deploy.sim.drives.traits import Reformed, Traits
+from slave.servos.canopen import pdo
+from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION, Power
+from slave.servos.canopen.status_bits import FOLLOWS, LIMITED, REMOTE, VOLTAGE, WARNING
+
+EDS = Path(__file__).with_name("drive.eds")
+Send = Callable[[int, bytes], None]
+"""(identifier, data)."""
+_RPDO_COMMUNICATION, _RPDO_ENTRIES, _TPDO_COMMUNICATION, _TPDO_ENTRIES = 0x1400, 0x1600, 0x1800, 0x1A00
+_INVALID = 0x8000_0000
+_FORMATS = {8: "B", 16: "H", 32: "i"}
+_TAKEN = {0x6040: "controlword", 0x607A: "target"}
+_GIVEN = {0x6041: "statusword", pdo.ENCODER: "encoder", 0x6064: "position"}
+_NOT_MAPPABLE, _PRESENT_STATE = 0x0604_0041, 0x0800_0022
+_BOOT, _PRE_OPERATIONAL, _OPERATIONAL = 0x00, 0x7F, 0x05
+_RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
+_PROFILE_POSITION = 1
+_BITS = {
+    Fault.NOT_FOLLOWING: (FOLLOWS, 0),
+    Fault.LIMIT_ACTIVE: (0, LIMITED),
+    Fault.LOCAL: (REMOTE, 0),
+    Fault.NO_VOLTAGE: (VOLTAGE, 0),
+    Fault.WARNS: (0, WARNING),
+}
+"""Bits of the statusword that a fault clears and sets."""
+_DEAF = (Fault.NOT_FOLLOWING, Fault.LOCAL, Fault.NO_VOLTAGE)
+
+
+@lru_cache(maxsize=1)
+def _dictionary() -> canopen.ObjectDictionary:
+    """Shared by all drives: what a drive is told is kept in its node, not here."""
+    return canopen.import_od(str(EDS), node_id=1)
+
+
+class _Wire(canopen.Network):
+    """The library's network without its threads: what it sends goes to the bus, what beats is timed here."""
+
+    def __init__(self, send: Send) -> None:
+        super().__init__()
+        self._deliver = send
+
+    def send_message(self, can_id: int, data: Any, remote: bool = False) -> None:
+        self._deliver(can_id, bytes(data))
+
+    def send_periodic(self, can_id: int, data: Any, period: float, remote: bool = False) -> Any:
+        return _Beat()
+
+
+class _Beat:
+    """A heartbeat as the library sees it; `SimulatedDrive.beat` sends the real one."""
+
+    def update(self, data: object) -> None:
+        """The state is read when it is sent."""
+
+    def stop(self) -> None:
+        """The period is read when it is due."""
+
+
+class SimulatedDrive:
+    """A drive without its motor: `target` is what it wants, `position` and `count` are what it is told."""
+
+    def __init__(self, node_id: int, send: Send, serial: int = 1) -> None:
+        self.id = node_id
+        self._serial = serial
+        self.position = 0
+        """Increments."""
+        self.count = 0
+        """Of the output encoder."""
+        self.target = 0
+        self.limited = False
+        """Whether a limit of its own keeps it from its target."""
+        self.state = Power.SWITCH_ON_DISABLED
+        self.fault = Fault.NONE
+        self.traits = Traits()
+        self.rebooted = False
+        """Set where the drive has lost what it was told; whoever reads it clears it."""
+        self._send_frame = send
+        self._controlword = 0
+        self._pending: bytes | None = None
+        self._rpdo: tuple[struct.Struct, list[str]] | None = None
+        self._tpdo: tuple[struct.Struct, list[str]] | None = None
+        self._stuck = 0
+        self._beaten_ns = 0
+        self._heard_ns: int | None = None
+        self._now_ns = 0
+        self._reformed = Reformed()
+        self._late: list[tuple[int, bytes]] = []
+        self._boot()
+
+    def _boot(self) -> None:
+        self._node = canopen.LocalNode(self.id, _dictionary())
+        self._network = _Wire(self._send)
+        self._node.associate_network(self._network)
+        node: Any = self._node  # half of the library is untyped
+        node.add_read_callback(self._read)
+        node.add_write_callback(self._write)
+        self._rpdo = self._tpdo = self._pending = self._heard_ns = None
+        # fetched where they are written, as they are needed hundreds of times a second
+        self._master_beat = pdo.HEARTBEAT
+        self._dead_ns = self._beat_ns = 0
+        self._controlword = 0
+        self.rebooted = True
+        self._send(pdo.HEARTBEAT + self.id, bytes([_BOOT]))
+        self._node.nmt._state = _PRE_OPERATIONAL
+
+    # what comes in
+
+    def on_frame(self, frame_id: int, data: bytes, now_ns: int) -> None:
+        """NMT, SDO, the targets, and the master's heartbeat."""
+        self._now_ns = now_ns
+        if frame_id == pdo.RPDO1 + self.id:
+            self._pending = data
+        elif frame_id == pdo.NMT:
+            self._on_nmt(data)
+        elif frame_id == self._master_beat and len(data) == 1:
+            self._heard_ns = now_ns
+        elif frame_id == pdo.SDO_REQUEST + self.id and len(data) == 8:
+            segment = self._reformed.segment(data)
+            if segment is not None:
+                self._answer_sdo(segment)
+            else:
+                self._network.notify(frame_id, bytearray(data), 0.0)
+        else:
+            self._network.notify(frame_id, bytearray(data), 0.0)
+
+    def _on_nmt(self, data: bytes) -> None:
+        if len(data) != 2 or data[1] not in (0, self.id):
+            return
+        if data[0] in (_RESET_NODE, _RESET_COMMUNICATION):
+            self._lose_connection()
+            self._boot()
+            return
+        self._network.notify(pdo.NMT, bytearray(data), 0.0)
+        if not self.operational:
+            self._lose_connection()
+
+    @property
+    def operational(self) -> bool:
+        """Whether PDOs pass."""
+        return bool(self._node.nmt._state == _OPERATIONAL)
+
+    def on_sync(self) -> None:
+        """Take in what was told since the last SYNC, and tell how things are."""
+        if not self.operational:
+            return
+        if self._pending is not None and self._rpdo is not None:
+            layout, names = self._rpdo
+            if len(self._pending) == layout.size:
+                taken = dict(zip(names, layout.unpack(self._pending), strict=True))
+                self.target = taken.get("target", self.target)
+                self._command(taken.get("controlword", self._controlword))
+            else:
+                self._emergency(0x8210, 0x11)
+            self._pending = None
+        if self._tpdo is not None:
+            layout, names = self._tpdo
+            now = {"statusword": self.statusword, "encoder": self.encoder, "position": self.position}
+            self._send(pdo.TPDO1 + self.id, layout.pack(*(now[name] for name in names)))
+
+    def beat(self, now_ns: int) -> None:
+        """Send a heartbeat or an answer that is due, and miss the master's heartbeat that is overdue."""
+        self._now_ns = now_ns
+        while self._late and now_ns >= self._late[0][0]:
+            self._send_now(pdo.SDO_ANSWER + self.id, self._late.pop(0)[1])
+        if self._beat_ns and now_ns - self._beaten_ns >= self._beat_ns:
+            self._beaten_ns = now_ns
+            self._send(pdo.HEARTBEAT + self.id, bytes([self._node.nmt._state]))
+        if self._heard_ns is not None and self._dead_ns and now_ns - self._heard_ns > self._dead_ns:
+            self._heard_ns = None
+            if self.state is Power.ENABLED:
+                self._emergency(0x8130, 0x11)
+            self._lose_connection()
+
+    def at_rest(self) -> None:
+        """The motor stands: a fault's reaction is over."""
+        if self.state is Power.FAULT_REACTION:
+            self.state = Power.FAULT
+
+    def fail(self, code: int, register: int) -> None:
+        """A fault of the drive's own: tell it, brake, and stay in fault until it is reset."""
+        if self.state not in (Power.FAULT, Power.FAULT_REACTION):
+            self._emergency(code, register)
+            self.state = Power.FAULT_REACTION
+
+    def happen(self, fault: Fault) -> None:
+        """A fault on demand; NONE ends what lasts."""
+        self._stuck = self.count
+        self.fault, self.limited = fault, False
+        if fault in CODES:
+            self.fail(*CODES[fault])
+        elif fault is Fault.RESTART:
+            self.fault = Fault.NONE
+            self._lose_connection()
+            self._boot()
+
+    # what it says
+
+    @property
+    def statusword(self) -> int:
+        """6041h."""
+        word = statusword(self.state) | (LIMITED if self.limited else 0)
+        clear, set_ = _BITS.get(self.fault, (0, 0))
+        return word & ~clear | set_
+
+    @property
+    def follows(self) -> bool:
+        """Whether it goes where its target is."""
+        return self.state is Power.ENABLED and self.fault not in _DEAF
+
+    @property
+    def encoder(self) -> int:
+        """The encoder's word (2000h)."""
+        if self.fault is Fault.ENCODER_ZERO:
+            return 0
+        if self.fault is Fault.ENCODER_STUCK:
+            return self._stuck
+        flag = {Fault.MAGNET_LOST: pdo.MAGNET_LOST, Fault.PARITY: pdo.PARITY_ERROR}.get(self.fault, 0)
+        return self.count | flag
+
+    def value(self, index: int, subindex: int = 0) -> int:
+        """An entry of its dictionary."""
+        raw: Any = self._node.object_dictionary[index]
+        entry = raw[subindex] if subindex or not hasattr(raw, "decode_raw") else raw
+        return int(entry.decode_raw(self._node.get_data(index, subindex)))
+
+    # within
+
+    def _command(self, controlword: int) -> None:
+        was = self.state
+        if self.fault is Fault.LOCAL:
+            self._controlword = controlword
+            return
+        state = after(self.state, controlword, self._controlword, self.traits.knows_16)
+        if state is Power.ENABLED and self.value(0x6060) != CYCLIC_SYNCHRONOUS_POSITION:
+            state = was
+        self.state, self._controlword = state, controlword
+        recovered = was is Power.FAULT or (was is Power.QUICK_STOP and state is Power.ENABLED)
+        if recovered and state is not was and self.value(0x603F):
+            if self.fault in CODES:
+                self.fault = Fault.NONE
+            self._emergency(0, 0)
+
+    def _lose_connection(self) -> None:
+        if self.state is Power.ENABLED:
+            self.state = Power.QUICK_STOP
+
+    def _emergency(self, code: int, register: int) -> None:
+        self._node.set_data(0x603F, 0, code.to_bytes(2, "little"))
+        self._node.set_data(0x1001, 0, bytes([register]))
+        self._send(pdo.EMERGENCY + self.id, struct.pack("<HB5x", code, register))
+
+    def _send(self, frame_id: int, data: bytes) -> None:
+        if frame_id == pdo.SDO_ANSWER + self.id:
+            self._answer_sdo(self._reformed.answer(data, self.traits.read_form))
+        else:
+            self._send_now(frame_id, data)
+
+    def _answer_sdo(self, data: bytes) -> None:
+        if self.traits.answers_after_ns:
+            self._late.append((self._now_ns + self.traits.answers_after_ns, data))
+        else:
+            self._send_now(pdo.SDO_ANSWER + self.id, data)
+
+    def _send_now(self, frame_id: int, data: bytes) -> None:
+        if self.fault is not Fault.SILENT:
+            self._send_frame(frame_id, data)
+
+    def _read(self, index: int, subindex: int, **_: object) -> int | None:
+        match index:
+            case 0x6041:
+                return self.statusword
+            case 0x6064:
+                return self.position
+            case 0x6061:
+                return _PROFILE_POSITION if self.fault is Fault.WRONG_MODE else self.value(0x6060)
+            case 0x1018 if subindex == 4:
+                return self._serial
+            case pdo.ENCODER:
+                return self.encoder
+        return None
+
+    def _write(self, index: int, subindex: int, data: bytes, **_: object) -> None:
+        if index in (0x1400, 0x1800) and subindex == 1:
+            self._activate(index, int.from_bytes(data, "little"))
+        elif index in (0x1600, 0x1A00) and (self._rpdo if index == 0x1600 else self._tpdo) is not None:
+            raise SdoAbortedError(_PRESENT_STATE)
+        elif index == 0x1016:
+            consumer = int.from_bytes(data, "little")
+            self._master_beat = pdo.HEARTBEAT + (consumer >> 16 & 0x7F)
+            self._dead_ns = (consumer & 0xFFFF) * NS_PER_MS
+        elif index == 0x1017:
+            self._beat_ns = int.from_bytes(data, "little") * NS_PER_MS
+        elif index == 0x6040:
+            self._command(int.from_bytes(data, "little"))
+        elif index == DEMAND:
+            if data[0] > max(Fault):
+                raise SdoAbortedError(0x0609_0030)
+            self.happen(Fault(data[0]))
+
+    def _activate(self, index: int, cob_id: int) -> None:
+        known = _TAKEN if index == _RPDO_COMMUNICATION else _GIVEN
+        layout = None
+        if not cob_id & _INVALID:
+            entries = index + 0x200
+            mapped = [self.value(entries, sub) for sub in range(1, self.value(entries) + 1)]
+            names = [known.get(entry >> 16, "") for entry in mapped]
+            formats = [_FORMATS.get(entry & 0xFF, "") for entry in mapped]
+            if not mapped or not all(names) or not all(formats):
+                raise SdoAbortedError(_NOT_MAPPABLE)
+            layout = struct.Struct("<" + "".join(formats)), names
+        if index == _RPDO_COMMUNICATION:
+            self._rpdo = layout
+        else:
+            self._tpdo = layout

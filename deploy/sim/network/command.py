@@ -1,0 +1,107 @@
+"""`tandem network`: the profiles, and whether this machine's emulated link is as they say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+from common.errors import TandemError
+from common.process.runtime import run, until_stopped
+from deploy.report.output import in_a_folder, write_json
+from deploy.sim.network.figures import DELAY_MS, LOSS_POINTS, RATE_SHARE, Measured
+from deploy.sim.network.network import open_network
+from deploy.sim.network.profile import Profile, load_profile, profile_names
+from deploy.sim.network.view import measured_table, profiles_table
+
+app = typer.Typer(no_args_is_help=True)
+
+
+@app.callback()
+def _group() -> None:
+    """Two hosts on this machine, and a link between them that behaves as a real network."""
+
+
+@app.command("list")
+def list_profiles(
+    profiles: Annotated[list[str] | None, typer.Argument(help="Names or files; all that there are.")] = None,
+) -> None:
+    """Show the profiles, or those named, with where their figures are from.
+
+    Example: `tandem network list 4g`
+    """
+    console = Console()
+    chosen = [load_profile(name) for name in profiles or profile_names()]
+    console.print(profiles_table(chosen))
+    for profile in chosen:
+        console.print(f"[bold]{profile.name}[/bold]: {profile.about}", highlight=False)
+        if profiles:
+            console.print(" ".join(profile.source.split()), style="dim", highlight=False)
+            outages = ", ".join(f"{outage.for_s:g} s at {outage.at_s:g} s" for outage in profile.outages)
+            console.print(f"outages: {outages or 'none'}", style="dim", highlight=False)
+
+
+@app.command()
+def verify(
+    profiles: Annotated[list[str] | None, typer.Argument(help="Names or files; all that there are.")] = None,
+    seconds: Annotated[float, typer.Option(help="How long each is measured.", min=1.0, max=600.0)] = 10.0,
+    backend: Annotated[
+        Literal["auto", "forwarder", "netem"], typer.Option(help="What emulates the link.")
+    ] = "auto",
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report", "--json", help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder
+        ),
+    ] = None,
+) -> None:
+    """Measure the emulated link beside its profile: 200 packets/s both ways, then more than its rate.
+
+    Needs root. Exit status 1 where it is not within 1 ms and 0.5 points of loss of the profile.
+
+    Example: `tandem network verify 4g adsl --seconds 30 --report network.json`
+    """
+    chosen = [load_profile(name) for name in profiles or profile_names()]
+    console = Console()
+    measured: list[Measured] = []
+
+    async def work() -> None:
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task("measuring", total=len(chosen))
+            for profile in chosen:
+                progress.update(task, description=f"measuring {profile.name}")
+                measured.append(await _measure(profile, seconds, backend))
+                progress.advance(task)
+
+    run(lambda stop: until_stopped(stop, work()))
+    _tell(measured, seconds, console)
+    if report is not None:
+        write_json(report, {"seconds": seconds, "profiles": [each.tree() for each in measured]})
+    if len(measured) < len(chosen):
+        raise TandemError("interrupted: not all profiles were measured")
+    off = [each.profile for each in measured if not each.kept]
+    if off:
+        raise TandemError(f"the emulated link is not as these profiles say: {', '.join(off)}")
+
+
+async def _measure(profile: Profile, seconds: float, backend: Any) -> Measured:
+    # an outage is no property of the packets that pass
+    async with open_network(profile.model_copy(update={"outages": []}), backend=backend) as network:
+        return await network.measure(seconds)
+
+
+def _tell(measured: list[Measured], seconds: float, console: Console) -> None:
+    if not measured:
+        return
+    console.print(measured_table(measured))
+    by = ", ".join(sorted({each.backend for each in measured}))
+    console.print(
+        f"{seconds:g} s at 200 packets/s each way, by the {by}. Red: more than {DELAY_MS:g} ms of delay or "
+        f"{LOSS_POINTS:g} points of loss from what was drawn by chance, or that beyond ± of the profile, or "
+        f"{RATE_SHARE:.0%} of the rate off.",
+        style="dim",
+        highlight=False,
+    )

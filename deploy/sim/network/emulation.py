@@ -1,0 +1,92 @@
+"""Both directions of an emulated link, and what may be asked of it. Pure; `forwarder.py` gives it packets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+from common.metrics.published import Summary, to_tree
+from deploy.sim.network.profile import Profile
+from deploy.sim.network.scheduler import Counters, PacketScheduler
+
+TO_ROBOT, TO_OPERATOR = "to_robot", "to_operator"
+DIRECTIONS = (TO_ROBOT, TO_OPERATOR)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkCounters:
+    """What the link has done since it was opened, each way."""
+
+    to_robot: Counters
+    to_operator: Counters
+
+    def tree(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+class Emulation(Protocol):
+    """Whatever makes packets late: our forwarder, or the kernel."""
+
+    name: str
+
+    def set(self, profile: Profile) -> None:
+        """Behave so from now on. Raises NetworkError."""
+
+    def cut(self, cut: bool) -> None:
+        """Let nothing pass, or let it pass again. Raises NetworkError."""
+
+    def counters(self) -> LinkCounters:
+        """Raises NetworkError."""
+
+    def planned(self) -> Mapping[str, Summary]:
+        """How long packets take by what was drawn, each way since the start; empty where it is not told."""
+
+    def close(self) -> None:
+        """End it; nothing passes any more."""
+
+
+class EmulatedLink:
+    """Two schedulers, and the requests by which another process steers them."""
+
+    def __init__(self, profile: Profile, seed: int = 0, now_ns: int = 0) -> None:
+        ways = profile.ways
+        self._ways: dict[str, PacketScheduler[bytes]] = {
+            # each with its own draws: what one direction carries does not change the other's luck
+            TO_ROBOT: PacketScheduler(ways.to_robot, 2 * seed, now_ns),
+            TO_OPERATOR: PacketScheduler(ways.to_operator, 2 * seed + 1, now_ns),
+        }
+
+    def push(self, way: str, now_ns: int, packet: bytes) -> None:
+        """Take an IP packet."""
+        self._ways[way].push(now_ns, packet, len(packet))
+
+    def due(self, now_ns: int) -> Iterator[tuple[str, bytes]]:
+        """The packets that arrive by now, each with its direction."""
+        for way, scheduler in self._ways.items():
+            for packet in scheduler.due(now_ns):
+                yield way, packet
+
+    @property
+    def next_ns(self) -> int | None:
+        """When the next packet arrives; None while none is under way."""
+        times = [ns for scheduler in self._ways.values() if (ns := scheduler.next_ns) is not None]
+        return min(times, default=None)
+
+    def answer(self, request: dict[str, Any], now_ns: int) -> dict[str, Any]:
+        """`{"set": profile}` and `{"cut": bool}` change the link; every answer holds its counters."""
+        if "set" in request:
+            ways = Profile.model_validate(request["set"]).ways
+            self._ways[TO_ROBOT].set(ways.to_robot, now_ns)
+            self._ways[TO_OPERATOR].set(ways.to_operator, now_ns)
+        for scheduler in self._ways.values():
+            scheduler.cut = bool(request.get("cut", scheduler.cut))
+        return {
+            way: {
+                "counters": asdict(scheduler.counters),
+                "late_ms": to_tree(scheduler.late.summary()),
+                "planned_ms": to_tree(scheduler.planned.summary()),
+            }
+            for way, scheduler in self._ways.items()
+        }

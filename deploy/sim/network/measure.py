@@ -1,0 +1,132 @@
+"""Measures an emulated link from both ends: first at a steady rate, then with more than it takes."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from common.clock import to_ns, wall_ns
+from common.errors import NetworkError
+from common.metrics.published import Summary
+from deploy.sim.network.emulation import DIRECTIONS, Emulation
+from deploy.sim.network.figures import Measured, WayMeasured, judge, rate_mbit
+from deploy.sim.network.host import Host
+from deploy.sim.network.probe import Plan
+from deploy.sim.network.profile import Profile, Way
+from deploy.sim.network.scheduler import LOSS, Counters
+
+RATE_HZ = 200.0
+SMALL, FULL = 128, 1400
+"""Bytes of an IP packet: about a command's, and of one that fills a link."""
+START_S = 0.05
+"""From the word to both ends until they begin."""
+LINGER_S = 0.5
+"""Beyond the link's own delay and queue."""
+FLOOD_S, FLOOD_OVER = 1.5, 1.3
+"""How long more than the link's rate is sent, and how much more."""
+MOST_MBIT = 35.0
+"""A faster link is not filled: the probe in Python would be what is measured."""
+
+
+async def measure(
+    hosts: Sequence[Host], profile: Profile, emulation: Emulation, seconds: float, rate_hz: float
+) -> Measured:
+    """Of both directions, for some seconds. Raises NetworkError where nothing arrives."""
+    ways = (profile.ways.to_robot, profile.ways.to_operator)
+    before, counted = emulation.planned(), emulation.counters()
+    count = round(seconds * rate_hz)
+    ends = await _run(hosts, ways, (rate_hz, rate_hz), (count, count), SMALL)
+    after, now = emulation.planned(), emulation.counters()
+    judged = []
+    for number, (way, name) in enumerate(zip(ways, DIRECTIONS, strict=True)):
+        sent, arrivals = ends[number]["sent"], ends[1 - number]["arrivals"]
+        drawn = (_mean_ms(before, after, name), _loss_percent(getattr(counted, name), getattr(now, name)))
+        judged.append(judge(way, sent, arrivals, SMALL, seconds, *drawn))
+    to_robot, to_operator = await _fill(hosts, ways, judged)
+    return Measured(profile.name, emulation.name, to_robot, to_operator)
+
+
+async def _fill(
+    hosts: Sequence[Host], ways: Sequence[Way], judged: Sequence[WayMeasured]
+) -> list[WayMeasured]:
+    """With the rate that came through when more was sent, where the link is slow enough to be filled."""
+    limits = [way.rate_mbit if way.rate_mbit and way.rate_mbit <= MOST_MBIT else 0.0 for way in ways]
+    if not any(limits):
+        return list(judged)
+    # packets a second; an end that has nothing to fill sends one packet
+    rates = [FLOOD_OVER * limit * 1e6 / (8 * FULL) or 1.0 for limit in limits]
+    counts = [round(FLOOD_S * rate) if limit else 1 for rate, limit in zip(rates, limits, strict=True)]
+    ends = await _run(hosts, ways, rates, counts, FULL)
+    filled = []
+    for number, (way, limit, one) in enumerate(zip(ways, limits, judged, strict=True)):
+        if limit:
+            came = rate_mbit(ends[1 - number]["arrivals"], FULL)
+            # what is lost has had its time on the link; what comes twice had it once
+            share = (1.0 - way.loss_percent / 100.0) * (1.0 + way.duplicate_percent / 100.0)
+            one = replace(one, rate_mbit=came, expected_rate_mbit=limit * share)
+        filled.append(one)
+    return filled
+
+
+async def _run(
+    hosts: Sequence[Host], ways: Sequence[Way], rates_hz: Sequence[float], counts: Sequence[int], size: int
+) -> list[dict[str, Any]]:
+    last_s = max(count / rate for count, rate in zip(counts, rates_hz, strict=True))
+    travel_ms = max(way.delay_ms + 6.0 * way.jitter_ms + way.reorder_ms + way.queue_ms for way in ways)
+    plans = [
+        Plan(here.address, there.address, rate, count, size, last_s + travel_ms / 1e3 + LINGER_S)
+        for here, there, rate, count in zip(hosts, hosts[::-1], rates_hz, counts, strict=True)
+    ]
+    probes: list[asyncio.subprocess.Process] = []
+    try:
+        for host, plan in zip(hosts, plans, strict=True):
+            probes.append(await _start(host, plan))
+        for probe in probes:
+            assert probe.stdout is not None
+            await probe.stdout.readline()  # "ready", or nothing: then it tells why at its end
+        word = f"{wall_ns() + to_ns(START_S)}\n".encode()
+        return await asyncio.gather(*(_noted(host, p, word) for host, p in zip(hosts, probes, strict=True)))
+    finally:
+        for probe in probes:
+            if probe.returncode is None:
+                probe.kill()
+                await probe.wait()
+
+
+async def _start(host: Host, plan: Plan) -> asyncio.subprocess.Process:
+    return await asyncio.create_subprocess_exec(
+        *host.command([sys.executable, "-m", "deploy.sim.network.probe", *plan.arguments()]),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+
+
+async def _noted(host: Host, process: asyncio.subprocess.Process, word: bytes) -> dict[str, Any]:
+    said, failed = await process.communicate(word)
+    if process.returncode:
+        words = failed.decode(errors="replace").strip().splitlines()[-1:]
+        raise NetworkError(f"the probe on the {host.name}'s host ended: {' '.join(words)}")
+    noted: dict[str, Any] = json.loads(said)
+    return noted
+
+
+def _loss_percent(before: Counters, after: Counters) -> float | None:
+    """Of the packets between the two; None where what is lost by chance is not counted by itself."""
+    packets = after.packets - before.packets
+    if LOSS not in after.dropped or not packets:
+        return None
+    return 100.0 * (after.dropped[LOSS] - before.dropped.get(LOSS, 0)) / packets
+
+
+def _mean_ms(before: Mapping[str, Summary], after: Mapping[str, Summary], way: str) -> float | None:
+    """Of the packets between the two; None where the emulation does not tell."""
+    if way not in after:
+        return None
+    was, now = before[way], after[way]
+    count = now.count - was.count
+    return (now.total - was.total) / count if count else None

@@ -1,0 +1,67 @@
+"""The simulated suit on real buses: the only file here that knows of the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import can
+
+from common.can.bus import CanBus
+from common.can.config import BusConfig
+from common.clock import to_s
+from common.metrics.published import SuitMetrics
+from common.process.realtime import enter_real_time
+from deploy.sim.suit.config import SuitConfig
+from deploy.sim.suit.echo import open_deaf_to_answers
+from deploy.sim.suit.faults import Outgoing
+from deploy.sim.suit.peer import NewestSync, PublishTruth, SuitPeer
+from deploy.sim.suit.suit import SimulatedSuit, build_suit
+from master.suit.protocol import SuitProtocol
+
+
+async def run(
+    config: SuitConfig,
+    stop: asyncio.Event,
+    publish_truth: PublishTruth | None = None,
+    on_suit: Callable[[SimulatedSuit], None] = lambda _: None,
+) -> SuitMetrics:
+    """Answer every SYNC until `stop` is set; returns what was counted.
+
+    `publish_truth` is called once a tick, after the answers have gone out; `on_suit` once, with the suit
+    that will answer. Raises ConfigError before anything is opened, and BusError where a bus cannot be.
+    """
+    protocol = SuitProtocol.load(config.dbc)
+    suit = build_suit(config, protocol)
+    on_suit(suit)
+    enter_real_time(config.process.realtime_priority)
+    loop = asyncio.get_running_loop()
+
+    def send(outgoing: Outgoing) -> None:
+        bus = buses[outgoing.bus]
+        if outgoing.delay_ns:
+            loop.call_later(to_s(outgoing.delay_ns), bus.send, outgoing.frame)
+        else:
+            bus.send(outgoing.frame)
+
+    def opener(bus: BusConfig) -> can.BusABC:
+        return open_deaf_to_answers(bus, protocol.sync(0))
+
+    peer = SuitPeer(suit, protocol, send, publish_truth)
+    newest = NewestSync(protocol.sync_id, peer.on_frame, loop.call_soon)
+    buses = {bus.name: CanBus(bus, newest.on_frame, opener=opener) for bus in config.buses}
+    try:
+        for bus in buses.values():
+            bus.open()
+        await stop.wait()
+    finally:
+        await asyncio.gather(*(bus.close() for bus in buses.values()))
+    counted = peer.counters
+    return SuitMetrics(
+        syncs=counted.syncs,
+        malformed_syncs=counted.malformed_syncs,
+        ticks=counted.ticks,
+        frames=counted.frames,
+        stale_syncs=newest.stale,
+        buses={name: bus.summary() for name, bus in buses.items()},
+    )

@@ -1,0 +1,163 @@
+"""What the simulated operator does: the motions there are, by name."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from importlib import resources
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from common.errors import ConfigError, ConfigMistake
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from deploy.sim.suit.gait import Curve, Gait, GaitError, Strides
+from deploy.sim.suit.limber import Limber
+from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, MotionError, Move
+
+MOTIONS = {
+    "bottle": "nursing",
+    "grasp": "hand",
+    "walk": "lower_limb",
+    "calibration_pose": None,
+    "sweep": None,
+    "limber": None,
+    "tray": None,
+    "calibration": None,
+}
+"""Each motion, and the one profile that can make it; None: any can."""
+
+STILL_S = 3.5
+"""A sweep begins with standing still this long, so that filters settle and the robot can align."""
+SWEEP_MARGIN_RAD = math.radians(1.0)
+SWEEP_PAUSE_S = 0.2
+SWEEP_SHARE = 0.4
+"""A sweep takes this share of each joint's velocity and acceleration limit at most."""
+
+
+class Motion(Protocol):
+    """Joint angles as a smooth function of time; it loops after `period_s`."""
+
+    @property
+    def period_s(self) -> float:
+        """Time after which it begins anew."""
+
+    def state(self, t_s: ArrayLike) -> tuple[Array, Array, Array]:
+        """Position rad, velocity rad/s and acceleration rad/s², (..., J), at times (...)."""
+
+
+def motion_mistakes(name: str, profile: str) -> list[ConfigMistake]:
+    """None for a motion that the profile can make; else which ones it can."""
+    able = [motion for motion, only in MOTIONS.items() if only in (None, profile)]
+    if name in able:
+        return []
+    return [ConfigMistake("motion", name, f"one of {', '.join(able)} for the profile {profile}")]
+
+
+def load_motion(name: str, skeleton: Skeleton) -> Motion:
+    """The named one of `MOTIONS` for a skeleton.
+
+    Raises ConfigError for another name, for a motion of another profile, and for one whose joints the
+    skeleton does not have or whose angles are beyond their limits.
+    """
+    mistakes = motion_mistakes(name, skeleton.name)
+    if mistakes:
+        raise ConfigError("motion", mistakes)
+    if name == "sweep":
+        return sweep(skeleton)
+    if name in ("limber", "tray", "calibration"):  # off the tray the operator always does this
+        return Limber(skeleton)
+    if name == "calibration_pose":
+        return stand_still(skeleton)
+    text = resources.files(__package__).joinpath(f"{name}.toml").read_text("utf-8")
+    return parse_motion(text, skeleton, source=f"{name}.toml")
+
+
+def parse_motion(text: str, skeleton: Skeleton, source: str) -> Motion:
+    """A motion from TOML text (its forms are described at the heads of bottle.toml and walk.toml)."""
+    table = tomllib.loads(text)
+    if "strides" in table:
+        return _gait(table, skeleton, source)
+    mistakes = _mistakes(table, skeleton)
+    if mistakes:
+        raise ConfigError(source, mistakes)
+    rest = {joint: math.radians(angle) for joint, angle in table["rest_deg"].items()}
+    moves = [
+        Move(joint, move["start_s"], move["duration_s"], math.radians(angle))
+        for move in table["move"]
+        for joint, angle in move["to_deg"].items()
+    ]
+    rest_rad = np.array([rest.get(joint, 0.0) for joint in skeleton.joint_names])
+    try:
+        return MinimumJerkMotion(skeleton.joint_names, rest_rad, moves, table["period_s"])
+    except MotionError as error:
+        raise ConfigError(source, [ConfigMistake("move", "", str(error))]) from None
+
+
+def _gait(table: dict[str, Any], skeleton: Skeleton, source: str) -> Motion:
+    curves = {
+        f"{side}_{joint}": (_curve(curve), ahead)
+        for side, ahead in table["ahead"].items()
+        for joint, curve in table["curve"].items()
+    }
+    try:
+        return Gait(skeleton.joint_names, curves, Strides(period_s=table["period_s"], **table["strides"]))
+    except GaitError as error:
+        raise ConfigError(source, [ConfigMistake("strides", table["strides"], str(error))]) from None
+
+
+def _curve(table: dict[str, Any]) -> Curve:
+    cosines, sines = (tuple(map(math.radians, table[key])) for key in ("cos_deg", "sin_deg"))
+    return Curve(math.radians(table["mean_deg"]), cosines, sines)
+
+
+def stand_still(skeleton: Skeleton) -> Motion:
+    """The zero pose, or as near to it as the limits let: what a calibration asks of the operator."""
+    return MinimumJerkMotion(skeleton.joint_names, _nearest_to_zero(skeleton, 0.0), [], period_s=1.0)
+
+
+def sweep(skeleton: Skeleton) -> Motion:
+    """Each joint after the other up, down and back, to one degree inside its limits."""
+    rest_rad = _nearest_to_zero(skeleton, SWEEP_MARGIN_RAD)
+    moves = []
+    now_s = STILL_S
+    for joint, rest in zip(skeleton.joints, rest_rad.tolist(), strict=True):
+        at = rest
+        for to in (joint.upper_rad - SWEEP_MARGIN_RAD, joint.lower_rad + SWEEP_MARGIN_RAD, rest):
+            if to != at:
+                # peaks of a minimum-jerk move: 1.875 Δ / T and 10 / √3 Δ / T²
+                for_velocity = 1.875 * abs(to - at) / (SWEEP_SHARE * joint.max_velocity_rad_s)
+                for_acceleration = math.sqrt(
+                    10.0 / math.sqrt(3.0) * abs(to - at) / (SWEEP_SHARE * joint.max_acceleration_rad_s2)
+                )
+                duration_s = max(for_velocity, for_acceleration)
+                moves.append(Move(joint.name, now_s, duration_s, to))
+                now_s += duration_s
+            at = to
+        now_s += SWEEP_PAUSE_S
+    return MinimumJerkMotion(skeleton.joint_names, rest_rad, moves, period_s=now_s)
+
+
+def _nearest_to_zero(skeleton: Skeleton, margin_rad: float) -> Array:
+    out: Array = np.clip(0.0, skeleton.lower_rad + margin_rad, skeleton.upper_rad - margin_rad)
+    return out
+
+
+def _mistakes(table: dict[str, Any], skeleton: Skeleton) -> list[ConfigMistake]:
+    """Angles of joints that the skeleton does not have, or beyond their limits."""
+    joints = {joint.name: joint for joint in skeleton.joints}
+    angles = [("rest_deg", table["rest_deg"])]
+    angles += [(f"move.{i}.to_deg", move["to_deg"]) for i, move in enumerate(table["move"])]
+    mistakes = []
+    for where, entries in angles:
+        for name, angle in entries.items():
+            joint = joints.get(name)
+            if joint is None:
+                expected = f"a joint of the skeleton {skeleton.name}"
+                mistakes.append(ConfigMistake(f"{where}.{name}", angle, expected))
+            elif not joint.lower_rad <= math.radians(angle) <= joint.upper_rad:
+                limits = f"{math.degrees(joint.lower_rad):g} to {math.degrees(joint.upper_rad):g}"
+                mistakes.append(ConfigMistake(f"{where}.{name}", angle, limits))
+    return mistakes

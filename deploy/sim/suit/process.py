@@ -1,0 +1,64 @@
+"""The simulated suit's process: answers on CAN, tells those who judge the truth, takes faults from them."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import tomllib
+from collections.abc import Callable
+from contextlib import AsyncExitStack
+from pathlib import Path
+
+from common.config.load import check_config
+from common.errors import ConfigError, ConfigMistake
+from common.link import Link, open_link
+from common.metrics.published import to_tree
+from common.process.launch import WriteFigures
+from common.wire.codec import encode
+from common.wire.messages import Truth
+from common.wire.topics import FAULTS, TRUTH
+from deploy.sim.suit.app import run as answer
+from deploy.sim.suit.config import SuitConfig
+from deploy.sim.suit.faults import FaultsConfig
+from deploy.sim.suit.suit import SimulatedSuit
+
+log = logging.getLogger("tandem.suit")
+
+
+async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+    """Answer until `stop` is set. Without a link the truth is told to nobody."""
+    async with AsyncExitStack() as stack:
+        link: Link | None = None
+        tell: Callable[[Truth], None] | None = None
+        if config.link.connect or config.link.listen:
+            link = await stack.enter_async_context(open_link(config.link, config.robot))
+            put = link.publish(TRUTH)
+            tell = lambda truth: put(encode(truth))  # noqa: E731
+
+        def on_suit(suit: SimulatedSuit) -> None:
+            if link is not None:
+                link.answer(FAULTS, lambda told, _: _take(told, config, suit))
+
+        buses = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in config.buses)
+        log.info("answers every SYNC for %d nodes on %s", len(config.nodes), buses)
+        write_figures(to_tree(await answer(config, stop, tell, on_suit)))
+
+
+def _take(told: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:
+    suit.faults.config = told_faults(told, list(config.nodes))
+    log.info("faults from now on: %s", suit.faults.config.model_dump(exclude_defaults=True) or "none")
+    return b"done"
+
+
+def told_faults(told: bytes, nodes: list[str]) -> FaultsConfig:
+    """The faults that somebody who tests asks for, as in the file's `[faults]`. Raises ConfigError."""
+    where = Path("told faults")
+    try:
+        table = tomllib.loads(told.decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        mistake = ConfigMistake("faults", told[:80], f"valid TOML ({error})")
+        raise ConfigError(where, [mistake]) from None
+    faults = check_config(where, table, FaultsConfig)
+    if mistakes := faults.unknown_nodes(nodes):
+        raise ConfigError(where, mistakes)
+    return faults

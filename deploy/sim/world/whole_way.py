@@ -1,0 +1,235 @@
+"""The whole way on a virtual clock: suit, master, slave and robot step together, far faster than real time.
+
+The same pure parts as in the processes, with the hosts' clocks apart and messages under way between them.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+from common.clock import NS_PER_MS, NS_PER_S
+from common.clock_sync import MasterExchange
+from common.config.load import Model, load_config
+from common.metrics.published import Unreached
+from common.wire.codec import decode, encode
+from common.wire.control import CHALLENGED, read_reply, request_bytes
+from common.wire.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState
+from deploy.examples.profiles import NURSING, example
+from deploy.measure import Trace
+from deploy.sim.network.profile import Profile
+from deploy.sim.network.profile import Way as Direction
+from deploy.sim.suit.config import SuitConfig
+from deploy.sim.suit.faults import Outgoing
+from deploy.sim.suit.motion import Motion
+from deploy.sim.suit.suit import build_suit
+from deploy.sim.world.link import VirtualLink
+from deploy.sim.world.troubles import Troubles, Way
+from master.config import MasterConfig
+from master.lease import LeaseKeeper
+from master.pipeline import CommandWriter, MasterPipeline, Solved
+from master.suit.protocol import SuitProtocol
+from slave.config import SlaveConfig
+from slave.pipeline import SlavePipeline
+from slave.servos.simulated import SimulatedRobot
+
+PERIOD_NS = 5 * NS_PER_MS
+NODE_NS = NS_PER_MS
+"""From SYNC to a node's answer."""
+SOLVE_NS = NS_PER_MS // 2
+SLAVE_PHASE_NS = 2_300_000
+"""The slave's ticks do not fall on the master's."""
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """How the two hosts and the way between them are."""
+
+    start_ns: int = NS_PER_S
+    """What the master's clock shows when the run begins."""
+    slave_ahead_ns: int = 7_123_456_789_012
+    """The slave's clock minus the master's at the start."""
+    slave_drift_ppm: float = 20.0
+    one_way_ns: int = 2 * NS_PER_MS
+    """Of a link that neither loses nor delays anything more; used where there is no `network`."""
+    network: Profile | None = None
+    """How the link behaves, as over an emulated network. Its outages are not played."""
+    network_seed: int = 1
+    profile: str = NURSING
+    motion: Motion | None = None
+    """Of the operator, instead of the one that the suit's file names."""
+    overrides: dict[str, list[str]] = field(default_factory=dict)
+    """Of the example files, by role."""
+
+
+class VirtualRun:
+    """One run; `now_ns` is true time, and the master's clock until that is stepped. Deterministic."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.troubles = Troubles()
+        network = world.network or Profile(both=Direction(delay_ms=world.one_way_ns / NS_PER_MS))
+        self.link = VirtualLink(network, world.network_seed, self._at)
+        self.master_config = _load(MasterConfig, "master", world)
+        self.robot = self.master_config.commanded[0]
+        self.slave_config = _load(SlaveConfig, "slave", world)
+        self._protocol = SuitProtocol.load(self.master_config.capture.dbc)
+        self.suit = build_suit(_load(SuitConfig, "suit", world), self._protocol, world.motion)
+        self._master = MasterPipeline(self.master_config, self._protocol)
+        self._writer = CommandWriter(self.robot)
+        self._lease = LeaseKeeper(self.robot, self.master_config.operator.name)
+        self.clock = MasterExchange()
+        self.slave = SlavePipeline(self.slave_config, draw_token=itertools.count(1).__next__, instance=1)
+        self.now_ns = world.start_ns
+        self._robot = SimulatedRobot(
+            self.slave_config.skeleton, self.slave_config.encoders, origin_ns=self.slave_ns
+        )
+        self.trace = Trace(self.slave_config.skeleton.joint_names)
+        self.commands: list[Command] = []
+        self.states: list[RobotState] = []
+        self.deliver: Callable[[bytes], bool] = lambda _: True
+        """Whether a command passes the link; a test may cut it."""
+        self._under_way: list[tuple[int, int, Callable[[], None]]] = []
+        self._order = itertools.count()
+        self._tick = 0
+
+    @property
+    def master_ns(self) -> int:
+        """The master's clock now."""
+        return self.now_ns + self.troubles.master_stepped_ns
+
+    @property
+    def slave_ns(self) -> int:
+        """The slave's clock now."""
+        return self._robot_ns + self.troubles.slave_stepped_ns
+
+    @property
+    def _robot_ns(self) -> int:
+        """Time at the robot itself, however the slave's clock is stepped."""
+        drift = self.now_ns * self._world.slave_drift_ppm * 1e-6
+        return self.now_ns + self._world.slave_ahead_ns + round(drift)
+
+    def beyond_reach(self) -> dict[str, Unreached]:
+        """What of the operator the robot could not follow, as the master counts it."""
+        return self._master.beyond_reach.metrics()
+
+    def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Go on for some time of the master's clock, or until a condition holds."""
+        end_ns = self.now_ns + round(seconds * NS_PER_S)
+        while self.now_ns < end_ns and not until():
+            self._step()
+
+    def stand_still(self, seconds: float) -> None:
+        """Both processes are stopped for so long: nobody ticks, puts or takes anything; time goes by."""
+        ticks = round(seconds * NS_PER_S / PERIOD_NS)
+        self.now_ns += ticks * PERIOD_NS
+        self._tick += ticks
+
+    def ask(self, action: Action, key: str = "", operator: str | None = None) -> ControlReply:
+        """Ask the robot now; as the master's operator unless told."""
+        operator = self.master_config.operator.name if operator is None else operator
+        request = ControlRequest(self.robot, action, operator, key)
+        if action in CHALLENGED:
+            request = replace(request, challenge=self.ask(Action.STATUS, operator=operator).challenge)
+        return read_reply(self.slave.on_control(request_bytes(request), self.slave_ns), action)
+
+    def _step(self) -> None:
+        begin_ns = self.now_ns
+        self._at(begin_ns, self._capture)
+        self._at(begin_ns + SLAVE_PHASE_NS, self._drive)
+        if self._tick % 50 == 0:
+            self._at(begin_ns + NODE_NS // 2, self._exchange_clocks)
+        self._tick += 1
+        while self._under_way and self._under_way[0][0] < begin_ns + PERIOD_NS:
+            self.now_ns, _, event = heapq.heappop(self._under_way)
+            event()
+        self.now_ns = begin_ns + PERIOD_NS
+
+    def _at(self, when_ns: int, event: Callable[[], None]) -> None:
+        heapq.heappush(self._under_way, (when_ns, next(self._order), event))
+
+    def _capture(self) -> None:
+        sync, late = self._master.tick(self._tick - 1, self.master_ns)
+        if late is not None:
+            self._put(late)
+        if not self.troubles.suit_heard:
+            for bus in self.master_config.capture.buses:
+                self._master.bus_down(bus.name)
+            return
+        answer = self.suit.on_sync(self._protocol.parse_sync(sync.data), self.now_ns)
+        if answer.truth is not None:
+            self.trace.add(answer.truth)
+        for delay_ns, together in itertools.groupby(answer.frames, key=lambda frame: frame.delay_ns):
+            self._at(self.now_ns + NODE_NS + delay_ns, partial(self._on_frames, list(together)))
+
+    def _on_frames(self, frames: list[Outgoing]) -> None:
+        for bus, frame, _ in frames:
+            if self._master.frame(bus, frame.id, frame.data, self.master_ns):
+                solved = self._master.close(self.master_ns)
+                if solved is not None:
+                    self._put(solved)
+
+    def _put(self, solved: Solved) -> None:
+        put_ns = self.master_ns + SOLVE_NS
+        command = self._writer.write(solved, self._lease.token, True, put_ns, put_ns)
+        self.commands.append(command)
+        self.trace.add(command)
+        payload = encode(command)
+        if self.deliver(payload):
+            self._carry(Way.COMMAND, payload, self.on_command, SOLVE_NS)
+
+    def on_command(self, payload: bytes) -> None:
+        """A command reaches the slave now."""
+        self.slave.on_command(payload, self.slave_ns, self.slave_ns)
+
+    def _carry(self, way: Way, payload: bytes, arrive: Callable[[bytes], None], after_ns: int = 0) -> None:
+        for later_ns, carried in self.troubles.carry(way, payload):
+            arrived = partial(arrive, carried)
+            if later_ns:
+                arrived = partial(self._after, later_ns, arrived)
+            self._at(self.now_ns + after_ns, partial(self._send, way, len(carried), arrived))
+
+    def _send(self, way: Way, size: int, arrived: Callable[[], None]) -> None:
+        self.link.send(way, self.now_ns, size, arrived)
+
+    def _after(self, later_ns: int, event: Callable[[], None]) -> None:
+        self._at(self.now_ns + later_ns, event)
+
+    def _drive(self) -> None:
+        now_ns = self.slave_ns
+        self._robot.advance(self._robot_ns)
+        true = self._robot.read()
+        reading = replace(true, read_ns=true.read_ns + self.troubles.slave_stepped_ns)
+        setpoint = self.slave.tick(now_ns, self.troubles.read(reading), self.troubles.body())
+        self.troubles.watch(true, setpoint)
+        if setpoint.ready:
+            self._robot.write(self.troubles.write(setpoint.position_rad))
+            self.slave.written(now_ns)
+        if self._tick % self.slave_config.loop.state_every == 0:
+            self._carry(Way.STATE, self.slave.state(now_ns), self._on_state)
+
+    def _on_state(self, payload: bytes) -> None:
+        state = decode(payload, RobotState, len(self.slave_config.skeleton.joints))
+        self.states.append(state)
+        self._lease.on_state(state, self.master_ns)
+        request = self._lease.request(self.master_ns)
+        if request is not None:
+            reply = self.slave.on_control(encode(request), self.slave_ns)
+            self._lease.on_reply(decode(reply, ControlReply), self.master_ns)
+
+    def _exchange_clocks(self) -> None:
+        self._carry(Way.QUERY, encode(self.clock.query(self.master_ns)), self._on_clock)
+
+    def _on_clock(self, query: bytes) -> None:
+        reply = self.slave.on_clock(query, self.slave_ns, self.slave_ns)
+        self._carry(Way.REPLY, reply, self._on_clock_reply)
+
+    def _on_clock_reply(self, reply: bytes) -> None:
+        self.clock.on_reply(decode(reply, ClockReply), self.master_ns)
+
+
+def _load(model: type[Model], role: str, world: World) -> Model:
+    return load_config(example(role, world.profile), model, world.overrides.get(role, ()))

@@ -1,0 +1,132 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.clock import NS_PER_MS
+from common.clock_sync import Offset
+from common.latency.stages import (
+    MOST_RECENT,
+    STAGES,
+    Durations,
+    LatencyBudget,
+    Passage,
+    RoundTrip,
+    StageTimes,
+    Told,
+)
+from common.metrics.published import Summary
+
+stamps = st.lists(st.integers(0, 100 * NS_PER_MS), min_size=8, max_size=8)
+
+
+def passage(steps_ns: list[int], master_ahead_ns: int = 0) -> Passage:
+    times = [sum(steps_ns[: i + 1]) for i in range(8)]
+    return Passage(*times[:4], *(t - master_ahead_ns for t in times[4:]))
+
+
+@given(
+    st.lists(stamps, min_size=1, max_size=30),
+    st.integers(-(10**15), 10**15),
+    st.integers(-NS_PER_MS, NS_PER_MS),
+)
+def test_the_rows_add_up_to_the_whole(all_steps: list[list[int]], ahead_ns: int, error_ns: int) -> None:
+    budget = LatencyBudget()
+    for steps in all_steps:
+        budget.record(passage(steps, ahead_ns), Offset(ahead_ns + error_ns, NS_PER_MS, trusted=True))
+    rows, total = budget.summary(), budget.total()
+    assert list(rows) == list(STAGES)
+    assert {row.count for row in rows.values()} == {total.count} == {len(all_steps)}
+    assert math.isclose(sum(row.mean for row in rows.values()), total.mean, rel_tol=1e-12, abs_tol=1e-12)
+
+
+def test_each_stage_is_the_time_between_its_stamps() -> None:
+    budget = LatencyBudget()
+    steps = [0, *(n * NS_PER_MS for n in range(1, 8))]
+    budget.record(passage(steps, master_ahead_ns=12345), Offset(12345, 70_000, trusted=True))
+    rows = budget.summary()
+    assert [row.max for row in rows.values()] == [1, 2, 3, 4, 5, 6, 7]
+    assert [round(row.p50, 2) for row in rows.values()] == [1, 2, 3, 4, 5, 6, 7]
+    assert rows["put→received"].bound == 0.07
+    assert budget.total().mean == 28.0
+
+
+def test_an_offset_that_is_off_makes_no_negative_stage() -> None:
+    budget = LatencyBudget()
+    steps = [0, *[NS_PER_MS] * 7]
+    # off by 1.5 ms: received half a millisecond before it was put
+    budget.record(passage(steps), Offset(-3 * NS_PER_MS // 2, 2 * NS_PER_MS, trusted=True))
+    rows = budget.summary()
+    assert budget.early == 1
+    assert rows["put→received"].mean == 0.0
+    assert rows["received→accepted"].mean == 0.5
+    assert budget.total().mean == 5.5
+
+
+def test_what_passed_while_the_offset_was_not_trusted_is_left_out() -> None:
+    budget = LatencyBudget()
+    budget.record(passage([0, *[NS_PER_MS] * 7]), Offset(0, 0, trusted=False))
+    assert budget.untrusted == 1
+    assert budget.summary()["put→received"] == Summary(0)
+    assert budget.total() == Summary(0)
+
+
+def test_budgets_merge() -> None:
+    one, two = LatencyBudget(), LatencyBudget()
+    one.record(passage([0, *[NS_PER_MS] * 7]), Offset(0, 10, trusted=True))
+    two.record(passage([0, *[3 * NS_PER_MS] * 7]), Offset(0, NS_PER_MS, trusted=True))
+    two.record(passage([0, *[3 * NS_PER_MS] * 7]), Offset(0, 0, trusted=False))
+    one.merge(two)
+    rows = one.summary()
+    assert rows["solved→put"].count == 2
+    assert rows["solved→put"].mean == 2.0
+    assert rows["solved→put"].max == 3.0
+    assert rows["put→received"].bound == 1.0
+    assert one.untrusted == 1
+    with pytest.raises(ValueError, match="different stages"):
+        StageTimes("a").merge(StageTimes("b"))
+
+
+@given(st.lists(st.integers(0, 100_000 * NS_PER_MS), min_size=1, max_size=50))
+def test_percentiles_are_good_to_three_digits(durations: list[int]) -> None:
+    recorded = Durations()
+    for duration in durations:
+        recorded.record(duration)
+    summary = recorded.summary()
+    median = min(sorted(durations)[(len(durations) + 1) // 2 - 1] / NS_PER_MS, 60_000)
+    assert math.isclose(summary.p50, median, rel_tol=2e-3, abs_tol=1e-3)
+    assert summary.max == max(durations) / NS_PER_MS
+    assert math.isclose(summary.mean, sum(durations) / len(durations) / NS_PER_MS, rel_tol=1e-12)
+
+
+def test_a_duration_below_zero_is_counted_and_taken_as_zero() -> None:
+    trip = RoundTrip()
+    trip.record(-5)
+    assert trip.clamped == 1
+    assert trip.summary().max == 0
+
+
+def test_stages_take_one_duration_each() -> None:
+    stages = StageTimes("one", "two")
+    with pytest.raises(ValueError, match="1 durations for 2 stages"):
+        stages.record(5)
+    stages.record(NS_PER_MS, 2 * NS_PER_MS)
+    assert stages.total().mean == 3.0
+    assert stages.summary()["two"].mean == 2.0
+
+
+def test_durations_are_told_one_by_one_and_once_each() -> None:
+    told = Told()
+    for duration_ns in (1_500_000, -7, 999):
+        told.record(duration_ns)
+    assert told.take_recent() == (1500, 0, 1)
+    assert told.take_recent() == ()
+    assert (told.count, told.clamped) == (3, 1), "and stay in the whole"
+
+
+def test_of_many_the_newest_are_told() -> None:
+    told = Told()
+    for n in range(MOST_RECENT + 3):
+        told.record(1000 * n)
+    assert told.take_recent() == tuple(range(3, MOST_RECENT + 3))

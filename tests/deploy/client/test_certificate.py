@@ -1,0 +1,127 @@
+"""A person's acts over tls, with a certificate of his own or the master's, at a robot with rules."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from pathlib import Path
+
+import pytest
+
+from common.errors import ConfigError, LinkError, TandemError
+from common.link import open_link
+from common.link.config import AccessConfig, LinkConfig
+from common.link.roles import Role
+from common.wire.codec import decode, encode
+from common.wire.messages import Action, ControlReply, ControlRequest
+from common.wire.stop import StopAnswer, pack_stop_answer, read_stop
+from common.wire.topics import CONTROL, STOP
+from deploy.certificates.folder import stem
+from deploy.client.answer import Answer
+from deploy.client.ask import ask_robots
+from deploy.client.reach import reach
+from deploy.harness.keys import make_keys, tls_of
+from deploy.ops.control.stop import stop_robots
+
+ACCESS = AccessConfig(operators={"nurse-1": ["robot-1"]}, routers=["router-1"])
+
+
+@pytest.fixture(name="keys", scope="module")
+def some_keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_keys(tmp_path_factory.mktemp("keys"), ["tls/127.0.0.1:1"], ["robot-1", "robot-2"])
+
+
+def endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tls/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def asked(at: str, keys: Path, who: str, *actions: Action) -> list[Answer]:
+    async def story() -> list[Answer]:
+        config = LinkConfig(listen=[at], tls=tls_of(keys, Role.ROBOT, "robot-1"), access=ACCESS)
+        async with open_link(config, "robot-1") as robot:
+
+            def answer(payload: bytes, _: int) -> bytes:
+                if read_stop(payload) is not None:
+                    return pack_stop_answer(StopAnswer(True, "estop", ""))
+                return encode(
+                    ControlReply(True, str(decode(payload, ControlRequest).action), "", challenge=1)
+                )
+
+            robot.answer(CONTROL, answer)
+            robot.answer(STOP, answer)
+            where = reach([at], ["robot-1"], "nurse-1", certificate=keys / f"{who}.pem")
+            return [(await ask_robots(where, action))[0] for action in actions]
+
+    return asyncio.run(story())
+
+
+def test_an_operator_engages_and_whoever_is_not_named_does_not(keys: Path) -> None:
+    (engaged,) = asked(endpoint(), keys, "operator-nurse-1", Action.ENGAGE)
+    assert (engaged.done, engaged.guard) == (True, "engage")
+    (stopped,) = asked(endpoint(), keys, "robot-robot-1", Action.ESTOP)
+    assert (stopped.done, stopped.guard) == (True, "estop")
+    (refused,) = asked(endpoint(), keys, "robot-robot-2", Action.ENGAGE)
+    assert not refused.done
+    assert "may your certificate ask it? Its log says who was refused" in refused.text
+
+
+def test_a_secure_endpoint_asks_who_you_are() -> None:
+    with pytest.raises(TandemError, match=r"who are you there\? Name your certificate by --certificate"):
+        reach(["tls/127.0.0.1:1"], ["robot-1"])
+    assert reach(["tcp/127.0.0.1:1"], ["robot-1"]).link.tls is None
+
+
+def test_the_masters_file_lends_its_keys_but_neither_its_doors_nor_its_rules(
+    keys: Path, tmp_path: Path
+) -> None:
+    example = Path("deploy/examples/master.toml").read_text("utf-8")
+    own = tls_of(keys, Role.OPERATOR, "nurse-1")
+    ends = '["tls/10.0.0.1:1"]\nmode = "client"'
+    text = example.replace('["tcp/127.0.0.1:7447"]', ends, 1).replace(
+        "[nodes] ",
+        f'[link.tls]\nca = "{own.ca}"\ncertificate = "{own.certificate}"\nkey = "{own.key}"\n'
+        '[link.access]\noperators = { nurse-1 = ["robot-1"] }\n[nodes] ',
+        1,
+    )
+    (tmp_path / "master.toml").write_text(text)
+    link = reach(None, None, master=tmp_path / "master.toml").link
+    assert (link.connect, link.listen, link.mode) == (["tls/10.0.0.1:1"], [], "client")
+    assert link.tls == own
+    assert link.access is None
+    other = tls_of(keys, Role.ROBOT, "robot-1").certificate
+    assert reach(None, None, master=tmp_path / "master.toml", certificate=other).link.tls == tls_of(
+        keys, Role.ROBOT, "robot-1"
+    )
+
+
+def test_a_certificate_alone_is_no_key(keys: Path, tmp_path: Path) -> None:
+    lonely = tmp_path / f"{stem(Role.OPERATOR, 'nurse-1')}.pem"
+    lonely.write_bytes((keys / lonely.name).read_bytes())
+
+    async def story() -> None:
+        await ask_robots(reach(["tls/127.0.0.1:1"], ["r"], "a", certificate=lonely), Action.STATUS)
+
+    with pytest.raises(LinkError, match=r"ca\.pem cannot be read \(No such file"):
+        asyncio.run(story())
+
+
+def test_an_endpoint_that_is_none_is_still_told(keys: Path) -> None:
+    with pytest.raises(ConfigError, match="expected a protocol out of"):
+        reach(["tsl/127.0.0.1:1"], ["r"], certificate=keys / "operator-nurse-1.pem")
+
+
+def test_with_rules_a_robot_is_seen_with_its_instance_and_stopped_by_whoever_is_named(keys: Path) -> None:
+    at = endpoint()
+
+    async def story() -> list[Answer]:
+        config = LinkConfig(listen=[at], tls=tls_of(keys, Role.ROBOT, "robot-1"), access=ACCESS)
+        async with open_link(config, "robot-1") as robot:
+            robot.answer(STOP, lambda *_: pack_stop_answer(StopAnswer(True, "estop", "stopped", 7)))
+            robot.declare_alive("slave", 7, [at])
+            where = reach([at], [], "nurse-1", certificate=keys / "operator-nurse-1.pem")
+            return await stop_robots(where, everyone=True, within_s=5.0)
+
+    (answer,) = asyncio.run(story())
+    assert (answer.robot, answer.done, answer.instance) == ("robot-1", True, 7)

@@ -1,0 +1,174 @@
+"""A robot's status: from what it sends, as plain values and as a table."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from common.metrics.published import DueMetrics, LeaseMetrics, Summary
+from common.skeleton import load_skeleton
+from common.skeleton.load import profile_names
+from common.wire.codec import encode
+from common.wire.messages import BaseAttitude, RobotState
+from common.wire.topics import Topic
+from deploy.client.answer import Answer
+from deploy.client.status import Heard, HeardOfAll, as_tree, decode_state, status_table
+from tests.published import master_metrics, slave_metrics
+
+
+def state(joints: int = 25, bound_ns: int = 40_000) -> RobotState:
+    zeros, valid = np.zeros(joints), np.ones(joints, np.bool_)
+    valid[3] = False
+    base = BaseAttitude(1, math.radians(90.0), None, 0.0, math.radians(2.0))
+    return RobotState(
+        "robot-1", 1, 1, 1, "track", "follows anna", "anna", valid, zeros, zeros, None, 5_000_000, bound_ns,
+        {"left_elbow": "over-current"}, base, 9,
+    )  # fmt: skip
+
+
+def tree(heard: Heard) -> dict[str, object]:
+    return as_tree(Answer("robot-1", True, "follows anna", "track"), heard)
+
+
+def heard() -> Heard:
+    metrics = slave_metrics(
+        lease=LeaseMetrics("anna", 9, 61.2, 0.1),
+        end_to_end_ms=Summary(5, p99=31.25),
+    )
+    return Heard(state(), metrics)
+
+
+def test_a_status_is_json_and_tells_all() -> None:
+    said = json.loads(json.dumps(tree(heard())))
+    assert (said["guard"], said["reason"], said["operator"]) == ("track", "follows anna", "anna")
+    assert said["faults"] == {"left_elbow": "over-current"}
+    assert said["encoders_invalid"] == 1
+    assert said["base"] == {
+        "tilt_deg": 2.0,
+        "inclination_deg": 90.0,
+        "azimuth_deg": None,
+        "tool_face_deg": 0.0,
+    }
+    assert said["offset_ms"] == {"offset": 5.0, "bound": 0.04, "trusted": True}
+    assert said["lease"]["held_s"] == 61.2
+
+
+def test_an_offset_that_is_not_trusted_has_no_bound() -> None:
+    said = tree(Heard(state(bound_ns=-1)))
+    assert said["offset_ms"] == {"offset": 5.0, "bound": None, "trusted": False}
+
+
+def test_what_the_operator_s_side_doubts_is_said_by_node() -> None:
+    told = heard()
+    told.take(master=master_metrics(doubts={"left_forearm": "its gyro is 5°/s off"}))
+    said = tree(told)
+    assert said["node_doubts"] == {"left_forearm": "its gyro is 5°/s off"}
+    assert "robot-1: node left_forearm: its gyro is 5°/s off" in rendered({"robot-1": said})
+
+
+def test_with_a_lease_it_waits_for_the_master_s_figures_too() -> None:
+    told = heard()
+    told.take(state=state())
+    assert not told.all.is_set()
+    told.take(master=master_metrics())
+    assert told.all.is_set()
+
+
+def test_commands_that_were_due_and_did_not_come_are_said_beside_both_figures() -> None:
+    metrics = slave_metrics(
+        due=DueMetrics(1000, 62),
+        one_way_ms=Summary(938, p99=0.5),
+        one_way_corrected_ms=Summary(1000, p99=4200.0),
+    )
+    said = tree(Heard(state(), metrics))
+    assert said["due"] == {"expected": 1000, "missing": 62}
+    shown = " ".join(rendered({"robot-1": said}).split())
+    assert "62 of 1000 commands were not there when they were due" in shown
+    assert "one way p99 0.5 ms, 4200.0 ms with them" in shown
+    assert "due" not in rendered({"robot-1": tree(heard())})
+
+
+def test_a_robot_that_told_nothing_is_said_to_have_told_nothing() -> None:
+    said = as_tree(Answer("robot-1", False, "does not answer"), Heard())
+    assert said["answers"] is False
+    assert said["faults"] is None
+    shown = rendered({"robot-1": said})
+    assert "no answer" in shown
+    assert "robot-1: does not answer" in shown
+
+
+def test_the_table_fits_and_says_faults_in_words() -> None:
+    shown = rendered({"robot-1": tree(heard()), "robot-2": tree(Heard())})
+    assert max(map(len, shown.splitlines())) <= 80
+    row = next(line for line in shown.splitlines() if line.split()[:1] == ["robot-1"])
+    assert row.split() == ["robot-1", "track", "anna", "61", "2.0", "0.040", "31.2", "2"]
+    assert "robot-1: left_elbow: over-current" in shown
+    assert "robot-1: encoders not heard: 1" in shown
+
+
+@pytest.mark.parametrize("profile", profile_names())
+def test_states_of_any_profile_are_understood(profile: str) -> None:
+    decoded = decode_state(encode(state(len(load_skeleton(profile).joints))))
+    assert decoded is not None
+    assert decoded.lease_id == 9
+
+
+def test_what_is_no_state_is_none() -> None:
+    assert decode_state(b"garbage") is None
+    assert decode_state(encode(state(joints=7))) is None
+
+
+def test_it_waits_until_both_have_come() -> None:
+    async def story() -> None:
+        heard = Heard()
+        heard.take(metrics=slave_metrics())
+        assert not heard.all.is_set()
+        heard.take(state=replace(state(), operator=""))
+        assert heard.all.is_set()
+
+    asyncio.run(story())
+
+
+def rendered(robots: dict[str, dict[str, object]]) -> str:
+    out = io.StringIO()
+    Console(file=out, width=80).print(status_table(robots))
+    return out.getvalue()
+
+
+def test_one_of_two_of_a_name_is_shown_with_its_place() -> None:
+    answer = Answer("robot-1", True, "waits", "hold", 7, "room 1")
+    said = as_tree(answer, heard(), namesakes=1)
+    assert (said["instance"], said["place"], said["namesakes"]) == (7, "room 1", 1)
+    shown = rendered({"robot-1 00000007": said})
+    assert "another robot bears this name; this one is at room 1" in " ".join(shown.split())
+
+
+class Topics:
+    """A link that hands over what is said on it."""
+
+    def __init__(self) -> None:
+        self.hear: dict[str, Callable[[bytes, int], None]] = {}
+
+    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
+        self.hear[topic.name] = on_payload
+
+
+def test_what_two_of_a_name_say_is_not_mixed() -> None:
+    link: Any = Topics()
+    told = HeardOfAll(link)
+    for instance, reason in ((1, "one"), (2, "other"), (1, "one")):
+        link.hear["state"](encode(replace(state(), instance=instance, reason=reason)), 0)
+    assert [getattr(told.of(instance).state, "reason", None) for instance in (1, 2, 3)] == [
+        "one",
+        "other",
+        None,
+    ]

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import io
+import json
+
+import pytest
+from rich.console import Console
+
+from deploy.experiments.accuracy.papers.figures import Experiment, Figure, gather
+from deploy.experiments.accuracy.papers.run import run_all
+from deploy.experiments.accuracy.papers.table import experiment_table, experiment_tree
+
+
+def made_up(seed: int) -> list[Figure]:
+    return [
+        Figure("error", "°", (0.1 * seed, 0.2), paper=1.5, target=0.35),
+        Figure("spread", "°", (float(seed),)),
+    ]
+
+
+MADE_UP = Experiment("X", "made up", made_up, ("a note",))
+
+
+def test_mean_and_worst_are_over_seeds_and_sides() -> None:
+    error, spread = gather({seed: made_up(seed) for seed in (1, 2, 3)})
+    assert error.mean == pytest.approx((0.1 + 0.2 + 0.3 + 3 * 0.2) / 6)
+    assert error.worst == pytest.approx(0.3)
+    assert error.met is True
+    assert spread.met is None, "nothing is asked of it"
+
+
+def test_one_bad_seed_misses_the_target() -> None:
+    assert gather({seed: made_up(seed) for seed in (1, 2, 3, 4)})[0].met is False
+
+
+@pytest.mark.parametrize("values", [(), (float("nan"),)])
+def test_a_seed_that_tells_nothing_has_missed(values: tuple[float, ...]) -> None:
+    rows = gather({1: made_up(1), 2: [Figure("error", "°", values, 1.5, 0.35)]})
+    assert rows[0].met is False
+
+
+def test_every_experiment_runs_with_every_seed() -> None:
+    done = list(run_all([MADE_UP], [1, 2, 3], jobs=1))
+    assert [(experiment.key, seed) for experiment, seed, _ in done] == [("X", 1), ("X", 2), ("X", 3)]
+
+
+def test_other_processes_find_the_same() -> None:
+    other = {seed: figures for _, seed, figures in run_all([MADE_UP], [1, 2], jobs=2)}
+    assert other == {seed: made_up(seed) for seed in (1, 2)}
+
+
+def test_table_and_report_say_the_papers_figure_ours_and_whether_it_was_reached() -> None:
+    rows = gather({seed: made_up(seed) for seed in (1, 4)})
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(experiment_table(MADE_UP, rows))
+    text = console.export_text()
+    assert "1.5" in text
+    assert "0.4" in text
+    assert "missed" in text
+    assert "a note" in text
+    tree = json.loads(json.dumps(experiment_tree(MADE_UP, rows)))
+    assert tree["figures"][0] == {
+        "name": "error",
+        "unit": "°",
+        "paper": 1.5,
+        "target": 0.35,
+        "mean": pytest.approx(0.225),
+        "worst": pytest.approx(0.4),
+        "met": False,
+        "by_seed": {"1": [0.1, 0.2], "4": [0.4, 0.2]},
+    }

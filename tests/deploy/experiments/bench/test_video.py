@@ -1,0 +1,32 @@
+"""What video does to commands and states on a link of 1 Mbit/s each way; each run in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+
+def run(video: str, seconds: float) -> dict[str, Any]:
+    command = [sys.executable, "-m", "deploy.experiments.bench.video", video, "--seconds", str(seconds)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    measured: dict[str, Any] = json.loads(done.stdout)
+    return measured
+
+
+def test_video_delays_no_command_and_states_hardly_but_would_if_nothing_held_it_back() -> None:
+    without, beside, unheld = (run(video, 2.5) for video in ("off", "controlled", "uncontrolled"))
+    assert beside["video"]["fps"] > 1
+    assert beside["command_ms"]["p50"] < 1.5 * without["command_ms"]["p50"]
+    # a state may wait for one picture: 30 ms of it, and what came before it was known
+    assert beside["state_ms"]["p50"] < without["state_ms"]["p50"] + 60
+    assert unheld["state_ms"]["p50"] > without["state_ms"]["p50"] + 300
+
+
+@pytest.mark.bench
+def test_commands_p99_with_video_is_at_most_half_as_much_again() -> None:
+    without, beside = run("off", 20.0), run("controlled", 20.0)
+    assert beside["command_ms"]["p99"] <= 1.5 * without["command_ms"]["p99"]

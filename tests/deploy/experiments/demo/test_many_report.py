@@ -1,0 +1,117 @@
+"""What a run of several robots says of each, and when it counts as failed."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+from rich.console import Console
+
+from common.metrics.published import MasterMetrics, SlaveMetrics, Summary, Ticks
+from common.wire.messages import RobotState
+from deploy.experiments.demo.many_report import ManyReport, make_many_report, many_table
+from deploy.experiments.demo.report import Seen
+from deploy.experiments.demo.run import DemoOptions
+from deploy.harness.rig import Rig, robot_name, slave_name
+from deploy.measure import Trace
+from tests.published import guard_metrics, master_metrics, slave_metrics
+
+JOINTS = ("left_elbow_pitch",)
+ROBOTS = 8
+HELD = {
+    "robot": "robot-3",
+    "at_s": 2.0,
+    "reason": "no encoder",
+    "lasted_s": 1.0,
+    "host": "the host kept its time",
+}
+COUNTED = slave_metrics(
+    ticks=Ticks(4000, 3),
+    guard=guard_metrics(received=150, accepted=140, dropped={"lease": 10}),
+    one_way_ms=Summary(140, p99=1.25),
+    end_to_end_ms=Summary(140, p99=30.5),
+)
+WELL = master_metrics()
+
+
+def state(guard: str) -> RobotState:
+    zeros, valid = np.zeros(1), np.ones(1, np.bool_)
+    return RobotState("r", 1, 1, 1, guard, "", "nurse-1", valid, zeros, zeros, None, 0, 1)
+
+
+def report(
+    lost_by: int = 0,
+    ended: dict[str, int] | None = None,
+    problem: str = "",
+    counted_last: SlaveMetrics | None = COUNTED,
+    master: MasterMetrics | None = WELL,
+) -> ManyReport:
+    """Of a run in which robot 1 was engaged first, and one robot was in `track` for half of the time only."""
+
+    def child(counted: MasterMetrics | SlaveMetrics | None) -> SimpleNamespace:
+        return SimpleNamespace(metrics=lambda kind: counted, cpu_percent=12.34, rss_mb=98.76)
+
+    def observer(number: int) -> SimpleNamespace:
+        guards = ["track"] * 100 if number != lost_by else ["track", "hold"] * 50
+        if number == -lost_by:
+            guards = ["hold"] * 100
+        if number == 1:
+            guards = ["hold"] * 50 + guards
+        return SimpleNamespace(trace=Trace(JOINTS), states=[state(guard) for guard in guards])
+
+    numbers = range(1, ROBOTS + 1)
+    slaves = [slave_name(n) for n in numbers]
+    observers = {robot_name(n): observer(n) for n in numbers}
+    children = {name: child(COUNTED) for name in slaves} | {"master": child(master)}
+    children[slaves[-1]] = child(counted_last)
+    rig = SimpleNamespace(
+        slaves=slaves, observers=observers, observer=observers["robot-1"], children=children
+    )
+    statuses = dict.fromkeys(children, 0) | (ended or {})
+    return make_many_report(DemoOptions(), cast(Rig, rig), statuses, Seen([HELD], {}, problem))
+
+
+def test_each_robot_has_its_own_figures() -> None:
+    made = report()
+    assert made.problems == []
+    assert list(made.tree["robots"]) == [f"robot-{i}" for i in range(1, 9)]
+    assert made.tree["robots"]["robot-8"]["accepted"] == 140
+    assert made.tree["robots"]["robot-8"]["in_track"] == 1.0
+    assert made.tree["cpu_percent"]["slave-8"] == 12.3
+
+
+def test_a_process_that_failed_a_robot_that_never_tracked_and_why_it_was_given_up_are_named() -> None:
+    made = report(lost_by=3, ended={"slave-5": 1}, problem="robot-3 held 3 times within 20 s")
+    assert made.problems == ["slave-5 ended with status 1", "robot-3 held 3 times within 20 s"]
+    assert made.tree["robots"]["robot-3"]["in_track"] == 0.5
+    assert made.tree["holds"] == [HELD]
+
+
+def test_only_what_follows_the_first_tracking_counts_as_left() -> None:
+    robots = report().tree["robots"]
+    assert robots["robot-1"]["in_track"] == 1.0
+
+
+def test_a_robot_that_never_tracked_is_a_problem() -> None:
+    assert report(lost_by=-2).problems == ["robot-2 never reached track"]
+
+
+def test_a_process_without_figures_and_a_robot_without_commands_are_problems() -> None:
+    assert report(counted_last=None).problems == ["robot-8 left no figures"]
+    deaf = replace(COUNTED, guard=replace(COUNTED.guard, received=0))
+    assert report(counted_last=deaf).problems == ["no command reached robot-8: nothing of it was judged"]
+    assert report(master=None).problems == ["the master left no figures"]
+
+
+def test_the_table_has_a_row_each_and_fits() -> None:
+    out = io.StringIO()
+    Console(file=out, width=80).print(many_table(report(lost_by=3).tree))
+    lines = out.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    rows = {line.split()[0]: line.split()[1:] for line in lines if "robot-" in line and "%" in line}
+    assert rows["robot-2"] == ["100%", "3", "4000", "12", "1.2", "30.5", "–", "–"]
+    assert rows["robot-3"][0] == "50%"
+    assert "robot-3 held at 2.0 s for 1.0 s: no encoder" in out.getvalue()

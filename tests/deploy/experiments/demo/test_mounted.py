@@ -1,0 +1,64 @@
+"""A real person's sensors, worn askew, drive the simulated legs: mounted from the recording itself."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.quaternion import Array
+from common.skeleton import load_skeleton
+from deploy.experiments.demo.mounted import mount
+from deploy.sim.world.whole_way import VirtualRun, World
+
+LEGS = load_skeleton("lower_limb")
+
+
+def knees_deg(recording: Path, overrides: list[str]) -> Array:
+    """What the master commands of both knees over the first steps and sitting down, (T, 2)."""
+    master = ["estimation.stance_s=1.0", *overrides]
+    run = VirtualRun(
+        World(
+            slave_ahead_ns=0,
+            slave_drift_ppm=0.0,
+            one_way_ns=500_000,
+            profile="lower_limb",
+            overrides={"suit": [f'replay="{recording}"'], "master": master},
+        )
+    )
+    run.run(13.0)
+    positions = np.degrees([command.position_rad for command in run.commands if command.valid.all()])
+    assert len(positions) > 200
+    return positions[:, [LEGS.joint_names.index(f"{side}_knee_flexion") for side in ("left", "right")]]
+
+
+@pytest.mark.recordings
+def test_knees_bend_forwards_once_the_sensors_are_mounted(tmp_path: Path) -> None:
+    folder = os.environ.get("TANDEM_DATA")
+    if not folder:
+        pytest.skip("TANDEM_DATA does not name the folder of recordings")
+    recording = Path(folder) / "human_full_body.npz"
+    mounted = mount(recording, LEGS, tmp_path)
+    assert mounted.left == {}
+    knees = knees_deg(recording, mounted.overrides)
+    assert knees.min() > -10.0
+    assert (knees.max(axis=0) > 90.0).all()
+    # by the stance alone they would bend the wrong way, where the robot's stay at their end
+    assert (knees_deg(recording, []).max(axis=0) < 10.0).all()
+
+
+def test_a_recording_without_a_stance_leaves_all_to_it(tmp_path: Path) -> None:
+    random = np.random.default_rng(3)
+    arrays: dict[str, Any] = {"t_s": 0.01 * np.arange(600)}
+    for name in LEGS.segment_names:
+        arrays[f"{name}_acc"] = random.standard_normal((600, 3)) + [0.0, 0.0, 9.8]
+        arrays[f"{name}_gyr"] = random.standard_normal((600, 3)) * 2.0
+    path = tmp_path / "restless.npz"
+    np.savez(path, **arrays)
+    mounted = mount(path, LEGS, tmp_path)
+    assert mounted.overrides == []
+    assert set(mounted.left) == set(LEGS.segment_names)
+    assert "stood still" in mounted.left["pelvis"]

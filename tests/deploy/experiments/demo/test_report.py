@@ -1,0 +1,265 @@
+"""The report's tree, of a run on the virtual clock in place of three processes."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+from rich.console import Console
+
+from common.metrics.published import MasterMetrics, SlaveMetrics, Summary, Ticks
+from common.wire.messages import Action
+from deploy.experiments.demo.report import Report, Seen, make_report
+from deploy.experiments.demo.run import DemoOptions
+from deploy.experiments.demo.view import print_report
+from deploy.harness.rig import Rig
+from deploy.measure import Trace
+from deploy.measure.tables import verdict_table
+from deploy.measure.targets import BENCH, BY_PROFILE, DEMO, of_demo, verdicts
+from deploy.sim.world.whole_way import VirtualRun, World
+from slave.pipeline import SlavePipeline
+from tests.published import master_metrics, slave_metrics
+
+ENDED_WELL: dict[str, int | None] = {"master": 0, "suit": 0, "slave": 0}
+
+
+@dataclass
+class FakeChild:
+    role: str
+    slave: SlaveMetrics
+    published: bool = True
+    cpu_percent: float = 12.34
+    rss_mb: float = 56.78
+
+    def metrics(self, kind: type[MasterMetrics | SlaveMetrics]) -> MasterMetrics | SlaveMetrics | None:
+        if not self.published:
+            return None
+        if kind is SlaveMetrics:
+            return self.slave
+        return master_metrics(ticks=Ticks(5, 0), frames_in_to_put_ms=Summary(9, 1.0, 1.0, 1.5, 2.0))
+
+
+def told_by(slave: SlavePipeline) -> SlaveMetrics:
+    """What the slave of a run on the virtual clock would have published."""
+    budget, counters = slave.journeys.budget, slave.guard.counters
+    return slave_metrics(
+        ticks=Ticks(5, 0),
+        guard=counters.metrics(str(slave.guard.state), slave.guard.reason),
+        stages_ms=budget.summary(),
+        end_to_end_ms=budget.total(),
+        one_way_ms=slave.one_way.summary(),
+        one_way_corrected_ms=slave.due.corrected.summary(),
+        commands=slave.arrivals.metrics(),
+        due=slave.due.metrics(),
+    )
+
+
+def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
+    observer = SimpleNamespace(
+        trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen, video=None
+    )
+    children = {role: FakeChild(role, told_by(run.slave)) for role in ENDED_WELL}
+    return cast(Rig, SimpleNamespace(observer=observer, children=children))
+
+
+def followed(profile: str, seconds: float) -> VirtualRun:
+    """Some seconds on one host: one clock, half a millisecond of link."""
+    run = VirtualRun(World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile))
+    run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
+    run.run(1.0)
+    assert run.ask(Action.ENGAGE).done
+    run.run(seconds)
+    for state in run.states:
+        run.trace.add(state)
+    return run
+
+
+@pytest.fixture(scope="module")
+def tracked() -> VirtualRun:
+    return followed("nursing", 12.0)
+
+
+@pytest.fixture(scope="module")
+def report(tracked: VirtualRun) -> Report:
+    return make_report(DemoOptions(), rig(tracked, ["hold", "align", "track"]), ENDED_WELL)
+
+
+def text(report: Report) -> str:
+    out = io.StringIO()
+    print_report(report, Console(file=out, width=80, color_system=None))
+    return out.getvalue()
+
+
+def test_a_good_run_has_no_problem_and_is_plain_json(report: Report) -> None:
+    assert report.problems == []
+    assert "the robot never held by itself" in text(report)
+    assert "the host itself was not measured" in " ".join(text(report).split())
+    assert json.loads(json.dumps(report.tree, allow_nan=False)) == report.tree
+    predict = report.tree["motion_by_strategy"]["predict"]
+    assert report.tree["motion_lag_ms"] == pytest.approx(predict["lag_ms"], abs=3.0)
+
+
+def test_the_replay_of_the_run_s_own_strategy_moves_as_the_run_did(report: Report) -> None:
+    motion, replayed = report.tree["motion"], report.tree["motion_by_strategy"]["predict"]
+    for figure in ("rmse_deg", "aligned_rmse_deg", "roughness"):
+        assert replayed[figure] == pytest.approx(motion[figure], rel=0.1), figure
+
+
+def test_predict_shows_a_third_of_hold_s_error_in_the_same_run(report: Report) -> None:
+    hold = report.tree["motion_by_strategy"]["hold"]
+    over_hold = report.tree["rmse_over_hold"]
+    assert over_hold == pytest.approx(report.tree["motion"]["rmse_deg"] / hold["rmse_deg"])
+    assert over_hold <= 1 / 3
+    found = {v.target.name: v for v in verdicts(report.tree, DEMO)}["same-instant RMSE / hold's"]
+    assert (found.value, found.met) == (over_hold, True)
+    for words in ("same commands, each strategy", "this run", "hold, replayed", "RMSE / hold's"):
+        assert words in text(report)
+
+
+def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualRun) -> None:
+    blind = rig(tracked, ["track"])
+    blind.observer.trace = Trace(tracked.trace.joint_names)
+    report = make_report(DemoOptions(), blind, ENDED_WELL)
+    assert (report.problems, report.comparison, report.motion) == ([], None, None)
+    assert (report.tree["motion_by_strategy"], report.tree["rmse_over_hold"]) == ({}, None)
+    shown = text(report)
+    assert "no truth to judge by" in shown
+    assert "each strategy" not in shown
+
+
+def test_every_problem_is_named(tracked: VirtualRun) -> None:
+    failed = rig(tracked, ["hold"])
+    failed.observer.trace = Trace(tracked.trace.joint_names)
+    cast(FakeChild, failed.children["slave"]).published = False
+    seen = Seen(problem="robot-1 held 3 times within 20 s")
+    problems = make_report(DemoOptions(), failed, {**ENDED_WELL, "slave": -9}, seen).problems
+    assert problems == [
+        "slave ended with status -9",
+        "slave left no figures",
+        "the robot never reached track",
+        "robot-1 held 3 times within 20 s",
+    ]
+
+
+def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: VirtualRun) -> None:
+    host = {
+        "ticks": {"expected": 90, "missed": 40},
+        "longest_ms": 143.0,
+        "priority": True,
+        "steal_percent": 4.2,
+    }
+    row = {
+        "robot": "robot-1",
+        "at_s": 6.3,
+        "reason": "no encoder",
+        "lasted_s": 1.7,
+        "host": "the host kept its time",
+    }
+    report = make_report(DemoOptions(), rig(tracked, ["track"]), ENDED_WELL, Seen([row], host))
+    assert (report.tree["holds"], report.tree["host"], report.problems) == ([row], host, [])
+    shown = " ".join(text(report).split())
+    assert "ticks missed: master 0 of 5, robot 0 of 5; by the host itself, of a bare loop: 40 of 90" in shown
+    assert "still for 143 ms at most, 4.2 % of its time stolen" in shown
+    assert "robot-1 held at 6.3 s for 1.7 s: no encoder (the host kept its time)" in shown
+
+
+def test_a_hand_s_report_has_its_five_joints_its_curves_and_paper_b_s_targets() -> None:
+    run = followed("hand", 5.0)
+    report = make_report(DemoOptions(profile="hand"), rig(run, ["hold", "align", "track"]), ENDED_WELL)
+    tree = json.loads(json.dumps(report.tree, allow_nan=False))
+    assert tree["options"]["profile"] == "hand"
+    assert tree["options"]["motion"] == "grasp"
+    assert list(tree["synergies"]) == [f"right_{f}" for f in ("thumb", "index", "middle", "ring", "little")]
+    assert tree["worst_joint"]["max_deg"] == max(row["max_deg"] for row in tree["accuracy"].values())
+    found = {v.target.name: v.met for v in verdicts(tree, BY_PROFILE["hand"])}
+    assert found["finger joint's RMSE, the worst (paper B)"]
+    assert found["finger joint's error, the largest (paper B)"]
+    shown = text(report)
+    for words in ("right_little_dipj", "as a robot's joints", "angular velocity, °/s", "(paper B)"):
+        assert words in shown
+    for words in ("η", "elbow"):
+        assert words not in shown
+
+
+def test_every_profile_has_its_targets_and_the_nursing_robot_no_others_than_before() -> None:
+    assert set(BY_PROFILE) == {"nursing", "hand", "lower_limb"}
+    assert BY_PROFILE["nursing"] is DEMO
+    assert len(DEMO) == 14
+
+
+@pytest.mark.parametrize("profile", sorted(BY_PROFILE))
+def test_every_target_s_path_leads_to_a_figure_in_a_real_report(profile: str) -> None:
+    """A renamed figure would not be missed otherwise: its target would only not be judged."""
+    report = make_report(DemoOptions(profile=profile), rig(followed(profile, 8.0), ["track"]), ENDED_WELL)
+    tree = json.loads(json.dumps(report.tree, allow_nan=False))
+    nowhere = [v.target.name for v in verdicts(tree, BY_PROFILE[profile]) if v.value is None]
+    assert nowhere == []
+
+
+def test_a_figure_that_is_missing_is_not_judged_and_neither_zero_nor_met() -> None:
+    for targets in (*BY_PROFILE.values(), BENCH):
+        for verdict in verdicts({}, targets):
+            assert (verdict.value, verdict.met) == (None, None)
+    assert "not judged" in shown_verdicts({})
+
+
+def shown_verdicts(tree: dict[str, object]) -> str:
+    out = io.StringIO()
+    Console(file=out, width=80).print(verdict_table("targets", verdicts(tree, DEMO)))
+    return out.getvalue()
+
+
+def test_a_run_in_which_no_command_reached_the_robot_failed(tracked: VirtualRun) -> None:
+    deaf = rig(tracked, ["track"])
+    child = cast(FakeChild, deaf.children["slave"])
+    child.slave = replace(child.slave, guard=replace(child.slave.guard, received=0))
+    assert make_report(DemoOptions(), deaf, ENDED_WELL).problems == [
+        "no command reached the robot: nothing below was judged"
+    ]
+
+
+def test_a_run_in_which_no_command_was_observed_failed(tracked: VirtualRun) -> None:
+    deaf = rig(tracked, ["track"])
+    deaf.observer.commands = []
+    assert make_report(DemoOptions(), deaf, ENDED_WELL).problems == [
+        "no command was observed: nothing below was judged"
+    ]
+
+
+def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
+    run = followed("nursing", 5.0)
+    run.stand_still(5.0)
+    run.run(5.0)
+    report = make_report(DemoOptions(), rig(run, ["track"]), ENDED_WELL)
+    verdict = {v.target.name: v for v in verdicts(report.tree, DEMO)}["commands due that never came"]
+    assert verdict.met is False
+    assert verdict.value == pytest.approx(62, abs=4)
+    assert "that were not there when they were due" in " ".join(text(report).split())
+    assert "it does not tell how soon the robot answers" in " ".join(text(report).split())
+
+
+def test_paper_b_s_60_ms_are_of_one_way_and_lag_and_fail_where_the_link_is_slow(report: Report) -> None:
+    tree = report.tree
+    lag_ms = max(0.0, tree["motion_lag_ms"])
+    assert tree["one_way_plus_lag_ms"] == pytest.approx(tree["one_way_ms"]["corrected"]["p99"] + lag_ms)
+    slow = {**tree, "one_way_plus_lag_ms": 61.0}
+    found = {v.target.name: v.met for v in verdicts(slow, BY_PROFILE["hand"])}
+    assert found["one way p99 + motion lag (paper B)"] is False
+
+
+@pytest.mark.parametrize(("p99_ms", "core_percent", "met"), [(5.0, 25.0, True), (5.1, 25.1, False)])
+def test_with_canopen_drives_their_answers_and_the_robot_s_core_are_judged_too(
+    p99_ms: float, core_percent: float, met: bool
+) -> None:
+    tree = {
+        "cpu_percent": {"slave": core_percent},
+        "servos": {"times_ms": {"sync_to_positions": {"p99": p99_ms}}},
+    }
+    found = {v.target.name: v.met for v in verdicts(tree, of_demo("nursing", "canopen"))}
+    assert found["SYNC → all positions, p99"] is met
+    assert found["robot, of one core"] is met
+    assert of_demo("nursing", "simulated") == DEMO

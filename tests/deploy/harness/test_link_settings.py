@@ -1,0 +1,24 @@
+import pytest
+
+from common.link.config import LinkConfig
+from common.link.configuration import zenoh_configuration
+from deploy.harness.link_settings import needed_age_s, open_timeout_s
+from deploy.sim.network import load_profile
+
+
+@pytest.mark.parametrize(
+    ("profile", "expected_s"), [("lan", 1.0), ("intercontinental", 1.0), ("geo-satellite", 4.0)]
+)
+def test_a_slow_line_is_given_the_round_trips_that_opening_takes(profile: str, expected_s: float) -> None:
+    opening_s = open_timeout_s(load_profile(profile))
+    assert opening_s == expected_s
+    settings = zenoh_configuration(LinkConfig(listen=["tcp/127.0.0.1:7447"], open_timeout_s=opening_s))
+    assert settings["transport"]["unicast"] == {
+        "open_timeout": 1e3 * expected_s,
+        "accept_timeout": 1e3 * expected_s,
+    }
+
+
+def test_commands_over_a_short_line_keep_the_guards_own_limit() -> None:
+    assert needed_age_s(load_profile("4g")) == 0.3
+    assert needed_age_s(load_profile("geo-satellite")) > 0.6

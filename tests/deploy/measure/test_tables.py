@@ -1,0 +1,176 @@
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from deploy.measure import MovedSeries, SolvedSeries, TruthSeries, accuracy, motion
+from deploy.measure.tables import (
+    Live,
+    accuracy_table,
+    latency_table,
+    live_view,
+    motion_table,
+    strategies_table,
+    verdict_table,
+)
+from deploy.measure.targets import BENCH, DEMO, Target, verdicts
+
+NAMES = [
+    *("neck_yaw", "neck_pitch", "waist_pitch"),
+    *(f"{s}_{j}" for s in ("left", "right") for j in ("shoulder_pitch", "shoulder_roll", "shoulder_yaw")),
+    *(f"{s}_{j}" for s in ("left", "right") for j in ("elbow_pitch", "elbow_roll")),
+]
+
+
+def stage(mean: float, count: int = 100) -> dict[str, float]:
+    return {"mean": mean, "p50": mean, "p99": 2 * mean, "max": 1234.56, "count": count}
+
+
+STAGES = {"sampled→frames in": stage(2.25), "put→received": stage(0.5), "servo written→moved": stage(13.0)}
+
+
+def text(renderable: Any, width: int = 80) -> str:
+    out = io.StringIO()
+    Console(file=out, width=width, color_system=None, legacy_windows=False).print(renderable)
+    return out.getvalue()
+
+
+def series() -> tuple[TruthSeries, SolvedSeries, MovedSeries]:
+    ticks = np.arange(2400)
+    swing = np.sin(2 * np.pi * 0.5 * ticks * 0.005)[:, None] * np.linspace(0.2, 1.0, len(NAMES))
+    everywhere = np.ones(swing.shape, np.bool_)
+    truth = TruthSeries(ticks, ticks * 5_000_000, swing)
+    solved = SolvedSeries(ticks[::16], swing[::16] + 0.001, everywhere[::16])
+    moved = MovedSeries(ticks[40::4] * 5_000_000, swing[30:-10:4], everywhere[40::4], everywhere[40::4, 0])
+    return truth, solved, moved
+
+
+def test_the_latency_budgets_means_add_up_to_its_total() -> None:
+    shown = text(latency_table(STAGES, total=stage(15.0), one_way={"bound": 0.071, "trusted": True}))
+    rows = [line.split() for line in shown.splitlines()]
+    total = next(row for row in rows if row and row[0] == "total")
+    assert total[1:] == ["15.75", "15.00", "30.00", "1234.56", "100"]
+    assert "± 0.071 ms" in shown
+
+
+def test_an_untrusted_offset_is_said() -> None:
+    assert "not trusted" in text(latency_table(STAGES, one_way={"bound": 0.071, "trusted": False}))
+    assert "not trusted" in text(latency_table(STAGES, one_way={"bound": None}))
+
+
+def test_an_empty_budget_shows_no_figures() -> None:
+    shown = text(latency_table({"a": {}, "b": {"count": 0}}))
+    assert "0.00" not in shown
+
+
+def test_the_accuracy_table_stands_beside_the_paper() -> None:
+    truth, solved, _ = series()
+    shown = text(accuracy_table(accuracy(truth, solved, NAMES)))
+    for figure in ("0.594", "0.451", "0.722", "0.547", "0.695", "0.127", "1.73"):
+        assert figure in shown
+    assert "0.057" in shown  # ours: 0.001 rad
+    for name in NAMES:
+        assert name in shown
+
+
+def test_the_motion_table_has_the_lag_and_the_moving_joints() -> None:
+    truth, _, moved = series()
+    shown = text(motion_table(motion(truth, moved, NAMES)))
+    assert "motion lag 50 ms" in shown
+    assert "all moving joints" in shown
+
+
+def test_the_run_stands_beside_its_replays() -> None:
+    truth, _, moved = series()
+    judged = motion(truth, moved, NAMES)
+    assert judged is not None
+    shown = text(strategies_table(judged, {"hold": judged, "predict": judged}))
+    rows = [line.split() for line in shown.splitlines()]
+    assert [row[:2] for row in rows if row[-2:-1] == ["0.01"] or row[-3:-2] == ["50"]] == [
+        ["this", "run"],
+        ["hold,", "replayed"],
+        ["predict,", "replayed"],
+    ]
+
+
+def test_no_data_is_said_plainly() -> None:
+    truth, solved, moved = series()
+    moved.tracking[:] = False
+    solved.valid[:] = False
+    assert "not enough data" in text(motion_table(motion(truth, moved, NAMES)))
+    assert "–" in text(accuracy_table(accuracy(truth, solved, NAMES)))
+
+
+def test_the_live_view_shows_the_worst_joints_and_what_was_dropped() -> None:
+    live = Live(
+        elapsed_s=12.34,
+        guard="track",
+        reason="engaged by nurse",
+        rates_hz={"capture": 200.0, "commands": 12.5},
+        stages=STAGES,
+        joint_error_deg={name: float(i) * (-1) ** i for i, name in enumerate(NAMES)},
+        drops={"late": 3, "never": 0},
+    )
+    shown = text(live_view(live, worst=2))
+    for words in ("track", "engaged by nurse", "200.0 Hz", "late 3", NAMES[-1], NAMES[-2], "put→received"):
+        assert words in shown
+    assert NAMES[-3] not in shown
+    assert "never" not in shown
+    assert "nothing" in text(live_view(Live(0.0, "", "")))
+
+
+def test_verdicts_say_met_missed_and_not_judged() -> None:
+    report = {"ticks": {"missed": 1}, "cpu_percent": {"master": 35.0}, "motion": None, "eta_percent": True}
+    lines = text(verdict_table("figures", verdicts(report, DEMO))).splitlines()
+    said = {verdict.target.name: line.split()[-1] for verdict in verdicts(report, DEMO) for line in lines
+            if line.strip().startswith(verdict.target.name)}  # fmt: skip
+    assert said["capture ticks missed"] == "missed"
+    assert said["master, of one core"] == "met"
+    assert said["roughness"] == "judged"
+    assert said["η (Eq. 25)"] == "judged"
+
+
+def test_the_worse_side_is_held_against_the_paper() -> None:
+    report = {"table_1": {"left_elbow_roll": {"error_deg": 0.1}, "right_elbow_roll": {"error_deg": 0.8}}}
+    found = {v.target.name: v for v in verdicts(report, DEMO)}
+    assert found["elbow roll, mean error"].value == 0.8
+    assert found["elbow roll, mean error"].met is False
+    assert found["elbow pitch, mean error"].met is None
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_nothing_is_wider_than_the_terminal_or_cut(width: int) -> None:
+    truth, solved, moved = series()
+    judged = motion(truth, moved, NAMES)
+    assert judged is not None
+    live = Live(1.0, "hold", "the operator's deadman was let go and the robot holds " * 2, stages=STAGES)
+    shown = [
+        text(accuracy_table(accuracy(truth, solved, NAMES)), width),
+        text(motion_table(judged), width),
+        text(strategies_table(judged, {"interpolate": judged}), width),
+        text(latency_table(STAGES, stage(15.0)), width),
+        text(verdict_table("bench", verdicts({}, BENCH)), width),
+        text(live_view(live), width),
+    ]
+    for table in shown:
+        assert max(map(len, table.splitlines())) <= width
+    if width >= 80:
+        assert all("…" not in table for table in shown[:5])
+
+
+def test_a_side_without_a_figure_is_not_judged_by_the_other() -> None:
+    target = Target("elbow", ("table_1", "*_elbow", "error_deg"), 1.0)
+    left, right = {"error_deg": 0.2}, {"error_deg": 0.4}
+
+    def value(table: dict[str, object]) -> float | None:
+        (verdict,) = verdicts({"table_1": table}, [target])
+        return verdict.value
+
+    assert value({"left_elbow": left, "right_elbow": right}) == 0.4
+    assert value({"left_elbow": left, "right_elbow": None}) is None
+    assert value({"left_elbow": left, "right_elbow": {}}) is None
+    # a robot with one arm only
+    assert value({"right_elbow": right}) == 0.4
+    assert value({}) is None
