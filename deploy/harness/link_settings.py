@@ -1,11 +1,10 @@
-"""What a network needs set over the example files, and which setups cannot be run at all. Pure."""
+"""The settings that a network needs over those of the example files. Pure."""
 
 from __future__ import annotations
 
 import math
 
 from common.link.config import LinkConfig
-from deploy.experiments.trial.plan import Plan, Setup
 from deploy.sim.network import Profile
 from slave.guard.config import GuardConfig
 
@@ -14,11 +13,6 @@ MARGIN_S = 0.05
 """For what a command waits before it is put, and for a busy machine."""
 WANDERS = 4.0
 """Standard deviations of jitter that a command may be late by and still be taken."""
-
-
-def max_age_s(plan: Plan, profile: Profile) -> float:
-    """The guard's age limit: as asked for, or what the network needs."""
-    return plan.max_age_s or needed_age_s(profile)
 
 
 def needed_age_s(profile: Profile) -> float:
@@ -41,13 +35,3 @@ def open_timeout_s(profile: Profile) -> float:
     needed_s = 6e-3 * (profile.ways.to_robot.delay_ms + profile.ways.to_operator.delay_ms)
     default_s = LinkConfig().open_timeout_s
     return default_s if needed_s <= default_s else math.ceil(2.0 * needed_s) / 2.0
-
-
-def why_impossible(setup: Setup) -> str | None:
-    """Why this setup cannot be run between two hosts; None where it can."""
-    if setup.transport == "unixsock-stream":
-        return (
-            "a unix socket is a file on one machine: it does not cross hosts, and between namespaces it "
-            "would pass the emulated link by"
-        )
-    return None

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from deploy.experiments.trial.folder import Folder
-from deploy.experiments.trial.report import HTML, write
+from deploy.experiments.trial.cell.folder import Folder
+from deploy.experiments.trial.report.write import HTML, write
 from tests.deploy.experiments.trial.made_up import PLAN, cells
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from deploy.experiments.trial.cell import Status
-from deploy.experiments.trial.plan import CellKey, Plan, Setup
+from deploy.experiments.trial.cell.plan import CellKey, Plan, Setup
+from deploy.experiments.trial.cell.result import Status
 from deploy.experiments.trial.remote.operator import run_remote_cell
 from deploy.harness.endpoints import free_port
 from deploy.harness.host import Host

@@ -11,7 +11,7 @@ from common.errors import TandemError
 from deploy.experiments.soak.criteria import CRITERIA
 from deploy.experiments.soak.events import Event
 from deploy.experiments.soak.growth import GROWTH
-from deploy.experiments.trial.targets import LIMITS, Judged
+from deploy.experiments.trial.report.targets import LIMITS, Judged
 from deploy.measure.targets import BENCH, BY_PROFILE
 from tests.deploy.experiments.soak.conftest import FAULT, PROCESSES, STORY, Make
 
@@ -43,7 +43,7 @@ def printed(make: Make) -> set[tuple[str, str]]:
         *(("trial", Judged(limit, None, None, (), 0).words) for limit in LIMITS),
         *(
             ("trial", words)
-            for words in texts("deploy/experiments/trial/judge.py", "_nothing_to_judge", _is_return)
+            for words in texts("deploy/experiments/trial/cell/judge.py", "_nothing_to_judge", _is_return)
         ),
         *(("faults", words) for words in fault_words()),
         *(("accuracy", words) for words in texts("deploy/experiments/accuracy/view.py", "_notes", _is_note)),

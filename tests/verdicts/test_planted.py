@@ -26,11 +26,11 @@ from deploy.experiments.soak.growth import (
     in_use,
     memory,
 )
-from deploy.experiments.trial.cell import Cell
-from deploy.experiments.trial.cell import Status as CellStatus
-from deploy.experiments.trial.plan import CellKey, Setup
-from deploy.experiments.trial.spread import Row
-from deploy.experiments.trial.targets import LIMITS, Limit, judge
+from deploy.experiments.trial.cell.plan import CellKey, Setup
+from deploy.experiments.trial.cell.result import Cell
+from deploy.experiments.trial.cell.result import Status as CellStatus
+from deploy.experiments.trial.report.spread import Row
+from deploy.experiments.trial.report.targets import LIMITS, Limit, judge
 from deploy.measure.accuracy import SIDES
 from deploy.measure.stillness import stillness
 from deploy.measure.targets import BENCH, BY_PROFILE, Target, verdicts

@@ -13,7 +13,7 @@ from common.errors import NetworkError, TandemError
 from common.process.runtime import run as run_until_stopped
 
 if TYPE_CHECKING:
-    from deploy.experiments.trial.plan import Plan
+    from deploy.experiments.trial.cell.plan import Plan
     from deploy.experiments.trial.progress import Progress
     from deploy.experiments.trial.run import RunCell
 
@@ -84,8 +84,8 @@ def trial(
     """
     if context.invoked_subcommand is not None:
         return
-    from deploy.experiments.trial.choice import choose
-    from deploy.experiments.trial.plan import Plan
+    from deploy.experiments.trial.cell.choice import choose
+    from deploy.experiments.trial.cell.plan import Plan
 
     if 0.0 < outage < SHORTEST_OUTAGE_S:
         raise TandemError(f"--outage {outage:g}: expected 0, or {SHORTEST_OUTAGE_S:g} s or longer")
@@ -146,7 +146,7 @@ def report(
 
 
 def _run_here(plan: Plan, path: Path, tasks: Path | None) -> None:
-    from deploy.experiments.trial.stage import run_cell
+    from deploy.experiments.trial.cell.stage import run_cell
     from deploy.sim.network.namespaces import why_not
 
     reason = why_not()
@@ -170,9 +170,9 @@ def _run_remote(plan: Plan, path: Path, tasks: Path | None, link: Path | None) -
 
 
 def _run(plan: Plan, path: Path, tasks: Path | None, run_cell: RunCell) -> None:
-    from deploy.experiments.trial.folder import Folder
+    from deploy.experiments.trial.cell.folder import Folder
+    from deploy.experiments.trial.report.tasks import TASKS, load_tasks
     from deploy.experiments.trial.run import run_trial
-    from deploy.experiments.trial.tasks import TASKS, load_tasks
 
     console, folder = Console(), Folder(path)
     load_tasks(tasks or TASKS)  # its mistakes now, not after an hour
@@ -193,9 +193,9 @@ def _run(plan: Plan, path: Path, tasks: Path | None, run_cell: RunCell) -> None:
 
 
 def _finish(path: Path, tasks: Path | None, console: Console) -> None:
-    from deploy.experiments.trial.folder import Folder
-    from deploy.experiments.trial.report import HTML, write
-    from deploy.experiments.trial.tasks import TASKS
+    from deploy.experiments.trial.cell.folder import Folder
+    from deploy.experiments.trial.report.tasks import TASKS
+    from deploy.experiments.trial.report.write import HTML, write
     from deploy.experiments.trial.view import print_findings
 
     findings = write(Folder(path), tasks or TASKS)

@@ -10,10 +10,10 @@ from rich.live import Live
 
 from common.clock import monotonic_ns
 from common.errors import TandemError
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.figures import BY_NAME, printed
-from deploy.experiments.trial.folder import Folder
-from deploy.experiments.trial.plan import CellKey, Plan
+from deploy.experiments.trial.cell.figures import BY_NAME, printed
+from deploy.experiments.trial.cell.folder import Folder
+from deploy.experiments.trial.cell.plan import CellKey, Plan
+from deploy.experiments.trial.cell.result import Cell, Status
 from deploy.experiments.trial.progress import Progress, clock, draw
 
 Tell = Callable[[str], None]

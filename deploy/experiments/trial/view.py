@@ -8,10 +8,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from deploy.experiments.trial.figures import BY_NAME, printed
-from deploy.experiments.trial.report import Findings
-from deploy.experiments.trial.spread import Row
-from deploy.experiments.trial.targets import Judged
+from deploy.experiments.trial.cell.figures import BY_NAME, printed
+from deploy.experiments.trial.report.spread import Row
+from deploy.experiments.trial.report.targets import Judged
+from deploy.experiments.trial.report.write import Findings
 from deploy.measure.tables import plain_table
 
 SHOWN = ("one_way_p50_ms", "one_way_bound_ms", "rmse_deg", "rmse_over_hold", "roughness", "flow_s")

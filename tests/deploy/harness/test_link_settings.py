@@ -3,7 +3,7 @@ import pytest
 from common.link.config import LinkConfig
 from common.link.configuration import zenoh_configuration
 from deploy.harness.link_settings import needed_age_s, open_timeout_s
-from deploy.sim.network import load_profile
+from deploy.sim.network import Profile, Way, load_profile, profile_names
 
 
 @pytest.mark.parametrize(
@@ -22,3 +22,21 @@ def test_a_slow_line_is_given_the_round_trips_that_opening_takes(profile: str, e
 def test_commands_over_a_short_line_keep_the_guards_own_limit() -> None:
     assert needed_age_s(load_profile("4g")) == 0.3
     assert needed_age_s(load_profile("geo-satellite")) > 0.6
+
+
+def one_way(delay_ms: float, jitter_ms: float = 0.0) -> Profile:
+    return Profile(both=Way(delay_ms=delay_ms, jitter_ms=jitter_ms))
+
+
+@pytest.mark.parametrize(
+    ("delay_ms", "jitter_ms", "limit_s"),
+    [(0.0, 0.0, 0.3), (125.0, 0.0, 0.3), (126.0, 0.0, 0.35), (150.0, 5.0, 0.4), (300.0, 10.0, 0.7)],
+)
+def test_the_guards_age_limit_is_the_default_or_what_a_long_line_needs(
+    delay_ms: float, jitter_ms: float, limit_s: float
+) -> None:
+    assert needed_age_s(one_way(delay_ms, jitter_ms)) == limit_s
+
+
+def test_every_network_that_comes_with_tandem_can_be_kept_within_the_guards_own_bound() -> None:
+    assert all(needed_age_s(load_profile(name)) <= 2.0 for name in profile_names())

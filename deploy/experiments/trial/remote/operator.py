@@ -19,15 +19,15 @@ from common.skeleton import Skeleton, load_skeleton
 from common.wire.codec import decode
 from common.wire.messages import RobotState, Statistics
 from deploy.examples.profiles import example
-from deploy.experiments.trial.attention import Attention
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.judge import judged
-from deploy.experiments.trial.plan import CellKey, Plan
-from deploy.experiments.trial.recorder import Recorder
-from deploy.experiments.trial.recording import Course, on_masters_clock
+from deploy.experiments.trial.cell.attention import Attention
+from deploy.experiments.trial.cell.choice import why_impossible
+from deploy.experiments.trial.cell.judge import judged
+from deploy.experiments.trial.cell.plan import CellKey, Plan
+from deploy.experiments.trial.cell.recorder import Recorder
+from deploy.experiments.trial.cell.recording import Course, on_masters_clock
+from deploy.experiments.trial.cell.result import Cell, Status
 from deploy.experiments.trial.remote import talk
 from deploy.harness.endpoints import Endpoints, free_port
-from deploy.harness.link_settings import why_impossible
 from deploy.harness.rig import OPERATOR, ROBOT, Rig
 from slave.config import SlaveConfig
 

@@ -22,9 +22,9 @@ from common.wire.codec import encode
 from common.wire.control import ask_control
 from common.wire.messages import Action, ControlRequest
 from common.wire.topics import COMMAND, CONTROL
-from deploy.experiments.trial.choice import strategies
-from deploy.experiments.trial.recorder import Recorder
-from deploy.experiments.trial.recording import Recording
+from deploy.experiments.trial.cell.choice import strategies
+from deploy.experiments.trial.cell.recorder import Recorder
+from deploy.experiments.trial.cell.recording import Recording
 from deploy.experiments.trial.remote import talk
 from deploy.harness.child import Child
 from deploy.harness.endpoints import free_port

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import random
 
-from deploy.experiments.trial.cell import Cell, Excerpt, Status
-from deploy.experiments.trial.plan import CellKey, Plan, Setup
+from deploy.experiments.trial.cell.plan import CellKey, Plan, Setup
+from deploy.experiments.trial.cell.result import Cell, Excerpt, Status
 
 PLAN = Plan(
     transports=("tcp", "udp"),

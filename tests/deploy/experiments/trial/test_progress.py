@@ -9,9 +9,9 @@ import pytest
 from rich.console import Console
 
 from common.errors import TandemError
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.folder import Folder
-from deploy.experiments.trial.plan import CellKey, Plan
+from deploy.experiments.trial.cell.folder import Folder
+from deploy.experiments.trial.cell.plan import CellKey, Plan
+from deploy.experiments.trial.cell.result import Cell, Status
 from deploy.experiments.trial.progress import Progress, clock
 from deploy.experiments.trial.run import Tell, run_trial
 from tests.deploy.experiments.trial.made_up import PLAN, cell

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.folder import Folder
-from deploy.experiments.trial.report import find
+from deploy.experiments.trial.cell.folder import Folder
+from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.report.write import find
 from deploy.experiments.trial.view import print_findings
 from tests.deploy.experiments.trial.made_up import PLAN, cells
 

@@ -13,10 +13,17 @@ import numpy as np
 
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
 from common.metrics.published import MasterMetrics, SlaveMetrics
-from deploy.experiments.trial.aftermath import aftermath
-from deploy.experiments.trial.cell import Excerpt
-from deploy.experiments.trial.figures import BY_NAME
-from deploy.experiments.trial.recording import Course, Recording, counts, echoes, latest_bound_ns, published
+from deploy.experiments.trial.cell.aftermath import aftermath
+from deploy.experiments.trial.cell.figures import BY_NAME
+from deploy.experiments.trial.cell.recording import (
+    Course,
+    Recording,
+    counts,
+    echoes,
+    latest_bound_ns,
+    published,
+)
+from deploy.experiments.trial.cell.result import Excerpt
 from deploy.measure import MovedSeries, TruthSeries, accuracy, motion
 from deploy.measure.baseline import arrivals, compare
 from deploy.measure.motion import at_shift

@@ -13,12 +13,12 @@ from common.metrics.published import ArrivalCounts, DueMetrics, Ticks
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics, Truth
-from deploy.experiments.trial.aftermath import aftermath
-from deploy.experiments.trial.cell import Status
-from deploy.experiments.trial.judge import judged
-from deploy.experiments.trial.measure import excerpt, measure, one_way_percentiles_ms
-from deploy.experiments.trial.plan import CellKey, Setup
-from deploy.experiments.trial.recording import Course, Outage, Recording, counts, on_masters_clock
+from deploy.experiments.trial.cell.aftermath import aftermath
+from deploy.experiments.trial.cell.judge import judged
+from deploy.experiments.trial.cell.measure import excerpt, measure, one_way_percentiles_ms
+from deploy.experiments.trial.cell.plan import CellKey, Setup
+from deploy.experiments.trial.cell.recording import Course, Outage, Recording, counts, on_masters_clock
+from deploy.experiments.trial.cell.result import Status
 from slave.config import SlaveConfig
 from tests.published import commanded, guard_metrics, master_metrics, slave_metrics
 

@@ -6,9 +6,9 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.figures import FIGURES
-from deploy.experiments.trial.plan import Plan, Setup
+from deploy.experiments.trial.cell.figures import FIGURES
+from deploy.experiments.trial.cell.plan import Plan, Setup
+from deploy.experiments.trial.cell.result import Cell, Status
 
 
 @dataclass(frozen=True, slots=True)

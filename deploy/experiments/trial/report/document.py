@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from deploy.experiments.trial.figures import BY_NAME, FIGURES, Figure, printed
-from deploy.experiments.trial.plan import Plan
-from deploy.experiments.trial.plots import Plot
-from deploy.experiments.trial.ranking import Ranking
-from deploy.experiments.trial.spread import Row, Spread
-from deploy.experiments.trial.targets import Judged
+from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, Figure, printed
+from deploy.experiments.trial.cell.plan import Plan
+from deploy.experiments.trial.report.plots import Plot
+from deploy.experiments.trial.report.ranking import Ranking
+from deploy.experiments.trial.report.spread import Row, Spread
+from deploy.experiments.trial.report.targets import Judged
 
 GROUPS = {
     "latency": "One way",
@@ -43,7 +43,7 @@ def as_html(
     import jinja2
 
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("deploy.experiments.trial", "."),
+        loader=jinja2.PackageLoader("deploy.experiments.trial.report", "."),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,

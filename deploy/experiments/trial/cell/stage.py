@@ -10,13 +10,14 @@ from common.config.load import load_config
 from common.errors import TandemError
 from common.wire.messages import Action
 from deploy.examples.profiles import example
-from deploy.experiments.trial.attention import Attention
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.judge import judged
-from deploy.experiments.trial.plan import CellKey, Plan
-from deploy.experiments.trial.recorder import Recorder
-from deploy.experiments.trial.recording import Course, Outage, Recording
-from deploy.harness.link_settings import max_age_s, open_timeout_s, why_impossible
+from deploy.experiments.trial.cell.attention import Attention
+from deploy.experiments.trial.cell.choice import why_impossible
+from deploy.experiments.trial.cell.judge import judged
+from deploy.experiments.trial.cell.plan import CellKey, Plan
+from deploy.experiments.trial.cell.recorder import Recorder
+from deploy.experiments.trial.cell.recording import Course, Outage, Recording
+from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.harness.link_settings import needed_age_s, open_timeout_s
 from deploy.harness.rig import ROUTER, Rig, open_rig
 from deploy.sim.network import Network, load_profile, open_network
 from slave.config import SlaveConfig
@@ -40,7 +41,7 @@ async def run_cell(plan: Plan, key: CellKey, stop: asyncio.Event, tell: Callable
     if reason is not None:
         return Cell(key, Status.IMPOSSIBLE, reason)
     profile = load_profile(key.setup.profile)
-    age_s = max_age_s(plan, profile)
+    age_s = plan.max_age_s or needed_age_s(profile)
     opening = f"link.open_timeout_s={open_timeout_s(profile)}"
     overrides = _overrides(plan, key, age_s, opening)
     config = load_config(example("slave", plan.robot), SlaveConfig, overrides["slave"])

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from common.errors import TandemError
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.figures import FIGURES, printed, rounded
-from deploy.experiments.trial.folder import Folder
+from deploy.experiments.trial.cell.figures import FIGURES, printed, rounded
+from deploy.experiments.trial.cell.folder import Folder
+from deploy.experiments.trial.cell.result import Cell, Status
 from deploy.experiments.trial.run import missing
 from tests.deploy.experiments.trial.made_up import PLAN, cell, cells
 

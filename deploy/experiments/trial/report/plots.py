@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from deploy.experiments.trial.cell import Status
-from deploy.experiments.trial.figures import BY_NAME
-from deploy.experiments.trial.spread import Row
+from deploy.experiments.trial.cell.figures import BY_NAME
+from deploy.experiments.trial.cell.result import Status
+from deploy.experiments.trial.report.spread import Row
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

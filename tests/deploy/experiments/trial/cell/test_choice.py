@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,11 +11,10 @@ from typer.testing import CliRunner
 from common.errors import ConfigError, NetworkError, TandemError
 from common.link.endpoint import TRANSPORTS
 from deploy.cli import app
-from deploy.experiments.trial.choice import choose
-from deploy.experiments.trial.folder import Folder
-from deploy.experiments.trial.plan import Setup
-from deploy.harness.link_settings import max_age_s, why_impossible
-from deploy.sim.network import Profile, Way, load_profile, profile_names
+from deploy.experiments.trial.cell.choice import choose, why_impossible
+from deploy.experiments.trial.cell.folder import Folder
+from deploy.experiments.trial.cell.plan import Setup
+from deploy.sim.network import profile_names
 from tests.deploy.experiments.trial.made_up import PLAN, cells
 
 
@@ -48,25 +46,6 @@ def test_a_network_of_ones_own_is_a_file(tmp_path: Path) -> None:
     file.write_text("[both]\ndelay = 3.0\n", "utf-8")
     with pytest.raises(ConfigError, match=r"both\.delay.*no such key"):
         choose("--profiles", str(file))
-
-
-def one_way(delay_ms: float, jitter_ms: float = 0.0) -> Profile:
-    return Profile(both=Way(delay_ms=delay_ms, jitter_ms=jitter_ms))
-
-
-@pytest.mark.parametrize(
-    ("delay_ms", "jitter_ms", "limit_s"),
-    [(0.0, 0.0, 0.3), (125.0, 0.0, 0.3), (126.0, 0.0, 0.35), (150.0, 5.0, 0.4), (300.0, 10.0, 0.7)],
-)
-def test_the_guards_age_limit_is_the_default_or_what_a_long_line_needs(
-    delay_ms: float, jitter_ms: float, limit_s: float
-) -> None:
-    assert max_age_s(PLAN, one_way(delay_ms, jitter_ms)) == limit_s
-    assert max_age_s(replace(PLAN, max_age_s=0.123), one_way(delay_ms, jitter_ms)) == 0.123
-
-
-def test_every_network_that_comes_with_tandem_can_be_kept_within_the_guards_own_bound() -> None:
-    assert all(max_age_s(PLAN, load_profile(name)) <= 2.0 for name in profile_names())
 
 
 def test_only_what_does_not_cross_hosts_is_impossible() -> None:

@@ -9,12 +9,12 @@ from dataclasses import asdict
 from math import isinf
 from typing import Any
 
-from deploy.experiments.trial.cell import Cell
-from deploy.experiments.trial.figures import BY_NAME, FIGURES, rounded
-from deploy.experiments.trial.plan import Plan
-from deploy.experiments.trial.ranking import Ranking
-from deploy.experiments.trial.spread import Row, Spread
-from deploy.experiments.trial.targets import Judged
+from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, rounded
+from deploy.experiments.trial.cell.plan import Plan
+from deploy.experiments.trial.cell.result import Cell
+from deploy.experiments.trial.report.ranking import Ranking
+from deploy.experiments.trial.report.spread import Row, Spread
+from deploy.experiments.trial.report.targets import Judged
 
 _KEYS = ("profile", "transport", "strategy", "repetition", "status")
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import TandemError
-from deploy.experiments.trial.plan import CellKey, Plan, Setup, check_continues, merged
+from deploy.experiments.trial.cell.plan import CellKey, Plan, Setup, check_continues, merged
 
 PLAN = Plan(
     transports=("tcp", "udp", "quic"),

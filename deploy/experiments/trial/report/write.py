@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from deploy.experiments.trial.document import as_html
-from deploy.experiments.trial.folder import Folder, as_json
-from deploy.experiments.trial.machine import as_csv, tree
-from deploy.experiments.trial.plan import Plan
-from deploy.experiments.trial.plots import plots
-from deploy.experiments.trial.ranking import Ranking, rankings
-from deploy.experiments.trial.spread import Row, rows
-from deploy.experiments.trial.targets import Judged, judge
-from deploy.experiments.trial.tasks import TASKS, load_tasks
+from deploy.experiments.trial.cell.folder import Folder, as_json
+from deploy.experiments.trial.cell.plan import Plan
+from deploy.experiments.trial.report.document import as_html
+from deploy.experiments.trial.report.machine import as_csv, tree
+from deploy.experiments.trial.report.plots import plots
+from deploy.experiments.trial.report.ranking import Ranking, rankings
+from deploy.experiments.trial.report.spread import Row, rows
+from deploy.experiments.trial.report.targets import Judged, judge
+from deploy.experiments.trial.report.tasks import TASKS, load_tasks
 from deploy.report.output import writing
 from deploy.sim.network.namespaces import congestion_control
 

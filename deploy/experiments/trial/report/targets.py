@@ -7,10 +7,10 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from deploy.experiments.trial.cell import Cell
-from deploy.experiments.trial.figures import BY_NAME, FIGURES, OUTAGE
-from deploy.experiments.trial.plan import Setup
-from deploy.experiments.trial.spread import Row
+from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, OUTAGE
+from deploy.experiments.trial.cell.plan import Setup
+from deploy.experiments.trial.cell.result import Cell
+from deploy.experiments.trial.report.spread import Row
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.measure import excerpt, measure, one_way_percentiles_ms
-from deploy.experiments.trial.plan import CellKey
-from deploy.experiments.trial.recording import Course, counts, echoes
+from deploy.experiments.trial.cell.measure import excerpt, measure, one_way_percentiles_ms
+from deploy.experiments.trial.cell.plan import CellKey
+from deploy.experiments.trial.cell.recording import Course, counts, echoes
+from deploy.experiments.trial.cell.result import Cell, Status
 from slave.config import SlaveConfig
 
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from deploy.experiments.trial.attention import Attention
+from deploy.experiments.trial.cell.attention import Attention
 
 
 def test_a_hold_is_remarked_once_and_engaged_as_soon_as_the_robot_takes_commands() -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import TandemError
-from deploy.experiments.trial.cell import Cell
-from deploy.experiments.trial.plan import CellKey, Plan, check_continues, merged
+from deploy.experiments.trial.cell.plan import CellKey, Plan, check_continues, merged
+from deploy.experiments.trial.cell.result import Cell
 from deploy.report.output import writing
 
 PLAN = "plan.json"

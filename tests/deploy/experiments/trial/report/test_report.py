@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.folder import Folder
-from deploy.experiments.trial.report import CSV, HTML, JSON, write
+from deploy.experiments.trial.cell.folder import Folder
+from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.report.write import CSV, HTML, JSON, write
 from tests.deploy.experiments.trial.made_up import PLAN, cell, cells
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from common.wire.messages import Command, RobotState, Statistics, Truth
-from deploy.experiments.trial.recording import Recording
+from deploy.experiments.trial.cell.recording import Recording
 from deploy.harness.observer import Heard
 
 

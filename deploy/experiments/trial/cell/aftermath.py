@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
 from common.metrics.published import SlaveMetrics
 from common.wire.messages import CommandEcho
-from deploy.experiments.trial.recording import Outage, Recording, counts, echoes, published
+from deploy.experiments.trial.cell.recording import Outage, Recording, counts, echoes, published
 
 MOVING = ("align", "track")
 LEFT_S = 0.5

@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import ConfigError
-from deploy.experiments.trial.cell import Cell, Status
-from deploy.experiments.trial.plan import CellKey, Setup
-from deploy.experiments.trial.ranking import rank, rankings
-from deploy.experiments.trial.spread import Spread, rows, spread
-from deploy.experiments.trial.targets import Limit, judge
-from deploy.experiments.trial.tasks import TASKS, Criterion, load_tasks
+from deploy.experiments.trial.cell.plan import CellKey, Setup
+from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.report.ranking import rank, rankings
+from deploy.experiments.trial.report.spread import Spread, rows, spread
+from deploy.experiments.trial.report.targets import Limit, judge
+from deploy.experiments.trial.report.tasks import TASKS, Criterion, load_tasks
 from tests.deploy.experiments.trial.made_up import PLAN, cells
 
 TASK = {task.name: task for task in load_tasks()}

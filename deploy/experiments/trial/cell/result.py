@@ -8,8 +8,8 @@ from enum import StrEnum
 from typing import Any
 
 from common.errors import TandemError
-from deploy.experiments.trial.figures import FIGURES, Values, rounded
-from deploy.experiments.trial.plan import CellKey, Setup
+from deploy.experiments.trial.cell.figures import FIGURES, Values, rounded
+from deploy.experiments.trial.cell.plan import CellKey, Setup
 
 VERSION = 1
 

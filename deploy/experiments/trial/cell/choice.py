@@ -7,6 +7,7 @@ from typing import get_args
 
 from common.errors import ConfigError, ConfigMistake
 from common.link.endpoint import TRANSPORTS
+from deploy.experiments.trial.cell.plan import Setup
 from deploy.sim.network import load_profile, profile_names
 from slave.track.config import TrackConfig
 
@@ -39,3 +40,13 @@ def choose(option: str, text: str) -> tuple[str, ...]:
         elif name not in known:
             raise ConfigError("trial", [ConfigMistake(option, name, f"some of {', '.join(known)}")])
     return tuple(names)
+
+
+def why_impossible(setup: Setup) -> str | None:
+    """Why this setup cannot be run between two hosts; None where it can."""
+    if setup.transport == "unixsock-stream":
+        return (
+            "a unix socket is a file on one machine: it does not cross hosts, and between namespaces it "
+            "would pass the emulated link by"
+        )
+    return None

@@ -9,7 +9,7 @@ from pydantic import Field
 from common.config.load import load_config
 from common.config.section import Section
 from common.errors import ConfigMistake
-from deploy.experiments.trial.figures import BY_NAME
+from deploy.experiments.trial.cell.figures import BY_NAME
 
 TASKS = Path(__file__).with_name("tasks.toml")
 """Those that come with the project."""

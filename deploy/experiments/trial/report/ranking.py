@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from deploy.experiments.trial.cell import Cell
-from deploy.experiments.trial.figures import BY_NAME, printed
-from deploy.experiments.trial.plan import Setup
-from deploy.experiments.trial.spread import Row, Spread, spread
-from deploy.experiments.trial.tasks import Criterion, Task
+from deploy.experiments.trial.cell.figures import BY_NAME, printed
+from deploy.experiments.trial.cell.plan import Setup
+from deploy.experiments.trial.cell.result import Cell
+from deploy.experiments.trial.report.spread import Row, Spread, spread
+from deploy.experiments.trial.report.tasks import Criterion, Task
 
 MOST_NAMED = 3
 """Setups in one sentence."""
