@@ -1,0 +1,115 @@
+"""The order of the rooms: which room may import which, and which files must stay pure."""
+
+from collections.abc import Sequence
+from fnmatch import fnmatch
+
+from tests.architecture.imports import SourceTree, circles
+
+ORDER: Sequence[Sequence[str]] = [
+    ["deploy"],
+    ["deploy/experiments", "deploy/ops"],
+    ["deploy/calibrate", "deploy/harness"],
+    ["deploy/client"],
+    ["deploy/sim"],
+    ["deploy/measure"],
+    ["deploy/report", "deploy/certificates", "deploy/examples"],
+    ["master", "slave"],
+    ["master/calibrate"],
+    ["master/joint_angles"],
+    ["master/orientation"],
+    ["master/suit"],
+    ["slave/guard", "slave/track", "slave/limit", "slave/servos", "slave/attitude", "slave/camera"],
+    ["slave/encoders"],
+    ["common/link"],
+    ["common/latency", "common/reach"],
+    ["common/clock_sync", "common/recording"],
+    ["common/wire", "common/process", "common/can", "common/skeleton"],
+    ["common/config", "common/metrics"],
+    ["common"],
+]  # fmt: skip
+"""Rooms from the top down. A file imports its own room and the rooms below; `common` is its top files alone.
+Rooms on one line do not import each other, but for those of the slave, where only circles are wrong."""
+
+KNOWN_WRONG = {
+    ("master/suit/nodes.py", "master.orientation.filter"),
+    ("deploy/harness/link_settings.py", "deploy.experiments.trial.plan"),
+}
+"""Imports against the order that still stand. Delete an entry with its import; the end is an empty set."""
+KNOWN_CIRCLES: Sequence[set[str]] = [
+    {"master.calibrate.recording", "master.calibrate.suit_recording"},
+    {"deploy.experiments.soak.run", "deploy.experiments.soak.view"},
+    {"deploy.experiments.demo.report", "deploy.experiments.demo.run", "deploy.experiments.demo.view"},
+    {"master/orientation", "master/orientation/joints", "master/suit"},
+    {"slave/servos", "slave/servos/canopen", "slave/servos/dynamixel"},
+    {"slave/guard", "slave/limit", "slave/track"},
+    {"deploy/calibrate", "deploy/calibrate/live"},
+    {"deploy/experiments/trial", "deploy/experiments/trial/remote", "deploy/harness"},
+]
+"""Circles of files and of folders that still stand, or a part of each. The end is an empty list."""
+
+IMPURE = [
+    "common/clock.py", "common/can/*", "common/link/*", "common/process/*", "common/recording/recorder.py",
+    "master/__main__.py", "master/app.py", "master/robot.py",
+    "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
+]  # fmt: skip
+"""The adapters. Nothing else in common, master and slave may touch a bus, link, clock or event loop."""
+RIM = {"asyncio", "zenoh", "can", "time", "socket", "uvloop", "mujoco", "serial", "canopen", "dynamixel_sdk"}
+
+
+def room_of(path: str) -> str:
+    """The innermost room of `ORDER` that holds the file at `path`."""
+    rooms = [room for level in ORDER for room in level if path.startswith(room + "/")]
+    return max(rooms, key=len)
+
+
+def against_the_order(tree: SourceTree) -> list[str]:
+    """Every import that goes up, sideways, or into the tests."""
+    level = {room: i for i, rooms in enumerate(ORDER) for room in rooms}
+    wrong = []
+    for each in tree.imports:
+        path = tree.where(each.source)
+        place = f"{path}:{each.line} imports {each.target}"
+        if (path, each.target) in KNOWN_WRONG:
+            continue
+        if each.target.partition(".")[0] == "tests":
+            wrong.append(place)
+        elif each.target in tree.paths:
+            source, target = room_of(path), room_of(tree.where(each.target))
+            others = {source.partition("/")[0], target.partition("/")[0]} == {"master", "slave"}
+            sideways = level[source] == level[target] and not source.startswith("slave/")
+            if source != target and (level[source] > level[target] or sideways or others):
+                wrong.append(place)
+    return wrong
+
+
+def between_siblings(tree: SourceTree) -> list[str]:
+    """Every import from one experiment to another, and from one of ops to another."""
+    wrong = []
+    for each in tree.imports:
+        if each.target not in tree.paths:
+            continue
+        for room in ("deploy.experiments.", "deploy.ops."):
+            if each.source.startswith(room) and each.target.startswith(room):
+                source, target = (
+                    name.removeprefix(room).split(".")[0] for name in (each.source, each.target)
+                )
+                if source != target:
+                    wrong.append(f"{tree.where(each.source)}:{each.line} imports {each.target}")
+    return wrong
+
+
+def impure(tree: SourceTree) -> list[str]:
+    """Every import of a bus, a link, a clock or an event loop outside the adapters."""
+    return [
+        f"{path}:{each.line} imports {each.target}"
+        for each in tree.imports
+        if (path := tree.where(each.source)).startswith(("common/", "master/", "slave/"))
+        and each.target.partition(".")[0] in RIM
+        and not any(fnmatch(path, pattern) for pattern in IMPURE)
+    ]
+
+
+def new_circles(tree: SourceTree) -> list[tuple[str, ...]]:
+    """Circles of files and of folders that are not known."""
+    found = circles(tree.files) + circles(tree.folders)
+    return [ring for ring in found if not any(set(ring) <= known for known in KNOWN_CIRCLES)]
