@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +12,7 @@ from rich.console import Console
 
 from common.config.load import load_config
 from common.errors import TandemError
-from common.process.logs import flush_log, in_words, start_log
+from common.process.logs import describe_exception, flush_log, print_error
 from common.process.runtime import run as run_until_stopped
 from common.process.streams import lost_output, secure
 from deploy.calibrate.commands import app as calibrate_app
@@ -21,6 +20,7 @@ from deploy.experiments.accuracy.commands import app as accuracy_app
 from deploy.experiments.faults.command import faults
 from deploy.experiments.soak.command import soak
 from deploy.experiments.trial.command import app as trial_app
+from deploy.log_options import Debug, Quiet, add_log_options, debugging, start_chosen_log
 from deploy.ops.attitude.command import attitude
 from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.ops.control.teller import acted
@@ -57,7 +57,6 @@ app.command()(doctor)
 app.command()(record)
 app.command()(recording)
 app.command()(soak)
-_debug = False
 EXIT_FAULT = 70
 """Status after a fault that no person caused (`EX_SOFTWARE`)."""
 EXIT_OUTPUT = 74
@@ -90,11 +89,10 @@ ReportFile = Annotated[
 
 @app.callback()
 def _options(
-    debug: Annotated[bool, typer.Option(help="Show tracebacks and every log line.")] = False,
+    debug: Debug = False,
+    quiet: Quiet = False,
 ) -> None:
-    global _debug
-    _debug = debug
-    start_log(logging.DEBUG if debug else logging.INFO)
+    start_chosen_log(debug=debug, quiet=quiet)
 
 
 @app.command()
@@ -223,6 +221,7 @@ def bench(
 
 for _act in OPERATORS_ACTS:
     app.command()(_act)
+add_log_options(app)
 arrange(app)
 
 
@@ -240,7 +239,7 @@ def main() -> None:
     status = _run()
     flush_log()
     if status == 0 and not acted() and (why := lost_output()) is not None:
-        _say(f"not all of the output could be written: {why}")
+        print_error("tandem", f"not all of the output could be written: {why}")
         status = EXIT_OUTPUT
     sys.exit(status)
 
@@ -252,23 +251,17 @@ def _run() -> int:
     except SystemExit as done:
         return done.code if isinstance(done.code, int) else int(done.code is not None)
     except TandemError as error:
-        if _debug:
+        if debugging():
             raise
-        flush_log()
-        _say(str(error))
+        print_error("tandem", str(error))
         return 1
     except Exception as error:
-        if _debug:
+        if debugging():
             raise
-        flush_log()
-        _say(f"a fault of tandem itself: {in_words(error)}; `tandem --debug` shows where it came from")
+        fault = f"a fault of tandem itself: {describe_exception(error)}; with --debug it shows the traceback"
+        print_error("tandem", fault)
         return EXIT_FAULT
     return 0
-
-
-def _say(text: str) -> None:
-    for line in text.splitlines():
-        print(f"tandem: {line}", file=sys.stderr)  # noqa: T201
 
 
 if __name__ == "__main__":

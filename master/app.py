@@ -29,7 +29,7 @@ from master.suit.doubt import DoubtLog, as_figures
 from master.suit.protocol import SuitProtocol
 from master.suit.silence import BusSigns, SilenceWatch
 
-log = logging.getLogger("tandem.master")
+log = logging.getLogger(__name__)
 
 
 class Master:

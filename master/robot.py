@@ -28,7 +28,7 @@ from master.picture import VideoWatch
 from master.pipeline import CommandWriter, Solved
 from master.robot_watch import RobotWatch
 
-log = logging.getLogger("tandem.master")
+log = logging.getLogger(__name__)
 
 
 class CommandedRobot:

@@ -38,7 +38,7 @@ from slave.last_known import EVERY_S, LastKnown, state_file
 from slave.pipeline import SlavePipeline
 from slave.servos import Servos, open_servos
 
-log = logging.getLogger("tandem.slave")
+log = logging.getLogger(__name__)
 
 
 class Slave:

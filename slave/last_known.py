@@ -22,7 +22,7 @@ EVERY_S = 5.0
 CHANGED_RAD = math.radians(1.0)
 """And only where some joint has moved by more than this."""
 
-log = logging.getLogger("tandem.slave")
+log = logging.getLogger(__name__)
 
 
 def state_file(robot: str, environment: Mapping[str, str]) -> Path:

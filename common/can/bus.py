@@ -50,7 +50,7 @@ Opener = Callable[[BusConfig], can.BusABC]
 StateOf = Callable[[BusConfig, can.BusABC], Controller | None]
 """How the controller of an open bus stands, None where nothing tells."""
 
-log = logging.getLogger("tandem.bus")
+log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True)
@@ -334,7 +334,7 @@ class CanBus:
                 return
             self._doubtful = self._doubtful and state is None
             if self._doubtful:
-                log.info("bus %s: open; up again once a frame has come", self.name)
+                log.info("bus %s: opened; counts as up once a frame arrives", self.name)
             else:
                 log.info("bus %s: up again", self.name)
             self._attach(bus)
@@ -359,4 +359,4 @@ def _shut_down(bus: can.BusABC, reader: Reader | None) -> None:
     try:
         bus.shutdown()
     except Exception as error:  # it has failed already; there is nothing left to save
-        log.info("closing %s: %s", bus.channel_info, error)
+        log.info("bus %s: error while closing: %s", bus.channel_info, error)

@@ -27,7 +27,7 @@ _LOOPBACK = "127.0.0.1"
 _IP_MULTICAST_ALL = getattr(socket, "IP_MULTICAST_ALL", 49)
 _SO_BINDTODEVICE = getattr(socket, "SO_BINDTODEVICE", 25)
 
-log = logging.getLogger("tandem.bus")
+log = logging.getLogger(__name__)
 
 
 def open_bus(config: BusConfig) -> can.BusABC:

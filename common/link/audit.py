@@ -12,7 +12,7 @@ from common.link.refusals import Refusals
 from common.link.session import Session
 from common.metrics.published import AccessMetrics
 
-log = logging.getLogger("tandem.access")
+log = logging.getLogger(__name__)
 
 
 class Audit:
@@ -26,7 +26,9 @@ class Audit:
         self._here: Counter[str] = Counter()
         self._connections: Counter[str] = Counter()
         if self._refusals is not None and self._known is None:
-            log.warning("no [link.access]: anyone with a certificate of this authority may command the robot")
+            log.warning(
+                "[link.access] is not set: anyone with a certificate of this authority may command the robot"
+            )
 
     def attach(self, session: Session) -> None:
         """Hear of everybody who is connected, and who comes and goes."""
@@ -44,7 +46,7 @@ class Audit:
         if self._here[who] <= 0:
             del self._here[who]
         if not here:
-            log.info("%s has gone", who)
+            log.info("%s disconnected", who)
         elif self._known is not None and who not in self._known:
             log.warning("%s connected: [link.access] does not name it, so it may do nothing", who)
         else:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from common.errors import LinkError
 
-log = logging.getLogger("tandem.link")
+log = logging.getLogger(__name__)
 
 _DESCRIPTORS = Path("/proc/self/fd")
 

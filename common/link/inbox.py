@@ -58,12 +58,12 @@ class Inbox:
         except CodecError as error:
             self._counters.handler_errors += 1
             if self._throttle.passes(monotonic_ns()):
-                log.warning("%s: a message cannot be read: %s", self._key, error)
+                log.warning("%s: received a message that cannot be decoded: %s", self._key, error)
         except Exception:
             # one bad message must not end the session, nor flood the log
             self._counters.handler_errors += 1
             if self._throttle.passes(monotonic_ns()):
-                log.exception("handler of %s failed", self._key)
+                log.exception("%s: the handler failed", self._key)
 
 
 def wake(loop: asyncio.AbstractEventLoop, callback: Callable[..., None], *args: object) -> None:

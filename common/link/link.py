@@ -73,7 +73,7 @@ class Link:
             except Exception as error:  # Zenoh's errors share no base that promises to be the only one
                 counters.put_errors += 1
                 if throttle.passes(monotonic_ns()):
-                    log.warning("%s: put failed: %s", topic.name, error)
+                    log.warning("%s: message not sent: %s", topic.name, error)
             else:
                 counters.sent += 1
 
@@ -162,7 +162,7 @@ class Link:
                 on_change(role, alive)
             except Exception:
                 self._count(ALIVE).handler_errors += 1
-                log.exception("handler of %s failed", ALIVE.name)
+                log.exception("%s: the handler failed", ALIVE.name)
 
         def on_sample(sample: zenoh.Sample) -> None:
             role = str(sample.key_expr).rpartition("/")[2]

@@ -25,7 +25,7 @@ LOOK_S = 0.1
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _TELLING = (b"unauthorized", b"intercepted", b"CertCommonName", b" WARN", b"\x1b[33m WARN")
 
-log = logging.getLogger("tandem.refused")
+log = logging.getLogger(__name__)
 _heard: Refusals | None = None
 
 

@@ -55,7 +55,7 @@ async def open_zenoh(
             raise LinkError(f"{missing} within {within_s:g} s")
         waits(f"waiting: {missing}")
         if turn == 0:
-            log.warning("%s: retrying every %g s at most, until it is there", missing, MOST_RETRY_S)
+            log.warning("%s: retrying, at least every %g s", missing, MOST_RETRY_S)
         turn += 1
         await asyncio.sleep(pause_s)
         # a router is looked for as often as before: each attempt lasts a while by itself
@@ -100,4 +100,4 @@ def _close(session: zenoh.Session) -> None:
     try:
         session.close()
     except Exception as error:  # nobody wants it any more
-        log.debug("close: %s", error)
+        log.debug("error while closing the session: %s", error)

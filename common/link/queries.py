@@ -86,13 +86,13 @@ class Answerer:
         except CodecError as error:
             self._counters.handler_errors += 1
             if self._throttle.passes(monotonic_ns()):
-                log.warning("%s: a question cannot be read: %s", self._key, error)
+                log.warning("%s: received a query that cannot be decoded: %s", self._key, error)
             query.reply_err(str(error))
             return
         except Exception as error:
             self._counters.handler_errors += 1
             if self._throttle.passes(monotonic_ns()):
-                log.exception("handler of %s failed", self._key)
+                log.exception("%s: the handler failed", self._key)
             query.reply_err(f"{type(error).__name__}: {error}")
             return
         query.reply(self._key, reply, express=self._express)

@@ -167,14 +167,14 @@ class Session:
         threading.Thread(target=self._close_session, args=(closed,), name="link-close", daemon=True).start()
         done, _ = await asyncio.wait({closed}, timeout=timeout_s)
         if not done:
-            log.warning("the link did not close within %g s: left behind", timeout_s)
+            log.warning("the Zenoh session did not close within %g s; the process ends without it", timeout_s)
         return bool(done)
 
     def _close_session(self, closed: asyncio.Future[None]) -> None:
         try:
             self._session.close()
         except Exception as error:  # a link that leads nowhere: nothing to be done about it now
-            log.debug("close: %s", error)
+            log.debug("error while closing the session: %s", error)
         wake(self._loop, _settle, closed)
 
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import logging
-import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from common.config.load import Model, load_config
 from common.errors import TandemError
-from common.process.logs import flush_log, start_log
+from common.process.logs import log_level, print_error, start_log
 from common.process.runtime import run
 from common.process.streams import secure
 
@@ -25,16 +23,21 @@ def launch(
     """Run a side until SIGINT, SIGTERM or SIGHUP; the exit status. A mistake is one clear line each."""
     parser = argparse.ArgumentParser(prog=f"python -m {role}")
     parser.add_argument("config", type=Path, help=f"TOML file, such as deploy/examples/{role}.toml")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="set one key, whatever the file says",
+    )  # fmt: skip
+    parser.add_argument("--debug", action="store_true", help="log everything, and show tracebacks")
+    parser.add_argument("--quiet", action="store_true", help="log warnings and errors only")
     arguments = parser.parse_args()
     secure()
-    start_log(logging.INFO)
     try:
+        start_log(log_level(debug=arguments.debug, quiet=arguments.quiet))
         config = load_config(arguments.config, model, arguments.overrides)
         run(lambda stop: side(config, stop, lambda _: None))
     except TandemError as error:
-        flush_log()
-        for line in str(error).splitlines():
-            sys.stderr.write(f"{role}: {line}\n")
+        if arguments.debug:
+            raise
+        print_error(role, str(error))
         return 1
     return 0

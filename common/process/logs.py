@@ -1,43 +1,62 @@
-"""The log, written by its own thread: a terminal or a journal that does not take it holds up no robot."""
+"""The log: lines with level, UTC time and logger, written by a thread of its own.
+
+A terminal or a journal that takes no more lines delays no loop. Each module logs as `getLogger(__name__)`.
+"""
 
 from __future__ import annotations
 
 import logging
 import os
 import queue
+import sys
 import threading
 import time
 import traceback
 from contextlib import suppress
 from pathlib import Path
 
+from common.errors import TandemError
 from common.process.streams import LossyRaw
 
-MOST_WAITING = 1000
-"""Lines; what comes beyond is lost, and counted."""
+MAX_WAITING = 1000
+"""Lines that wait to be written; further ones are lost and counted."""
 FLUSH_S = 0.5
-"""How long the end of the process waits for what is still to be written."""
-FORMAT = "%(asctime)s %(name)s: %(message)s"
+"""The longest wait at the end of the process for lines not yet written."""
+_STDERR = 2
+
+log = logging.getLogger(__name__)
 
 
-class OneLine(logging.Formatter):
-    """A traceback becomes the exception's words and place; whole ones are for `--debug`."""
+class LogFormatter(logging.Formatter):
+    """`TIME LEVEL LOGGER: TEXT`; for the journal `<PRIORITY>LOGGER: TEXT`, since it stamps the time itself.
+
+    Without `tracebacks`, an exception becomes one line: its type, text and place.
+    """
+
+    def __init__(self, *, tracebacks: bool, journal: bool) -> None:
+        time_and_level = "" if journal else "%(asctime)s.%(msecs)03dZ %(levelname)s "
+        super().__init__(f"{time_and_level}%(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
+        self.converter = time.gmtime
+        self._tracebacks = tracebacks
+        self._journal = journal
 
     def format(self, record: logging.LogRecord) -> str:
-        """One line, whatever the record carries."""
-        if not record.exc_info or record.exc_info[1] is None:
-            return super().format(record)
-        bare = logging.makeLogRecord({**record.__dict__, "exc_info": None, "exc_text": None})
-        return f"{super().format(bare)}: {in_words(record.exc_info[1])}"
+        """The record as text; several lines only where it carries several."""
+        if not self._tracebacks and record.exc_info and record.exc_info[1] is not None:
+            bare = logging.makeLogRecord({**record.__dict__, "exc_info": None, "exc_text": None})
+            text = f"{super().format(bare)}: {describe_exception(record.exc_info[1])}"
+        else:
+            text = super().format(record)
+        return with_priority(text, record.levelno) if self._journal else text
 
 
-class PatientHandler(logging.Handler):
-    """Writes to a descriptor from its own thread. No call blocks or raises."""
+class ThreadedLogHandler(logging.Handler):
+    """Writes to a file descriptor from its own thread. No call blocks or raises."""
 
-    def __init__(self, fd: int = 2) -> None:
+    def __init__(self, fd: int = _STDERR) -> None:
         super().__init__()
         self._raw = LossyRaw(fd)
-        self._lines: queue.Queue[str] = queue.Queue(MOST_WAITING)
+        self._lines: queue.Queue[str] = queue.Queue(MAX_WAITING)
         self._lost = 0
         self._thread: threading.Thread | None = None
 
@@ -46,7 +65,7 @@ class PatientHandler(logging.Handler):
         try:
             line = self.format(record)
         except Exception as error:
-            line = f"a line that cannot be formatted ({error}): {record.msg!r}"
+            line = self._own_line(f"a log line could not be formatted ({error}): {record.msg!r}")
         try:
             self._lines.put_nowait(line)
         except queue.Full:
@@ -56,40 +75,84 @@ class PatientHandler(logging.Handler):
             self._thread.start()
 
     def flush(self) -> None:
-        """Wait until all is written, for FLUSH_S at most."""
+        """Wait until all lines are written, but at most FLUSH_S."""
         until_s = time.monotonic() + FLUSH_S
         while self._lines.unfinished_tasks and time.monotonic() < until_s:
             time.sleep(0.002)
 
+    def _own_line(self, text: str) -> str:
+        return self.format(log.makeRecord(log.name, logging.WARNING, __file__, 0, text, (), None))
+
     def _write(self) -> None:
-        with suppress(OSError):  # a loop's real-time priority is not for its log
+        with suppress(OSError):  # the real-time priority of the loop's thread is not for its log
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         while True:
             line = self._lines.get()
             lost, self._lost = self._lost, 0
             if lost:
-                line = f"({lost} lines lost here: the log was not taken)\n{line}"
-            # past the text stream: its lock must not be held by a thread that waits when the process ends
+                line = f"{self._own_line(f'{lost} log lines lost: standard error was blocked')}\n{line}"
+            # not through the text stream: no thread may hold its lock when the process ends
             self._raw.write(f"{line}\n".encode("utf-8", "replace"))
             self._lines.task_done()
 
 
+def log_level(*, debug: bool, quiet: bool) -> int:
+    """The level that the options `--debug` and `--quiet` ask for. Raises TandemError where both are given."""
+    if debug and quiet:
+        raise TandemError("--debug and --quiet: expected only one of the two")
+    return logging.DEBUG if debug else logging.WARNING if quiet else logging.INFO
+
+
 def start_log(level: int) -> None:
-    """Log from `level` up to standard error; a log that somebody has set up already is let be."""
+    """Log from `level` up to standard error. Leaves a log alone that was set up before by others."""
     logging.raiseExceptions = False
-    handler = PatientHandler()
-    handler.setFormatter((logging.Formatter if level <= logging.DEBUG else OneLine)(FORMAT))
-    logging.basicConfig(level=level, handlers=[handler])
+    root = logging.getLogger()
+    if not root.handlers:
+        root.addHandler(ThreadedLogHandler())
+    for handler in root.handlers:
+        if isinstance(handler, ThreadedLogHandler):
+            root.setLevel(level)
+            handler.setFormatter(LogFormatter(tracebacks=level <= logging.DEBUG, journal=in_journal()))
 
 
 def flush_log() -> None:
-    """Before a last word is written beside it."""
+    """Wait until the log is written, before a last message is printed beside it."""
     for handler in logging.getLogger().handlers:
         handler.flush()
 
 
-def in_words(error: BaseException) -> str:
-    """An exception in one line: kind, text and place."""
-    where = traceback.extract_tb(error.__traceback__)
-    place = f" ({Path(where[-1].filename).name}:{where[-1].lineno})" if where else ""
+def print_error(program: str, text: str) -> None:
+    """Write why a program ends, below its log: `PROGRAM: LINE` for each line."""
+    flush_log()
+    for line in text.splitlines():
+        message = f"{program}: {line}"
+        sys.stderr.write((with_priority(message, logging.ERROR) if in_journal() else message) + "\n")
+
+
+def describe_exception(error: BaseException) -> str:
+    """An exception in one line: type, text, file and line."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
     return f"{type(error).__name__}: {error}{place}"
+
+
+def in_journal() -> bool:
+    """Whether standard error leads to systemd's journal (JOURNAL_STREAM of systemd.exec(5))."""
+    try:
+        stderr = os.fstat(_STDERR)
+    except OSError:
+        return False
+    return os.environ.get("JOURNAL_STREAM") == f"{stderr.st_dev}:{stderr.st_ino}"
+
+
+def with_priority(text: str, level: int) -> str:
+    """The text with the journal's priority before each line (sd-daemon(3)): `<3>` for an error."""
+    if level >= logging.CRITICAL:
+        priority = 2
+    elif level >= logging.ERROR:
+        priority = 3
+    elif level >= logging.WARNING:
+        priority = 4
+    else:
+        priority = 6 if level >= logging.INFO else 7
+    return "\n".join(f"<{priority}>{line}" for line in text.splitlines())

@@ -24,7 +24,7 @@ _RETRY_NS = 50 * NS_PER_MS
 _NEVER_NS = 1 << 63
 _MOST_TEXT = 256
 
-log = logging.getLogger("tandem.notify")
+log = logging.getLogger(__name__)
 
 
 class Notifier:
@@ -91,7 +91,9 @@ def open_notifier(environment: MutableMapping[str, str] = os.environ) -> Notifie
     if not address:
         return Notifier()
     if address[0] not in "/@":
-        log.warning("%s = %s: expected a path or an abstract socket; nothing is told", SOCKET, address)
+        log.warning(
+            "%s = %s: expected a path or an abstract socket; systemd gets no reports", SOCKET, address
+        )
         return Notifier()
     ours = pid in ("", str(os.getpid()))
     watchdog_ns = 1000 * int(watchdog_us) if ours and watchdog_us.isdecimal() else 0

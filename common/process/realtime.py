@@ -11,7 +11,7 @@ from pydantic import Field
 
 from common.config.section import Section
 
-log = logging.getLogger("tandem.realtime")
+log = logging.getLogger(__name__)
 
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 """mlockall(2): what is there, what will come, each page from its first use on."""
@@ -29,8 +29,8 @@ def enter_real_time(priority: int) -> bool:
     """Give this thread, and those it starts later, SCHED_FIFO, and lock the process's memory; 0: neither.
 
     Call it once what takes long has been built: with the priority, that would take a core from the
-    neighbours. False, and a word in the log, where the priority is refused; memory that may not be locked
-    is told too, but not fatal either.
+    neighbours. False, and a warning in the log, where the priority is refused. Memory that may not be locked
+    is a warning too, and not fatal.
     """
     if not priority:
         return False
@@ -39,7 +39,7 @@ def enter_real_time(priority: int) -> bool:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except OSError as error:
         log.warning(
-            "no real-time priority (%s): ticks may be missed beside other load; "
+            "no real-time priority (%s): under load the loop may miss ticks; "
             "grant CAP_SYS_NICE or LimitRTPRIO, or set process.realtime_priority = 0",
             error.strerror,
         )
@@ -57,7 +57,7 @@ def _lock_memory() -> None:
             return
         refused = os.strerror(ctypes.get_errno())
     log.warning(
-        "memory is not locked (%s): a page that has to be read again from a disk holds a tick up; "
+        "memory not locked (%s): a page that must be read from the disk again delays a tick; "
         "grant CAP_IPC_LOCK or LimitMEMLOCK=infinity",
         refused,
     )

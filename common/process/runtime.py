@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 import signal
 import sys
@@ -15,6 +16,7 @@ from typing import Any
 import uvloop
 
 from common.process.heap import freeze_heap, use_one_arena
+from common.process.logs import in_journal, with_priority
 
 SHUTDOWN_S = 3.0
 EXIT_HUNG = 70
@@ -123,9 +125,11 @@ class _Shutdown:
 
     def _end(self, status: int, why: str) -> None:
         # straight to the descriptor: a lock of logging or stderr may be what hangs
-        lines = [f"stopped hard ({why}); still running:", *self._hanging()]
+        text = "\n  ".join([f"ended by force ({why}); still running:", *self._hanging()])
+        if in_journal():
+            text = with_priority(text, logging.CRITICAL)
         with suppress(OSError):  # nobody may read it any more: the process ends all the same
-            os.write(2, ("\n  ".join(lines) + "\n").encode("utf-8", "replace"))
+            os.write(2, f"{text}\n".encode("utf-8", "replace"))
         os._exit(status)
 
     def _hanging(self) -> list[str]:

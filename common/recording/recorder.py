@@ -33,7 +33,7 @@ CAPACITY = 4000
 CLOSE_S = 2.0
 """How long closing waits for a disk that hangs: less than a process is given to end."""
 
-log = logging.getLogger("tandem.recording")
+log = logging.getLogger(__name__)
 
 
 class _Item(NamedTuple):
@@ -115,7 +115,7 @@ class Recorder:
             try:
                 self._queue.put(None, timeout=CLOSE_S)
             except queue.Full:
-                log.error("%s: the disk hangs; the end of the recording is lost", self.path)
+                log.error("%s: the disk does not respond; the end of the recording is lost", self.path)
                 return
             self._thread.join(CLOSE_S)
 
@@ -181,13 +181,13 @@ class Recorder:
         counters = self.counters
         counters.failed = (error.strerror if isinstance(error, OSError) else None) or str(error)
         counters.lost += self._unflushed
-        log.error("%s: the recording ends here: %s; the rest goes on", self.path, counters.failed)
+        log.error("%s: the recording ends here: %s; the process continues", self.path, counters.failed)
         with suppress(OSError):  # it flushes once more, and fails as before
             self._stream.close()
         try:  # so that the file ends with a whole chunk
             os.truncate(self.path, self._whole)
         except OSError as second:
-            log.info("%s: its torn end stays: %s", self.path, second)
+            log.info("%s: the incomplete chunk at its end could not be cut off: %s", self.path, second)
 
 
 def _create(path: Path) -> BinaryIO:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import signal
 import sys
 from collections.abc import Sequence
@@ -66,10 +67,11 @@ class Child:
         await self.run(arguments, through)
 
     async def run(self, arguments: Sequence[str], through: Sequence[str] = ()) -> None:
-        """Start `tandem ROLE` with these arguments."""
+        """Start `tandem ROLE` with these arguments; with `--debug` where this process has it."""
         self.lifetime += 1
         with self.log.open("ab") as log:
-            self._process = Spawned([*through, *self._tandem, self.role, *arguments], log)
+            debug = ["--debug"] if logging.getLogger().isEnabledFor(logging.DEBUG) else []
+            self._process = Spawned([*through, *self._tandem, self.role, *arguments, *debug], log)
         self._usage = psutil.Process(self._process.pid)
 
     @property

@@ -11,7 +11,7 @@ from common.errors import RecordingError
 from master.calibrate.recording import NodeRecording
 from master.suit.recorded import Sweeps, read_sweeps
 
-log = logging.getLogger("tandem.calibrate")
+log = logging.getLogger(__name__)
 
 
 def load_suit(path: Path) -> dict[str, NodeRecording]:

@@ -23,7 +23,7 @@ from slave.attitude.config import BaseConfig
 from slave.attitude.frame import FrameAngles, FrameParser, encode, radians
 from slave.attitude.vote import Vote
 
-log = logging.getLogger("tandem.slave")
+log = logging.getLogger(__name__)
 
 _AGAIN_S = 1.0
 _WAIT_S = 0.1

@@ -33,7 +33,7 @@ _JOIN_S = 1.0
 _BUSY_SHARE = 0.5
 """Of one core, that making pictures may take."""
 
-log = logging.getLogger("tandem.camera")
+log = logging.getLogger(__name__)
 
 
 class Camera(Protocol):

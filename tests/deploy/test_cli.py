@@ -152,10 +152,25 @@ def test_a_picture_of_another_kind_is_refused_before_the_work(tandem: Tandem) ->
     assert "expected a name that ends in .png" in said
 
 
-def test_debug_shows_the_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "argv", ["tandem", "--debug", "master", "nosuch.toml"])
+@pytest.mark.parametrize("line", ["--debug master nosuch.toml", "master nosuch.toml --debug"])
+def test_debug_before_or_after_the_command_shows_the_traceback(
+    monkeypatch: pytest.MonkeyPatch, line: str
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["tandem", *line.split()])
     with pytest.raises(TandemError):
         cli.main()
+
+
+@pytest.mark.parametrize("line", ["--debug --quiet bench", "--debug bench --quiet"])
+def test_debug_and_quiet_exclude_each_other(tandem: Tandem, line: str) -> None:
+    assert tandem(line) == (1, "tandem: --debug and --quiet: expected only one of the two\n")
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "calibrate imu", "trial serve", "keys make"])
+def test_every_command_takes_debug_and_quiet(command: str) -> None:
+    help_text = shown(*command.split(), "--help")
+    assert "--debug" in help_text
+    assert "--quiet" in help_text
 
 
 @pytest.mark.usefixtures("default_signals")

@@ -31,7 +31,7 @@ OnAnswer = Callable[[Answered], None]
 AskAll = Callable[[bytes, OnAnswer], Awaitable[object]]
 Tell = Callable[[Answer], None]
 
-log = logging.getLogger("tandem.stop")
+log = logging.getLogger(__name__)
 
 
 async def repeat_until_stopped(

@@ -11,7 +11,7 @@ from common.clock import Clock, monotonic_ns, to_ns
 from common.errors import RecordingError
 from common.recording import Recorder, RecorderCounters
 
-log = logging.getLogger("tandem.record")
+log = logging.getLogger(__name__)
 
 
 class Tape:

@@ -19,7 +19,7 @@ from common.process.pacing import TickGrid
 from common.process.runtime import until_stopped
 from common.process.ticker import ticks
 
-log = logging.getLogger("tandem.router")
+log = logging.getLogger(__name__)
 
 
 def zenohd_configuration(config: RouterConfig) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from slave.config import SlaveConfig
 from slave.servos.canopen.pdo import TPDO1
 from slave.servos.simulated import CYCLE_NS
 
-log = logging.getLogger("tandem.drives")
+log = logging.getLogger(__name__)
 
 
 def _open(config: BusConfig) -> can.BusABC:

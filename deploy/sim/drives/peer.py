@@ -27,7 +27,7 @@ _LOOK_NS = 10 * NS_PER_MS
 _UNBOUNDED = 0xFFFF_FFFF
 _WRONG_ZERO_RAD, _TWIN_RAD, _RUNS_AWAY_RAD_S = np.radians((30.0, 49.0, 60.0)).tolist()
 
-log = logging.getLogger("tandem.drives")
+log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True)

@@ -22,7 +22,7 @@ from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.faults import FaultsConfig
 from deploy.sim.suit.suit import SimulatedSuit
 
-log = logging.getLogger("tandem.suit")
+log = logging.getLogger(__name__)
 
 
 async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:

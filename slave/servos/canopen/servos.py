@@ -31,7 +31,7 @@ from slave.servos.canopen.network import DriveNetwork, Outgoing, period_ns
 from slave.servos.canopen.pdo import RPDO1
 from slave.servos.servos import EncoderReading
 
-log = logging.getLogger("tandem.servos")
+log = logging.getLogger(__name__)
 
 _POLL_S = 0.0005
 _LISTEN_NS = 250 * NS_PER_MS
@@ -41,7 +41,7 @@ _TOLD = 3
 _EARLY_NS = 2 * NS_PER_MS
 """A setpoint written this long before its SYNC is due goes with it: ticks jitter, SYNC must not skip one."""
 
-log = logging.getLogger("tandem.slave")
+log = logging.getLogger(__name__)
 
 Opener = Callable[[BusConfig], can.BusABC]
 

@@ -21,7 +21,7 @@ from slave.servos.dynamixel.settings import Settings, settings_of
 from slave.servos.dynamixel.startup import arm, inspect, prepare
 from slave.servos.servos import EncoderReading
 
-log = logging.getLogger("tandem.slave.dynamixel")
+log = logging.getLogger(__name__)
 
 _FIRST_PAUSE_NS = to_ns(0.1)
 _LONGEST_PAUSE_NS = to_ns(2.0)

@@ -11,7 +11,7 @@ from slave.servos.dynamixel.bus import Bus, ServoError
 from slave.servos.dynamixel.registers import Register
 from slave.servos.dynamixel.settings import Settings
 
-log = logging.getLogger("tandem.slave.dynamixel")
+log = logging.getLogger(__name__)
 
 NAMES = {
     x.RETURN_DELAY: "return delay time",

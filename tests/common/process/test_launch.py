@@ -13,7 +13,7 @@ from common.config.section import Section
 from common.errors import TandemError
 from common.process.launch import WriteFigures, launch
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 class OneKey(Section):
@@ -64,6 +64,16 @@ def test_a_mistake_in_the_file_starts_nothing(file: Path, capsys: pytest.Capture
         f"side: {file}: robot = (not set): expected this key to be set",
         f"side: {file}: robots = 1: expected no such key (is it misspelt?)",
     ]
+
+
+def test_debug_shows_the_traceback(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["python -m side", str(file), "--debug"])
+
+    async def side(config: OneKey, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+        raise TandemError("no bus")
+
+    with pytest.raises(TandemError):
+        launch("side", OneKey, side)
 
 
 @pytest.mark.parametrize(("role", "other"), [("master", "slave"), ("slave", "master")])

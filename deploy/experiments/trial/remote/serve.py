@@ -31,7 +31,7 @@ from deploy.harness.endpoints import free_port
 from deploy.harness.observer import Observer
 from slave.config import SlaveConfig
 
-log = logging.getLogger("tandem.trial")
+log = logging.getLogger(__name__)
 
 UP_S = 20.0
 """A slave that says nothing for this long after its start has failed."""
