@@ -16,6 +16,7 @@ from common.process.logs import describe_exception, flush_log, print_error
 from common.process.runtime import run as run_until_stopped
 from common.process.streams import lost_output, secure
 from deploy.calibrate.commands import app as calibrate_app
+from deploy.calibrate.live.command import live
 from deploy.experiments.accuracy.commands import app as accuracy_app
 from deploy.experiments.faults.command import faults
 from deploy.experiments.soak.command import soak
@@ -42,6 +43,7 @@ app = typer.Typer(
     help="A nurse moves; a humanoid upper body far away moves the same way, safely, "
     "and everyone knows how late it was.\n\nStart with `tandem demo`.",
 )
+calibrate_app.command("live")(live)
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(accuracy_app, name="accuracy")
 app.add_typer(keys_app, name="keys")

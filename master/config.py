@@ -12,7 +12,8 @@ from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
-from master.orientation.estimator import EstimationConfig
+from master.orientation.config import EstimationConfig
+from master.orientation.filters import filter_mistakes
 from master.suit.nodes import NodeConfig, wiring_mistakes
 from master.suit.plausibility import PlausibilityConfig
 
@@ -97,10 +98,12 @@ class MasterConfig(Section):
 
 
 def node_mistakes(nodes: dict[str, NodeConfig], skeleton: Skeleton) -> list[ConfigMistake]:
-    """Segments without a node, and nodes without a segment."""
+    """Segments without a node, nodes without a segment, and filters that do not exist."""
     missing = [name for name in skeleton.segment_names if name not in nodes]
     foreign = [name for name in nodes if name not in skeleton.segment_names]
+    named = [(name, node.filter) for name, node in nodes.items() if node.filter is not None]
     return [
+        *(mistake for n, own in named for mistake in filter_mistakes(f"nodes.{n}.filter", own)),
         *(ConfigMistake(f"nodes.{n}", None, f"a node, as {skeleton.name} has one there") for n in missing),
         *(ConfigMistake(f"nodes.{n}", n, f"a segment of the profile {skeleton.name}") for n in foreign),
     ]

@@ -1,11 +1,10 @@
-"""`tandem calibrate`: its commands, one file each."""
+"""`tandem calibrate`: the commands that work on a recording, one file each; `deploy/cli.py` adds `live`."""
 
 from __future__ import annotations
 
 import typer
 
 from deploy.calibrate.imu import imu
-from deploy.calibrate.live.command import live
 from deploy.calibrate.mag import mag
 from deploy.calibrate.mount import mount
 from deploy.calibrate.record import record
@@ -22,4 +21,3 @@ app.command("imu")(imu)
 app.command("mag")(mag)
 app.command("mount")(mount)
 app.command("record")(record)
-app.command("live")(live)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,8 @@ from common.errors import RecordingError as RecordingError
 from common.quaternion import Array
 from common.recording.npz import Arrays, read_arrays
 from master.calibrate.stamps import Grid, lay_out
+
+log = logging.getLogger(__name__)
 
 _LOWEST_RATE_HZ, _HIGHEST_RATE_HZ = 5.0, 20_000.0
 _RATE_UNKNOWN_HZ = 100.0
@@ -190,9 +193,22 @@ def _laid_out(values: Array, slots: Array) -> Array:
 
 
 def _load_mcap(path: Path) -> dict[str, NodeRecording]:
-    from master.calibrate.suit_recording import load_suit
+    """Every node of a suit that answered at least once, by segment; warns where the file was cut off."""
+    from master.suit.recorded import read_sweeps
 
-    return load_suit(path)
+    sweeps = read_sweeps(path)
+    if sweeps.cut:
+        log.warning("%s: %s; its first %.1f s are whole", path, sweeps.cut, sweeps.duration_s)
+    nodes = {}
+    for i, name in enumerate(sweeps.nodes):
+        acc, gyr, mag = (sweeps.readings[:, i, k : k + 3].astype(np.float64) for k in (0, 3, 6))
+        if np.isnan(gyr).all():
+            log.warning("%s: never answered", name)
+            continue
+        nodes[name] = NodeRecording(name, sweeps.rate_hz, acc, gyr, None if np.isnan(mag).all() else mag)
+    if not nodes:
+        raise RecordingError(f"{path}: no node answered; check the bus and record again")
+    return nodes
 
 
 Reader = Callable[[Path], dict[str, NodeRecording]]

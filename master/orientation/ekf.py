@@ -75,6 +75,10 @@ class EkfConfig(FrontSection):
     rest_noise: float = Field(default=4e-4, gt=0.0, allow_inf_nan=False)
     """rad/s/√Hz, of the gyro's reading at rest as its bias. More: rest teaches less."""
 
+    def make(self, rate_hz: float, count: int) -> EkfFilter:
+        """The filter for `count` nodes."""
+        return EkfFilter(self, rate_hz, count)
+
 
 @dataclass(slots=True)
 class _State:

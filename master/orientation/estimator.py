@@ -6,82 +6,25 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
-from pydantic import Field
 
-from common.config.section import Section
-from common.errors import ConfigError, ConfigMistake
+from common.errors import ConfigError
 from common.quaternion import Array, conjugate, from_rotation_vector, heading_rad, multiply, rotate
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from master.orientation.affine import ACC, GYR, MAG, Calibration, apply, load_calibration
-from master.orientation.ekf import EkfConfig
-from master.orientation.filter import FilterBank, FilterName
-from master.orientation.filters import makers
+from master.orientation.config import EstimationConfig
+from master.orientation.filters import FilterBank
 from master.orientation.heading import HeadingMemory
-from master.orientation.joints.online import OnlineConfig, OnlineHeadings
+from master.orientation.joints.online import OnlineHeadings
 from master.orientation.liveness import Liveness
 from master.orientation.lowpass import LowPass
-from master.orientation.mahony import MahonyConfig
 from master.orientation.stance import Stance, StanceLimits
-from master.orientation.vqf import VqfConfig
 from master.suit.doubt import NodeDoubt, Weight
 
 _GRAVITY_M_S2 = 9.81
-
-
-class EstimationConfig(Section):
-    """`[estimation]`: how readings become orientations."""
-
-    filter: FilterName = "vqf"
-    """Orientation filter of every node that does not name its own."""
-    order: Literal[2, 4, 6, 8] = 2
-    """Order of the Butterworth low-passes."""
-    # equal cut-offs keep the three sensors in step: on the five BROAD trials at hand vqf's error is 2.51° at
-    # 50 Hz for all as with none at all, 3.7° with the accelerometer at 10 Hz, 6.2° with the magnetometer at 5
-    accelerometer_cutoff_hz: float = Field(default=50.0, ge=0.0, allow_inf_nan=False)
-    """-3 dB; 0 leaves the accelerometer as it is."""
-    gyroscope_cutoff_hz: float = Field(default=50.0, ge=0.0, allow_inf_nan=False)
-    """-3 dB; 0 leaves the gyroscope as it is. Its delay is made good in the posture."""
-    magnetometer_cutoff_hz: float = Field(default=50.0, ge=0.0, allow_inf_nan=False)
-    """-3 dB; 0 leaves the magnetometer as it is."""
-    settle_s: float = Field(default=1.0, ge=0.0, le=60.0)
-    """From a node's first answer, or its return, until its orientation counts as valid."""
-    stance_s: float = Field(default=0.0, ge=0.0, le=60.0)
-    """So long standing still in the zero pose then gives the nodes' headings, and the mounting of those whose
-    file does not give it; 0: headings by the magnetometers, mounting as calibrated."""
-    stance_heading_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
-    """Where the operator faces meanwhile, from east towards north."""
-    stance_turn_deg_s: float = Field(default=15.0, gt=0.0, le=360.0)
-    """A node that turns faster meanwhile, degrees/s, does not stand still: the pose is asked for again."""
-    stance_lean_deg: float = Field(default=15.0, gt=0.0, le=90.0)
-    """A segment that leans farther from upright, degrees, is not in the zero pose: it is asked for again.
-    Noticed only where the node's file gives its mounting."""
-    vqf: VqfConfig = VqfConfig()
-    mahony: MahonyConfig = MahonyConfig()
-    ekf: EkfConfig = EkfConfig()
-    constraints: Literal["online", "off"] = "off"
-    """`online`: headings by the gyros, corrected by what the joints cannot do and by the magnetometers as far
-    as the field is undisturbed. `off`: each node's heading by its own filter alone."""
-    online: OnlineConfig = OnlineConfig()
-
-    @property
-    def cutoffs_hz(self) -> tuple[float, float, float]:
-        """In the sensors' order: accelerometer, gyroscope, magnetometer."""
-        return self.accelerometer_cutoff_hz, self.gyroscope_cutoff_hz, self.magnetometer_cutoff_hz
-
-    def mistakes_at(self, rate_hz: float) -> list[ConfigMistake]:
-        """What cannot be done at that rate: a cut-off must lie below half of it."""
-        names = ("accelerometer", "gyroscope", "magnetometer")
-        return [
-            ConfigMistake(
-                f"estimation.{name}_cutoff_hz", cutoff, f"less than half the rate of {rate_hz:g} Hz, or 0"
-            )
-            for name, cutoff in zip(names, self.cutoffs_hz, strict=True)
-            if cutoff >= 0.5 * rate_hz
-        ]
 
 
 class Node(Protocol):
@@ -179,10 +122,8 @@ class Estimator:
         """(3, N, 3, 4), what is applied to accelerometers, gyros and magnetometers."""
         self._samples = np.empty((3, count, 3))
         self._lowpass = LowPass(config.cutoffs_hz, config.order, rate_hz, count)
-        self._bank = FilterBank(
-            [node.filter or config.filter for node in nodes],
-            makers(rate_hz, config.vqf, config.mahony, config.ekf),
-        )
+        names = [node.filter or config.filter for node in nodes]
+        self._bank = FilterBank(names, config.filter_sections, rate_hz)
         self._liveness = Liveness(count, math.ceil(config.settle_s * rate_hz))
         self._heading: _Headings = HeadingMemory(count)
         self._q_of_filters = self._bank.q_world_from_sensor

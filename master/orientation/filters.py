@@ -1,24 +1,128 @@
-"""The filters by their names, as a TOML writes them."""
+"""The registry of orientation filters, and a bank in which each node has the filter that it names.
+
+To add a filter, add its section to `FILTERS`; nothing else changes.
+"""
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from master.orientation.ekf import EkfConfig, EkfFilter
-from master.orientation.filter import MakeFilter
-from master.orientation.mahony import MahonyConfig, MahonyFilter
-from master.orientation.vqf import VqfConfig, VqfFilter
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import create_model
+
+from common.config.section import Section
+from common.errors import ConfigMistake
+from common.quaternion import Array
+from common.wire.messages import Mask
+from master.orientation.ekf import EkfConfig
+from master.orientation.filter import FilterSection, OrientationFilter
+from master.orientation.mahony import MahonyConfig
+from master.orientation.vqf import VqfConfig
+from master.suit.doubt import NodeDoubt
+
+FILTERS: dict[str, type[FilterSection]] = {"vqf": VqfConfig, "mahony": MahonyConfig, "ekf": EkfConfig}
+"""By name: `filter = "vqf"` selects a filter, `[estimation.vqf]` holds its parameters."""
 
 
-def makers(
-    rate_hz: float,
-    vqf: VqfConfig | None = None,
-    mahony: MahonyConfig | None = None,
-    ekf: EkfConfig | None = None,
-) -> dict[str, MakeFilter]:
-    """What makes each filter for readings at that rate; None takes the defaults."""
-    return {
-        "vqf": partial(VqfFilter, vqf or VqfConfig(), rate_hz),
-        "mahony": partial(MahonyFilter, mahony or MahonyConfig(), rate_hz),
-        "ekf": partial(EkfFilter, ekf or EkfConfig(), rate_hz),
-    }
+def filter_mistakes(key: str, name: str) -> list[ConfigMistake]:
+    """A mistake at `key` if no filter has that name."""
+    return [] if name in FILTERS else [ConfigMistake(key, name, f"one of {', '.join(FILTERS)}")]
+
+
+def read_sections(tables: Mapping[str, object], context: Any = None) -> dict[str, FilterSection]:
+    """The section of every filter, from `tables` or with defaults. Raises pydantic.ValidationError."""
+    fields: dict[str, Any] = {name: (section, section()) for name, section in FILTERS.items()}
+    sections = create_model("FilterSections", __base__=Section, **fields)
+    return dict(sections.model_validate(tables, context=context))
+
+
+class FilterBank:
+    """N nodes, each filtered by the filter it names; itself an `OrientationFilter`."""
+
+    def __init__(self, names: Sequence[str], sections: Mapping[str, FilterSection], rate_hz: float) -> None:
+        """`names` holds one filter's name for each node, `sections` the parameters of each filter."""
+        self._count = len(names)
+        self._parts: list[tuple[NDArray[np.intp] | slice, OrientationFilter]] = []
+        for name in dict.fromkeys(names):
+            rows = np.flatnonzero([n == name for n in names])
+            filter_ = sections[name].make(rate_hz, len(rows))
+            # a slice where all share one filter: nothing is then copied
+            self._parts.append((slice(None) if len(rows) == self._count else rows, filter_))
+
+    def update(self, gyr_rad_s: Array, acc_m_s2: Array, mag_ut: Array, dt_s: float | None = None) -> None:
+        """One tick's readings, (N, 3) each."""
+        for rows, part in self._parts:
+            part.update(gyr_rad_s[rows], acc_m_s2[rows], mag_ut[rows], dt_s)
+
+    def q_world_from_sensor(self) -> Array:
+        """Orientations (N, 4)."""
+        out = np.empty((self._count, 4))
+        for rows, part in self._parts:
+            out[rows] = part.q_world_from_sensor()
+        return out
+
+    def q_inertial_from_sensor(self) -> Array:
+        """Orientations (N, 4) without the magnetometers."""
+        out = np.empty((self._count, 4))
+        for rows, part in self._parts:
+            out[rows] = part.q_inertial_from_sensor()
+        return out
+
+    def bias_rad_s(self) -> Array:
+        """Gyro biases (N, 3)."""
+        out = np.empty((self._count, 3))
+        for rows, part in self._parts:
+            out[rows] = part.bias_rad_s()
+        return out
+
+    def undecided(self) -> Mask:
+        """(N,) whose rate may be a bias that is not learnt."""
+        out = np.zeros(self._count, dtype=np.bool_)
+        for rows, part in self._parts:
+            out[rows] = part.undecided()
+        return out
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """Doubted nodes by their number among all N."""
+        out = {}
+        for rows, part in self._parts:
+            places = np.arange(self._count)[rows].tolist()
+            out.update({places[node]: doubt for node, doubt in part.doubts().items()})
+        return out
+
+    @property
+    def spoilt(self) -> Mask | None:
+        """(N,), or None for nobody."""
+        out = None
+        for rows, part in self._parts:
+            spoilt = part.spoilt
+            if spoilt is not None:
+                out = np.zeros(self._count, dtype=np.bool_) if out is None else out
+                out[rows] = spoilt
+        return out
+
+    @property
+    def skipped(self) -> NDArray[np.int64]:
+        """(N,)."""
+        out = np.zeros(self._count, dtype=np.int64)
+        for rows, part in self._parts:
+            out[rows] = part.skipped
+        return out
+
+    def restart(self, nodes: Mask) -> None:
+        """Forget the past of some nodes, mask (N,)."""
+        for rows, part in self._parts:
+            part.restart(nodes[rows])
+
+    def snapshot(self) -> object:
+        """The state of every part."""
+        return [part.snapshot() for _, part in self._parts]
+
+    def restore(self, snapshot: object) -> None:
+        """Go on from a snapshot of this bank."""
+        if not isinstance(snapshot, list) or len(snapshot) != len(self._parts):
+            raise TypeError("not a snapshot of this bank")
+        for (_, part), state in zip(self._parts, snapshot, strict=True):
+            part.restore(state)

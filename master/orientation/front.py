@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from common.config.section import Section
 from common.quaternion import Array
 from common.wire.messages import Mask
 from master.orientation.field_watch import FieldWatch
+from master.orientation.filter import FilterSection
 from master.orientation.gross_bias import PERIOD_S, GrossBias
 from master.orientation.soundness import Soundness
 from master.suit.doubt import NodeDoubt, Weight
@@ -30,7 +30,7 @@ _TOLD_RAD_S = math.radians(2.0)
 """A bias larger than this is one that calibration should have taken off."""
 
 
-class FrontSection(Section):
+class FrontSection(FilterSection):
     """What the configurations of all filters share."""
 
     rest_bias_limit_deg_s: float = Field(default=20.0, ge=0.0, le=90.0, allow_inf_nan=False)

@@ -31,6 +31,10 @@ class MahonyConfig(FrontSection):
     bias_limit_rad_s: float = Field(default=0.1, ge=0.0, allow_inf_nan=False)
     """Bound on each axis of the learnt bias; 0 for none."""
 
+    def make(self, rate_hz: float, count: int) -> MahonyFilter:
+        """The filter for `count` nodes."""
+        return MahonyFilter(self, rate_hz, count)
+
 
 @dataclass(frozen=True, slots=True)
 class _Snapshot:

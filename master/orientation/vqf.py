@@ -28,6 +28,10 @@ class VqfConfig(FrontSection):
     reject_disturbed_field: bool = True
     """Leave out a magnetic field whose strength or dip is not the usual one."""
 
+    def make(self, rate_hz: float, count: int) -> VqfFilter:
+        """The filter for `count` nodes."""
+        return VqfFilter(self, rate_hz, count)
+
 
 class VqfFilter(BehindFront):
     """An `OrientationFilter` of n `vqf.VQF` objects (C++, about 1 µs an update).

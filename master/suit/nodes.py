@@ -9,7 +9,6 @@ from pydantic import Field
 from common.can.config import BusConfig, names_used_twice
 from common.config.section import RelativePath, Section
 from common.errors import ConfigMistake
-from master.orientation.filter import FilterName
 
 
 class NodeConfig(Section):
@@ -21,8 +20,8 @@ class NodeConfig(Section):
     """Name of the bus it hangs on."""
     magnetometer: bool = True
     """False: it has none, and its filter runs on gyro and accelerometer."""
-    filter: FilterName | None = None
-    """Orientation filter of this node; None takes the suit's."""
+    filter: str | None = None
+    """Name of this node's orientation filter; None takes the suit's. The master's file checks the name."""
     calibration: RelativePath | None = None
     """Its calibration TOML; None leaves the readings as they come."""
 

@@ -31,18 +31,14 @@ ORDER: Sequence[Sequence[str]] = [
 Rooms on one line do not import each other, but for those of the slave, where only circles are wrong."""
 
 KNOWN_WRONG = {
-    ("master/suit/nodes.py", "master.orientation.filter"),
     ("deploy/harness/link_settings.py", "deploy.experiments.trial.plan"),
 }
 """Imports against the order that still stand. Delete an entry with its import; the end is an empty set."""
 KNOWN_CIRCLES: Sequence[set[str]] = [
-    {"master.calibrate.recording", "master.calibrate.suit_recording"},
     {"deploy.experiments.soak.run", "deploy.experiments.soak.view"},
     {"deploy.experiments.demo.report", "deploy.experiments.demo.run", "deploy.experiments.demo.view"},
-    {"master/orientation", "master/orientation/joints", "master/suit"},
     {"slave/servos", "slave/servos/canopen", "slave/servos/dynamixel"},
     {"slave/guard", "slave/limit", "slave/track"},
-    {"deploy/calibrate", "deploy/calibrate/live"},
     {"deploy/experiments/trial", "deploy/experiments/trial/remote", "deploy/harness"},
 ]
 """Circles of files and of folders that still stand, or a part of each. The end is an empty list."""

@@ -49,14 +49,15 @@ def files(
     """
     from rich.console import Console
 
-    from deploy.experiments.accuracy.judge import FILTERS, judge
+    from deploy.experiments.accuracy.judge import judge
     from deploy.experiments.accuracy.picture import draw
     from deploy.experiments.accuracy.view import accuracy_of_files
+    from master.orientation.filters import FILTERS
 
     if filter_ != "all" and filter_ not in FILTERS:
         raise typer.BadParameter(f"{filter_!r}: expected {', '.join(FILTERS)} or all", param_hint="--filter")
     console = Console()
-    judged = judge(recordings, FILTERS if filter_ == "all" else (filter_,), console, jobs, align=align)
+    judged = judge(recordings, list(FILTERS) if filter_ == "all" else [filter_], console, jobs, align=align)
     console.print(accuracy_of_files(judged.tree))
     if report is not None:
         write_json(report, judged.tree)

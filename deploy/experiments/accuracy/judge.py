@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -18,10 +18,9 @@ from deploy.experiments.accuracy.online import Run, run_online
 from deploy.experiments.accuracy.picture import Panel
 from deploy.experiments.accuracy.recording import Trial, load_trial
 from deploy.harness.workers import Tell, jobs_here, run_each
-from master.orientation.filter import FilterName, OrientationFilter
-from master.orientation.filters import makers
+from master.orientation.filter import OrientationFilter
+from master.orientation.filters import FILTERS
 
-FILTERS: tuple[str, ...] = get_args(FilterName)
 _PARTS = ("total", "heading", "inclination")
 _LITTLE = 30_000
 """Samples × filters: below it starting processes takes longer than the work."""
@@ -87,7 +86,7 @@ def _run(work: tuple[Path, str], tell: Tell) -> Array:
 
 
 def _filter(trial: Trial, name: str) -> OrientationFilter:
-    return makers(trial.rate_hz)[name](1)
+    return FILTERS[name]().make(trial.rate_hz, 1)
 
 
 def _unheard(_: int) -> None:

@@ -17,8 +17,8 @@ from common.wire.codec import decode, encode
 from common.wire.messages import Command, CommandStamps
 from deploy.measure.timing import spread_us, time_calls
 from master.joint_angles.solver import JointSolver
-from master.orientation.estimator import EstimationConfig, Estimator
-from master.orientation.filter import FilterName
+from master.orientation.config import EstimationConfig
+from master.orientation.estimator import Estimator
 from master.suit.nodes import NodeConfig
 from master.suit.plausibility import BLOCK, Plausibility, PlausibilityConfig
 from master.suit.poll import Poll, Sweep
@@ -53,7 +53,7 @@ def pipeline(seconds: float) -> dict[str, Any]:
     }
 
 
-def ticks(seconds: float, count: int, fd: bool = True, filter_name: FilterName = "vqf") -> dict[str, Any]:
+def ticks(seconds: float, count: int, fd: bool = True, filter_name: str = "vqf") -> dict[str, Any]:
     """µs a tick: `decode_us` from frames to SI units, `fuse_us` to calibrate, low-pass and fuse."""
     protocol = SuitProtocol.load()
     poll = Poll(nodes(count), protocol, LOST_AFTER, {BUS: fd})

@@ -21,7 +21,8 @@ from common.skeleton.kinematics import orientations, origins
 from common.wire.messages import Mask
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import Calibration, identity
-from master.orientation.estimator import EstimationConfig, Estimator
+from master.orientation.config import EstimationConfig
+from master.orientation.estimator import Estimator
 
 RATE_HZ = 200.0
 GRAVITY, FIELD_UT = np.array([0.0, 0.0, 9.81]), np.array([0.0, 28.0, -39.0])

@@ -1,17 +1,12 @@
 """A magnetometer that changes while worn is told, and believed less, by every filter."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, multiply, rotate
-from master.orientation.ekf import EkfConfig
 from master.orientation.field_watch import FieldWatch
 from master.orientation.filter import OrientationFilter
-from master.orientation.filters import makers
-from master.orientation.mahony import MahonyConfig
-from master.orientation.vqf import VqfConfig
+from master.orientation.filters import FILTERS
 from master.suit.doubt import Weight
 
 from .test_estimator import FIELD_UT, GRAVITY, attitudes
@@ -23,12 +18,7 @@ IRON_UT = np.array([0.0, 10.0, 0.0])
 
 
 def unwatched(name: str) -> OrientationFilter:
-    configs: dict[str, Any] = {
-        "vqf": VqfConfig(field_change=0.0),
-        "mahony": MahonyConfig(field_change=0.0),
-        "ekf": EkfConfig(field_change=0.0),
-    }
-    return makers(RATE_HZ, **{name: configs[name]})[name](1)
+    return FILTERS[name].model_validate({"field_change": 0.0}).make(RATE_HZ, 1)
 
 
 def turning(filter_: OrientationFilter, seconds: float, iron_from_s: float, offset_ut: Array) -> float:
@@ -52,8 +42,8 @@ def turning(filter_: OrientationFilter, seconds: float, iron_from_s: float, offs
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_hard_iron_is_told_and_believed_less(name: str, axis: int) -> None:
     offset = np.roll(IRON_UT, axis - 1) * 1.5
-    filter_ = makers(RATE_HZ)[name](1)
-    clean = turning(makers(RATE_HZ)[name](1), 50.0, 99.0, offset)
+    filter_ = FILTERS[name]().make(RATE_HZ, 1)
+    clean = turning(FILTERS[name]().make(RATE_HZ, 1), 50.0, 99.0, offset)
     watched, before = turning(filter_, 50.0, 20.0, offset), turning(unwatched(name), 50.0, 20.0, offset)
     (doubt,) = filter_.doubts().values()
     assert doubt.weight is Weight.TOLD
@@ -63,7 +53,7 @@ def test_hard_iron_is_told_and_believed_less(name: str, axis: int) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_in_the_earth_s_field_alone_nothing_is_doubted_or_changed(name: str) -> None:
-    filter_, plain = makers(RATE_HZ)[name](1), unwatched(name)
+    filter_, plain = FILTERS[name]().make(RATE_HZ, 1), unwatched(name)
     assert turning(filter_, 30.0, 99.0, IRON_UT) == turning(plain, 30.0, 99.0, IRON_UT)
     assert filter_.doubts() == {}
 
@@ -105,7 +95,7 @@ def test_on_broad_only_a_change_is_told(recording: LoadRecording) -> None:
         gyr, acc = (np.ascontiguousarray(trial[key]) for key in ("gyr", "acc"))
         ticks, rate_hz = 16_000, float(trial["rate_hz"])
         for iron_ut, told in ((0.0, False), (10.0, True)):
-            filter_ = makers(rate_hz)["vqf"](1)
+            filter_ = FILTERS["vqf"]().make(rate_hz, 1)
             said = False
             for tick in range(ticks):
                 mag = trial["mag"][tick].copy()

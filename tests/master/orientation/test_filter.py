@@ -2,16 +2,18 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from master.orientation.filter import FilterBank, MakeFilter
-from master.orientation.mahony import MahonyConfig, MahonyFilter
+from master.orientation.filter import FilterSection
+from master.orientation.filters import FilterBank
+from master.orientation.mahony import MahonyConfig
 from master.orientation.vqf import VqfConfig, VqfFilter
 
 RATE_HZ = 200.0
 NAMES = ["vqf", "mahony", "vqf", "mahony", "mahony"]
-MAKE: dict[str, MakeFilter] = {
-    "vqf": lambda n: VqfFilter(VqfConfig(), RATE_HZ, n),
-    "mahony": lambda n: MahonyFilter(MahonyConfig(ki=0.1), RATE_HZ, n),
-}
+SECTIONS: dict[str, FilterSection] = {"vqf": VqfConfig(), "mahony": MahonyConfig(ki=0.1)}
+
+
+def bank_of(names: list[str]) -> FilterBank:
+    return FilterBank(names, SECTIONS, RATE_HZ)
 
 
 def readings(ticks: int, nodes: int, seed: int = 0) -> list[tuple[Array, Array, Array]]:
@@ -27,8 +29,8 @@ def readings(ticks: int, nodes: int, seed: int = 0) -> list[tuple[Array, Array, 
 
 
 def test_each_node_has_the_filter_it_names() -> None:
-    bank = FilterBank(NAMES, MAKE)
-    alone = [MAKE[name](1) for name in NAMES]
+    bank = bank_of(NAMES)
+    alone = [SECTIONS[name].make(RATE_HZ, 1) for name in NAMES]
     for tick in readings(50, 5):
         bank.update(*tick)
         for i, one in enumerate(alone):
@@ -42,7 +44,7 @@ def test_each_node_has_the_filter_it_names() -> None:
 
 @pytest.mark.parametrize("names", [NAMES, ["vqf"] * 5, ["mahony"] * 5])
 def test_restart_reaches_the_right_nodes(names: list[str]) -> None:
-    bank, fresh, old = FilterBank(names, MAKE), FilterBank(names, MAKE), FilterBank(names, MAKE)
+    bank, fresh, old = bank_of(names), bank_of(names), bank_of(names)
     for tick in readings(50, 5):
         bank.update(*tick)
         old.update(*tick)
@@ -58,7 +60,7 @@ def test_restart_reaches_the_right_nodes(names: list[str]) -> None:
 
 @pytest.mark.parametrize("names", [NAMES, ["vqf"] * 5, ["mahony"] * 5])
 def test_goes_on_from_a_snapshot(names: list[str]) -> None:
-    bank = FilterBank(names, MAKE)
+    bank = bank_of(names)
     for tick in readings(30, 5):
         bank.update(*tick)
     snapshot = bank.snapshot()

@@ -1,292 +1,63 @@
-"""What every filter must do, through the one interface."""
+"""Every filter in the registry keeps the contract, is in the README, and is selected by a TOML file."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
+from pydantic import Field
 
-from common.config.section import Section
-from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, multiply, rotate
-from master import orientation as fuse
-from master.orientation.ekf import EkfConfig
-from master.orientation.estimator import EstimationConfig, Estimator
-from master.orientation.filter import OrientationFilter
-from master.orientation.filters import makers
-from master.orientation.mahony import MahonyConfig
-from master.orientation.vqf import VqfConfig
+from master import orientation
+from master.orientation.config import EstimationConfig
+from master.orientation.estimator import Estimator
+from master.orientation.filter import FilterSection, OrientationFilter
+from master.orientation.filters import FILTERS
+from master.orientation.mahony import MahonyConfig, MahonyFilter
 from master.suit.nodes import NodeConfig
 
-RATE_HZ = 200.0
-GRAVITY = np.array([0.0, 0.0, 9.81])
-FIELD_UT = np.array([0.0, 28.0, -39.0])
-NO_FIELD = np.full(3, np.nan)
-UP = np.array([0.0, 0.0, 1.0])
-NODES = 3
-
-every_filter = pytest.mark.parametrize("name", list(makers(RATE_HZ)))
+from .filter_contract import GRAVITY, RATE_HZ, FilterContract
 
 
-def make(name: str, nodes: int = NODES) -> OrientationFilter:
-    return makers(RATE_HZ)[name](nodes)
+class TestEveryFilter(FilterContract):
+    @pytest.fixture(params=list(FILTERS))
+    def section(self, request: pytest.FixtureRequest) -> FilterSection:
+        return FILTERS[request.param]()
 
 
-def attitudes(seed: int = 0) -> Array:
-    return Rotation.random(NODES, rng=seed).as_quat(scalar_first=True)
+class SlowConfig(FilterSection):
+    """Another filter's section."""
+
+    gain: float = Field(default=0.1, gt=0.0)
+
+    def make(self, rate_hz: float, count: int) -> OrientationFilter:
+        return MahonyFilter(MahonyConfig(kp=self.gain), rate_hz, count)
 
 
-def seen(q: Array, v_world: Array) -> Array:
-    """A world vector in each sensor's coordinates."""
-    return np.ascontiguousarray(rotate(conjugate(q), np.broadcast_to(v_world, (len(q), 3))))
+def test_a_filter_is_added_by_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(FILTERS, "slow", SlowConfig)
+    config = EstimationConfig.model_validate({"filter": "slow", "slow": {"gain": 0.2}})
+    assert config.filter_sections["slow"] == SlowConfig(gain=0.2)
+    assert config.mistakes_at(RATE_HZ) == []
+    bank = Estimator(config, [NodeConfig(id=1, bus="b")], RATE_HZ)._bank
+    ((_, filter_),) = bank._parts
+    assert isinstance(filter_, MahonyFilter)
+    assert filter_._config.kp == 0.2
 
 
-def inclination_deg(q: Array, truth: Array) -> float:
-    up = rotate(multiply(q, conjugate(truth)), UP)
-    return float(np.degrees(np.max(np.arctan2(np.hypot(up[:, 0], up[:, 1]), up[:, 2]))))
-
-
-def off_deg(q: Array, truth: Array) -> float:
-    return float(np.degrees(np.max(angle_between(q, truth))))
-
-
-def rate_at(time_s: float, seed: int = 0) -> Array:
-    rng = np.random.default_rng(seed)
-    phase, speed = rng.uniform(0.0, 6.0, (NODES, 3)), rng.uniform(0.5, 3.0, (NODES, 3))
-    return np.sin(speed * time_s + phase)
-
-
-def move(
-    filter_: OrientationFilter,
-    truth: Array,
-    dts_s: Array,
-    field: Array = FIELD_UT,
-    tell_dt: bool = True,
-    start_s: float = 0.0,
-) -> Array:
-    """Turn by `rate_at` with those times between readings; the truth at the end."""
-    time_s = start_s
-    for dt_s in dts_s:
-        rate = rate_at(time_s + 0.5 * dt_s)
-        time_s += dt_s
-        truth = multiply(truth, from_rotation_vector(rate * dt_s))
-        mag = seen(truth, field)
-        filter_.update(rate, seen(truth, GRAVITY), mag, float(dt_s) if tell_dt else None)
-    return truth
-
-
-def rest(filter_: OrientationFilter, truth: Array, ticks: int, field: Array = FIELD_UT) -> None:
-    still, acc, mag = np.zeros((NODES, 3)), seen(truth, GRAVITY), seen(truth, field)
-    for _ in range(ticks):
-        filter_.update(still, acc, mag)
-
-
-@every_filter
-def test_starts_from_a_still_pose_at_once_and_stays(name: str) -> None:
-    filter_, truth = make(name), attitudes()
-    rest(filter_, truth, 1)
-    assert off_deg(filter_.q_world_from_sensor(), truth) < 0.1
-    rest(filter_, truth, 600)
-    assert off_deg(filter_.q_world_from_sensor(), truth) < 0.1
-    assert np.max(np.abs(filter_.bias_rad_s())) < 1e-3
-
-
-@every_filter
-def test_the_nominal_period_told_is_the_nominal_period_untold(name: str) -> None:
-    told, untold, dts_s = make(name), make(name), np.full(100, 1.0 / RATE_HZ)
-    move(told, attitudes(), dts_s)
-    move(untold, attitudes(), dts_s, tell_dt=False)
-    assert np.array_equal(told.q_world_from_sensor(), untold.q_world_from_sensor())
-
-
-@every_filter
-@settings(max_examples=5, derandomize=True, deadline=None)
-@given(seed=st.integers(0, 1000))
-def test_follows_a_motion_read_at_uneven_times(name: str, seed: int) -> None:
-    filter_, truth = make(name), attitudes(seed)
-    rest(filter_, truth, 100)
-    dts_s = np.random.default_rng(seed).uniform(0.002, 0.012, 400)
-    truth = move(filter_, truth, dts_s)
-    assert off_deg(filter_.q_world_from_sensor(), truth) < 0.5
-
-
-@every_filter
-def test_uneven_times_left_untold_do_harm(name: str) -> None:
-    filter_, truth = make(name), attitudes(1)
-    rest(filter_, truth, 100)
-    truth = move(filter_, truth, np.full(200, 0.012), tell_dt=False)
-    assert off_deg(filter_.q_world_from_sensor(), truth) > 3.0
-
-
-@every_filter
-def test_a_gap_is_bridged_by_the_turn_told_and_costs_little(name: str) -> None:
-    filter_, truth = make(name), attitudes(2)
-    rest(filter_, truth, 100)
-    gaps_s = np.full(300, 1.0 / RATE_HZ)
-    gaps_s[100::50] = 20.0 / RATE_HZ
-    truth = move(filter_, truth, gaps_s)
-    assert off_deg(filter_.q_world_from_sensor(), truth) < 1.0
-
-
-@every_filter
-def test_a_gap_turns_by_the_rate_less_its_bias(name: str) -> None:
-    """Rest teaches the bias; a long gap must not integrate it."""
-    filter_, truth, bias = make(name), attitudes(3), np.full((NODES, 3), 0.01)
-    acc, no_field = seen(truth, GRAVITY), np.tile(NO_FIELD, (NODES, 1))
-    for _ in range(1000):
-        filter_.update(bias, acc, no_field)
-    before, learnt = filter_.q_world_from_sensor(), filter_.bias_rad_s()
-    filter_.update(bias, acc, no_field, 2.0)
-    turned = angle_between(before, filter_.q_world_from_sensor())
-    expected = np.linalg.norm(2.0 * (bias - learnt), axis=1)
-    # the accelerometer takes back some of it
-    assert np.all(turned <= expected + 2e-3)
-
-
-@every_filter
-def test_a_disturbed_field_never_touches_the_inclination(name: str) -> None:
-    clean, disturbed = make(name), make(name)
-    truth = attitudes(4)
-    for filter_ in (clean, disturbed):
-        rest(filter_, truth, 200)
-    dts_s = np.full(600, 1.0 / RATE_HZ)
-    move(clean, truth, dts_s)
-    end = move(disturbed, truth, dts_s, FIELD_UT + [25.0, -20.0, 30.0])
-    ends = [filter_.q_world_from_sensor() for filter_ in (clean, disturbed)]
-    assert inclination_deg(ends[1], end) < 0.3
-    if name != "mahony":  # which learns one bias from both sensors, by K_i, so that a trace of it shows
-        assert inclination_deg(ends[1], ends[0]) < 1e-6
-
-
-@every_filter
-def test_a_field_of_another_strength_is_left_out(name: str) -> None:
-    filter_ = make(name)
-    # vqf takes a field for the usual one after 5 s of motion
-    truth = move(filter_, attitudes(5), np.full(1800, 1.0 / RATE_HZ))
-    # by direction the field is then 55° off
-    end = move(filter_, truth, np.full(600, 1.0 / RATE_HZ), FIELD_UT + [40.0, 0.0, 0.0])
-    assert off_deg(filter_.q_world_from_sensor(), end) <= 3.0
-
-
-@every_filter
-def test_without_the_magnetometer_it_is_the_same_up_to_a_turn_about_the_vertical(name: str) -> None:
-    filter_, truth = make(name), attitudes(6)
-    rest(filter_, truth, 100)
-    move(filter_, truth, np.full(300, 1.0 / RATE_HZ), FIELD_UT + [10.0, 0.0, 0.0])
-    between = multiply(filter_.q_inertial_from_sensor(), conjugate(filter_.q_world_from_sensor()))
-    assert np.allclose(between[:, 1:3], 0.0, atol=1e-9)
-
-
-@every_filter
-def test_the_orientation_without_the_magnetometer_hears_nothing_of_it(name: str) -> None:
-    dts_s = np.full(600, 1.0 / RATE_HZ)
-    headings = []
-    for field in (FIELD_UT, FIELD_UT + [25.0, -20.0, 30.0]):
-        filter_, truth = make(name), attitudes(7)
-        rest(filter_, truth, 200)
-        before = filter_.q_inertial_from_sensor()
-        end = move(filter_, truth, dts_s, field)
-        # how far it turned in the world, beside the truth
-        turned = multiply(filter_.q_inertial_from_sensor(), conjugate(before))
-        frame = multiply(before, conjugate(truth))
-        true_turn = multiply(multiply(frame, multiply(end, conjugate(truth))), conjugate(frame))
-        headings.append(off_deg(turned, true_turn))
-    assert max(headings) < (1.0 if name == "mahony" else 0.3)
-
-
-@every_filter
-def test_six_axis_keeps_its_inclination_and_its_heading(name: str) -> None:
-    filter_, truth = make(name), attitudes(8)
-    rest(filter_, truth, 1, NO_FIELD)
-    start = filter_.q_world_from_sensor()
-    assert inclination_deg(start, truth) < 0.1
-    rest(filter_, truth, 100, NO_FIELD)
-    end = move(filter_, truth, np.full(600, 1.0 / RATE_HZ), NO_FIELD)
-    found = filter_.q_world_from_sensor()
-    assert inclination_deg(found, end) < 0.2
-    # by its own heading at the start
-    assert off_deg(multiply(conjugate(start), found), multiply(conjugate(truth), end)) < 1.0
-    assert np.allclose(filter_.q_inertial_from_sensor(), found, atol=1e-12)
-
-
-@every_filter
-def test_a_magnetometer_that_falls_silent_leaves_the_others_alone(name: str) -> None:
-    some, all_ = make(name), make(name)
-    truth = attitudes(9)
-    rest(some, truth, 50)
-    rest(all_, truth, 50)
-    mag = seen(truth, FIELD_UT + [5.0, 0.0, 0.0])
-    silent = mag.copy()
-    silent[1] = np.nan
-    for _ in range(100):
-        some.update(rate_at(0.0), seen(truth, GRAVITY), silent)
-        all_.update(rate_at(0.0), seen(truth, GRAVITY), mag)
-    found, expected = some.q_world_from_sensor(), all_.q_world_from_sensor()
-    assert np.all(np.isfinite(found))
-    assert np.allclose(found[[0, 2]], expected[[0, 2]], atol=1e-12)
-
-
-@every_filter
-def test_restart_forgets_all_of_a_node_and_nothing_of_the_others(name: str) -> None:
-    filter_, alone, fresh = make(name), make(name), make(name)
-    dts_s = np.full(200, 1.0 / RATE_HZ)
-    truth = move(filter_, attitudes(10), dts_s)
-    move(alone, attitudes(10), dts_s)
-    filter_.restart(np.array([True, False, False]))
-    for each in (filter_, alone, fresh):
-        move(each, truth, dts_s, start_s=1.0)
-    for of in (
-        lambda f: f.q_world_from_sensor(), lambda f: f.q_inertial_from_sensor(), lambda f: f.bias_rad_s(),
-    ):  # fmt: skip
-        assert np.allclose(of(filter_)[0], of(fresh)[0], atol=1e-12)
-        assert np.allclose(of(filter_)[1:], of(alone)[1:], atol=1e-12)
-
-
-@every_filter
-def test_goes_on_from_a_snapshot_again_and_again(name: str) -> None:
-    filter_, dts_s = make(name), np.full(100, 1.0 / RATE_HZ)
-    truth = move(filter_, attitudes(11), dts_s)
-    snapshot = filter_.snapshot()
-    ends = []
-    for _ in range(3):
-        filter_.restore(snapshot)
-        move(filter_, truth, dts_s, FIELD_UT + [10.0, 0.0, 0.0])
-        parts = (filter_.q_world_from_sensor(), filter_.q_inertial_from_sensor(), filter_.bias_rad_s())
-        ends.append(np.concatenate(parts, axis=1))
-    assert np.array_equal(ends[0], ends[1])
-    assert np.array_equal(ends[0], ends[2])
-    with pytest.raises(TypeError, match="not a snapshot"):
-        filter_.restore(None)
-    with pytest.raises(TypeError, match="not a snapshot"):
-        make(name, NODES + 1).restore(snapshot)
-
-
-@every_filter
-def test_what_it_hands_out_is_the_caller_s_own(name: str) -> None:
-    filter_ = make(name)
-    rest(filter_, attitudes(), 2)
-    for of in (filter_.q_world_from_sensor, filter_.q_inertial_from_sensor, filter_.bias_rad_s):
-        before = of()
-        of()[:] = 7.0
-        assert np.array_equal(of(), before)
-
-
-@pytest.mark.parametrize(
-    ("name", "config"), [("vqf", VqfConfig()), ("mahony", MahonyConfig()), ("ekf", EkfConfig())]
-)
-def test_the_readme_has_every_parameter_with_its_default(name: str, config: Section) -> None:
-    text = (Path(next(iter(fuse.__path__))) / "README.md").read_text("utf-8")
+@pytest.mark.parametrize("name", list(FILTERS))
+def test_the_readme_has_every_parameter_with_its_default(name: str) -> None:
+    text = (Path(next(iter(orientation.__path__))) / "README.md").read_text("utf-8")
     rows = text.partition(f"| `[estimation.{name}]` |")[2].partition("\n\n")[0].splitlines()[2:]
     found = [row.split("|")[1:3] for row in rows]
-    expected = {key: str(value).replace("True", "true") for key, value in config.model_dump().items()}
+    expected = {
+        key: str(value).replace("True", "true") for key, value in FILTERS[name]().model_dump().items()
+    }
     assert {key.strip(" `"): default.strip() for key, default in found} == expected
 
 
 def test_a_toml_gives_each_node_its_filter_and_each_filter_its_keys() -> None:
     nodes = [
         NodeConfig.model_validate({"id": i, "bus": "b", "filter": name})
-        for i, name in enumerate([*makers(RATE_HZ), None], 1)
+        for i, name in enumerate([*FILTERS, None], 1)
     ]
     config = EstimationConfig.model_validate({"filter": "ekf", "ekf": {"bias_limit_rad_s": 0.001}})
     estimator, rest_ = Estimator(config, nodes, RATE_HZ), Readings()

@@ -7,9 +7,10 @@ import pytest
 
 from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, multiply, rotate
 from master.orientation.affine import identity
-from master.orientation.estimator import EstimationConfig, Estimator
+from master.orientation.config import EstimationConfig
+from master.orientation.estimator import Estimator
 from master.orientation.filter import OrientationFilter
-from master.orientation.filters import makers
+from master.orientation.filters import FILTERS
 from master.orientation.vqf import VqfConfig
 from master.suit.doubt import Weight
 
@@ -43,7 +44,7 @@ BIASES = np.array([[5.0, 0.0, 0.0], [0.0, -5.0, 0.0], [0.0, 0.0, 3.0], [4.0, -9.
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("field", [True, False])
 def test_a_gross_bias_is_learnt_at_rest(name: str, field: bool) -> None:
-    filter_ = makers(RATE_HZ)[name](len(BIASES))
+    filter_ = FILTERS[name]().make(RATE_HZ, len(BIASES))
     truth = run(filter_, BIASES, 6.0, field=field, turn=np.zeros_like(BIASES))
     assert np.abs(np.degrees(filter_.bias_rad_s()) - BIASES).max() < 0.2
     assert {node: doubt.weight for node, doubt in filter_.doubts().items()} == dict.fromkeys(
@@ -61,7 +62,7 @@ def test_a_gross_bias_is_learnt_at_rest(name: str, field: bool) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_beyond_the_setting_the_node_is_called_uncalibrated(name: str) -> None:
-    filter_ = makers(RATE_HZ)[name](2)
+    filter_ = FILTERS[name]().make(RATE_HZ, 2)
     run(filter_, np.array([[0.0, 21.0, 0.0], [0.0, 19.0, 0.0]]), 4.0, field=True, turn=np.zeros((2, 3)))
     doubts = filter_.doubts()
     assert doubts[0].weight is Weight.INVALID
@@ -70,7 +71,7 @@ def test_beyond_the_setting_the_node_is_called_uncalibrated(name: str) -> None:
 
 
 def test_the_bound_is_a_setting() -> None:
-    filter_ = makers(RATE_HZ, VqfConfig(rest_bias_limit_deg_s=4.0))["vqf"](1)
+    filter_ = VqfConfig(rest_bias_limit_deg_s=4.0).make(RATE_HZ, 1)
     run(filter_, np.array([[5.0, 0.0, 0.0]]), 4.0, field=True, turn=np.zeros((1, 3)))
     assert filter_.doubts()[0].weight is Weight.INVALID
 
@@ -80,7 +81,7 @@ def test_the_bound_is_a_setting() -> None:
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_steady_turn_is_no_bias(name: str, deg_s: float, axis: int) -> None:
     """Gravity tells it about a level axis, the field about the vertical."""
-    filter_ = makers(RATE_HZ)[name](3)
+    filter_ = FILTERS[name]().make(RATE_HZ, 3)
     level = np.zeros(3)
     level[axis] = deg_s
     turn = rotate(conjugate(attitudes(3)), np.tile(level, (3, 1))) if axis == 2 else np.tile(level, (3, 1))
@@ -95,7 +96,7 @@ def test_a_steady_turn_is_no_bias(name: str, deg_s: float, axis: int) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_without_a_field_a_turn_that_wavers_as_a_person_does_is_no_bias(name: str) -> None:
-    filter_, rng, n = makers(RATE_HZ)[name](1), np.random.default_rng(1), 1
+    filter_, rng, n = FILTERS[name]().make(RATE_HZ, 1), np.random.default_rng(1), 1
     up = rotate(conjugate(attitudes(n)), np.tile([0.0, 0.0, 1.0], (n, 1)))
     acc = rotate(conjugate(attitudes(n)), np.broadcast_to(GRAVITY, (n, 3)))
     wander = 0.0
@@ -108,9 +109,9 @@ def test_without_a_field_a_turn_that_wavers_as_a_person_does_is_no_bias(name: st
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_goes_on_from_a_snapshot(name: str) -> None:
-    filter_, bias = makers(RATE_HZ)[name](1), np.array([[0.0, 7.0, 0.0]])
+    filter_, bias = FILTERS[name]().make(RATE_HZ, 1), np.array([[0.0, 7.0, 0.0]])
     run(filter_, bias, 3.0, field=True, turn=np.zeros((1, 3)))
-    snapshot, other = filter_.snapshot(), makers(RATE_HZ)[name](1)
+    snapshot, other = filter_.snapshot(), FILTERS[name]().make(RATE_HZ, 1)
     other.restore(snapshot)
     assert np.array_equal(other.bias_rad_s(), filter_.bias_rad_s())
     for each in (filter_, other):
@@ -120,7 +121,7 @@ def test_it_goes_on_from_a_snapshot(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_until_it_is_learnt_a_steady_rate_is_undecided_and_beyond_the_setting_for_ever(name: str) -> None:
-    filter_, still = makers(RATE_HZ)[name](3), np.zeros((3, 3))
+    filter_, still = FILTERS[name]().make(RATE_HZ, 3), np.zeros((3, 3))
     biases = np.array([[0.0, 12.0, 0.0], [0.0, 0.0, 25.0], [0.5, 0.0, 0.0]])
     run(filter_, biases, 1.0, field=True, turn=still)
     assert filter_.undecided().tolist() == [True, True, False]
@@ -130,7 +131,7 @@ def test_until_it_is_learnt_a_steady_rate_is_undecided_and_beyond_the_setting_fo
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_person_who_turns_is_not_undecided(name: str) -> None:
-    filter_ = makers(RATE_HZ)[name](1)
+    filter_ = FILTERS[name]().make(RATE_HZ, 1)
     for tick in range(400):
         rate = np.radians(25.0 + 5.0 * np.sin(2.0 * np.pi * tick / RATE_HZ)) * upright(1, 1.0)
         filter_.update(rate, GRAVITY[None] * np.ones((1, 3)), np.full((1, 3), np.nan))

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.quaternion import Array, angle_between
-from master.orientation.estimator import EstimationConfig, Estimator
+from master.orientation.config import EstimationConfig
+from master.orientation.estimator import Estimator
 from master.orientation.filter import OrientationFilter
-from master.orientation.filters import makers
+from master.orientation.filters import FILTERS
 from master.orientation.soundness import Soundness
 from master.suit.doubt import Weight
 
@@ -46,7 +47,7 @@ def run(filter_: OrientationFilter, truth: Array, ticks: int, wrong: list[Wrong]
     )
 )  # fmt: skip
 def test_it_survives_whatever_a_channel_says(name: str, wrong: list[Wrong]) -> None:
-    truth, filter_ = attitudes(2), makers(RATE_HZ)[name](2)
+    truth, filter_ = attitudes(2), FILTERS[name]().make(RATE_HZ, 2)
     run(filter_, truth, 60, wrong)
     # a start with few fields takes longer to find north
     assert np.max(angle_between(filter_.q_world_from_sensor(), truth)) < np.radians(10.0)

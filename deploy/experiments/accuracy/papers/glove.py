@@ -19,7 +19,8 @@ from deploy.sim.suit.tray import TrayConfig
 from master.joint_angles.angles import intrinsic_angles
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import Calibration, identity
-from master.orientation.estimator import EstimationConfig, Estimator
+from master.orientation.config import EstimationConfig
+from master.orientation.estimator import Estimator
 
 FILTERS = ("ekf", "vqf")
 """The paper's and our default."""

@@ -20,7 +20,7 @@ from deploy import cli
 from deploy.experiments.accuracy.broad import errors, score, with_heading_of
 from deploy.experiments.accuracy.online import run_online
 from deploy.experiments.accuracy.recording import load_trial
-from master.orientation.filters import makers
+from master.orientation.filters import FILTERS
 
 RATE_HZ = 100.0
 TICKS = 400
@@ -89,7 +89,7 @@ def test_a_free_heading_is_set_where_the_movement_begins_and_nothing_else() -> N
     assert np.max(errors(found, truth).total) < 1e-7
 
 
-@pytest.mark.parametrize("name", list(makers(RATE_HZ)))
+@pytest.mark.parametrize("name", list(FILTERS))
 def test_a_perfect_recording_scores_near_zero_with_dropped_samples_too(name: str, tmp_path: Path) -> None:
     gaps = slice(200, 220)
     whole = load_trial(saved(tmp_path))
@@ -97,7 +97,7 @@ def test_a_perfect_recording_scores_near_zero_with_dropped_samples_too(name: str
     holes = load_trial(saved(tmp_path, acc=holed(trial()["acc"], gaps)))
     assert int(holes.dropped.sum()) == 20
     for each, most_deg in ((whole, 2.0), (holes, 8.0)):
-        run = run_online(each, makers(RATE_HZ)[name](1), lambda _: None)
+        run = run_online(each, FILTERS[name]().make(RATE_HZ, 1), lambda _: None)
         assert each.q_world_from_sensor is not None
         assert (
             score(errors(run.q_world_from_sensor, each.q_world_from_sensor), each.movement).total_deg
@@ -109,14 +109,14 @@ def test_a_perfect_recording_scores_near_zero_with_dropped_samples_too(name: str
 
 def test_nothing_is_known_before_the_first_sample_kept(tmp_path: Path) -> None:
     late = load_trial(saved(tmp_path, gyr=holed(trial()["gyr"], slice(0, 3))))
-    q = run_online(late, makers(RATE_HZ)["vqf"](1), lambda _: None).q_world_from_sensor
+    q = run_online(late, FILTERS["vqf"]().make(RATE_HZ, 1), lambda _: None).q_world_from_sensor
     assert np.isnan(q[:3]).all()
     assert np.isfinite(q[3:]).all()
 
 
 def test_every_sample_counts_towards_the_progress(tmp_path: Path) -> None:
     heard: list[int] = []
-    run_online(load_trial(saved(tmp_path)), makers(RATE_HZ)["vqf"](1), heard.append)
+    run_online(load_trial(saved(tmp_path)), FILTERS["vqf"]().make(RATE_HZ, 1), heard.append)
     assert sum(heard) == TICKS
 
 

@@ -19,8 +19,8 @@ from deploy.sim.suit.motion import Motion
 from deploy.sim.suit.sensors import IdealSensors, earth_field_ut
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import identity
-from master.orientation.estimator import EstimationConfig, Estimator
-from master.orientation.filter import FilterName
+from master.orientation.config import EstimationConfig
+from master.orientation.estimator import Estimator
 
 EARTH_UT = earth_field_ut(50.0, 60.0)
 DECIDE_TICKS = 16
@@ -28,7 +28,7 @@ DECIDE_TICKS = 16
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    filter: FilterName | None = None
+    filter: str | None = None
     calibration: Path | None = None
 
 

@@ -17,7 +17,8 @@ from master.calibrate.mounting import find_mounting
 from master.calibrate.recording import load_recordings
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import Calibration, identity
-from master.orientation.estimator import EstimationConfig, Estimator
+from master.orientation.config import EstimationConfig
+from master.orientation.estimator import Estimator
 
 pytestmark = pytest.mark.recordings
 
