@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from common.can.bus import CanBus
 from common.clock import monotonic_ns
-from common.latency.stages import Durations, StageTimes
+from common.latency.budget import StageTimes
+from common.latency.durations import Durations
 from common.link import Session, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints

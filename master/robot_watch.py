@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from common.clock import to_ns
 from common.latency.arrivals import Arrivals
-from common.latency.stages import RoundTrip
+from common.latency.durations import StreamedDurations
+from common.latency.one_way import round_trip_ns
 from common.wire.messages import RobotState
 from common.wire.topics import STATE
 
@@ -14,7 +15,7 @@ class RobotWatch:
 
     def __init__(self) -> None:
         self.state: RobotState | None = None
-        self.round_trip = RoundTrip()
+        self.round_trip = StreamedDurations()
         self.arrivals = Arrivals()
         """Of the states, by their numbers; a robot that starts anew begins its count anew."""
         self._heard_ns = 0
@@ -33,9 +34,7 @@ class RobotWatch:
         echo = state.echo
         if ours and echo is not None and echo.sequence != self._echoed:
             self._echoed = echo.sequence
-            # the time on the slave is measured on the slave's clock alone, so no offset enters
-            on_slave_ns = state.sent_ns - echo.received_ns
-            self.round_trip.record(arrived_ns - echo.put_ns - on_slave_ns)
+            self.round_trip.record(round_trip_ns(state, echo, arrived_ns))
 
     def silent(self, now_ns: int) -> bool:
         """Whether the robot has not been heard within the state topic's time-out."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import statistics
 from collections import deque
 
-from common.latency.stages import Durations, Told
+from common.latency.durations import Durations, StreamedDurations
 from common.metrics.published import DueMetrics
 from common.wire.topics import COMMAND
 
@@ -27,7 +27,7 @@ class Due:
     def __init__(self) -> None:
         self.corrected = Durations()
         """One way, of every command that came and of every one that was due and did not."""
-        self.recent = Told()
+        self.recent = StreamedDurations()
         """Of those that did not come, to be told one by one."""
         self.missing = 0
         """Was not there when it was due and a newer came; one that comes later yet stays counted."""

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock_sync import Offset
-from common.latency.stages import LatencyBudget, Passage
+from common.latency.budget import LatencyBudget
+from common.latency.stamps import Passage
 from common.wire.messages import Command, CommandEcho
 from slave.servos.servos import EncoderReading
 

@@ -13,7 +13,8 @@ import numpy as np
 from common.clock_sync import Offset, SlaveExchange
 from common.errors import CodecError
 from common.latency.arrivals import Arrivals
-from common.latency.stages import Told
+from common.latency.durations import StreamedDurations
+from common.latency.one_way import one_way_ns
 from common.link.namesakes import Namesakes
 from common.process.throttle import Throttle
 from common.quaternion import Array
@@ -78,7 +79,7 @@ class SlavePipeline:
         )
         self.clock = SlaveExchange()
         self.journeys = Journeys()
-        self.one_way = Told()
+        self.one_way = StreamedDurations()
         """From put to received, of every command of the lease's holder while the offset was trusted."""
         self.due = Due()
         """The same with the commands that were due and did not come."""
@@ -89,7 +90,7 @@ class SlavePipeline:
         self.on_accepted: Callable[[Command, int, Offset], None] | None = None
         """Called with every command that the guard accepts, now_ns, and the clocks' offset."""
         self.camera_fault = ""
-        """Told with the state; no reason to stop moving."""
+        """StreamedDurations with the state; no reason to stop moving."""
         self._states_sent = 0
         self._reading: EncoderReading | None = None
         self._body = WELL
@@ -109,9 +110,9 @@ class SlavePipeline:
         # another operator's stamps are of another clock
         if command.lease and command.lease == self.guard.lease.token:
             self.arrivals.note(command.lease, command.sequence)
-            put_ns, transit_ns = command.stamps.put_ns, None
-            if offset.trusted:
-                transit_ns = offset.remote_ns(received_ns) - put_ns
+            put_ns = command.stamps.put_ns
+            transit_ns = one_way_ns(put_ns, received_ns, offset)
+            if transit_ns is not None:
                 self.one_way.record(transit_ns)
             self.due.note(self._master_clock, command.sequence, put_ns, transit_ns)
         if self.guard.on_command(command, received_ns, now_ns, offset).accepted:

@@ -65,6 +65,10 @@ class Offset:
         """A stamp of our clock, on the remote one."""
         return local_ns + self.offset_ns
 
+    def reversed(self) -> Offset:
+        """Our clock against the other host's."""
+        return Offset(-self.offset_ns, self.bound_ns, self.trusted)
+
 
 NEVER_MEASURED = Offset(0, UNKNOWN_NS, trusted=False)
 

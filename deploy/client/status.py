@@ -15,6 +15,7 @@ from rich.text import Text
 
 from common.clock import to_ms
 from common.errors import CodecError
+from common.latency.one_way import master_offset
 from common.link import Link, open_session
 from common.metrics.published import MasterMetrics, SlaveMetrics, to_tree
 from common.skeleton import load_skeleton
@@ -170,9 +171,9 @@ def _degrees(angle_rad: float | None) -> float | None:
 def _offset(state: RobotState | None) -> dict[str, Any] | None:
     if state is None:
         return None
-    trusted = state.offset_bound_ns >= 0
-    bound_ms = to_ms(state.offset_bound_ns) if trusted else None
-    return {"offset": to_ms(state.master_offset_ns), "bound": bound_ms, "trusted": trusted}
+    offset = master_offset(state)
+    bound_ms = to_ms(offset.bound_ns) if offset.trusted else None
+    return {"offset": to_ms(offset.offset_ns), "bound": bound_ms, "trusted": offset.trusted}
 
 
 def status_table(robots: Mapping[str, Mapping[str, Any]]) -> RenderableType:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from common.clock import to_ns, to_s
 from common.errors import CodecError
+from common.latency.one_way import master_offset
 from common.link import Link
 from common.metrics.published import CameraMetrics, MasterMetrics, SlaveMetrics
 from common.skeleton import Skeleton
@@ -143,7 +144,7 @@ class Observer:
             return f"{len(names)} joints are not known yet ({', '.join(names[:3])} …)"
         if command.lease == 0:
             return "the master does not hold the robot's lease"
-        if state.offset_bound_ns < 0:
+        if not master_offset(state).trusted:
             return "the clock offset is not trusted yet"
         if not self.ready and state.guard == "hold":
             return "the robot takes no command yet"

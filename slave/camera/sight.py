@@ -6,7 +6,8 @@ from collections import OrderedDict
 from dataclasses import dataclass
 
 from common.clock_sync import Offset
-from common.latency.stages import Durations
+from common.latency.durations import Durations
+from common.latency.one_way import one_way_ns
 from common.wire.messages import Command
 
 _KEPT = 256
@@ -47,12 +48,11 @@ class Sight:
         if known is None:
             return None
         captured_ns, sent_ns = known
-        transit_ns: int | None = None
-        if offset.trusted:
-            sampled_ns = offset.local_ns(command.stamps.sampled_ns)
-            self.observation_age.record(sampled_ns - captured_ns)
-            if command.seen_ns:
-                transit_ns = offset.local_ns(command.seen_ns) - sent_ns
+        to_master = offset.reversed()
+        age_ns = one_way_ns(captured_ns, command.stamps.sampled_ns, to_master)
+        if age_ns is not None:
+            self.observation_age.record(age_ns)
+        transit_ns = one_way_ns(sent_ns, command.seen_ns, to_master) if command.seen_ns else None
         if command.seen_frame <= self._newest:
             return None
         self._newest = command.seen_frame

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.clock import NS_PER_MS as MS
-from common.latency.stages import MOST_STEPS, Durations
+from common.latency.durations import MOST_STEPS, Durations
 from slave.due import Due
 
 PERIOD_NS = 80 * MS

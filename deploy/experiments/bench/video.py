@@ -20,7 +20,7 @@ import numpy as np
 
 from common.clock import monotonic_ns, to_ns
 from common.clock_sync import Offset
-from common.latency.stages import Durations
+from common.latency.durations import Durations
 from common.link import Link, open_link
 from common.link.config import LinkConfig
 from common.metrics.published import CameraMetrics, Summary

@@ -9,6 +9,7 @@ import numpy as np
 
 from common.clock import to_ms, to_ns
 from common.errors import CodecError
+from common.latency.one_way import master_offset, one_way_ns
 from common.link import Link
 from common.metrics.published import HeapMetrics, MasterMetrics, SlaveMetrics, Summary
 from common.skeleton import Skeleton
@@ -97,20 +98,22 @@ class Watch:
         echo = state.echo
         if echo is None:
             return
-        this, trusted = (echo.sequence, echo.put_ns), state.offset_bound_ns >= 0
-        put_ns = echo.put_ns - state.master_offset_ns
+        this, offset = (echo.sequence, echo.put_ns), master_offset(state)
+        written_ns = one_way_ns(echo.put_ns, echo.written_ns, offset)
         # a state may tell that it was accepted, and only the next that it was written
-        if trusted and echo.written_ns and this != self._written:
+        if written_ns is not None and echo.written_ns and this != self._written:
             self._written = this
-            self._written_ms.append(to_ms(echo.written_ns - put_ns))
+            self._written_ms.append(to_ms(written_ns))
         if this == self._echoed:
             return
         self._echoed = this
         self.accepted_ns = arrived_ns
-        if trusted:
-            self._one_way_ms.append(to_ms(echo.received_ns - put_ns))
-            self._age_max_ms = np.fmax(self._age_max_ms, to_ms(echo.accepted_ns - put_ns))
-            self._row["offset_bound_ms"] = to_ms(state.offset_bound_ns)
+        transit_ns = one_way_ns(echo.put_ns, echo.received_ns, offset)
+        accepted_ns = one_way_ns(echo.put_ns, echo.accepted_ns, offset)
+        if transit_ns is not None and accepted_ns is not None:
+            self._one_way_ms.append(to_ms(transit_ns))
+            self._age_max_ms = np.fmax(self._age_max_ms, to_ms(accepted_ns))
+            self._row["offset_bound_ms"] = to_ms(offset.bound_ns)
 
     def on_statistics(self, payload: bytes, _: int) -> None:
         """A process told what it counted."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from common.clock import NS_PER_MS
-from common.latency.stages import Durations
+from common.latency.durations import Durations
 from deploy.sim.network.delay import DelayProcess
 from deploy.sim.network.loss import Losses, gilbert_elliott
 from deploy.sim.network.profile import Way

@@ -20,7 +20,7 @@ from common.can.frame import Frame
 from common.can.state import Controller, ask_kernel
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
 from common.errors import RobotError
-from common.latency.stages import Durations
+from common.latency.durations import Durations
 from common.metrics.published import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
+from common.latency.one_way import master_offset
 from common.metrics.published import GuardMetrics, MasterMetrics, SlaveMetrics
 from common.skeleton import Skeleton
 from common.wire.messages import Command, CommandEcho, RobotState, Statistics, Truth
@@ -74,19 +75,20 @@ def on_masters_clock(states: Iterable[RobotState]) -> list[RobotState]:
     """
     moved = []
     for state in states:
-        if state.offset_bound_ns < 0:
+        offset, echo = master_offset(state), state.echo
+        if not offset.trusted:
             continue
-        ahead_ns, echo = state.master_offset_ns, state.echo
+        to_master = offset.remote_ns
         if echo is not None:
             echo = replace(
                 echo,
-                received_ns=echo.received_ns + ahead_ns,
-                accepted_ns=echo.accepted_ns + ahead_ns,
-                written_ns=echo.written_ns + ahead_ns if echo.written_ns else 0,
+                received_ns=to_master(echo.received_ns),
+                accepted_ns=to_master(echo.accepted_ns),
+                written_ns=to_master(echo.written_ns) if echo.written_ns else 0,
             )
         moved.append(
             replace(
-                state, sent_ns=state.sent_ns + ahead_ns, encoder_ns=state.encoder_ns + ahead_ns, echo=echo
+                state, sent_ns=to_master(state.sent_ns), encoder_ns=to_master(state.encoder_ns), echo=echo
             )
         )
     return moved
@@ -94,7 +96,7 @@ def on_masters_clock(states: Iterable[RobotState]) -> list[RobotState]:
 
 def latest_bound_ns(states: Sequence[RobotState]) -> int | None:
     """The widest bound of a trusted offset among them."""
-    return max((s.offset_bound_ns for s in states if s.offset_bound_ns >= 0), default=None)
+    return max((o.bound_ns for o in map(master_offset, states) if o.trusted), default=None)
 
 
 @dataclass(frozen=True, slots=True)

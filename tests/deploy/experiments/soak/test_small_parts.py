@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import ConfigError
-from common.latency.stages import Durations
+from common.latency.durations import Durations
 from deploy.experiments.soak.counts import Additions
 from deploy.experiments.soak.faults import FAULTS, chosen
 from deploy.experiments.soak.options import in_words, seconds

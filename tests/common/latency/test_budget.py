@@ -1,3 +1,5 @@
+"""The latency budget: the rows are the stages, and their means add up to the whole."""
+
 import math
 
 import pytest
@@ -6,16 +8,8 @@ from hypothesis import strategies as st
 
 from common.clock import NS_PER_MS
 from common.clock_sync import Offset
-from common.latency.stages import (
-    MOST_RECENT,
-    STAGES,
-    Durations,
-    LatencyBudget,
-    Passage,
-    RoundTrip,
-    StageTimes,
-    Told,
-)
+from common.latency.budget import LatencyBudget, StageTimes
+from common.latency.stamps import STAGES, Passage
 from common.metrics.published import Summary
 
 stamps = st.lists(st.integers(0, 100 * NS_PER_MS), min_size=8, max_size=8)
@@ -72,41 +66,6 @@ def test_what_passed_while_the_offset_was_not_trusted_is_left_out() -> None:
     assert budget.total() == Summary(0)
 
 
-def test_budgets_merge() -> None:
-    one, two = LatencyBudget(), LatencyBudget()
-    one.record(passage([0, *[NS_PER_MS] * 7]), Offset(0, 10, trusted=True))
-    two.record(passage([0, *[3 * NS_PER_MS] * 7]), Offset(0, NS_PER_MS, trusted=True))
-    two.record(passage([0, *[3 * NS_PER_MS] * 7]), Offset(0, 0, trusted=False))
-    one.merge(two)
-    rows = one.summary()
-    assert rows["solved→put"].count == 2
-    assert rows["solved→put"].mean == 2.0
-    assert rows["solved→put"].max == 3.0
-    assert rows["put→received"].bound == 1.0
-    assert one.untrusted == 1
-    with pytest.raises(ValueError, match="different stages"):
-        StageTimes("a").merge(StageTimes("b"))
-
-
-@given(st.lists(st.integers(0, 100_000 * NS_PER_MS), min_size=1, max_size=50))
-def test_percentiles_are_good_to_three_digits(durations: list[int]) -> None:
-    recorded = Durations()
-    for duration in durations:
-        recorded.record(duration)
-    summary = recorded.summary()
-    median = min(sorted(durations)[(len(durations) + 1) // 2 - 1] / NS_PER_MS, 60_000)
-    assert math.isclose(summary.p50, median, rel_tol=2e-3, abs_tol=1e-3)
-    assert summary.max == max(durations) / NS_PER_MS
-    assert math.isclose(summary.mean, sum(durations) / len(durations) / NS_PER_MS, rel_tol=1e-12)
-
-
-def test_a_duration_below_zero_is_counted_and_taken_as_zero() -> None:
-    trip = RoundTrip()
-    trip.record(-5)
-    assert trip.clamped == 1
-    assert trip.summary().max == 0
-
-
 def test_stages_take_one_duration_each() -> None:
     stages = StageTimes("one", "two")
     with pytest.raises(ValueError, match="1 durations for 2 stages"):
@@ -114,19 +73,3 @@ def test_stages_take_one_duration_each() -> None:
     stages.record(NS_PER_MS, 2 * NS_PER_MS)
     assert stages.total().mean == 3.0
     assert stages.summary()["two"].mean == 2.0
-
-
-def test_durations_are_told_one_by_one_and_once_each() -> None:
-    told = Told()
-    for duration_ns in (1_500_000, -7, 999):
-        told.record(duration_ns)
-    assert told.take_recent() == (1500, 0, 1)
-    assert told.take_recent() == ()
-    assert (told.count, told.clamped) == (3, 1), "and stay in the whole"
-
-
-def test_of_many_the_newest_are_told() -> None:
-    told = Told()
-    for n in range(MOST_RECENT + 3):
-        told.record(1000 * n)
-    assert told.take_recent() == tuple(range(3, MOST_RECENT + 3))
