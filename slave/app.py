@@ -36,7 +36,7 @@ from slave.guard.states import State
 from slave.guard.tilt import base_loss
 from slave.last_known import EVERY_S, LastKnown, state_file
 from slave.pipeline import SlavePipeline
-from slave.servos import Servos, open_servos
+from slave.servos import Servos
 
 log = logging.getLogger(__name__)
 
@@ -214,10 +214,10 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigu
 async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
     notifier = open_notifier()
     last_known = None
-    if config.servos.remembers:
+    if config.servos.entry.remembers:
         last_known = LastKnown(state_file(config.robot, os.environ), config.skeleton.joint_names)
     before_rad = last_known.before_rad if last_known else None
-    servos = open_servos(config.servos, config.skeleton, config.encoders, before_rad)
+    servos = config.servos.open(config.skeleton, config.encoders, before_rad)
     base = open_base(config.base)
     # after a simulator has been built, which takes long; before any thread starts, so that each has it
     enter_real_time(config.process.realtime_priority)

@@ -10,10 +10,10 @@ from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from slave.attitude.config import BaseConfig
+from slave.backends import ServosConfig
 from slave.camera.config import CameraConfig
 from slave.encoders.counts import EncoderConfig
 from slave.guard.config import GuardConfig
-from slave.servos.config import ServosConfig
 from slave.track.config import TrackConfig
 
 

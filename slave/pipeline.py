@@ -73,8 +73,8 @@ class SlavePipeline:
             config.robot,
             self.skeleton,
             config.guard,
-            make_tracker(config.track, config.servos.bus_lag_s),
-            last_known_rad=(last_known_rad or {}) if config.servos.single_reading else None,
+            make_tracker(config.track, config.servos.chosen.bus_lag_s),
+            last_known_rad=(last_known_rad or {}) if config.servos.entry.single_reading else None,
             draw_token=draw_token,
         )
         self.clock = SlaveExchange()

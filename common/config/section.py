@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,14 @@ class Section(BaseModel):
     def mistakes(self) -> list[ConfigMistake]:
         """What no single key can tell: contradictions between keys. Asked once all keys are well formed."""
         return []
+
+
+def one_of(name: str, known: Iterable[str]) -> str:
+    """The name, if it is a known one. For validators of keys that name an entry of a table."""
+    names = [repr(other) for other in known]
+    if repr(name) not in names:
+        raise ValueError(f"expected {', '.join(names[:-1])} or {names[-1]}")
+    return name
 
 
 def _beside_the_file(path: Path, info: ValidationInfo) -> Path:

@@ -21,7 +21,7 @@ from deploy.measure import Motion, MovedSeries, TruthSeries, motion
 from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
 from slave.limit.limit import SetpointLimiter
-from slave.servos.simulated import SimulatedRobot
+from slave.servos.mujoco.simulated import SimulatedRobot
 from slave.track.config import make_tracker
 
 Strategy = Literal["hold", "interpolate", "predict"]
@@ -131,7 +131,7 @@ class _Way:
     def __init__(self, strategy: Strategy, config: SlaveConfig, now_ns: int, position_rad: Array) -> None:
         skeleton = config.skeleton
         self._tracker = make_tracker(
-            config.track.model_copy(update={"strategy": strategy}), config.servos.bus_lag_s
+            config.track.model_copy(update={"strategy": strategy}), config.servos.chosen.bus_lag_s
         )
         self._limits = config.guard.limits(skeleton)
         self._limiter = SetpointLimiter(skeleton.joint_names, self._limits)

@@ -34,12 +34,13 @@ def servos(
     Example: `tandem servos slave.toml --write`
     """
     from slave.config import SlaveConfig
+    from slave.servos.dynamixel.config import DynamixelConfig
     from slave.servos.dynamixel.latency import too_late
     from slave.servos.dynamixel.setup import set_up
 
     checked = load_config(config, SlaveConfig, list(set_ or ()))
-    bus = checked.servos.dynamixel
-    if checked.servos.backend != "dynamixel" or bus is None:
+    bus = checked.servos.chosen
+    if not isinstance(bus, DynamixelConfig):
         raise TandemError(f'{config}: servos.backend is "{checked.servos.backend}": expected "dynamixel"')
     found = set_up(bus, checked.skeleton, checked.encoders, write)
     Console().print(as_table(found))

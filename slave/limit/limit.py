@@ -9,7 +9,7 @@ import numpy as np
 
 from common.quaternion import Array
 from common.wire.messages import Mask
-from slave.guard.events import Clamp, Rule
+from slave.limit.clamp import Clamp, Rule
 
 
 @dataclass(frozen=True, slots=True)

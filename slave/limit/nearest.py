@@ -19,7 +19,7 @@ from common.reach import Reach
 from common.skeleton import Skeleton
 from common.skeleton.kinematics import relative_orientations
 from common.wire.messages import Mask
-from slave.guard.events import Clamp, Rule
+from slave.limit.clamp import Clamp, Rule
 from slave.limit.limit import Limits
 
 _H_S = 1e-4

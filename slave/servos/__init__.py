@@ -1,6 +1,5 @@
-"""What moves the joints and reads them back: one Protocol, one adapter a robot."""
+"""What moves the joints and reads them back: one Protocol, one folder a backend (slave/backends.py)."""
 
-from slave.servos.open import open_servos
 from slave.servos.servos import EncoderReading, Servos
 
-__all__ = ["EncoderReading", "Servos", "open_servos"]
+__all__ = ["EncoderReading", "Servos"]

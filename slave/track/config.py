@@ -1,12 +1,12 @@
-"""`[track]`: which strategy turns 12.5 commands a second into a setpoint for every servo tick."""
+"""The table of tracking strategies, and `[track]`, which chooses one: from 12.5 Hz to the servo rate."""
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
-from common.config.section import Section
+from common.config.section import Section, one_of
 from slave.track.hold import Hold
 from slave.track.interpolate import Interpolate
 from slave.track.predict import Predict
@@ -20,8 +20,8 @@ until the drives take a setpoint in, and for 4 ms (2 on average) it stands."""
 class TrackConfig(Section):
     """`[track]` of the slave's TOML."""
 
-    strategy: Literal["hold", "interpolate", "predict"] = "predict"
-    """`hold`: the newest sample. `interpolate`: smooth, one period late. `predict`: extrapolated to now."""
+    strategy: str = "predict"
+    """A name of `STRATEGIES`."""
     blend_s: float = Field(default=0.06, gt=0.0, le=1.0)
     """Time over which a difference between the old course and a new sample's is worked off."""
     servo_lag_s: float = Field(default=SERVO_LAG_S, ge=0.0, le=0.5)
@@ -33,13 +33,25 @@ class TrackConfig(Section):
     """`interpolate`: how much later than usual a sample may arrive at least and still find the robot moving;
     with more jitter than this the margin is the jitter, as measured."""
 
+    @field_validator("strategy")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return one_of(name, STRATEGIES)
+
+
+STRATEGIES: dict[str, Callable[[TrackConfig, float], Tracker]] = {
+    # the newest sample
+    "hold": lambda config, bus_lag_s: Hold(),
+    # smooth, one period late
+    "interpolate": lambda config, bus_lag_s: Interpolate(config.blend_s, config.jitter_margin_s),
+    # extrapolated to now
+    "predict": lambda config, bus_lag_s: Predict(
+        config.blend_s, config.servo_lag_s + bus_lag_s, config.max_horizon_s
+    ),
+}
+"""To add a strategy, add its line here: it gets `[track]` and the mean delay of the servos' bus, s."""
+
 
 def make_tracker(config: TrackConfig, bus_lag_s: float = 0.0) -> Tracker:
     """The strategy that the configuration names, for servos whose bus adds some lag to their own."""
-    match config.strategy:
-        case "hold":
-            return Hold()
-        case "interpolate":
-            return Interpolate(config.blend_s, config.jitter_margin_s)
-        case "predict":
-            return Predict(config.blend_s, config.servo_lag_s + bus_lag_s, config.max_horizon_s)
+    return STRATEGIES[config.strategy](config, bus_lag_s)

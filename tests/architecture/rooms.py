@@ -37,8 +37,6 @@ KNOWN_WRONG = {
 KNOWN_CIRCLES: Sequence[set[str]] = [
     {"deploy.experiments.soak.run", "deploy.experiments.soak.view"},
     {"deploy.experiments.demo.report", "deploy.experiments.demo.run", "deploy.experiments.demo.view"},
-    {"slave/servos", "slave/servos/canopen", "slave/servos/dynamixel"},
-    {"slave/guard", "slave/limit", "slave/track"},
     {"deploy/experiments/trial", "deploy/experiments/trial/remote", "deploy/harness"},
 ]
 """Circles of files and of folders that still stand, or a part of each. The end is an empty list."""

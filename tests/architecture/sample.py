@@ -24,7 +24,7 @@ SAMPLE_PATH = [
     "slave/track/predict.py",
     "slave/track/estimate.py",
     "slave/limit/limit.py",
-    "slave/servos/mujoco.py",
-    "slave/servos/simulated.py",
+    "slave/servos/mujoco/servos.py",
+    "slave/servos/mujoco/simulated.py",
     "slave/encoders/counts.py",
 ]

@@ -7,8 +7,8 @@ from typing import Any
 from common.process.heap import freeze_heap
 from common.skeleton import load_skeleton
 from deploy.measure.timing import time_calls
-from slave.servos.model import STEP_S
-from slave.servos.simulated import CYCLE_NS, STEPS_PER_CYCLE, SimulatedRobot
+from slave.servos.mujoco.model import STEP_S
+from slave.servos.mujoco.simulated import CYCLE_NS, STEPS_PER_CYCLE, SimulatedRobot
 
 
 def robot(seconds: float) -> dict[str, Any]:

@@ -33,6 +33,7 @@ from deploy.harness.tracking import until_tracking
 from deploy.measure.stillness import Course, stillness
 from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
+from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.pdo import COUNT_BITS, SYNC, TPDO1
 
 START_S = 40.0
@@ -204,7 +205,7 @@ class EncoderWatch:
         self._skeleton = skeleton
         overrides = ['servos.backend="canopen"', *drive_buses(can_port)]
         config = load_config(example("slave", NURSING), SlaveConfig, overrides)
-        canopen = config.servos.canopen
+        canopen = config.servos.section(CanopenConfig)
         drives = canopen.drives_of(skeleton)
         self._buses = [open_bus(bus) for bus in canopen.buses]
         self._joints = {

@@ -22,8 +22,9 @@ from common.process.ticker import ticks
 from deploy.sim.drives.faults import Planned
 from deploy.sim.drives.peer import DrivePeer
 from slave.config import SlaveConfig
+from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.pdo import TPDO1
-from slave.servos.simulated import CYCLE_NS
+from slave.servos.mujoco.simulated import CYCLE_NS
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +38,7 @@ async def run(config: SlaveConfig, stop: asyncio.Event, faults: Sequence[Planned
 
     Raises BusError where a bus cannot be opened.
     """
-    canopen = config.servos.canopen
+    canopen = config.servos.section(CanopenConfig)
     buses: dict[str, CanBus] = {}
 
     def send(bus: str, frame_id: int, data: bytes) -> None:

@@ -10,7 +10,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.encoders.counts import EncoderConfig, Encoders
-from slave.servos.simulated import CYCLE_NS, SimulatedRobot
+from slave.servos.mujoco.simulated import CYCLE_NS, SimulatedRobot
 
 _AT_REST_RAD_S = 1e-6
 MOST_CYCLES = 25

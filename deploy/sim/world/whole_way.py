@@ -34,7 +34,7 @@ from master.pipeline import CommandWriter, MasterPipeline, Solved
 from master.suit.protocol import SuitProtocol
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline
-from slave.servos.simulated import SimulatedRobot
+from slave.servos.mujoco.simulated import SimulatedRobot
 
 PERIOD_NS = 5 * NS_PER_MS
 NODE_NS = NS_PER_MS

@@ -11,6 +11,8 @@ from common.can.config import BusConfig, names_used_twice
 from common.config.section import Section
 from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
+from slave.encoders.counts import EncoderConfig
+from slave.servos.backend import BackendConfig
 from slave.servos.canopen.load import bits_per_s, told_bitrate, too_much
 
 INCREMENTS_PER_TURN = 65536
@@ -54,7 +56,7 @@ def _two_groups() -> list[BusConfig]:
     ]
 
 
-class CanopenConfig(Section):
+class CanopenConfig(BackendConfig):
     """The drives as one network, which one SYNC moves."""
 
     buses: list[BusConfig] = Field(default_factory=_two_groups, min_length=1)
@@ -84,6 +86,11 @@ class CanopenConfig(Section):
     start_timeout_s: float = Field(10.0, gt=0.0, le=120.0)
     """All drives configured and enabled within, or the slave does not start."""
 
+    @property
+    def bus_lag_s(self) -> float:
+        """A setpoint waits half a SYNC period; the drives then take a whole one to go there."""
+        return 1.5 / self.sync_hz
+
     def drives_of(self, skeleton: Skeleton) -> dict[str, DriveConfig]:
         """One drive a joint, in the order of the joints."""
         if self.drives:
@@ -107,7 +114,7 @@ class CanopenConfig(Section):
             for name, count in counts.items()
         }
 
-    def mistakes_for(self, skeleton: Skeleton) -> list[ConfigMistake]:
+    def mistakes_for(self, skeleton: Skeleton, encoders: EncoderConfig) -> list[ConfigMistake]:
         """Joints without a drive, drives without a joint, ids used twice, times that do not fit."""
         key = "servos.canopen"
         mistakes = names_used_twice(self.buses, f"{key}.buses")

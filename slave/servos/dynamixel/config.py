@@ -7,10 +7,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from common.config.section import Section
 from common.errors import ConfigMistake
 from common.skeleton import Skeleton
 from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT, EncoderConfig
+from slave.servos.backend import BackendConfig
 from slave.servos.dynamixel.registers import GOAL_POSITION, HEALTH, PRESENT_POSITION
 
 WATCHDOG_UNIT_S = 0.02
@@ -22,7 +22,7 @@ _BUSY = 0.8
 """Share of a cycle that the wire may be busy for: the rest is the adapter's and the servos' own delay."""
 
 
-class DynamixelConfig(Section):
+class DynamixelConfig(BackendConfig):
     """`[servos.dynamixel]` of the slave's TOML. Zero and direction of the joints are `[encoders]`."""
 
     port: str = Field(min_length=1)

@@ -8,7 +8,9 @@ import pytest
 
 from common.wire.messages import Action
 from slave.guard import GuardConfig, State
-from slave.guard.events import Change, Clamp
+from slave.guard.config import JointLimits
+from slave.guard.events import Change
+from slave.limit.clamp import Clamp, Rule
 from slave.track import Target
 
 MakeRig = Callable[..., Any]
@@ -192,3 +194,17 @@ def test_only_the_newest_events_are_kept(make_rig: MakeRig) -> None:
         rig.run(0.3)
     assert len(rig.guard.events) == 5
     assert sum(rig.guard.counters.clamps.values()) > 100
+
+
+def test_a_posture_within_tighter_limits_is_counted_once(make_rig: MakeRig) -> None:
+    config = GuardConfig(jump_window_rad=4.0, joints={"left_shoulder_roll": JointLimits(upper_deg=30.0)})
+    rig = make_rig(config).to_track()
+    roll = rig.skeleton.joint_names.index("left_shoulder_roll")
+    target = np.zeros(rig.joints)
+    rig.send(position_rad=target)
+    before = rig.guard.counters.clamps[Rule.POSITION]
+    target[roll] = np.radians(60.0)
+    for _ in range(4):
+        rig.send(position_rad=target)
+    assert rig.guard.counters.clamps[Rule.POSITION] == before + 1
+    assert np.degrees(rig.tracker.newest.position_rad[roll]) <= 30.0 + 1e-9

@@ -9,7 +9,7 @@ from slave.guard import GuardConfig
 from slave.guard.placed import Placement
 from slave.guard.plausible import Plausibility
 from slave.limit.limit import SetpointLimiter
-from slave.servos.simulated import SimulatedRobot
+from slave.servos.mujoco.simulated import SimulatedRobot
 
 PERIOD_NS = 5_000_000
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from slave.guard import GuardConfig
-from slave.guard.events import Clamp, Rule
 from slave.limit import limit
+from slave.limit.clamp import Clamp, Rule
 from slave.limit.limit import Limits, SetpointLimiter
 
 SKELETON = load_skeleton("nursing")

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -13,7 +10,6 @@ from common.skeleton import load_skeleton
 from common.skeleton.kinematics import orientations, relative_orientations
 from slave.guard import GuardConfig
 from slave.guard.config import JointLimits
-from slave.guard.events import Rule
 from slave.limit.nearest import NearestPosture
 
 SKELETON = load_skeleton("nursing")
@@ -103,15 +99,3 @@ def test_a_posture_that_passes_a_tighter_limit_does_not_jump() -> None:
         assert np.abs(now - before).max() <= np.radians(1.5 * 0.5 + 2.0)
         before = now
     np.testing.assert_allclose(np.degrees(before[ARM[1]]), 70.0, atol=1e-6)
-
-
-def test_the_guard_tells_of_it_once_as_of_any_clamp(make_rig: Callable[..., Any]) -> None:
-    config = GuardConfig(jump_window_rad=4.0, joints={"left_shoulder_roll": JointLimits(upper_deg=30.0)})
-    rig = make_rig(config).to_track()
-    rig.send(position_rad=arm(0.0, 0.0, 0.0))
-    before = rig.guard.counters.clamps[Rule.POSITION]
-    target = arm(0.0, 60.0, 0.0)
-    for _ in range(4):
-        rig.send(position_rad=target)
-    assert rig.guard.counters.clamps[Rule.POSITION] == before + 1
-    assert np.degrees(rig.tracker.newest.position_rad[ARM[1]]) <= 30.0 + 1e-9

@@ -1,19 +1,12 @@
 """The strategies side by side on simulated reaches: the figures of slave/track/README.md, with a margin."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from common.config.load import check_config
-from common.errors import ConfigError
-from slave.servos.config import ServosConfig
-from slave.track import Tracker
+from slave.backends import ServosConfig
 from slave.track.config import TrackConfig, make_tracker
-from slave.track.hold import Hold
-from slave.track.interpolate import Interpolate
-from slave.track.predict import Predict
 from slave.track.simulate import TICK_S, Figures, Run, Strategy, World, figures, run, tracker_for
 
 WORLD = World(seconds=14.0)
@@ -73,18 +66,11 @@ def test_a_run_is_the_same_every_time() -> None:
     np.testing.assert_array_equal(first.robot_rad, second.robot_rad)
 
 
-@pytest.mark.parametrize(
-    ("strategy", "kind"), [("hold", Hold), ("interpolate", Interpolate), ("predict", Predict)]
-)
-def test_the_configuration_names_the_strategy(strategy: Strategy, kind: type[Tracker]) -> None:
-    assert isinstance(make_tracker(TrackConfig(strategy=strategy)), kind)
-
-
 def test_predict_aims_ahead_by_the_bus_of_the_drives_too() -> None:
     servos = ServosConfig.model_validate({"backend": "canopen", "canopen": {"sync_hz": 50}})
-    assert servos.bus_lag_s == pytest.approx(0.03)
-    assert ServosConfig().bus_lag_s == 0.0
-    still, early = (make_tracker(TrackConfig(), lag_s) for lag_s in (0.0, servos.bus_lag_s))
+    assert servos.chosen.bus_lag_s == pytest.approx(0.03)
+    assert ServosConfig().chosen.bus_lag_s == 0.0
+    still, early = (make_tracker(TrackConfig(), lag_s) for lag_s in (0.0, servos.chosen.bus_lag_s))
     rate = np.array([1.0, -0.5])
     for k in range(20):
         now_ns = k * 80_000_000
@@ -97,8 +83,3 @@ def test_predict_aims_ahead_by_the_bus_of_the_drives_too() -> None:
     # the farther ahead, the less of the velocity is believed to last
     assert (ahead <= 0.03).all()
     assert (ahead >= 0.75 * 0.03).all()
-
-
-def test_a_strategy_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"strategy = 'guess': expected 'hold', 'interpolate' or 'predict'"):
-        check_config(Path("slave.toml"), {"strategy": "guess"}, TrackConfig)

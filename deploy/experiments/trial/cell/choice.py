@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import get_args
 
 from common.errors import ConfigError, ConfigMistake
 from common.link.endpoint import TRANSPORTS
 from deploy.experiments.trial.cell.plan import Setup
 from deploy.sim.network import load_profile, profile_names
-from slave.track.config import TrackConfig
+from slave.track.config import STRATEGIES
 
 ALL = "all"
 
 
 def strategies() -> list[str]:
     """Those that a slave knows."""
-    return list(get_args(TrackConfig.model_fields["strategy"].annotation))
+    return list(STRATEGIES)
 
 
 KNOWN: dict[str, Callable[[], Sequence[str]]] = {

@@ -15,10 +15,12 @@ from common.errors import TandemError
 from common.link.config import LinkConfig
 from common.link.roles import Role, common_name
 from common.link.router import RouterConfig
+from common.skeleton import Skeleton
 from deploy.sim.suit.config import SuitConfig
 from master.config import MasterConfig
 from master.suit.protocol import SuitProtocol
 from slave.config import SlaveConfig
+from slave.servos.canopen.config import CanopenConfig
 from slave.servos.dynamixel.config import DynamixelConfig
 
 GENERAL = "host"
@@ -103,15 +105,15 @@ def _of_master(config: MasterConfig) -> Needs:
 
 
 def _of_slave(config: SlaveConfig) -> Needs:
-    servos, ports = config.servos, []
-    if servos.backend == "dynamixel" and servos.dynamixel is not None:
-        ports.append(servos.dynamixel.port)
+    servos, ports = config.servos.chosen, []
+    if isinstance(servos, DynamixelConfig):
+        ports.append(servos.port)
     if config.base.source == "serial":
         ports.append(config.base.port)
     return Needs(
         role="slave",
-        buses=_of_drives(config) if servos.backend == "canopen" else (),
-        servos=servos.dynamixel if servos.backend == "dynamixel" else None,
+        buses=_of_drives(servos, config.skeleton) if isinstance(servos, CanopenConfig) else (),
+        servos=servos if isinstance(servos, DynamixelConfig) else None,
         realtime_priority=config.process.realtime_priority,
         serial_ports=tuple(ports),
         camera=Camera(config.camera.source),
@@ -121,9 +123,8 @@ def _of_slave(config: SlaveConfig) -> Needs:
     )
 
 
-def _of_drives(config: SlaveConfig) -> tuple[BusNeed, ...]:
-    canopen = config.servos.canopen
-    loads = canopen.load(config.skeleton)
+def _of_drives(canopen: CanopenConfig, skeleton: Skeleton) -> tuple[BusNeed, ...]:
+    loads = canopen.load(skeleton)
     return tuple(
         BusNeed(bus, rate_hz=canopen.sync_hz, drives=loads[bus.name][0], bits_per_s=loads[bus.name][1])
         for bus in canopen.buses

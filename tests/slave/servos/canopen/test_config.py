@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 from common.skeleton import load_skeleton
+from slave.backends import ServosConfig
 from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig, DriveConfig
-from slave.servos.config import ServosConfig
 
 NURSING = load_skeleton("nursing")
 
@@ -16,7 +16,7 @@ def test_without_any_drives_each_joint_has_one(profile: str) -> None:
     drives = CanopenConfig().drives_of(skeleton)
     assert tuple(drives) == skeleton.joint_names
     assert len({(d.bus, d.id) for d in drives.values()}) == len(drives)
-    assert CanopenConfig().mistakes_for(skeleton) == []
+    assert CanopenConfig().mistakes_for(skeleton, EncoderConfig()) == []
 
 
 def with_drive(joint: str, **changes: object) -> CanopenConfig:
@@ -41,7 +41,7 @@ def with_drive(joint: str, **changes: object) -> CanopenConfig:
     ],
 )
 def test_a_mistake_names_key_and_expectation(config: CanopenConfig, key: str, expected: str) -> None:
-    mistakes = config.mistakes_for(NURSING)
+    mistakes = config.mistakes_for(NURSING, EncoderConfig())
     assert any(key in m.key and expected in m.expected for m in mistakes), mistakes
 
 

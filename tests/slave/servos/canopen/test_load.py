@@ -6,6 +6,7 @@ import pytest
 
 from common.can.config import BusConfig
 from common.skeleton import load_skeleton
+from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig, DriveConfig
 from slave.servos.canopen.load import BUSIEST, bits_per_s, frame_bits, too_much
 
@@ -30,23 +31,23 @@ def test_25_drives_at_200_hz_are_more_than_1_mbit_s() -> None:
     count, bits = one_bus(200).load(NURSING)["all"]
     assert count == 25
     assert 1.14e6 < bits < 1.18e6
-    (mistake,) = one_bus(200).mistakes_for(NURSING)
+    (mistake,) = one_bus(200).mistakes_for(NURSING, EncoderConfig())
     assert mistake.key == "servos.canopen.sync_hz"
     for words in ("25 drives at 200 Hz are 1.17 Mbit/s on a bus of 1 Mbit/s", "at most 125", "more buses"):
         assert words in mistake.expected
 
 
 def test_what_the_bus_carries_is_not_refused() -> None:
-    assert one_bus(125).mistakes_for(NURSING) == []
-    assert CanopenConfig(sync_hz=200, heartbeat_ms=20).mistakes_for(NURSING) == []
+    assert one_bus(125).mistakes_for(NURSING, EncoderConfig()) == []
+    assert CanopenConfig(sync_hz=200, heartbeat_ms=20).mistakes_for(NURSING, EncoderConfig()) == []
 
 
 def test_a_slower_bus_carries_less() -> None:
-    (mistake,) = one_bus(50, bitrate=250_000).mistakes_for(NURSING)
+    (mistake,) = one_bus(50, bitrate=250_000).mistakes_for(NURSING, EncoderConfig())
     assert "on a bus of 0.25 Mbit/s" in mistake.expected
     assert "at most 25" in mistake.expected
     assert "or up to 1 Mbit/s" in mistake.expected
-    assert one_bus(25, bitrate=250_000).mistakes_for(NURSING) == []
+    assert one_bus(25, bitrate=250_000).mistakes_for(NURSING, EncoderConfig()) == []
 
 
 def test_the_boundary() -> None:

@@ -43,7 +43,7 @@ def test_a_setpoint_is_reached_with_gears_directions_and_zeros(sync_hz: int) -> 
     }
     encoders = EncoderConfig(zero_counts={ELBOW: 4000}, reversed=[ELBOW, "neck_yaw"])
     wired = Wired(plain.model_copy(update={"drives": drives}), encoders)
-    assert wired.config.mistakes_for(wired.skeleton) == []
+    assert wired.config.mistakes_for(wired.skeleton, EncoderConfig()) == []
     wired.up()
     wired.setpoint = small_posture(wired)
     wired.run(2.5)

@@ -30,12 +30,12 @@ from deploy.harness.host import Host
 from deploy.sim.drives.app import run as run_drives
 from deploy.sim.drives.faults import DEMAND, Fault
 from deploy.sim.drives.node import EDS
+from slave.backends import ServosConfig
 from slave.config import SlaveConfig
-from slave.encoders.counts import Encoders
-from slave.servos import open_servos
+from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.servos import CanopenServos
-from slave.servos.config import ServosConfig
+from tests.slave.servos.contract import Subject, check
 
 NURSING = load_skeleton("nursing")
 DEADLINE_S = 60.0
@@ -179,9 +179,19 @@ class Ticking:
         return bool(reading.valid.all() and off.max() < 0.006)
 
 
+def test_they_keep_the_contract_of_all_backends(config: CanopenConfig, tmp_path: Path) -> None:
+    async def test() -> None:
+        pause = threading.Event()
+        servos = ServosConfig(backend="canopen", canopen=config).open(NURSING, EncoderConfig())
+        check(Subject(servos, NURSING, EncoderConfig(), lambda: bool(pause.wait(0.002))))
+
+    with drives_on(config, tmp_path):
+        uvloop.run(test())
+
+
 def test_start_follow_quick_stop_fault_and_back(config: CanopenConfig, tmp_path: Path) -> None:
     async def test() -> None:
-        servos = open_servos(ServosConfig(backend="canopen", canopen=config), NURSING, None)  # type: ignore[arg-type]
+        servos = ServosConfig(backend="canopen", canopen=config).open(NURSING, EncoderConfig())
         assert isinstance(servos, CanopenServos)
         servos.start()
         try:

@@ -11,8 +11,8 @@ from common.config.load import load_config
 from common.errors import ConfigError
 from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
-from slave.servos import open_servos
 from slave.servos.dynamixel import registers as x
+from slave.servos.dynamixel.config import DynamixelConfig
 from slave.servos.dynamixel.servos import DynamixelServos
 from slave.servos.dynamixel.settings import settings_of
 
@@ -22,9 +22,8 @@ KEY = "servos.dynamixel"
 
 def test_the_example_is_a_whole_robot() -> None:
     config = load_config(EXAMPLE, SlaveConfig)
-    assert isinstance(open_servos(config.servos, config.skeleton, config.encoders), DynamixelServos)
-    assert config.servos.dynamixel is not None
-    assert config.servos.dynamixel.wire_time_s() == pytest.approx(6.1e-3, abs=0.1e-3)
+    assert isinstance(config.servos.open(config.skeleton, config.encoders), DynamixelServos)
+    assert config.servos.section(DynamixelConfig).wire_time_s() == pytest.approx(6.1e-3, abs=0.1e-3)
 
 
 @pytest.mark.parametrize(
@@ -61,9 +60,8 @@ def test_a_backend_without_its_section_is_refused(tmp_path: Path) -> None:
 
 def test_servos_may_go_as_far_and_as_fast_as_the_table_says_and_little_more() -> None:
     config = load_config(EXAMPLE, SlaveConfig, ['encoders.reversed=["neck_pitch"]'])
-    assert config.servos.dynamixel is not None
     encoders = Encoders(config.skeleton, config.encoders)
-    found = settings_of(config.servos.dynamixel, config.skeleton, encoders)
+    found = settings_of(config.servos.section(DynamixelConfig), config.skeleton, encoders)
     for servo, joint in zip(found, config.skeleton.joints, strict=True):
         span = (servo.highest - servo.lowest) * 2 * np.pi / 4096
         assert np.deg2rad(5.8) < span - (joint.upper_rad - joint.lower_rad) < np.deg2rad(6.2)

@@ -20,15 +20,16 @@ from common.wire.codec import decode, encode
 from common.wire.control import read_reply
 from common.wire.messages import Action, ClockReply, Command, CommandStamps, ControlReply, ControlRequest
 from slave import app
+from slave.backends import ServosConfig
 from slave.camera.config import CameraConfig
 from slave.config import SlaveConfig
 from slave.guard.body import Body
 from slave.guard.states import State
 from slave.last_known import LastKnown, save
 from slave.pipeline import SlavePipeline
-from slave.servos.config import ServosConfig
 from slave.servos.dynamixel.registers import TORQUE
 from slave.servos.dynamixel.servos import DynamixelServos
+from tests.slave.servos.contract import Subject, check
 
 if TYPE_CHECKING:
     from tests.slave.servos.dynamixel.conftest import Rig
@@ -103,6 +104,13 @@ class StepClock:
     def __call__(self) -> int:
         self.now_ns += 2_000_000
         return self.now_ns
+
+
+def test_they_keep_the_contract_of_all_backends(patient: Rig) -> None:
+    patient.port._clock = StepClock()
+    servos = DynamixelServos(patient.config, patient.skeleton, patient.encoder_config)
+    pause = threading.Event()
+    check(Subject(servos, patient.skeleton, patient.encoder_config, lambda: bool(pause.wait(0.005))))
 
 
 @pytest.mark.parametrize("wrong", [np.zeros(3), np.full(14, np.nan)])

@@ -7,12 +7,12 @@ import pytest
 
 from common.errors import RobotError
 from common.skeleton import load_skeleton
+from slave.backends import ServosConfig
 from slave.encoders.counts import EncoderConfig
-from slave.servos import open_servos
-from slave.servos.config import ServosConfig
-from slave.servos.mujoco import MujocoServos
+from slave.servos.mujoco.servos import MujocoServos
+from slave.servos.mujoco.simulated import CYCLE_NS
 from slave.servos.servos import EncoderReading
-from slave.servos.simulated import CYCLE_NS
+from tests.slave.servos.contract import Subject, check
 
 SKELETON = load_skeleton("nursing")
 J = len(SKELETON.joints)
@@ -105,5 +105,11 @@ def test_a_setpoint_that_is_none_is_refused_where_it_is_written() -> None:
         MujocoServos(SKELETON).write(np.full(J, np.nan))
 
 
+def test_it_keeps_the_contract_of_all_backends() -> None:
+    clock = StepClock()
+    servos = MujocoServos(SKELETON, clock=clock)
+    check(Subject(servos, SKELETON, EncoderConfig(), pass_time=lambda: clock.turns(2)))
+
+
 def test_the_configuration_opens_it() -> None:
-    assert isinstance(open_servos(ServosConfig(), SKELETON, EncoderConfig()), MujocoServos)
+    assert isinstance(ServosConfig().open(SKELETON, EncoderConfig()), MujocoServos)

@@ -3,7 +3,7 @@ import pytest
 
 from common.skeleton import load_skeleton
 from slave.encoders.counts import RAD_PER_COUNT, EncoderConfig, Encoders
-from slave.servos.simulated import CYCLE_NS, MOST_CYCLES, SimulatedRobot
+from slave.servos.mujoco.simulated import CYCLE_NS, MOST_CYCLES, SimulatedRobot
 from slave.track.config import SERVO_LAG_S
 
 SKELETON = load_skeleton("nursing")

@@ -12,8 +12,8 @@ from common.metrics.published import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
+from slave.servos.mujoco.simulated import CYCLE_NS, SimulatedRobot
 from slave.servos.servos import EncoderReading
-from slave.servos.simulated import CYCLE_NS, SimulatedRobot
 
 _JOIN_S = 1.0
 
