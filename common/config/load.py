@@ -14,6 +14,15 @@ from common.errors import NOT_SET, ConfigError, ConfigMistake
 
 Model = TypeVar("Model", bound=Section)
 
+RENAMED = {
+    "stance_s": "zero_pose_s",
+    "stance_heading_deg": "zero_pose_heading_deg",
+    "stance_turn_deg_s": "zero_pose_turn_deg_s",
+    "stance_lean_deg": "zero_pose_lean_deg",
+    "stance_sd_deg": "zero_pose_sd_deg",
+}
+"""Keys that had another name, old to new: an old one is refused, and the new one named."""
+
 
 def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -> Model:
     """Read and check a TOML file before anything is opened.
@@ -43,7 +52,7 @@ def check_config(path: Path, table: dict[str, Any], model: type[Model]) -> Model
             ConfigMistake(
                 ".".join(map(str, e["loc"])) or "file",
                 NOT_SET if e["type"] == "missing" else e["input"],
-                _expected(e["type"], e["msg"]),
+                _expected(e["type"], e["msg"], e["loc"]),
             )
             for e in error.errors()
         ]
@@ -82,9 +91,10 @@ def _mistake(path: Path | str, key: str, value: object, expected: str) -> Config
     return ConfigError(path, [ConfigMistake(key, value, expected)])
 
 
-def _expected(kind: str, message: str) -> str:
+def _expected(kind: str, message: str, place: tuple[int | str, ...]) -> str:
     if kind == "extra_forbidden":
-        return "no such key (is it misspelt?)"
+        new = RENAMED.get(str(place[-1]))
+        return f"the key {new}, its new name" if new else "no such key (is it misspelt?)"
     if kind == "missing":
         return "this key to be set"
     for lead in ("Input should be ", "Value error, expected ", "Value error, "):

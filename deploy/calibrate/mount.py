@@ -1,4 +1,4 @@
-"""`tandem calibrate mount`: how each unit sits on its segment, from a stance and a motion."""
+"""`tandem calibrate mount`: how each unit sits on its segment, from a zero pose and a motion."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def mount(
     recording: RecordingFile,
     profile: Annotated[str, typer.Option(help="Whose segments the nodes are on.")] = "nursing",
     out: OutFolder = Path("calibration"),
-    stance: Annotated[
+    zero_pose: Annotated[
         str | None,
         typer.Option(
             metavar="FROM:TO",
@@ -68,7 +68,7 @@ def mount(
     make_folder(out)
     recorded = load_recordings(recording)
     nodes = calibrated(of_profile(recorded, skeleton), out)
-    between = None if stance is None else (float(stance.split(":")[0]), float(stance.split(":")[1]))
+    between = None if zero_pose is None else (float(zero_pose.split(":")[0]), float(zero_pose.split(":")[1]))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("joints", total=None)
         found = find_mounting(
@@ -86,8 +86,8 @@ def mount(
             console.print(note, style="yellow", highlight=False, markup=False)
         if found.nodes:
             console.print(
-                f"stance {found.stance_s[0]:.1f} to {found.stance_s[1]:.1f} s; written to {out}; angles "
-                "over the recording: mounting.png"
+                f"zero pose {found.zero_pose_s[0]:.1f} to {found.zero_pose_s[1]:.1f} s; written to {out}; "
+                "angles over the recording: mounting.png"
             )
     if found.refused:
         raise TandemError("\n".join(f"{recording}: {line}" for line in refusals(found)))
@@ -107,7 +107,7 @@ def as_report(found: Mounting, recording: Path) -> dict[str, Any]:
     """Everything found, for machines; angles in degrees."""
     return {
         "recording": recording.name,
-        "stance_s": list(found.stance_s),
+        "zero_pose_s": list(found.zero_pose_s),
         "nodes": {
             name: {
                 "q_sensor_from_segment": node.q_sensor_from_segment.tolist(),

@@ -39,7 +39,7 @@ def solved_angles(
 def draw_angles(
     recordings: Mapping[str, NodeRecording], skeleton: Skeleton, found: Mounting, path: Path
 ) -> None:
-    """Write the PNG: a row a joint, its limits dashed, the stance shaded."""
+    """Write the PNG: a row a joint, its limits dashed, the zero pose shaded."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -56,7 +56,7 @@ def draw_angles(
         axes.plot(time_s, np.degrees(angles[:, j]), linewidth=0.7)
         for limit in (joint.lower_rad, joint.upper_rad):
             axes.axhline(np.degrees(limit), color="k", linestyle="--", linewidth=0.6)
-        axes.axvspan(*found.stance_s, color="k", alpha=0.1)
+        axes.axvspan(*found.zero_pose_s, color="k", alpha=0.1)
         axes.set_ylabel(f"{joint.name} °", fontsize=7, rotation=0, ha="right")
         axes.grid(alpha=0.3)
     figure.axes[-1].set_xlabel("s")

@@ -1,4 +1,4 @@
-"""Which way the person faced in the stance, by the level axes of the joints, with the sign of each.
+"""Which way the person faced in the zero pose, by the level axes of the joints, with the sign of each.
 
 An axis of a joint that lies level in the zero pose points where the table says, so every one tells where the
 zero pose faced. Its sign is the one by which the joint bends within its limits; where that is not plain, the
@@ -26,7 +26,7 @@ _PLAIN_RAD = math.radians(1.5)
 _AXIS_FLOOR_RAD = math.radians(1.0)
 """No axis of a person is known better."""
 _ONE_LIMB_RAD, _PAIR_RAD = math.radians(15.0), math.radians(8.0)
-"""How far a person's limb, or the mean of a pair of them, faces from ahead in the stance."""
+"""How far a person's limb, or the mean of a pair of them, faces from ahead in the zero pose."""
 
 
 @dataclass(slots=True)
@@ -62,7 +62,7 @@ def islands_of(names: tuple[str, ...], joints: list[JointMotion]) -> list[Island
 def axes_by_node(
     skeleton: Skeleton,
     suit: Oriented,
-    q_stance: dict[str, Array],
+    q_zero_pose: dict[str, Array],
     joints: list[JointMotion],
     island: Island,
 ) -> dict[str, list[Axis]]:
@@ -81,14 +81,16 @@ def axes_by_node(
             ends, joint.fit.axes, joint.fit.axis_sigma_rad, strict=True
         ):
             if abs(zero_axis[2]) < _LEVEL:
-                there = rotate(multiply(heading_turn(island[name][0]), q_stance[name]), axis)
+                there = rotate(multiply(heading_turn(island[name][0]), q_zero_pose[name]), axis)
                 facing = _heading(there) - _heading(zero_axis)
                 found.append((name, Axis(number, facing, math.hypot(sigma, _AXIS_FLOOR_RAD), True)))
         if not found:
             continue
         # both ends of a joint share one sign: as its angle stays within its limits
         lead = found[0][1].facing_rad
-        excess = [_excess(skeleton, suit, i, joint, q_stance, island, lead + turn) for turn in (0.0, math.pi)]
+        excess = [
+            _excess(skeleton, suit, i, joint, q_zero_pose, island, lead + turn) for turn in (0.0, math.pi)
+        ]
         flip = math.pi if excess[1] < excess[0] else 0.0
         told = abs(excess[1] - excess[0]) > _PLAIN_RAD
         for name, axis_found in found:
@@ -105,7 +107,7 @@ def _excess(
     suit: Oriented,
     i: int,
     joint: JointMotion,
-    q_stance: dict[str, Array],
+    q_zero_pose: dict[str, Array],
     island: Island,
     facing_rad: float,
 ) -> float:
@@ -117,7 +119,7 @@ def _excess(
         return 0.0
     turns = {name: facing_rad - island[name][0] for name in (joint.parent, joint.segment)}
     angle = joint_angles(skeleton, suit, i, {
-        name: (island[name][0], multiply(conjugate(q_stance[name]), heading_turn(turn)))
+        name: (island[name][0], multiply(conjugate(q_zero_pose[name]), heading_turn(turn)))
         for name, turn in turns.items()
     })[first]  # fmt: skip
     return float(np.mean(np.maximum(limits[0] - angle, 0.0) + np.maximum(angle - limits[1], 0.0)))
@@ -149,7 +151,7 @@ def limits_of(skeleton: Skeleton, angle: str | None) -> tuple[float, float] | No
 
 
 def facing_of(axes: dict[str, list[Axis]]) -> tuple[float, float] | None:
-    """Which way the person faced in the stance, and its standard deviation; settles signs that were open.
+    """Which way the person faced in the zero pose, and its standard deviation; settles signs that were open.
 
     Limbs are turned in or out alike on both sides: a pair of limbs says more than either.
     """

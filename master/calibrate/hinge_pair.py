@@ -2,7 +2,7 @@
 
 The rates alone (paper C) leave the axes' relative sign open, and skin that shakes under a sensor can turn
 their answer far away: on a walking person's thigh by 80°, where the answer from rates, inclinations and
-accelerations together stays within 2° of the one that knows the stance. So the latter is the answer, and the
+accelerations together stays within 2° of the one that knows the zero pose. So the latter is the answer, the
 former stands beside it. Low-passed, the rates alone must not contradict it: what both are apart is in the
 stated uncertainty, and beyond a limit nothing is said.
 """
@@ -92,7 +92,7 @@ def find_hinge_pair(one: NodeRecording, two: NodeRecording) -> HingePair:
     second = math.copysign(1.0, float(second @ axis2)) * second
     turn = to_matrix(heading_turn(fit.offset_rad))
     zero1 = tangents(axis1)[:, 0]
-    zero2 = (turn @ child.r_stance).T @ (parent.r_stance @ zero1)
+    zero2 = (turn @ child.r_zero_pose).T @ (parent.r_zero_pose @ zero1)
     zero2 -= axis2 * (zero2 @ axis2)
     hinge = Hinge(axis1, axis2, zero1, zero2, fit.levers_m[0], fit.levers_m[1])
     signed = FoundHinge(

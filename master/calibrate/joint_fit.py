@@ -17,7 +17,7 @@ All at once they are what comes nearest, by Gauss-Newton from several starts, to
     p̈1 = p̈2', p̈ = R (a − ω̇ × r − ω × (ω × r))   every joint: its centre moves but once (Kok et al. 2014)
 
 where rates ω and accelerations p̈ are in the earth frames, low-passed there so that what skin and muscle
-add under the sensor counts little. The stance, in which all segments stand as in the zero pose, says how far
+add under the sensor counts little. The time in which all segments stand in the zero pose says how far
 each axis is from the vertical.
 """
 
@@ -78,7 +78,7 @@ def fit_joint(
     """The unknowns of one joint.
 
     `zero_axes` are its axes in the zero pose (3,), body frame: one for a hinge, two for a joint of two, None
-    for a ball joint. `spacing_s` is the time between samples. Where there was no stance, `near` are a hinge's
+    for a ball joint. `spacing_s` is the time between samples. Without a zero pose, `near` are a hinge's
     axes to start from besides others, and `zero_axes` only says that it is one.
     """
     count = len(parent.r)
@@ -92,7 +92,7 @@ def fit_joint(
     if zero_axes is None:
         starts = [Unknowns(None, float(offset), np.zeros(6)) for offset in offsets]
     elif near is None:
-        starts = _starts_of_stance(parent, child, zero_axes, offsets)
+        starts = _starts_of_zero_pose(parent, child, zero_axes, offsets)
     else:
         starts = [Unknowns(axes, float(offset), np.zeros(6)) for axes in near for offset in offsets]
         starts += _starts_anywhere(parent, child, offsets)
@@ -146,15 +146,15 @@ def _same_axes(one: Unknowns, other: Unknowns) -> bool:
     return all(abs(float(a @ b)) > math.cos(_ALIKE_RAD) for a, b in zip(one.axes, other.axes, strict=True))
 
 
-def _starts_of_stance(
+def _starts_of_zero_pose(
     parent: Moving, child: Moving, zero_axes: Sequence[Array], offsets: Array
 ) -> list[Unknowns]:
     starts = []
     for heading in np.arange(_HEADINGS) * math.pi / _HEADINGS:
         for offset in offsets:
-            # R_stance j = Rz(heading) a, in the parent's earth frame
-            axis1 = parent.r_stance.T @ rotate(heading_turn(heading), zero_axes[0])
-            axis2 = child.r_stance.T @ rotate(heading_turn(heading - offset), zero_axes[-1])
+            # R_zero_pose j = Rz(heading) a, in the parent's earth frame
+            axis1 = parent.r_zero_pose.T @ rotate(heading_turn(heading), zero_axes[0])
+            axis2 = child.r_zero_pose.T @ rotate(heading_turn(heading - offset), zero_axes[-1])
             starts.append(Unknowns((axis1, axis2), float(offset), np.zeros(6)))
     return starts
 
@@ -163,9 +163,9 @@ def _starts_anywhere(parent: Moving, child: Moving, offsets: Array) -> list[Unkn
     """Of a hinge: at every instant, so also in the reference pose, both units have its axis the same way."""
     starts = []
     for axis in half_sphere(_DIRECTIONS):
-        there = parent.r_stance @ axis
+        there = parent.r_zero_pose @ axis
         for offset in offsets:
-            axis2 = child.r_stance.T @ rotate(heading_turn(-offset), there)
+            axis2 = child.r_zero_pose.T @ rotate(heading_turn(-offset), there)
             starts.append(Unknowns((axis, axis2), float(offset), np.zeros(6)))
     return starts
 

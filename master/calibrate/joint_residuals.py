@@ -21,10 +21,10 @@ ALIGNED_RAD = math.radians(6.0)
 RATE_RAD_S = 0.3
 ACCELERATION_M_S2 = 0.6
 """The same for rates and for the joint centre's acceleration."""
-STANCE_RAD = math.radians(8.0)
-"""How far an axis in the stance is from where the zero pose has it."""
-_STANCE_SHARE = 0.25
-"""The stance counts as much as this share of all samples."""
+ZERO_POSE_RAD = math.radians(8.0)
+"""How far an axis, while the person stands in the zero pose, is from where the skeleton has it there."""
+_ZERO_POSE_SHARE = 0.25
+"""Standing in the zero pose counts as much as this share of all samples."""
 LEVER_M = 0.3
 _HUBER = 2.0
 """Residuals beyond so many standard deviations count by their size, not its square."""
@@ -35,7 +35,7 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """One unit over the moving part of a recording, (K, ...) samples, and in the stance."""
+    """One unit over the moving part of a recording, (K, ...) samples, and in the zero pose."""
 
     r: Array
     """(K, 3, 3) rotation matrices, own earth frame from sensor."""
@@ -45,7 +45,7 @@ class Moving:
     """(K, 3) m/s², specific force in the own earth frame, low-passed."""
     lever: Array
     """(K, 3, 3): times r, the acceleration of the sensor against a point it is r away from, earth frame."""
-    r_stance: Array
+    r_zero_pose: Array
     """(3, 3)."""
 
     def some(self, rows: Rows) -> Moving:
@@ -87,8 +87,8 @@ class JointProblem:
         residual, jacobian = _huber(residual, jacobian)
         if unknowns.axes is None or not self._stood:
             return residual, jacobian
-        stance, slope = self._stance(unknowns.axes, jacobian.shape[1])
-        return np.concatenate([residual, stance]), np.concatenate([jacobian, slope])
+        standing, slope = self._zero_pose(unknowns.axes, jacobian.shape[1])
+        return np.concatenate([residual, standing]), np.concatenate([jacobian, slope])
 
     def by_sample(self, unknowns: Unknowns) -> tuple[Array, Array, Array]:
         """Of each sample the gradient Jᵀr (K, P) and the normal matrix JᵀJ (K, P, P); (P, P) the prior's."""
@@ -139,17 +139,17 @@ class JointProblem:
         pieces[1:1] = joint(u, v, du, dv, relative, drelative, cosine, size)
         return pieces
 
-    def _stance(self, axes: tuple[Array, Array], size: int) -> tuple[Array, Array]:
-        """Each axis is as steep in the stance as in the zero pose; a level one has either sign."""
+    def _zero_pose(self, axes: tuple[Array, Array], size: int) -> tuple[Array, Array]:
+        """Each axis is as steep as in the skeleton's zero pose; a level one has either sign."""
         assert self._zero_axes is not None
         # it speaks once, beside samples of which many say the same
-        weight = math.sqrt(max(1.0, len(self._1.r) * _STANCE_SHARE)) / STANCE_RAD
+        weight = math.sqrt(max(1.0, len(self._1.r) * _ZERO_POSE_SHARE)) / ZERO_POSE_RAD
         residual, jacobian = np.zeros(2), np.zeros((2, size))
-        stances = (self._1.r_stance, self._2.r_stance)
+        zero_poses = (self._1.r_zero_pose, self._2.r_zero_pose)
         zero = (self._zero_axes[0], self._zero_axes[-1])
         for i in range(2):
-            residual[i] = weight * (stances[i] @ axes[i] - zero[i])[2]
-            jacobian[i, 2 * i : 2 * i + 2] = weight * (stances[i] @ tangents(axes[i]))[2]
+            residual[i] = weight * (zero_poses[i] @ axes[i] - zero[i])[2]
+            jacobian[i, 2 * i : 2 * i + 2] = weight * (zero_poses[i] @ tangents(axes[i]))[2]
         return residual, jacobian
 
 

@@ -1,6 +1,6 @@
-"""How each unit sits on its segment, from a stance in the zero pose and a motion, with no magnetometer.
+"""How each unit sits on its segment, from standing in the zero pose and a motion, with no magnetometer.
 
-The stance says where up is in every unit. That leaves one angle a unit open: which way its segment faced, in
+The zero pose says where up is in every unit. That leaves one angle a unit open: the way its segment faced, in
 the unit's own earth frame. Two things tell it (`joint_fit.py`):
 
 - an axis of a joint that lies level in the zero pose (elbow, knee, finger): the table says which way it then
@@ -31,11 +31,11 @@ from master.calibrate.neighbours import check_order, fit_pairs
 from master.calibrate.oriented import Oriented, mean_rotation, moving, orient
 from master.calibrate.recording import NodeRecording
 from master.calibrate.sides import check_sides
-from master.calibrate.standing import find_stance, given_stance
 from master.calibrate.unit_evidence import unit_evidence
+from master.calibrate.zero_pose import find_zero_pose, given_zero_pose
 
 _TURNED_RAD = math.radians(36.0)
-"""How far a limb may be turned in or out in the stance: a real person's arms are, by so much each."""
+"""How far a limb may be turned in or out in the zero pose: a real person's arms are, by so much each."""
 _WORST_FACING_RAD = math.radians(25.0)
 _ALONE = "no neighbour of it is left to compare it with"
 
@@ -47,11 +47,11 @@ class NodeMounting:
     q_sensor_from_segment: Array
     """(4,)."""
     sigma_rad: float
-    """One standard deviation of the angle about the long axis; the stance itself is not in it."""
+    """One standard deviation of the angle about the long axis; the zero pose itself is not in it."""
     tilt_rad: float | None
-    """How far its own axis was from level in the stance; None where it has none."""
+    """How far its own axis was from level in the zero pose; None where it has none."""
     heading_rad: float
-    """Turns the unit's own earth frame into the common one, in which the person faces east in the stance."""
+    """Turns the unit's own earth frame into the common one; the person faces east in the zero pose."""
     told_by: str
     """Its own joint's axis, or the segment whose facing it shares."""
 
@@ -64,7 +64,7 @@ class Mounting:
     refused: dict[str, str]
     """Nodes that the recording does not determine, or whose evidence contradicts it: why, and what to do."""
     joints: list[JointMotion]
-    stance_s: tuple[float, float]
+    zero_pose_s: tuple[float, float]
     evidence: dict[str, list[Evidence]]
     """What was compared before the answer was believed, by node."""
 
@@ -72,13 +72,13 @@ class Mounting:
 def find_mounting(
     recordings: Mapping[str, NodeRecording],
     skeleton: Skeleton,
-    stance_s: tuple[float, float] | None = None,
+    zero_pose_s: tuple[float, float] | None = None,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Mounting:
     """The mounting of every node of the skeleton that was recorded.
 
-    `recordings` are by segment; readings must be calibrated. Without `stance_s` the first stretch in which
-    everyone rests is the stance. Raises PoorMotionError where nothing at all can be said; what fails for
+    `recordings` are by segment; readings must be calibrated. Without `zero_pose_s` the first stretch in which
+    everyone rests is the zero pose. Raises PoorMotionError where nothing at all can be said; what fails for
     single nodes is in `refused`. A node whose own readings contradict each other takes no part.
     """
     names = [name for name in skeleton.segment_names if name in recordings]
@@ -91,17 +91,17 @@ def find_mounting(
         alone = dict.fromkeys(names, _ALONE)
         return Mounting({}, contradicted | alone, [], (0.0, 0.0), evidence)
     suit = orient(recordings, names)
-    if stance_s is None:
-        stance = find_stance(suit.gyr_rad_s, suit.rate_hz)
+    if zero_pose_s is None:
+        zero_pose = find_zero_pose(suit.gyr_rad_s, suit.rate_hz)
     else:
-        stance = given_stance(*stance_s, suit.q.shape[1], suit.rate_hz)
-    units, spacing_s = moving(suit, stance)
+        zero_pose = given_zero_pose(*zero_pose_s, suit.q.shape[1], suit.rate_hz)
+    units, spacing_s = moving(suit, zero_pose)
     wrong = _misplaced(skeleton, names, units, spacing_s, evidence)
     names = [name for name in names if name not in wrong]
     contradicted |= wrong
     if len(names) < 2:
         left = dict.fromkeys(names, _ALONE)
-        return Mounting({}, contradicted | left, [], _seconds(stance, suit), evidence)
+        return Mounting({}, contradicted | left, [], _seconds(zero_pose, suit), evidence)
     at = dict(zip(suit.names, units, strict=True))
     suit = suit.some(names)
     joints = []
@@ -112,7 +112,7 @@ def find_mounting(
             joint_motion(skeleton, skeleton.segment_names.index(child), at[parent], at[child], spacing_s)
         )
     progress(len(pairs), len(pairs))
-    found = _by_sides(skeleton, suit, _assemble(skeleton, suit, stance, joints), evidence)
+    found = _by_sides(skeleton, suit, _assemble(skeleton, suit, zero_pose, joints), evidence)
     return replace(found, refused=contradicted | found.refused, evidence=evidence)
 
 
@@ -158,8 +158,8 @@ def _misplaced(
     return {name: late[name][0].advice for name in names if late[name][0].contradicts}
 
 
-def _seconds(stance: slice, suit: Oriented) -> tuple[float, float]:
-    return stance.start / suit.rate_hz, stance.stop / suit.rate_hz
+def _seconds(zero_pose: slice, suit: Oriented) -> tuple[float, float]:
+    return zero_pose.start / suit.rate_hz, zero_pose.stop / suit.rate_hz
 
 
 def posture(suit: Oriented, mounting: Mounting) -> Array:
@@ -174,13 +174,13 @@ def posture(suit: Oriented, mounting: Mounting) -> Array:
     return np.stack(out, axis=1)
 
 
-def _assemble(skeleton: Skeleton, suit: Oriented, stance: slice, joints: list[JointMotion]) -> Mounting:
-    q_stance = {name: mean_rotation(q[stance]) for name, q in zip(suit.names, suit.q, strict=True)}
+def _assemble(skeleton: Skeleton, suit: Oriented, zero_pose: slice, joints: list[JointMotion]) -> Mounting:
+    q_zero_pose = {name: mean_rotation(q[zero_pose]) for name, q in zip(suit.names, suit.q, strict=True)}
     islands = islands_of(suit.names, joints)
     nodes: dict[str, NodeMounting] = {}
     refused: dict[str, str] = {}
     for island in islands:
-        axes = axes_by_node(skeleton, suit, q_stance, joints, island)
+        axes = axes_by_node(skeleton, suit, q_zero_pose, joints, island)
         facing = facing_of(axes)
         if facing is None:
             refused.update({name: _why(name, joints) for name in island})
@@ -189,7 +189,7 @@ def _assemble(skeleton: Skeleton, suit: Oriented, stance: slice, joints: list[Jo
             lone = any(name in axes for name in _other_side(skeleton))
             facing = (facing[0], max(facing[1], _TURNED_RAD)) if lone else facing
         for name in island:
-            node = _node(skeleton, name, q_stance[name], island, axes, facing, joints)
+            node = _node(skeleton, name, q_zero_pose[name], island, axes, facing, joints)
             if node.sigma_rad > _WORST_FACING_RAD:
                 refused[name] = (
                     f"which way it faced is only known to ± {math.degrees(node.sigma_rad):.0f}°: a person's "
@@ -198,7 +198,7 @@ def _assemble(skeleton: Skeleton, suit: Oriented, stance: slice, joints: list[Jo
                 )
             else:
                 nodes[name] = node
-    limits = _seconds(stance, suit)
+    limits = _seconds(zero_pose, suit)
     joints = [_with_flexion(skeleton, suit, joint, nodes) for joint in joints]
     return Mounting({name: nodes[name] for name in suit.names if name in nodes}, refused, joints, limits, {})
 
@@ -214,7 +214,7 @@ def _other_side(skeleton: Skeleton) -> dict[str, str]:
 def _node(
     skeleton: Skeleton,
     name: str,
-    q_stance: Array,
+    q_zero_pose: Array,
     island: Island,
     axes: dict[str, list[Axis]],
     facing: tuple[float, float],
@@ -243,10 +243,10 @@ def _node(
             sigma = math.sqrt(sigma**2 + abs(variance - island[source][1]))
     tilt = None
     if source == name:
-        tilts = [_tilt(skeleton, joints[a.joint], name, q_stance) for a in axes[name]]
+        tilts = [_tilt(skeleton, joints[a.joint], name, q_zero_pose) for a in axes[name]]
         tilt = max(tilts, key=abs)
     return NodeMounting(
-        multiply(conjugate(q_stance), heading_turn(mine - offset)),
+        multiply(conjugate(q_zero_pose), heading_turn(mine - offset)),
         sigma,
         tilt,
         math.remainder(offset - facing_rad, 2.0 * math.pi),
@@ -254,12 +254,12 @@ def _node(
     )
 
 
-def _tilt(skeleton: Skeleton, joint: JointMotion, name: str, q_stance: Array) -> float:
-    """How far the joint's axis is from level (or from where the zero pose has it) in the stance, rad."""
+def _tilt(skeleton: Skeleton, joint: JointMotion, name: str, q_zero_pose: Array) -> float:
+    """How far the joint's axis is from level (or from where the skeleton has it) in the zero pose, rad."""
     assert joint.fit is not None
     assert joint.fit.axes is not None
     axis = joint.fit.axes[0 if name == joint.parent else 1]
-    return math.asin(max(-1.0, min(1.0, float(rotate(q_stance, axis)[2]))))
+    return math.asin(max(-1.0, min(1.0, float(rotate(q_zero_pose, axis)[2]))))
 
 
 def _with_flexion(

@@ -67,7 +67,7 @@ def orient(recordings: Mapping[str, NodeRecording], names: Sequence[str]) -> Ori
     return Oriented(tuple(names), rate_hz, np.stack(acc), np.stack(gyr), np.stack(q))
 
 
-def moving(suit: Oriented, stance: slice) -> tuple[list[Moving], float]:
+def moving(suit: Oriented, zero_pose: slice) -> tuple[list[Moving], float]:
     """Each unit over the recording at some 20 Hz, low-passed, and the spacing of these samples, s."""
     # a fast recording is thinned out as soon as its low-pass lets it
     first = max(1, round(suit.rate_hz / (5.0 * _SMOOTH_HZ)))
@@ -81,7 +81,7 @@ def moving(suit: Oriented, stance: slice) -> tuple[list[Moving], float]:
         lever = _cross_matrices(np.gradient(rate, 1.0 / middle_hz, axis=0)) + spin @ spin
         in_earth = r @ np.concatenate([rate[..., None], force[..., None], lever], axis=2)
         slow = _lowpass(in_earth.reshape(-1, 15), _SLOW_HZ, middle_hz)[::second].reshape(-1, 3, 5)
-        mean = to_matrix(mean_rotation(q[stance]))
+        mean = to_matrix(mean_rotation(q[zero_pose]))
         units.append(Moving(r[::second], slow[..., 0], slow[..., 1], slow[..., 2:], mean))
     return units, first * second / suit.rate_hz
 

@@ -71,7 +71,7 @@ def _excess(skeleton: Skeleton, suit: Oriented, ends: Ends, rows: tuple[int, int
     entry, judge = skeleton.segments[rows[0]], skeleton.segments[rows[1]]
     step = max(1, round(suit.rate_hz / 10.0))
     child = _segment(suit, ends, entry.name, step)
-    # a trunk that does not tell how it moves stands upright, as everyone faced in the stance
+    # a trunk that does not tell how it moves stands upright, as everyone faced in the zero pose
     parent = _segment(suit, ends, entry.parent, step) if entry.parent in ends else IDENTITY
     frame = skeleton.axis_frames[rows[1]]
     angles = intrinsic_angles(frame.T @ to_matrix(multiply(conjugate(parent), child)) @ frame)

@@ -31,14 +31,14 @@ class EstimationConfig(Section):
     """-3 dB; 0 leaves the magnetometer as it is."""
     settle_s: float = Field(default=1.0, ge=0.0, le=60.0)
     """From a node's first answer, or its return, until its orientation counts as valid."""
-    stance_s: float = Field(default=0.0, ge=0.0, le=60.0)
+    zero_pose_s: float = Field(default=0.0, ge=0.0, le=60.0)
     """So long standing still in the zero pose then gives the nodes' headings, and the mounting of those whose
     file does not give it; 0: headings by the magnetometers, mounting as calibrated."""
-    stance_heading_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
+    zero_pose_heading_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
     """Where the operator faces meanwhile, from east towards north."""
-    stance_turn_deg_s: float = Field(default=15.0, gt=0.0, le=360.0)
+    zero_pose_turn_deg_s: float = Field(default=15.0, gt=0.0, le=360.0)
     """A node that turns faster meanwhile, degrees/s, does not stand still: the pose is asked for again."""
-    stance_lean_deg: float = Field(default=15.0, gt=0.0, le=90.0)
+    zero_pose_lean_deg: float = Field(default=15.0, gt=0.0, le=90.0)
     """A segment that leans farther from upright, degrees, is not in the zero pose: it is asked for again.
     Noticed only where the node's file gives its mounting."""
     constraints: Literal["online", "off"] = "off"

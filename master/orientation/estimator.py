@@ -21,7 +21,7 @@ from master.orientation.heading import HeadingMemory
 from master.orientation.joints.online import OnlineHeadings
 from master.orientation.liveness import Liveness
 from master.orientation.lowpass import LowPass
-from master.orientation.stance import Stance, StanceLimits
+from master.orientation.zero_pose import ZeroPose, ZeroPoseLimits
 from master.suit.doubt import NodeDoubt, Weight
 
 _GRAVITY_M_S2 = 9.81
@@ -130,12 +130,14 @@ class Estimator:
         if config.constraints == "online" and skeleton is not None:
             self._heading = OnlineHeadings(config.online, skeleton, rate_hz)
             self._q_of_filters = self._bank.q_inertial_from_sensor
-        self._stance = Stance(
+        self._zero_pose = ZeroPose(
             calibration.q_sensor_from_segment,
-            math.ceil(config.stance_s * rate_hz),
-            math.radians(config.stance_heading_deg),
+            math.ceil(config.zero_pose_s * rate_hz),
+            math.radians(config.zero_pose_heading_deg),
             calibration.mounted,
-            limits=StanceLimits(math.radians(config.stance_turn_deg_s), math.radians(config.stance_lean_deg)),
+            limits=ZeroPoseLimits(
+                math.radians(config.zero_pose_turn_deg_s), math.radians(config.zero_pose_lean_deg)
+            ),
         )
         self._mounted = calibration.mounted
         self._parts: tuple[_Stateful, ...] = (
@@ -143,7 +145,7 @@ class Estimator:
             self._bank,
             self._liveness,
             self._heading,
-            self._stance,
+            self._zero_pose,
         )
         self._gyr_rad_s = np.zeros((count, 3))
         # the filters hold each reading for the period before it, which leads by half of it on average
@@ -174,11 +176,11 @@ class Estimator:
             self._gyr_rad_s = np.where(spoilt[:, None], self._bank.bias_rad_s(), self._gyr_rad_s)
         if changes.settled.any():
             self._find(changes.settled, np.isfinite(filtered[MAG, :, 0]))
-        if not self._stance.known.all():
+        if not self._zero_pose.known.all():
             self._stand(filtered[MAG])
         if self._heading.due():
-            usable = self._liveness.settled & self._stance.known
-            mounting = self._stance.q_sensor_from_segment
+            usable = self._liveness.settled & self._zero_pose.known
+            mounting = self._zero_pose.q_sensor_from_segment
             self._heading.correct(self._q_of_filters(), filtered[MAG], mounting, usable)
 
     def _find(self, settled: Mask, magnetic: Mask) -> None:
@@ -188,15 +190,15 @@ class Estimator:
         self._heading.find(settled, q, np.where(magnetic, heading_rad(between), np.nan))
 
     def _stand(self, mag_ut: Array) -> None:
-        """One tick of the stance."""
+        """One tick of the zero pose."""
         rate = self._rate_of_sensors()
         # a finger's unit with a bias of 20°/s would refuse the whole suit's pose for ever
         believed = self._liveness.settled & ~self._bank.undecided()
-        done = self._stance.add(self._oriented(rate), believed, rate)
+        done = self._zero_pose.add(self._oriented(rate), believed, rate)
         # apart: the heading of a mounting found now is the magnetometer's own
         for nodes in (done & self._mounted, done & ~self._mounted):
             if nodes.any():
-                self._heading.stand(nodes, self._stance.correction_rad, self._q_of_filters(), mag_ut)
+                self._heading.stand(nodes, self._zero_pose.correction_rad, self._q_of_filters(), mag_ut)
 
     def doubts(self) -> dict[int, NodeDoubt]:
         """Nodes that are not believed, or not wholly, by their number."""
@@ -205,16 +207,16 @@ class Estimator:
         asked = self._liveness.settled.copy()
         # of a node whose joints are invalid anyhow no pose helps, and the others need not wait for it
         asked[[node for node, doubt in filters.items() if doubt.weight >= Weight.INVALID]] = False
-        return {**joints, **filters, **self._stance.doubts(asked)}
+        return {**joints, **filters, **self._zero_pose.doubts(asked)}
 
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""
         rate = self._rate_of_sensors()
-        mounting = self._stance.q_sensor_from_segment
+        mounting = self._zero_pose.q_sensor_from_segment
         return Posture(
             q_world_from_segment=multiply(self._oriented(rate), mounting),
             rate_rad_s=rotate(conjugate(mounting), rate),
-            valid=self._liveness.settled & self._stance.known,
+            valid=self._liveness.settled & self._zero_pose.known,
         )
 
     def _idle(self, nodes: Mask) -> None:

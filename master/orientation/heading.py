@@ -32,7 +32,7 @@ class HeadingMemory:
         self.turn[back] = heading_turn(heading_rad(between))
 
     def stand(self, nodes: Mask, correction_rad: Array, q_world_from_sensor: Array, mag_ut: Array) -> None:
-        """Turn those of the nodes without a magnetometer by what a stance gives, (N,)."""
+        """Turn those of the nodes without a magnetometer by what a zero pose gives, (N,)."""
         six_axis = nodes & np.isnan(mag_ut[:, 0])
         self.turn[six_axis] = multiply(heading_turn(correction_rad[six_axis]), self.turn[six_axis])
 

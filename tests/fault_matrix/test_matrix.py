@@ -83,7 +83,7 @@ def test_drives_that_differ_from_encoders_go_on_without_the_comparison(
 @pytest.mark.parametrize(
     ("name", "without"),
     [
-        ("zero pose of somebody who leans", "estimation.stance_lean_deg=80.0"),
+        ("zero pose of somebody who leans", "estimation.zero_pose_lean_deg=80.0"),
         ("gyro with a gross bias", "estimation.vqf.rest_bias=false"),
         ("iron at a magnetometer while it is worn", "estimation.vqf.field_change=0.0"),
     ],

@@ -23,7 +23,7 @@ ELBOW = "right_elbow_pitch"
 ZERO_COUNTS = 1000
 OWN_LIMIT_DEG = 20.0
 OVERRIDES = {
-    "master": ["estimation.stance_s=1.0"],
+    "master": ["estimation.zero_pose_s=1.0"],
     # three robots share this machine's cores: half the turns are enough to follow
     "slave": ["loop.rate_hz=100"],
     # calibrated otherwise, so its encoders show other counts for the same angles

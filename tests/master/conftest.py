@@ -23,7 +23,7 @@ def recordings_folder() -> Path:
 def possible_deg() -> Mapping[str, Range]:
     """Each kind of joint's range.
 
-    The zero is the stance of a person at ease: elbows hang bent by some 15°, and are that far beyond when
+    The zero is the zero pose of a person at ease: elbows hang bent by some 15°, and are that far beyond when
     they are straight.
     """
     return {

@@ -49,6 +49,10 @@ def test_robots_are_named_in_a_list_or_one_alone() -> None:
         ("estimation.filter='magic'", ["estimation.filter = 'magic'", "one of vqf, mahony, ekf"]),
         ("nodes.head.filter='magic'", ["nodes.head.filter = 'magic'", "one of vqf, mahony, ekf"]),
         ("estimation.mahony.kp=-1.0", ["estimation.mahony.kp = -1.0", "greater than or equal to 0"]),
+        (
+            "estimation.stance_s=1.0",
+            ["estimation.stance_s = 1.0", "expected the key zero_pose_s, its new name"],
+        ),
         ("estimation.magic.kp=1.0", ["estimation.magic = {'kp': 1.0}", "no such key"]),
         ("robot='robot 1'", ["robot = 'robot 1'", "pattern"]),
         ("robots=['robot 1']", ["robots.0 = 'robot 1'", "pattern"]),

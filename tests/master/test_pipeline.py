@@ -174,7 +174,7 @@ def test_a_doubted_node_s_joints_are_invalid_and_what_refuses_engage_is_in_the_c
 
 
 def test_nobody_engages_before_a_zero_pose_was_good() -> None:
-    config = ("estimation.stance_s=0.5",)
+    config = ("estimation.zero_pose_s=0.5",)
     still = Bench(master=config)
     solved = still.run(400)
     assert "waits for the zero pose" in solved[15].doubt
@@ -182,6 +182,6 @@ def test_nobody_engages_before_a_zero_pose_was_good() -> None:
     assert solved[-1].doubt == ""
     assert solved[-1].valid.all()
     # it stands for 3.5 s before it reaches for the bottle
-    last = Bench('motion="bottle"', master=("estimation.stance_s=3.0",)).run(1000)[-1]
+    last = Bench('motion="bottle"', master=("estimation.zero_pose_s=3.0",)).run(1000)[-1]
     assert "zero pose refused: turned" in last.doubt
     assert not last.valid.any()

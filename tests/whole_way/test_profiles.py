@@ -13,7 +13,7 @@ from deploy.measure import Accuracy, Motion, accuracy, motion
 from deploy.sim.world.whole_way import VirtualRun, World
 from slave.limit.limit import Limits
 
-STANCE = {"master": ["estimation.stance_s=1.0"]}
+ZERO_POSE = {"master": ["estimation.zero_pose_s=1.0"]}
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Run:
 
 def followed(profile: str, seconds: float) -> Run:
     run = VirtualRun(
-        World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile, overrides=STANCE)
+        World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile, overrides=ZERO_POSE)
     )
     run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
     run.run(1.0)

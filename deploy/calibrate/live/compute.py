@@ -152,7 +152,7 @@ def _mount(
             mounting = find_mounting(
                 nodes,
                 config.skeleton,
-                session.stance_s,
+                session.zero_pose_s,
                 lambda done, of: progress.update(task, completed=done, total=of),
             )
     except TandemError as error:

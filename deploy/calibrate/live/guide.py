@@ -1,6 +1,6 @@
 """What the person is to do now, which node still wants what: a state machine on the readings' own time.
 
-    attitudes ▸ tumble ▸ wear ▸ stance ▸ limber ▸ done
+    attitudes ▸ tumble ▸ wear ▸ zero pose ▸ limber ▸ done
 
 Parts that were not asked for are left out. Pure: readings go in, the view comes out.
 """
@@ -16,20 +16,20 @@ import numpy as np
 from common.quaternion import Array
 from deploy.calibrate.live.steps import (
     WINDOW_S,
-    Attitudes,
-    Limber,
+    AttitudesStep,
+    MoveJointsStep,
     NodeProgress,
-    Stance,
+    ReadingsWindow,
     Step,
-    Tumble,
-    Wear,
-    Window,
+    TumbleStep,
+    WearStep,
+    ZeroPoseStep,
     summed_up,
 )
 
 What = Literal["imu", "mag", "mount"]
 WHATS: tuple[What, ...] = ("imu", "mag", "mount")
-StepName = Literal["attitudes", "tumble", "wear", "stance", "limber", "done"]
+StepName = Literal["attitudes", "tumble", "wear", "zero_pose", "limber", "done"]
 _SILENT_S = 2.0
 
 
@@ -45,11 +45,11 @@ class GuideOptions:
     """Share of all directions that a magnetometer must have seen."""
     tumble_s: float = 30.0
     """At least so long."""
-    stance_s: float = 3.0
+    zero_pose_s: float = 3.0
     limber_s: float = 20.0
     """So long must every joint have moved."""
     by_word: bool = False
-    """The stance begins when the person says so."""
+    """The zero pose begins when the person says so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +83,8 @@ class Guide:
         self._count = len(magnetometer)
         self._names = _steps(options.what)
         self._at = 0
-        self._tumble = Tumble(self._count, magnetometer, options.coverage, options.tumble_s)
-        self._stance = Stance(self._count, options.stance_s, options.by_word)
+        self._tumble = TumbleStep(self._count, magnetometer, options.coverage, options.tumble_s)
+        self._zero_pose = ZeroPoseStep(self._count, options.zero_pose_s, options.by_word)
         self._step = self._begin(self._names[0])
         self._readings: list[Array] = []
         self._held = 0
@@ -97,14 +97,14 @@ class Guide:
         return self._names[self._at]
 
     @property
-    def stance_s(self) -> tuple[float, float]:
-        """When the zero pose was held, in seconds since the step `stance` began."""
-        return self._stance.stance_s
+    def zero_pose_s(self) -> tuple[float, float]:
+        """When the zero pose was held, in seconds since that step began."""
+        return self._zero_pose.zero_pose_s
 
     def word(self) -> None:
-        """The person pressed Enter: "I stand" in the stance; elsewhere "that is enough, go on"."""
-        if self.step == "stance":
-            self._stance.word()
+        """The person pressed Enter: "I stand" in the zero pose; elsewhere "that is enough, go on"."""
+        if self.step == "zero_pose":
+            self._zero_pose.word()
         elif self.step != "done":
             self._skip = True
 
@@ -133,7 +133,7 @@ class Guide:
             nodes[i] = NodeProgress(0.0, "silent: look at its plug")
         return View(self.step, self._at + 1, steps, step.title, step.todo, nodes)
 
-    def _take(self, window: Window) -> None:
+    def _take(self, window: ReadingsWindow) -> None:
         if self._step is None:
             return
         self._silent_s = np.where(window.answered, 0.0, self._silent_s + window.seconds)
@@ -156,15 +156,15 @@ class Guide:
         o = self._options
         match name:
             case "attitudes":
-                return Attitudes(self._count, o.still_s, o.attitudes)
+                return AttitudesStep(self._count, o.still_s, o.attitudes)
             case "tumble":
                 return self._tumble
             case "wear":
-                return Wear(self._count)
-            case "stance":
-                return self._stance
+                return WearStep(self._count)
+            case "zero_pose":
+                return self._zero_pose
             case "limber":
-                return Limber(self._parents, o.limber_s, self._stance.bias_rad_s)
+                return MoveJointsStep(self._parents, o.limber_s, self._zero_pose.bias_rad_s)
             case "done":
                 return None
 
@@ -176,5 +176,5 @@ def _steps(what: Sequence[What]) -> list[StepName]:
     if "mag" in what:
         names.append("tumble")
     if "mount" in what:
-        names += ["wear", "stance", "limber"]
+        names += ["wear", "zero_pose", "limber"]
     return [*names, "done"]

@@ -23,7 +23,7 @@ from master.suit.poll import Sweep
 
 _SHOW_S = 0.2
 _LOG_S = 5.0
-_FILE: dict[StepName, str] = {"attitudes": "tray", "tumble": "tray", "stance": "worn", "limber": "worn"}
+_FILE: dict[StepName, str] = {"attitudes": "tray", "tumble": "tray", "zero_pose": "worn", "limber": "worn"}
 """Which recording a step belongs to: with `wear` there is none, as units are handled one by one."""
 
 
@@ -34,8 +34,8 @@ class Session:
     tray: Path | None = None
     """Attitudes and tumbling."""
     worn: Path | None = None
-    """The stance, and the motion after it."""
-    stance_s: tuple[float, float] | None = None
+    """The zero pose, and the motion after it."""
+    zero_pose_s: tuple[float, float] | None = None
     """When the zero pose was held, in the time of `worn`."""
     finished: bool = False
     counters: dict[str, object] = field(default_factory=dict)
@@ -103,7 +103,7 @@ class LiveSession:
         session.finished = self._guide.step == "done"
         session.counters["recordings"] = [recorder.summary() for recorder in self._recorders]
         if session.worn is not None and self._guide.step in ("limber", "done"):
-            session.stance_s = self._guide.stance_s
+            session.zero_pose_s = self._guide.zero_pose_s
 
     async def _work(self, polling: object) -> None:
         assert asyncio.iscoroutine(polling)

@@ -37,7 +37,7 @@ class NodeProgress:
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class ReadingsWindow:
     """A stretch of readings, summed up: N nodes."""
 
     seconds: float
@@ -56,7 +56,7 @@ class Window:
         return out
 
 
-def summed_up(readings: Array, rate_hz: float) -> Window:
+def summed_up(readings: Array, rate_hz: float) -> ReadingsWindow:
     """A window of readings (K, N, 9), NaN where a node did not answer."""
     there = np.isfinite(readings[:, :, 3])
     share = there.mean(axis=0)
@@ -65,7 +65,7 @@ def summed_up(readings: Array, rate_hz: float) -> Window:
     count = np.maximum(there.sum(axis=0), 1)[:, None]
     mean = known.sum(axis=0) / count
     square = np.where(there[:, :, None], (readings - mean) ** 2, 0.0).sum(axis=0) / count
-    return Window(len(readings) / rate_hz, answered, mean, np.sqrt(square))
+    return ReadingsWindow(len(readings) / rate_hz, answered, mean, np.sqrt(square))
 
 
 class Step(Protocol):
@@ -74,14 +74,14 @@ class Step(Protocol):
     title: str
     todo: str
 
-    def add(self, window: Window) -> None:
+    def add(self, window: ReadingsWindow) -> None:
         """Take the next window of readings."""
 
     def progress(self) -> list[NodeProgress]:
         """Every node, in order."""
 
 
-class Attitudes:
+class AttitudesStep:
     """Rest in many attitudes (paper B, 2.2.1): counts each node's distinct ones."""
 
     title = "Rest in many attitudes"
@@ -98,7 +98,7 @@ class Attitudes:
         self._found: list[list[Array]] = [[] for _ in range(nodes)]
         self._counted = np.zeros(nodes, dtype=np.bool_)
 
-    def add(self, window: Window) -> None:
+    def add(self, window: ReadingsWindow) -> None:
         """Take the next window of readings."""
         norm = np.maximum(np.linalg.norm(window.mean[:, :3], axis=1, keepdims=True), 1e-9)
         direction = window.mean[:, :3] / norm
@@ -140,7 +140,7 @@ def spread(directions: Array) -> float:
     return float(np.linalg.eigvalsh(directions.T @ directions / len(directions))[0])
 
 
-class Tumble:
+class TumbleStep:
     """Turn about freely for the magnetometer: counts the cells of the sphere that each node has seen.
 
     The attitudes' readings count too, so this step listens from the beginning.
@@ -164,13 +164,13 @@ class Tumble:
         self._cells = sphere_cells(self._CELLS)
         self._nodes = nodes
 
-    def listen(self, window: Window) -> None:
+    def listen(self, window: ReadingsWindow) -> None:
         """Take readings of another step."""
         field = np.where(window.answered[:, None], window.mean[:, 6:9], np.nan)
         if np.isfinite(field).any():
             self._seen.append(field)
 
-    def add(self, window: Window) -> None:
+    def add(self, window: ReadingsWindow) -> None:
         """Take the next window of readings."""
         self._seconds += window.seconds
         self.listen(window)
@@ -214,7 +214,7 @@ def sphere_cells(count: int) -> Array:
     return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1)
 
 
-class Wear:
+class WearStep:
     """Put the suit on: over once the units no longer turn as one."""
 
     title = "Put the suit on"
@@ -224,7 +224,7 @@ class Wear:
         self._nodes = nodes
         self._seconds = 0.0
 
-    def add(self, window: Window) -> None:
+    def add(self, window: ReadingsWindow) -> None:
         """Take the next window of readings."""
         # deviation within the window: the gyros' biases are not known yet, but steady
         turning = np.linalg.norm(window.deviation[:, 3:6], axis=1)[window.answered]
@@ -238,15 +238,15 @@ class Wear:
         return [NodeProgress(share, "worn" if share >= 1.0 else "not moving by itself yet")] * self._nodes
 
 
-class Stance:
+class ZeroPoseStep:
     """Stand in the zero pose: all nodes at rest at once."""
 
     title = "Stand in the zero pose"
     todo = "Stand upright, look ahead, arms hanging, palms facing the thighs, fingers straight. Keep still."
 
-    def __init__(self, nodes: int, stance_s: float, wait_for_word: bool) -> None:
-        """With `wait_for_word` the stance counts only once the person says so."""
-        self._wanted_s = stance_s
+    def __init__(self, nodes: int, zero_pose_s: float, wait_for_word: bool) -> None:
+        """With `wait_for_word` the zero pose counts only once the person says so."""
+        self._wanted_s = zero_pose_s
         self._said = not wait_for_word
         if wait_for_word:
             self.todo += " Press Enter as you begin."
@@ -260,7 +260,7 @@ class Stance:
         """The person says: I stand."""
         self._said = True
 
-    def add(self, window: Window) -> None:
+    def add(self, window: ReadingsWindow) -> None:
         """Take the next window of readings."""
         self._past_s += window.seconds
         if self._rest_s >= self._wanted_s:
@@ -272,7 +272,7 @@ class Stance:
         else:
             self._rest_s = 0.0
             self._mean_rates.clear()
-        self.stance_s = (self._past_s - self._rest_s, self._past_s)
+        self.zero_pose_s = (self._past_s - self._rest_s, self._past_s)
         """From when until when, since the step began."""
 
     @property
@@ -292,7 +292,7 @@ class Stance:
         ]
 
 
-class Limber:
+class MoveJointsStep:
     """Move every joint: counts the seconds in which the two units of each turned differently."""
 
     title = "Move every joint"
@@ -308,7 +308,7 @@ class Limber:
         self._bias = bias_rad_s
         self._seconds = np.zeros(len(parents))
 
-    def add(self, window: Window) -> None:
+    def add(self, window: ReadingsWindow) -> None:
         """Take the next window of readings."""
         mean = window.mean[:, 3:6] - self._bias
         # what a unit turned in the window, to and fro included

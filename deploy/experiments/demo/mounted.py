@@ -16,14 +16,14 @@ class Mounted:
     overrides: list[str]
     """Of the master's file: the calibration of each node that the motion told of."""
     left: dict[str, str]
-    """The other nodes, and why; the stance alone must do for them."""
+    """The other nodes, and why; the zero pose alone must do for them."""
 
 
 def mount(recording: Path, skeleton: Skeleton, folder: Path) -> Mounted:
     """Find how the sensors of a full-body recording sit, and write a file a node into `folder`.
 
     A segment that was not recorded goes by the one it hangs on, as in the replay: a flat, stiff hand.
-    Where nothing can be said, as of a recording without a stance, every node is among the `left`.
+    Where nothing can be said, as of a recording without a zero pose, every node is among the `left`.
     Raises RecordingError for a file that is none.
     """
     from master.calibrate.hinge import PoorMotionError

@@ -55,7 +55,7 @@ class DemoOptions:
         if self.motion is not None:
             suit.append(f'motion="{self.motion}"')
         # simulated and recorded operators begin in the zero pose: zeroed there, as the paper's reference was
-        master = [f'estimation.filter="{self.filter}"', "estimation.stance_s=1.0"]
+        master = [f'estimation.filter="{self.filter}"', "estimation.zero_pose_s=1.0"]
         if self.replay is not None:
             suit.append(f'replay="{self.replay.resolve()}"')
         slave = [f'track.strategy="{self.strategy}"', f'camera.source="{"robot" if self.camera else "off"}"']
@@ -121,7 +121,7 @@ async def _mount(options: DemoOptions, replay: Path, folder: Path, console: Cons
     console.print(f"finding from {replay.name} how its sensors sit …")
     mounted = await asyncio.to_thread(mount, replay, load_skeleton(options.profile), folder)
     for name, why in mounted.left.items():
-        console.print(f"[yellow]{name}: by the stance alone ({why})", highlight=False)
+        console.print(f"[yellow]{name}: by the zero pose alone ({why})", highlight=False)
     return mounted.overrides
 
 

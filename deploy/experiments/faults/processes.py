@@ -107,7 +107,7 @@ async def run_process_trial(fault: ProcessFault, host: Host) -> Outcome:
     """Try it. Raises TandemError where the robot does not follow the operator when the fault is to come."""
     overrides = {
         "slave": ['servos.backend="canopen"', 'camera.source="off"'],
-        "master": ["estimation.stance_s=1.0"],
+        "master": ["estimation.zero_pose_s=1.0"],
         DRIVES: [],
     }
     async with open_rig(overrides=overrides) as rig:

@@ -221,7 +221,7 @@ SUIT = (
         "The suit is put on, and the operator stands bowed by 25° where the zero pose is to be taken.",
         Reaction.HOLDS,
         "Refuses to engage, and says which segment leaned by how much. It stands.",
-        "Stand upright, arms hanging, and still for `stance_s`; then engage.",
+        "Stand upright, arms hanging, and still for `zero_pose_s`; then engage.",
         body.leans,
         begins=State.HOLD, setting=body.LEANS, stands_s=AT_ONCE_S,
     ),

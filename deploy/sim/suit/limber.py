@@ -11,7 +11,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 
 PUT_ON_S = 3.0
-STANCE_S = 6.0
+ZERO_POSE_S = 6.0
 MOVING_S = 30.0
 _RAMP_S = 1.0
 _MARGIN_RAD = math.radians(2.0)
@@ -32,11 +32,11 @@ class Limber:
 
     def __init__(self, skeleton: Skeleton, moving_s: float = MOVING_S) -> None:
         lower, upper = skeleton.lower_rad + _MARGIN_RAD, skeleton.upper_rad - _MARGIN_RAD
-        self.stance_from_s = PUT_ON_S
-        self.stance_until_s = PUT_ON_S + STANCE_S
-        self.period_s = self.stance_until_s + moving_s
+        self.zero_pose_from_s = PUT_ON_S
+        self.zero_pose_until_s = PUT_ON_S + ZERO_POSE_S
+        self.period_s = self.zero_pose_until_s + moving_s
         self._rest = np.clip(0.0, skeleton.lower_rad, skeleton.upper_rad)
-        self._bursts = ((0.0, PUT_ON_S), (self.stance_until_s, self.period_s))
+        self._bursts = ((0.0, PUT_ON_S), (self.zero_pose_until_s, self.period_s))
         # rhythms that are no simple multiples of each other, so that no two joints keep in step
         place = np.mod(_GOLDEN * np.arange(1, len(lower) + 1), 1.0)
         omega = 2.0 * math.pi * (_SLOWEST_HZ + (_FASTEST_HZ - _SLOWEST_HZ) * place)

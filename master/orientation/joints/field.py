@@ -30,7 +30,7 @@ class MagneticHeadings:
         self._usual_ut = np.full(2, np.nan)
         self._disturbance_ut2 = np.zeros(count)
         self.north_rad: Array = np.zeros(count)
-        """(N,) by how much north is west of where each magnetometer says, as far as a stance told."""
+        """(N,) by how much north is west of where each magnetometer says, as far as a zero pose told."""
 
     def direction(self, mag_world_ut: Array) -> Array:
         """Heading errors θ (N,), rad, that bring fields (N, 3) to where north is; NaN without one."""

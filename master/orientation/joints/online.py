@@ -50,8 +50,8 @@ class OnlineConfig(Section):
     """How that drift changes: a random walk, degrees/s after a second."""
     start_sd_deg: float = Field(default=10.0, gt=0.0, le=180.0, allow_inf_nan=False)
     """Of the heading with which a node begins, by its magnetometer or as it was when it was lost."""
-    stance_sd_deg: float = Field(default=2.0, gt=0.0, le=90.0, allow_inf_nan=False)
-    """Of the heading that a stance gives."""
+    zero_pose_sd_deg: float = Field(default=2.0, gt=0.0, le=90.0, allow_inf_nan=False)
+    """Of the heading that a zero pose gives."""
 
 
 class OnlineHeadings:
@@ -98,9 +98,9 @@ class OnlineHeadings:
         self._turn()
 
     def stand(self, nodes: Mask, correction_rad: Array, q_inertial_from_sensor: Array, mag_ut: Array) -> None:
-        """Take the headings that a stance gives some nodes: by `correction_rad` (N,) from those so far."""
+        """Take the headings that a zero pose gives some nodes: by `correction_rad` (N,) from those so far."""
         theta = self._headings.theta_rad + np.where(nodes, correction_rad, 0.0)
-        self._headings.set(nodes, theta, math.radians(self._config.stance_sd_deg) ** 2)
+        self._headings.set(nodes, theta, math.radians(self._config.zero_pose_sd_deg) ** 2)
         self._field.set_north(nodes, theta, rotate(q_inertial_from_sensor, mag_ut))
         self._turn()
 

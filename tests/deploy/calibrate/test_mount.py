@@ -15,7 +15,7 @@ from tests.master.calibrate.worn import wear
 
 
 @pytest.mark.parametrize("text", ["3", "1:2:3", "a:b", "-1:2", ":", "²:3", "5:2", "2:2", "1e3:2e3"])
-def test_a_stance_that_is_no_from_to_is_refused(text: str) -> None:
+def test_a_zero_pose_that_is_no_from_to_is_refused(text: str) -> None:
     with pytest.raises(typer.BadParameter, match="FROM:TO"):
         _times(text)
 

@@ -141,7 +141,7 @@ class Covered:
 
 
 def covered(worn: Worn, found: Mounting) -> list[Covered]:
-    """Every written node's whole error of rotation, as it sat in the stance."""
+    """Every written node's whole error of rotation, as it sat in the zero pose."""
     return [
         Covered(
             name,

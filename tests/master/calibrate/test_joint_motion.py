@@ -31,7 +31,7 @@ def judge(monkeypatch: pytest.MonkeyPatch, segment: str, moving: bool = True, **
         np.zeros((count, 3, 3)),
         np.eye(3),
     )
-    still = Moving(unit.r, np.zeros((count, 3)), unit.acc, unit.lever, unit.r_stance)
+    still = Moving(unit.r, np.zeros((count, 3)), unit.acc, unit.lever, unit.r_zero_pose)
     return joint_motion(ARMS, ARMS.segment_names.index(segment), still, unit, 0.05)
 
 

@@ -169,12 +169,12 @@ def test_without_any_motion_every_node_is_refused_with_what_to_do(upper_body: Wo
     assert "bend left_forearm against left_upper_arm ten times" in found.refused["left_forearm"]
 
 
-def test_without_a_stance_it_is_refused(upper_body: Worn) -> None:
+def test_without_a_zero_pose_it_is_refused(upper_body: Worn) -> None:
     with pytest.raises(PoorMotionError, match="nobody stood still"):
         find_mounting(still(upper_body, slice(500, 1500)), upper_body.skeleton)
 
 
-def test_a_stance_outside_the_recording_is_refused(upper_body: Worn) -> None:
+def test_a_zero_pose_outside_the_recording_is_refused(upper_body: Worn) -> None:
     with pytest.raises(PoorMotionError, match="not in the recording"):
         find_mounting(upper_body.nodes, upper_body.skeleton, (100.0, 104.0))
 

@@ -12,14 +12,14 @@ from master.calibrate.mounting_files import of_profile
 from master.calibrate.neighbours import Fits, check_order, fit_pairs
 from master.calibrate.oriented import moving, orient
 from master.calibrate.recording import NodeRecording, load_recordings
-from master.calibrate.standing import find_stance
+from master.calibrate.zero_pose import find_zero_pose
 from tests.master.calibrate.worn import wear
 
 
 def fits_of(nodes: dict[str, NodeRecording], skeleton: Skeleton) -> tuple[Fits, list[tuple[int, int]]]:
     names = [n for n in skeleton.segment_names if n in nodes]
     suit = orient(nodes, names)
-    units, _ = moving(suit, find_stance(suit.gyr_rad_s, suit.rate_hz))
+    units, _ = moving(suit, find_zero_pose(suit.gyr_rad_s, suit.rate_hz))
     links = [
         (names.index(s.parent), names.index(s.name))
         for s in skeleton.segments

@@ -316,8 +316,8 @@ def test_calibrations_are_read_from_the_files_that_the_nodes_name(tmp_path: Path
     assert np.allclose(turned, [0.0, np.pi], atol=0.01)
 
 
-def test_a_stance_zeroes_sensors_worn_askew_for_an_operator_who_faces_a_known_way() -> None:
-    config = EstimationConfig(settle_s=0.1, stance_s=0.5, stance_heading_deg=40.0)
+def test_a_zero_pose_zeroes_sensors_worn_askew_for_an_operator_who_faces_a_known_way() -> None:
+    config = EstimationConfig(settle_s=0.1, zero_pose_s=0.5, zero_pose_heading_deg=40.0)
     mounting, facing = attitudes(5, 3), np.radians(40.0)
     fuse = estimator(5, config)
     standing = multiply(heading_turn(np.full(5, facing)), conjugate(mounting))
@@ -394,8 +394,8 @@ def test_with_constraints_it_finds_the_same_headings_and_goes_on_from_a_snapshot
     assert np.array_equal(ends[0], ends[1])
 
 
-def test_with_constraints_a_stance_gives_nodes_without_magnetometer_their_headings() -> None:
-    config = EstimationConfig(settle_s=0.1, stance_s=0.2, stance_heading_deg=40.0, constraints="online")
+def test_with_constraints_a_zero_pose_gives_nodes_without_magnetometer_their_headings() -> None:
+    config = EstimationConfig(settle_s=0.1, zero_pose_s=0.2, zero_pose_heading_deg=40.0, constraints="online")
     mounting = attitudes(7, 5)
     calibration = replace(identity(7), q_sensor_from_segment=mounting)
     fuse = Estimator(config, [Node()] * 7, RATE_HZ, calibration, load_skeleton("lower_limb"))

@@ -142,7 +142,7 @@ def test_a_person_who_turns_is_not_undecided(name: str) -> None:
 def test_a_node_with_a_gross_bias_does_not_keep_the_others_from_their_zero_pose(
     deg_s: float, weight: Weight
 ) -> None:
-    config = EstimationConfig(settle_s=1.0, stance_s=1.5)
+    config = EstimationConfig(settle_s=1.0, zero_pose_s=1.5)
     estimator = Estimator(config, [Node()] * 3, RATE_HZ, identity(3))
     noise, bias = np.random.default_rng(2), np.zeros((3, 3))
     bias[1, 0] = np.radians(deg_s)

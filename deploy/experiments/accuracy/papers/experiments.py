@@ -19,7 +19,7 @@ EXPERIMENTS = (
     ),
     Experiment(
         "A-suit",
-        "the same, with the joints' constraints and a stance of 2 s",
+        "the same, with the joints' constraints and a zero pose of 2 s",
         telerobot.as_a_suit,
         ("How the units sit is known, as `tandem calibrate mount` finds it. constraints = online.",),
     ),

@@ -30,7 +30,7 @@ STILL_TARGET_DEG, STILL_PAPER_DEG = 0.5, 1.0
 RMSE_TARGET_DEG, RMSE_PAPER_DEG = 1.0, 1.5
 SPREAD_TARGET_PERCENT = 0.7
 MOST_TARGET_DEG, MOST_PAPER_DEG = 2.0, 3.0
-STANCE_S = 3.0
+ZERO_POSE_S = 3.0
 """The fixture lies in its zero position this long at first: as a glove does, it takes its zero there."""
 SETTLED_S = 4.5
 """By then the filters have settled and the zero is taken."""
@@ -76,7 +76,7 @@ def hinged_pair() -> Skeleton:
 def orient(take: Take, filter_name: str, calibration: Calibration | None = None) -> tuple[Array, Array]:
     """Orientations (T, N, 4) and rates (T, N, 3) that the master's estimator finds, tick by tick."""
     count = take.samples.shape[2]
-    config = EstimationConfig.model_validate({"filter": filter_name, "stance_s": STANCE_S})
+    config = EstimationConfig.model_validate({"filter": filter_name, "zero_pose_s": ZERO_POSE_S})
     estimator = Estimator(config, [_Node()] * count, take.rate_hz, calibration or identity(count))
     q, rate = np.empty((len(take.samples), count, 4)), np.empty((len(take.samples), count, 3))
     for k, tick in enumerate(ticks(take)):

@@ -33,7 +33,7 @@ def experiment(seed: int, grade: GradeName = "calibrated") -> list[Figure]:
     """Both knees of one walk, every sensor 40° askew about an axis of its own; no magnetometer is read."""
     q_segment_from_sensor = askew(seed)
     take = walk(seed, grade, q_segment_from_sensor)
-    found = find_mounting(recordings(take), LEGS, stance_s=(0.3, STILL_S - 0.3))
+    found = find_mounting(recordings(take), LEGS, zero_pose_s=(0.3, STILL_S - 0.3))
     missing = [name for name in WORN if name not in found.nodes]
     axes = axis_errors_deg(take, q_segment_from_sensor)
     figures = [Figure("hinge axes in both sensors' frames", "°", axes, None, AXIS_TARGET_DEG)]

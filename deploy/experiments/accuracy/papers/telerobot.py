@@ -24,7 +24,7 @@ from master.calibrate.node_file import write_calibration
 ETA_TARGET_PERCENT = 1.0
 ARMS = ("chest", "left_upper_arm", "left_forearm", "right_upper_arm", "right_forearm")
 """The segments that Table 1's angles lie between."""
-STANCE_S = 2.0
+ZERO_POSE_S = 2.0
 """Of the motion's first 3.5 s, in which the operator stands in the zero pose."""
 SECONDS = 32.5
 """Two periods of the motion, take and deliver a bottle."""
@@ -40,7 +40,7 @@ def whole_way(
 
 
 def as_a_suit(seed: int, seconds: float = SECONDS) -> list[Figure]:
-    """The same with what only a suit knows: how its units sit, a stance first, what elbows cannot do.
+    """The same with what only a suit knows: how its units sit, a zero pose first, what elbows cannot do.
 
     The mounting is as `tandem calibrate mount` leaves it, here of units that sit straight.
     """
@@ -48,7 +48,7 @@ def as_a_suit(seed: int, seconds: float = SECONDS) -> list[Figure]:
         file = Path(folder) / "straight.toml"
         made = Made(date=date.today(), recording="none: straight by construction", unit="rad")
         write_calibration(file, {"mounting": (IDENTITY, made)})
-        master = [f"estimation.stance_s={STANCE_S}", 'estimation.constraints="online"']
+        master = [f"estimation.zero_pose_s={ZERO_POSE_S}", 'estimation.constraints="online"']
         master += [f"nodes.{name}.calibration={json.dumps(str(file))}" for name in ARMS]
         return whole_way(seed, seconds, (), master)
 
@@ -60,7 +60,7 @@ def own_calibration(seed: int, seconds: float = SECONDS, session: TrayConfig = S
     units = Imperfections("raw", len(names), seed)
     affine = calibrate(units, len(names), chosen, seed, session).calibration.affine
     with tempfile.TemporaryDirectory() as folder:
-        master = [f"estimation.stance_s={STANCE_S}"]
+        master = [f"estimation.zero_pose_s={ZERO_POSE_S}"]
         for name, unit in zip(ARMS, chosen, strict=True):
             path = Path(folder) / f"{name}.toml"
             parts = zip(("accelerometer", "gyroscope", "magnetometer"), affine[:, unit].tolist(), strict=True)

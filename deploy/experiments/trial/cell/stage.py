@@ -67,7 +67,7 @@ def _overrides(plan: Plan, key: CellKey, age_s: float, opening: str) -> dict[str
     return {
         "suit": [f"seed={plan.seed_of(key)}", f'motion="{plan.motion}"'],
         # the simulated operator begins in the zero pose: zeroed there, as the paper's reference was
-        "master": ["estimation.stance_s=1.0", opening],
+        "master": ["estimation.zero_pose_s=1.0", opening],
         "slave": [f'track.strategy="{key.setup.strategy}"', f"guard.max_age_s={age_s}", opening],
     }
 

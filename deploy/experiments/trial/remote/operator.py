@@ -228,7 +228,7 @@ async def _operators_rig(plan: Plan, key: CellKey, robot: str, tls: TlsConfig | 
     )
     overrides = {
         "suit": [f"seed={plan.seed_of(key)}", f'motion="{plan.motion}"'],
-        "master": ["estimation.stance_s=1.0", *_keys(tls if key.setup.transport in SECURE else None)],
+        "master": ["estimation.zero_pose_s=1.0", *_keys(tls if key.setup.transport in SECURE else None)],
     }
     async with AsyncExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-")))

@@ -19,7 +19,7 @@ from master.suit.nodes import NodeConfig
 RATE_HZ = 50.0
 HAND = load_skeleton("hand")
 TRAY = TrayConfig(attitudes=22, still_s=2.0, tumble_s=25.0)
-OPTIONS = GuideOptions(still_s=1.0, attitudes=20, tumble_s=5.0, stance_s=3.0, limber_s=6.0)
+OPTIONS = GuideOptions(still_s=1.0, attitudes=20, tumble_s=5.0, zero_pose_s=3.0, limber_s=6.0)
 
 
 def suit(motion: str, **changes: object) -> SuitConfig:
@@ -60,12 +60,14 @@ def led(readings: Array, options: GuideOptions = OPTIONS, guide: Guide | None = 
 
 def test_it_leads_through_all_steps_in_order_to_the_end(readings: Array) -> None:
     run = led(readings)
-    assert list(run.began_s) == ["attitudes", "tumble", "wear", "stance", "limber", "done"]
+    assert list(run.began_s) == ["attitudes", "tumble", "wear", "zero_pose", "limber", "done"]
     assert run.guide.view().nodes == []
-    begin, end = run.guide.stance_s
-    stance = readings[:, :, 3:6][round((run.began_s["stance"] + begin) * RATE_HZ) :][: int(3.0 * RATE_HZ)]
-    assert end - begin == pytest.approx(OPTIONS.stance_s, abs=0.3)
-    assert stance.std(axis=0).max() < 0.01
+    begin, end = run.guide.zero_pose_s
+    zero_pose = readings[:, :, 3:6][round((run.began_s["zero_pose"] + begin) * RATE_HZ) :][
+        : int(3.0 * RATE_HZ)
+    ]
+    assert end - begin == pytest.approx(OPTIONS.zero_pose_s, abs=0.3)
+    assert zero_pose.std(axis=0).max() < 0.01
 
 
 @pytest.mark.parametrize(
@@ -135,11 +137,11 @@ def test_the_units_in_the_tray_do_not_count_as_worn(readings: Array) -> None:
     assert list(led(tray, options).began_s) == ["wear"]
 
 
-def test_the_stance_waits_for_the_word_where_a_person_can_give_it(readings: Array) -> None:
+def test_the_zero_pose_waits_for_the_word_where_a_person_can_give_it(readings: Array) -> None:
     options = GuideOptions(("mount",), by_word=True)
     worn_from = round(led(readings).began_s["wear"] * RATE_HZ)
     run = led(readings[worn_from:], options)
-    assert run.guide.step == "stance"
+    assert run.guide.step == "zero_pose"
     run.guide.word()
     led(readings[worn_from:], options, run.guide)
     assert run.guide.step in ("limber", "done")

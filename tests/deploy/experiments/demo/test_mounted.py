@@ -19,7 +19,7 @@ LEGS = load_skeleton("lower_limb")
 
 def knees_deg(recording: Path, overrides: list[str]) -> Array:
     """What the master commands of both knees over the first steps and sitting down, (T, 2)."""
-    master = ["estimation.stance_s=1.0", *overrides]
+    master = ["estimation.zero_pose_s=1.0", *overrides]
     run = VirtualRun(
         World(
             slave_ahead_ns=0,
@@ -46,11 +46,11 @@ def test_knees_bend_forwards_once_the_sensors_are_mounted(tmp_path: Path) -> Non
     knees = knees_deg(recording, mounted.overrides)
     assert knees.min() > -10.0
     assert (knees.max(axis=0) > 90.0).all()
-    # by the stance alone they would bend the wrong way, where the robot's stay at their end
+    # by the zero pose alone they would bend the wrong way, where the robot's stay at their end
     assert (knees_deg(recording, []).max(axis=0) < 10.0).all()
 
 
-def test_a_recording_without_a_stance_leaves_all_to_it(tmp_path: Path) -> None:
+def test_a_recording_without_a_zero_pose_leaves_all_to_it(tmp_path: Path) -> None:
     random = np.random.default_rng(3)
     arrays: dict[str, Any] = {"t_s": 0.01 * np.arange(600)}
     for name in LEGS.segment_names:

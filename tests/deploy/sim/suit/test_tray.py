@@ -74,6 +74,6 @@ def test_limber_moves_every_joint_within_its_limits_and_consistently(profile: st
     assert np.abs(np.gradient(position, 1e-3, axis=0) - velocity)[1:-1].max() < 1e-3
     # the jerk of a quintic is not continuous
     assert np.abs(np.gradient(velocity, 1e-3, axis=0) - acceleration)[1:-1].max() < 0.1
-    stance = (t > limber.stance_from_s) & (t < limber.stance_until_s)
-    assert (velocity[stance] == 0.0).all()
-    assert (position[stance] == np.clip(0.0, skeleton.lower_rad, skeleton.upper_rad)).all()
+    zero_pose = (t > limber.zero_pose_from_s) & (t < limber.zero_pose_until_s)
+    assert (velocity[zero_pose] == 0.0).all()
+    assert (position[zero_pose] == np.clip(0.0, skeleton.lower_rad, skeleton.upper_rad)).all()

@@ -59,7 +59,7 @@ def test_a_node_without_a_magnetometer_says_nothing() -> None:
     assert np.isinf(disturbed).all()
 
 
-def test_north_is_where_most_magnetometers_say_once_a_stance_tells_the_headings() -> None:
+def test_north_is_where_most_magnetometers_say_once_a_zero_pose_tells_the_headings() -> None:
     field = MagneticHeadings(5, 30.0)
     known, nodes = np.full(5, 3.0), np.ones(5, dtype=np.bool_)
     field.set_north(nodes, known, fields(0.8))

@@ -21,7 +21,7 @@ TURNED = {"local": [{"nodes": LIMBS, "from_s": 5.0, "ramp_s": 1.0, "turn_deg": 4
 CREEPING = {"local": [{"nodes": LIMBS, "from_s": 4.0, "ramp_s": 12.0, "turn_deg": 40.0}]}
 """Neither by these nor by a sudden change: only other nodes give them away."""
 RAIL = {"dipole": [{"position_m": [0.6, 0.0, 0.7], "moment_a_m2": [0.0, 20.0, 0.0]}]}
-"""There from the beginning; a stance tells the headings with which to begin."""
+"""There from the beginning; a zero pose tells the headings with which to begin."""
 
 BENT = from_axis_angle([0.0, -1.0, 0.0], np.radians(80.0))
 """A forearm before the upper arm that hangs: its floating axis stands upright."""
@@ -57,7 +57,7 @@ def test_a_bed_s_rail_that_was_always_there(wear: Any, arms: Skeleton) -> None:
     sway = Sway(arms)
     # one degree askew, so that the mounting counts as known
     mounting = np.tile(from_axis_angle([0.0, 0.0, 1.0], np.radians(1.0)), (5, 1))
-    keys = {"stance_s": 1.0, "q_sensor_from_segment": mounting}
+    keys = {"zero_pose_s": 1.0, "q_sensor_from_segment": mounting}
     quiet, online, off = (
         wear(arms, sway, 25.0, disturbance=room, constraints=constraints, **keys)
         for room, constraints in (({}, "online"), (RAIL, "online"), (RAIL, "off"))
@@ -67,7 +67,7 @@ def test_a_bed_s_rail_that_was_always_there(wear: Any, arms: Skeleton) -> None:
 
 
 def test_arms_without_magnetometers_worn_askew(wear: Any, arms: Skeleton) -> None:
-    """A stance gives the headings; the joints keep them while the gyros' biases drift."""
+    """A zero pose gives the headings; the joints keep them while the gyros' biases drift."""
     askew = Rotation.random(5, rng=3).as_quat(scalar_first=True)
     phase = np.arange(15.0).reshape(5, 3)
 
@@ -83,7 +83,7 @@ def test_arms_without_magnetometers_worn_askew(wear: Any, arms: Skeleton) -> Non
             magnetometers=False,
             q_sensor_from_segment=askew,
             bias_rad_s=bias,
-            stance_s=1.0,
+            zero_pose_s=1.0,
             constraints=constraints,
         )
         for constraints in ("online", "off")
@@ -126,7 +126,7 @@ def test_a_node_that_is_not_usable_neither_corrects_nor_is_corrected(
 
 
 def test_an_error_that_no_heading_explains_counts_hardly_more_than_a_small_one(arms: Skeleton) -> None:
-    """Of headings known to 2° from a stance, one cannot be 60° off: then the mounting is wrong."""
+    """Of headings known to 2° from a zero pose, one cannot be 60° off: then the mounting is wrong."""
     found_rad = []
     for off_deg in (6.0, 60.0):
         online = OnlineHeadings(OnlineConfig(), arms, 200.0)

@@ -23,7 +23,7 @@ from master.orientation.estimator import Estimator
 pytestmark = pytest.mark.recordings
 
 CONFIG = EstimationConfig.model_validate(
-    {"constraints": "online", "stance_s": 1.0}
+    {"constraints": "online", "zero_pose_s": 1.0}
     | {f"{sensor}_cutoff_hz": 0.0 for sensor in ("accelerometer", "gyroscope", "magnetometer")}
 )
 

@@ -15,8 +15,8 @@ _EDGE_S = 0.2
 _LONGEST_S = 10.0
 
 
-def find_stance(gyr_rad_s: Array, rate_hz: float) -> slice:
-    """The samples of the first stretch in which all units (N, T, 3) rest: people begin with the stance.
+def find_zero_pose(gyr_rad_s: Array, rate_hz: float) -> slice:
+    """The samples of the first stretch in which all units (N, T, 3) rest: people begin with the zero pose.
 
     Raises PoorMotionError where there is none.
     """
@@ -32,16 +32,16 @@ def find_stance(gyr_rad_s: Array, rate_hz: float) -> slice:
             return slice(begin + edge, min(end - edge, begin + edge + round(_LONGEST_S * rate_hz)))
     raise PoorMotionError(
         "nobody stood still: begin with three seconds in the zero pose (arms hanging, palms to the thighs), "
-        "or name the stance with --stance FROM:TO"
+        "or name the zero pose with --zero-pose FROM:TO"
     )
 
 
-def given_stance(from_s: float, to_s: float, samples: int, rate_hz: float) -> slice:
+def given_zero_pose(from_s: float, to_s: float, samples: int, rate_hz: float) -> slice:
     """The samples between two times. Raises PoorMotionError where they are not in the recording."""
     begin, end = round(from_s * rate_hz), round(to_s * rate_hz)
     if not 0 <= begin < end <= samples or end - begin < 0.2 * rate_hz:
         raise PoorMotionError(
-            f"a stance from {from_s:g} to {to_s:g} s is not in the recording of {samples / rate_hz:.1f} s; "
+            f"zero pose from {from_s:g} to {to_s:g} s: not in the recording of {samples / rate_hz:.1f} s; "
             "expected FROM:TO in seconds, 0.2 s or longer"
         )
     return slice(begin, end)

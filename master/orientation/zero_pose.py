@@ -28,7 +28,7 @@ _STRAY_RAD = math.radians(6.0)
 
 
 @dataclass(frozen=True, slots=True)
-class StanceLimits:
+class ZeroPoseLimits:
     """What is still the zero pose."""
 
     turn_rad_s: float = math.radians(15.0)
@@ -37,7 +37,7 @@ class StanceLimits:
     """Inclination of any segment whose mounting is known."""
 
 
-class Stance:
+class ZeroPose:
     """Takes the nodes' mean orientations over `ticks` ticks without fault as those of the zero pose."""
 
     def __init__(
@@ -47,9 +47,9 @@ class Stance:
         facing_rad: float,
         mounted: Mask | None = None,
         *,
-        limits: StanceLimits | None = None,
+        limits: ZeroPoseLimits | None = None,
     ) -> None:
-        """`q_sensor_from_segment` (N, 4) stands until the stance is complete, for good if `ticks` is 0.
+        """`q_sensor_from_segment` (N, 4) stands until the zero pose is complete, for good if `ticks` is 0.
 
         For good also that of the nodes `mounted` (N,), by default none.
         """
@@ -57,12 +57,12 @@ class Stance:
         self._ticks = ticks
         self._facing = heading_turn(facing_rad)
         self._mounted = np.zeros(count, dtype=np.bool_) if mounted is None else mounted
-        self._limits = limits or StanceLimits()
+        self._limits = limits or ZeroPoseLimits()
         self._sum = np.zeros((count, 4))
         self._first = np.zeros((count, 4))
         self._taken = np.zeros(count, dtype=np.int64)
         self.known: Mask = np.full(count, ticks == 0)
-        """(N,) nodes whose stance is complete."""
+        """(N,) nodes whose zero pose is complete."""
         self.refused = 0
         """How often a pose was not the zero pose."""
         self.reasons: dict[int, str] = {}
@@ -70,7 +70,7 @@ class Stance:
         self.q_sensor_from_segment = q_sensor_from_segment.copy()
         """(N, 4)."""
         self.correction_rad = np.zeros(count)
-        """(N,) what the headings of mounted nodes lacked when their stance was complete; 0 for others."""
+        """(N,) what the headings of mounted nodes lacked when their zero pose was complete; 0 for others."""
         self.lean_rad = np.full(count, np.nan)
         """(N,) how far mounted nodes leaned from the zero pose in the last pose; NaN for others."""
 
@@ -183,7 +183,7 @@ class Stance:
     def restore(self, snapshot: object) -> None:
         """Go on from a snapshot."""
         if not isinstance(snapshot, dict) or snapshot.keys() != set(_STATE):
-            raise TypeError("not a snapshot of this stance")
+            raise TypeError("not a snapshot of this zero pose")
         for name, part in copy.deepcopy(snapshot).items():
             setattr(self, name, part)
 

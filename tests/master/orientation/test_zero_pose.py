@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, heading_turn, multiply
 from master.orientation.heading import HeadingMemory
-from master.orientation.stance import Stance
+from master.orientation.zero_pose import ZeroPose
 from master.suit.doubt import Weight
 
 SAME = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
@@ -14,69 +14,69 @@ MOUNTED = Rotation.random(3, rng=0).as_quat(scalar_first=True)
 
 
 def test_off_it_leaves_the_mounting_as_calibrated() -> None:
-    stance = Stance(MOUNTED, 0, 0.0)
-    assert stance.known.all()
-    stance.add(SAME, ALL)
-    assert np.array_equal(stance.q_sensor_from_segment, MOUNTED)
+    zero_pose = ZeroPose(MOUNTED, 0, 0.0)
+    assert zero_pose.known.all()
+    zero_pose.add(SAME, ALL)
+    assert np.array_equal(zero_pose.q_sensor_from_segment, MOUNTED)
 
 
-def test_the_mean_over_the_stance_becomes_the_zero_pose() -> None:
+def test_the_mean_over_the_time_becomes_the_zero_pose() -> None:
     rng = np.random.default_rng(1)
-    stance = Stance(SAME, 400, 0.0)
+    zero_pose = ZeroPose(SAME, 400, 0.0)
     for tick in range(400):
-        assert not stance.known.any()
-        assert np.array_equal(stance.q_sensor_from_segment, SAME)
+        assert not zero_pose.known.any()
+        assert np.array_equal(zero_pose.q_sensor_from_segment, SAME)
         sway = multiply(MOUNTED, from_rotation_vector(0.01 * rng.normal(size=(3, 3))))
         # the sign of a quaternion means nothing
-        stance.add(sway if tick % 2 else -sway, ALL)
-    assert stance.known.all()
-    zero = multiply(MOUNTED, stance.q_sensor_from_segment)
+        zero_pose.add(sway if tick % 2 else -sway, ALL)
+    assert zero_pose.known.all()
+    zero = multiply(MOUNTED, zero_pose.q_sensor_from_segment)
     assert np.max(angle_between(zero, SAME)) < 0.003
 
 
 def test_the_operator_s_facing_is_kept() -> None:
-    stance = Stance(SAME, 1, 0.7)
-    stance.add(MOUNTED, ALL)
-    zero = multiply(MOUNTED, stance.q_sensor_from_segment)
+    zero_pose = ZeroPose(SAME, 1, 0.7)
+    zero_pose.add(MOUNTED, ALL)
+    zero = multiply(MOUNTED, zero_pose.q_sensor_from_segment)
     assert np.max(angle_between(zero, heading_turn(0.7))) < 1e-7
 
 
 def test_only_settled_nodes_count_and_one_that_drops_out_begins_again() -> None:
-    stance = Stance(SAME, 4, 0.0)
+    zero_pose = ZeroPose(SAME, 4, 0.0)
     first, alone = np.array([True, True, False]), np.array([True, False, False])
     wrong = np.concatenate([MOUNTED[:1], heading_turn(np.ones(2))])
     for _ in range(3):
-        stance.add(wrong, first)
-    stance.add(wrong, alone)
-    assert stance.known.tolist() == [True, False, False]
+        zero_pose.add(wrong, first)
+    zero_pose.add(wrong, alone)
+    assert zero_pose.known.tolist() == [True, False, False]
     for _ in range(4):
-        assert not stance.known[1:].any()
-        stance.add(MOUNTED, ALL)
-    assert stance.known.all()
-    zero = multiply(MOUNTED, stance.q_sensor_from_segment)
+        assert not zero_pose.known[1:].any()
+        zero_pose.add(MOUNTED, ALL)
+    assert zero_pose.known.all()
+    zero = multiply(MOUNTED, zero_pose.q_sensor_from_segment)
     assert np.max(angle_between(zero, SAME)) < 1e-7
 
 
 def test_once_known_it_stays_even_while_the_node_is_lost() -> None:
-    stance = Stance(SAME, 1, 0.0)
-    stance.add(MOUNTED, np.array([True, False, False]))
-    kept = stance.q_sensor_from_segment[0].copy()
-    stance.add(SAME, np.array([False, False, False]))
-    stance.add(SAME, ALL)
-    assert np.array_equal(stance.q_sensor_from_segment[0], kept)
+    zero_pose = ZeroPose(SAME, 1, 0.0)
+    zero_pose.add(MOUNTED, np.array([True, False, False]))
+    kept = zero_pose.q_sensor_from_segment[0].copy()
+    zero_pose.add(SAME, np.array([False, False, False]))
+    zero_pose.add(SAME, ALL)
+    assert np.array_equal(zero_pose.q_sensor_from_segment[0], kept)
 
 
-def test_stance_goes_on_from_a_snapshot() -> None:
-    stance = Stance(SAME, 2, 0.0)
-    stance.add(MOUNTED, ALL)
-    snapshot = stance.snapshot()
-    stance.add(MOUNTED, ALL)
-    stance.restore(snapshot)
-    assert not stance.known.any()
-    stance.add(MOUNTED, ALL)
-    assert stance.known.all()
+def test_zero_pose_goes_on_from_a_snapshot() -> None:
+    zero_pose = ZeroPose(SAME, 2, 0.0)
+    zero_pose.add(MOUNTED, ALL)
+    snapshot = zero_pose.snapshot()
+    zero_pose.add(MOUNTED, ALL)
+    zero_pose.restore(snapshot)
+    assert not zero_pose.known.any()
+    zero_pose.add(MOUNTED, ALL)
+    assert zero_pose.known.all()
     with pytest.raises(TypeError, match="not a snapshot"):
-        stance.restore(None)
+        zero_pose.restore(None)
 
 
 def test_a_lost_heading_is_taken_up_again() -> None:
@@ -108,17 +108,17 @@ def test_heading_memory_goes_on_from_a_snapshot() -> None:
 
 def test_of_mounted_nodes_it_takes_the_heading_and_says_how_far_they_lean() -> None:
     mounted = np.array([True, True, False])
-    stance = Stance(MOUNTED, 2, 0.7, mounted)
+    zero_pose = ZeroPose(MOUNTED, 2, 0.7, mounted)
     # the heading is arbitrary; the second node's segment leans by 3° besides
     lean = from_rotation_vector(np.array([[0.0, 0.0, 0.0], [np.radians(3.0), 0.0, 0.0], [0.0, 0.0, 0.0]]))
     standing = multiply(multiply(heading_turn(np.array([1.0, -2.0, 0.3])), lean), conjugate(MOUNTED))
-    assert not stance.add(standing, ALL).any()
-    assert stance.add(standing, ALL).all()
-    assert np.array_equal(stance.q_sensor_from_segment[mounted], MOUNTED[mounted])
-    assert np.allclose(stance.correction_rad, [-0.3, 2.7, 0.0], atol=0.01)
-    assert np.allclose(np.degrees(stance.lean_rad[mounted]), [0.0, 3.0], atol=0.01)
-    assert np.isnan(stance.lean_rad[2])
-    zero = multiply(standing[2:], stance.q_sensor_from_segment[2:])
+    assert not zero_pose.add(standing, ALL).any()
+    assert zero_pose.add(standing, ALL).all()
+    assert np.array_equal(zero_pose.q_sensor_from_segment[mounted], MOUNTED[mounted])
+    assert np.allclose(zero_pose.correction_rad, [-0.3, 2.7, 0.0], atol=0.01)
+    assert np.allclose(np.degrees(zero_pose.lean_rad[mounted]), [0.0, 3.0], atol=0.01)
+    assert np.isnan(zero_pose.lean_rad[2])
+    zero = multiply(standing[2:], zero_pose.q_sensor_from_segment[2:])
     assert np.max(angle_between(zero, heading_turn(0.7))) < 1e-7
 
 
@@ -134,78 +134,78 @@ def leaning(deg: float, node: int = 1) -> Array:
 
 @pytest.mark.parametrize(("deg", "taken"), [(14.9, True), (15.1, False), (25.0, False), (90.0, False)])
 def test_a_lean_of_a_mounted_segment_is_refused_for_all(deg: float, taken: bool) -> None:
-    stance = Stance(MOUNTED, 4, 0.0, ALL)
+    zero_pose = ZeroPose(MOUNTED, 4, 0.0, ALL)
     for _ in range(4):
-        stance.add(leaning(deg), ALL, STILL)
-    assert stance.known.all() == taken
-    assert stance.known.any() == taken
-    doubts = stance.doubts(ALL)
+        zero_pose.add(leaning(deg), ALL, STILL)
+    assert zero_pose.known.all() == taken
+    assert zero_pose.known.any() == taken
+    doubts = zero_pose.doubts(ALL)
     if taken:
         assert doubts == {}
         return
-    assert stance.refused == 1
+    assert zero_pose.refused == 1
     assert list(doubts) == [1, 0, 2]
     assert doubts[1].words == f"zero pose refused: leaned by {deg:.0f}°, at most 15 is upright"
     assert doubts[0].words == "waits for the zero pose: stand upright, arms hanging, and still"
     assert {doubt.weight for doubt in doubts.values()} == {Weight.REFUSED}
     for _ in range(4):
-        stance.add(leaning(2.0), ALL, STILL)
-    assert stance.known.all()
-    assert stance.doubts(ALL) == {}
+        zero_pose.add(leaning(2.0), ALL, STILL)
+    assert zero_pose.known.all()
+    assert zero_pose.doubts(ALL) == {}
 
 
 @pytest.mark.parametrize(("deg_s", "taken"), [(14.9, True), (15.1, False), (60.0, False)])
 def test_who_turns_during_the_pose_is_asked_again(deg_s: float, taken: bool) -> None:
-    stance, turning = Stance(SAME, 4, 0.0), STILL.copy()
+    zero_pose, turning = ZeroPose(SAME, 4, 0.0), STILL.copy()
     turning[2, 0] = np.radians(deg_s)
     for tick in range(4):
-        stance.add(MOUNTED, ALL, turning if tick == 2 else STILL)
-    assert stance.known.all() == taken
+        zero_pose.add(MOUNTED, ALL, turning if tick == 2 else STILL)
+    assert zero_pose.known.all() == taken
     if not taken:
-        assert stance.reasons == {2: f"turned at {deg_s:.0f}°/s, at most 15 is standing still"}
+        assert zero_pose.reasons == {2: f"turned at {deg_s:.0f}°/s, at most 15 is standing still"}
         # from the beginning, not from where it was
         for _ in range(2):
-            assert not stance.add(MOUNTED, ALL, STILL).any()
-            assert not stance.known.any()
-        stance.add(MOUNTED, ALL, STILL)
-    assert stance.known.all()
+            assert not zero_pose.add(MOUNTED, ALL, STILL).any()
+            assert not zero_pose.known.any()
+        zero_pose.add(MOUNTED, ALL, STILL)
+    assert zero_pose.known.all()
 
 
 def test_who_bends_slowly_is_asked_again_too() -> None:
-    stance = Stance(SAME, 400, 0.0)
+    zero_pose = ZeroPose(SAME, 400, 0.0)
     for tick in range(400):
         bend = np.zeros((3, 3))
         bend[0, 1] = np.radians(8.0) * tick / 400
-        stance.add(multiply(MOUNTED, from_rotation_vector(bend)), ALL, STILL)
-    assert not stance.known.any()
-    assert "turned by 6°" in stance.reasons[0]
+        zero_pose.add(multiply(MOUNTED, from_rotation_vector(bend)), ALL, STILL)
+    assert not zero_pose.known.any()
+    assert "turned by 6°" in zero_pose.reasons[0]
 
 
 def test_of_an_unknown_mounting_a_lean_cannot_be_noticed() -> None:
-    stance = Stance(SAME, 4, 0.0)
+    zero_pose = ZeroPose(SAME, 4, 0.0)
     for _ in range(4):
-        stance.add(leaning(25.0), ALL, STILL)
-    assert stance.known.all()
+        zero_pose.add(leaning(25.0), ALL, STILL)
+    assert zero_pose.known.all()
 
 
 def test_a_node_that_comes_later_needs_the_whole_pose_again() -> None:
-    stance, first = Stance(MOUNTED, 4, 0.0, ALL), np.array([True, True, False])
+    zero_pose, first = ZeroPose(MOUNTED, 4, 0.0, ALL), np.array([True, True, False])
     for _ in range(4):
-        stance.add(leaning(0.0), first, STILL)
-    assert stance.known.tolist() == [True, True, False]
+        zero_pose.add(leaning(0.0), first, STILL)
+    assert zero_pose.known.tolist() == [True, True, False]
     for _ in range(8):
-        stance.add(leaning(40.0), ALL, STILL)
-    assert not stance.known[2]
-    assert "is 40° from the zero pose" in stance.doubts(ALL)[1].words
+        zero_pose.add(leaning(40.0), ALL, STILL)
+    assert not zero_pose.known[2]
+    assert "is 40° from the zero pose" in zero_pose.doubts(ALL)[1].words
     for _ in range(4):
-        stance.add(leaning(0.0), ALL, STILL)
-    assert stance.known.all()
+        zero_pose.add(leaning(0.0), ALL, STILL)
+    assert zero_pose.known.all()
 
 
 def test_who_begins_later_does_not_delay_the_others_but_refuses_for_them_if_it_leans() -> None:
     first = np.array([True, True, False])
     for deg, known in ((0.0, [True, True, False]), (20.0, [False, False, False])):
-        stance = Stance(MOUNTED, 4, 0.0, ALL)
+        zero_pose = ZeroPose(MOUNTED, 4, 0.0, ALL)
         for tick in range(4):
-            stance.add(leaning(deg, node=2), first if tick < 2 else ALL, STILL)
-        assert stance.known.tolist() == known
+            zero_pose.add(leaning(deg, node=2), first if tick < 2 else ALL, STILL)
+        assert zero_pose.known.tolist() == known
