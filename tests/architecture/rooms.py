@@ -30,14 +30,11 @@ ORDER: Sequence[Sequence[str]] = [
 """Rooms from the top down. A file imports its own room and the rooms below; `common` is its top files alone.
 Rooms on one line do not import each other, but for those of the slave, where only circles are wrong."""
 
-KNOWN_WRONG = {
-    ("deploy/harness/link_settings.py", "deploy.experiments.trial.plan"),
-}
+KNOWN_WRONG: set[tuple[str, str]] = set()
 """Imports against the order that still stand. Delete an entry with its import; the end is an empty set."""
 KNOWN_CIRCLES: Sequence[set[str]] = [
     {"deploy.experiments.soak.run", "deploy.experiments.soak.view"},
     {"deploy.experiments.demo.report", "deploy.experiments.demo.run", "deploy.experiments.demo.view"},
-    {"deploy/experiments/trial", "deploy/experiments/trial/remote", "deploy/harness"},
 ]
 """Circles of files and of folders that still stand, or a part of each. The end is an empty list."""
 
