@@ -14,7 +14,6 @@ from rich.text import Text
 from deploy.measure.accuracy import SIDES, Accuracy, JointAccuracy
 from deploy.measure.motion import Motion
 from deploy.measure.paper import ETA_PERCENT, TABLE_1
-from deploy.measure.targets import Verdict
 
 Stage = Mapping[str, Any]
 """A `Summary` as plain values: `count`, and `mean`, `p50`, `p99`, `max` in ms, None where count is 0."""
@@ -155,25 +154,6 @@ def synergy_table(judged: Mapping[str, Mapping[str, float] | None]) -> Renderabl
     for name, row in judged.items():
         figures = [None if row is None else row[key] for key in ("mae_deg", "rmse_deg", "max_deg")]
         table.add_row(name, *(_number(figure, 3) for figure in figures))
-    return table
-
-
-def verdict_table(title: str, verdicts: Iterable[Verdict]) -> RenderableType:
-    """Each figure beside its target, and whether it was met."""
-    table = _table(title, "figure", "measured", "at most", "")
-    for verdict in verdicts:
-        target = verdict.target
-        said = {
-            True: Text("met", "green"),
-            False: Text("missed", "bold red"),
-            None: Text("not judged", "yellow"),
-        }
-        table.add_row(
-            target.name,
-            UNKNOWN if verdict.value is None else f"{verdict.value:.4g} {target.unit}".rstrip(),
-            f"{target.limit:g} {target.unit}".rstrip(),
-            said[verdict.met],
-        )
     return table
 
 

@@ -1,91 +1,123 @@
-"""One criterion, judged: what it asks, what was measured, whether that will do, or why nobody can tell."""
+"""The one verdict of tandem: what was asked, what was measured, the limit, and the outcome."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
-from typing import Any
 
-from deploy.measure.estimated import LEAST_ESTIMATED
-from deploy.measure.trend import Slope
+from rich.console import Group, RenderableType
+from rich.text import Text
 
-LEAST_SHARE = 0.2
-"""Where less than this is left unexplained, that nothing went wrong in it says little."""
+from deploy.measure.tables import UNKNOWN, plain_table
 
 
-class Status(StrEnum):
-    """What came of a criterion."""
+class Outcome(StrEnum):
+    """Whether the requirement is kept. What was not measured is never called passed."""
 
-    PASS = "pass"
-    FAIL = "fail"
+    PASSED = "passed"
+    FAILED = "failed"
     NOT_JUDGED = "not judged"
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """`figure` beside `limit`, in `unit`; both None where nothing could be measured."""
+    """One requirement, judged."""
 
-    group: str
     name: str
-    status: Status
-    figure: float | None
-    limit: float | None
+    """What is asked, such as `motion lag`."""
+    outcome: Outcome
+    measured: float | None = None
+    """None where nothing could be measured; infinite where what should have come never came."""
+    limit: float | None = None
+    """The most it may be."""
     unit: str = ""
-    note: str = ""
-    """Where the figure comes from, or why there is none."""
+    why: str = ""
+    """Where the measured value comes from, or why there is none."""
+    group: str = ""
 
-    def tree(self) -> dict[str, Any]:
-        """Plain values."""
-        return {**asdict(self), "status": str(self.status)}
+    @property
+    def passed(self) -> bool | None:
+        """None where it was not judged."""
+        return None if self.outcome is Outcome.NOT_JUDGED else self.outcome is Outcome.PASSED
+
+    def tree(self) -> dict[str, str | float | None]:
+        """The JSON object of a report."""
+        measured = None if self.measured is None or math.isinf(self.measured) else self.measured
+        return {**asdict(self), "outcome": str(self.outcome), "measured": measured}
 
 
 def at_most(
-    group: str, name: str, figure: float | None, limit: float, unit: str = "", note: str = ""
+    name: str, measured: float | None, limit: float, unit: str = "", *, why: str = "", group: str = ""
 ) -> Verdict:
-    """Pass where the figure is within the limit, the limit included."""
-    if figure is None:
-        return Verdict(group, name, Status.NOT_JUDGED, None, limit, unit, note)
-    return Verdict(group, name, Status.PASS if figure <= limit else Status.FAIL, figure, limit, unit, note)
-
-
-def of_enough(verdict: Verdict, share: float) -> Verdict:
-    """Not judged instead of passed, where too small a `share` of what there was could have failed."""
-    if verdict.status is not Status.PASS or share >= LEAST_SHARE:
-        return verdict
-    words = f"only {100.0 * share:.0f} % of it was outside of what explains"
-    note = f"{words}; {verdict.note}" if verdict.note else words
-    return replace(verdict, status=Status.NOT_JUDGED, note=note)
-
-
-def of_most(verdict: Verdict, share: float) -> Verdict:
-    """Not judged instead of passed, where the figure is known for less than LEAST_ESTIMATED of the time."""
-    if verdict.status is not Status.PASS or share >= LEAST_ESTIMATED:
-        return verdict
-    words = f"known for only {100.0 * share:.0f} % of the samples"
-    note = f"{words}; {verdict.note}" if verdict.note else words
-    return replace(verdict, status=Status.NOT_JUDGED, figure=None, note=note)
-
-
-def not_above(
-    group: str, name: str, slope: Slope | None, limit: float, unit: str, note: str, too_short: str
-) -> Verdict:
-    """Whether something grows by more than a limit that counts as nothing.
-
-    Pass: with confidence it does not. Fail: with confidence it does. Else the soak was too short to tell.
-    """
-    if slope is None:
-        return Verdict(group, name, Status.NOT_JUDGED, None, limit, unit, too_short)
-    words = f"{slope.low:+.3g} to {slope.high:+.3g} with 95 % confidence, {slope.points} points"
-    note = f"{words}; {note}" if note else words
-    if slope.high <= limit:
-        status = Status.PASS
-    elif slope.low > limit:
-        status = Status.FAIL
+    """Passed up to the limit, the limit included; not judged where nothing was measured."""
+    if measured is None:
+        outcome = Outcome.NOT_JUDGED
     else:
-        status, note = Status.NOT_JUDGED, f"too short to tell: {note}"
-    return Verdict(group, name, status, slope.value, limit, unit, note)
+        outcome = Outcome.PASSED if measured <= limit else Outcome.FAILED
+    return Verdict(name, outcome, measured, limit, unit, why, group)
 
 
-def failed(verdicts: list[Verdict]) -> list[Verdict]:
-    """Those that failed."""
-    return [verdict for verdict in verdicts if verdict.status is Status.FAIL]
+def unproven(verdict: Verdict, why: str, measured: float | None) -> Verdict:
+    """The verdict, not judged instead of passed: too little was looked at. A failure stays one."""
+    if verdict.outcome is not Outcome.PASSED:
+        return verdict
+    why = f"{why}; {verdict.why}" if verdict.why else why
+    return replace(verdict, outcome=Outcome.NOT_JUDGED, why=why, measured=measured)
+
+
+def failed(verdicts: Iterable[Verdict]) -> list[Verdict]:
+    """The verdicts that failed."""
+    return [verdict for verdict in verdicts if verdict.outcome is Outcome.FAILED]
+
+
+def counts(verdicts: Iterable[Verdict]) -> str:
+    """How many there are of each outcome, such as `3 passed, 0 failed, 1 not judged`."""
+    outcomes = [verdict.outcome for verdict in verdicts]
+    return ", ".join(f"{outcomes.count(outcome)} {outcome}" for outcome in Outcome)
+
+
+def with_unit(value: float | None, unit: str = "") -> str:
+    """A value for people, with four digits and its unit; a dash where there is none."""
+    if value is None:
+        return UNKNOWN
+    return "never" if math.isinf(value) else f"{value:.4g} {unit}".rstrip()
+
+
+STYLES = {Outcome.PASSED: "green", Outcome.FAILED: "bold red", Outcome.NOT_JUDGED: "yellow"}
+
+
+def verdict_table(title: str, verdicts: Iterable[Verdict]) -> RenderableType:
+    """A row for each verdict, grouped; below it those that were not judged, by their reason."""
+    verdicts = list(verdicts)
+    reasons = any(v.why for v in verdicts if v.outcome is not Outcome.NOT_JUDGED)
+    table = plain_table(title or "criterion", "measured", "at most", "", *[""] * reasons)
+    if reasons:
+        table.columns[-1].justify, table.columns[-1].no_wrap = "left", False
+    group = ""
+    not_judged: dict[str, list[str]] = {}
+    for v in verdicts:
+        if v.outcome is Outcome.NOT_JUDGED:
+            not_judged.setdefault(v.why, []).append(v.name)
+            continue
+        if v.group != group:
+            group = v.group
+            table.add_section()
+        table.add_row(
+            Text.assemble((f"{v.group}: ", "dim"), v.name) if v.group else v.name,
+            with_unit(v.measured, v.unit),
+            with_unit(v.limit, v.unit),
+            Text(v.outcome, STYLES[v.outcome]),
+            *([Text(v.why, "dim")] if reasons else []),
+        )
+    style = STYLES[Outcome.NOT_JUDGED]
+    return Group(
+        table,
+        *(
+            Text.assemble(
+                ("not judged: ", style), "; ".join(names), (f" ({why or 'nothing was measured'})", "dim")
+            )
+            for why, names in not_judged.items()
+        ),
+    )

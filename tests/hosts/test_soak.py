@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from deploy.experiments.soak.events import of_kind, read_events
+from deploy.experiments.soak.files.events import of_kind, read_events
 
 pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
 
@@ -46,8 +46,8 @@ def test_it_comes_back_from_each_fault_and_judges_itself(tmp_path: Path) -> None
         "recorder: full disks that it did not live through, saying so once",
         "loops: processes that ended by themselves",
     ):
-        assert judged[name]["status"] == "pass", (judged[name], said)
-    assert judged["memory: master's memory grows"]["status"] == "not judged"
+        assert judged[name]["outcome"] == "passed", (judged[name], said)
+    assert judged["memory: master's memory grows"]["outcome"] == "not judged"
     assert {path.name for path in report.iterdir()} >= {
         "report.json", "report.html", "soak.png", "events.jsonl", "samples.csv", "master.log", "recorder.log",
     }  # fmt: skip

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from common.errors import TandemError
-from deploy.experiments.soak.criteria import CRITERIA
-from deploy.experiments.soak.events import Event
-from deploy.experiments.soak.growth import GROWTH
-from deploy.experiments.trial.report.targets import LIMITS, Judged
-from deploy.measure.targets import BENCH, BY_PROFILE
+from deploy.experiments.bench.targets import BENCH
+from deploy.experiments.demo.targets import BY_PROFILE
+from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.judge.judge import verdicts_of
+from deploy.experiments.trial.report.targets import LIMITS
 from tests.deploy.experiments.soak.conftest import FAULT, PROCESSES, STORY, Make
 
 ROOT = Path(__file__).parents[2]
@@ -40,7 +40,7 @@ def printed(make: Make) -> set[tuple[str, str]]:
         ),
         *(("bench", target.name) for target in BENCH),
         *(("soak", name) for name in soak_names(make)),
-        *(("trial", Judged(limit, None, None, (), 0).words) for limit in LIMITS),
+        *(("trial", limit.words) for limit in LIMITS),
         *(
             ("trial", words)
             for words in texts("deploy/experiments/trial/cell/judge.py", "_nothing_to_judge", _is_return)
@@ -56,7 +56,7 @@ def printed(make: Make) -> set[tuple[str, str]]:
 
 def soak_names(make: Make) -> set[str]:
     """With the process or the fault that a name holds left open."""
-    found = {f"{v.group}: {v.name}" for of in (*CRITERIA, *GROWTH) for v in of(make(events=ENDED))}
+    found = {f"{v.group}: {v.name}" for v in verdicts_of(make(events=ENDED))}
     processes = "|".join(PROCESSES)
     return {
         re.sub(rf": ({processes})\b|\bthe (master|slave) missed", _process, name).replace(

@@ -11,11 +11,13 @@ import pytest
 
 from common.errors import TandemError
 from common.recording import RecorderCounters
+from deploy.experiments.bench.targets import BENCH
+from deploy.experiments.demo.targets import BY_PROFILE
 from deploy.experiments.faults.fault import Fault
 from deploy.experiments.faults.scene import Scene
 from deploy.experiments.faults.table import FAULTS
 from deploy.experiments.faults.trial import _judge, _stillness_amiss, run_trial
-from deploy.experiments.soak.growth import (
+from deploy.experiments.soak.judge.growth import (
     BLOCKS_H,
     DRIFT_MS_H,
     IN_USE_MB_H,
@@ -30,11 +32,11 @@ from deploy.experiments.trial.cell.plan import CellKey, Setup
 from deploy.experiments.trial.cell.result import Cell
 from deploy.experiments.trial.cell.result import Status as CellStatus
 from deploy.experiments.trial.report.spread import Row
-from deploy.experiments.trial.report.targets import LIMITS, Limit, judge
+from deploy.experiments.trial.report.targets import LIMITS, SetupLimit, judge
 from deploy.measure.accuracy import SIDES
 from deploy.measure.stillness import stillness
-from deploy.measure.targets import BENCH, BY_PROFILE, Target, verdicts
-from deploy.measure.verdict import Status
+from deploy.measure.target import Target, judge_targets
+from deploy.measure.verdict import Outcome
 from deploy.ops.record.record import RecordOptions, Taken, _check
 from slave.guard import State
 from tests.deploy.experiments.soak.conftest import STORY, Make
@@ -59,20 +61,20 @@ def tree(targets: tuple[Target, ...], values: dict[str, float]) -> dict[str, Any
 @pytest.mark.parametrize("name", TARGETS)
 def test_each_target_turns_red_just_above_its_limit_and_no_other_does(name: str) -> None:
     targets, target = TARGETS[name]
-    assert all(v.met for v in verdicts(tree(targets, {}), targets))
-    above = verdicts(tree(targets, {target.name: target.limit + 1e-6}), targets)
-    assert [v.target.name for v in above if v.met is False] == [target.name]
+    assert all(v.passed for v in judge_targets(tree(targets, {}), targets))
+    above = judge_targets(tree(targets, {target.name: target.limit + 1e-6}), targets)
+    assert [v.name for v in above if v.passed is False] == [target.name]
 
 
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: f"{limit.figure} {limit.profile}")
-def test_each_limit_of_a_trial_is_missed_just_above_it(limit: Limit) -> None:
+def test_each_limit_of_a_trial_is_missed_just_above_it(limit: SetupLimit) -> None:
     setup = Setup("tcp", limit.profile or "lan", limit.strategy or "predict")
 
     def met(value: float) -> bool:
         values = {"moved_alone": 0.0, limit.figure: value}
         cells = [Cell(CellKey(setup, n), CellStatus.DONE, values=values) for n in range(3)]
         [found] = judge([Row(setup, cells, {})], [limit])
-        return found.met
+        return found.passed is True
 
     assert met(limit.at_most)
     assert not met(limit.at_most + 1e-6)
@@ -90,7 +92,7 @@ DRIFTS = {
 def test_each_latency_that_drifts_fails(make: Make, column: str) -> None:
     def failing(per_hour: float) -> int:
         seen = make(LONG, **{column: lambda at_s: 0.5 + per_hour * at_s / 3600.0})
-        return sum(v.status is Status.FAIL for v in drift(seen))
+        return sum(v.outcome is Outcome.FAILED for v in drift(seen))
 
     assert failing(0.5 * DRIFTS[column]) == 0
     assert failing(4.0 * DRIFTS[column]) == 1
@@ -100,7 +102,7 @@ def test_each_latency_that_drifts_fails(make: Make, column: str) -> None:
 def test_each_process_that_leaks_fails(make: Make, process: str) -> None:
     def failing(of: Any, column: str, per_hour: float, events: Any = STORY) -> list[str]:
         leak = {f"{process}_{column}": lambda at_s: 100.0 + per_hour * at_s / 3600.0}
-        return [v.name for v in of(make(LONG, events, **leak)) if v.status is Status.FAIL]
+        return [v.name for v in of(make(LONG, events, **leak)) if v.outcome is Outcome.FAILED]
 
     both = [f"{process}'s memory grows", f"{process} grows between faults"]
     assert failing(memory, "rss_mb", 0.5 * RSS_MB_H) == []

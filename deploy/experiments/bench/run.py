@@ -16,11 +16,13 @@ from common.wire.topics import COMMAND
 from deploy.experiments.bench.capture import capture
 from deploy.experiments.bench.link import link
 from deploy.experiments.bench.loop import RATE_HZ, loop
+from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.bench.transports import transports
 from deploy.experiments.bench.worker import BenchError, in_worker
-from deploy.measure.tables import bench_table, verdict_table
-from deploy.measure.targets import BENCH, verdicts
+from deploy.measure.tables import bench_table
+from deploy.measure.target import judge_targets
 from deploy.measure.timing import total
+from deploy.measure.verdict import verdict_table
 
 QUICK = 0.12
 """Share of the time that each bench gets in quick mode."""
@@ -68,10 +70,8 @@ def bench(quick: bool, console: Console) -> dict[str, Any]:
             _put(report, each.path, figures)
             progress.advance(task, each.seconds)
     report["core_percent"] = core_percent(report)
-    judged = verdicts(report, BENCH)
-    report["verdicts"] = [
-        {"figure": v.target.name, "value": v.value, "at_most": v.target.limit, "met": v.met} for v in judged
-    ]
+    judged = judge_targets(report, BENCH)
+    report["verdicts"] = [verdict.tree() for verdict in judged]
     console.print(bench_table(report))
     console.print(verdict_table("is this machine good enough?", judged))
     for name, reason in report["failed"].items():

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from deploy.experiments.demo.draw_curves import in_terminal
 from deploy.experiments.demo.report import Report, trees
+from deploy.experiments.demo.targets import of_demo
 from deploy.harness.rig import Rig
 from deploy.measure.tables import (
     Live,
@@ -19,10 +20,10 @@ from deploy.measure.tables import (
     strategies_table,
     synergy_table,
     ticks_text,
-    verdict_table,
     video_table,
 )
-from deploy.measure.targets import of_demo, verdicts
+from deploy.measure.target import judge_targets
+from deploy.measure.verdict import verdict_table
 
 
 def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
@@ -77,7 +78,7 @@ def print_report(report: Report, console: Console) -> None:
         console.print(shown)
     options = tree["options"]
     targets = of_demo(options["profile"], options["servos"])
-    console.print(verdict_table("targets", verdicts(tree, targets)))
+    console.print(verdict_table("targets", judge_targets(tree, targets)))
 
 
 def _errors_deg(rig: Rig) -> dict[str, float]:

@@ -17,9 +17,9 @@ from common.process.runtime import run as run_until_stopped
 from common.process.runtime import until_stopped
 
 if TYPE_CHECKING:
-    from deploy.experiments.soak.events import Event
-    from deploy.experiments.soak.judge import Judged
-    from deploy.experiments.soak.options import SoakOptions
+    from deploy.experiments.soak.files.events import Event
+    from deploy.experiments.soak.files.options import SoakOptions
+    from deploy.experiments.soak.judge.judge import JudgedSoak
 
 REPORT_S = 60.0
 """How long stopping, judging and drawing may take after a Ctrl-C."""
@@ -54,8 +54,8 @@ def soak(
     Example: `tandem soak --duration 30m --faults all --report soak-1`
     """
     from deploy.experiments.soak.faults import FAULTS, chosen
-    from deploy.experiments.soak.judge import judge as judge_folder
-    from deploy.experiments.soak.options import SoakOptions, seconds
+    from deploy.experiments.soak.files.options import SoakOptions, seconds
+    from deploy.experiments.soak.judge.judge import judge_soak
     from deploy.measure.tables import plain_table
 
     console = Console()
@@ -66,7 +66,7 @@ def soak(
         console.print(table)
         return
     if judge is not None:
-        _tell(judge_folder(judge), judge, console)
+        _tell(judge_soak(judge), judge, console)
         return
     options = SoakOptions(
         seconds(duration), transport, profile, router, faults=tuple(chosen(faults)), every_s=every, seed=seed
@@ -76,19 +76,19 @@ def soak(
 
         folder = folder_for(report, Path(temporary))
         run_until_stopped(lambda stop: _soak(options, folder, stop, console), shutdown_s=REPORT_S)
-        _tell(judge_folder(folder), folder if report is not None else None, console)
+        _tell(judge_soak(folder), folder if report is not None else None, console)
 
 
-def _tell(judged: Judged, folder: Path | None, console: Console) -> None:
-    from deploy.experiments.soak.report import write_report
-    from deploy.experiments.soak.view import verdicts_table
-    from deploy.measure.verdict import Status, failed
+def _tell(judged: JudgedSoak, folder: Path | None, console: Console) -> None:
+    from deploy.experiments.soak.report.write import write_report
+    from deploy.measure.verdict import counts, failed, verdict_table
 
     if folder is not None:
         write_report(judged, folder)
-    console.print(verdicts_table(judged.verdicts))
-    counts = ", ".join(f"{judged.count(status)} {status}" for status in Status)
-    console.print(f"{judged.ended}; {counts}" + (f"; report: {folder}/report.html" if folder else ""))
+    console.print(verdict_table("criterion", judged.verdicts))
+    console.print(
+        f"{judged.ended}; {counts(judged.verdicts)}" + (f"; report: {folder}/report.html" if folder else "")
+    )
     wrong = failed(judged.verdicts)
     if wrong:
         raise TandemError("the soak failed: " + "; ".join(f"{v.group}: {v.name}" for v in wrong))
@@ -106,7 +106,7 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
     """Run it; whatever happens, its files are whole and say how it ended."""
     from rich.live import Live
 
-    from deploy.experiments.soak.log import SoakLog
+    from deploy.experiments.soak.files.log import SoakLog
     from deploy.experiments.soak.run import SOAK, Soak
     from deploy.experiments.soak.stage import Stage
     from deploy.experiments.soak.watch import Watch

@@ -21,10 +21,10 @@ from common.process.ticker import ticks
 from common.wire.messages import Action
 from deploy.experiments.soak import recorder as recording
 from deploy.experiments.soak.faults import FAULTS, Case, Fault, possible
+from deploy.experiments.soak.files.log import SoakLog
+from deploy.experiments.soak.files.options import SoakOptions
 from deploy.experiments.soak.link import LinkLosses, nature
-from deploy.experiments.soak.log import SoakLog
 from deploy.experiments.soak.operator import Operator
-from deploy.experiments.soak.options import SoakOptions
 from deploy.experiments.soak.schedule import Planned, distance_s, schedule
 from deploy.experiments.soak.stage import Stage
 from deploy.experiments.soak.view import draw

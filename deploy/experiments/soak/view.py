@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Group, RenderableType
@@ -11,17 +11,15 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from deploy.experiments.soak.events import Event
-from deploy.experiments.soak.options import in_words
+from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.files.options import in_words
 from deploy.measure.tables import GUARD_STYLE, UNKNOWN, plain_table
-from deploy.measure.verdict import Status, Verdict
 
 if TYPE_CHECKING:
-    from deploy.experiments.soak.log import SoakLog
+    from deploy.experiments.soak.files.log import SoakLog
     from deploy.experiments.soak.run import Progress
     from deploy.experiments.soak.stage import Stage
 
-STYLES = {Status.PASS: "green", Status.FAIL: "bold red", Status.NOT_JUDGED: "yellow"}
 HIDDEN = ("begin", "started", "guard", "lease", "joints", "undone", "still")
 """Events that say little to who watches."""
 
@@ -66,42 +64,6 @@ def line(event: Event) -> Text:
         f"{key} {value}" for key, value in event.what.items() if value not in (None, "", False, True)
     )
     return Text(f"{event.at_s:8.1f} s  {event.kind}  {what}", "dim", overflow="ellipsis", no_wrap=True)
-
-
-def verdicts_table(verdicts: Sequence[Verdict]) -> RenderableType:
-    """One row a criterion, by group; then those that were not judged, reason by reason."""
-    table = plain_table("criterion", "figure", "at most", "", "")
-    table.columns[-1].justify = "left"
-    table.columns[-1].no_wrap = False
-    group = ""
-    unjudged: dict[str, list[str]] = {}
-    for verdict in verdicts:
-        if verdict.status is Status.NOT_JUDGED:
-            unjudged.setdefault(verdict.note, []).append(verdict.name)
-            continue
-        if verdict.group != group:
-            group = verdict.group
-            table.add_section()
-        table.add_row(
-            Text.assemble((f"{verdict.group}: ", "dim"), verdict.name),
-            number(verdict.figure, verdict.unit),
-            number(verdict.limit, verdict.unit),
-            Text(str(verdict.status), STYLES[verdict.status]),
-            Text(verdict.note, "dim"),
-        )
-    style = STYLES[Status.NOT_JUDGED]
-    return Group(table, *(_unjudged(why, names, style) for why, names in unjudged.items()))
-
-
-def _unjudged(why: str, names: Sequence[str], style: str) -> Text:
-    return Text.assemble(
-        ("not judged: ", style), "; ".join(names), (f" ({why or 'nothing was measured'})", "dim")
-    )
-
-
-def number(value: float | None, unit: str = "") -> str:
-    """For people: three digits, and the unit."""
-    return UNKNOWN if value is None else f"{value:.3g} {unit}".rstrip()
 
 
 def _figure(row: Mapping[str, Any], name: str, unit: str = "") -> str:

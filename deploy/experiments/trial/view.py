@@ -10,9 +10,9 @@ from rich.text import Text
 
 from deploy.experiments.trial.cell.figures import BY_NAME, printed
 from deploy.experiments.trial.report.spread import Row
-from deploy.experiments.trial.report.targets import Judged
 from deploy.experiments.trial.report.write import Findings
 from deploy.measure.tables import plain_table
+from deploy.measure.verdict import verdict_table
 
 SHOWN = ("one_way_p50_ms", "one_way_bound_ms", "rmse_deg", "rmse_over_hold", "roughness", "flow_s")
 
@@ -27,8 +27,8 @@ def print_findings(findings: Findings, console: Console) -> None:
     failed = sum(len(row.failed) for row in findings.rows)
     if failed:
         console.print(Text(f"{failed} failed: run, and came to nothing", "bold red"))
-    for judged in findings.judged:
-        console.print(_target(judged))
+    if findings.judged:
+        console.print(verdict_table("targets", findings.judged))
     profile = ""
     for ranking in sorted(findings.rankings, key=lambda r: r.profile):
         if ranking.profile != profile:
@@ -55,12 +55,3 @@ def _table(rows: Iterable[Row]) -> Table:
             *(printed(name, row.median(name)) for name in SHOWN),
         )
     return table
-
-
-def _target(judged: Judged) -> Text:
-    words = f"{judged.words}: {judged.measured}, at most {judged.limit.at_most:g}"
-    if judged.met:
-        return Text.assemble(("met     ", "green"), words)
-    reasons = [f"{s.profile} {s.name}" for s in judged.missed[:4]]
-    reasons += [f"{judged.failed} failed"] if judged.failed else []
-    return Text.assemble(("missed  ", "bold red"), words, (f"  ({', '.join(reasons)})", "dim"))

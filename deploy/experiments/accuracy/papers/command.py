@@ -18,7 +18,7 @@ def papers(
     report: Annotated[
         Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
     ] = None,
-    strict: Annotated[bool, typer.Option(help="Exit with status 1 where a target is missed.")] = False,
+    strict: Annotated[bool, typer.Option(help="Exit with status 1 if a target fails.")] = False,
     jobs: Annotated[
         int | None, typer.Option(help="Processes at once; one a core (at most 4) without it.", min=1)
     ] = None,
@@ -34,6 +34,7 @@ def papers(
     from deploy.experiments.accuracy.papers.figures import Figure, gather
     from deploy.experiments.accuracy.papers.run import run_all
     from deploy.experiments.accuracy.papers.table import experiment_table, experiment_tree
+    from deploy.measure.verdict import Outcome
 
     keys = [key.strip() for key in (only or "").split(",") if key.strip()]
     known = [experiment.key for experiment in EXPERIMENTS]
@@ -58,13 +59,11 @@ def papers(
     missed = 0
     for experiment in wanted:
         rows = gather(dict(sorted(found[experiment.key].items())))
-        missed += sum(row.met is False for row in rows)
+        missed += sum(row.outcome is Outcome.FAILED for row in rows)
         trees[experiment.key] = experiment_tree(experiment, rows)
         console.print(experiment_table(experiment, rows))
-    console.print(
-        f"{seeds} seeds; targets missed: {missed}" if missed else f"{seeds} seeds; every target met"
-    )
+    console.print(f"{seeds} seeds; " + (f"targets failed: {missed}" if missed else "every target passed"))
     if report is not None:
-        write_json(report, {"seeds": seeds, "missed": missed, "experiments": trees})
+        write_json(report, {"seeds": seeds, "failed": missed, "experiments": trees})
     if strict and missed:
         raise typer.Exit(1)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from deploy.measure.verdict import Outcome, Verdict, at_most
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +65,22 @@ class Row:
         return max(values, default=None)
 
     @property
-    def met(self) -> bool | None:
-        """Whether the worst of every seed reaches the target; a seed that told nothing has missed it.
+    def verdict(self) -> Verdict | None:
+        """Whether the worst of every seed reaches the target; a seed without a value has failed it.
 
         None where nothing is asked.
         """
         if self.target is None:
             return None
-        worst = self.worst
-        return worst is not None and all(self.by_seed.values()) and worst <= self.target
+        verdict = at_most(self.name, self.worst, self.target, self.unit)
+        if not all(self.by_seed.values()):
+            return replace(verdict, outcome=Outcome.FAILED, why="a seed gave no value")
+        return verdict
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """Of the verdict, where there is one."""
+        return None if self.verdict is None else self.verdict.outcome
 
 
 def gather(by_seed: Mapping[int, Sequence[Figure]]) -> list[Row]:

@@ -12,8 +12,7 @@ from rich.text import Text
 
 from deploy.experiments.accuracy.papers.figures import Experiment, Row
 from deploy.measure.tables import UNKNOWN
-
-_SAID = {True: Text("met", "green"), False: Text("missed", "bold red"), None: Text("")}
+from deploy.measure.verdict import STYLES
 
 
 def experiment_table(experiment: Experiment, rows: Sequence[Row]) -> RenderableType:
@@ -31,7 +30,7 @@ def experiment_table(experiment: Experiment, rows: Sequence[Row]) -> RenderableT
         table.add_row(
             f"{row.name}, {row.unit}" if row.unit else row.name,
             *(_number(x) for x in (row.paper, row.mean, row.worst, row.target)),
-            _SAID[row.met],
+            "" if row.outcome is None else Text(row.outcome, STYLES[row.outcome]),
         )
     return Group(table, *(Text(note, "dim") for note in experiment.notes))
 
@@ -49,7 +48,7 @@ def experiment_tree(experiment: Experiment, rows: Sequence[Row]) -> dict[str, An
                 "target": row.target,
                 "mean": row.mean,
                 "worst": row.worst,
-                "met": row.met,
+                "outcome": row.outcome,
                 "by_seed": {str(seed): list(values) for seed, values in row.by_seed.items()},
             }
             for row in rows

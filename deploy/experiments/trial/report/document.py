@@ -12,7 +12,7 @@ from deploy.experiments.trial.cell.plan import Plan
 from deploy.experiments.trial.report.plots import Plot
 from deploy.experiments.trial.report.ranking import Ranking
 from deploy.experiments.trial.report.spread import Row, Spread
-from deploy.experiments.trial.report.targets import Judged
+from deploy.measure.verdict import Verdict, with_unit
 
 GROUPS = {
     "latency": "One way",
@@ -35,7 +35,7 @@ def as_html(
     plan: Plan,
     rows: Sequence[Row],
     ranks: Sequence[Ranking],
-    judged: Sequence[Judged],
+    judged: Sequence[Verdict],
     plots: Sequence[Plot],
     about: dict[str, str],
 ) -> str:
@@ -49,7 +49,13 @@ def as_html(
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters |= {"cell": _cell, "spread": _range, "image": _image, "plain": _plain}
+    environment.filters |= {
+        "cell": _cell,
+        "spread": _range,
+        "image": _image,
+        "plain": _plain,
+        "unit": with_unit,
+    }
     expected = len(plan.cells())
     finished = sum(cell.settled for row in rows for cell in row.cells)
     return environment.get_template("report.html.jinja").render(

@@ -6,7 +6,6 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from math import isinf
 from typing import Any
 
 from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, rounded
@@ -14,13 +13,17 @@ from deploy.experiments.trial.cell.plan import Plan
 from deploy.experiments.trial.cell.result import Cell
 from deploy.experiments.trial.report.ranking import Ranking
 from deploy.experiments.trial.report.spread import Row, Spread
-from deploy.experiments.trial.report.targets import Judged
+from deploy.measure.verdict import Verdict
 
 _KEYS = ("profile", "transport", "strategy", "repetition", "status")
 
 
 def tree(
-    plan: Plan, rows: Sequence[Row], ranks: Sequence[Ranking], judged: Sequence[Judged], about: dict[str, str]
+    plan: Plan,
+    rows: Sequence[Row],
+    ranks: Sequence[Ranking],
+    judged: Sequence[Verdict],
+    about: dict[str, str],
 ) -> dict[str, Any]:
     """`compared` holds no time, host or version: those are in `about`. Figures are rounded as printed."""
     return {
@@ -29,7 +32,7 @@ def tree(
             "plan": plan.tree(),
             "setups": {_path(row): _setup(row) for row in rows},
             "rankings": [_ranking(ranking) for ranking in ranks],
-            "targets": [_target(target) for target in judged],
+            "targets": [verdict.tree() for verdict in judged],
         },
     }
 
@@ -82,15 +85,4 @@ def _ranking(ranking: Ranking) -> dict[str, Any]:
             }
             for place in ranking.places
         ],
-    }
-
-
-def _target(judged: Judged) -> dict[str, Any]:
-    return {
-        "what": judged.words,
-        "at_most": judged.limit.at_most,
-        "worst": None if judged.worst is None or isinf(judged.worst) else round(judged.worst, 3),
-        "met": judged.met,
-        "failed": judged.failed,
-        "missed_by": [f"{s.profile}/{s.transport}/{s.strategy}" for s in judged.missed],
     }

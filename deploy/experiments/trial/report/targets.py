@@ -1,4 +1,4 @@
-"""The figures a trial is to reach, as data, and whether this one did. Pure."""
+"""The limits that a trial is held to, as data, and its verdicts. Pure."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, OUTAGE
-from deploy.experiments.trial.cell.plan import Setup
 from deploy.experiments.trial.cell.result import Cell
 from deploy.experiments.trial.report.spread import Row
+from deploy.measure.verdict import Outcome, Verdict
+
+MOST_NAMED = 4
+"""Setups that a verdict names."""
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
-    """The most a figure may be, in the median of a setup's repeats."""
+class SetupLimit:
+    """The most that a value may be, in the median of a setup's repeats."""
 
     figure: str
     at_most: float
@@ -25,87 +28,80 @@ class Limit:
     each: bool = False
     """Every single repeat must keep it: what endangers a person has no median."""
 
+    @property
+    def words(self) -> str:
+        """What is asked of which setups."""
+        where = f" under {self.profile}" if self.profile else ""
+        setups = f", {self.strategy}{where}" if self.strategy else where
+        return f"{BY_NAME[self.figure].title}{setups}"
+
+    @property
+    def of_outage(self) -> bool:
+        """Whether only a cell with an outage can keep or break it."""
+        return BY_NAME[self.figure].group == OUTAGE
+
 
 LIMITS = (
-    Limit("rmse_over_hold", 0.4, "predict", "4g"),
-    Limit("roughness", 3.0, "predict", "4g"),
-    Limit("rmse_over_hold", 0.5, "predict", "intercontinental"),
-    Limit("roughness", 3.0, "predict", "intercontinental"),
-    Limit("flow_s", 1.5),
-    Limit("stale_accepted", 0, each=True),
-    Limit("moved_alone", 0, each=True),
+    SetupLimit("rmse_over_hold", 0.4, "predict", "4g"),
+    SetupLimit("roughness", 3.0, "predict", "4g"),
+    SetupLimit("rmse_over_hold", 0.5, "predict", "intercontinental"),
+    SetupLimit("roughness", 3.0, "predict", "intercontinental"),
+    SetupLimit("flow_s", 1.5),
+    SetupLimit("stale_accepted", 0, each=True),
+    SetupLimit("moved_alone", 0, each=True),
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """A limit, and the setups it is asked of."""
-
-    limit: Limit
-    worst: float | None
-    """None where every repeat failed; infinite where what should have come never did."""
-    worst_setup: Setup | None
-    missed: Sequence[Setup]
-    asked: int
-    """Of how many setups."""
-    failed: int = 0
-    """Repeats that were run and came to nothing: what they would have shown is not known."""
-
-    @property
-    def met(self) -> bool:
-        """Whether every setup kept it, and every repeat that was asked told of it."""
-        return not self.missed and not self.failed
-
-    @property
-    def measured(self) -> str:
-        """The worst, as people read it."""
-        if self.worst is None:
-            return "nothing"
-        if math.isinf(self.worst):
-            return "never"
-        return f"{self.worst:.3g} {BY_NAME[self.limit.figure].unit}".rstrip()
-
-    @property
-    def words(self) -> str:
-        """What was asked of which setups."""
-        where = f" under {self.limit.profile}" if self.limit.profile else ""
-        who = f", {self.limit.strategy}{where}" if self.limit.strategy else where
-        return f"{BY_NAME[self.limit.figure].title}{who}"
+def judge(rows: Sequence[Row], limits: Sequence[SetupLimit] = LIMITS, outage: bool = True) -> list[Verdict]:
+    """A verdict for each limit that this trial has setups for; `outage`: whether its cells have an outage."""
+    asked = [limit for limit in limits if outage or not limit.of_outage]
+    return [verdict for limit in asked if (verdict := _judge(limit, rows)) is not None]
 
 
-def judge(rows: Sequence[Row], limits: Sequence[Limit] = LIMITS, outage: bool = True) -> list[Judged]:
-    """Those that this trial has setups for; `outage` where each cell was to have one."""
-    asked = [limit for limit in limits if outage or BY_NAME[limit.figure].group != OUTAGE]
-    return [judged for limit in asked if (judged := _judge(limit, rows)) is not None]
-
-
-def _judge(limit: Limit, rows: Sequence[Row]) -> Judged | None:
+def _judge(limit: SetupLimit, rows: Sequence[Row]) -> Verdict | None:
+    """Passed where every setup keeps the limit and no repeat failed; None where it is asked of no setup."""
     asked = [
         row
         for row in rows
         if limit.strategy in (None, row.setup.strategy) and limit.profile in (None, row.setup.profile)
     ]
     found = [
-        (max(values) if limit.each else statistics.median(values), row.setup)
+        (
+            max(values) if limit.each else statistics.median(values),
+            f"{row.setup.name} over {row.setup.profile}",
+        )
         for row in asked
         if (values := [_value(limit, cell) for cell in row.done if _is_asked(limit, cell)])
     ]
     failed = sum(len(row.failed) for row in asked)
-    if not found:
-        return Judged(limit, None, None, (), 0, failed) if failed else None
-    worst, setup = max(found, key=lambda item: item[0])
-    missed = [s for value, s in found if value > limit.at_most]
-    return Judged(limit, worst, setup, missed, len(found), failed)
+    if not found and not failed:
+        return None
+    worst, setup = max(found, default=(None, ""), key=lambda item: item[0])
+    missed = [name for value, name in found if value > limit.at_most]
+    reasons = [f"worst: {setup}"] if found and not missed else []
+    if missed:
+        more = ", …" if len(missed) > MOST_NAMED else ""
+        reasons.append(f"{len(missed)} of {len(found)} setups: {', '.join(missed[:MOST_NAMED])}{more}")
+    if failed:
+        reasons.append(f"{failed} failed")
+    return Verdict(
+        limit.words,
+        Outcome.FAILED if missed or failed else Outcome.PASSED,
+        worst,
+        limit.at_most,
+        BY_NAME[limit.figure].unit,
+        "; ".join(reasons),
+    )
 
 
-def _is_asked(limit: Limit, cell: Cell) -> bool:
-    """Whether the cell should have the figure: those of an outage only where one was made."""
-    if BY_NAME[limit.figure].group != OUTAGE:
-        return True
-    return any(cell.values.get(figure.name) is not None for figure in FIGURES if figure.group == OUTAGE)
+def _is_asked(limit: SetupLimit, cell: Cell) -> bool:
+    """Whether the cell should have the value: those of an outage only where one was made."""
+    return not limit.of_outage or any(
+        cell.values.get(f.name) is not None for f in FIGURES if f.group == OUTAGE
+    )
 
 
-def _value(limit: Limit, cell: Cell) -> float:
-    """A figure that should be there and is not misses every limit: commands that never flowed again."""
+def _value(limit: SetupLimit, cell: Cell) -> float:
+    """A value that should be there and is not breaks every limit: commands that never flowed again."""
     value = cell.values.get(limit.figure)
     return math.inf if value is None else value

@@ -15,8 +15,9 @@ from deploy.experiments.trial.report.machine import as_csv, tree
 from deploy.experiments.trial.report.plots import plots
 from deploy.experiments.trial.report.ranking import Ranking, rankings
 from deploy.experiments.trial.report.spread import Row, rows
-from deploy.experiments.trial.report.targets import Judged, judge
+from deploy.experiments.trial.report.targets import judge
 from deploy.experiments.trial.report.tasks import TASKS, load_tasks
+from deploy.measure.verdict import Verdict
 from deploy.report.output import writing
 from deploy.sim.network.namespaces import congestion_control
 
@@ -30,7 +31,7 @@ class Findings:
     plan: Plan
     rows: list[Row]
     rankings: list[Ranking]
-    judged: list[Judged]
+    judged: list[Verdict]
 
 
 def find(folder: Folder, tasks: Path = TASKS) -> Findings:

@@ -13,13 +13,15 @@ from rich.console import Console
 
 from common.metrics.published import MasterMetrics, SlaveMetrics, Summary, Ticks
 from common.wire.messages import Action
+from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.demo.report import Report, Seen, make_report
 from deploy.experiments.demo.run import DemoOptions
+from deploy.experiments.demo.targets import BY_PROFILE, DEMO, of_demo
 from deploy.experiments.demo.view import print_report
 from deploy.harness.rig import Rig
 from deploy.measure import Trace
-from deploy.measure.tables import verdict_table
-from deploy.measure.targets import BENCH, BY_PROFILE, DEMO, of_demo, verdicts
+from deploy.measure.target import judge_targets
+from deploy.measure.verdict import verdict_table
 from deploy.sim.world.whole_way import VirtualRun, World
 from slave.pipeline import SlavePipeline
 from tests.published import master_metrics, slave_metrics
@@ -114,8 +116,8 @@ def test_predict_shows_a_third_of_hold_s_error_in_the_same_run(report: Report) -
     over_hold = report.tree["rmse_over_hold"]
     assert over_hold == pytest.approx(report.tree["motion"]["rmse_deg"] / hold["rmse_deg"])
     assert over_hold <= 1 / 3
-    found = {v.target.name: v for v in verdicts(report.tree, DEMO)}["same-instant RMSE / hold's"]
-    assert (found.value, found.met) == (over_hold, True)
+    found = {v.name: v for v in judge_targets(report.tree, DEMO)}["same-instant RMSE / hold's"]
+    assert (found.measured, found.passed) == (over_hold, True)
     for words in ("same commands, each strategy", "this run", "hold, replayed", "RMSE / hold's"):
         assert words in text(report)
 
@@ -175,7 +177,7 @@ def test_a_hand_s_report_has_its_five_joints_its_curves_and_paper_b_s_targets() 
     assert tree["options"]["motion"] == "grasp"
     assert list(tree["synergies"]) == [f"right_{f}" for f in ("thumb", "index", "middle", "ring", "little")]
     assert tree["worst_joint"]["max_deg"] == max(row["max_deg"] for row in tree["accuracy"].values())
-    found = {v.target.name: v.met for v in verdicts(tree, BY_PROFILE["hand"])}
+    found = {v.name: v.passed for v in judge_targets(tree, BY_PROFILE["hand"])}
     assert found["finger joint's RMSE, the worst (paper B)"]
     assert found["finger joint's error, the largest (paper B)"]
     shown = text(report)
@@ -196,20 +198,20 @@ def test_every_target_s_path_leads_to_a_figure_in_a_real_report(profile: str) ->
     """A renamed figure would not be missed otherwise: its target would only not be judged."""
     report = make_report(DemoOptions(profile=profile), rig(followed(profile, 8.0), ["track"]), ENDED_WELL)
     tree = json.loads(json.dumps(report.tree, allow_nan=False))
-    nowhere = [v.target.name for v in verdicts(tree, BY_PROFILE[profile]) if v.value is None]
+    nowhere = [v.name for v in judge_targets(tree, BY_PROFILE[profile]) if v.measured is None]
     assert nowhere == []
 
 
 def test_a_figure_that_is_missing_is_not_judged_and_neither_zero_nor_met() -> None:
     for targets in (*BY_PROFILE.values(), BENCH):
-        for verdict in verdicts({}, targets):
-            assert (verdict.value, verdict.met) == (None, None)
+        for verdict in judge_targets({}, targets):
+            assert (verdict.measured, verdict.passed) == (None, None)
     assert "not judged" in shown_verdicts({})
 
 
 def shown_verdicts(tree: dict[str, object]) -> str:
     out = io.StringIO()
-    Console(file=out, width=80).print(verdict_table("targets", verdicts(tree, DEMO)))
+    Console(file=out, width=80).print(verdict_table("targets", judge_targets(tree, DEMO)))
     return out.getvalue()
 
 
@@ -235,9 +237,9 @@ def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
     run.stand_still(5.0)
     run.run(5.0)
     report = make_report(DemoOptions(), rig(run, ["track"]), ENDED_WELL)
-    verdict = {v.target.name: v for v in verdicts(report.tree, DEMO)}["commands due that never came"]
-    assert verdict.met is False
-    assert verdict.value == pytest.approx(62, abs=4)
+    verdict = {v.name: v for v in judge_targets(report.tree, DEMO)}["commands due that never came"]
+    assert verdict.passed is False
+    assert verdict.measured == pytest.approx(62, abs=4)
     assert "that were not there when they were due" in " ".join(text(report).split())
     assert "it does not tell how soon the robot answers" in " ".join(text(report).split())
 
@@ -247,7 +249,7 @@ def test_paper_b_s_60_ms_are_of_one_way_and_lag_and_fail_where_the_link_is_slow(
     lag_ms = max(0.0, tree["motion_lag_ms"])
     assert tree["one_way_plus_lag_ms"] == pytest.approx(tree["one_way_ms"]["corrected"]["p99"] + lag_ms)
     slow = {**tree, "one_way_plus_lag_ms": 61.0}
-    found = {v.target.name: v.met for v in verdicts(slow, BY_PROFILE["hand"])}
+    found = {v.name: v.passed for v in judge_targets(slow, BY_PROFILE["hand"])}
     assert found["one way p99 + motion lag (paper B)"] is False
 
 
@@ -259,7 +261,7 @@ def test_with_canopen_drives_their_answers_and_the_robot_s_core_are_judged_too(
         "cpu_percent": {"slave": core_percent},
         "servos": {"times_ms": {"sync_to_positions": {"p99": p99_ms}}},
     }
-    found = {v.target.name: v.met for v in verdicts(tree, of_demo("nursing", "canopen"))}
+    found = {v.name: v.passed for v in judge_targets(tree, of_demo("nursing", "canopen"))}
     assert found["SYNC → all positions, p99"] is met
     assert found["robot, of one core"] is met
     assert of_demo("nursing", "simulated") == DEMO

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from deploy.experiments.soak.criteria import Seen
-from deploy.experiments.soak.events import Event
-from deploy.experiments.soak.explain import explanation
-from deploy.experiments.soak.samples import Samples, header
+from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.files.samples import Samples, header
+from deploy.experiments.soak.judge.evidence import SoakEvidence
 
 PROCESSES = ["master", "slave", "recorder", "soak"]
-Make = Callable[..., Seen]
+Make = Callable[..., SoakEvidence]
 
 FAULT = {
     "fault": "master-kill", "number": 0, "holds": True, "heard": True, "begun_s": 100.0, "flow_limit_s": 15.0,
@@ -44,7 +43,7 @@ STORY = (
 def make() -> Make:
     """Makes a soak of so many seconds; columns given are functions of time, or values."""
 
-    def made(seconds: int = 600, events: tuple[Event, ...] = STORY, **columns: Any) -> Seen:
+    def made(seconds: int = 600, events: tuple[Event, ...] = STORY, **columns: Any) -> SoakEvidence:
         at_s = np.arange(1.0, seconds + 1.0)
         table: dict[str, Array] = {
             name: np.full(seconds, np.nan) for name in header(PROCESSES) if name != "guard"
@@ -68,6 +67,6 @@ def make() -> Make:
         for name, value in {**usual, **columns}.items():
             table[name] = np.broadcast_to(value(at_s) if callable(value) else value, seconds).astype(float)
         samples = Samples(table)
-        return Seen(events, samples, explanation(events, samples))
+        return SoakEvidence.of(events, samples)
 
     return made

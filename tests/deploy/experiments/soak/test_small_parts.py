@@ -13,10 +13,11 @@ from common.errors import ConfigError
 from common.latency.durations import Durations
 from deploy.experiments.soak.counts import Additions
 from deploy.experiments.soak.faults import FAULTS, chosen
-from deploy.experiments.soak.options import in_words, seconds
-from deploy.experiments.soak.windows import AFTER_S, BEFORE_S, Window, explained, reason
+from deploy.experiments.soak.files.options import in_words, seconds
+from deploy.experiments.soak.judge.growth import not_above
+from deploy.experiments.soak.judge.windows import AFTER_S, BEFORE_S, Window, explained, reason
 from deploy.measure.trend import Slope
-from deploy.measure.verdict import Status, at_most, not_above
+from deploy.measure.verdict import Outcome, at_most
 
 
 @pytest.mark.parametrize(
@@ -86,29 +87,24 @@ def test_a_window_s_ends() -> None:
     assert (reason(15.0, [window]), reason(30.0, [window])) == ("kill", "")
 
 
-def test_a_figure_at_its_limit_passes_above_it_fails_and_none_is_not_judged() -> None:
-    judged = [at_most("g", "n", figure, 1.5).status for figure in (1.5, 1.5001, None)]
-    assert judged == [Status.PASS, Status.FAIL, Status.NOT_JUDGED]
-
-
 @pytest.mark.parametrize(
     ("low", "high", "status"),
     [
-        (-1.0, 0.5, Status.PASS),
-        (-1.0, 0.51, Status.NOT_JUDGED),
-        (0.5, 2.0, Status.NOT_JUDGED),
-        (0.51, 2.0, Status.FAIL),
-        (-3.0, -1.0, Status.PASS),
+        (-1.0, 0.5, Outcome.PASSED),
+        (-1.0, 0.51, Outcome.NOT_JUDGED),
+        (0.5, 2.0, Outcome.NOT_JUDGED),
+        (0.51, 2.0, Outcome.FAILED),
+        (-3.0, -1.0, Outcome.PASSED),
     ],
 )
-def test_growth_is_judged_by_its_whole_interval(low: float, high: float, status: Status) -> None:
+def test_growth_is_judged_by_its_whole_interval(low: float, high: float, status: Outcome) -> None:
     found = Slope((low + high) / 2.0, low, high, 50)
-    assert not_above("g", "n", found, 0.5, "MB/h", "", "too short").status is status
+    assert not_above(at_most("grows", None, 0.5, "MB/h"), found).outcome is status
 
 
 def test_no_slope_says_that_it_was_too_short() -> None:
-    verdict = not_above("g", "n", None, 0.5, "MB/h", "", "too short: 20 s")
-    assert (verdict.status, verdict.note) == (Status.NOT_JUDGED, "too short: 20 s")
+    verdict = not_above(at_most("grows", None, 0.5, why="too short: 20 s"), None)
+    assert (verdict.outcome, verdict.why) == (Outcome.NOT_JUDGED, "too short: 20 s")
 
 
 def test_faults_are_chosen_by_name() -> None:

@@ -27,10 +27,10 @@ def test_every_experiment_is_printed_and_reported(tmp_path: Path) -> None:
     status, output = run("--seeds", "2", "--report", str(tmp_path / "papers.json"))
     assert status == 0, output
     assert "good" in output
-    assert "targets missed: 1" in output
+    assert "targets failed: 1" in output
     report = json.loads((tmp_path / "papers.json").read_text("utf-8"))
     assert list(report["experiments"]) == ["A", "B"]
-    assert (report["seeds"], report["missed"]) == (2, 1)
+    assert (report["seeds"], report["failed"]) == (2, 1)
 
 
 def test_only_those_named_run_and_strict_fails_where_one_misses() -> None:

@@ -25,18 +25,18 @@ def test_mean_and_worst_are_over_seeds_and_sides() -> None:
     error, spread = gather({seed: made_up(seed) for seed in (1, 2, 3)})
     assert error.mean == pytest.approx((0.1 + 0.2 + 0.3 + 3 * 0.2) / 6)
     assert error.worst == pytest.approx(0.3)
-    assert error.met is True
-    assert spread.met is None, "nothing is asked of it"
+    assert error.outcome == "passed"
+    assert spread.outcome is None, "nothing is asked of it"
 
 
 def test_one_bad_seed_misses_the_target() -> None:
-    assert gather({seed: made_up(seed) for seed in (1, 2, 3, 4)})[0].met is False
+    assert gather({seed: made_up(seed) for seed in (1, 2, 3, 4)})[0].outcome == "failed"
 
 
 @pytest.mark.parametrize("values", [(), (float("nan"),)])
 def test_a_seed_that_tells_nothing_has_missed(values: tuple[float, ...]) -> None:
     rows = gather({1: made_up(1), 2: [Figure("error", "°", values, 1.5, 0.35)]})
-    assert rows[0].met is False
+    assert rows[0].outcome == "failed"
 
 
 def test_every_experiment_runs_with_every_seed() -> None:
@@ -56,7 +56,7 @@ def test_table_and_report_say_the_papers_figure_ours_and_whether_it_was_reached(
     text = console.export_text()
     assert "1.5" in text
     assert "0.4" in text
-    assert "missed" in text
+    assert "failed" in text
     assert "a note" in text
     tree = json.loads(json.dumps(experiment_tree(MADE_UP, rows)))
     assert tree["figures"][0] == {
@@ -66,6 +66,6 @@ def test_table_and_report_say_the_papers_figure_ours_and_whether_it_was_reached(
         "target": 0.35,
         "mean": pytest.approx(0.225),
         "worst": pytest.approx(0.4),
-        "met": False,
+        "outcome": "failed",
         "by_seed": {"1": [0.1, 0.2], "4": [0.4, 0.2]},
     }

@@ -16,13 +16,13 @@ def test_units_as_delivered_meet_every_target_once_calibrated() -> None:
     asked = [row for row in rows if row.target is not None]
     assert len(asked) == 9, "the ellipsoid's, and four of each filter"
     for row in asked:
-        assert row.met, (row.name, row.values)
+        assert row.outcome == "passed", (row.name, row.values)
 
 
 def test_uncalibrated_units_miss_them() -> None:
     take = glove.moved(Imperfections("raw", 2, 1), 1, 8.0)
     missed = gather({1: glove.moving_figures(take, glove.orient(take, "vqf")[0])})
-    assert [row.met for row in missed][:2] == [False, False]
+    assert [row.outcome for row in missed][:2] == ["failed", "failed"]
 
 
 def turning(seconds: float) -> Array:

@@ -13,10 +13,10 @@ def test_units_as_delivered_reach_table_1_and_eta_once_calibrated() -> None:
         row = rows[f"{joint.replace('_', ' ')}, mean error"]
         assert row.paper == row.target == paper.error_deg
         assert len(row.values) == 2, "both arms"
-        assert row.met, (joint, row.values)
+        assert row.outcome == "passed", (joint, row.values)
     eta = rows["η (Eq. 25)"]
     assert (eta.paper, eta.target) == (ETA_PERCENT, 1.0)
-    assert eta.met, eta.values
+    assert eta.outcome == "passed", eta.values
 
 
 def test_what_only_a_suit_knows_brings_eta_below_its_target() -> None:
@@ -25,7 +25,7 @@ def test_what_only_a_suit_knows_brings_eta_below_its_target() -> None:
         {row.name: row for row in gather({1: run(1, 16.5)})}["η (Eq. 25)"]
         for run in (telerobot.whole_way, telerobot.as_a_suit)
     )
-    assert suit.met, suit.values
+    assert suit.outcome == "passed", suit.values
     assert suit.worst is not None
     assert alone.worst is not None
     assert suit.worst < 0.8 * alone.worst
@@ -33,4 +33,4 @@ def test_what_only_a_suit_knows_brings_eta_below_its_target() -> None:
 
 def test_a_run_too_short_to_judge_misses_its_targets() -> None:
     rows = gather({1: telerobot.whole_way(1, seconds=1.0)})
-    assert all(row.met is False for row in rows if row.target is not None)
+    assert all(row.outcome == "failed" for row in rows if row.target is not None)

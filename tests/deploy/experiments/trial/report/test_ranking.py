@@ -12,8 +12,9 @@ from deploy.experiments.trial.cell.plan import CellKey, Setup
 from deploy.experiments.trial.cell.result import Cell, Status
 from deploy.experiments.trial.report.ranking import rank, rankings
 from deploy.experiments.trial.report.spread import Spread, rows, spread
-from deploy.experiments.trial.report.targets import Limit, judge
+from deploy.experiments.trial.report.targets import SetupLimit, judge
 from deploy.experiments.trial.report.tasks import TASKS, Criterion, load_tasks
+from deploy.measure.verdict import with_unit
 from tests.deploy.experiments.trial.made_up import PLAN, cells
 
 TASK = {task.name: task for task in load_tasks()}
@@ -112,37 +113,42 @@ def test_a_figure_that_nobody_has_counts_for_nobody_and_one_that_others_have_cou
 def test_a_limit_is_kept_up_to_its_very_edge_by_the_median(value: float, met: bool) -> None:
     setup = Setup("tcp", "4g", "predict")
     repeats = with_values(setup, {"rmse_over_hold": 0.1}, {"rmse_over_hold": value}, {"rmse_over_hold": 0.9})
-    [judged] = judge(rows(PLAN, repeats), [Limit("rmse_over_hold", 0.4, "predict", "4g")])
-    assert judged.met is met
-    assert judged.worst == value
+    [judged] = judge(rows(PLAN, repeats), [SetupLimit("rmse_over_hold", 0.4, "predict", "4g")])
+    assert judged.passed is met
+    assert judged.measured == value
 
 
 def test_a_limit_of_each_repeat_is_missed_by_one() -> None:
     repeats = with_values(Setup("tcp", "4g", "predict"), *({"stale_accepted": v} for v in (0.0, 0.0, 1.0)))
-    [judged] = judge(rows(PLAN, repeats), [Limit("stale_accepted", 0.0, each=True)])
-    assert judged.met is False
+    [judged] = judge(rows(PLAN, repeats), [SetupLimit("stale_accepted", 0.0, each=True)])
+    assert judged.passed is False
 
 
 def test_commands_that_never_flow_again_miss_the_limit_and_no_outage_asks_for_none() -> None:
-    setup, limits = Setup("tcp", "4g", "predict"), [Limit("flow_s", 1.5)]
+    setup, limits = Setup("tcp", "4g", "predict"), [SetupLimit("flow_s", 1.5)]
     back, never = {"flow_s": 0.5, "moved_alone": 0.0}, {"flow_s": None, "moved_alone": 0.0}
     [once] = judge(rows(PLAN, with_values(setup, back, never, back)), limits)
     [mostly] = judge(rows(PLAN, with_values(setup, never, back, never)), limits)
-    assert (once.met, once.measured) == (True, "0.5 s")
-    assert (mostly.met, mostly.measured) == (False, "never")
+    assert (once.passed, once.measured) == (True, 0.5)
+    assert (mostly.passed, with_unit(mostly.measured)) == (False, "never")
     assert judge(rows(PLAN, with_values(setup, {"rmse_deg": 1.0}, {"rmse_deg": 1.0})), limits) == []
 
 
 def test_a_repeat_that_failed_meets_no_target_it_was_asked_of() -> None:
     setup, good = Setup("tcp", "4g", "predict"), {"roughness": 1.0, "flow_s": 0.5}
     failed = [Cell(CellKey(setup, n), Status.FAILED, "the robot is not heard") for n in (2, 3)]
-    limits = [Limit("roughness", 3.0, "predict"), Limit("flow_s", 1.5), Limit("roughness", 3.0, "hold")]
+    limits = [
+        SetupLimit("roughness", 3.0, "predict"),
+        SetupLimit("flow_s", 1.5),
+        SetupLimit("roughness", 3.0, "hold"),
+    ]
     some = judge(rows(PLAN, with_values(setup, good) + failed), limits)
-    assert [(j.met, j.failed, j.measured) for j in some] == [(False, 2, "1"), (False, 2, "0.5 s")]
+    assert [(j.passed, j.measured) for j in some] == [(False, 1.0), (False, 0.5)]
+    assert {j.why for j in some} == {"worst: tcp with predict over 4g; 2 failed"}
     none = judge(rows(PLAN, failed), limits)
-    assert [(j.met, j.failed, j.measured) for j in none] == [(False, 2, "nothing"), (False, 2, "nothing")]
+    assert [(j.passed, j.why, j.measured) for j in none] == 2 * [(False, "2 failed", None)]
     without_outage = judge(rows(PLAN, failed), limits, outage=False)
-    assert [j.limit for j in without_outage] == limits[:1], (
+    assert [j.name for j in without_outage] == [limits[0].words], (
         "an outage's target is not asked of a trial without"
     )
     impossible = [Cell(CellKey(setup, 1), Status.IMPOSSIBLE, "does not cross hosts")]
@@ -151,13 +157,13 @@ def test_a_repeat_that_failed_meets_no_target_it_was_asked_of() -> None:
 
 def test_a_robot_that_never_followed_does_not_keep_a_limit_of_how_it_followed() -> None:
     repeats = with_values(Setup("tcp", "4g", "predict"), {"tracked": 0.0}, {"tracked": 0.0})
-    [judged] = judge(rows(PLAN, repeats), [Limit("roughness", 3.0, "predict", "4g")])
-    assert judged.met is False
+    [judged] = judge(rows(PLAN, repeats), [SetupLimit("roughness", 3.0, "predict", "4g")])
+    assert judged.passed is False
 
 
 def test_a_limit_of_another_network_is_not_asked() -> None:
     repeats = with_values(Setup("tcp", "lan", "predict"), {"rmse_over_hold": 0.9})
-    assert judge(rows(PLAN, repeats), [Limit("rmse_over_hold", 0.4, "predict", "4g")]) == []
+    assert judge(rows(PLAN, repeats), [SetupLimit("rmse_over_hold", 0.4, "predict", "4g")]) == []
 
 
 def test_a_task_that_asks_for_no_figure_of_ours_is_refused_by_name(tmp_path: Path) -> None:

@@ -9,19 +9,18 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from deploy.experiments.soak.events import Event, EventFile
-from deploy.experiments.soak.judge import Judged, judge
-from deploy.experiments.soak.plots import decimated, with_gaps
-from deploy.experiments.soak.report import write_report
-from deploy.experiments.soak.samples import SampleFile
-from deploy.experiments.soak.view import verdicts_table
-
-from .conftest import STORY
+from deploy.experiments.soak.files.events import Event, EventFile
+from deploy.experiments.soak.files.samples import SampleFile
+from deploy.experiments.soak.judge.judge import JudgedSoak, judge_soak
+from deploy.experiments.soak.report.plots import decimated, with_gaps
+from deploy.experiments.soak.report.write import write_report
+from deploy.measure.verdict import verdict_table
+from tests.deploy.experiments.soak.conftest import STORY
 
 LEFT_OUT = Event(0.0, "begin", {"transport": "tcp", "seed": 4, "left_out": {"outage": "no <network>"}})
 
 
-def judged(folder: Path, *more: Event) -> Judged:
+def judged(folder: Path, *more: Event) -> JudgedSoak:
     events, samples = EventFile(folder), SampleFile(folder, ["master", "slave", "soak"])
     for event in (LEFT_OUT, *STORY[1:], *more):
         events.add(event)
@@ -32,7 +31,7 @@ def judged(folder: Path, *more: Event) -> Judged:
         samples.add(row | ({"lost": 2.0} if second == 150 else {}))
     events.close()
     samples.close()
-    return judge(folder)
+    return judge_soak(folder)
 
 
 def test_the_json_says_all(tmp_path: Path) -> None:
@@ -41,11 +40,11 @@ def test_the_json_says_all(tmp_path: Path) -> None:
         tmp_path,
     )
     tree = json.loads((tmp_path / "report.json").read_text())
-    assert tree["verdict"] == "fail"
+    assert tree["verdict"] == "failed"
     assert tree["ended"] == "it ran its time"
     assert tree["options"]["left_out"] == {"outage": "no <network>"}
     [lost] = [c for c in tree["criteria"] if c["name"] == "lost, unexplained"]
-    assert (lost["status"], lost["figure"], lost["limit"]) == ("fail", 2.0, 0.0)
+    assert (lost["outcome"], lost["measured"], lost["limit"]) == ("failed", 2.0, 0.0)
     assert tree["faults"][0]["flow_s"] == 4.0
 
 
@@ -64,7 +63,7 @@ def test_the_table_has_a_row_a_criterion(tmp_path: Path) -> None:
     result = judged(tmp_path)
     console = Console(width=200, record=True)
     with console.capture() as shown:
-        console.print(verdicts_table(result.verdicts))
+        console.print(verdict_table("criterion", result.verdicts))
     words = " ".join(shown.get().split())
     assert all(verdict.name in words for verdict in result.verdicts)
 

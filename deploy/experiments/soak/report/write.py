@@ -8,11 +8,10 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from deploy.experiments.soak.judge import Judged
-from deploy.experiments.soak.options import in_words
-from deploy.experiments.soak.plots import draw
-from deploy.experiments.soak.view import number
-from deploy.measure.verdict import Status, Verdict
+from deploy.experiments.soak.files.options import in_words
+from deploy.experiments.soak.judge.judge import JudgedSoak
+from deploy.experiments.soak.report.plots import draw
+from deploy.measure.verdict import Outcome, Verdict, counts, with_unit
 from deploy.report.output import write_json, writing
 
 STYLE = """
@@ -25,10 +24,10 @@ td.n { text-align: right; white-space: nowrap } td.pass, td.fail, td.not { white
 .pass { color: #18794e } .fail { color: #c0392b; font-weight: bold } .not { color: #9a6700 }
 img { max-width: 100% }
 """
-_CLASS = {Status.PASS: "pass", Status.FAIL: "fail", Status.NOT_JUDGED: "not"}
+_CLASS = {Outcome.PASSED: "pass", Outcome.FAILED: "fail", Outcome.NOT_JUDGED: "not"}
 
 
-def write_report(judged: Judged, folder: Path) -> None:
+def write_report(judged: JudgedSoak, folder: Path) -> None:
     """Write `report.json`, `soak.png` and `report.html`. Raises TandemError where the disk refuses."""
     write_json(folder / "report.json", judged.tree())
     picture = draw(judged.seen)
@@ -38,7 +37,7 @@ def write_report(judged: Judged, folder: Path) -> None:
             path.write_bytes(content)
 
 
-def _page(judged: Judged, picture: bytes) -> str:
+def _page(judged: JudgedSoak, picture: bytes) -> str:
     tree = judged.tree()
     title = f"tandem soak, {in_words(tree['lasted_s'])}: {tree['verdict']}"
     image = base64.b64encode(picture).decode()
@@ -51,14 +50,13 @@ def _page(judged: Judged, picture: bytes) -> str:
     ])  # fmt: skip
 
 
-def _words(judged: Judged, tree: dict[str, Any]) -> str:
+def _words(judged: JudgedSoak, tree: dict[str, Any]) -> str:
     options = tree["options"]
     where = f"over {options.get('transport')}"
     if options.get("profile"):
         where += f" through the network {options['profile']}"
     left_out = "; ".join(f"{name}: {why}" for name, why in options.get("left_out", {}).items())
-    counts = ", ".join(f"{judged.count(status)} {status}" for status in Status)
-    words = f"{where}, seed {options.get('seed')}; {tree['ended']}. Criteria: {counts}."
+    words = f"{where}, seed {options.get('seed')}; {tree['ended']}. Criteria: {counts(judged.verdicts)}."
     return words + (f" Faults left out: {left_out}." if left_out else "")
 
 
@@ -67,8 +65,9 @@ def _verdicts(verdicts: Sequence[Verdict]) -> str:
     for v in verdicts:
         rows.append(
             f"<tr><td><span class=note>{escape(v.group)}</span> {escape(v.name)}"
-            f"<td class=n>{escape(number(v.figure, v.unit))}<td class=n>{escape(number(v.limit, v.unit))}"
-            f'<td class="{_CLASS[v.status]}">{v.status}<td class=note>{escape(v.note)}</tr>'
+            f"<td class=n>{escape(with_unit(v.measured, v.unit))}"
+            f"<td class=n>{escape(with_unit(v.limit, v.unit))}"
+            f'<td class="{_CLASS[v.outcome]}">{v.outcome}<td class=note>{escape(v.why)}</tr>'
         )
     return f"<table>{''.join(rows)}</table>"
 

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from deploy.experiments.soak.events import Event
-from deploy.experiments.soak.explain import Explained, explanation, unexplained_lefts
-from deploy.experiments.soak.windows import Window
-
-from .conftest import STORY, Make
+from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.judge.explain import Explained, explanation, unexplained_lefts
+from deploy.experiments.soak.judge.windows import Window
+from tests.deploy.experiments.soak.conftest import STORY, Make
 
 
 def explained(make: Make, *events: Event) -> Explained:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from common.quaternion import Array
-from deploy.experiments.soak.criteria import Seen
-from deploy.experiments.soak.events import of_kind
-from deploy.experiments.soak.samples import Samples
+from deploy.experiments.soak.files.events import of_kind
+from deploy.experiments.soak.files.samples import Samples
+from deploy.experiments.soak.judge.evidence import SoakEvidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +38,7 @@ FAULT_COLOURS = (
 )
 
 
-def draw(seen: Seen) -> bytes:
+def draw(seen: SoakEvidence) -> bytes:
     """A PNG of the whole soak."""
     import matplotlib
 
@@ -126,7 +126,7 @@ def _of_processes(panel: Axes, samples: Samples, what: str, words: str, unit_s: 
     panel.set_ylabel(words)
 
 
-def _faults(panels: list[Axes], seen: Seen, unit_s: float) -> None:
+def _faults(panels: list[Axes], seen: SoakEvidence, unit_s: float) -> None:
     faults = of_kind(seen.events, "fault")
     names = sorted({str(event.what["fault"]) for event in faults})
     colours = {name: FAULT_COLOURS[i % len(FAULT_COLOURS)] for i, name in enumerate(names)}

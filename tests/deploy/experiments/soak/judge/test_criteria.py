@@ -11,25 +11,26 @@ import pytest
 
 from common.config.load import load_config
 from deploy.examples.profiles import example
-from deploy.experiments.soak.criteria import AGE_MS, CRITERIA, HOLD_S, STANDS_S, STRAYS_DEG, TRACK_S
-from deploy.experiments.soak.events import Event
 from deploy.experiments.soak.faults import FAULTS, SUIT_LOST_S
+from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.judge.commands import AGE_MS
+from deploy.experiments.soak.judge.evidence import of_enough
+from deploy.experiments.soak.judge.judge import WRONG, verdicts_of
+from deploy.experiments.soak.judge.robot import HOLD_S, STANDS_S, STRAYS_DEG, TRACK_S
+from deploy.experiments.soak.judge.windows import AFTER_S
 from deploy.experiments.soak.link import nature
-from deploy.experiments.soak.windows import AFTER_S
-from deploy.measure.verdict import Status, Verdict, at_most, of_enough
+from deploy.measure.verdict import Outcome, Verdict, at_most
 from deploy.sim.network import load_profile
 from master.config import MasterConfig
-
-from .conftest import RECOVERED, STORY, Make
+from tests.deploy.experiments.soak.conftest import RECOVERED, STORY, Make
 
 
 def judged(seen: Any) -> dict[str, Verdict]:
-    verdicts = [verdict for criterion in CRITERIA for verdict in criterion(seen)]
-    return {f"{v.group}: {v.name}": v for v in verdicts}
+    return {f"{v.group}: {v.name}": v for v in verdicts_of(seen, WRONG)}
 
 
 def failing(seen: Any) -> set[str]:
-    return {name for name, verdict in judged(seen).items() if verdict.status is Status.FAIL}
+    return {name for name, verdict in judged(seen).items() if verdict.outcome is Outcome.FAILED}
 
 
 def at(second: float, value: float = 1.0) -> Any:
@@ -95,22 +96,25 @@ def test_a_datagram_that_the_network_lost_explains_one_command(
 def test_where_little_is_left_unexplained_that_nothing_was_lost_is_no_pass(
     make: Make, every_s: int, judges: bool
 ) -> None:
-    def status(name: str, **columns: Any) -> Status:
-        return judged(make(**columns))[name].status
+    def outcome(name: str, **columns: Any) -> Outcome:
+        return judged(make(**columns))[name].outcome
 
     lossy = lambda at_s: np.where(at_s % every_s == 0, 1.0, 0.0)  # noqa: E731
-    as_judged = Status.PASS if judges else Status.NOT_JUDGED
-    assert status("commands: out of order, unexplained", link_lost=lossy) is as_judged
-    every_second = status("guard: holds that nothing explains", link_lost=1.0)
-    assert (every_second, status("guard: holds that nothing explains")) == (Status.NOT_JUDGED, Status.PASS)
+    as_judged = Outcome.PASSED if judges else Outcome.NOT_JUDGED
+    assert outcome("commands: out of order, unexplained", link_lost=lossy) is as_judged
+    every_second = outcome("guard: holds that nothing explains", link_lost=1.0)
+    assert (every_second, outcome("guard: holds that nothing explains")) == (
+        Outcome.NOT_JUDGED,
+        Outcome.PASSED,
+    )
 
 
-@pytest.mark.parametrize(("share", "status"), [(0.2, Status.PASS), (0.199, Status.NOT_JUDGED)])
+@pytest.mark.parametrize(("share", "outcome"), [(0.2, Outcome.PASSED), (0.199, Outcome.NOT_JUDGED)])
 def test_a_fifth_left_unexplained_is_enough_to_pass_and_none_is_needed_to_fail(
-    share: float, status: Status
+    share: float, outcome: Outcome
 ) -> None:
-    assert of_enough(at_most("commands", "lost", 0.0, 0.0), share).status is status
-    assert of_enough(at_most("commands", "lost", 1.0, 0.0), share).status is Status.FAIL
+    assert of_enough(at_most("lost", 0.0, 0.0), share).outcome is outcome
+    assert of_enough(at_most("lost", 1.0, 0.0), share).outcome is Outcome.FAILED
 
 
 def test_a_network_s_delay_is_allowed_for(make: Make) -> None:
@@ -227,8 +231,8 @@ def test_an_engagement_that_led_to_nothing_excuses_no_later_move(make: Make) -> 
 
 
 def test_how_much_of_all_is_explained_stands_beside_the_figure(make: Make) -> None:
-    note = judged(make(lost=at(103)))["commands: lost, unexplained"].note
-    assert note.startswith("1 in all; 7262 of 7500 were sent outside of what explains")
+    note = judged(make(lost=at(103)))["commands: lost, unexplained"].why
+    assert note.startswith("1 in all; 7262 of 7500 were sent outside of faults and stalls")
 
 
 def test_a_joint_that_moves_while_the_robot_holds_fails(make: Make) -> None:
@@ -253,7 +257,7 @@ def test_missed_ticks_are_judged_by_their_share_without_those_of_the_host(make: 
     # 491 rows outside of windows, 200 ticks each: 98 is just below one in a thousand
     name = "loops: ticks the master missed, unexplained"
     ticks = judged(make())[name]
-    assert ticks.figure == 0.0
+    assert ticks.measured == 0.0
     assert failing(make(master_missed=at(50, 50.0))) == set()
     assert failing(make(master_missed=at(50, 500.0))) == {name}
     assert failing(make(master_missed=at(50, 500.0), host_still_ms=at(50, 12.0))) == set()
@@ -307,9 +311,9 @@ def test_how_it_ended(make: Make, what: dict[str, Any], wrong: set[str]) -> None
 def test_without_faults_and_commands_nothing_is_claimed(make: Make) -> None:
     seen = make(events=STORY[:6], sent=0.0)
     verdicts = judged(seen)
-    assert verdicts["commands: lost, unexplained"].status is Status.NOT_JUDGED
-    assert verdicts["guard: holds on a fault, the slowest"].status is Status.NOT_JUDGED
-    failed_ = [v.name for v in verdicts.values() if v.status is Status.FAIL]
+    assert verdicts["commands: lost, unexplained"].outcome is Outcome.NOT_JUDGED
+    assert verdicts["guard: holds on a fault, the slowest"].outcome is Outcome.NOT_JUDGED
+    failed_ = [v.name for v in verdicts.values() if v.outcome is Outcome.FAILED]
     assert failed_ == ["sides that saw none at all"]
 
 
@@ -325,22 +329,22 @@ def test_a_soak_that_saw_no_command_at_all_fails(make: Make, column: str) -> Non
 def test_both_sides_still_for_5_s_fail_though_no_number_is_missing(make: Make) -> None:
     seen = make(sent=lambda at_s: np.where((at_s > 300) & (at_s <= 305), 0.0, 12.5), gone=at(306.0, 62.0))
     verdict = judged(seen)["commands: due and never came, unexplained"]
-    assert (verdict.status, verdict.figure) == (Status.FAIL, 62.0)
-    assert judged(seen)["commands: lost, unexplained"].status is not Status.FAIL
+    assert (verdict.outcome, verdict.measured) == (Outcome.FAILED, 62.0)
+    assert judged(seen)["commands: lost, unexplained"].outcome is not Outcome.FAILED
 
 
 def test_that_the_robot_left_off_explains_no_command_that_was_due(make: Make) -> None:
     left = Event(305.5, "left", {"guard": "hold", "reason": "no command"})
     seen = make(events=(*STORY, left), gone=at(306.0, 62.0))
-    assert judged(seen)["commands: due and never came, unexplained"].status is Status.FAIL
-    assert judged(make(events=(*STORY, left), lost=at(306.0)))["commands: lost, unexplained"].figure == 0.0
+    assert judged(seen)["commands: due and never came, unexplained"].outcome is Outcome.FAILED
+    assert judged(make(events=(*STORY, left), lost=at(306.0)))["commands: lost, unexplained"].measured == 0.0
     in_a_fault = make(gone=at(104.0, 62.0))
-    assert judged(in_a_fault)["commands: due and never came, unexplained"].status is Status.PASS
+    assert judged(in_a_fault)["commands: due and never came, unexplained"].outcome is Outcome.PASSED
 
 
 def test_what_was_due_is_not_judged_where_the_robot_does_not_tell(make: Make) -> None:
     verdict = judged(make(due=np.nan, gone=np.nan))["commands: due and never came, unexplained"]
-    assert (verdict.status, verdict.figure) == (Status.NOT_JUDGED, None)
+    assert (verdict.outcome, verdict.measured) == (Outcome.NOT_JUDGED, None)
 
 
 @pytest.mark.parametrize(
@@ -353,22 +357,22 @@ def test_what_was_due_is_not_judged_where_the_robot_does_not_tell(make: Make) ->
     ],
 )
 def test_what_nobody_told_is_not_judged_and_no_zero(make: Make, column: str, name: str) -> None:
-    assert judged(make())[name].status is Status.PASS
+    assert judged(make())[name].outcome is Outcome.PASSED
     verdict = judged(make(**{column: np.nan}))[name]
-    assert (verdict.status, verdict.figure) == (Status.NOT_JUDGED, None)
+    assert (verdict.outcome, verdict.measured) == (Outcome.NOT_JUDGED, None)
 
 
 @pytest.mark.parametrize(
-    ("unknown", "status"), [(0, Status.PASS), (0.04, Status.PASS), (0.06, Status.NOT_JUDGED)]
+    ("unknown", "outcome"), [(0, Outcome.PASSED), (0.04, Outcome.PASSED), (0.06, Outcome.NOT_JUDGED)]
 )
 def test_an_age_that_was_known_for_less_than_95_percent_is_no_pass(
-    make: Make, unknown: float, status: Status
+    make: Make, unknown: float, outcome: Outcome
 ) -> None:
     gone = round(600 * unknown)
     seen = make(age_max_ms=lambda at_s: np.where(abs(at_s - 300.5) < 0.5 * gone, np.nan, 20.0))
     verdict = judged(seen)["commands: oldest that was acted on"]
-    assert (verdict.status, verdict.figure) == (status, 20.0 if status is Status.PASS else None)
+    assert (verdict.outcome, verdict.measured) == (outcome, 20.0 if outcome is Outcome.PASSED else None)
     late = make(
         events=(), age_max_ms=lambda at_s: np.where(abs(at_s - 300.5) < 0.5 * gone, np.nan, AGE_MS + 1.0)
     )
-    assert judged(late)["commands: oldest that was acted on"].status is Status.FAIL
+    assert judged(late)["commands: oldest that was acted on"].outcome is Outcome.FAILED

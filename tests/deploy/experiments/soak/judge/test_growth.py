@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from deploy.experiments.soak.criteria import Seen
-from deploy.experiments.soak.events import Event
-from deploy.experiments.soak.growth import (
+from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.judge.evidence import SoakEvidence
+from deploy.experiments.soak.judge.growth import (
     DRIFT_MS_H,
     MORE,
     RSS_MB_H,
@@ -19,9 +19,8 @@ from deploy.experiments.soak.growth import (
     in_use,
     memory,
 )
-from deploy.measure.verdict import Status, Verdict
-
-from .conftest import FAULT, RECOVERED, STORY, Make
+from deploy.measure.verdict import Outcome, Verdict
+from tests.deploy.experiments.soak.conftest import FAULT, RECOVERED, STORY, Make
 
 LONG = 3600
 
@@ -31,7 +30,7 @@ def of(verdicts: list[Verdict], words: str) -> Verdict:
     return found
 
 
-def rss(seen: Seen) -> Verdict:
+def rss(seen: SoakEvidence) -> Verdict:
     return of(memory(seen), "master's memory")
 
 
@@ -41,10 +40,10 @@ def growing(mb_h: float, noise: float = 0.02) -> object:
 
 
 def test_memory_that_stays_passes_and_a_leak_fails(make: Make) -> None:
-    assert rss(make(LONG, master_rss_mb=growing(0.0))).status is Status.PASS
+    assert rss(make(LONG, master_rss_mb=growing(0.0))).outcome is Outcome.PASSED
     leak = rss(make(LONG, master_rss_mb=growing(3.0 * RSS_MB_H)))
-    assert leak.status is Status.FAIL
-    assert leak.figure == pytest.approx(3.0 * RSS_MB_H, rel=0.1)
+    assert leak.outcome is Outcome.FAILED
+    assert leak.measured == pytest.approx(3.0 * RSS_MB_H, rel=0.1)
 
 
 def test_the_first_minutes_of_a_life_are_its_own_affair(make: Make) -> None:
@@ -52,7 +51,7 @@ def test_the_first_minutes_of_a_life_are_its_own_affair(make: Make) -> None:
         out: Array = 100.0 - 30.0 * np.exp(-at_s / 15.0)
         return out
 
-    assert rss(make(LONG, master_rss_mb=warming)).status is Status.PASS
+    assert rss(make(LONG, master_rss_mb=warming)).outcome is Outcome.PASSED
 
 
 def test_another_life_s_level_is_no_growth(make: Make) -> None:
@@ -60,7 +59,7 @@ def test_another_life_s_level_is_no_growth(make: Make) -> None:
         "master_life": lambda at_s: 1.0 + at_s // 900,
         "master_rss_mb": lambda at_s: 100.0 + 10.0 * (at_s // 900) + 0.01 * np.sin(at_s),
     }
-    assert rss(make(LONG, **lives)).status is Status.PASS
+    assert rss(make(LONG, **lives)).outcome is Outcome.PASSED
 
 
 def test_a_leak_in_every_life_is_found_though_each_begins_anew(make: Make) -> None:
@@ -68,7 +67,7 @@ def test_a_leak_in_every_life_is_found_though_each_begins_anew(make: Make) -> No
         "master_life": lambda at_s: 1.0 + at_s // 900,
         "master_rss_mb": lambda at_s: 100.0 + 10.0 * (at_s % 900) / 3600.0 + 0.01 * np.sin(at_s),
     }
-    assert rss(make(LONG, **lives)).status is Status.FAIL
+    assert rss(make(LONG, **lives)).outcome is Outcome.FAILED
 
 
 def many_faults(seconds: int, every_s: int) -> tuple[Event, ...]:
@@ -84,32 +83,32 @@ def test_what_each_fault_costs_is_told_apart_from_what_grows_with_time(make: Mak
     def stepping(at_s: Array) -> Array:
         return 100.0 + 0.2 * np.maximum(0.0, (at_s - 100.0) // 100)
 
-    def between(seen: Seen) -> Verdict:
+    def between(seen: SoakEvidence) -> Verdict:
         return of(memory(seen), "master grows between faults")
 
     steps = make(LONG, events, master_rss_mb=stepping)
-    assert rss(steps).status is Status.FAIL
-    assert between(steps).status is Status.PASS
+    assert rss(steps).outcome is Outcome.FAILED
+    assert between(steps).outcome is Outcome.PASSED
     leak = between(make(LONG, events, master_rss_mb=growing(3.0 * RSS_MB_H, noise=0.001)))
-    assert leak.status is Status.FAIL
-    assert leak.figure == pytest.approx(3.0 * RSS_MB_H, rel=0.1)
+    assert leak.outcome is Outcome.FAILED
+    assert leak.measured == pytest.approx(3.0 * RSS_MB_H, rel=0.1)
     assert not [v for v in memory(make(LONG, STORY[:6])) if "between" in v.name]
 
 
 def test_short_lives_are_not_judged_and_it_is_said(make: Make) -> None:
     short = rss(make(int(WARM_UP_S + SHORTEST_S) - 10))
-    assert short.status is Status.NOT_JUDGED
-    assert "too short" in short.note
-    assert rss(make(int(WARM_UP_S + SHORTEST_S) + 20)).status is Status.PASS
+    assert short.outcome is Outcome.NOT_JUDGED
+    assert "too short" in short.why
+    assert rss(make(int(WARM_UP_S + SHORTEST_S) + 20)).outcome is Outcome.PASSED
 
 
 def test_drift_counts_only_outside_of_faults(make: Make) -> None:
     def slow_in_the_fault(at_s: Array) -> Array:
         return np.where((at_s >= 100.0) & (at_s <= 111.0), 80.0, 0.5)
 
-    assert of(drift(make(LONG, one_way_p50_ms=slow_in_the_fault)), "one way").status is Status.PASS
+    assert of(drift(make(LONG, one_way_p50_ms=slow_in_the_fault)), "one way").outcome is Outcome.PASSED
     drifting = make(LONG, one_way_p50_ms=lambda at_s: 0.5 + 4.0 * DRIFT_MS_H * at_s / 3600.0)
-    assert of(drift(drifting), "one way").status is Status.FAIL
+    assert of(drift(drifting), "one way").outcome is Outcome.FAILED
 
 
 def test_each_pair_of_lives_has_its_own_offset_between_the_clocks(make: Make) -> None:
@@ -117,11 +116,11 @@ def test_each_pair_of_lives_has_its_own_offset_between_the_clocks(make: Make) ->
         "master_life": lambda at_s: 1.0 + at_s // 1800,
         "one_way_p50_ms": lambda at_s: 0.5 + 0.3 * (at_s // 1800) + 0.001 * np.sin(at_s),
     }
-    assert of(drift(make(LONG, **lives)), "one way").status is Status.PASS
+    assert of(drift(make(LONG, **lives)), "one way").outcome is Outcome.PASSED
 
 
 def test_what_was_not_measured_is_not_judged(make: Make) -> None:
-    assert of(drift(make(LONG)), "round trip").status is Status.NOT_JUDGED
+    assert of(drift(make(LONG)), "round trip").outcome is Outcome.NOT_JUDGED
 
 
 def test_descriptors_are_held_against_those_after_the_warm_up(make: Make) -> None:
@@ -129,9 +128,9 @@ def test_descriptors_are_held_against_those_after_the_warm_up(make: Make) -> Non
         return lambda at_s: 20.0 + gained * (at_s > 400.0)
 
     fds = "master's descriptors"
-    assert of(handles(make(600, master_fds=more(MORE))), fds).status is Status.PASS
-    assert of(handles(make(600, master_fds=more(MORE + 1.0))), fds).status is Status.FAIL
-    assert of(handles(make(200, master_fds=more(0.0))), fds).status is Status.NOT_JUDGED
+    assert of(handles(make(600, master_fds=more(MORE))), fds).outcome is Outcome.PASSED
+    assert of(handles(make(600, master_fds=more(MORE + 1.0))), fds).outcome is Outcome.FAILED
+    assert of(handles(make(200, master_fds=more(0.0))), fds).outcome is Outcome.NOT_JUDGED
 
 
 def test_a_leak_of_0_6_mb_an_hour_is_failed_by_half_an_hour_although_resident_memory_hides_it(
@@ -139,10 +138,10 @@ def test_a_leak_of_0_6_mb_an_hour_is_failed_by_half_an_hour_although_resident_me
 ) -> None:
     half = 1800
     hidden = make(half, master_rss_mb=growing(0.0), master_in_use_mb=growing(0.6, noise=0.01))
-    assert rss(hidden).status is Status.PASS, "the reserve that was touched at the start takes it up"
-    assert of(in_use(hidden), "master's bytes in use").status is Status.FAIL
+    assert rss(hidden).outcome is Outcome.PASSED, "the reserve that was touched at the start takes it up"
+    assert of(in_use(hidden), "master's bytes in use").outcome is Outcome.FAILED
     # objects of 64 bytes that Python itself allocates: C counts none of them
     blocks = make(half, slave_blocks=lambda at_s: 3e5 + 0.6e6 / 64 * at_s / 3600.0)
-    assert of(in_use(blocks), "slave's objects in use").status is Status.FAIL
-    assert of(in_use(make(half)), "slave's objects in use").status is Status.PASS
-    assert of(in_use(make(half, slave_blocks=np.nan)), "slave's objects").status is Status.NOT_JUDGED
+    assert of(in_use(blocks), "slave's objects in use").outcome is Outcome.FAILED
+    assert of(in_use(make(half)), "slave's objects in use").outcome is Outcome.PASSED
+    assert of(in_use(make(half, slave_blocks=np.nan)), "slave's objects").outcome is Outcome.NOT_JUDGED

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from common.errors import TandemError
-from deploy.experiments.soak.events import Event, EventFile, of_kind, read_events
-from deploy.experiments.soak.log import SHOWN, SoakLog
-from deploy.experiments.soak.samples import SampleFile, header, read_samples
+from deploy.experiments.soak.files.events import Event, EventFile, of_kind, read_events
+from deploy.experiments.soak.files.log import SHOWN, SoakLog
+from deploy.experiments.soak.files.samples import SampleFile, header, read_samples
 
 PROCESSES = ["master", "soak"]
 

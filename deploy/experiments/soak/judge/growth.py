@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from common.quaternion import Array
 from common.wire.messages import Mask
-from deploy.experiments.soak.criteria import Seen
-from deploy.experiments.soak.events import of_kind
+from deploy.experiments.soak.files.events import of_kind
+from deploy.experiments.soak.judge.evidence import SoakEvidence
 from deploy.measure.trend import Slope, in_bins, slope
-from deploy.measure.verdict import Status, Verdict, at_most, not_above
+from deploy.measure.verdict import Outcome, Verdict, at_most
 
 WARM_UP_S = 120.0
 """A process takes what it needs for good in its first minutes; only after that growth means anything."""
@@ -37,11 +39,11 @@ MORE = 3.0
 """Descriptors or threads above those after the warm-up: a question under way may hold a few."""
 
 
-def drift(seen: Seen) -> list[Verdict]:
+def drift(seen: SoakEvidence) -> list[Verdict]:
     """Latency over time, outside of what is explained; each pair of lives of master and slave by itself."""
     lives = _lives(seen, "master") * 1000 + _lives(seen, "slave")
     return [
-        _not_above(seen, "latency", f"{name} drifts", column, lives, seen.quiet, limit, "ms/h")
+        _not_above(seen, f"{name} drifts", column, lives, seen.quiet, limit, "ms/h")
         for name, column, limit in (
             ("one way, median", "one_way_p50_ms", DRIFT_MS_H),
             ("round trip, mean", "round_trip_ms", DRIFT_MS_H),
@@ -51,7 +53,7 @@ def drift(seen: Seen) -> list[Verdict]:
     ]
 
 
-def memory(seen: Seen) -> list[Verdict]:
+def memory(seen: SoakEvidence) -> list[Verdict]:
     """Resident memory of each process: over all that happens, and between the faults alone.
 
     The first faults of a life touch stacks and code that nothing else does; what grows with time is a leak.
@@ -62,17 +64,15 @@ def memory(seen: Seen) -> list[Verdict]:
     for name in seen.samples.processes:
         column, lives = f"{name}_rss_mb", _lives(seen, name)
         verdicts.append(
-            _not_above(seen, "memory", f"{name}'s memory grows", column, lives, everything, RSS_MB_H, "MB/h")
+            _not_above(seen, f"{name}'s memory grows", column, lives, everything, RSS_MB_H, "MB/h")
         )
         if of_kind(seen.events, "fault"):
             words = f"{name} grows between faults"
-            verdicts.append(
-                _not_above(seen, "memory", words, column, lives, seen.quiet, RSS_MB_H, "MB/h", parts)
-            )
+            verdicts.append(_not_above(seen, words, column, lives, seen.quiet, RSS_MB_H, "MB/h", parts))
     return verdicts
 
 
-def in_use(seen: Seen) -> list[Verdict]:
+def in_use(seen: SoakEvidence) -> list[Verdict]:
     """Memory that master and slave hold on to: bytes that C allocated, and objects of Python."""
     everything = np.ones(len(seen.samples), np.bool_)
     verdicts = []
@@ -83,20 +83,17 @@ def in_use(seen: Seen) -> list[Verdict]:
             ("objects in use", f"{name}_blocks", BLOCKS_H, "/h"),
         ):
             title = f"{name}'s {words} grow"
-            verdicts.append(_not_above(seen, "memory", title, column, lives, everything, limit, unit))
+            verdicts.append(_not_above(seen, title, column, lives, everything, limit, unit))
     return verdicts
 
 
-def handles(seen: Seen) -> list[Verdict]:
+def handles(seen: SoakEvidence) -> list[Verdict]:
     """File descriptors and threads at the end of each life against those after its warm-up."""
     return [
         _more(seen, f"{name}'s {words} grow", f"{name}_{column}", _lives(seen, name))
         for name in seen.samples.processes
         for column, words in (("fds", "descriptors"), ("threads", "threads"))
     ]
-
-
-GROWTH = (drift, memory, in_use, handles)
 
 
 def stretches(
@@ -118,13 +115,13 @@ def stretches(
     return out
 
 
-def _lives(seen: Seen, name: str) -> Array:
+def _lives(seen: SoakEvidence, name: str) -> Array:
     """(N,) number of the life, NaN where it does not run."""
     return seen.samples[f"{name}_life"]
 
 
 def _slope(
-    seen: Seen, column: str, lives: Array, use: Mask, parts: Array | None = None
+    seen: SoakEvidence, column: str, lives: Array, use: Mask, parts: Array | None = None
 ) -> tuple[Slope | None, float]:
     """The slope per hour, and how long the longest life was after its warm-up, s; of parts: all together."""
     at_s = seen.samples.at_s
@@ -136,19 +133,40 @@ def _slope(
 
 
 def _not_above(
-    seen: Seen, group: str, name: str, column: str, lives: Array, use: Mask, limit: float, unit: str,
+    seen: SoakEvidence,
+    name: str,
+    column: str,
+    lives: Array,
+    use: Mask,
+    limit: float,
+    unit: str,
     parts: Array | None = None,
-) -> Verdict:  # fmt: skip
+) -> Verdict:
     found, judged_s = _slope(seen, column, lives, use, parts)
     what = "one life" if parts is None else "all stretches between faults"
     too_short = (
         f"too short: {judged_s:.0f} s of {what} after {WARM_UP_S:.0f} s of warm-up, "
         f"at least {SHORTEST_S:.0f} s are needed"
     )
-    return not_above(group, name, found, limit, unit, "", too_short)
+    return not_above(Verdict(name, Outcome.NOT_JUDGED, None, limit, unit, too_short), found)
 
 
-def _more(seen: Seen, name: str, column: str, lives: Array) -> Verdict:
+def not_above(verdict: Verdict, slope: Slope | None) -> Verdict:
+    """Whether a slope is above the verdict's limit, below which growth counts as nothing.
+
+    Passed: with 95 % confidence it is not. Failed: with that confidence it is. Else it is not judged.
+    """
+    limit = verdict.limit
+    if slope is None or limit is None:
+        return verdict
+    why = f"{slope.low:+.3g} to {slope.high:+.3g} with 95 % confidence, {slope.points} points"
+    if slope.low <= limit < slope.high:
+        return replace(verdict, measured=slope.value, why=f"too short to tell: {why}")
+    outcome = Outcome.PASSED if slope.high <= limit else Outcome.FAILED
+    return replace(verdict, outcome=outcome, measured=slope.value, why=why)
+
+
+def _more(seen: SoakEvidence, name: str, column: str, lives: Array) -> Verdict:
     """The most that any life had more in its end than after its warm-up."""
     at_s, values = seen.samples.at_s, seen.samples[column]
     gains = []
@@ -163,6 +181,6 @@ def _more(seen: Seen, name: str, column: str, lives: Array) -> Verdict:
             gains.append((float(np.median(last) - np.median(first)), float(np.median(first))))
     if not gains:
         words = f"too short: no life of {2.0 * WARM_UP_S:.0f} s"
-        return Verdict("handles", name, Status.NOT_JUDGED, None, MORE, "", words)
+        return Verdict(name, Outcome.NOT_JUDGED, limit=MORE, why=words)
     gained, first_had = max(gains)
-    return at_most("handles", name, gained, MORE, note=f"from {first_had:.0f}")
+    return at_most(name, gained, MORE, why=f"from {first_had:.0f}")

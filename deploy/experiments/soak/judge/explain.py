@@ -10,9 +10,9 @@ import numpy as np
 
 from common.quaternion import Array
 from common.wire.messages import Mask
-from deploy.experiments.soak.events import Event, of_kind
-from deploy.experiments.soak.samples import Samples
-from deploy.experiments.soak.windows import Window, explained, reason
+from deploy.experiments.soak.files.events import Event, of_kind
+from deploy.experiments.soak.files.samples import Samples
+from deploy.experiments.soak.judge.windows import Window, explained, reason
 from deploy.harness.excuse import STILL_S
 
 LOST_WITHIN_S = 1.5

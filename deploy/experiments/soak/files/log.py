@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from common.clock import Clock, monotonic_ns, to_s
-from deploy.experiments.soak.events import Event, EventFile
-from deploy.experiments.soak.samples import SampleFile
+from deploy.experiments.soak.files.events import Event, EventFile
+from deploy.experiments.soak.files.samples import SampleFile
 
 SHOWN = 8
 """Newest events that are kept for the screen."""

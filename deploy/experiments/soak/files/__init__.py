@@ -1,0 +1,1 @@
+"""The files that a soak writes while it runs: its options, events and samples."""

@@ -1,0 +1,1 @@
+"""From the two files of a soak to its verdicts. Pure."""

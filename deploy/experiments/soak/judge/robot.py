@@ -1,0 +1,137 @@
+"""The robot holds on a fault, stands, never moves unasked, and follows again after it. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from deploy.experiments.soak.files.events import Event, of_kind
+from deploy.experiments.soak.judge.evidence import SoakEvidence, of_enough
+from deploy.experiments.soak.judge.explain import unexplained_lefts
+from deploy.measure.verdict import Outcome, Verdict, at_most
+
+HOLD_S = 0.2 + 0.08
+"""The guard's time-out for commands, two states of 20 ms, and 40 ms for the observer."""
+STANDS_S = 0.21 + 0.3 + 0.04
+"""As in the fault matrix, from the last state before the fault."""
+STRAYS_DEG = 0.9
+"""More than a standing robot is shaken by; see deploy/experiments/soak/motion.py."""
+TRACK_S = 15.0
+"""`guard.align_timeout_s`."""
+MOVES_WITHIN_S, ANSWERED_WITHIN_S = 2.0, 1.0
+"""An engaged robot is seen to move so soon; and so late after that comes the answer to its engagement."""
+MOVING = ("align", "track")
+
+
+def guard(seen: SoakEvidence) -> list[Verdict]:
+    """It holds on every fault that asks for it, stands, and never moves by itself."""
+    must_hold = [what for what in seen.recovered if what["holds"] and what["heard"]]
+    way_s = seen.network.get("way_s", 0.0)
+    held, stood = _less_stalls(seen, must_hold, "held_s"), _less_stalls(seen, must_hold, "stands_s")
+    holds = unexplained_lefts(seen.events, seen.explained)
+    explained_share = np.mean(seen.explained.accounted(seen.samples.at_s)) if len(seen.samples) else 0.0
+    strayed = seen.samples["strayed_deg"]
+    farthest = None if np.isnan(strayed).all() else float(np.nanmax(strayed))
+    stray_why = "farthest joint, 0.7 s after it held and later"
+    return [
+        slowest("holds on a fault, the slowest", held, "held_s", HOLD_S + way_s),
+        slowest("stands after a fault, the slowest", stood, "stands_s", STANDS_S + way_s),
+        of_enough(
+            at_most("holds that nothing explains", float(len(holds)), 0.0, why=_reasons(holds)),
+            1.0 - float(explained_share),
+        ),
+        _needless_holds(seen),
+        _unasked_moves(seen),
+        at_most("moved while it held", farthest, STRAYS_DEG, "°", why=stray_why),
+    ]
+
+
+def _needless_holds(seen: SoakEvidence) -> Verdict:
+    needless = [
+        what
+        for what in seen.recovered
+        if not what["holds"]
+        and what.get("held_s") is not None
+        and not seen.explained.accounts_for_hold(what["begun_s"] + what["held_s"])
+    ]
+    why = ", ".join(sorted({what["fault"] for what in needless}))
+    return at_most("holds on a fault that asks for none", float(len(needless)), 0.0, why=why)
+
+
+def _unasked_moves(seen: SoakEvidence) -> Verdict:
+    """Moves without an engagement of their own. An engagement that led to none serves for no later move."""
+    engaged_s = [e.at_s for e in of_kind(seen.events, "engage") if e.what.get("done")]
+    moved_s = [
+        e.at_s
+        for e in of_kind(seen.events, "guard")
+        if e.what.get("to") in MOVING and e.what.get("from") not in MOVING
+    ]
+    why = f"engaged {len(engaged_s)} times, began to move {len(moved_s)} times"
+    unasked = 0
+    for at_s in moved_s:
+        own = next((t for t in engaged_s if at_s - MOVES_WITHIN_S <= t <= at_s + ANSWERED_WITHIN_S), None)
+        if own is None:
+            unasked += 1
+        else:
+            engaged_s.remove(own)
+    return at_most("began to move without being engaged", float(unasked), 0.0, why=why)
+
+
+def recovery(seen: SoakEvidence) -> list[Verdict]:
+    """How soon commands flow and the robot follows again, after each kind of fault."""
+    done = seen.recovered
+    begun = len(of_kind(seen.events, "fault"))
+    lost = [what for what in done if not what["done"]]
+    failed = [f"{what['fault']}: {what['failed']}" for what in done if what.get("failed")]
+    under_way = " (one under way when the soak ended)" if begun > len(done) else ""
+    verdicts = [
+        at_most(
+            "faults after which it did not follow again",
+            float(len(lost)) if done else None,
+            0.0,
+            why=f"of {len(done)}{under_way}" if begun else "there was no fault",
+        ),
+        at_most("faults that could not be brought about", float(len(failed)), 0.0, why="; ".join(failed[:3])),
+    ]
+    limits = {what["fault"]: what["flow_limit_s"] for what in done if what["flow_limit_s"] is not None}
+    for fault, limit_s in sorted(limits.items()):
+        like = [what for what in done if what["fault"] == fault]
+        verdicts.append(slowest(f"commands flow again after {fault}", like, "flow_s", limit_s))
+    again = [what for what in done if what.get("track_s") is not None]
+    return [*verdicts, slowest("follows again once engaged", again, "track_s", TRACK_S)]
+
+
+def _less_stalls(
+    seen: SoakEvidence, faults: Sequence[Mapping[str, Any]], key: str
+) -> list[Mapping[str, Any]]:
+    """The faults with a time that starts when the master can see the fault, without the host's stalls."""
+    own: list[Mapping[str, Any]] = []
+    for what in faults:
+        took_s, begun_s = what.get(key), what["begun_s"]
+        if took_s is not None:
+            still_s = seen.explained.still_s(begun_s, begun_s + took_s)
+            took_s = round(took_s - still_s - what.get("notices_s", 0.0), 3)
+        own.append({**what, key: took_s})
+    return own
+
+
+def slowest(name: str, faults: Sequence[Mapping[str, Any]], key: str, limit_s: float) -> Verdict:
+    """The longest time. A missing one fails: what should have come did not."""
+    if not faults:
+        return Verdict(name, Outcome.NOT_JUDGED, limit=limit_s, unit="s", why="no such fault")
+    missing = [what["fault"] for what in faults if what.get(key) is None and "fault" in what]
+    if missing:
+        why = f"never after: {', '.join(missing)}"
+        return Verdict(name, Outcome.FAILED, limit=limit_s, unit="s", why=why)
+    worst = max(faults, key=lambda what: what[key])
+    values = sorted(what[key] for what in faults)
+    why = f"of {len(faults)}, median {values[len(values) // 2]:.3g}"
+    if "fault" in worst:
+        why += f"; {worst['fault']}"
+    return at_most(name, float(worst[key]), limit_s, "s", why=why)
+
+
+def _reasons(lefts: Sequence[Event]) -> str:
+    return "; ".join(f"{e.at_s:.0f} s: {e.what.get('guard')}: {e.what.get('reason')}" for e in lefts[:3])

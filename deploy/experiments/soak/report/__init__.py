@@ -1,0 +1,1 @@
+"""The report of a soak: JSON, one HTML page and its plot."""
