@@ -13,7 +13,9 @@ from common.latency.durations import Durations
 from common.link import Session, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
-from common.metrics.published import MasterMetrics, Ticks, to_tree
+from common.metrics.master import MasterMetrics
+from common.metrics.parts import Ticks
+from common.metrics.tree import to_tree
 from common.process.heap import freeze_heap, heap_in_use, reserve_heap
 from common.process.launch import WriteFigures
 from common.process.notify import Notifier, open_notifier

@@ -6,7 +6,7 @@ from collections import deque
 
 from common.clock import to_ns
 from common.errors import CodecError
-from common.metrics.published import VideoReceived
+from common.metrics.master import VideoReceived
 from common.wire.video import VideoFrame, decode_frame
 
 _SILENT_S = 2.0

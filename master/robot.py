@@ -13,7 +13,7 @@ from common.clock import monotonic_ns, to_ns
 from common.clock_sync import MasterExchange
 from common.errors import CodecError, LinkError
 from common.link import Link
-from common.metrics.published import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
+from common.metrics.master import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
 from common.process.pacing import TickGrid
 from common.process.throttle import Throttle
 from common.process.ticker import ticks

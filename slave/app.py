@@ -13,7 +13,9 @@ from common.clock import monotonic_ns, to_ms
 from common.link import Link, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
-from common.metrics.published import OffsetMetrics, SlaveMetrics, Ticks, to_tree
+from common.metrics.parts import Ticks
+from common.metrics.slave import OffsetMetrics, SlaveMetrics
+from common.metrics.tree import to_tree
 from common.process.heap import freeze_heap, heap_in_use, reserve_heap
 from common.process.launch import WriteFigures
 from common.process.notify import Notifier, open_notifier

@@ -12,7 +12,7 @@ import statistics
 from collections import deque
 
 from common.latency.durations import Durations, StreamedDurations
-from common.metrics.published import DueMetrics
+from common.metrics.slave import DueMetrics
 from common.wire.topics import COMMAND
 
 PERIODS = 15

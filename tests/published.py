@@ -4,23 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from common.metrics.published import (
+from common.metrics.link import TopicCounters
+from common.metrics.master import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard, VideoReceived
+from common.metrics.parts import HeapMetrics, Software, Summary, Ticks
+from common.metrics.slave import (
     ArrivalCounts,
-    CommandedMetrics,
     DueMetrics,
     GuardMetrics,
-    HeapMetrics,
-    LeaseHeld,
-    MasterMetrics,
     OffsetMetrics,
-    RobotHeard,
     ServoMetrics,
     SlaveMetrics,
-    Software,
-    Summary,
-    Ticks,
-    TopicCounters,
-    VideoReceived,
 )
 
 NOTHING = Summary(0)

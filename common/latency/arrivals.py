@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.metrics.published import ArrivalCounts
+from common.metrics.slave import ArrivalCounts
 
 REMEMBERED = 256
 """A missing number may still come this many numbers later (20 s) and is then late, not lost."""

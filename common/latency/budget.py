@@ -8,7 +8,7 @@ from common.clock import NS_PER_MS
 from common.clock_sync import Offset
 from common.latency.durations import Durations
 from common.latency.stamps import STAGES, Passage
-from common.metrics.published import Summary
+from common.metrics.parts import Summary
 
 
 class StageTimes:

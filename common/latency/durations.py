@@ -7,7 +7,7 @@ from collections import deque
 from hdrh.histogram import HdrHistogram
 
 from common.clock import NS_PER_MS
-from common.metrics.published import Summary
+from common.metrics.parts import Summary
 
 _LONGEST_US = 60_000_000
 _DIGITS = 3

@@ -10,7 +10,7 @@ from common.link.config import LinkConfig
 from common.link.listening import hear_refusals
 from common.link.refusals import Refusals
 from common.link.session import Session
-from common.metrics.published import AccessMetrics
+from common.metrics.link import AccessMetrics
 
 log = logging.getLogger(__name__)
 

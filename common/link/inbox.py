@@ -10,7 +10,7 @@ import zenoh
 
 from common.clock import monotonic_ns
 from common.errors import CodecError
-from common.metrics.published import TopicCounters
+from common.metrics.link import TopicCounters
 from common.process.mailbox import Mailbox
 from common.process.throttle import Throttle
 

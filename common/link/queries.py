@@ -13,7 +13,7 @@ from zenoh.handlers import Callback
 from common.clock import monotonic_ns
 from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link.inbox import wake
-from common.metrics.published import TopicCounters
+from common.metrics.link import TopicCounters
 from common.process.throttle import Throttle
 from common.wire.stop import read_stop
 from common.wire.topics import Topic

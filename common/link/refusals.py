@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from common.clock import to_ns
-from common.metrics.published import RefusalMetrics
+from common.metrics.link import RefusalMetrics
 from common.process.throttle import Throttle
 
 REPEAT_S = 10.0

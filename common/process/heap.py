@@ -13,7 +13,7 @@ import gc
 import sys
 import threading
 
-from common.metrics.published import HeapMetrics
+from common.metrics.parts import HeapMetrics
 
 _M_TRIM_THRESHOLD, _M_ARENA_MAX = -1, -8
 """mallopt(3)."""

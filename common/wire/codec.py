@@ -12,7 +12,9 @@ from typing import Any, TypeVar
 import msgpack
 
 from common.errors import CodecError
-from common.metrics.published import MasterMetrics, SlaveMetrics, from_tree, to_tree
+from common.metrics.master import MasterMetrics
+from common.metrics.slave import SlaveMetrics
+from common.metrics.tree import from_tree, to_tree
 from common.wire import fields
 from common.wire.fields import MAX_DOUBT, MAX_ITEMS, MAX_NAME, MAX_TEXT
 from common.wire.messages import (

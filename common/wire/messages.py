@@ -8,7 +8,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from common.metrics.published import MasterMetrics, SlaveMetrics
+from common.metrics.master import MasterMetrics
+from common.metrics.slave import SlaveMetrics
 from common.quaternion import Array
 
 Mask = NDArray[np.bool_]

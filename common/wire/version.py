@@ -6,7 +6,7 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-from common.metrics.published import Software
+from common.metrics.parts import Software
 from common.wire.codec import VERSION as SCHEMA
 
 

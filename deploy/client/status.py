@@ -17,7 +17,9 @@ from common.clock import to_ms
 from common.errors import CodecError
 from common.latency.one_way import master_offset
 from common.link import Link, open_session
-from common.metrics.published import MasterMetrics, SlaveMetrics, to_tree
+from common.metrics.master import MasterMetrics
+from common.metrics.slave import SlaveMetrics
+from common.metrics.tree import to_tree
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.wire.codec import decode

@@ -15,7 +15,7 @@ from typing import TypeVar
 import psutil
 
 from common.errors import TandemError
-from common.metrics.published import from_tree
+from common.metrics.tree import from_tree
 from deploy.harness.spawn import Spawned
 
 _Metrics = TypeVar("_Metrics")

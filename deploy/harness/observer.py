@@ -9,7 +9,8 @@ from common.clock import to_ns, to_s
 from common.errors import CodecError
 from common.latency.one_way import master_offset
 from common.link import Link
-from common.metrics.published import CameraMetrics, MasterMetrics, SlaveMetrics
+from common.metrics.master import MasterMetrics
+from common.metrics.slave import CameraMetrics, SlaveMetrics
 from common.skeleton import Skeleton
 from common.wire.codec import decode
 from common.wire.messages import Command, RobotState, Statistics, Truth

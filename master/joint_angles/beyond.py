@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.clock import to_ns
-from common.metrics.published import Unreached
+from common.metrics.master import Unreached
 from common.quaternion import Array
 
 COUNTED_RAD = math.radians(5.0)

@@ -15,7 +15,7 @@ from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns, to_s
 from common.clock_sync import Offset
 from common.errors import CodecError, RobotError
 from common.latency.durations import Durations
-from common.metrics.published import CameraMetrics
+from common.metrics.slave import CameraMetrics
 from common.quaternion import Array
 from common.wire.messages import Command
 from common.wire.video import VideoFrame, encode_frame

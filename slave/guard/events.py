@@ -6,7 +6,7 @@ from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from common.metrics.published import GuardMetrics
+from common.metrics.slave import GuardMetrics
 from slave.limit.clamp import Clamp
 
 

@@ -6,7 +6,7 @@ import secrets
 from collections.abc import Callable
 
 from common.clock import to_s
-from common.metrics.published import LeaseMetrics
+from common.metrics.slave import LeaseMetrics
 from common.wire.lease import lease_id
 
 DrawToken = Callable[[], int]

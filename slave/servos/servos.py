@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from common.metrics.published import ServoMetrics
+from common.metrics.slave import ServoMetrics
 from common.quaternion import Array
 from common.wire.messages import Mask
 

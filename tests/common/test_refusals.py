@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from common.clock import to_ns
 from common.link.refusals import MAX_KINDS, REPEAT_S, Refusals
-from common.metrics.published import RefusalMetrics
+from common.metrics.link import RefusalMetrics
 
 AT = "2026-11-28T08:16:01.873954Z TRACE"
 ACL = "zenoh::net::routing::interceptor::access_control:"

@@ -9,7 +9,7 @@ import psutil
 import pytest
 
 from common.clock import to_ns
-from common.metrics.published import CameraMetrics
+from common.metrics.slave import CameraMetrics
 from deploy.harness.host import Host
 from deploy.harness.rig import ROLES, Rig, open_rig
 from deploy.harness.tracking import until_tracking

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.clock import to_ns
-from common.metrics.published import SlaveMetrics
+from common.metrics.slave import SlaveMetrics
 from common.wire.messages import RobotState
 from deploy.harness.host import Host
 from deploy.harness.rig import ROLES, Rig, open_rig

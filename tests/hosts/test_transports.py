@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from common.link.endpoint import SECURE, TRANSPORTS
-from common.metrics.published import AccessMetrics, MasterMetrics, SlaveMetrics
+from common.metrics.link import AccessMetrics
+from common.metrics.master import MasterMetrics
+from common.metrics.slave import SlaveMetrics
 from common.skeleton import load_skeleton
 from deploy.harness.host import Host
 from deploy.harness.keys import MASTER, access_override

@@ -15,7 +15,7 @@ from common.errors import ConfigMistake
 from common.link import open_session
 from common.link.audit import Audit
 from common.link.config import LinkConfig
-from common.metrics.published import to_tree
+from common.metrics.tree import to_tree
 from common.process.runtime import run
 from common.wire.topics import COMMAND, CONTROL, STATE, STOP, VIDEO
 

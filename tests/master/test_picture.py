@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from common.metrics.published import VideoReceived
+from common.metrics.master import VideoReceived
 from common.wire.video import VideoFrame, encode_frame
 from master.picture import VideoWatch
 

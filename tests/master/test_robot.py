@@ -14,7 +14,7 @@ import pytest
 
 from common.clock import monotonic_ns
 from common.config.load import load_config
-from common.metrics.published import MasterMetrics
+from common.metrics.master import MasterMetrics
 from common.wire.codec import VERSION, decode, encode
 from common.wire.lease import lease_id
 from common.wire.messages import (

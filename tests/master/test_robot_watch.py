@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS, to_ns
-from common.metrics.published import Summary
+from common.metrics.parts import Summary
 from common.wire.messages import CommandEcho, RobotState
 from common.wire.topics import STATE
 from master.robot_watch import RobotWatch

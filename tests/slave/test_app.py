@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from common.link.config import LinkConfig
-from common.metrics.published import ServoMetrics
+from common.metrics.slave import ServoMetrics
 from common.process.notify import Notifier
 from common.process.pacing import Due, TickGrid
 from common.wire.codec import decode

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from common.config.load import check_config
 from common.errors import ConfigError, RobotError
-from common.metrics.published import ServoMetrics
+from common.metrics.slave import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton, load_skeleton
 from slave.backends import BACKENDS, Backend, ServosConfig

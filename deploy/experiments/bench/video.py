@@ -23,7 +23,8 @@ from common.clock_sync import Offset
 from common.latency.durations import Durations
 from common.link import Link, open_link
 from common.link.config import LinkConfig
-from common.metrics.published import CameraMetrics, Summary
+from common.metrics.parts import Summary
+from common.metrics.slave import CameraMetrics
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from common.skeleton import load_skeleton

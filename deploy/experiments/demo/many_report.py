@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from common.metrics.published import MasterMetrics, SlaveMetrics
+from common.metrics.master import MasterMetrics
+from common.metrics.slave import SlaveMetrics
 from deploy.experiments.demo.report import Seen, tree_or_none, trees
 from deploy.harness.observer import Observer
 from deploy.harness.rig import Rig

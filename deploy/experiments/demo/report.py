@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from common.config.load import load_config
-from common.metrics.published import CommandedMetrics, MasterMetrics, SlaveMetrics, to_tree
+from common.metrics.master import CommandedMetrics, MasterMetrics
+from common.metrics.slave import SlaveMetrics
+from common.metrics.tree import to_tree
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.synergy import synergy_positions
 from common.wire.messages import Mask

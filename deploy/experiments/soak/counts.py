@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.metrics.published import Summary
+from common.metrics.parts import Summary
 
 
 class Additions:

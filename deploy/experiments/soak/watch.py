@@ -11,7 +11,9 @@ from common.clock import to_ms, to_ns
 from common.errors import CodecError
 from common.latency.one_way import master_offset, one_way_ns
 from common.link import Link
-from common.metrics.published import HeapMetrics, MasterMetrics, SlaveMetrics, Summary
+from common.metrics.master import MasterMetrics
+from common.metrics.parts import HeapMetrics, Summary
+from common.metrics.slave import SlaveMetrics
 from common.skeleton import Skeleton
 from common.wire.codec import decode
 from common.wire.messages import Command, RobotState, Statistics

@@ -14,7 +14,8 @@ from common.config.section import Section
 from common.errors import TandemError
 from common.link import Link, open_link
 from common.link.config import LinkConfig
-from common.metrics.published import RecorderMetrics, to_tree
+from common.metrics.recorder import RecorderMetrics
+from common.metrics.tree import to_tree
 from common.process.launch import WriteFigures
 from common.process.runtime import until_stopped
 from common.wire.topics import COMMAND, STATE, STATISTICS, Topic, video

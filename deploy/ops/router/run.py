@@ -12,7 +12,7 @@ from common.link.audit import Audit
 from common.link.configuration import zenoh_configuration
 from common.link.router import RouterConfig
 from common.link.session import Session, open_session
-from common.metrics.published import to_tree
+from common.metrics.tree import to_tree
 from common.process.launch import WriteFigures
 from common.process.notify import Notifier, open_notifier
 from common.process.pacing import TickGrid

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
-from common.metrics.published import Summary, to_tree
+from common.metrics.parts import Summary
+from common.metrics.tree import to_tree
 from deploy.sim.network.profile import Profile
 from deploy.sim.network.scheduler import Counters, PacketScheduler
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from common.clock import to_ns, wall_ns
 from common.errors import NetworkError
-from common.metrics.published import Summary
+from common.metrics.parts import Summary
 from deploy.sim.network.emulation import DIRECTIONS, Emulation
 from deploy.sim.network.figures import Measured, WayMeasured, judge, rate_mbit
 from deploy.sim.network.host import Host

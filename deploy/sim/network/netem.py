@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from common.errors import NetworkError
-from common.metrics.published import Summary
+from common.metrics.parts import Summary
 from deploy.sim.network.emulation import LinkCounters
 from deploy.sim.network.loss import gilbert_elliott
 from deploy.sim.network.namespaces import LINK, Run, ip, link_addresses

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import NetworkError
-from common.metrics.published import Summary, from_tree
+from common.metrics.parts import Summary
+from common.metrics.tree import from_tree
 from deploy.sim.network.emulation import TO_OPERATOR, TO_ROBOT, LinkCounters
 from deploy.sim.network.namespaces import LINK, Run, ip, link_addresses
 from deploy.sim.network.profile import Profile

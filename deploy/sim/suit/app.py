@@ -10,7 +10,7 @@ import can
 from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.clock import to_s
-from common.metrics.published import SuitMetrics
+from common.metrics.suit import SuitMetrics
 from common.process.realtime import enter_real_time
 from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.echo import open_deaf_to_answers

@@ -12,7 +12,7 @@ from pathlib import Path
 from common.config.load import check_config
 from common.errors import ConfigError, ConfigMistake
 from common.link import Link, open_link
-from common.metrics.published import to_tree
+from common.metrics.tree import to_tree
 from common.process.launch import WriteFigures
 from common.wire.codec import encode
 from common.wire.messages import Truth

@@ -14,7 +14,7 @@ from functools import partial
 from common.clock import NS_PER_MS, NS_PER_S
 from common.clock_sync import MasterExchange
 from common.config.load import Model, load_config
-from common.metrics.published import Unreached
+from common.metrics.master import Unreached
 from common.wire.codec import decode, encode
 from common.wire.control import CHALLENGED, read_reply, request_bytes
 from common.wire.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState

@@ -21,7 +21,7 @@ from common.can.state import Controller, ask_kernel
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
 from common.errors import RobotError
 from common.latency.durations import Durations
-from common.metrics.published import ServoMetrics
+from common.metrics.slave import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig

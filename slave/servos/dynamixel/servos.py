@@ -9,7 +9,7 @@ import numpy as np
 
 from common.clock import Clock, monotonic_ns, to_s
 from common.errors import RobotError
-from common.metrics.published import ServoMetrics
+from common.metrics.slave import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig

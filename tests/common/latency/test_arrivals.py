@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.latency.arrivals import REMEMBERED, Arrivals
-from common.metrics.published import ArrivalCounts
+from common.metrics.slave import ArrivalCounts
 
 
 def noted(*sequences: int, lease: int = 7) -> Arrivals:

@@ -10,7 +10,7 @@ from common.clock import NS_PER_MS
 from common.clock_sync import Offset
 from common.latency.budget import LatencyBudget, StageTimes
 from common.latency.stamps import STAGES, Passage
-from common.metrics.published import Summary
+from common.metrics.parts import Summary
 
 stamps = st.lists(st.integers(0, 100 * NS_PER_MS), min_size=8, max_size=8)
 

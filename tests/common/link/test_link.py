@@ -18,7 +18,7 @@ from common.errors import LinkError, LinkTimeoutError
 from common.link import Link, Session, open_link, open_session
 from common.link.config import LinkConfig, TopicConfig
 from common.link.queries import MAX_WAITING, Answerer
-from common.metrics.published import TopicCounters
+from common.metrics.link import TopicCounters
 from common.wire.stop import pack_stop
 from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, Priority
 

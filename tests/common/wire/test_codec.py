@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import CodecError
-from common.metrics.published import LeaseHeld, to_tree
+from common.metrics.master import LeaseHeld
+from common.metrics.tree import to_tree
 from common.wire.codec import (
     ANGLE_LIMIT_RAD,
     CONTROL_BYTES,

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from common.metrics.published import DueMetrics, LeaseMetrics, Summary
+from common.metrics.parts import Summary
+from common.metrics.slave import DueMetrics, LeaseMetrics
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.wire.codec import encode

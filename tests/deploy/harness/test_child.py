@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import TandemError
-from common.metrics.published import Ticks
+from common.metrics.parts import Ticks
 from deploy.harness import child as child_module
 from deploy.harness.child import Child
 

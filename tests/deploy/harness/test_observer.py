@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common.link import Link
-from common.metrics.published import Ticks
+from common.metrics.parts import Ticks
 from common.skeleton import load_skeleton
 from common.wire.codec import encode
 from common.wire.messages import Command, CommandEcho, CommandStamps, Message, RobotState, Statistics, Truth

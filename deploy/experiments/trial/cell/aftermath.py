@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
-from common.metrics.published import SlaveMetrics
+from common.metrics.slave import SlaveMetrics
 from common.wire.messages import CommandEcho
 from deploy.experiments.trial.cell.recording import Outage, Recording, counts, echoes, published
 

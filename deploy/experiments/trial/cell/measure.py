@@ -12,7 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
-from common.metrics.published import MasterMetrics, SlaveMetrics
+from common.metrics.master import MasterMetrics
+from common.metrics.slave import SlaveMetrics
 from deploy.experiments.trial.cell.aftermath import aftermath
 from deploy.experiments.trial.cell.figures import BY_NAME
 from deploy.experiments.trial.cell.recording import (

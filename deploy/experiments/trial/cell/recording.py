@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 from common.latency.one_way import master_offset
-from common.metrics.published import GuardMetrics, MasterMetrics, SlaveMetrics
+from common.metrics.master import MasterMetrics
+from common.metrics.slave import GuardMetrics, SlaveMetrics
 from common.skeleton import Skeleton
 from common.wire.messages import Command, CommandEcho, RobotState, Statistics, Truth
 from deploy.measure import Trace

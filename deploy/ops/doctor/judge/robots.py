@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from statistics import median
 
-from common.metrics.published import Software
+from common.metrics.parts import Software
 from deploy.ops.doctor.judge.finding import Finding, fail, ok, warn
 from deploy.ops.doctor.read.robots import RobotFacts
 from slave.guard.config import GuardConfig

@@ -13,7 +13,7 @@ from common.clock_sync import MasterExchange
 from common.errors import CodecError, LinkError
 from common.link import Link, open_session
 from common.link.config import LinkConfig
-from common.metrics.published import Software
+from common.metrics.parts import Software
 from common.wire.codec import decode, encode
 from common.wire.messages import Action, ClockReply
 from common.wire.presence import several_bear

@@ -10,7 +10,9 @@ from typing import cast
 import numpy as np
 from rich.console import Console
 
-from common.metrics.published import MasterMetrics, SlaveMetrics, Summary, Ticks
+from common.metrics.master import MasterMetrics
+from common.metrics.parts import Summary, Ticks
+from common.metrics.slave import SlaveMetrics
 from common.wire.messages import RobotState
 from deploy.experiments.demo.many_report import ManyReport, make_many_report, many_table
 from deploy.experiments.demo.report import Seen

@@ -11,7 +11,9 @@ from typing import cast
 import pytest
 from rich.console import Console
 
-from common.metrics.published import MasterMetrics, SlaveMetrics, Summary, Ticks
+from common.metrics.master import MasterMetrics
+from common.metrics.parts import Summary, Ticks
+from common.metrics.slave import SlaveMetrics
 from common.wire.messages import Action
 from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.demo.report import Report, Seen, make_report

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S
-from common.metrics.published import ArrivalCounts, DueMetrics, MasterMetrics, SlaveMetrics, Summary, Ticks
+from common.metrics.master import MasterMetrics
+from common.metrics.parts import Summary, Ticks
+from common.metrics.slave import ArrivalCounts, DueMetrics, SlaveMetrics
 from common.skeleton import load_skeleton
 from common.wire.codec import encode
 from common.wire.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics

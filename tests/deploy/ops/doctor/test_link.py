@@ -14,7 +14,7 @@ from common.clock import monotonic_ns
 from common.link import Link, open_session
 from common.link.config import AccessConfig, LinkConfig, TlsConfig
 from common.link.roles import Role
-from common.metrics.published import Software
+from common.metrics.parts import Software
 from common.wire.codec import decode, encode
 from common.wire.messages import ClockQuery, ClockReply, ControlReply, Statistics
 from common.wire.presence import several_bear

@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 from common.errors import ConfigError, RecordingError, TandemError
 from common.link import open_link
 from common.link.config import LinkConfig
-from common.metrics.published import RecorderMetrics, from_tree
+from common.metrics.recorder import RecorderMetrics
+from common.metrics.tree import from_tree
 from common.recording import Recorder, read_recording
 from common.wire.topics import COMMAND, STATE, STATISTICS, video
 from deploy import cli

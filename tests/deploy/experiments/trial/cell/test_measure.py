@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from common.link.config import LinkConfig
-from common.metrics.published import ArrivalCounts, DueMetrics, Ticks
+from common.metrics.parts import Ticks
+from common.metrics.slave import ArrivalCounts, DueMetrics
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics, Truth

@@ -9,7 +9,10 @@ from typing import Any
 import pytest
 
 from common.errors import CodecError
-from common.metrics.published import CameraMetrics, MasterMetrics, SlaveMetrics, Summary, from_tree, to_tree
+from common.metrics.master import MasterMetrics
+from common.metrics.parts import Summary
+from common.metrics.slave import CameraMetrics, SlaveMetrics
+from common.metrics.tree import from_tree, to_tree
 from tests.published import guard_metrics, master_metrics, slave_metrics
 
 CAMERA = CameraMetrics(1, 2.0, 3.0, 4.0, 5, 6.0, 7, 8, 9, Summary(0), Summary(0), Summary(0), "")

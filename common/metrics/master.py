@@ -1,0 +1,84 @@
+"""What the master publishes about itself and the robots that it commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from common.metrics.link import AccessMetrics, TopicCounters
+from common.metrics.parts import HeapMetrics, Software, Summary, Ticks
+from common.metrics.tree import Metrics
+
+
+@dataclass(frozen=True, slots=True)
+class Unreached(Metrics):
+    """How far a segment of the operator was beyond what the robot can reach."""
+
+    percent: float
+    """Share of all solved postures."""
+    now_deg: float
+    most_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class RobotHeard(Metrics):
+    """What the master hears of a robot."""
+
+    silent: bool
+    times_lost: int
+    undecodable: int
+    missing: int
+    """States that never came, by their numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseHeld(Metrics):
+    """Whether the master holds a robot's lease, and what the robot last answered."""
+
+    held: bool
+    answer: str
+
+
+@dataclass(frozen=True, slots=True)
+class VideoReceived(Metrics):
+    """Pictures of a robot's camera at the master."""
+
+    received: int
+    late: int
+    undecodable: int
+
+
+@dataclass(frozen=True, slots=True)
+class CommandedMetrics(Metrics):
+    """One robot as the master commands it."""
+
+    commands_sent: int
+    round_trip_ms: Summary
+    robot: RobotHeard
+    lease: LeaseHeld
+    video: VideoReceived
+    link: dict[str, TopicCounters]
+    """By topic."""
+    round_trip_recent_us: tuple[int, ...] = ()
+    """Each round trip since the message before; in messages only, not in the file at the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class MasterMetrics(Metrics):
+    """The master's process. A message to a robot tells of that robot alone."""
+
+    software: Software
+    heap: HeapMetrics
+    ticks: Ticks
+    stages_ms: dict[str, Summary]
+    frames_in_to_put_ms: Summary
+    nodes: dict[str, dict[str, int]]
+    """Each node's counters (`master.suit.health.NodeHealth`) that are not zero, by segment."""
+    doubts: dict[str, str]
+    """Why a node's readings are not believed, by segment."""
+    beyond_reach: dict[str, Unreached]
+    """Segments that the robot could not bring to the operator's posture, by segment."""
+    buses: dict[str, dict[str, bool | int | str]]
+    """Each bus's counters and last error (`common.can.bus.CanBus.summary`)."""
+    robots: dict[str, CommandedMetrics]
+    access: AccessMetrics | None = None
+    """In the file at the end only."""

@@ -1,0 +1,133 @@
+"""What the slave publishes about itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from common.metrics.link import AccessMetrics, TopicCounters
+from common.metrics.parts import HeapMetrics, Software, Summary, Ticks
+from common.metrics.tree import Metrics
+
+
+@dataclass(frozen=True, slots=True)
+class GuardMetrics(Metrics):
+    """What the guard did since the start."""
+
+    state: str
+    reason: str
+    received: int
+    accepted: int
+    dropped: dict[str, int]
+    """Refused commands, by gate."""
+    losses: dict[str, int]
+    """Holds, by what was lost."""
+    clamps: dict[str, int]
+    """Clamps begun, by rule."""
+    doubts: dict[str, int]
+    """Times that a joint was held because its encoder was not believed, by joint."""
+    late_steps: int
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseMetrics(Metrics):
+    """The lease that is in force."""
+
+    operator: str
+    id: int
+    held_s: float
+    renewed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ArrivalCounts(Metrics):
+    """Commands of the lease's holder, by their numbers."""
+
+    arrived: int
+    lost: int
+    late: int
+    repeated: int
+
+
+@dataclass(frozen=True, slots=True)
+class DueMetrics(Metrics):
+    """Commands of the lease's holder, by time: also those that nobody sent."""
+
+    expected: int
+    """Came, or should have come between two that did."""
+    missing: int
+    """Was not there when it was due and a newer came, lost or never sent; the late ones are among them."""
+
+
+@dataclass(frozen=True, slots=True)
+class OffsetMetrics(Metrics):
+    """The master's clock minus the slave's."""
+
+    offset_ms: float
+    bound_ms: float
+    trusted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ServoMetrics(Metrics):
+    """A servo backend: whatever it counts and times, by name."""
+
+    counters: dict[str, int] = field(default_factory=dict)
+    times_ms: dict[str, Summary] = field(default_factory=dict)
+    buses: dict[str, dict[str, bool | int | str]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraMetrics(Metrics):
+    """The camera's feed: rates of the last seconds, counters, times."""
+
+    pictures: int
+    fps: float
+    kb_s: float
+    mean_kb: float
+    width: int
+    sent_kb: float
+    budget_bytes: int
+    gave_way: int
+    unseen: int
+    make_ms: Summary
+    transit_ms: Summary
+    action_to_observation_ms: Summary
+    fault: str
+    """Why there is no picture; empty while all is well."""
+
+
+@dataclass(frozen=True, slots=True)
+class SlaveMetrics(Metrics):
+    """The slave's process."""
+
+    software: Software
+    instance: int
+    """A number that only this process bears."""
+    heap: HeapMetrics
+    ticks: Ticks
+    guard: GuardMetrics
+    lease: LeaseMetrics | None
+    stages_ms: dict[str, Summary]
+    end_to_end_ms: Summary
+    one_way_ms: Summary
+    """Of the commands that came."""
+    one_way_corrected_ms: Summary
+    """The same with every command that was due and did not come: how long the robot went without it."""
+    commands: ArrivalCounts
+    due: DueMetrics
+    early: int
+    """One-way times below zero by the measured offset, taken as zero."""
+    unmoved: int
+    offset: OffsetMetrics
+    undecodable: dict[str, int]
+    base: dict[str, int]
+    """Counters of the base's attitude sensor; {} without one."""
+    servos: ServoMetrics
+    video: CameraMetrics | None
+    link: dict[str, TopicCounters]
+    one_way_recent_us: tuple[int, ...] = ()
+    """Each one-way time since the message before; in messages only, not in the file at the end."""
+    one_way_missing_recent_us: tuple[int, ...] = ()
+    """What `one_way_corrected_ms` took for each command that did not come; likewise in messages only."""
+    access: AccessMetrics | None = None
+    """In the file at the end only."""
