@@ -19,7 +19,7 @@ for number in (signal.SIGINT, signal.SIGHUP):
 os.execv(sys.executable, [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *sys.argv[1:]])
 """
 SLICE = (
-    "common/test_runtime.py",
+    "common/process/test_runtime.py",
     "deploy/harness/test_spawn.py",
     "deploy/experiments/demo/test_interrupt.py",
     "deploy/test_cli.py::test_ctrl_c_in_a_demo_is_one_line",
@@ -31,7 +31,7 @@ def test_every_file_that_names_a_signal_sets_it_up() -> None:
     files = [file for file in TESTS.rglob("*.py") if file not in (Path(__file__), TESTS / "conftest.py")]
     sending = {str(file.relative_to(TESTS)): file.read_text("utf-8") for file in files}
     sending = {name: text for name, text in sending.items() if SENT.search(text)}
-    assert "common/test_runtime.py" in sending
+    assert "common/process/test_runtime.py" in sending
     assert [name for name, text in sending.items() if "default_signals" not in text] == []
 
 

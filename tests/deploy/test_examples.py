@@ -104,7 +104,7 @@ def test_containers_get_what_the_units_get_and_no_more() -> None:
 
 def test_the_image_is_built_from_files_that_there_are() -> None:
     build = compose()["x-tandem"]["build"]
-    root = (DEPLOY / build["context"]).resolve()
+    root = (DEPLOY / "ops" / build["context"]).resolve()
     lines = (root / build["dockerfile"]).read_text("utf-8").splitlines()
     words = {line.split()[0] for line in lines if line and not line.startswith((" ", "#"))}
     assert {"FROM", "USER", "ENTRYPOINT", "STOPSIGNAL"} <= words
