@@ -12,7 +12,7 @@ from common.skeleton import load_skeleton
 from slave.guard.config import GuardConfig, JointLimits
 from slave.limit.clamp import Rule
 
-NAMES = load_skeleton().joint_names
+NAMES = load_skeleton("nursing").joint_names
 ROLL = NAMES.index("left_shoulder_roll")
 
 
