@@ -31,8 +31,7 @@ def opened(
     monkeypatch.setattr(opening, "_open_off_the_loop", attempt)
     monkeypatch.setattr(opening, "RETRY_S", 0.0)
     listen = [ROUTER] if mode == "listens" else []
-    mode = "peer" if listen else mode
-    config = LinkConfig(connect=[ROUTER], mode=mode, listen=listen)
+    config = LinkConfig(connect=[ROUTER], mode="client" if mode == "client" else "peer", listen=listen)
     return asyncio.run(opening.open_zenoh(config, waits=said.append)), said
 
 
@@ -66,7 +65,7 @@ def test_it_is_looked_for_ever_more_rarely(monkeypatch: pytest.MonkeyPatch) -> N
         pauses.append(seconds)
         await real(0)
 
-    monkeypatch.setattr(opening.asyncio, "sleep", sleep)
+    monkeypatch.setattr(asyncio, "sleep", sleep)
     left = [12]
 
     async def attempt(*_: object) -> object:

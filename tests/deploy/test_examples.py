@@ -23,7 +23,7 @@ from slave.config import SlaveConfig
 
 DEPLOY = Path(cli.__file__).parent
 EXAMPLES = DEPLOY / "examples"
-MODELS = {
+MODELS: dict[str, Any] = {
     "master": MasterConfig, "slave": SlaveConfig, "suit": SuitConfig, "router": RouterConfig,
     "operator": MasterConfig, "robot": SlaveConfig,
 }  # fmt: skip
@@ -121,10 +121,9 @@ def test_the_deployment_page_names_commands_and_files_that_there_are() -> None:
     assert len(named) > 10
     for command, second in named:
         assert command in commands or command in groups, command
-        if second and groups.get(command) is not None:
-            assert second in {
-                str(getattr(c.callback, "__name__", "")) for c in groups[command].registered_commands
-            }
+        group = groups.get(command)
+        if second and group is not None:
+            assert second in {str(getattr(c.callback, "__name__", "")) for c in group.registered_commands}
     for file in re.findall(r"\$D/([\w./@-]+)", page):
         assert (DEPLOY / file).exists() or any(DEPLOY.glob(f"{file}*")), file
     for link in re.findall(r"\]\(([^)]+)\)", page):

@@ -108,7 +108,7 @@ def test_an_emergency_stop_fails_without_its_transition(monkeypatch: pytest.Monk
 
 
 def test_the_table_names_only_protections_there_are() -> None:
-    known = {part.name for part in (*GATES, *ARRIVAL_WATCHES, *BODY_WATCHES)} | RULES
+    known = {gate.name for gate in GATES} | {w.name for w in (*ARRIVAL_WATCHES, *BODY_WATCHES)} | RULES
     assert set().union(*(fault.held_by for fault in FAULTS)) <= known
     assert set().union(*(fault.refused_by for fault in FAULTS)) <= known | {"codec"}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,7 +24,7 @@ def lines() -> list[str]:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_each_row_is_on_the_page_with_its_bounds(row) -> None:
+def test_each_row_is_on_the_page_with_its_bounds(row: Any) -> None:
     assert "| " + " | ".join(words(row)) + " |" in lines()
 
 

@@ -20,8 +20,9 @@ from deploy.certificates.folder import stem, write_pair
 from deploy.certificates.make import new_authority, new_identity
 from deploy.harness.child import Child
 from deploy.harness.host import Host as ThisHost
+from deploy.sim.network import Host
 from deploy.sim.network.namespaces import why_not
-from deploy.sim.network.network import Host, open_network
+from deploy.sim.network.network import open_network
 from master.suit.protocol import SHIPPED_DBC
 
 if TYPE_CHECKING:

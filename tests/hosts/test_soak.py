@@ -78,7 +78,7 @@ def test_interrupted_it_still_writes_its_report_and_leaves_nobody_behind(tmp_pat
 def test_killed_it_is_judged_from_what_it_left(tmp_path: Path) -> None:
     report = tmp_path / "report"
     options = ["--duration", "1h", "--faults", "none", "--report", str(report)]
-    soak = subprocess.Popen([*SOAK, *options], stdout=subprocess.DEVNULL, start_new_session=True)
+    soak = subprocess.Popen([*SOAK, *options], stdout=subprocess.DEVNULL, text=True, start_new_session=True)
     try:
         followed(report, soak)
     finally:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from common.link.config import LinkConfig
-from common.metrics.slave import ServoMetrics
+from common.metrics.slave import ServoMetrics, SlaveMetrics
 from common.process.notify import Notifier
 from common.process.pacing import Due, TickGrid
 from common.wire.codec import decode
@@ -66,7 +66,12 @@ def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
     class Keeping(FakeLink):
         def publish(self, topic: Topic) -> Callable[[bytes], None]:
-            return lambda payload: words.append(decode(payload, Statistics).metrics.one_way_recent_us)
+            def keep(payload: bytes) -> None:
+                metrics = decode(payload, Statistics).metrics
+                assert isinstance(metrics, SlaveMetrics)
+                words.append(metrics.one_way_recent_us)
+
+            return keep
 
         def counters(self) -> dict[str, object]:
             return {}

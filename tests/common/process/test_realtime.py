@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import os
 import resource
@@ -10,7 +11,6 @@ import sys
 
 import pytest
 
-from common.process import realtime
 from common.process.realtime import enter_real_time
 
 
@@ -24,7 +24,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
             calls.append(flags)
             return 0
 
-    monkeypatch.setattr(realtime.ctypes, "CDLL", lambda *_, **__: Libc())
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: Libc())
     monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     monkeypatch.setattr(
         os, "sched_setscheduler", lambda pid, policy, param: calls.append((pid, policy, param.sched_priority))

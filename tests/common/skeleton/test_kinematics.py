@@ -65,7 +65,7 @@ def test_agrees_with_the_tree_walked_by_scipy() -> None:
     for row, (position, heading) in enumerate(zip(positions, headings, strict=True)):
         turns, expected_m = by_scipy(position, heading)
         found = Rotation.from_quat(q[row], scalar_first=True)
-        assert max((found.inv() * Rotation.concatenate(turns)).magnitude()) < 1e-14
+        assert np.max((found.inv() * Rotation.concatenate(turns)).magnitude()) < 1e-14
         assert np.allclose(places[row], expected_m, atol=1e-14)
 
 

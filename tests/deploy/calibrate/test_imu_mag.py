@@ -132,7 +132,7 @@ def whole_session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     apart = from_rotation_vector(np.radians([0.0, 2.0, 0.0]))
     mag = rotate(conjugate(apart), rotate(conjugate(s.pop("q")), np.array([0.0, 25.0, -43.3])))
     mag += np.random.default_rng(5).normal(scale=0.1, size=mag.shape)
-    np.savez(path, rate_hz=RATE_HZ, mag=mag + BIAS, **s)
+    np.savez(path, rate_hz=RATE_HZ, mag=mag + BIAS, **s)  # type: ignore[arg-type]
     return path
 
 

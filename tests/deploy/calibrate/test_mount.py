@@ -31,7 +31,7 @@ def test_nodes_that_stood_still_are_refused_by_name_and_not_written(tmp_path: Pa
     noise = 0.001 * np.random.default_rng(0).normal(size=(500, 3))
     up = np.tile([0.0, 0.0, 9.81], (500, 1))
     arrays = {f"{n}_{k}": v for n in ("chest", "head") for k, v in (("acc", up), ("gyr", noise))}
-    np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(500), **arrays)
+    np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(500), **arrays)  # type: ignore[arg-type]
     with pytest.raises(TandemError, match=r"chest, head are not written: .*hardly moved; walk some steps"):
         mount(tmp_path / "s.npz", out=tmp_path / "out")
     assert list((tmp_path / "out").glob("*.toml")) == []
@@ -51,7 +51,7 @@ def test_evidence_that_contradicts_itself_writes_nothing_and_says_so_once(tmp_pa
         arrays = {f"{n}_acc": unit.acc_m_s2 for n, unit in spoilt.items()}
         arrays |= {f"{n}_gyr": unit.gyr_rad_s for n, unit in spoilt.items()}
         length = len(next(iter(arrays.values())))
-        np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(length), **arrays)
+        np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(length), **arrays)  # type: ignore[arg-type]
         with pytest.raises(TandemError, match=said) as error:
             mount(tmp_path / "s.npz", out=out, report=tmp_path / "report.json")
         assert list(out.glob("*.toml")) == []

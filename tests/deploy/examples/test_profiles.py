@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from common.config.load import load_config
@@ -56,6 +58,6 @@ def test_an_unknown_profile_names_those_there_are() -> None:
     ],
 )  # fmt: skip
 def test_what_another_profile_has_is_refused(role: str, override: str, said: str) -> None:
-    model = {"master": MasterConfig, "slave": SlaveConfig, "suit": SuitConfig}[role]
+    models: dict[str, Any] = {"master": MasterConfig, "slave": SlaveConfig, "suit": SuitConfig}
     with pytest.raises(ConfigError, match=said):
-        load_config(example(role, "hand"), model, [override])
+        load_config(example(role, "hand"), models[role], [override])

@@ -9,8 +9,8 @@ from cryptography.x509 import IPAddress, SubjectAlternativeName, load_pem_x509_c
 from common.errors import ConfigError
 from common.link.certificates import check_tls
 from common.link.config import LinkConfig, TlsConfig
-from common.link.endpoint import SECURE
-from deploy.harness.endpoints import TRANSPORTS, Endpoints, local_endpoints, network_endpoints
+from common.link.endpoint import SECURE, TRANSPORTS
+from deploy.harness.endpoints import Endpoints, local_endpoints, network_endpoints
 from deploy.sim.network import Host, Network
 
 

@@ -17,9 +17,11 @@ def reach_rad(time_s: Array) -> Array:
 
     def blend(u: Array) -> Array:
         u = np.clip(u, 0.0, 1.0)
-        return u**3 * (10 - 15 * u + 6 * u * u)
+        curve: Array = u**3 * (10 - 15 * u + 6 * u * u)
+        return curve
 
-    return np.radians(60.0) * (blend(phase) - blend(phase - 1.5))
+    angle: Array = np.radians(60.0) * (blend(phase) - blend(phase - 1.5))
+    return angle
 
 
 def posture(time_s: Array) -> Array:
@@ -38,11 +40,11 @@ class Run:
         self.at = posture
 
     def truth(self) -> TruthSeries:
-        return TruthSeries(self.ticks, self.ticks * TICK_NS, self.at(self.ticks * 0.005))
+        return TruthSeries(self.ticks, self.ticks * TICK_NS, self.at(0.005 * self.ticks.astype(np.float64)))
 
     def solved(self, error_rad: float = 0.0, late_s: float = 0.0) -> SolvedSeries:
         ticks = self.ticks[::16]
-        position = self.at(ticks * 0.005 - late_s) + error_rad
+        position = self.at(0.005 * ticks.astype(np.float64) - late_s) + error_rad
         return SolvedSeries(ticks, position, np.ones(position.shape, np.bool_))
 
     def moved(
@@ -50,7 +52,7 @@ class Run:
     ) -> MovedSeries:
         # odd instants, so that nothing falls on a tick
         at_ns = np.arange(700_001, int(self.ticks[-1]) * TICK_NS, 20_000_000, dtype=np.int64)
-        position = change(self.at(at_ns * 1e-9 - late_s))
+        position = change(self.at(1e-9 * at_ns.astype(np.float64) - late_s))
         everywhere = np.ones(position.shape, np.bool_)
         return MovedSeries(at_ns, position, everywhere, everywhere[:, 0])
 

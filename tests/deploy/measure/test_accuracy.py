@@ -184,7 +184,7 @@ def test_fast_periods_are_the_reaches_alone(run: Any) -> None:
 
 def test_a_lost_command_ends_a_period() -> None:
     ticks = np.delete(np.arange(12) * STEP_TICKS, 6)
-    true_deg = 0.25 * ticks
+    true_deg = 0.25 * ticks.astype(np.float64)
     usable = np.ones(11, np.bool_)
     assert fast_periods(ticks, true_deg, usable) == [slice(0, 6), slice(6, 11)]
     usable[2] = False
@@ -194,7 +194,7 @@ def test_a_lost_command_ends_a_period() -> None:
 @pytest.mark.parametrize(("step_deg", "found"), [(FAST_FLOOR_DEG, 1), (FAST_FLOOR_DEG - 0.01, 0)])
 def test_a_joint_that_only_trembles_has_no_fast_period(step_deg: float, found: int) -> None:
     ticks = np.arange(12) * STEP_TICKS
-    assert len(fast_periods(ticks, step_deg * np.arange(12), np.ones(12, np.bool_))) == found
+    assert len(fast_periods(ticks, step_deg * np.arange(12.0), np.ones(12, np.bool_))) == found
 
 
 @pytest.mark.parametrize(("count", "known"), [(MIN_SAMPLES, True), (MIN_SAMPLES - 1, False)])

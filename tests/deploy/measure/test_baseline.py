@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from common.link.config import LinkConfig
 from common.quaternion import Array
@@ -33,7 +34,7 @@ def posture(time_s: Array) -> tuple[Array, Array]:
     return position, velocity
 
 
-def at(now_ns: Array) -> tuple[Array, Array]:
+def at(now_ns: NDArray[np.int64]) -> tuple[Array, Array]:
     return posture((now_ns - BEGIN_NS) / 1e9)
 
 
@@ -168,9 +169,7 @@ def test_only_the_end_of_a_long_run_is_replayed(monkeypatch: pytest.MonkeyPatch)
 
 def test_without_commands_tracking_or_truth_there_is_nothing_to_compare() -> None:
     still = replace(moved(), tracking=np.zeros(len(moved().tracking), np.bool_))
-    nothing = TruthSeries(
-        *(column[:0] for column in (truth().tick, truth().sampled_ns)), truth().position_rad[:0]
-    )
+    nothing = TruthSeries(truth().tick[:0], truth().sampled_ns[:0], truth().position_rad[:0])
     assert compare(truth(), moved(), [], CONFIG) is None
     assert compare(truth(), still, accepted(), CONFIG) is None
     assert compare(nothing, moved(), accepted(), CONFIG) is None

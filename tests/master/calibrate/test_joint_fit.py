@@ -54,7 +54,8 @@ def jointed(seed: int, kind: str, count: int = 500) -> tuple[Moving, Moving, dic
         f, phase = random.uniform(0.15, 0.6, (2, 3, channels, 1))
         out: Array = scale * np.sin(2.0 * math.pi * (f * t + phase)).sum(axis=0).T / 2.0
         # everything begins with a moment in the zero pose
-        return out * np.clip((t - 0.5) / 1.0, 0.0, 1.0)[:, None]
+        out *= np.clip((t - 0.5) / 1.0, 0.0, 1.0)[:, None]
+        return out
 
     parent = Rotation.from_rotvec(curve(3, 0.8))
     bend = curve(3, 1.0)
@@ -85,7 +86,7 @@ def jointed(seed: int, kind: str, count: int = 500) -> tuple[Moving, Moving, dic
         force = frame.apply(push[1:-1]) + k @ lever
         out.append(Moving(r, frame.apply(rate), force, k, r[0]))
     axes = (Y, Z) if kind == "two axes" else (Y, Y)
-    truth = {
+    truth: dict[str, Array | float] = {
         "offset": offset,
         "axis1": mounts[0].inv().apply(axes[0]),
         "axis2": mounts[1].inv().apply(axes[1]),

@@ -20,7 +20,12 @@ STEADY = Steadiness(0.0, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0)
 
 def judge(monkeypatch: pytest.MonkeyPatch, segment: str, moving: bool = True, **fit: Any) -> JointMotion:
     """What is made of a fit with those properties, and otherwise beyond doubt."""
-    good = {"axis_sigma_rad": (0.01, 0.01), "offset_sigma_rad": 0.01, "rival": 9.0, "axis_rival": 9.0}
+    good: dict[str, Any] = {
+        "axis_sigma_rad": (0.01, 0.01),
+        "offset_sigma_rad": 0.01,
+        "rival": 9.0,
+        "axis_rival": 9.0,
+    }
     found = JointFit((Y, Y), 0.0, np.zeros((2, 3)), misfit={}, steady=STEADY, **(good | fit))
     monkeypatch.setattr(module, "fit_joint", lambda *_: found)
     count, turning = 100, 2.0 if moving else 0.0

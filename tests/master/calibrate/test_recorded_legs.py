@@ -113,7 +113,7 @@ def test_left_and_right_jog_alike_half_a_stride_apart(person: Person) -> None:
     assert abs(np.percentile(left, 98) - np.percentile(right, 98)) < 12.0
     assert np.corrcoef(left, right)[0, 1] < 0.0
     hips = [person.angles_deg[f"{side}_hip_flexion"][jog] for side in SIDES]
-    assert np.corrcoef(*hips)[0, 1] < -0.7
+    assert np.corrcoef(hips[0], hips[1])[0, 1] < -0.7
 
 
 @pytest.mark.parametrize("k", range(2))

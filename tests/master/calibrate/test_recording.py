@@ -62,7 +62,7 @@ def test_the_rate_is_of_the_whole_recording(tmp_path: Path) -> None:
     assert node.rate_hz == pytest.approx(1 / 0.0095, rel=2e-3)
 
 
-EVEN: Array = np.arange(100) * 0.01
+EVEN: Array = np.arange(100, dtype=np.float64) * 0.01
 
 
 @pytest.mark.parametrize(

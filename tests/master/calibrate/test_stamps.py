@@ -6,7 +6,7 @@ from common.quaternion import Array
 from master.calibrate.stamps import Grid, lay_out
 
 COUNT = 12_000
-EVEN: Array = 100.0 + np.arange(COUNT) * 0.01
+EVEN: Array = 100.0 + np.arange(COUNT, dtype=np.float64) * 0.01
 ORDER: Array = np.arange(COUNT, dtype=np.float64)
 RNG = np.random.default_rng(0)
 

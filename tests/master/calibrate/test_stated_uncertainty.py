@@ -116,8 +116,9 @@ def inertial(seed: int) -> tuple[str, NodeRecording, Array, Array]:
         gyr = np.degrees(gyr)
     if fault == "zeros":
         acc[rng.random(len(acc)) < 0.02] = 0.0
-    maps = (np.column_stack([g, g @ b]) for g, b in ((acc_gain, acc_bias), (gyr_gain, gyr_bias)))
-    return fault, NodeRecording("unit", 50.0, acc, gyr), *maps
+    acc_map = np.column_stack([acc_gain, acc_gain @ acc_bias])
+    gyr_map = np.column_stack([gyr_gain, gyr_gain @ gyr_bias])
+    return fault, NodeRecording("unit", 50.0, acc, gyr), acc_map, gyr_map
 
 
 def magnetic_tally(count: int) -> Tally:

@@ -17,7 +17,8 @@ def rates(*seconds_and_speeds: tuple[float, float]) -> Array:
     """Stretches of an even turn each, with bias and noise."""
     speed = np.concatenate([np.full(round(s * RATE_HZ), v) for s, v in seconds_and_speeds])
     noise = np.random.default_rng(0).normal(scale=2e-3, size=(len(speed), 3))
-    return speed[:, None] * np.array([0.6, 0.0, 0.8]) + BIAS + noise
+    readings: Array = speed[:, None] * np.array([0.6, 0.0, 0.8]) + BIAS + noise
+    return readings
 
 
 def found(gyr: Array, shortest_s: float = 2.0) -> list[list[int]]:

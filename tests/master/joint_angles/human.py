@@ -79,7 +79,8 @@ def random_motions(skeleton: Skeleton, count: int, steps: int, dt_s: float, seed
     lasts_s = np.maximum(rng.uniform(0.4, 3.0, count), 1.875 * farthest / np.radians(300.0))
     u = np.arange(steps)[:, None] * dt_s / lasts_s + rng.uniform(0.0, 2.0, count)
     u = np.abs((u + 1.0) % 2.0 - 1.0)[..., None, None]
-    return begin + (end - begin) * (u**3 * (10.0 + u * (6.0 * u - 15.0)))
+    path: Array = begin + (end - begin) * (u**3 * (10.0 + u * (6.0 * u - 15.0)))
+    return path
 
 
 def turns(q: Array) -> Array:

@@ -67,7 +67,7 @@ def test_every_segment_s_angles_are_scipy_s_intrinsic_ones() -> None:
     for i, segment in enumerate(SKELETON.segments):
         order = "".join("XYZ"[int(np.argmax(np.abs(axis)))] for axis in segment.axes)
         sign = np.array([sum(axis) for axis in segment.axes])
-        expected[i] = sign * rotations[i].as_euler(order)
+        expected[i] = sign * rotations[i].as_euler(order)  # type: ignore[call-overload]
     solved, _ = SOLVER.solve(q, STILL)
     assert np.allclose(solved, SKELETON.joints_from_angles @ expected.ravel(), atol=1e-9)
 

@@ -41,9 +41,9 @@ def told(angle_rad: Array, solver: JointSolver | None = None) -> tuple[dict[str,
 
 
 def there_and_back(angle_deg: float) -> Array:
-    return np.interp(
-        np.arange(0.0, 8.0, DT_S), [0.0, 1.0, 3.0, 5.0, 7.0, 8.0], [0, 0, angle_deg, angle_deg, 0, 0]
-    )
+    corners_s = [0.0, 1.0, 3.0, 5.0, 7.0, 8.0]
+    angles: Array = np.interp(np.arange(0.0, 8.0, DT_S), corners_s, [0, 0, angle_deg, angle_deg, 0, 0])
+    return angles
 
 
 def steps(position_deg: dict[str, Array]) -> float:

@@ -206,22 +206,17 @@ class FilterContract:
         assert np.allclose(found[[0, 2]], expected[[0, 2]], atol=1e-12)
 
     def test_restart_forgets_all_of_a_node_and_nothing_of_the_others(self, section: FilterSection) -> None:
-        filter_, alone, fresh = (
-            make(section),
-            make(section),
-            make(section),
-        )
+        filter_, alone, fresh = (make(section) for _ in range(3))
         dts_s = np.full(200, 1.0 / RATE_HZ)
         truth = move(filter_, attitudes(10), dts_s)
         move(alone, attitudes(10), dts_s)
         filter_.restart(np.array([True, False, False]))
         for each in (filter_, alone, fresh):
             move(each, truth, dts_s, start_s=1.0)
-        for of in (
-            lambda f: f.q_world_from_sensor(), lambda f: f.q_inertial_from_sensor(), lambda f: f.bias_rad_s(),
-        ):  # fmt: skip
-            assert np.allclose(of(filter_)[0], of(fresh)[0], atol=1e-12)
-            assert np.allclose(of(filter_)[1:], of(alone)[1:], atol=1e-12)
+        for name in ("q_world_from_sensor", "q_inertial_from_sensor", "bias_rad_s"):
+            restarted, other, new = (getattr(each, name)() for each in (filter_, alone, fresh))
+            assert np.allclose(restarted[0], new[0], atol=1e-12)
+            assert np.allclose(restarted[1:], other[1:], atol=1e-12)
 
     def test_goes_on_from_a_snapshot_again_and_again(self, section: FilterSection) -> None:
         filter_, dts_s = make(section), np.full(100, 1.0 / RATE_HZ)

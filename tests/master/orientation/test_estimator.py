@@ -1,5 +1,6 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,7 +69,7 @@ def estimator(
     return Estimator(config, [Node()] * count, RATE_HZ, calibration or identity(count))
 
 
-def rest(estimator_: Estimator, truth: Array, ticks: int, **changes: Array) -> None:
+def rest(estimator_: Estimator, truth: Array, ticks: int, **changes: Any) -> None:
     readings = replace(seen_by(truth, np.zeros((len(truth), 3))), **changes)
     for _ in range(ticks):
         estimator_.update(readings)

@@ -34,7 +34,8 @@ def test_each_node_has_the_filter_it_names() -> None:
     for tick in readings(50, 5):
         bank.update(*tick)
         for i, one in enumerate(alone):
-            one.update(*(part[i : i + 1] for part in tick))
+            gyr, acc, mag = (part[i : i + 1] for part in tick)
+            one.update(gyr, acc, mag)
     q, bias = bank.q_world_from_sensor(), bank.bias_rad_s()
     assert q.shape == (5, 4)
     for i, one in enumerate(alone):
@@ -71,7 +72,7 @@ def test_goes_on_from_a_snapshot(names: list[str]) -> None:
             bank.update(*tick)
         ends.append(bank.q_world_from_sensor())
         bank.restore(snapshot)
-    assert np.array_equal(*ends)
+    assert np.array_equal(ends[0], ends[1])
     with pytest.raises(TypeError, match="not a snapshot"):
         bank.restore([])
 

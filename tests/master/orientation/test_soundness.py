@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.quaternion import Array, angle_between
+from master.orientation.affine import identity
 from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
 from master.orientation.filter import OrientationFilter
@@ -15,7 +16,7 @@ from master.orientation.filters import FILTERS
 from master.orientation.soundness import Soundness
 from master.suit.doubt import Weight
 
-from .test_estimator import QUICK, Node, attitudes, identity, seen_by
+from .test_estimator import QUICK, Node, attitudes, seen_by
 
 RATE_HZ = 200.0
 NAMES = ("vqf", "mahony", "ekf")
@@ -32,7 +33,7 @@ def run(filter_: OrientationFilter, truth: Array, ticks: int, wrong: list[Wrong]
         for at, sensor, axis, value in wrong:
             if at == tick:
                 parts[sensor][0, axis] = value
-        filter_.update(*parts)
+        filter_.update(parts[0], parts[1], parts[2])
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -68,7 +68,7 @@ class Suit:
     def holds(sweep: Sweep, index: int, seed: int) -> bool:
         """Whether a node's values are those of that seed, in SI units."""
         counts = raw(seed)
-        return (
+        return bool(
             sweep.acc_m_s2[index].tolist() == (counts[:3] * PROTOCOL.acc_scale).tolist()
             and sweep.gyr_rad_s[index].tolist() == (counts[3:6] * PROTOCOL.gyr_scale).tolist()
             and sweep.mag_ut[index].tolist() == (counts[6:] * PROTOCOL.mag_scale).tolist()

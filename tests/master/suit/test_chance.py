@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,8 @@ def said(counts: np.ndarray) -> list[tuple[int, int, str]]:
     count = counts.shape[1]
     watch = Plausibility(PlausibilityConfig(), count, 200.0, SCALE)
     yes, no = np.ones(count, np.bool_), np.zeros(count, np.bool_)
-    out, before = [], set()
+    out: list[Any] = []
+    before: set[Any] = set()
     for tick, v in enumerate(counts * SCALE):
         watch.take(Sweep(tick, 1 + 5_000_000 * tick, 0, v[:, :3], v[:, 3:6], v[:, 6:], yes, no), v)
         doubts = watch.doubts()

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from common.quaternion import Array
 from deploy.sim.suit.lies import LieKind
 from master.suit.doubt import Weight
 from master.suit.plausibility import Plausibility, PlausibilityConfig
@@ -147,7 +148,8 @@ def still_counts() -> np.ndarray:
     random = np.random.default_rng(7)
     truth = np.repeat([[0.3, 0.2, 4096.4, 0.0, 0.3, 0.6, 0.0, 0.0, 0.0]], 8000, axis=0)
     noise = random.standard_normal(truth.shape) * np.repeat([2.0, 0.5, 1.0], 3)
-    return np.rint(truth + noise)
+    counts: Array = np.rint(truth + noise)
+    return counts
 
 
 def judged(counts: np.ndarray, **settings: object) -> list[str]:

@@ -212,11 +212,11 @@ def test_random_traffic_only_ever_yields_what_was_soundly_answered(
                 expected[node.id - 1] = seed
         sweep = suit.window(frames)
         assert sweep.fresh.tolist() == answered
-        for index, seed in enumerate(expected):
-            if seed is None:
+        for index, answer in enumerate(expected):
+            if answer is None:
                 assert sweep.lost[index]
             else:
-                assert suit.holds(sweep, index, seed)
+                assert suit.holds(sweep, index, answer)
     for health in suit.poll.health:
         assert health.fresh + health.late + health.lost == suit.tick
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import cantools
 import numpy as np
@@ -22,7 +23,7 @@ from master.suit.protocol import (
 )
 
 PROTOCOL = SuitProtocol.load()
-DATABASE = cantools.database.load_file(SHIPPED_DBC)
+DATABASE: Any = cantools.database.load_file(SHIPPED_DBC)
 
 counts = st.lists(st.integers(-32768, 32767), min_size=9, max_size=9).map(lambda c: np.array(c, np.int16))
 node_ids = st.integers(1, 127)

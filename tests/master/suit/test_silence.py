@@ -27,7 +27,8 @@ QUIET = BusSigns(
     ],
 )
 def test_what_was_counted_names_the_cause(counter: str, words: str) -> None:
-    assert words in advice(QUIET, replace(QUIET, **{counter: 1}))
+    counted = {counter: 1}
+    assert words in advice(QUIET, replace(QUIET, **counted))  # type: ignore[arg-type]
     assert words not in advice(QUIET, QUIET)
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from common.config.sensor_calibration import NodeCalibration
 from common.quaternion import Array, conjugate, rotate
+from common.wire.messages import Mask
 from slave.attitude.angles import (
     azimuth_rad,
     gravity_tool_face_rad,
@@ -69,7 +70,7 @@ def worst(at: tuple[Array, Array, Array], up: Array, field: Array) -> Worst:
     q = orientation(*at)
     upright = np.minimum(inclination, np.pi - inclination) < NEAR_VERTICAL_RAD - 1e-9
 
-    def largest(found: Array, truth: Array, where: Array) -> float:
+    def largest(found: Array, truth: Array, where: Mask) -> float:
         return math.degrees(np.abs((found - truth + np.pi) % (2.0 * np.pi) - np.pi)[where].max())
 
     everywhere = np.ones_like(upright)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common.link.config import LinkConfig
-from common.metrics.slave import ServoMetrics
+from common.metrics.slave import ServoMetrics, SlaveMetrics
 from common.process.pacing import Due, TickGrid
 from common.wire.codec import decode
 from common.wire.messages import BaseAttitude, RobotState
@@ -64,7 +64,7 @@ class FakeBase:
         return {"frames": 7}
 
 
-def state_with(base: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[RobotState, dict[str, object]]:
+def state_with(base: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[RobotState, SlaveMetrics]:
     async def four_ticks(grid: TickGrid) -> AsyncIterator[Due]:
         for tick in range(4):
             yield Due(tick, grid.origin_ns, 0)

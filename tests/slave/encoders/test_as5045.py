@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +12,7 @@ counts = st.integers(0, 4095)
 GOOD = [Flag.OCF, Flag.OCF | Flag.MAG_INC, Flag.OCF | Flag.MAG_DEC, Flag.OCF | OUT_OF_RANGE]
 
 
-def one(word: int):
+def one(word: int) -> Any:
     return decode(np.array([word], np.uint32))
 
 

@@ -22,15 +22,15 @@ def with_value(rig: Any, value: float) -> Any:
 
 
 def newest(rig: Any) -> int:
-    return rig.guard._newest_sequence
+    return int(rig.guard._newest_sequence)
 
 
 def oldest_ns(rig: Any) -> int:
-    return rig.now_ns - to_ns(rig.config.max_age_s) + rig.offset.bound_ns
+    return int(rig.now_ns - to_ns(rig.config.max_age_s) + rig.offset.bound_ns)
 
 
 def newest_ns(rig: Any) -> int:
-    return rig.now_ns + to_ns(rig.config.future_tolerance_s) + rig.offset.bound_ns
+    return int(rig.now_ns + to_ns(rig.config.future_tolerance_s) + rig.offset.bound_ns)
 
 
 @dataclass(frozen=True)

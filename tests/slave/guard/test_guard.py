@@ -178,7 +178,7 @@ def test_changes_and_clamps_are_remembered_and_counted(rig: Any) -> None:
     changes = [(e.before, e.after) for e in events if isinstance(e, Change)]
     assert changes == [("boot", "hold"), ("hold", "align"), ("align", "track"), ("track", "hold")]
     clamps = {(e.joint, e.rule): e for e in events if isinstance(e, Clamp)}
-    position = clamps["left_elbow_pitch", "position"]
+    position = clamps["left_elbow_pitch", Rule.POSITION]
     assert (position.asked, position.given) == pytest.approx((rig.target[6], rig.skeleton.upper_rad[6]))
     counted = rig.guard.counters.metrics("hold", "")
     assert counted.clamps == {"position": 1, "velocity": 1, "acceleration": 1}

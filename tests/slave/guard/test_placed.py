@@ -37,7 +37,7 @@ def run_away(rig: Any, rate_deg_s: float) -> float:
             break
     assert rig.guard.state is State.ESTOP
     assert "by itself" in rig.guard.reason or "against" in rig.guard.reason
-    return (rig.now_ns - began_ns) / 1e9
+    return float(rig.now_ns - began_ns) / 1e9
 
 
 @pytest.mark.parametrize("rate_deg_s", [-30.0, 60.0, 300.0])
@@ -73,7 +73,7 @@ def stopped_after_s(rig: Any, state: State, rate_deg_s: float, wander_rad_s: flo
             evident_ns = rig.now_ns
         if rig.guard.state is State.ESTOP:
             assert "against its setpoint" in rig.guard.reason
-            return (rig.now_ns - evident_ns) / 1e9
+            return float(rig.now_ns - evident_ns) / 1e9
         assert rig.guard.state in (State.ALIGN, State.TRACK)
     return math.inf
 

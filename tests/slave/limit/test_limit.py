@@ -7,6 +7,7 @@ from hypothesis import given, settings
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
+from common.wire.messages import Mask
 from slave.guard import GuardConfig
 from slave.limit import limit
 from slave.limit.clamp import Clamp, Rule
@@ -43,7 +44,7 @@ class Watched:
         target: Array,
         rate: Array | None = None,
         dt_s: float = DT,
-        held: Array = NONE,
+        held: Mask = NONE,
         scale: float = 1.0,
     ) -> None:
         before = self.limiter

@@ -23,7 +23,7 @@ class Subject:
     servos: Servos
     skeleton: Skeleton
     encoders: EncoderConfig
-    pass_time: Callable[[], None]
+    pass_time: Callable[[], object]
     """Lets the robot move on by some milliseconds, or waits for them."""
     near_rad: float = 0.01
     """A joint has arrived when it is this close to its setpoint."""
@@ -37,7 +37,10 @@ class Subject:
     def posture(self, share: float) -> Array:
         """(J,) a posture near the middle of every range."""
         low, high = self.skeleton.lower_rad, self.skeleton.upper_rad
-        return np.clip(np.full(len(low), share), low + 0.1 * (high - low), high - 0.1 * (high - low))
+        posture: Array = np.clip(
+            np.full(len(low), share), low + 0.1 * (high - low), high - 0.1 * (high - low)
+        )
+        return posture
 
     def go(self, target_rad: Array) -> None:
         """Write a setpoint again and again, as the slave does, until the joints are there."""

@@ -117,5 +117,5 @@ def test_when_a_slow_link_becomes_fast_the_played_segment_is_still_there() -> No
         feed(tracker, k, PERIOD * k / 1e3, 1.0, transit=230)
     for k, at_ms in ((40, 3351), (41, 3352), (42, 3365)):
         tracker.accept(PERIOD * k * MS, at_ms * MS, np.array([PERIOD * k / 1e3]), np.ones(1))
-    at_ms = 3365.0 + 79.0
-    assert course(tracker, at_ms)[0] == pytest.approx(at_ms / 1e3 - tracker.delay_s, abs=1e-3)
+    late_ms = 3365.0 + 79.0
+    assert course(tracker, late_ms)[0] == pytest.approx(late_ms / 1e3 - tracker.delay_s, abs=1e-3)

@@ -10,7 +10,7 @@ import pytest
 from common.can.config import BusConfig
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from deploy.calibrate.live.guide import Guide, GuideOptions
+from deploy.calibrate.live.guide import Guide, GuideOptions, StepName
 from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.suit import _wearer
 from deploy.sim.suit.tray import TrayConfig
@@ -45,13 +45,13 @@ def readings() -> Array:
 @dataclass
 class Run:
     guide: Guide
-    began_s: dict[str, float]
+    began_s: dict[StepName, float]
 
 
 def led(readings: Array, options: GuideOptions = OPTIONS, guide: Guide | None = None) -> Run:
     if guide is None:
         guide = Guide([True] * readings.shape[1], HAND.parents.tolist(), RATE_HZ, options)
-    began = {guide.step: 0.0}
+    began: dict[StepName, float] = {guide.step: 0.0}
     for k in range(0, len(readings), 10):
         guide.add(readings[k : k + 10])
         began.setdefault(guide.step, (k + 10) / RATE_HZ)

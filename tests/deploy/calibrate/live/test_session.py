@@ -51,8 +51,8 @@ class Done:
 
 
 def loaded(role: str, *overrides: str) -> Any:
-    model = {"master": MasterConfig, "suit": SuitConfig}[role]
-    return load_config(EXAMPLES / "lower_limb" / f"{role}.toml", model, overrides)
+    models: dict[str, Any] = {"master": MasterConfig, "suit": SuitConfig}
+    return load_config(EXAMPLES / "lower_limb" / f"{role}.toml", models[role], overrides)
 
 
 def askew(names: tuple[str, ...]) -> dict[str, list[float]]:

@@ -62,7 +62,7 @@ def test_angles_and_velocities_of_robot_and_operator_are_those_of_the_motion() -
 
 
 def test_a_silence_of_the_encoders_is_a_gap_and_not_a_line() -> None:
-    found = curves(truth(), moved(keep=np.r_[0:200, 250:500]), HAND)  # type: ignore[arg-type]
+    found = curves(truth(), moved(keep=np.r_[0:200, 250:500]), HAND)
     assert found is not None
     silent = (found.time_s > 3.05) & (found.time_s < 3.95)
     assert np.isnan(found.robot.angle_deg[silent]).all()

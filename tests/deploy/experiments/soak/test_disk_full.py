@@ -64,10 +64,14 @@ def case_on(stage: FakeStage) -> Case:
     return Case(cast(Stage, stage), random.Random(1), {}, {})
 
 
+async def begun(stage: FakeStage) -> None:
+    await FULL.begin(case_on(stage))
+
+
 def test_a_disk_that_cannot_be_filled_leaves_the_recorder_running() -> None:
     stage = FakeStage(small_disk=False)
     with pytest.raises(TandemError, match="cannot be filled"):
-        asyncio.run(FULL.begin(case_on(stage)))
+        asyncio.run(begun(stage))
     assert stage.recorder.running
     assert stage.meant == {"recorder"}
 

@@ -27,7 +27,10 @@ ERROR = {"hold": (2.0, 0.09, 4.5), "interpolate": (3.0, 0.1, 1.1), "predict": (0
 
 def values(setup: Setup, seed: int) -> dict[str, float | None]:
     draw = random.Random(f"{setup} {seed}")
-    near = lambda value: value * draw.uniform(0.95, 1.05)  # noqa: E731
+
+    def near(value: float) -> float:
+        return value * draw.uniform(0.95, 1.05)
+
     delay = DELAY_MS[setup.profile] * (1.3 if setup.transport == "tcp" else 1.0)
     base, slope, rough = ERROR[setup.strategy]
     error = base + slope * delay

@@ -19,7 +19,8 @@ def pose(skeleton: Skeleton, seed: int) -> Array:
     """Orientations (N, 4) somewhere within all limits."""
     rng = np.random.default_rng(seed)
     joints = rng.uniform(skeleton.lower_rad, skeleton.upper_rad)
-    return orientations(skeleton, joints[None], rng.uniform(-3.0, 3.0))[0]
+    found: Array = orientations(skeleton, joints[None], rng.uniform(-3.0, 3.0))[0]
+    return found
 
 
 @pytest.mark.parametrize("profile", PROFILES)

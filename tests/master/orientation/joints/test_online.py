@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from common.quaternion import IDENTITY, Array, angle_between, from_axis_angle, heading_turn, multiply
 from common.skeleton import Skeleton, load_skeleton
+from common.wire.messages import Mask
 from deploy.sim.suit.motion import load_motion
 from master.orientation.joints.online import OnlineConfig, OnlineHeadings
 
@@ -27,7 +28,7 @@ BENT = from_axis_angle([0.0, -1.0, 0.0], np.radians(80.0))
 """A forearm before the upper arm that hangs: its floating axis stands upright."""
 
 
-def of_all(names: list[str], skeleton: Skeleton) -> Array:
+def of_all(names: list[str], skeleton: Skeleton) -> Mask:
     return np.isin(skeleton.segment_names, names)
 
 

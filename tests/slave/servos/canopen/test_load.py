@@ -21,7 +21,7 @@ def test_a_frame_lies_between_no_stuff_bits_and_the_most(size: int) -> None:
     assert bare < frame_bits(size) <= bare + (stuffed - 1) // 4
 
 
-def one_bus(sync_hz: int, **options: int) -> CanopenConfig:
+def one_bus(sync_hz: int, **options: str | int | float | bool) -> CanopenConfig:
     bus = BusConfig(name="all", interface="socketcan", channel="can0", fd=False, options=options)
     drives = {name: DriveConfig(id=i, bus="all") for i, name in enumerate(NURSING.joint_names, 1)}
     return CanopenConfig(buses=[bus], drives=drives, sync_hz=sync_hz, heartbeat_ms=20)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from common.quaternion import Array
 from deploy.sim.drives.faults import Fault
 from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen import pdo
@@ -15,9 +18,10 @@ from tests.slave.servos.canopen.conftest import Wired
 ELBOW = "left_elbow_pitch"
 
 
-def small_posture(wired: Wired, rad: float = 0.2) -> np.ndarray:
+def small_posture(wired: Wired, rad: float = 0.2) -> Array:
     skeleton = wired.skeleton
-    return np.clip(np.full(25, rad), skeleton.lower_rad, skeleton.upper_rad)
+    posture: Array = np.clip(np.full(25, rad), skeleton.lower_rad, skeleton.upper_rad)
+    return posture
 
 
 def test_all_drives_come_up_and_nothing_moves(wired: Wired) -> None:
@@ -259,8 +263,8 @@ def test_a_drive_that_is_not_there_is_named_with_its_place(wired: Wired) -> None
 
 
 def test_a_setting_that_is_refused_is_told_with_its_object(wired: Wired) -> None:
-    drive = wired.peer.drives[0]
-    drive._node.add_write_callback(_refuse_limits)
+    node: Any = wired.peer.drives[0]._node
+    node.add_write_callback(_refuse_limits)
     wired.start()
     wired.run(0.2)
     said = wired.network.not_running["neck_yaw"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import canopen
 import numpy as np
@@ -109,7 +110,7 @@ class Served:
 
     def __init__(self) -> None:
         self.said: list[bytes] = []
-        self.node = canopen.LocalNode(5, str(EDS))
+        self.node: Any = canopen.LocalNode(5, str(EDS))
         self.node.associate_network(_Wire(lambda _, data: self.said.append(data)))
 
     def ask(self, transfer: Read | Write) -> bytes:

@@ -143,7 +143,8 @@ def drives_thread(config: CanopenConfig) -> Iterator[None]:
     thread = threading.Thread(target=lambda: loop.run_until_complete(run_drives(slave, stop)))
     log, heard = logging.getLogger("tandem.drives"), Heard()
     log.addHandler(heard)
-    level, _ = log.level, log.setLevel(logging.INFO)
+    level = log.level
+    log.setLevel(logging.INFO)
     thread.start()
     try:
         assert heard.ready.wait(DEADLINE_S)
@@ -343,6 +344,7 @@ def test_the_library_s_master_finds_a_cia_402_drive(config: CanopenConfig, tmp_p
             assert node.sdo[0x1001].raw == 0x09
         finally:
             network.bus = None
+            assert network.notifier is not None
             network.notifier.stop()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -243,7 +243,12 @@ def test_a_servo_past_the_end_of_its_turn_does_not_go_round(make_rig: Callable[.
 def test_a_cable_that_is_pulled_is_a_fault_of_all_and_a_new_one_is_taken_in_after_a_reset(rig: Rig) -> None:
     opened = []
     open_port = rig.driver._open_port
-    rig.driver._open_port = lambda *args: (opened.append(rig.now_ns), open_port(*args))[1]
+
+    def open_again(*args: Any) -> Any:
+        opened.append(rig.now_ns)
+        return open_port(*args)
+
+    rig.driver._open_port = open_again
     rig.driver.start()
     rig.cycles(3)
     rig.port.pull()

@@ -241,8 +241,11 @@ def test_a_joint_that_moves_while_the_robot_holds_fails(make: Make) -> None:
 
 
 def test_a_hold_between_faults_fails_unless_the_host_stood_still(make: Make) -> None:
-    left = (*STORY, Event(200.0, "left", {"guard": "hold", "reason": "no command"}))
-    left = (*left, Event(203.0, "recovered", {"fault": "", "done": True}))
+    left = (
+        *STORY,
+        Event(200.0, "left", {"guard": "hold", "reason": "no command"}),
+        Event(203.0, "recovered", {"fault": "", "done": True}),
+    )
     assert failing(make(events=left)) == {"guard: holds that nothing explains"}
     still = Event(199.9, "still", {"from_s": 199.6, "still_ms": 250.0, "excused_ms": 250.0})
     assert failing(make(events=(*left, still))) == set()

@@ -25,7 +25,12 @@ def judged(folder: Path, *more: Event) -> JudgedSoak:
     for event in (LEFT_OUT, *STORY[1:], *more):
         events.add(event)
     for second in range(1, 200):
-        row = {"at_s": second, "guard": "track", "sent": 12.5, "one_way_p50_ms": 0.4 + 0.01 * (second % 7)}
+        row: dict[str, float | str] = {
+            "at_s": second,
+            "guard": "track",
+            "sent": 12.5,
+            "one_way_p50_ms": 0.4 + 0.01 * (second % 7),
+        }
         row |= {f"{name}_life": 1 for name in ("master", "slave", "soak")}
         row |= {f"{name}_rss_mb": 90.0 for name in ("master", "slave", "soak")}
         samples.add(row | ({"lost": 2.0} if second == 150 else {}))

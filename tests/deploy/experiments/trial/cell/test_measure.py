@@ -34,7 +34,7 @@ BEGIN_NS = 7 * S
 
 
 def posture(at_ns: int) -> Array:
-    position = REST_RAD.copy()
+    position: Array = REST_RAD.copy()
     position[JOINT] = 0.5 * np.sin(2.0 * (at_ns - BEGIN_NS) / S)
     return position
 

@@ -119,14 +119,16 @@ def test_a_limit_is_kept_up_to_its_very_edge_by_the_median(value: float, met: bo
 
 
 def test_a_limit_of_each_repeat_is_missed_by_one() -> None:
-    repeats = with_values(Setup("tcp", "4g", "predict"), *({"stale_accepted": v} for v in (0.0, 0.0, 1.0)))
+    counts: list[dict[str, float | None]] = [{"stale_accepted": v} for v in (0.0, 0.0, 1.0)]
+    repeats = with_values(Setup("tcp", "4g", "predict"), *counts)
     [judged] = judge(rows(PLAN, repeats), [SetupLimit("stale_accepted", 0.0, each=True)])
     assert judged.passed is False
 
 
 def test_commands_that_never_flow_again_miss_the_limit_and_no_outage_asks_for_none() -> None:
     setup, limits = Setup("tcp", "4g", "predict"), [SetupLimit("flow_s", 1.5)]
-    back, never = {"flow_s": 0.5, "moved_alone": 0.0}, {"flow_s": None, "moved_alone": 0.0}
+    back: dict[str, float | None] = {"flow_s": 0.5, "moved_alone": 0.0}
+    never = back | {"flow_s": None}
     [once] = judge(rows(PLAN, with_values(setup, back, never, back)), limits)
     [mostly] = judge(rows(PLAN, with_values(setup, never, back, never)), limits)
     assert (once.passed, once.measured) == (True, 0.5)
@@ -135,7 +137,8 @@ def test_commands_that_never_flow_again_miss_the_limit_and_no_outage_asks_for_no
 
 
 def test_a_repeat_that_failed_meets_no_target_it_was_asked_of() -> None:
-    setup, good = Setup("tcp", "4g", "predict"), {"roughness": 1.0, "flow_s": 0.5}
+    setup = Setup("tcp", "4g", "predict")
+    good: dict[str, float | None] = {"roughness": 1.0, "flow_s": 0.5}
     failed = [Cell(CellKey(setup, n), Status.FAILED, "the robot is not heard") for n in (2, 3)]
     limits = [
         SetupLimit("roughness", 3.0, "predict"),
