@@ -15,6 +15,7 @@ from common.skeleton import Skeleton
 from common.wire.codec import decode
 from common.wire.messages import Command, RobotState, Statistics, Truth
 from common.wire.topics import COMMAND, STATE, STATISTICS, TRUTH
+from deploy.harness.operator import GuardSight
 from deploy.measure import Trace
 
 Heard = Command | RobotState | Statistics | Truth
@@ -37,7 +38,8 @@ class Observer:
         self.slave: SlaveMetrics | None = None
         self.undecodable = 0
         """Messages that could not be read: of another version, or broken."""
-        self.guards_seen: list[str] = []
+        self.guard_changes: list[GuardSight] = []
+        """The first state of each stretch in one guard state."""
         self.states: list[RobotState] = []
         """While recording."""
         self.commands: list[Command] = []
@@ -78,8 +80,8 @@ class Observer:
         elif isinstance(message, RobotState):
             self.state = message
             self._rate("states", message.sequence, message.sent_ns)
-            if self.guards_seen[-1:] != [message.guard]:
-                self.guards_seen.append(message.guard)
+            if not self.guard_changes or self.guard_changes[-1].guard != message.guard:
+                self.guard_changes.append(GuardSight(message.sent_ns, message.guard, message.reason))
         else:
             self.truth = message
         if self.recording:
@@ -116,6 +118,11 @@ class Observer:
     def guard(self) -> str:
         """The guard's state as last told."""
         return self.state.guard if self.state else "not heard"
+
+    @property
+    def guards_seen(self) -> list[str]:
+        """The guard's states, in the order in which they came."""
+        return [sight.guard for sight in self.guard_changes]
 
     @property
     def sent_ns(self) -> int:

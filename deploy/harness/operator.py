@@ -1,130 +1,175 @@
-"""The demo's operator: sees that the robot holds, engages it anew by an act of his own, and gives up in time.
+"""The operator of a robot: engages it, engages it again after a hold, and gives up in time. Pure.
 
-The rule: the demo fails when a robot has held HOLDS times within HOLDS_WITHIN_S, or is not back in `track`
-BACK_S after it left. A hold that the host itself explains (excuse.py) is printed like any other,
-with the evidence, but does not count to the first.
+States and time come in, acts come out. `deploy/harness/engage.py` hears the states and sends the acts. Every
+experiment uses this rule; each has its own `Patience`, and decides itself when its robot is ready.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from common.clock import to_ns, to_s
-from common.wire.messages import RobotState
-from deploy.harness.excuse import Lost
+from common.clock import to_s
+from deploy.harness.excuse import Evidence, Lost
 
-HOLDS, HOLDS_WITHIN_S = 3, 20.0
-BACK_S = 20.0
 JUDGED_AFTER_S = 1.0
+"""A core that still stands can report a stall only later: a hold is judged no sooner than this."""
 
 HostLost = Callable[[int], Lost]
 """What the host lost just before a time of its clock, ns."""
 
 
+@dataclass(frozen=True, slots=True)
+class GuardSight:
+    """What an operator sees of a robot at one moment."""
+
+    at_ns: int
+    guard: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """When an operator gives up on a robot. A robot in `estop` is given up at once."""
+
+    back_s: float = 20.0
+    """The robot must track again within this, from when it left `track`."""
+    holds: int | None = None
+    """So many holds within `holds_within_s` are too many; a hold that the host explains does not count.
+    None: any number is fine."""
+    holds_within_s: float = 20.0
+
+
 @dataclass(slots=True)
-class Hold:
-    """The robot had moved, and held without being asked to."""
+class UnaskedHold:
+    """The robot moved, and held without being asked to."""
 
     robot: str
     began_ns: int
-    """Robot's clock; in a demo the host's."""
     was: str
-    """`align` or `track`."""
+    """The guard's state before: `align` or `track`."""
     reason: str
+    engaged_ns: int | None = None
+    """When the operator engaged again; None while he has not."""
+    refused: str = ""
+    """What the robot last answered when it refused to engage."""
     tracked_ns: int | None = None
-    """When it tracked again; None where it has not yet."""
+    """When it tracked again; None while it does not."""
 
 
 @dataclass(slots=True)
 class Operator:
-    """One robot's operator. Pure: states in, whether to engage and whether to give up out."""
+    """One robot's operator."""
 
     robot: str
-    host_lost: HostLost
-    holds: list[Hold] = field(default_factory=list)
+    patience: Patience | None = None
+    """None: he never gives up."""
+    wanted_ns: int = 0
+    """Since when the robot is to track."""
+    again_s: float = 0.0
+    """How long he waits after one request to engage before the next."""
+    host_lost: HostLost = lambda _: Lost(0.0, 0.0, Evidence.NONE)
     guard: str = "silent"
     reason: str = "not heard"
+    holds: list[UnaskedHold] = field(default_factory=list)
+    moved_ns: int = 0
+    """When the robot was first seen to move; 0 before."""
+    engaged: int = 0
+    """How often a request to engage was granted."""
     engaged_ns: int = 0
-    """When it was first seen to move; 0 before."""
+    """When it was last granted; 0 before."""
     refused: str = ""
-    """What the robot last answered when it did not engage."""
-    _left_ns: int = 0
+    """What the robot last answered; empty when it engaged."""
+    _asked_ns: int | None = None
 
-    def begin(self, now_ns: int) -> None:
-        """From now on the robot is wanted in `track`."""
-        self._left_ns = now_ns
-
-    def see(self, states: Iterable[RobotState]) -> list[str]:
-        """Take the states heard since the last time, and return what there is to say."""
-        said: list[str] = []
-        for state in states:
-            said += self._see(state)
-        return said
-
-    def _see(self, state: RobotState) -> list[str]:
-        before, self.guard, self.reason = self.guard, state.guard, state.reason
-        if state.guard in ("align", "track") and not self.engaged_ns:
-            self.engaged_ns = state.sent_ns
-        if state.guard == "hold" and before in ("align", "track"):
+    def see(self, sight: GuardSight) -> list[UnaskedHold]:
+        """Take what was seen next, and return the holds that it began or ended."""
+        before, self.guard, self.reason = self.guard, sight.guard, sight.reason
+        if self.guard in ("align", "track") and not self.moved_ns:
+            self.moved_ns = sight.at_ns
+        if self.guard == "hold" and before in ("align", "track"):
             if before == "track":
-                self._left_ns = state.sent_ns
-            self.holds.append(Hold(self.robot, state.sent_ns, before, state.reason))
-            at_s = to_s(state.sent_ns - self.engaged_ns)
-            return [f"{self.robot} holds after {at_s:.1f} s: {state.reason}; the operator engages again"]
-        if state.guard == "track" and before != "track":
-            return self._back(state.sent_ns)
+                self.wanted_ns = sight.at_ns
+            self.holds.append(UnaskedHold(self.robot, sight.at_ns, before, sight.reason))
+            return self.holds[-1:]
+        if self.guard == "track" and before != "track":
+            ended = [hold for hold in self.holds if hold.tracked_ns is None]
+            for hold in ended:
+                hold.tracked_ns = sight.at_ns
+            return ended
         return []
-
-    def _back(self, now_ns: int) -> list[str]:
-        open_ = [hold for hold in self.holds if hold.tracked_ns is None]
-        for hold in open_:
-            hold.tracked_ns = now_ns
-        return [f"{self.robot} tracks again: {self._in_words(hold)}" for hold in open_]
-
-    def _in_words(self, hold: Hold) -> str:
-        row = self.row(hold)
-        blame = "counts" if row["counts"] else "does not count"
-        return f"out of track for {row['lasted_s']:.1f} s; {blame}: just before, {row['host']}"
 
     @property
     def tracks(self) -> bool:
         """Whether the robot follows."""
         return self.guard == "track"
 
-    @property
-    def wants_to_engage(self) -> bool:
-        """Whether it stands and has to be told to move."""
-        return self.guard == "hold"
+    def engages(self, now_ns: int, ready: bool = True) -> bool:
+        """Whether he engages the robot now: it holds, it is ready, and he has not just asked."""
+        waited = self._asked_ns is None or to_s(now_ns - self._asked_ns) >= self.again_s
+        return self.guard == "hold" and ready and waited
+
+    def answered(self, now_ns: int, refusal: str) -> None:
+        """Take the robot's answer to a request to engage; an empty refusal means that it engaged."""
+        self._asked_ns, self.refused = now_ns, refusal
+        if not refusal:
+            self.engaged += 1
+            self.engaged_ns = now_ns
+        if self.holds and self.holds[-1].tracked_ns is None:
+            self.holds[-1].refused = refusal or self.holds[-1].refused
+            if not refusal:
+                self.holds[-1].engaged_ns = now_ns
 
     def gives_up(self, now_ns: int) -> str | None:
-        """Why the demo fails, in words; None while it goes on."""
+        """Why he gives up on the robot; None while he does not."""
+        patience = self.patience
+        if patience is None:
+            return None
         if self.guard == "estop":
             return f"{self.robot} is in estop: {self.reason}"
-        # a core that still stands can tell of it only later
-        old = [hold for hold in self.holds if now_ns - hold.began_ns > to_ns(JUDGED_AFTER_S)]
-        counted = [hold for hold in old if self._counts(hold)][-HOLDS:]
-        if len(counted) == HOLDS and counted[-1].began_ns - counted[0].began_ns <= to_ns(HOLDS_WITHIN_S):
-            return f"{self.robot} held {HOLDS} times within {HOLDS_WITHIN_S:g} s, last: {counted[-1].reason}"
-        if not self.tracks and now_ns - self._left_ns > to_ns(BACK_S):
+        if (last := self._one_too_many(patience, now_ns)) is not None:
+            within_s = f"{patience.holds_within_s:g}"
+            return f"{self.robot} held {patience.holds} times within {within_s} s, last: {last.reason}"
+        if not self.tracks and to_s(now_ns - self.wanted_ns) > patience.back_s:
             refused = f"; asked to engage: {self.refused}" if self.refused else ""
-            return f"{self.robot} did not track for {BACK_S:g} s: {self.guard} ({self.reason}){refused}"
+            return (
+                f"{self.robot} did not track for {patience.back_s:g} s: {self.guard} ({self.reason}){refused}"
+            )
         return None
 
-    def _counts(self, hold: Hold) -> bool:
+    def _one_too_many(self, patience: Patience, now_ns: int) -> UnaskedHold | None:
+        if patience.holds is None:
+            return None
+        old = [hold for hold in self.holds if to_s(now_ns - hold.began_ns) > JUDGED_AFTER_S]
+        counted = [hold for hold in old if self._counts(hold)][-patience.holds :]
+        if len(counted) < patience.holds:
+            return None
+        lasted_s = to_s(counted[-1].began_ns - counted[0].began_ns)
+        return counted[-1] if lasted_s <= patience.holds_within_s else None
+
+    def _counts(self, hold: UnaskedHold) -> bool:
         return not self.host_lost(hold.began_ns).explains_hold
 
-    def row(self, hold: Hold) -> dict[str, Any]:
+    def words(self, hold: UnaskedHold) -> str:
+        """The line that a person reads when the hold begins, and when it is over."""
+        row = self.row(hold)
+        if hold.tracked_ns is None:
+            return f"{self.robot} holds after {row['at_s']:.1f} s: {hold.reason}; the operator engages again"
+        counts = "counts" if row["counts"] else "does not count"
+        lasted = f"out of track for {row['lasted_s']:.1f} s"
+        return f"{self.robot} tracks again: {lasted}; {counts}: just before, {row['host']}"
+
+    def row(self, hold: UnaskedHold) -> dict[str, Any]:
         """One of a report's `holds`."""
         lost = self.host_lost(hold.began_ns)
-        lasted_ns = None if hold.tracked_ns is None else hold.tracked_ns - hold.began_ns
+        lasted_s = None if hold.tracked_ns is None else to_s(hold.tracked_ns - hold.began_ns)
         return {
             "robot": hold.robot,
-            "at_s": round(to_s(hold.began_ns - self.engaged_ns), 2),
+            "at_s": round(to_s(hold.began_ns - self.moved_ns), 2),
             "was": hold.was,
             "reason": hold.reason,
-            "lasted_s": None if lasted_ns is None else round(to_s(lasted_ns), 2),
+            "lasted_s": None if lasted_s is None else round(lasted_s, 2),
             "host_still_ms": round(1e3 * lost.excused_s),
             "host": str(lost),
             "counts": self._counts(hold),

@@ -108,6 +108,11 @@ class Rig:
         host = self.network.robot if role in ("slave", DRIVES) else self.network.operator
         return host.command(())
 
+    def check(self) -> None:
+        """Raise TandemError where a process has ended by itself."""
+        for child in self.children.values():
+            child.check()
+
     async def logged(self, name: str, text: str, timeout_s: float) -> None:
         """Wait until a process has logged something. Raises TandemError where it does not."""
         deadline_ns = monotonic_ns() + to_ns(timeout_s)

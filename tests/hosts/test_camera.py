@@ -11,8 +11,8 @@ import pytest
 from common.clock import to_ns
 from common.metrics.slave import CameraMetrics
 from deploy.harness.host import Host
-from deploy.harness.rig import ROLES, Rig, open_rig
-from deploy.harness.tracking import until_tracking
+from deploy.harness.rig import Rig, open_rig
+from deploy.harness.start import start_tracking
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
@@ -39,10 +39,7 @@ def test_a_camera_killed_while_the_robot_tracks_is_a_word_in_the_state_and_nothi
     async def story(host: Host) -> None:
         async with open_rig(overrides={"slave": ['camera.source="robot"']}) as rig:
             observer = rig.observer
-            for role in ROLES:
-                await rig.start(role)
-            await rig.until(lambda: observer.ready, 60.0, "readiness")
-            await until_tracking(rig)
+            await start_tracking(rig)
             assert observer.state is not None
             if "no OpenGL" in observer.state.faults.get("camera", ""):
                 pytest.skip(observer.state.faults["camera"])

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import signal
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
 
-from deploy.harness import operator as rule
+from deploy.experiments.demo.operators import PATIENCE, DemoOperators
 from deploy.harness.host import Host
-from deploy.harness.rig import ROLES, Rig, open_rig
-from deploy.harness.tend import Tending
+from deploy.harness.operator import Patience
+from deploy.harness.rig import Rig, open_rig
+from deploy.harness.start import start_all
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
@@ -19,54 +20,48 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
 
 
-async def tended(rig: Rig, said: list[str]) -> Tending:
-    for role in ROLES:
-        await rig.start(role)
-    await rig.until(lambda: rig.observer.ready, 60.0, "readiness")
-    tending = Tending(rig, Host(), asyncio.Event(), lambda: None, said.append)
-    await tending.until_all_track()
-    assert not tending.problem
-    return tending
+async def started(rig: Rig, lines: list[str], patience: Patience) -> DemoOperators:
+    await start_all(rig)
+    operators = DemoOperators(rig, Host(), lambda: None, lines.append, patience)
+    await operators.follow(0.0)
+    assert not operators.problem
+    return operators
 
 
-def test_a_robot_that_held_is_engaged_again_by_an_act_and_the_hold_is_told(
-    monkeypatch: pytest.MonkeyPatch, on_this_host: OnThisHost
-) -> None:
-    monkeypatch.setattr(rule, "HOLDS", 100)  # however often this host stands still
-
+def test_a_robot_that_held_is_engaged_again_and_the_hold_is_reported(on_this_host: OnThisHost) -> None:
     async def story(_: Host) -> None:
-        said: list[str] = []
+        lines: list[str] = []
         async with open_rig() as rig:
-            tending = await tended(rig, said)
-            before = len(tending.rows())
+            # however often this host stands still
+            operators = await started(rig, lines, replace(PATIENCE, holds=None))
+            before = len(operators.rows())
             rig.children["master"].send(signal.SIGSTOP)
             await rig.until(lambda: rig.observer.guard == "hold", 10.0, "hold")
             rig.children["master"].send(signal.SIGCONT)
-            await tending.watch(0.5)
-            assert not tending.problem
+            await operators.follow(0.5)
+            assert not operators.problem
             assert rig.observer.guard == "track"
-            rows = tending.rows()[before:]
+            rows = operators.rows()[before:]
             assert any("no command" in row["reason"] or "lease" in row["reason"] for row in rows), rows
             assert all(row["lasted_s"] > 0.0 for row in rows)
-            assert any("engages again" in line for line in said)
-            assert any("tracks again" in line for line in said)
-            await tending.let_go()
+            assert any("engages again" in line for line in lines)
+            assert any("tracks again" in line for line in lines)
+            await operators.let_go()
             assert rig.observer.guard == "hold"
 
     on_this_host(story)
 
 
-def test_a_robot_whose_master_is_gone_is_given_up(
-    monkeypatch: pytest.MonkeyPatch, on_this_host: OnThisHost
-) -> None:
+def test_a_robot_whose_master_is_gone_is_given_up(on_this_host: OnThisHost) -> None:
     async def story(_: Host) -> None:
         async with open_rig() as rig:
-            tending = await tended(rig, [])
-            with monkeypatch.context() as patched:
-                patched.setattr(rule, "BACK_S", 3.0)
-                await rig.children["master"].kill()
-                await tending.watch(0.5)
-            assert "did not track for 3 s: hold (" in tending.problem
-            assert tending.rows()[-1]["lasted_s"] is None
+            await start_all(rig)
+            operators = DemoOperators(rig, Host(), lambda: None, print, Patience(back_s=10.0))
+            await operators.follow(0.0)
+            await rig.children["master"].kill()
+            await rig.until(lambda: rig.observer.guard == "hold", 10.0, "hold")
+            await operators.follow(0.5)
+            assert "did not track for 10 s: hold (" in operators.problem
+            assert operators.rows()[-1]["lasted_s"] is None
 
     on_this_host(story)

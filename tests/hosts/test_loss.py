@@ -11,9 +11,10 @@ import pytest
 from common.clock import to_ns
 from common.metrics.slave import SlaveMetrics
 from common.wire.messages import RobotState
+from deploy.harness.engage import until_tracking
 from deploy.harness.host import Host
-from deploy.harness.rig import ROLES, Rig, open_rig
-from deploy.harness.tracking import until_tracking
+from deploy.harness.rig import open_rig
+from deploy.harness.start import start_tracking
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
@@ -26,18 +27,11 @@ BRAKE_S = 0.35
 """From the fastest joint speed to standstill, and the servo's own settling."""
 
 
-async def tracking(rig: Rig) -> None:
-    for role in ROLES:
-        await rig.start(role)
-    await rig.until(lambda: rig.observer.ready, 60.0, "readiness")
-    await until_tracking(rig)
-
-
 def test_killed_master_leaves_the_robot_holding_until_engaged_anew(on_this_host: OnThisHost) -> None:
     async def story(host: Host) -> None:
         async with open_rig() as rig:
             observer = rig.observer
-            await tracking(rig)
+            await start_tracking(rig)
             observer.recording = True
             await rig.children["master"].kill()
             await rig.until(lambda: observer.guard == "hold", 5.0, "hold")
@@ -73,7 +67,7 @@ def test_killed_slave_is_told_by_the_master_and_resumes_only_when_engaged(on_thi
     async def story(host: Host) -> None:
         async with open_rig() as rig:
             observer = rig.observer
-            await tracking(rig)
+            await start_tracking(rig)
             await rig.children["slave"].kill()
             await rig.until(lambda: "is silent" in rig.children["master"].said(), 5.0, "word from the master")
 
@@ -95,7 +89,7 @@ def test_killed_slave_is_told_by_the_master_and_resumes_only_when_engaged(on_thi
 def test_each_process_stops_cleanly(on_this_host: OnThisHost, stop: signal.Signals) -> None:
     async def story(host: Host) -> None:
         async with open_rig() as rig:
-            await tracking(rig)
+            await start_tracking(rig)
             statuses = {role: await rig.children[role].stop(stop) for role in ("master", "suit", "slave")}
             assert statuses == {"master": 0, "suit": 0, "slave": 0}, {
                 role: child.last_words() for role, child in rig.children.items()

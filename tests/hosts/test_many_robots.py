@@ -10,9 +10,10 @@ import pytest
 
 from common.quaternion import Array
 from common.wire.messages import Action, RobotState
+from deploy.harness.engage import until_tracking
 from deploy.harness.host import Host
 from deploy.harness.rig import Rig, open_rig
-from deploy.harness.tracking import until_tracking
+from deploy.harness.start import start_all
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
@@ -33,20 +34,6 @@ OVERRIDES = {
 }
 
 
-async def ready(rig: Rig) -> None:
-    for name in (*rig.slaves, "suit"):
-        await rig.start(name)
-    everyone = rig.observers.values()
-
-    def alive() -> None:
-        for child in rig.children.values():
-            child.check()
-
-    await rig.until(lambda: all(o.state for o in everyone), 60.0, "word from every robot", alive)
-    await rig.start("master")
-    await rig.until(lambda: all(o.ready for o in everyone), 60.0, "readiness of every robot", alive)
-
-
 def unexplained(states: list[RobotState], host: Host) -> list[str]:
     """Why the robot held each time that the host had not stood still just before."""
     held = [b for a, b in pairwise(states) if (a.guard, b.guard) in (("track", "hold"), ("align", "hold"))]
@@ -63,7 +50,7 @@ def test_who_is_engaged_follows_and_what_befalls_one_does_not_reach_the_others(
 ) -> None:
     async def story(host: Host) -> None:
         async with open_rig(overrides=OVERRIDES, robots=3) as rig:
-            await ready(rig)
+            await start_all(rig)
             assert len({state.lease_id for state in states(rig).values()}) == 3
 
             # a subset: two of the three

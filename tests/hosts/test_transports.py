@@ -14,20 +14,13 @@ from common.metrics.slave import SlaveMetrics
 from common.skeleton import load_skeleton
 from deploy.harness.host import Host
 from deploy.harness.keys import MASTER, access_override
-from deploy.harness.rig import ROBOT, ROLES, Rig, open_rig
-from deploy.harness.tracking import until_tracking
+from deploy.harness.rig import ROBOT, open_rig
+from deploy.harness.start import start_tracking
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
 pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
-
-
-async def tracks(rig: Rig) -> None:
-    for role in ROLES:
-        await rig.start(role)
-    await rig.until(lambda: rig.observer.ready, 60.0, "readiness")
-    await until_tracking(rig)
 
 
 @pytest.mark.parametrize("routed", [False, True], ids=["direct", "routed"])
@@ -37,7 +30,7 @@ def test_the_robot_tracks_over(on_this_host: OnThisHost, transport: str, routed:
         access = [access_override([ROBOT])] if transport in SECURE else []
         rules = dict.fromkeys(("slave", "master", "router"), access)
         async with open_rig(transport, rules, routed=routed) as rig:
-            await tracks(rig)
+            await start_tracking(rig)
             assert rig.observer.state is not None
             assert rig.observer.state.offset_bound_ns > 0
             statuses = await rig.stop()
@@ -71,7 +64,7 @@ def test_body_nodes_on_classic_can_and_gloves_on_fd(on_this_host: OnThisHost) ->
 
     async def story(host: Host) -> None:
         async with open_rig(overrides=overrides) as rig:
-            await tracks(rig)
+            await start_tracking(rig)
             statuses = await rig.stop()
             assert set(statuses.values()) == {0}
             master = rig.children["master"].metrics(MasterMetrics)

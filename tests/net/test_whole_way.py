@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from common.clock import monotonic_ns, to_ns, to_s
+from deploy.harness.engage import until_tracking
 from deploy.harness.host import Host
-from deploy.harness.rig import ROLES, Rig, open_rig
-from deploy.harness.tracking import until_tracking
+from deploy.harness.rig import Rig, open_rig
+from deploy.harness.start import start_tracking
 from deploy.sim.network import Network, load_profile, open_network
 from slave.guard.config import GuardConfig
 
@@ -42,10 +43,7 @@ def test_the_robot_holds_in_an_outage_and_moves_again_only_when_engaged(on_this_
 
 
 async def tracks(rig: Rig) -> None:
-    for role in ROLES:
-        await rig.start(role)
-    await rig.until(lambda: rig.observer.ready, 60.0, "readiness", lambda: alive(rig))
-    await until_tracking(rig)
+    await start_tracking(rig)
     observer = rig.observer
     await rig.until(
         lambda: observer.slave is not None and observer.slave.one_way_ms.count > 12,
@@ -67,7 +65,7 @@ async def outage(rig: Rig, network: Network) -> None:
         state = observer.state
         return state is not None and state.echo is not None and state.echo.received_ns > back_ns
 
-    await rig.until(again, 10.0, "commands after the outage", lambda: alive(rig))
+    await rig.until(again, 10.0, "commands after the outage", rig.check)
     states = [s for s in observer.states if s.echo is not None and s.echo.received_ns > back_ns]
     first = states[0].echo
     assert first is not None
@@ -89,8 +87,3 @@ def none_was_stale(rig: Rig) -> None:
     guard = rig.observer.slave.guard
     assert guard.losses["command"] >= 1
     assert guard.received == guard.accepted + sum(guard.dropped.values())
-
-
-def alive(rig: Rig) -> None:
-    for child in rig.children.values():
-        child.check()

@@ -15,11 +15,12 @@ from rich.text import Text
 from common.clock import monotonic_ns
 from common.errors import TandemError
 from deploy.experiments.demo.many_report import ManyReport, make_many_report, many_table
+from deploy.experiments.demo.operators import DemoOperators
 from deploy.experiments.demo.report import Seen
 from deploy.experiments.demo.run import START_S, DemoOptions, check
 from deploy.harness.host import watch_host
 from deploy.harness.rig import Rig, open_rig
-from deploy.harness.tend import Tending
+from deploy.harness.start import start_all
 
 
 async def show_many(
@@ -59,21 +60,13 @@ async def _story(options: DemoOptions, robots: int, stop: asyncio.Event, console
     async with watch_host() as host, rigging as rig:
         with Live(console=console, refresh_per_second=4, transient=True) as live:
             look = _look(rig, stop, live)
-            tending = Tending(rig, host, stop, look, lambda line: console.print(line, style="yellow"))
-            for name in (*rig.slaves, "suit"):
-                await rig.start(name)
-            everyone = rig.observers.values()
             start_s = START_S + 2.0 * robots  # they share the machine's cores while they start
-            await rig.until(lambda: all(o.state for o in everyone), start_s, "word from every robot", look)
-            await rig.start("master")
-            await rig.until(lambda: all(o.ready for o in everyone), start_s, "readiness of every robot", look)
-            await tending.until_all_track()
-            for child in rig.children.values():
-                child.measure(first=True)
-            await tending.watch(options.seconds)
-            if not tending.problem:
-                await tending.let_go()
-        seen = Seen(tending.rows(), host.figures(monotonic_ns()), tending.problem)
+            await start_all(rig, start_s, look)
+            operators = DemoOperators(rig, host, look, lambda line: console.print(line, style="yellow"))
+            await operators.follow(options.seconds, lambda: _measure(rig))
+            if not operators.problem:
+                await operators.let_go()
+        seen = Seen(operators.rows(), host.figures(monotonic_ns()), operators.problem)
         return make_many_report(options, rig, await rig.stop(), seen)
 
 
@@ -88,3 +81,8 @@ def _look(rig: Rig, stop: asyncio.Event, live: Live) -> Callable[[], None]:
         live.update(Text(guards))
 
     return look
+
+
+def _measure(rig: Rig) -> None:
+    for child in rig.children.values():
+        child.measure(first=True)

@@ -18,11 +18,12 @@ from common.errors import TandemError
 from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING, example
 from deploy.experiments.demo.mounted import mount
+from deploy.experiments.demo.operators import DemoOperators
 from deploy.experiments.demo.report import Report, Seen, make_report
 from deploy.experiments.demo.view import draw
 from deploy.harness.host import Host, watch_host
 from deploy.harness.rig import Rig, open_rig
-from deploy.harness.tend import Tending
+from deploy.harness.start import start_all
 from deploy.sim.suit.config import SuitConfig
 from master.config import MasterConfig
 from slave.config import SlaveConfig
@@ -94,25 +95,14 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
             overrides["master"] += await _mount(options, options.replay, Path(folder), console)
         host = await stack.enter_async_context(watch_host())
         rig = await stack.enter_async_context(open_rig(options.transport, overrides, options.profile))
-        observer = rig.observer
         with Live(console=console, refresh_per_second=4, transient=True) as live:
             show = _Show(rig, host, stop, live)
-            tending = Tending(rig, host, stop, show.look, lambda line: console.print(line, style="yellow"))
-            if "drives" in rig.children:
-                await rig.start("drives")
-                await rig.logged("drives", "drives on", START_S)
-            for role in ("slave", "suit"):
-                await rig.start(role)
-            # the master last: processes that still start would take the time of its first ticks
-            await rig.until(lambda: observer.state is not None, START_S, "word from the robot", show.look)
-            await rig.start("master")
-            await rig.until(lambda: observer.ready, START_S, "readiness", show.look)
-            await tending.until_all_track()
-            show.begin()
-            await tending.watch(options.seconds)
-            if not tending.problem:
-                await tending.let_go()
-        seen = Seen(tending.rows(), host.figures(monotonic_ns()), tending.problem)
+            await start_all(rig, START_S, show.look)
+            operators = DemoOperators(rig, host, show.look, lambda line: console.print(line, style="yellow"))
+            await operators.follow(options.seconds, show.begin)
+            if not operators.problem:
+                await operators.let_go()
+        seen = Seen(operators.rows(), host.figures(monotonic_ns()), operators.problem)
         return make_report(options, rig, await rig.stop(), seen)
 
 

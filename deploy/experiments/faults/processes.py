@@ -28,8 +28,8 @@ from deploy.experiments.faults.scene import Scene
 from deploy.experiments.faults.trial import Outcome
 from deploy.harness.excuse import Lost
 from deploy.harness.host import Host, watch_host
-from deploy.harness.rig import DRIVES, ROLES, Rig, drive_buses, open_rig
-from deploy.harness.tracking import until_tracking
+from deploy.harness.rig import DRIVES, Rig, drive_buses, open_rig
+from deploy.harness.start import start_tracking
 from deploy.measure.stillness import Course, stillness
 from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
@@ -111,7 +111,7 @@ async def run_process_trial(fault: ProcessFault, host: Host) -> Outcome:
         DRIVES: [],
     }
     async with open_rig(overrides=overrides) as rig:
-        await _following(rig)
+        await start_tracking(rig)
         with EncoderWatch(rig.can_port, rig.skeleton) as watch:
             observer = rig.observer
             await rig.until(lambda: _fast(rig), START_S, "fast motion")
@@ -169,15 +169,6 @@ async def _done(act: Awaitable[object]) -> None:
 def _fast(rig: Rig) -> bool:
     command = rig.observer.command
     return command is not None and float(np.abs(command.velocity_rad_s).max()) > FAST_RAD_S
-
-
-async def _following(rig: Rig) -> None:
-    await rig.start(DRIVES)
-    await rig.logged(DRIVES, "drives on", START_S)
-    for role in ROLES:
-        await rig.start(role)
-    await rig.until(lambda: rig.observer.ready, START_S, "readiness")
-    await until_tracking(rig)
 
 
 def _judge(

@@ -24,16 +24,17 @@ from deploy.experiments.soak.faults import FAULTS, Case, Fault, possible
 from deploy.experiments.soak.files.log import SoakLog
 from deploy.experiments.soak.files.options import SoakOptions
 from deploy.experiments.soak.link import LinkLosses, nature
-from deploy.experiments.soak.operator import Operator
+from deploy.experiments.soak.recovery import SoakOperator
 from deploy.experiments.soak.schedule import Planned, distance_s, schedule
 from deploy.experiments.soak.stage import Stage
 from deploy.experiments.soak.view import draw
 from deploy.harness.child import usage
 from deploy.harness.host import Host
+from deploy.harness.start import start_all
 
 SOAK = "soak"
 """The name of this process among those that are watched."""
-HEARD_S = 30.0
+START_S = 90.0
 LOOK_S = 0.05
 STEADY_S = 3.0
 """The robot follows at least so long between two faults."""
@@ -63,7 +64,7 @@ class Soak:
         self._log = log
         self._host = host
         self._live = live
-        self._operator = Operator(stage)
+        self._operator = SoakOperator(stage)
         self._ends: dict[str, int] = {}
         self._self = psutil.Process()
         self._losses = LinkLosses(stage.rig.network)
@@ -107,24 +108,13 @@ class Soak:
 
     async def _start(self) -> None:
         stage = self._stage
-        for name in (*stage.rig.slaves, "suit"):
-            await stage.start(name)
-        await self._until(lambda: stage.watch.heard(monotonic_ns()), "word from the robot")
-        # the master last: processes that still start would take the time of its first ticks
-        await stage.start("master")
+        # a process that ends by itself is started again, also now
+        await start_all(stage.rig, START_S, check=lambda: None, start=stage.start)
         await stage.start(recording.NAME)
         recovery = await self._operator.recover(monotonic_ns())
         if not recovery.done:
             waiting = stage.rig.observer.waiting_for()
             raise TandemError(f"the robot never followed: {recovery.refused or waiting}")
-
-    async def _until(self, reached: Any, what: str) -> None:
-        deadline_ns = monotonic_ns() + to_ns(HEARD_S)
-        while not reached():
-            if monotonic_ns() > deadline_ns:
-                words = {n: c.last_words() for n, c in self._stage.children.items() if c.log.exists()}
-                raise TandemError(f"no {what} within {HEARD_S:g} s: {words}")
-            await asyncio.sleep(LOOK_S)
 
     async def _tend(self, until_s: float) -> None:
         """Let it run; a robot that leaves off by itself is noted, and engaged again."""

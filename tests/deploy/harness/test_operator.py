@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from common.clock import to_ns
-from common.wire.messages import RobotState
 from deploy.harness.excuse import STILL_S, Evidence, Lost
-from deploy.harness.operator import BACK_S, HOLDS_WITHIN_S, JUDGED_AFTER_S, HostLost, Operator
+from deploy.harness.operator import JUDGED_AFTER_S, GuardSight, HostLost, Operator, Patience, UnaskedHold
 
+BACK_S, HOLDS_WITHIN_S = 20.0, 20.0
+PATIENCE = Patience(BACK_S, 3, HOLDS_WITHIN_S)
 LATE_S = JUDGED_AFTER_S + 0.1
 
 
@@ -17,21 +17,23 @@ def lost(still_s: float) -> HostLost:
     return lambda at_ns: Lost(still_s, still_s, Evidence.PRIORITY)
 
 
-def state(at_s: float, guard: str, reason: str = "because") -> RobotState:
-    zeros, valid = np.zeros(1), np.ones(1, np.bool_)
-    return RobotState("r", 1, to_ns(at_s), 1, guard, reason, "nurse-1", valid, zeros, zeros, None, 0, 1)
+def state(at_s: float, guard: str, reason: str = "because") -> GuardSight:
+    return GuardSight(to_ns(at_s), guard, reason)
 
 
 KEPT_ITS_TIME = lost(0.0)
 
 
+def see(one: Operator, *sights: GuardSight) -> list[UnaskedHold]:
+    return [hold for sight in sights for hold in one.see(sight)]
+
+
 def operator(host_lost: HostLost = KEPT_ITS_TIME) -> Operator:
     """His robot is engaged at 1 s and tracks at 2 s."""
-    one = Operator("robot-1", host_lost)
-    one.begin(0)
-    assert one.see([state(0.5, "hold")]) == []
-    assert one.wants_to_engage
-    assert one.see([state(1.0, "align"), state(2.0, "track")]) == []
+    one = Operator("robot-1", PATIENCE, host_lost=host_lost, again_s=0.25)
+    assert see(one, state(0.5, "hold")) == []
+    assert one.engages(to_ns(0.5))
+    assert see(one, state(1.0, "align"), state(2.0, "track")) == []
     assert one.tracks
     return one
 
@@ -39,28 +41,48 @@ def operator(host_lost: HostLost = KEPT_ITS_TIME) -> Operator:
 def holds(one: Operator, *at_s: float) -> None:
     """It holds at each, and tracks again half a second later."""
     for t in at_s:
-        one.see([state(t, "hold"), state(t + 0.2, "align"), state(t + 0.5, "track")])
+        see(one, state(t, "hold"), state(t + 0.2, "align"), state(t + 0.5, "track"))
 
 
-def test_a_hold_is_said_engaged_again_and_kept() -> None:
+def test_a_hold_is_printed_engaged_again_and_kept() -> None:
     one = operator()
-    [said] = one.see([state(6.0, "hold", "no encoder"), state(6.02, "hold", "no encoder")])
-    assert "robot-1 holds after 5.0 s: no encoder" in said
-    assert one.wants_to_engage
-    [said] = one.see([state(6.5, "align"), state(8.0, "track")])
-    assert "tracks again: out of track for 2.0 s" in said
-    [hold] = one.holds
+    [hold] = see(one, state(6.0, "hold", "no encoder"), state(6.02, "hold", "no encoder"))
+    assert "robot-1 holds after 5.0 s: no encoder" in one.words(hold)
+    assert one.engages(to_ns(6.02))
+    assert see(one, state(6.5, "align"), state(8.0, "track")) == [hold]
+    assert "tracks again: out of track for 2.0 s" in one.words(hold)
     assert one.row(hold) == {
         "robot": "robot-1", "at_s": 5.0, "was": "track", "reason": "no encoder",
         "lasted_s": 2.0, "host_still_ms": 0, "host": "the host kept its time", "counts": True,
     }  # fmt: skip
 
 
+def test_he_engages_only_a_robot_that_holds_and_is_ready_and_waits_between_two_requests() -> None:
+    one = operator()
+    assert not one.engages(to_ns(2.5))
+    [hold] = see(one, state(3.0, "hold"))
+    assert not one.engages(to_ns(3.0), ready=False)
+    one.answered(to_ns(3.1), "still braking")
+    assert not one.engages(to_ns(3.3))
+    assert one.engages(to_ns(3.4))
+    one.answered(to_ns(3.5), "")
+    assert (one.engaged, one.engaged_ns, one.refused) == (1, to_ns(3.5), "")
+    assert (hold.engaged_ns, hold.refused) == (to_ns(3.5), "still braking")
+
+
+def test_without_patience_he_never_gives_up() -> None:
+    one = Operator("robot-1", guard="track")
+    holds(one, 1.0, 2.0, 3.0, 4.0)
+    see(one, state(5.0, "estop"))
+    assert one.gives_up(to_ns(1000.0)) is None
+    assert len(one.holds) == 4
+
+
 def test_alignment_that_ends_in_hold_is_a_hold_too_and_both_end_with_track() -> None:
     one = operator()
-    one.see([state(3.0, "hold"), state(3.5, "align"), state(4.0, "hold"), state(4.5, "align")])
+    see(one, state(3.0, "hold"), state(3.5, "align"), state(4.0, "hold"), state(4.5, "align"))
     assert [(hold.was, hold.tracked_ns) for hold in one.holds] == [("track", None), ("align", None)]
-    assert len(one.see([state(5.0, "track")])) == 2
+    assert len(see(one, state(5.0, "track"))) == 2
     assert [hold.tracked_ns for hold in one.holds] == [to_ns(5.0)] * 2
 
 
@@ -97,9 +119,9 @@ def test_a_hold_counts_unless_the_host_is_shown_to_have_stood_still_before_it(
         return found
 
     one = operator(host_lost)
-    one.see([state(2.9, "hold")])
-    [line] = one.see([state(2.95, "track")])
-    assert said in line
+    [hold] = see(one, state(2.9, "hold"))
+    see(one, state(2.95, "track"))
+    assert said in one.words(hold)
     one.holds.clear()
     asked.clear()
     holds(one, 3.0, 4.0, 5.0, 6.0)
@@ -118,8 +140,8 @@ def test_what_the_host_says_a_second_late_is_waited_for() -> None:
 @pytest.mark.parametrize("still_s", [0.0, 1.0])
 def test_a_robot_that_does_not_come_back_is_given_up_whatever_the_host_did(still_s: float) -> None:
     one = operator(lost(still_s))
-    one.see([state(3.0, "hold", "no command")])
-    one.refused = "still braking"
+    see(one, state(3.0, "hold", "no command"))
+    one.answered(to_ns(3.0), "still braking")
     assert one.gives_up(to_ns(3.0 + BACK_S)) is None
     why = one.gives_up(to_ns(3.1 + BACK_S))
     assert why == "robot-1 did not track for 20 s: hold (no command); asked to engage: still braking"
@@ -127,16 +149,15 @@ def test_a_robot_that_does_not_come_back_is_given_up_whatever_the_host_did(still
 
 def test_going_to_and_fro_between_hold_and_align_is_no_way_back() -> None:
     one = operator(lost(1.0))
-    one.see([state(3.0 + t, guard) for t in range(20) for guard in ("hold", "align")])
+    see(one, *(state(3.0 + t, guard) for t in range(20) for guard in ("hold", "align")))
     assert one.gives_up(to_ns(3.1 + BACK_S)) is not None
 
 
 def test_a_robot_that_is_never_heard_or_stopped_by_a_person_is_given_up() -> None:
-    one = Operator("robot-1", lost(0.0))
-    one.begin(to_ns(1.0))
+    one = Operator("robot-1", PATIENCE, wanted_ns=to_ns(1.0))
     assert one.gives_up(to_ns(1.0 + BACK_S)) is None
     assert one.gives_up(to_ns(1.1 + BACK_S)) == "robot-1 did not track for 20 s: silent (not heard)"
     one = operator()
-    one.see([state(3.0, "estop", "e-stop by visitor")])
+    see(one, state(3.0, "estop", "e-stop by visitor"))
     assert one.gives_up(to_ns(3.0)) == "robot-1 is in estop: e-stop by visitor"
-    assert not one.wants_to_engage
+    assert not one.engages(to_ns(3.0))

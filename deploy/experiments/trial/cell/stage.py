@@ -5,26 +5,27 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from common.clock import monotonic_ns, to_ns, to_s
+from common.clock import monotonic_ns, to_s
 from common.config.load import load_config
 from common.errors import TandemError
-from common.wire.messages import Action
 from deploy.examples.profiles import example
-from deploy.experiments.trial.cell.attention import Attention
 from deploy.experiments.trial.cell.choice import why_impossible
 from deploy.experiments.trial.cell.judge import judged
 from deploy.experiments.trial.cell.plan import CellKey, Plan
 from deploy.experiments.trial.cell.recorder import Recorder
 from deploy.experiments.trial.cell.recording import Course, Outage, Recording
+from deploy.experiments.trial.cell.remarks import hold_remarks
 from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.harness.engage import EngageDriver, RigRobot, keep_engaged, until_tracking
 from deploy.harness.link_settings import needed_age_s, open_timeout_s
-from deploy.harness.rig import ROUTER, Rig, open_rig
+from deploy.harness.operator import Operator
+from deploy.harness.rig import ROBOT, Rig, open_rig
+from deploy.harness.start import start_all
 from deploy.sim.network import Network, load_profile, open_network
 from slave.config import SlaveConfig
 
 START_S = 30.0
 """Processes up, filters settled, clock trusted, lease held."""
-ENGAGE_S = 3.0
 ALIGN_S = 25.0
 TOLD_S = 1.6
 """Statistics come once a second: after this each process has told them once more."""
@@ -107,18 +108,10 @@ class _Story:
         )
 
     async def _to_track(self) -> None:
-        rig, observer = self._rig, self._rig.observer
         self._tell("starting")
-        for name in rig.children:
-            if name not in ("master", ROUTER):  # a router runs already
-                await rig.start(name)
-        # the master last: processes that still start would take the time of its first ticks
-        await rig.until(lambda: observer.state is not None, START_S, "word from the robot", self._look)
-        await rig.start("master")
-        await rig.until(lambda: observer.ready, START_S, "readiness", self._look)
+        await start_all(self._rig, START_S, self._look)
         self._tell("aligning")
-        await self._engage()
-        await rig.until(lambda: observer.guard == "track", ALIGN_S, "track", self._look)
+        await until_tracking(self._rig, timeout_s=ALIGN_S, check=self._look)
 
     async def _judged_time(self) -> tuple[Recording, dict[str, float], float, float]:
         self._tell(f"following for {self._plan.seconds:g} s")
@@ -127,7 +120,10 @@ class _Story:
         for child in children.values():
             child.measure(first=True)
         before, began_ns = self._network.counters(), monotonic_ns()
-        await self._follow(began_ns, began_ns + to_ns(self._plan.seconds))
+        operator = Operator(ROBOT, guard="track")
+        driver = EngageDriver(operator, RigRobot(self._rig, waits_until_ready=True))
+        await keep_engaged([driver], self._plan.seconds, self._look, LOOK_S)
+        self._remarks += hold_remarks(operator.holds, began_ns)
         after, seconds = self._network.counters(), to_s(monotonic_ns() - began_ns)
         for child in children.values():
             child.measure()
@@ -135,22 +131,6 @@ class _Story:
         up = (after.to_robot.bytes - before.to_robot.bytes) / seconds
         down = (after.to_operator.bytes - before.to_operator.bytes) / seconds
         return self._recorder.take(), used, up, down
-
-    async def _follow(self, began_ns: int, until_ns: int) -> None:
-        """Let it run; where the robot holds, the operator engages again as soon as that is possible."""
-        observer, attention = self._rig.observer, Attention(self._remarks)
-        while monotonic_ns() < until_ns:
-            self._look()
-            at_s = to_s(monotonic_ns() - began_ns)
-            reason = observer.state.reason if observer.state is not None else ""
-            if attention.look(at_s, observer.guard, reason, observer.ready):
-                refusal = ""
-                try:
-                    await self._engage()
-                except TandemError as error:
-                    refusal = str(error)
-                attention.acted(at_s, refusal)
-            await asyncio.sleep(LOOK_S)
 
     async def _outage(self) -> tuple[Recording, Outage]:
         rig, observer = self._rig, self._rig.observer
@@ -165,26 +145,15 @@ class _Story:
             ready_ns = monotonic_ns()
             await asyncio.sleep(WATCH_S)
             act_ns = monotonic_ns()
-            await self._engage()
-            await rig.until(lambda: observer.guard == "track", ALIGN_S, "track after the outage", self._look)
+            await until_tracking(rig, timeout_s=ALIGN_S, check=self._look)
         except TandemError as error:
             self._look()
             self._remarks.append(str(error))
         await asyncio.sleep(TOLD_S)
         return self._recorder.take(), Outage(cut_ns, back_ns, ready_ns, act_ns)
 
-    async def _engage(self) -> None:
-        """The operator's act, again where it is refused: the robot knows a delay later what is known here."""
-        deadline_ns = monotonic_ns() + to_ns(ENGAGE_S)
-        while not (reply := await self._rig.control(Action.ENGAGE)).done:
-            if monotonic_ns() > deadline_ns:
-                raise TandemError(f"engage was refused: {reply.text}")
-            self._look()
-            await asyncio.sleep(LOOK_S)
-
     def _look(self) -> None:
         """Fail early. Raises TandemError."""
         if self._stop.is_set():
             raise TandemError("interrupted")
-        for child in self._rig.children.values():
-            child.check()
+        self._rig.check()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import tempfile
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from common.clock import monotonic_ns, to_ns, to_s
+from common.clock import monotonic_ns, to_ns
 from common.config.load import load_config
 from common.errors import LinkError, TandemError
 from common.link import Link, open_link, open_session
@@ -19,20 +20,21 @@ from common.skeleton import Skeleton, load_skeleton
 from common.wire.codec import decode
 from common.wire.messages import RobotState, Statistics
 from deploy.examples.profiles import example
-from deploy.experiments.trial.cell.attention import Attention
 from deploy.experiments.trial.cell.choice import why_impossible
 from deploy.experiments.trial.cell.judge import judged
 from deploy.experiments.trial.cell.plan import CellKey, Plan
 from deploy.experiments.trial.cell.recorder import Recorder
 from deploy.experiments.trial.cell.recording import Course, on_masters_clock
+from deploy.experiments.trial.cell.remarks import hold_remarks
 from deploy.experiments.trial.cell.result import Cell, Status
 from deploy.experiments.trial.remote import talk
 from deploy.harness.endpoints import Endpoints, free_port
+from deploy.harness.engage import EngageDriver, keep_engaged, until_all_track
+from deploy.harness.operator import GuardSight, Operator, Patience
 from deploy.harness.rig import OPERATOR, ROBOT, Rig
 from slave.config import SlaveConfig
 
 START_S = 30.0
-ENGAGE_S = 3.0
 ALIGN_S = 25.0
 LOOK_S = 0.2
 
@@ -89,6 +91,35 @@ class Partner:
         if not answer.taken:
             raise TandemError(f"the robot's host: {answer.fault}")
         return answer
+
+
+class PartnerRobot:
+    """The robot over there: seen and engaged through its host."""
+
+    def __init__(self, partner: Partner) -> None:
+        self._partner = partner
+        self._ready = False
+
+    @property
+    def ready(self) -> bool:
+        """Whether the robot holds and takes the operator's commands."""
+        return self._ready
+
+    async def look(self) -> Sequence[GuardSight]:
+        """How its guard stands now. Raises TandemError."""
+        answer = await self._partner.look()
+        if answer.fault:
+            raise TandemError(f"the robot's host: {answer.fault}")
+        self._ready = answer.taking
+        return [GuardSight(monotonic_ns(), answer.guard, answer.reason)]
+
+    async def engage(self) -> str:
+        """Ask the robot to engage; its refusal, empty where it engages."""
+        try:
+            await self._partner.do(talk.Engage(operator=OPERATOR))
+        except TandemError as error:
+            return str(error)
+        return ""
 
 
 async def run_remote_cell(
@@ -150,10 +181,16 @@ async def _play(
         await rig.until(lambda: rig.observer.command is not None, START_S, "command of the master")
         await partner.until(lambda a: a.taking and _whole(rig), START_S, "readiness of the robot")
         tell("aligning")
-        await _engage(partner)
-        await partner.until(lambda a: a.guard == "track", ALIGN_S, "track")
+        check = partial(_check, rig)
+        wanted = Operator(ROBOT, Patience(ALIGN_S), wanted_ns=monotonic_ns())
+        await until_all_track([EngageDriver(wanted, PartnerRobot(partner))], check, LOOK_S)
         tell(f"following for {plan.seconds:g} s")
-        remarks = await _follow(plan, partner, rig, recorder)
+        await partner.do(talk.Record())
+        recorder.take()
+        for child in rig.children.values():
+            child.measure(first=True)
+        began_ns, operator = monotonic_ns(), Operator(ROBOT, guard="track")
+        await keep_engaged([EngageDriver(operator, PartnerRobot(partner))], plan.seconds, check, LOOK_S)
         heard = recorder.take()
         answer = await partner.do(talk.Take())
         for child in rig.children.values():
@@ -161,46 +198,14 @@ async def _play(
         cpu = {"master": rig.children["master"].cpu_percent, "slave": answer.cpu_percent}
         tell("fetching what the robot said")
         states, told = await partner.kept(skeleton)
+    remarks = tuple(hold_remarks(operator.holds, began_ns))
     judged_time = replace(heard, states=on_masters_clock(states), told=[*heard.told, *told])
-    return Course(judged_time, plan.max_age_s, shared_clock=False, cpu_percent=cpu, remarks=tuple(remarks))
+    return Course(judged_time, plan.max_age_s, shared_clock=False, cpu_percent=cpu, remarks=remarks)
 
 
-async def _follow(plan: Plan, partner: Partner, rig: Rig, recorder: Recorder) -> list[str]:
-    """Let it run; where the robot holds, the operator engages again as soon as that is possible."""
-    attention = Attention()
-    await partner.do(talk.Record())
-    recorder.take()
-    for child in rig.children.values():
-        child.measure(first=True)
-    began_ns = monotonic_ns()
-    while (at_s := to_s(monotonic_ns() - began_ns)) < plan.seconds:
-        for name in ("suit", "master"):
-            rig.children[name].check()
-        answer = await partner.look()
-        if answer.fault:
-            raise TandemError(f"the robot's host: {answer.fault}")
-        if attention.look(at_s, answer.guard, answer.reason, answer.taking):
-            refusal = ""
-            try:
-                await _engage(partner)
-            except TandemError as error:
-                refusal = str(error)
-            attention.acted(at_s, refusal)
-        await asyncio.sleep(LOOK_S)
-    return attention.remarks
-
-
-async def _engage(partner: Partner) -> None:
-    """The operator's act, again where it is refused: the robot knows a delay later what is known here."""
-    deadline_ns = monotonic_ns() + to_ns(ENGAGE_S)
-    while True:
-        try:
-            await partner.do(talk.Engage(operator=OPERATOR))
-            return
-        except TandemError:
-            if monotonic_ns() > deadline_ns:
-                raise
-        await asyncio.sleep(LOOK_S)
+def _check(rig: Rig) -> None:
+    for name in ("suit", "master"):
+        rig.children[name].check()
 
 
 def _whole(rig: Rig) -> bool:

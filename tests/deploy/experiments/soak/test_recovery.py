@@ -12,8 +12,10 @@ import pytest
 from common.clock import NS_PER_S, to_ns
 from common.errors import LinkTimeoutError
 from common.wire.messages import Action, ControlReply
-from deploy.experiments.soak.operator import GIVE_UP_S, LOOK_S, Operator, Recovery
+from deploy.experiments.soak.recovery import GIVE_UP_S, LOOK_S, Recovery, SoakOperator
 from deploy.experiments.soak.stage import Stage
+from deploy.harness.operator import GuardSight
+from deploy.harness.rig import ROBOT
 
 
 class Robot:
@@ -25,6 +27,7 @@ class Robot:
         self.now_ns = 0
         self.guard_state = "hold"
         self.engaged = 0
+        self.guard_changes: list[GuardSight] = []
         self.asked: list[float] = []
         self.accepted_ns = to_ns(flows_s)
         self._flows_s, self._ready_s, self._refuses = flows_s, ready_s, refuses
@@ -51,8 +54,12 @@ class Robot:
     def known(self) -> bool:
         return self.ready
 
-    async def control(self, action: Action) -> ControlReply:
-        assert action is Action.ENGAGE
+    @property
+    def state(self) -> SimpleNamespace:
+        return SimpleNamespace(sent_ns=self.now_ns, guard=self.guard(self.now_ns), reason="")
+
+    async def control(self, action: Action, robot: str) -> ControlReply:
+        assert (action, robot) == (Action.ENGAGE, ROBOT)
         self.asked.append(self.now_s)
         if len(self.asked) <= self._refuses:
             if len(self.asked) == 1:
@@ -67,9 +74,9 @@ class Robot:
 
 def recovered(robot: Robot) -> tuple[Recovery, list[Mapping[str, Any]]]:
     told: list[Mapping[str, Any]] = []
-    rig = SimpleNamespace(observer=robot, control=robot.control)
+    rig = SimpleNamespace(observers={ROBOT: robot}, control=robot.control)
     stage = SimpleNamespace(watch=robot, rig=rig, tell=lambda _, what: told.append(what))
-    operator = Operator(cast(Stage, stage), lambda: robot.now_ns, robot.sleep)
+    operator = SoakOperator(cast(Stage, stage), lambda: robot.now_ns, robot.sleep)
     return asyncio.run(operator.recover(0)), told
 
 

@@ -1,4 +1,4 @@
-"""The soak's operator: sees that the robot has come back, and engages it by an act of his own."""
+"""How a soak's robot comes back: how soon commands flow, it is ready, it follows; it is engaged each time."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from common.clock import Clock, monotonic_ns, to_ns, to_s
-from common.errors import CodecError, LinkError
-from common.wire.messages import Action
 from deploy.experiments.soak.stage import Stage
+from deploy.harness.engage import EngageDriver, RigRobot
+from deploy.harness.operator import Operator
+from deploy.harness.rig import ROBOT
 
 Sleep = Callable[[float], Awaitable[None]]
 LOOK_S = 0.02
 SETTLE_S = 0.3
-"""After an answer, until states tell of it."""
+"""After an answer, until states show its effect."""
 GIVE_UP_S = 90.0
 """A robot that does not follow again within this is counted as not recovered."""
 
@@ -41,12 +42,33 @@ class Recovery:
         return {k: round(v, 3) if isinstance(v, float) else v for k, v in asdict(self).items()}
 
 
-class Operator:
-    """Engages where the robot waits for it; never sooner, never by itself."""
+class SoakRobot(RigRobot):
+    """The soak's robot. It is engaged only while it is heard; each request to engage is an event."""
+
+    def __init__(self, stage: Stage, clock: Clock = monotonic_ns) -> None:
+        super().__init__(stage.rig, waits_until_ready=True)
+        self._stage = stage
+        self._clock = clock
+
+    @property
+    def ready(self) -> bool:
+        """Whether it was heard just now, holds, takes commands, and every joint is known."""
+        return self._stage.watch.guard(self._clock()) == "hold" and super().ready
+
+    async def engage(self) -> str:
+        """Ask it to engage; its refusal, empty where it engages."""
+        refusal = await super().engage()
+        self._stage.watch.engaged += not refusal
+        self._stage.tell("engage", {"done": not refusal, "text": refusal})
+        return refusal
+
+
+class SoakOperator:
+    """Brings the robot back after a fault, and measures how long each step takes."""
 
     def __init__(self, stage: Stage, clock: Clock = monotonic_ns, sleep: Sleep = asyncio.sleep) -> None:
-        self._stage = stage
         self._watch = stage.watch
+        self._robot = SoakRobot(stage, clock)
         self._clock = clock
         self._sleep = sleep
 
@@ -59,33 +81,19 @@ class Operator:
 
     async def recover(self, undone_ns: int) -> Recovery:
         """Wait, and engage, until the robot follows again. `undone_ns`: when the fault was undone."""
-        recovery = Recovery()
-        engaged_ns = 0
+        operator, recovery = Operator(ROBOT, again_s=SETTLE_S), Recovery()
+        driver = EngageDriver(operator, self._robot, clock=self._clock)
         while self._clock() - undone_ns < to_ns(GIVE_UP_S):
             now_ns = self._clock()
             if recovery.flow_s is None and self._watch.flows(now_ns, undone_ns):
                 recovery.flow_s = to_s(self._watch.accepted_ns - undone_ns)
             if recovery.flow_s is not None and self.follows:
-                recovery.track_s = to_s(now_ns - engaged_ns) if engaged_ns else None
+                recovery.track_s = to_s(now_ns - operator.engaged_ns) if operator.engaged_ns else None
                 recovery.done = True
-                return recovery
-            if self._watch.guard(now_ns) == "hold" and self._stage.rig.observer.ready:
-                recovery.ready_s = to_s(now_ns - undone_ns) if recovery.ready_s is None else recovery.ready_s
-                if await self._engage(recovery):
-                    engaged_ns = self._clock()
-                await self._sleep(SETTLE_S)
+                break
+            if recovery.ready_s is None and self._robot.ready:
+                recovery.ready_s = to_s(now_ns - undone_ns)
+            await driver.turn()
             await self._sleep(LOOK_S)
+        recovery.engaged, recovery.refused = operator.engaged, operator.refused
         return recovery
-
-    async def _engage(self, recovery: Recovery) -> bool:
-        try:
-            reply = await self._stage.rig.control(Action.ENGAGE)
-        except (LinkError, CodecError) as error:
-            done, recovery.refused = False, str(error)
-        else:
-            done, recovery.refused = reply.done, "" if reply.done else reply.text
-        if done:
-            recovery.engaged += 1
-            self._watch.engaged += 1
-        self._stage.tell("engage", {"done": done, "text": recovery.refused})
-        return done
