@@ -154,7 +154,7 @@ def demo(
             show_default=False,
         ),
     ] = None,
-    strategy: Annotated[str, typer.Option(help="predict, interpolate or hold.")] = "predict",
+    strategy: Annotated[str, typer.Option(help="predict, interpolate or latest.")] = "predict",
     filter_: Annotated[str, typer.Option("--filter", help="vqf, mahony or ekf.")] = "vqf",
     seed: Annotated[int, typer.Option(help="Of the simulated sensors' errors.")] = 1,
     robots: Annotated[

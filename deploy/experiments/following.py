@@ -17,7 +17,7 @@ from deploy.measure import Motion, MovedSeries, motion
 from deploy.sim.network.profile import Profile, Way, load_profile
 from deploy.sim.world.whole_way import VirtualRun, World
 
-STRATEGIES = ("hold", "interpolate", "predict")
+STRATEGIES = ("latest", "interpolate", "predict")
 PROFILES = ("lan", "4g", "intercontinental")
 DELAYS_MS = (2, 30, 50, 80, 150)
 LOSS_PERCENT = 2.0
@@ -90,18 +90,18 @@ def main(
 ) -> None:
     """Print how each strategy follows over each link, as the table of slave/track/README.md."""
     row = "| {:16} | {:11} | {:>6} | {:>6} | {:>6} | {:>9} | {:>9} |\n"
-    head = ("link", "strategy", "RMSE °", "/ hold", "lag ms", "aligned °", "roughness")
+    head = ("link", "strategy", "RMSE °", "/ latest", "lag ms", "aligned °", "roughness")
     sys.stdout.write(row.format(*head) + row.format(*("---" for _ in head)))
     for name, profile in links().items():
         if not name.startswith(only):
             continue
-        hold_deg = math.nan
+        latest_deg = math.nan
         for strategy in STRATEGIES:
             m = follow(World(network=profile, network_seed=seed), strategy, seconds).motion
             if m is None:
                 raise SystemExit(f"{name}, {strategy}: the robot did not track for long enough to be judged")
-            hold_deg = m.rmse_deg if strategy == "hold" else hold_deg
-            figures = (m.rmse_deg, m.rmse_deg / hold_deg, m.lag_ms, m.aligned_rmse_deg, m.roughness)
+            latest_deg = m.rmse_deg if strategy == "latest" else latest_deg
+            figures = (m.rmse_deg, m.rmse_deg / latest_deg, m.lag_ms, m.aligned_rmse_deg, m.roughness)
             digits = (2, 2, 0, 2, 1)
             cells = ("-" if f is None else f"{f:.{d}f}" for f, d in zip(figures, digits, strict=True))
             sys.stdout.write(row.format(name, strategy, *cells))

@@ -24,7 +24,7 @@ from slave.limit.limit import SetpointLimiter
 from slave.servos.mujoco.simulated import SimulatedRobot
 from slave.track.config import make_tracker
 
-Strategy = Literal["hold", "interpolate", "predict"]
+Strategy = Literal["latest", "interpolate", "predict"]
 STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
 MOST_S = 30.0
 """Of a longer run only the end is replayed: that is 1.3 s of work a strategy, however long the run was."""
@@ -58,9 +58,9 @@ class Comparison:
     """On the virtual robot; its row of the run's own strategy tells how true the replay is."""
 
     @property
-    def rmse_over_hold(self) -> float:
-        """Same-instant RMSE of the real run over that of `hold`."""
-        return self.as_run.rmse_deg / self.replayed["hold"].rmse_deg
+    def rmse_over_latest(self) -> float:
+        """Same-instant RMSE of the real run over that of `latest`."""
+        return self.as_run.rmse_deg / self.replayed["latest"].rmse_deg
 
 
 def compare(

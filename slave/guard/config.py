@@ -56,7 +56,7 @@ class GuardConfig(Section):
     """`align` that takes longer ends in `hold`."""
     jump_window_rad: float = Field(0.7, gt=0.0, le=4.0)
     """When in `track` any joint is further than this from its target, all come back at the speed of `align`.
-    Followed motion stays within 0.55 (measured: three profiles, `hold` and `predict`, 60 ms one way)."""
+    Followed motion stays within 0.55 (measured: three profiles, `latest` and `predict`, 60 ms one way)."""
     engage_window_rad: float = Field(0.1, gt=0.0, le=1.0)
     """`engage` is refused where an encoder is further than this from the held setpoint."""
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pydantic import Field, field_validator
 
 from common.config.section import Section, one_of
-from slave.track.hold import Hold
 from slave.track.interpolate import Interpolate
+from slave.track.latest import Latest
 from slave.track.predict import Predict
 from slave.track.tracker import Tracker
 
@@ -36,12 +36,14 @@ class TrackConfig(Section):
     @field_validator("strategy")
     @classmethod
     def _known(cls, name: str) -> str:
+        if name == "hold":
+            raise ValueError("expected 'latest', the new name of 'hold'")
         return one_of(name, STRATEGIES)
 
 
 STRATEGIES: dict[str, Callable[[TrackConfig, float], Tracker]] = {
     # the newest sample
-    "hold": lambda config, bus_lag_s: Hold(),
+    "latest": lambda config, bus_lag_s: Latest(),
     # smooth, one period late
     "interpolate": lambda config, bus_lag_s: Interpolate(config.blend_s, config.jitter_margin_s),
     # extrapolated to now

@@ -24,7 +24,7 @@ _SERVO_HZ, _SERVO_DAMPING = 8.0, math.sqrt(0.5)
 SERVO_LAG_S = 2.0 * _SERVO_DAMPING / (2.0 * math.pi * _SERVO_HZ) + TICK_S / 2.0
 """Of the servo below behind a ramp, and half a tick for which a setpoint stands on average."""
 
-Strategy = Literal["hold", "interpolate", "predict"]
+Strategy = Literal["latest", "interpolate", "predict"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ def test_the_example_is_right() -> None:
         ("guard.joints.neck_yaw.upper_deg=75.0", ["guard.joints.neck_yaw.upper_deg = 75.0", "skeleton's"]),
         ("guard.velocity_scale=1.5", ["guard.velocity_scale = 1.5", "less than or equal to 1"]),
         ("encoders.zero_counts.tail=1", ["encoders.zero_counts", "joint"]),
-        ("track.strategy='guess'", ["track.strategy = 'guess'", "'hold'"]),
+        ("track.strategy='guess'", ["track.strategy = 'guess'", "'latest'"]),
         ("loop.rate_hz=5", ["loop.rate_hz = 5", "greater than or equal to 20"]),
         ("servos.backend='steam'", ["servos.backend = 'steam'", "'mujoco'"]),
     ],

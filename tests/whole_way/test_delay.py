@@ -21,21 +21,21 @@ ROUND_S = 16.0
 
 @dataclass(frozen=True)
 class Pair:
-    hold: Motion
+    latest: Motion
     predict: Motion
 
     @property
     def share(self) -> float:
-        return self.predict.rmse_deg / self.hold.rmse_deg
+        return self.predict.rmse_deg / self.latest.rmse_deg
 
 
 @cache
 def pair(profile: str, seed: int) -> Pair:
     world = World(network=load_profile(profile), network_seed=seed)
-    hold, predict = (follow(world, strategy, ROUND_S).motion for strategy in ("hold", "predict"))
-    assert hold is not None
+    latest, predict = (follow(world, strategy, ROUND_S).motion for strategy in ("latest", "predict"))
+    assert latest is not None
     assert predict is not None
-    return Pair(hold, predict)
+    return Pair(latest, predict)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -46,17 +46,17 @@ def test_the_patient_sees_the_nurses_now(profile: str, most: float, seed: int) -
     assert judged.predict.roughness is not None
     assert judged.predict.roughness <= 3.0
     assert judged.predict.lag_ms is not None
-    assert judged.hold.lag_ms is not None
-    assert abs(judged.predict.lag_ms) <= 0.5 * judged.hold.lag_ms
+    assert judged.latest.lag_ms is not None
+    assert abs(judged.predict.lag_ms) <= 0.5 * judged.latest.lag_ms
 
 
 def test_100_ms_with_jitter_and_loss_still_halves_the_error() -> None:
     far = Profile(both=Way(delay_ms=100.0, jitter_ms=5.0, loss_percent=0.5))
     world = World(network=far, network_seed=1)
-    hold, predict = (follow(world, strategy, ROUND_S).motion for strategy in ("hold", "predict"))
-    assert hold is not None
+    latest, predict = (follow(world, strategy, ROUND_S).motion for strategy in ("latest", "predict"))
+    assert latest is not None
     assert predict is not None
-    assert predict.rmse_deg <= 0.5 * hold.rmse_deg
+    assert predict.rmse_deg <= 0.5 * latest.rmse_deg
     assert predict.roughness is not None
     assert predict.roughness <= 3.0
 

@@ -75,15 +75,15 @@ def test_the_setpoint_never_breaks_a_limit(minute: VirtualRun) -> None:
 
 
 def test_prediction_shows_the_patient_a_third_of_holds_error() -> None:
-    hold, predict = judged_motion("hold", 20.0), judged_motion("predict", 20.0)
-    assert predict.rmse_deg <= hold.rmse_deg / 3
+    latest, predict = judged_motion("latest", 20.0), judged_motion("predict", 20.0)
+    assert predict.rmse_deg <= latest.rmse_deg / 3
     assert predict.lag_ms is not None
     assert abs(predict.lag_ms) <= 25
     assert predict.roughness is not None
     assert predict.roughness <= 2.5
 
 
-@pytest.mark.parametrize(("strategy", "one_way_ms"), [("interpolate", 2), ("predict", 80), ("hold", 80)])
+@pytest.mark.parametrize(("strategy", "one_way_ms"), [("interpolate", 2), ("predict", 80), ("latest", 80)])
 def test_no_encoder_is_doubted_whatever_the_strategy_and_the_delay(strategy: str, one_way_ms: int) -> None:
     overrides = {"slave": [f'track.strategy="{strategy}"']}
     run = engaged(World(one_way_ns=one_way_ms * 1_000_000, overrides=overrides))

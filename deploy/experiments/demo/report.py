@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 REPLAYED = (
     f"the last {MOST_S:g} s (at most) of the run's accepted commands, replayed on the virtual robot by each "
-    "strategy; rmse_over_hold is the real robot's RMSE over the same instants, over that of hold"
+    "strategy; rmse_over_latest is the real robot's RMSE over the same instants, over that of latest"
 )
 
 
@@ -119,7 +119,7 @@ def make_report(
         "motion": _motion(moved_right),
         "motion_by_strategy": _motion_by_strategy(compared),
         "motion_by_strategy_is": REPLAYED,
-        "rmse_over_hold": compared.rmse_over_hold if compared else None,
+        "rmse_over_latest": compared.rmse_over_latest if compared else None,
         "accuracy": _accuracy(solved_right),
         "estimated": dict(solved_right.estimated),
         "estimated_fast": dict(solved_right.estimated_fast),

@@ -12,7 +12,7 @@ _WHOLE_WAY = (
     Target("last frame in → put, p99", ("frames_in_to_put_ms", "p99"), 3.0, "ms"),
     Target("commands due that never came", ("commands", "missing"), 0),
     Target("motion lag", ("motion_lag_ms",), 25.0, "ms"),
-    Target("same-instant RMSE / hold's", ("rmse_over_hold",), 0.333),
+    Target("same-instant RMSE / latest", ("rmse_over_latest",), 0.333),
     Target("roughness", ("motion", "roughness"), 2.5),
 )
 """For every profile."""

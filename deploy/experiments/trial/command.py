@@ -39,8 +39,8 @@ def trial(
         str, typer.Option(help="Networks: names, or TOML files of your own, comma-separated, or `all`.")
     ] = "4g",
     strategies: Annotated[
-        str, typer.Option(help="hold, interpolate, predict; comma-separated, or `all`.")
-    ] = ("hold,predict"),
+        str, typer.Option(help="latest, interpolate, predict; comma-separated, or `all`.")
+    ] = ("latest,predict"),
     repeat: Annotated[int, typer.Option(help="How often each setup is run.", min=1, max=100)] = 3,
     seconds: Annotated[float, typer.Option(help="Judged in each cell.", min=3.0, max=3600.0)] = 20.0,
     outage: Annotated[

@@ -65,6 +65,6 @@ def _line(cell: Cell) -> str:
     if cell.status is not Status.DONE:
         colour = "yellow" if cell.status is Status.IMPOSSIBLE else "red"
         return f"{head} [{colour}]{cell.status}[/]: {cell.why}"
-    shown = ("one_way_p50_ms", "rmse_deg", "rmse_over_hold", "roughness", "flow_s")
+    shown = ("one_way_p50_ms", "rmse_deg", "rmse_over_latest", "roughness", "flow_s")
     figures = (f"{BY_NAME[name].title} {printed(name, cell.values.get(name), unit=True)}" for name in shown)
     return f"{head} {', '.join(figures)}"

@@ -14,7 +14,7 @@ from deploy.experiments.trial.report.write import Findings
 from deploy.measure.tables import plain_table
 from deploy.measure.verdict import verdict_table
 
-SHOWN = ("one_way_p50_ms", "one_way_bound_ms", "rmse_deg", "rmse_over_hold", "roughness", "flow_s")
+SHOWN = ("one_way_p50_ms", "one_way_bound_ms", "rmse_deg", "rmse_over_latest", "roughness", "flow_s")
 
 
 def print_findings(findings: Findings, console: Console) -> None:

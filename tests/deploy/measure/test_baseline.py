@@ -113,23 +113,23 @@ def test_only_commands_that_the_slave_took_are_replayed_in_their_order_of_arriva
 def test_a_perfect_robot_is_judged_beside_every_strategy(comparison: Comparison) -> None:
     assert tuple(comparison.replayed) == STRATEGIES
     assert comparison.as_run.rmse_deg < 0.01
-    assert comparison.rmse_over_hold == comparison.as_run.rmse_deg / comparison.replayed["hold"].rmse_deg
+    assert comparison.rmse_over_latest == comparison.as_run.rmse_deg / comparison.replayed["latest"].rmse_deg
 
 
-def test_hold_is_half_a_period_late_and_more_than_three_times_worse_than_predict(
+def test_latest_is_half_a_period_late_and_more_than_three_times_worse_than_predict(
     comparison: Comparison,
 ) -> None:
-    hold, predict = comparison.replayed["hold"], comparison.replayed["predict"]
-    assert predict.rmse_deg < hold.rmse_deg / 3
+    latest, predict = comparison.replayed["latest"], comparison.replayed["predict"]
+    assert predict.rmse_deg < latest.rmse_deg / 3
     assert abs(lag_ms(comparison, "predict")) < 10
     # transit, half of 80 ms on average, the servos' 31 ms, and what the limits smear of each step
     at_least = TRANSIT_NS / MS + 40 + 1e3 * CONFIG.track.servo_lag_s
-    assert at_least - 3 < lag_ms(comparison, "hold") < at_least + 40
+    assert at_least - 3 < lag_ms(comparison, "latest") < at_least + 40
 
 
 def test_interpolate_is_smooth_and_a_whole_period_late(comparison: Comparison) -> None:
     assert lag_ms(comparison, "interpolate") > TRANSIT_NS / MS + 80
-    smooth, steps = comparison.replayed["interpolate"].roughness, comparison.replayed["hold"].roughness
+    smooth, steps = comparison.replayed["interpolate"].roughness, comparison.replayed["latest"].roughness
     assert smooth is not None
     assert steps is not None
     assert smooth == pytest.approx(1.0, abs=0.1)
@@ -138,7 +138,7 @@ def test_interpolate_is_smooth_and_a_whole_period_late(comparison: Comparison) -
 
 def test_commands_play_at_their_real_arrival(comparison: Comparison) -> None:
     slower = compared(TRANSIT_NS + 40 * MS)
-    assert lag_ms(slower, "hold") - lag_ms(comparison, "hold") == pytest.approx(40, abs=4)
+    assert lag_ms(slower, "latest") - lag_ms(comparison, "latest") == pytest.approx(40, abs=4)
 
 
 def test_the_replay_is_read_when_the_real_robot_was_and_is_the_same_each_time() -> None:

@@ -85,11 +85,11 @@ def test_the_run_stands_beside_its_replays() -> None:
     truth, _, moved = series()
     judged = motion(truth, moved, NAMES)
     assert judged is not None
-    shown = text(strategies_table(judged, {"hold": judged, "predict": judged}))
+    shown = text(strategies_table(judged, {"latest": judged, "predict": judged}))
     rows = [line.split() for line in shown.splitlines()]
     assert [row[:2] for row in rows if row[-2:-1] == ["0.01"] or row[-3:-2] == ["50"]] == [
         ["this", "run"],
-        ["hold,", "replayed"],
+        ["latest,", "replayed"],
         ["predict,", "replayed"],
     ]
 

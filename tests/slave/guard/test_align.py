@@ -234,7 +234,7 @@ def test_all_nodes_lost_stops_every_joint_before_the_robot_holds(rig: Any) -> No
     assert rig.guard._limiter.at_rest
 
 
-@pytest.mark.parametrize("strategy", ["hold", "interpolate", "predict"])
+@pytest.mark.parametrize("strategy", ["latest", "interpolate", "predict"])
 def test_a_target_that_sweeps_past_a_held_joint_does_not_let_it_go(rig: Any, strategy: str) -> None:
     # the master says 0 of a lost joint: on return the target comes from there, past where it is held
     rig.guard._tracker = make_tracker(TrackConfig.model_validate({"strategy": strategy}))

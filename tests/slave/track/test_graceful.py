@@ -141,10 +141,10 @@ def test_predict_is_as_near_after_the_delay_has_come_back_as_before() -> None:
     assert before < during < np.deg2rad(10.0)
 
 
-def test_without_velocities_predict_is_still_better_than_hold() -> None:
+def test_without_velocities_predict_is_still_better_than_latest() -> None:
     taken = samples(blind)
     figures = []
-    for strategy in ("hold", "predict"):
+    for strategy in ("latest", "predict"):
         config = TrackConfig.model_validate({"strategy": strategy})
         times_s, positions, _ = targets(make_tracker(config), taken)
         truth, _ = OPERATOR.at(times_s + config.servo_lag_s)

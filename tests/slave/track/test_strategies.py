@@ -15,7 +15,7 @@ UNLIMITED = replace(WORLD, max_velocity_deg_s=1e5, max_acceleration_deg_s2=1e8)
 
 @pytest.fixture(scope="module")
 def runs() -> dict[Strategy, Run]:
-    strategies: tuple[Strategy, ...] = ("hold", "interpolate", "predict")
+    strategies: tuple[Strategy, ...] = ("latest", "interpolate", "predict")
     return {s: run(tracker_for(s), WORLD) for s in strategies}
 
 
@@ -27,7 +27,7 @@ def judged(runs: dict[Strategy, Run]) -> dict[Strategy, Figures]:
 def test_predict_is_early_enough_near_enough_and_smooth_enough(judged: dict[Strategy, Figures]) -> None:
     predict = judged["predict"]
     assert abs(predict.lag_ms) <= 15.0
-    assert predict.rmse_deg <= 0.25 * judged["hold"].rmse_deg
+    assert predict.rmse_deg <= 0.25 * judged["latest"].rmse_deg
     assert predict.roughness <= 2.2
 
 
@@ -39,15 +39,15 @@ def test_interpolate_is_late_and_the_smoothest(judged: dict[Strategy, Figures]) 
 
 
 def test_predict_needs_no_guard_to_be_smooth() -> None:
-    unlimited = {s: figures(run(tracker_for(s), UNLIMITED)) for s in ("hold", "predict")}
-    assert unlimited["predict"].rmse_deg <= 0.3 * unlimited["hold"].rmse_deg
+    unlimited = {s: figures(run(tracker_for(s), UNLIMITED)) for s in ("latest", "predict")}
+    assert unlimited["predict"].rmse_deg <= 0.3 * unlimited["latest"].rmse_deg
     assert unlimited["predict"].roughness <= 2.1
-    assert unlimited["hold"].lag_ms == pytest.approx(83.0, abs=5.0)
+    assert unlimited["latest"].lag_ms == pytest.approx(83.0, abs=5.0)
 
 
-def test_predict_without_velocities_still_beats_hold(judged: dict[Strategy, Figures]) -> None:
+def test_predict_without_velocities_still_beats_latest(judged: dict[Strategy, Figures]) -> None:
     blind = figures(run(tracker_for("predict"), replace(WORLD, velocity_known=False)))
-    assert blind.rmse_deg <= 0.6 * judged["hold"].rmse_deg
+    assert blind.rmse_deg <= 0.6 * judged["latest"].rmse_deg
 
 
 @pytest.mark.parametrize("strategy", ["interpolate", "predict"])

@@ -54,7 +54,7 @@ FIGURES = (
     Figure("rmse_deg", "RMSE", "°", 2, MOTION,
            "same-instant tracking error: encoders against the operator's true angles at the same moment, "
            "over the joints that move: what the patient sees"),
-    Figure("rmse_over_hold", "RMSE / hold's", "", 3, MOTION,
+    Figure("rmse_over_latest", "RMSE / latest", "", 3, MOTION,
            "that error over the one plain hold makes of the very same commands, replayed with their "
            "arrival times"),
     Figure("lag_ms", "motion lag", "ms", 0, MOTION,

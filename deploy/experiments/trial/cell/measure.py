@@ -170,18 +170,18 @@ def _motion(judged: Recording, config: SlaveConfig) -> dict[str, float | None]:
         return figures
     return figures | {
         "rmse_deg": followed.rmse_deg,
-        "rmse_over_hold": _over_hold(judged, truth, moved, config),
+        "rmse_over_latest": _over_latest(judged, truth, moved, config),
         "lag_ms": followed.lag_ms,
         "aligned_rmse_deg": followed.aligned_rmse_deg,
         "roughness": followed.roughness,
     }
 
 
-def _over_hold(
+def _over_latest(
     judged: Recording, truth: TruthSeries, moved: MovedSeries, config: SlaveConfig
 ) -> float | None:
     compared = compare(truth, moved, arrivals(judged.commands, judged.states), config)
-    return None if compared is None else compared.rmse_over_hold
+    return None if compared is None else compared.rmse_over_latest
 
 
 def _guard(judged: Recording) -> dict[str, float | None]:

@@ -42,9 +42,9 @@ class SetupLimit:
 
 
 LIMITS = (
-    SetupLimit("rmse_over_hold", 0.4, "predict", "4g"),
+    SetupLimit("rmse_over_latest", 0.4, "predict", "4g"),
     SetupLimit("roughness", 3.0, "predict", "4g"),
-    SetupLimit("rmse_over_hold", 0.5, "predict", "intercontinental"),
+    SetupLimit("rmse_over_latest", 0.5, "predict", "intercontinental"),
     SetupLimit("roughness", 3.0, "predict", "intercontinental"),
     SetupLimit("flow_s", 1.5),
     SetupLimit("stale_accepted", 0, each=True),

@@ -114,13 +114,13 @@ def test_the_replay_of_the_run_s_own_strategy_moves_as_the_run_did(report: Repor
 
 
 def test_predict_shows_a_third_of_hold_s_error_in_the_same_run(report: Report) -> None:
-    hold = report.tree["motion_by_strategy"]["hold"]
-    over_hold = report.tree["rmse_over_hold"]
-    assert over_hold == pytest.approx(report.tree["motion"]["rmse_deg"] / hold["rmse_deg"])
-    assert over_hold <= 1 / 3
-    found = {v.name: v for v in judge_targets(report.tree, DEMO)}["same-instant RMSE / hold's"]
-    assert (found.measured, found.passed) == (over_hold, True)
-    for words in ("same commands, each strategy", "this run", "hold, replayed", "RMSE / hold's"):
+    latest = report.tree["motion_by_strategy"]["latest"]
+    over_latest = report.tree["rmse_over_latest"]
+    assert over_latest == pytest.approx(report.tree["motion"]["rmse_deg"] / latest["rmse_deg"])
+    assert over_latest <= 1 / 3
+    found = {v.name: v for v in judge_targets(report.tree, DEMO)}["same-instant RMSE / latest"]
+    assert (found.measured, found.passed) == (over_latest, True)
+    for words in ("same commands, each strategy", "this run", "latest, replayed", "RMSE / latest"):
         assert words in text(report)
 
 
@@ -129,7 +129,7 @@ def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualRun) -> None:
     blind.observer.trace = Trace(tracked.trace.joint_names)
     report = make_report(DemoOptions(), blind, ENDED_WELL)
     assert (report.problems, report.comparison, report.motion) == ([], None, None)
-    assert (report.tree["motion_by_strategy"], report.tree["rmse_over_hold"]) == ({}, None)
+    assert (report.tree["motion_by_strategy"], report.tree["rmse_over_latest"]) == ({}, None)
     shown = text(report)
     assert "no truth to judge by" in shown
     assert "each strategy" not in shown

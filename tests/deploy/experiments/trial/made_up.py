@@ -11,7 +11,7 @@ from deploy.experiments.trial.cell.result import Cell, Excerpt, Status
 PLAN = Plan(
     transports=("tcp", "udp"),
     profiles=("lan", "4g"),
-    strategies=("hold", "predict"),
+    strategies=("latest", "predict"),
     repeat=3,
     seconds=20.0,
     outage_s=2.0,
@@ -22,7 +22,7 @@ PLAN = Plan(
     max_age_s=0.0,
 )
 DELAY_MS = {"lan": 1.0, "wifi": 6.0, "4g": 45.0, "intercontinental": 150.0}
-ERROR = {"hold": (2.0, 0.09, 4.5), "interpolate": (3.0, 0.1, 1.1), "predict": (0.9, 0.03, 2.0)}
+ERROR = {"latest": (2.0, 0.09, 4.5), "interpolate": (3.0, 0.1, 1.1), "predict": (0.9, 0.03, 2.0)}
 
 
 def values(setup: Setup, seed: int) -> dict[str, float | None]:
@@ -48,7 +48,7 @@ def values(setup: Setup, seed: int) -> dict[str, float | None]:
         "delivered": 100.0 if setup.transport == "tcp" else near(95.0),
         "accepted": 98.0,
         "rmse_deg": near(error),
-        "rmse_over_hold": near(error / (2.0 + 0.09 * delay)),
+        "rmse_over_latest": near(error / (2.0 + 0.09 * delay)),
         "lag_ms": near(delay + 40.0),
         "aligned_rmse_deg": near(0.9),
         "roughness": near(rough + 0.004 * delay),

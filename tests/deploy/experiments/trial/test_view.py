@@ -17,7 +17,7 @@ from tests.deploy.experiments.trial.made_up import PLAN, cells
 
 def test_setups_stand_whole_in_80_columns_under_their_network(tmp_path: Path) -> None:
     plan = replace(PLAN, transports=("tcp", "quic-datagram", "ws"), profiles=("lan", "intercontinental"),
-                   strategies=("hold", "interpolate"))  # fmt: skip
+                   strategies=("latest", "interpolate"))  # fmt: skip
     folder = Folder(tmp_path)
     folder.begin(plan)
     for one in cells(replace(plan, transports=("tcp", "quic-datagram"))):
@@ -28,7 +28,7 @@ def test_setups_stand_whole_in_80_columns_under_their_network(tmp_path: Path) ->
     assert max(map(len, lines)) <= 80
     assert lines.index(" intercontinental") > lines.index(" lan")
     assert sum("quic-datagram interpolate" in line and "1." in line for line in lines) >= 2
-    assert "lan, ws with hold: not run yet" in lines
+    assert "lan, ws with latest: not run yet" in lines
     assert any(line.split()[:3] == ["flow", "after", "outage"] and "passed" in line for line in lines)
     assert any(line.startswith("Holding a hand: ") for line in lines)
 

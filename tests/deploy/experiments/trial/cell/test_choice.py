@@ -49,7 +49,7 @@ def test_a_network_of_ones_own_is_a_file(tmp_path: Path) -> None:
 
 
 def test_only_what_does_not_cross_hosts_is_impossible() -> None:
-    why = {t: why_impossible(Setup(t, "lan", "hold")) for t in TRANSPORTS}
+    why = {t: why_impossible(Setup(t, "lan", "latest")) for t in TRANSPORTS}
     assert [t for t, reason in why.items() if reason] == ["unixsock-stream"]
     assert "does not cross hosts" in str(why["unixsock-stream"])
 

@@ -206,7 +206,7 @@ def test_motion_is_judged_at_the_same_instant(figures: dict[str, float]) -> None
     assert figures["rmse_deg"] == pytest.approx(np.degrees(np.sin(0.06)) / np.sqrt(2), rel=0.05)
     assert figures["aligned_rmse_deg"] < 0.05
     assert figures["roughness"] == pytest.approx(1.0, abs=0.05)
-    assert 0.0 < figures["rmse_over_hold"] < 1.0
+    assert 0.0 < figures["rmse_over_latest"] < 1.0
     assert figures["tracked"] == 100.0
     assert figures["holds"] == 0.0
 

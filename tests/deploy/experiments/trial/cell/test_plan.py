@@ -13,7 +13,7 @@ from deploy.experiments.trial.cell.plan import CellKey, Plan, Setup, check_conti
 PLAN = Plan(
     transports=("tcp", "udp", "quic"),
     profiles=("lan", "4g"),
-    strategies=("hold", "predict"),
+    strategies=("latest", "predict"),
     repeat=4,
     seconds=20.0,
     outage_s=2.0,

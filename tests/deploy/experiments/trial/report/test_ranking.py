@@ -53,7 +53,7 @@ def test_a_criterion_scores_between_0_and_100_and_never_more_for_worse(
 
 
 def test_reaching_wants_the_hand_where_the_nurses_is_and_holding_a_hand_wants_it_smooth() -> None:
-    plan = replace(PLAN, strategies=("hold", "interpolate", "predict"))
+    plan = replace(PLAN, strategies=("latest", "interpolate", "predict"))
     found = {(r.task.name, r.profile): r for r in rankings(load_tasks(), rows(plan, cells(plan)))}
     reach, hand = found["reach", "4g"].best, found["hold-a-hand", "4g"].best
     assert reach is not None
@@ -112,8 +112,10 @@ def test_a_figure_that_nobody_has_counts_for_nobody_and_one_that_others_have_cou
 @pytest.mark.parametrize(("value", "met"), [(0.4, True), (0.4001, False)])
 def test_a_limit_is_kept_up_to_its_very_edge_by_the_median(value: float, met: bool) -> None:
     setup = Setup("tcp", "4g", "predict")
-    repeats = with_values(setup, {"rmse_over_hold": 0.1}, {"rmse_over_hold": value}, {"rmse_over_hold": 0.9})
-    [judged] = judge(rows(PLAN, repeats), [SetupLimit("rmse_over_hold", 0.4, "predict", "4g")])
+    repeats = with_values(
+        setup, {"rmse_over_latest": 0.1}, {"rmse_over_latest": value}, {"rmse_over_latest": 0.9}
+    )
+    [judged] = judge(rows(PLAN, repeats), [SetupLimit("rmse_over_latest", 0.4, "predict", "4g")])
     assert judged.passed is met
     assert judged.measured == value
 
@@ -143,7 +145,7 @@ def test_a_repeat_that_failed_meets_no_target_it_was_asked_of() -> None:
     limits = [
         SetupLimit("roughness", 3.0, "predict"),
         SetupLimit("flow_s", 1.5),
-        SetupLimit("roughness", 3.0, "hold"),
+        SetupLimit("roughness", 3.0, "latest"),
     ]
     some = judge(rows(PLAN, with_values(setup, good) + failed), limits)
     assert [(j.passed, j.measured) for j in some] == [(False, 1.0), (False, 0.5)]
@@ -165,8 +167,8 @@ def test_a_robot_that_never_followed_does_not_keep_a_limit_of_how_it_followed() 
 
 
 def test_a_limit_of_another_network_is_not_asked() -> None:
-    repeats = with_values(Setup("tcp", "lan", "predict"), {"rmse_over_hold": 0.9})
-    assert judge(rows(PLAN, repeats), [SetupLimit("rmse_over_hold", 0.4, "predict", "4g")]) == []
+    repeats = with_values(Setup("tcp", "lan", "predict"), {"rmse_over_latest": 0.9})
+    assert judge(rows(PLAN, repeats), [SetupLimit("rmse_over_latest", 0.4, "predict", "4g")]) == []
 
 
 def test_a_task_that_asks_for_no_figure_of_ours_is_refused_by_name(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Strategy `hold`: the newest sample until the next. A staircase; what the others are measured against."""
+"""Strategy `latest`: the newest sample until the next. A staircase; what the others are measured against."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from common.quaternion import Array
 from slave.track.tracker import Target
 
 
-class Hold:
+class Latest:
     """A `Tracker` that repeats the newest sample."""
 
     def __init__(self) -> None:
