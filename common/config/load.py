@@ -20,6 +20,7 @@ RENAMED = {
     "stance_turn_deg_s": "zero_pose_turn_deg_s",
     "stance_lean_deg": "zero_pose_lean_deg",
     "stance_sd_deg": "zero_pose_sd_deg",
+    "mounting": "alignment",
 }
 """Keys that had another name, old to new: an old one is refused, and the new one named."""
 

@@ -5,7 +5,7 @@ Every key optional (identity where it is left out):
     accelerometer = [[a, b, c, offset], ...]    # 3 rows of 4: m/s² from m/s²
     gyroscope     = [[...], ...]                # rad/s from rad/s
     magnetometer  = [[...], ...]                # µT from µT
-    q_sensor_from_segment = [w, x, y, z]        # mounting
+    q_sensor_from_segment = [w, x, y, z]        # alignment
 
     [made.accelerometer]                        # how a part came about; `Made` lists the keys
 """
@@ -16,7 +16,7 @@ from datetime import date
 from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, AliasChoices, Field
 
 from common.config.section import Section
 from common.quaternion import IDENTITY
@@ -51,7 +51,7 @@ class Made(Section):
 
     The residuals are means over the data of: accelerometer |‖a‖ - g| of still intervals, m/s²; gyroscope
     the angle between gravity as turned by the gyro and as measured, rad; magnetometer the standard
-    deviation of ‖m‖, µT; mounting: see `unit`.
+    deviation of ‖m‖, µT; alignment: see `unit`.
     """
 
     date: date
@@ -73,7 +73,8 @@ class MadeParts(Section):
     accelerometer: Made | None = None
     gyroscope: Made | None = None
     magnetometer: Made | None = None
-    mounting: Made | None = None
+    alignment: Made | None = Field(default=None, validation_alias=AliasChoices("alignment", "mounting"))
+    """How the sensor sits on its segment. Files of earlier versions call it `mounting`."""
 
 
 class NodeCalibration(Section):
@@ -86,5 +87,5 @@ class NodeCalibration(Section):
     magnetometer: AffineRows = _SAME
     """3 × 4, offset in µT."""
     q_sensor_from_segment: UnitQuaternion = IDENTITY.tolist()
-    """Mounting: turns the segment's coordinates into the sensor's."""
+    """Sensor-to-segment alignment: turns the segment's coordinates into the sensor's."""
     made: MadeParts = MadeParts()

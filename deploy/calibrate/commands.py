@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import typer
 
+from common.errors import TandemError
+from deploy.calibrate.align import align
 from deploy.calibrate.imu import imu
 from deploy.calibrate.mag import mag
-from deploy.calibrate.mount import mount
 from deploy.calibrate.record import record
 
 app = typer.Typer(no_args_is_help=True)
@@ -19,5 +20,12 @@ def _group() -> None:
 
 app.command("imu")(imu)
 app.command("mag")(mag)
-app.command("mount")(mount)
+app.command("align")(align)
 app.command("record")(record)
+
+
+@app.command(
+    "mount", hidden=True, context_settings={"ignore_unknown_options": True, "allow_extra_args": True}
+)
+def _mount() -> None:
+    raise TandemError("`tandem calibrate mount` is now `tandem calibrate align`")

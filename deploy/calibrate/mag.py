@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _axes(text: str | None) -> str | None:
-    from master.calibrate.magnetic_axes import axes_matrix
+    from master.calibrate.magnetometer_axes import axes_matrix
 
     if text is not None:
         try:
@@ -63,7 +63,7 @@ def mag(
     from deploy.calibrate import session as sessions
     from deploy.calibrate.pictures import draw_magnetic
     from master.calibrate.magnetic import MagneticOptions, calibrate_magnetic
-    from master.calibrate.magnetic_axes import axes_matrix, hemisphere_named
+    from master.calibrate.magnetometer_axes import axes_matrix, hemisphere_named
     from master.calibrate.node_file import accelerometer_map
 
     options = MagneticOptions(
@@ -89,7 +89,7 @@ def _gist(found: MagneticCalibration) -> dict[str, Any]:
     return {
         "field_ut": found.fit.field_ut,
         "coverage": found.coverage,
-        "aligned_deg": None if found.alignment is None else math.degrees(found.alignment.angle_rad),
+        "aligned_deg": None if found.rotation is None else math.degrees(found.rotation.angle_rad),
         "evidence": [one.as_report() for one in found.evidence],
         "hold_out_percent": 100.0 * found.hold_out_spread_ut / found.fit.field_ut,
     }

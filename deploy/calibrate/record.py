@@ -23,7 +23,7 @@ def record(
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
     ] = None,
 ) -> None:
-    """Record the raw readings of all nodes, until Ctrl-C: for `calibrate imu`, `mag` and `mount`.
+    """Record the raw readings of all nodes, until Ctrl-C: for `calibrate imu`, `mag` and `align`.
 
     Example: `tandem calibrate record deploy/examples/master.toml --out session.mcap --seconds 300`
     """

@@ -128,7 +128,7 @@ def _excess(
 def joint_angles(
     skeleton: Skeleton, suit: Oriented, i: int, ends: Mapping[str, tuple[float, Array]]
 ) -> Array:
-    """Intrinsic angles (3, K) of a joint at some 20 Hz, for heading and mounting by name."""
+    """Intrinsic angles (3, K) of a joint at some 20 Hz, for heading and alignment by name."""
     entry = skeleton.segments[i]
     step = max(1, round(suit.rate_hz / 20.0))
     q = [

@@ -1,4 +1,4 @@
-"""One joint's part in the mounting: whether its motion told anything, and what to do where it did not."""
+"""One joint's part in the alignment: whether its motion told anything, and what to do where it did not."""
 
 from __future__ import annotations
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from common.config.sensor_calibration import Made
 from common.quaternion import Array
-from master.calibrate.alignment import Alignment, UndeterminedError, align_magnetometer
 from master.calibrate.codes import clean
 from master.calibrate.ellipsoid import (
     Ellipsoid,
@@ -22,7 +21,8 @@ from master.calibrate.ellipsoid import (
     spread_ut,
 )
 from master.calibrate.evidence import Evidence, refuse_contradictions, unjudged
-from master.calibrate.magnetic_axes import Hemisphere, check_axes
+from master.calibrate.magnetometer_axes import Hemisphere, check_axes
+from master.calibrate.magnetometer_rotation import MagnetometerRotation, UndeterminedError, align_magnetometer
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
 from master.calibrate.soundness import check_clipped, check_samples
@@ -64,7 +64,7 @@ class MagneticCalibration:
     """(K, 3), those that were used."""
     hold_out_ut: Array
     """(K,), calibrated strength minus the field, by fits that did not see the reading."""
-    alignment: Alignment | None = None
+    rotation: MagnetometerRotation | None = None
     """Into the accelerometer's axes; None where they are not known."""
     notes: tuple[str, ...] = ()
     evidence: tuple[Evidence, ...] = ()
@@ -76,7 +76,7 @@ class MagneticCalibration:
     @property
     def affine(self) -> Array:
         """(3, 4): calibrated µT, in the accelerometer's axes where they are known, from readings."""
-        plain = self.fit.affine if self.alignment is None else self.alignment.apply(self.fit.affine)
+        plain = self.fit.affine if self.rotation is None else self.rotation.apply(self.fit.affine)
         return np.column_stack([plain[:, :3] @ self.axes, plain[:, 3]])
 
     @property
@@ -158,10 +158,10 @@ def calibrate_magnetic(
             f"{100 * seen:.0f} % of the sphere seen; more makes it surer: the hard iron is known to "
             f"±{1.96 * float(sigma[:, 3].max()):.2g} µT (95 %)"
         )
-    alignment, words = _align(recording, mag, fit, accelerometer)
+    rotation, words = _align(recording, mag, fit, accelerometer)
     said = (*words, *unjudged(evidence))
-    if alignment is not None:
-        sigma = alignment.widen(sigma, fit.affine)
+    if rotation is not None:
+        sigma = rotation.widen(sigma, fit.affine)
     return MagneticCalibration(
         name=recording.name,
         fit=fit,
@@ -169,7 +169,7 @@ def calibrate_magnetic(
         coverage=seen,
         readings_ut=mag[known],
         hold_out_ut=hold_out,
-        alignment=alignment,
+        rotation=rotation,
         notes=(*notes, *(("; ".join(said),) if said else ())),
         evidence=evidence,
         axes=axes,
@@ -226,7 +226,7 @@ def _widened(fit: Ellipsoid, readings: Array, blocks: NDArray[np.intp]) -> float
 
 def _align(
     recording: NodeRecording, mag_ut: Array, fit: Ellipsoid, accelerometer: Array | None
-) -> tuple[Alignment | None, tuple[str, ...]]:
+) -> tuple[MagnetometerRotation | None, tuple[str, ...]]:
     """The turn into the accelerometer's axes, or words why there is none."""
     without = "its axes are not turned into the accelerometer's, which may turn headings by a degree"
     if accelerometer is None:

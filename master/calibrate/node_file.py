@@ -19,19 +19,19 @@ from common.config.sensor_calibration import Made, NodeCalibration
 from common.errors import ConfigError, ConfigMistake, TandemError
 from common.quaternion import Array
 
-Part = Literal["accelerometer", "gyroscope", "magnetometer", "mounting"]
+Part = Literal["accelerometer", "gyroscope", "magnetometer", "alignment"]
 _KEY: dict[Part, str] = {
     "accelerometer": "accelerometer",
     "gyroscope": "gyroscope",
     "magnetometer": "magnetometer",
-    "mounting": "q_sensor_from_segment",
+    "alignment": "q_sensor_from_segment",
 }
 _DIGITS = 10
 """Significant digits of a number: more than any sensor's."""
 
 
 def write_calibration(path: Path, parts: dict[Part, tuple[Array, Made]]) -> NodeCalibration:
-    """Write parts into a node's file: affine maps (3, 4), or the mounting (4,), each with its `Made`.
+    """Write parts into a node's file: affine maps (3, 4), or the alignment (4,), each with its `Made`.
 
     Other parts and comments of an existing file stay. The file is replaced in one step, so that who reads
     it meanwhile sees the old or the new one. Returns what the file now says.
@@ -41,7 +41,10 @@ def write_calibration(path: Path, parts: dict[Part, tuple[Array, Made]]) -> Node
     document = _existing(path)
     for part, (values, made) in parts.items():
         document[_KEY[part]] = _numbers(values)
-        _made_table(document)[part] = _table(made)
+        table = _made_table(document)
+        table[part] = _table(made)
+        if part == "alignment":
+            table.pop("mounting", None)  # its name in files of earlier versions
     text = tomlkit.dumps(document)
     checked = check_config(path, tomllib.loads(text), NodeCalibration)
     try:

@@ -26,7 +26,7 @@ _KNOWN_M = 0.05
 """Centres nearer than that to each other, sideways, tell nothing."""
 
 Ends = Mapping[str, tuple[float, Array]]
-"""Of each mounted node the heading of its own earth frame, rad, and `q_sensor_from_segment`."""
+"""Of each aligned node the heading of its own earth frame, rad, and `q_sensor_from_segment`."""
 
 
 def check_sides(skeleton: Skeleton, suit: Oriented, joints: list[JointMotion], ends: Ends) -> Evidence:

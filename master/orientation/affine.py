@@ -25,14 +25,14 @@ class Calibration:
     """(3, N, 3, 4): accelerometer, gyroscope, magnetometer."""
     q_sensor_from_segment: Array
     """(N, 4)."""
-    mounting_made: Mask | None = None
-    """(N,) whose file says how the mounting was found; None: nobody's."""
+    alignment_made: Mask | None = None
+    """(N,) whose file says how the alignment was found; None: nobody's."""
 
     @property
-    def mounted(self) -> Mask:
-        """(N,) nodes whose mounting is known: found, or at least not the identity."""
+    def aligned(self) -> Mask:
+        """(N,) nodes whose alignment is known: found, or at least not the identity."""
         askew: Mask = np.any(self.q_sensor_from_segment != IDENTITY, axis=-1)
-        return askew if self.mounting_made is None else askew | self.mounting_made
+        return askew if self.alignment_made is None else askew | self.alignment_made
 
 
 def identity(count: int) -> Calibration:
@@ -59,7 +59,7 @@ def _stack(nodes: list[NodeCalibration]) -> Calibration:
             ]
         ),
         q_sensor_from_segment=normalise(np.array([node.q_sensor_from_segment for node in nodes])),
-        mounting_made=np.array([node.made.mounting is not None for node in nodes], dtype=np.bool_),
+        alignment_made=np.array([node.made.alignment is not None for node in nodes], dtype=np.bool_),
     )
 
 

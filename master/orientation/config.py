@@ -32,15 +32,15 @@ class EstimationConfig(Section):
     settle_s: float = Field(default=1.0, ge=0.0, le=60.0)
     """From a node's first answer, or its return, until its orientation counts as valid."""
     zero_pose_s: float = Field(default=0.0, ge=0.0, le=60.0)
-    """So long standing still in the zero pose then gives the nodes' headings, and the mounting of those whose
-    file does not give it; 0: headings by the magnetometers, mounting as calibrated."""
+    """How long the operator stands still in the zero pose, s. It gives the nodes' headings, and the alignment
+    of nodes whose file does not give it. 0: headings by the magnetometers, alignment as calibrated."""
     zero_pose_heading_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
     """Where the operator faces meanwhile, from east towards north."""
     zero_pose_turn_deg_s: float = Field(default=15.0, gt=0.0, le=360.0)
     """A node that turns faster meanwhile, degrees/s, does not stand still: the pose is asked for again."""
     zero_pose_lean_deg: float = Field(default=15.0, gt=0.0, le=90.0)
     """A segment that leans farther from upright, degrees, is not in the zero pose: it is asked for again.
-    Noticed only where the node's file gives its mounting."""
+    Noticed only where the node's file gives its alignment."""
     constraints: Literal["online", "off"] = "off"
     """`online`: headings by the gyros, corrected by what the joints cannot do and by the magnetometers as far
     as the field is undisturbed. `off`: each node's heading by its own filter alone."""

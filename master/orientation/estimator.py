@@ -82,7 +82,7 @@ class _Headings(_Stateful, Protocol):
 
     def due(self) -> bool: ...
 
-    def correct(self, q: Array, mag_ut: Array, mounting: Array, usable: Mask, /) -> None: ...
+    def correct(self, q: Array, mag_ut: Array, alignment: Array, usable: Mask, /) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,12 +134,12 @@ class Estimator:
             calibration.q_sensor_from_segment,
             math.ceil(config.zero_pose_s * rate_hz),
             math.radians(config.zero_pose_heading_deg),
-            calibration.mounted,
+            calibration.aligned,
             limits=ZeroPoseLimits(
                 math.radians(config.zero_pose_turn_deg_s), math.radians(config.zero_pose_lean_deg)
             ),
         )
-        self._mounted = calibration.mounted
+        self._aligned = calibration.aligned
         self._parts: tuple[_Stateful, ...] = (
             self._lowpass,
             self._bank,
@@ -180,8 +180,8 @@ class Estimator:
             self._stand(filtered[MAG])
         if self._heading.due():
             usable = self._liveness.settled & self._zero_pose.known
-            mounting = self._zero_pose.q_sensor_from_segment
-            self._heading.correct(self._q_of_filters(), filtered[MAG], mounting, usable)
+            alignment = self._zero_pose.q_sensor_from_segment
+            self._heading.correct(self._q_of_filters(), filtered[MAG], alignment, usable)
 
     def _find(self, settled: Mask, magnetic: Mask) -> None:
         """Give nodes that have settled their heading."""
@@ -195,8 +195,8 @@ class Estimator:
         # a finger's unit with a bias of 20°/s would refuse the whole suit's pose for ever
         believed = self._liveness.settled & ~self._bank.undecided()
         done = self._zero_pose.add(self._oriented(rate), believed, rate)
-        # apart: the heading of a mounting found now is the magnetometer's own
-        for nodes in (done & self._mounted, done & ~self._mounted):
+        # apart: the heading of an alignment found now is the magnetometer's own
+        for nodes in (done & self._aligned, done & ~self._aligned):
             if nodes.any():
                 self._heading.stand(nodes, self._zero_pose.correction_rad, self._q_of_filters(), mag_ut)
 
@@ -212,10 +212,10 @@ class Estimator:
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""
         rate = self._rate_of_sensors()
-        mounting = self._zero_pose.q_sensor_from_segment
+        alignment = self._zero_pose.q_sensor_from_segment
         return Posture(
-            q_world_from_segment=multiply(self._oriented(rate), mounting),
-            rate_rad_s=rotate(conjugate(mounting), rate),
+            q_world_from_segment=multiply(self._oriented(rate), alignment),
+            rate_rad_s=rotate(conjugate(alignment), rate),
             valid=self._liveness.settled & self._zero_pose.known,
         )
 

@@ -40,7 +40,7 @@ class HeadingMemory:
         """Never: nothing is corrected from tick to tick."""
         return False
 
-    def correct(self, q_world_from_sensor: Array, mag_ut: Array, mounting: Array, usable: Mask) -> None:
+    def correct(self, q_world_from_sensor: Array, mag_ut: Array, alignment: Array, usable: Mask) -> None:
         """Nothing."""
 
     def snapshot(self) -> object:

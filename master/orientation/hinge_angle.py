@@ -67,7 +67,7 @@ class Hinge:
 
 
 def hinge_of(skeleton: Skeleton, segments: list[str], q_sensor_from_segment: Array) -> Hinge:
-    """Hinges about the first axis of the named segments' joints, as table and mounting (N, 4) have them."""
+    """Hinges about the first axis of the named segments' joints, as table and alignment (N, 4) have them."""
     far = [skeleton.segment_names.index(name) for name in segments]
     near = skeleton.parents[far]
     q1, q2 = q_sensor_from_segment[near], q_sensor_from_segment[far]

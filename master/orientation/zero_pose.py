@@ -1,14 +1,14 @@
 """What standing still in the zero pose tells of each node: its heading, or how its sensor sits.
 
 It assumes that every segment then stands as in the skeleton's zero pose and that the operator faces a known
-heading. Of a node whose mounting is calibrated only the heading is taken. Of any other node the mounting
+heading. Of a node whose alignment is calibrated only the heading is taken. Of any other node the alignment
 itself is taken: a stopgap, because a six-axis node's own heading is arbitrary, so that for a sensor worn
 askew the axes found here may be turned about the vertical.
 
-A pose is refused, and asked for again, if any node turns during it, or if a segment whose sensor's mounting
+A pose is refused, and asked for again, if any node turns during it, or if a segment whose sensor's alignment
 is known leans from upright: a bent waist or elbow. It is then refused for all nodes that were taking it. A
 node whose gyro is not to be believed yet takes no part: it neither refuses nor delays the others' pose. What
-cannot be noticed: how a segment stands whose mounting is not known, and what is turned about the vertical.
+cannot be noticed: how a segment stands whose alignment is not known, and what is turned about the vertical.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class ZeroPoseLimits:
     turn_rad_s: float = math.radians(15.0)
     """Rate of any node; swaying and breathing stay below."""
     lean_rad: float = math.radians(15.0)
-    """Inclination of any segment whose mounting is known."""
+    """Inclination of any segment whose alignment is known."""
 
 
 class ZeroPose:
@@ -45,18 +45,18 @@ class ZeroPose:
         q_sensor_from_segment: Array,
         ticks: int,
         facing_rad: float,
-        mounted: Mask | None = None,
+        aligned: Mask | None = None,
         *,
         limits: ZeroPoseLimits | None = None,
     ) -> None:
         """`q_sensor_from_segment` (N, 4) stands until the zero pose is complete, for good if `ticks` is 0.
 
-        For good also that of the nodes `mounted` (N,), by default none.
+        For good also that of the nodes `aligned` (N,), by default none.
         """
         count = len(q_sensor_from_segment)
         self._ticks = ticks
         self._facing = heading_turn(facing_rad)
-        self._mounted = np.zeros(count, dtype=np.bool_) if mounted is None else mounted
+        self._aligned = np.zeros(count, dtype=np.bool_) if aligned is None else aligned
         self._limits = limits or ZeroPoseLimits()
         self._sum = np.zeros((count, 4))
         self._first = np.zeros((count, 4))
@@ -70,9 +70,9 @@ class ZeroPose:
         self.q_sensor_from_segment = q_sensor_from_segment.copy()
         """(N, 4)."""
         self.correction_rad = np.zeros(count)
-        """(N,) what the headings of mounted nodes lacked when their zero pose was complete; 0 for others."""
+        """(N,) what the headings of aligned nodes lacked when their zero pose was complete; 0 for others."""
         self.lean_rad = np.full(count, np.nan)
-        """(N,) how far mounted nodes leaned from the zero pose in the last pose; NaN for others."""
+        """(N,) how far aligned nodes leaned from the zero pose in the last pose; NaN for others."""
 
     def add(self, q_world_from_sensor: Array, settled: Mask, rate_rad_s: Array | None = None) -> Mask:
         """One tick: orientations (N, 4), which of them count, and their rates (N, 3) without the bias.
@@ -100,7 +100,7 @@ class ZeroPose:
         if not done.any():
             return done
         # of who came later too: whoever leans, the operator does not stand in the zero pose
-        leaning = self._lean(taking & self._mounted)
+        leaning = self._lean(taking & self._aligned)
         if leaning:
             self._refuse(leaning, taking)
             return np.zeros_like(taking)
@@ -137,7 +137,7 @@ class ZeroPose:
         }
 
     def _lean(self, nodes: Mask) -> dict[int, str]:
-        """Which mounted nodes lean, by node, the farthest first."""
+        """Which aligned nodes lean, by node, the farthest first."""
         segment = multiply(normalise(self._sum[nodes]), self.q_sensor_from_segment[nodes])
         correction = -heading_rad(multiply(segment, conjugate(self._facing)))
         self.correction_rad[nodes] = correction
@@ -158,7 +158,7 @@ class ZeroPose:
         self._taken[taking] = 0
 
     def _conclude(self, done: Mask) -> None:
-        sits = done & ~self._mounted
+        sits = done & ~self._aligned
         self.q_sensor_from_segment[sits] = multiply(conjugate(normalise(self._sum[sits])), self._facing)
         self.known = self.known | done
         self.reasons = {}

@@ -20,8 +20,8 @@ def live(
         "calibration"
     ),
     what: Annotated[
-        str, typer.Option(help="Of imu, mag and mount, those to be done, with commas.")
-    ] = "imu,mag,mount",
+        str, typer.Option(help="Of imu, mag and align, those to be done, with commas.")
+    ] = "imu,mag,align",
     still_s: Annotated[float, typer.Option(help="How long to rest in an attitude, s.", min=1.0)] = 3.0,
     attitudes: Annotated[int, typer.Option(help="How many attitudes to rest in.", min=12, max=100)] = 20,
     tumble_s: Annotated[float, typer.Option(help="Shortest time to turn about freely, s.", min=0.0)] = 30.0,
@@ -41,7 +41,7 @@ def live(
     """Calibrate the suit, led step by step: what to do now, which node wants what, how good it became.
 
     First all units lie in one tray that is put down in many attitudes and turned about; then they are worn.
-    Ctrl-C keeps what was recorded, for `calibrate imu`, `mag` and `mount`.
+    Ctrl-C keeps what was recorded, for `calibrate imu`, `mag` and `align`.
 
     Example: `tandem calibrate live deploy/examples/master.toml --out calibration --what imu,mag`
     """
@@ -52,7 +52,7 @@ def live(
     from deploy.calibrate.live.guide import GuideOptions
     from deploy.calibrate.live.run import LiveSession, Session
     from deploy.calibrate.session import make_folder, tell_machines
-    from master.calibrate.magnetic_axes import hemisphere_named
+    from master.calibrate.magnetometer_axes import hemisphere_named
     from master.config import MasterConfig
 
     checked = load_config(config, MasterConfig, set_ or ())
@@ -77,7 +77,7 @@ def live(
         kept = ", ".join(str(path) for path in (session.tray, session.worn) if path is not None)
         raise TandemError(
             f"stopped before the end; recorded so far: {kept or 'nothing'}. "
-            "`tandem calibrate imu`, `mag` and `mount` can read it"
+            "`tandem calibrate imu`, `mag` and `align` can read it"
         )
     choice = Choice(wanted, gravity, still_s, hemisphere_named(hemisphere), pictures)
     figures, refusals = compute(checked, session, choice, out, console)

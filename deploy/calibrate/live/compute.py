@@ -1,4 +1,4 @@
-"""From what was recorded to the nodes' files: the same calculations as `calibrate imu`, `mag` and `mount`."""
+"""From what was recorded to the nodes' files: the same calculations as `calibrate imu`, `mag` and `align`."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from rich.progress import Progress, track
 
 from common.errors import TandemError
 from deploy.calibrate import session as sessions
+from deploy.calibrate.align import as_report, joints_table, nodes_table
+from deploy.calibrate.align import refusals as alignment_refusals
+from deploy.calibrate.align_picture import draw_angles
 from deploy.calibrate.live.guide import What
 from deploy.calibrate.live.run import Session
-from deploy.calibrate.mount import as_report, joints_table, nodes_table
-from deploy.calibrate.mount import refusals as mount_refusals
-from deploy.calibrate.mount_picture import draw_angles
 from deploy.calibrate.pictures import draw_inertial, draw_magnetic
 from deploy.calibrate.views import inertial_table, magnetic_table, notes
 from deploy.report.output import writing
+from master.calibrate.alignment import find_alignment
+from master.calibrate.alignment_files import calibrated, write_alignment
 from master.calibrate.inertial import InertialCalibration, InertialOptions, calibrate_inertial
 from master.calibrate.magnetic import MagneticCalibration, MagneticOptions, calibrate_magnetic
-from master.calibrate.magnetic_axes import Hemisphere
-from master.calibrate.mounting import find_mounting
-from master.calibrate.mounting_files import calibrated, write_mounting
+from master.calibrate.magnetometer_axes import Hemisphere
 from master.calibrate.node_file import accelerometer_map
 from master.calibrate.recording import NodeRecording, load_recordings
 from master.config import MasterConfig
@@ -60,7 +60,7 @@ def compute(
         if "mag" in choice.what:
             figures["mag"] = _mag(config, session.tray, choice, folder, day, console, refusals)
     if session.worn is not None:
-        figures["mount"] = _mount(config, session, choice, folder, day, console, refusals)
+        figures["align"] = _align(config, session, choice, folder, day, console, refusals)
     written = sorted(path.stem for path in folder.glob("*.toml") if path.stem in config.nodes)
     if written:
         console.print("To use them, name each in the master's file, as in")
@@ -135,7 +135,7 @@ def _with_progress(found: Mapping[str, Node], console: Console) -> Iterator[tupl
     yield from track(found.items(), "pictures", console=console, transient=True)
 
 
-def _mount(
+def _align(
     config: MasterConfig,
     session: Session,
     choice: Choice,
@@ -149,18 +149,18 @@ def _mount(
         nodes = calibrated(load_recordings(session.worn), folder)
         with Progress(console=console, transient=True) as progress:
             task = progress.add_task("joints", total=None)
-            mounting = find_mounting(
+            alignment = find_alignment(
                 nodes,
                 config.skeleton,
                 session.zero_pose_s,
                 lambda done, of: progress.update(task, completed=done, total=of),
             )
     except TandemError as error:
-        refusals.append(f"mount: {error}")
+        refusals.append(f"align: {error}")
         return {"refused": {"": str(error)}}
-    write_mounting(mounting, session.worn, folder, day)
-    if choice.pictures and mounting.nodes:
-        draw_angles(nodes, config.skeleton, mounting, folder / "mounting.png")
-    console.print(nodes_table(mounting), joints_table(mounting))
-    refusals += [f"mount: {line}" for line in mount_refusals(mounting)]
-    return as_report(mounting, session.worn)
+    write_alignment(alignment, session.worn, folder, day)
+    if choice.pictures and alignment.nodes:
+        draw_angles(nodes, config.skeleton, alignment, folder / "alignment.png")
+    console.print(nodes_table(alignment), joints_table(alignment))
+    refusals += [f"align: {line}" for line in alignment_refusals(alignment)]
+    return as_report(alignment, session.worn)

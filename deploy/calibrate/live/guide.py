@@ -27,8 +27,8 @@ from deploy.calibrate.live.steps import (
     summed_up,
 )
 
-What = Literal["imu", "mag", "mount"]
-WHATS: tuple[What, ...] = ("imu", "mag", "mount")
+What = Literal["imu", "mag", "align"]
+WHATS: tuple[What, ...] = ("imu", "mag", "align")
 StepName = Literal["attitudes", "tumble", "wear", "zero_pose", "limber", "done"]
 _SILENT_S = 2.0
 
@@ -175,6 +175,6 @@ def _steps(what: Sequence[What]) -> list[StepName]:
         names.append("attitudes")
     if "mag" in what:
         names.append("tumble")
-    if "mount" in what:
+    if "align" in what:
         names += ["wear", "zero_pose", "limber"]
     return [*names, "done"]

@@ -17,7 +17,7 @@ from common.config.load import load_config
 from common.errors import TandemError
 from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING, example
-from deploy.experiments.demo.mounted import mount
+from deploy.experiments.demo.alignment import align
 from deploy.experiments.demo.operators import DemoOperators
 from deploy.experiments.demo.report import Report, Seen, make_report
 from deploy.experiments.demo.view import draw
@@ -91,8 +91,8 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
     async with AsyncExitStack() as stack:
         overrides = options.overrides()
         if options.replay is not None:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-mounting-"))
-            overrides["master"] += await _mount(options, options.replay, Path(folder), console)
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-alignment-"))
+            overrides["master"] += await _align(options, options.replay, Path(folder), console)
         host = await stack.enter_async_context(watch_host())
         rig = await stack.enter_async_context(open_rig(options.transport, overrides, options.profile))
         with Live(console=console, refresh_per_second=4, transient=True) as live:
@@ -106,13 +106,13 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
         return make_report(options, rig, await rig.stop(), seen)
 
 
-async def _mount(options: DemoOptions, replay: Path, folder: Path, console: Console) -> list[str]:
+async def _align(options: DemoOptions, replay: Path, folder: Path, console: Console) -> list[str]:
     """What the master's file must say of sensors that sit askew."""
     console.print(f"finding from {replay.name} how its sensors sit …")
-    mounted = await asyncio.to_thread(mount, replay, load_skeleton(options.profile), folder)
-    for name, why in mounted.left.items():
+    aligned = await asyncio.to_thread(align, replay, load_skeleton(options.profile), folder)
+    for name, why in aligned.left.items():
         console.print(f"[yellow]{name}: by the zero pose alone ({why})", highlight=False)
-    return mounted.overrides
+    return aligned.overrides
 
 
 class _Show:

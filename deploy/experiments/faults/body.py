@@ -81,7 +81,7 @@ def leans(scene: Scene) -> None:
     scene.refuses_to_engage("zero pose refused: leaned by 25°")
 
 
-LEANS = Setting(mounted=True, master=("estimation.zero_pose_s=1.0",), motion=leaning)
+LEANS = Setting(aligned=True, master=("estimation.zero_pose_s=1.0",), motion=leaning)
 GROSS_BIAS = Setting(lead_s=4.0, suit=(f'faults.lie=[{{node="{NODE}",kind="biased_gyro",offset=12.0}}]',))
 IRON = Setting(
     lead_s=20.0, suit=(f'faults.lie=[{{node="{NODE}",kind="magnetised",offset=15.0,from_s=6.0}}]',)

@@ -31,7 +31,7 @@ class Setting:
     """Overrides of the suit's example file."""
     master: tuple[str, ...] = ()
     """Overrides of the master's."""
-    mounted: bool = False
+    aligned: bool = False
     """How each node sits is known, so that a lean from the zero pose can be told."""
     motion: Callable[[], Motion] | None = None
     """Of the operator, None for the usual reach."""
@@ -52,12 +52,12 @@ class Later:
 @contextmanager
 def files(setting: Setting) -> Iterator[list[str]]:
     """The overrides of the master's file, and meanwhile the calibrations that they name."""
-    if not setting.mounted:
+    if not setting.aligned:
         yield list(setting.master)
         return
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "straight.toml"
         made = Made(date=date.today(), recording="none: straight by construction", unit="rad")
-        write_calibration(file, {"mounting": (IDENTITY, made)})
+        write_calibration(file, {"alignment": (IDENTITY, made)})
         names = load_skeleton(NURSING).segment_names
         yield [*setting.master, *(f"nodes.{name}.calibration={json.dumps(str(file))}" for name in names)]

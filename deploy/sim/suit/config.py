@@ -56,7 +56,7 @@ class SuitConfig(Section):
     """How good the sensors are: `ideal` (quantised only), `calibrated`, `raw` (as delivered)."""
     field: FieldConfig = FieldConfig()
     disturbance: DisturbanceConfig = DisturbanceConfig()
-    mounting: dict[str, QuaternionList] = Field(default={})
+    alignment: dict[str, QuaternionList] = Field(default={})
     """q_segment_from_sensor (wxyz) of nodes that sit askew, by segment; others are aligned with it."""
     faults: FaultsConfig = FaultsConfig()
     replay: RelativePath | None = None
@@ -68,9 +68,9 @@ class SuitConfig(Section):
     def mistakes(self) -> list[ConfigMistake]:
         """Names that nothing has, ids used twice, quaternions that are no rotation."""
         mistakes = wiring_mistakes(self.nodes, self.buses, "buses") + self.link.mistakes()
-        for name, q in self.mounting.items():
+        for name, q in self.alignment.items():
             if not abs(math.hypot(*q) - 1.0) < 1e-3:
-                mistakes.append(ConfigMistake(f"mounting.{name}", q, "a quaternion (wxyz) of length 1"))
+                mistakes.append(ConfigMistake(f"alignment.{name}", q, "a quaternion (wxyz) of length 1"))
         mistakes += self.faults.unknown_nodes(list(self.nodes))
         try:
             segments = load_skeleton(self.profile).segment_names
@@ -82,7 +82,7 @@ class SuitConfig(Section):
             ConfigMistake("disturbance.local.nodes", name, f"a segment of the profile {self.profile}, or all")
             for name in self.disturbance.unknown_nodes(list(segments))
         ]
-        for key, names in (("nodes", self.nodes), ("mounting", self.mounting)):
+        for key, names in (("nodes", self.nodes), ("alignment", self.alignment)):
             mistakes += [
                 ConfigMistake(f"{key}.{name}", name, f"a segment of the profile {self.profile}")
                 for name in names

@@ -1,4 +1,4 @@
-"""What the calibration of the mounting asks of the operator: stand still, then move every joint at once."""
+"""What the calibration of the alignment asks of the operator: stand still, then move every joint at once."""
 
 from __future__ import annotations
 

@@ -38,9 +38,9 @@ class IdealSensors:
         disturbance: Disturbance | None = None,
     ) -> None:
         count = len(skeleton.segments)
-        mounting = np.tile(IDENTITY, (count, 1)) if q_segment_from_sensor is None else q_segment_from_sensor
+        alignment = np.tile(IDENTITY, (count, 1)) if q_segment_from_sensor is None else q_segment_from_sensor
         self._chain = Chain(skeleton)
-        self._segment_from_sensor = to_matrix(normalise(mounting))
+        self._segment_from_sensor = to_matrix(normalise(alignment))
         # rows: specific force, rate, field, in the world; the first two are filled in at each reading
         self._in_world = np.zeros((count, 3, 3))
         self._in_world[:, 2] = field_ut

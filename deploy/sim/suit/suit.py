@@ -225,7 +225,7 @@ def build_suit(config: SuitConfig, protocol: SuitProtocol, motion: Motion | None
 def _wearer(config: SuitConfig, skeleton: Skeleton, motion: Motion | None = None) -> Wearer:
     if config.replay is not None:
         return RecordedOperator(load_replay(config.replay, skeleton, config.nodes))
-    mounting = np.array([config.mounting.get(name, IDENTITY) for name in skeleton.segment_names])
+    alignment = np.array([config.alignment.get(name, IDENTITY) for name in skeleton.segment_names])
     field_ut = earth_field_ut(config.field.strength_ut, config.field.dip_deg)
     disturbance = None
     if config.disturbance != DisturbanceConfig():
@@ -233,7 +233,7 @@ def _wearer(config: SuitConfig, skeleton: Skeleton, motion: Motion | None = None
     imperfections = Imperfections(config.grade, len(skeleton.segments), config.seed)
     worn = SimulatedOperator(
         motion or load_motion(config.motion, skeleton),
-        IdealSensors(skeleton, field_ut, mounting, disturbance),
+        IdealSensors(skeleton, field_ut, alignment, disturbance),
         imperfections,
     )
     if config.motion not in ("tray", "calibration"):

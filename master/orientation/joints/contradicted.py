@@ -1,6 +1,6 @@
 """Joints that keep turning about an axis about which they cannot.
 
-The mounting, the zero pose or a heading is wrong then, and the joint holds headings to something wrong.
+The alignment, the zero pose or a heading is wrong then, and the joint holds headings to something wrong.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class OnlineConfig(Section):
     """
 
     joint_sd_deg: float = Field(default=2.0, gt=0.0, le=90.0, allow_inf_nan=False)
-    """How far a joint turns about an axis about which it should not, degrees: mounting, skin, anatomy.
+    """How far a joint turns about an axis about which it should not, degrees: alignment, skin, anatomy.
     Larger: joints correct more slowly, and wrong ones do less harm."""
     joint_memory_s: float = Field(default=1.0, gt=0.0, allow_inf_nan=False)
     """For how long it keeps that error, s."""
@@ -109,7 +109,7 @@ class OnlineHeadings:
         self._ticks += 1
         return self._ticks % _EVERY == 0
 
-    def correct(self, q_inertial_from_sensor: Array, mag_ut: Array, mounting: Array, usable: Mask) -> None:
+    def correct(self, q_inertial_from_sensor: Array, mag_ut: Array, alignment: Array, usable: Mask) -> None:
         """Takes the filters' orientations (N, 4), calibrated fields (N, 3), `q_sensor_from_segment` (N, 4).
 
         Nodes that are not `usable` (N,) neither correct nor are corrected.
@@ -123,7 +123,7 @@ class OnlineHeadings:
         )
         information, gain = self._from_field(rotate(q_inertial_from_sensor, mag_ut), usable, dt_s)
         if len(self._joints):
-            q = multiply(multiply(self.turn, q_inertial_from_sensor), mounting)
+            q = multiply(multiply(self.turn, q_inertial_from_sensor), alignment)
             of_joints, gain_of_joints = self._from_joints(q, usable, dt_s)
             information += of_joints
             gain += gain_of_joints
@@ -162,8 +162,8 @@ class OnlineHeadings:
         return {
             int(joints.child[k]): NodeDoubt(
                 f"turns by {found.degrees(k):.0f}° against {self._names[joints.parent[k]]} about an axis "
-                "about which the joint cannot: its mounting, zero pose or heading is wrong, or it slipped. "
-                "Take the zero pose again, or `tandem calibrate mount`",
+                "about which the joint cannot: its alignment, zero pose or heading is wrong, or it slipped. "
+                "Take the zero pose again, or `tandem calibrate align`",
                 Weight.TOLD,
             )
             for k in np.flatnonzero(found.now).tolist()

@@ -54,7 +54,7 @@ def test_an_unknown_profile_names_those_there_are() -> None:
         ("slave", "encoders.reversed=['left_elbow_pitch']", "expected a joint of the hand profile"),
         ("master", "nodes.chest={id=99, bus='suit'}", "nodes.chest = .*: expected a segment of the profile"),
         ("suit", "motion='bottle'", "motion = 'bottle': expected one of grasp, "),
-        ("suit", "mounting.head=[1.0, 0.0, 0.0, 0.0]", "mounting.head = .*: expected a segment of"),
+        ("suit", "alignment.head=[1.0, 0.0, 0.0, 0.0]", "alignment.head = .*: expected a segment of"),
     ],
 )  # fmt: skip
 def test_what_another_profile_has_is_refused(role: str, override: str, said: str) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from common.errors import TandemError
 from common.quaternion import Array, angle_between, conjugate, from_axis_angle, normalise, rotate
-from master.calibrate.mounting import Mounting, find_mounting
+from master.calibrate.alignment import SuitAlignment, find_alignment
 from master.calibrate.recording import NodeRecording
 from tests.master.calibrate.worn import Worn, wear
 
@@ -140,7 +140,7 @@ class Covered:
         return self.error_deg <= 1.96 * self.sigma_deg
 
 
-def covered(worn: Worn, found: Mounting) -> list[Covered]:
+def covered(worn: Worn, found: SuitAlignment) -> list[Covered]:
     """Every written node's whole error of rotation, as it sat in the zero pose."""
     return [
         Covered(
@@ -162,7 +162,7 @@ def count(seeds: Iterable[int]) -> dict[str, Counter[str]]:
         counts = out[planted.kind]
         counts["sessions"] += 1
         try:
-            found = find_mounting(planted.worn.nodes, planted.worn.skeleton)
+            found = find_alignment(planted.worn.nodes, planted.worn.skeleton)
         except TandemError:
             counts["refused"] += len(planted.worn.nodes)
             continue

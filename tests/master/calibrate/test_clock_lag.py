@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from master.calibrate.alignment import find_alignment
 from master.calibrate.clock_lag import Lag, check_lags
-from master.calibrate.mounting import find_mounting
 from tests.master.calibrate.worn import Worn, wear
 
 ARM = ("chest", "upper_arm", "forearm", "hand")
@@ -23,7 +23,7 @@ def worn() -> Worn:
 def test_a_late_node_is_refused_and_the_others_are_not_late(worn: Worn, name: str, by: int) -> None:
     unit = worn.nodes[name]
     late = replace(unit, acc_m_s2=np.roll(unit.acc_m_s2, by, 0), gyr_rad_s=np.roll(unit.gyr_rad_s, by, 0))
-    found = find_mounting({**worn.nodes, name: late}, worn.skeleton)
+    found = find_alignment({**worn.nodes, name: late}, worn.skeleton)
     said = re.search(r"readings come (\d+) ms", found.refused[name])
     assert said is not None
     assert int(said[1]) == pytest.approx(abs(10 * by), abs=15)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.skeleton import Skeleton, load_skeleton
-from master.calibrate.mounting_files import of_profile
+from master.calibrate.alignment_files import of_profile
 from master.calibrate.neighbours import Fits, check_order, fit_pairs
 from master.calibrate.oriented import moving, orient
 from master.calibrate.recording import NodeRecording, load_recordings

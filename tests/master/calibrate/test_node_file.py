@@ -32,7 +32,7 @@ def test_other_parts_and_comments_stay(tmp_path: Path) -> None:
         '[made.gyroscope]\ndate = 2026-01-02\nrecording = "old.npz"\nunit = "rad"\n'
     )
     write_calibration(path, {"accelerometer": (MAP, MADE)})
-    write_calibration(path, {"mounting": (np.array([0.8, 0.6, 0.0, 0.0]), MADE)})
+    write_calibration(path, {"alignment": (np.array([0.8, 0.6, 0.0, 0.0]), MADE)})
     text = path.read_text()
     assert "# worn by nurse 1" in text
     assert "# by hand" in text
@@ -40,7 +40,7 @@ def test_other_parts_and_comments_stay(tmp_path: Path) -> None:
     assert node.gyroscope[0][3] == 0.5
     assert node.made.gyroscope is not None
     assert node.made.gyroscope.recording == "old.npz"
-    assert node.made.accelerometer == node.made.mounting == MADE
+    assert node.made.accelerometer == node.made.alignment == MADE
     assert node.q_sensor_from_segment == [0.8, 0.6, 0.0, 0.0]
 
 
@@ -70,3 +70,17 @@ def test_a_disk_that_takes_nothing_is_said(tmp_path: Path) -> None:
     (tmp_path / "node.toml").mkdir()
     with pytest.raises(ConfigError, match="expected a readable file"):
         write_calibration(tmp_path / "node.toml", {"accelerometer": (MAP, MADE)})
+
+
+def test_an_alignment_by_its_old_name_is_read_and_then_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "node.toml"
+    path.write_text(
+        "q_sensor_from_segment = [0.6, 0.8, 0.0, 0.0]\n[made.mounting]\n"
+        'date = 2026-01-02\nrecording = "old.npz"\nunit = "rad"\n'
+    )
+    made = load_config(path, NodeCalibration).made.alignment
+    assert made is not None
+    assert made.recording == "old.npz"
+    write_calibration(path, {"alignment": (np.array([0.8, 0.6, 0.0, 0.0]), MADE)})
+    assert load_config(path, NodeCalibration).made.alignment == MADE
+    assert "mounting" not in path.read_text()

@@ -12,7 +12,7 @@ import pytest
 from common.quaternion import Array, conjugate, rotate
 from common.skeleton import load_skeleton
 from common.skeleton.full_body import RECORDED_AS
-from master.calibrate.mounting import find_mounting, posture
+from master.calibrate.alignment import find_alignment, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import load_recordings
 from master.joint_angles.decomposition import JointAngles
@@ -52,17 +52,17 @@ def person() -> Person:
         pytest.skip("TANDEM_DATA does not name the folder of recordings")
     file = load_recordings(Path(folder) / "human_full_body.npz")
     recordings = {name: file[RECORDED_AS[name]] for name in LEGS.segment_names}
-    mounting = find_mounting(recordings, LEGS)
-    assert mounting.refused == {}
+    alignment = find_alignment(recordings, LEGS)
+    assert alignment.refused == {}
     suit = orient(recordings, LEGS.segment_names)
-    q_sensor_from_segment = np.array([mounting.nodes[n].q_sensor_from_segment for n in LEGS.segment_names])
+    q_sensor_from_segment = np.array([alignment.nodes[n].q_sensor_from_segment for n in LEGS.segment_names])
     gyr, acc = (
         np.stack(list(r), axis=1)
         for r in zip(*((r.gyr_rad_s, r.acc_m_s2) for r in recordings.values()), strict=True)
     )
     rates = rotate(conjugate(q_sensor_from_segment), gyr)
     solver = JointAngles(LEGS)
-    solved = np.degrees([solver.solve(*tick) for tick in zip(posture(suit, mounting), rates, strict=True)])
+    solved = np.degrees([solver.solve(*tick) for tick in zip(posture(suit, alignment), rates, strict=True)])
     hinge = hinge_of(LEGS, ["left_shank", "right_shank"], q_sensor_from_segment)
     online = HingeAngle(HingeAngleConfig(), hinge, suit.rate_hz)
     near, far = [1, 4], [2, 5]

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from common.skeleton import load_skeleton
-from master.calibrate.mounting import find_mounting
-from master.calibrate.mounting_files import of_profile
+from master.calibrate.alignment import find_alignment
+from master.calibrate.alignment_files import of_profile
 from master.calibrate.recording import NodeRecording, load_recordings
 from tests.master.calibrate.worn import wear
 
@@ -22,7 +22,7 @@ def exchanged(nodes: dict[str, NodeRecording]) -> dict[str, NodeRecording]:
 
 
 def check(nodes: dict[str, NodeRecording], profile: str) -> None:
-    found = find_mounting(exchanged(nodes), load_skeleton(profile))
+    found = find_alignment(exchanged(nodes), load_skeleton(profile))
     assert found.nodes == {}
     assert any("left and right seem to be exchanged" in why for why in found.refused.values())
 

@@ -51,8 +51,8 @@ def wear(profile: str, seed: int, askew_deg: float = 40.0, moving_s: float = MOV
     count = len(skeleton.segments)
     axis = random.normal(size=(count, 3))
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    mounting = from_axis_angle(axis, np.radians(askew_deg) * random.uniform(0.5, 1.0, count))
-    sensors = IdealSensors(skeleton, earth_field_ut(50.0, 60.0), mounting)
+    alignment = from_axis_angle(axis, np.radians(askew_deg) * random.uniform(0.5, 1.0, count))
+    sensors = IdealSensors(skeleton, earth_field_ut(50.0, 60.0), alignment)
     flaws = Imperfections("calibrated", count, seed)
     motion = zip(now, (after - before) / (2.0 * h), (after - 2.0 * now + before) / h**2, strict=True)
     readings = np.array([flaws.apply(sensors.read(*state)) for state in motion])
@@ -61,6 +61,6 @@ def wear(profile: str, seed: int, askew_deg: float = 40.0, moving_s: float = MOV
     return Worn(
         skeleton,
         {n: NodeRecording(n, RATE_HZ, readings[:, i, :3], readings[:, i, 3:6]) for n, i in rows.items()},
-        {n: mounting[i] for n, i in rows.items()},
+        {n: alignment[i] for n, i in rows.items()},
         now,
     )

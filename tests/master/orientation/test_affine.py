@@ -49,7 +49,7 @@ def test_nan_stays_within_its_sensor(tmp_path: Path) -> None:
     assert np.isfinite(np.delete(out.reshape(6, 3), 2 * MAG, 0)).all()
 
 
-def test_a_nearly_unit_mounting_is_normalised(tmp_path: Path) -> None:
+def test_a_nearly_unit_alignment_is_normalised(tmp_path: Path) -> None:
     path = write(tmp_path, "q_sensor_from_segment = [0.7071, 0.7071, 0, 0]")
     assert np.linalg.norm(load_calibration([path]).q_sensor_from_segment[0]) == pytest.approx(1.0, abs=1e-15)
 

@@ -280,17 +280,17 @@ def test_a_missing_magnetometer_leaves_the_other_nodes_alone() -> None:
     assert found.valid.all()
 
 
-def test_a_mounting_that_is_calibrated_gives_the_segment_s_posture_and_rate() -> None:
-    mounting = attitudes(4, 9)
-    askew = estimator(4, QUICK, replace(identity(4), q_sensor_from_segment=mounting))
+def test_an_alignment_that_is_calibrated_gives_the_segment_s_posture_and_rate() -> None:
+    alignment = attitudes(4, 9)
+    askew = estimator(4, QUICK, replace(identity(4), q_sensor_from_segment=alignment))
     turning = Turning(4)
     for _ in range(200):
         readings = turning.readings()
         askew.update(readings)
     posture = askew.posture()
-    segment = multiply(turning.q, mounting)
+    segment = multiply(turning.q, alignment)
     assert np.max(angle_between(posture.q_world_from_segment, segment)) < np.radians(1.0)
-    assert np.allclose(posture.rate_rad_s, rotate(conjugate(mounting), readings.gyr_rad_s), atol=0.15)
+    assert np.allclose(posture.rate_rad_s, rotate(conjugate(alignment), readings.gyr_rad_s), atol=0.15)
 
 
 def test_readings_are_calibrated_before_all_else() -> None:
@@ -319,9 +319,9 @@ def test_calibrations_are_read_from_the_files_that_the_nodes_name(tmp_path: Path
 
 def test_a_zero_pose_zeroes_sensors_worn_askew_for_an_operator_who_faces_a_known_way() -> None:
     config = EstimationConfig(settle_s=0.1, zero_pose_s=0.5, zero_pose_heading_deg=40.0)
-    mounting, facing = attitudes(5, 3), np.radians(40.0)
+    alignment, facing = attitudes(5, 3), np.radians(40.0)
     fuse = estimator(5, config)
-    standing = multiply(heading_turn(np.full(5, facing)), conjugate(mounting))
+    standing = multiply(heading_turn(np.full(5, facing)), conjugate(alignment))
     rest(fuse, standing, SETTLE_TICKS + 99)
     assert not fuse.posture().valid.any()
     rest(fuse, standing, 1)
@@ -330,7 +330,7 @@ def test_a_zero_pose_zeroes_sensors_worn_askew_for_an_operator_who_faces_a_known
     rate = np.random.default_rng(4).normal(size=(5, 3))
     for _ in range(100):
         q = multiply(q, from_rotation_vector(rate / RATE_HZ))
-        fuse.update(seen_by(multiply(q, conjugate(mounting)), rotate(mounting, rate)))
+        fuse.update(seen_by(multiply(q, conjugate(alignment)), rotate(alignment, rate)))
     posture = fuse.posture()
     assert np.max(angle_between(posture.q_world_from_segment, q)) < np.radians(1.0)
     assert np.allclose(posture.rate_rad_s, rate, atol=0.05)
@@ -397,11 +397,11 @@ def test_with_constraints_it_finds_the_same_headings_and_goes_on_from_a_snapshot
 
 def test_with_constraints_a_zero_pose_gives_nodes_without_magnetometer_their_headings() -> None:
     config = EstimationConfig(settle_s=0.1, zero_pose_s=0.2, zero_pose_heading_deg=40.0, constraints="online")
-    mounting = attitudes(7, 5)
-    calibration = replace(identity(7), q_sensor_from_segment=mounting)
+    alignment = attitudes(7, 5)
+    calibration = replace(identity(7), q_sensor_from_segment=alignment)
     fuse = Estimator(config, [Node()] * 7, RATE_HZ, calibration, load_skeleton("lower_limb"))
     facing = heading_turn(np.full(7, np.radians(40.0)))
-    rest(fuse, multiply(facing, conjugate(mounting)), 80, mag_ut=np.full((7, 3), np.nan))
+    rest(fuse, multiply(facing, conjugate(alignment)), 80, mag_ut=np.full((7, 3), np.nan))
     posture = fuse.posture()
     assert posture.valid.all()
     assert np.max(angle_between(posture.q_world_from_segment, facing)) < np.radians(0.5)

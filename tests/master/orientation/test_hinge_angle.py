@@ -222,9 +222,9 @@ def test_with_the_axis_upright_the_accelerometers_are_not_asked() -> None:
     assert online.deviation_rad[0] > 0.4
 
 
-def test_levers_and_axes_are_turned_with_the_mounting() -> None:
+def test_levers_and_axes_are_turned_with_the_alignment() -> None:
     q = np.tile(from_rotation_vector(np.array([0.3, -0.4, 0.9])), (7, 1))
-    plain, turned = (hinge_of(LEGS, KNEES, mounting) for mounting in (conjugate(q) * [1, 0, 0, 0], q))
+    plain, turned = (hinge_of(LEGS, KNEES, alignment) for alignment in (conjugate(q) * [1, 0, 0, 0], q))
     plain = hinge_of(LEGS, KNEES, np.tile([1.0, 0.0, 0.0, 0.0], (7, 1)))
     for name in Hinge.__slots__:
         np.testing.assert_allclose(getattr(turned, name), rotate(q[:2], getattr(plain, name)), atol=1e-12)

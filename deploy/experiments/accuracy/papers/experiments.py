@@ -21,7 +21,7 @@ EXPERIMENTS = (
         "A-suit",
         "the same, with the joints' constraints and a zero pose of 2 s",
         telerobot.as_a_suit,
-        ("How the units sit is known, as `tandem calibrate mount` finds it. constraints = online.",),
+        ("How the units sit is known, as `tandem calibrate align` finds it. constraints = online.",),
     ),
     Experiment(
         "A-raw",
@@ -48,9 +48,9 @@ EXPERIMENTS = (
         "the knees, sensors 40° askew, 20 s of walking (lower-limb paper, section 4.1)",
         lower_limb.experiment,
         (
-            "The page prints no figures. Axes and mounting are found from the same recording, the levers are "
-            "the table's; no magnetometer is read. Sensors are fixed to the segments: skin that moves under "
-            "them is not simulated.",
+            "The page prints no figures. Axes and alignment are found from the same recording, the levers "
+            "are the table's; no magnetometer is read. Sensors are fixed to the segments: skin that moves "
+            "under them is not simulated.",
         ),
     ),
     Experiment(

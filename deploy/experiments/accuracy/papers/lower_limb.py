@@ -12,8 +12,8 @@ from deploy.experiments.accuracy.papers.figures import Figure
 from deploy.experiments.accuracy.papers.fixture import Take, record
 from deploy.sim.suit.imperfections import GradeName, Imperfections
 from deploy.sim.suit.motion import load_motion
+from master.calibrate.alignment import find_alignment
 from master.calibrate.hinge import find_hinge
-from master.calibrate.mounting import find_mounting
 from master.calibrate.recording import NodeRecording
 from master.orientation.hinge_angle import HingeAngleConfig, hinge_angles, hinge_of
 
@@ -33,16 +33,16 @@ def experiment(seed: int, grade: GradeName = "calibrated") -> list[Figure]:
     """Both knees of one walk, every sensor 40° askew about an axis of its own; no magnetometer is read."""
     q_segment_from_sensor = askew(seed)
     take = walk(seed, grade, q_segment_from_sensor)
-    found = find_mounting(recordings(take), LEGS, zero_pose_s=(0.3, STILL_S - 0.3))
+    found = find_alignment(recordings(take), LEGS, zero_pose_s=(0.3, STILL_S - 0.3))
     missing = [name for name in WORN if name not in found.nodes]
     axes = axis_errors_deg(take, q_segment_from_sensor)
     figures = [Figure("hinge axes in both sensors' frames", "°", axes, None, AXIS_TARGET_DEG)]
     if missing:
         return [*figures, Figure("knee angle, RMSE", "°", (), None, KNEE_TARGET_DEG)]
-    mounting = np.array(
+    alignment = np.array(
         [found.nodes[name].q_sensor_from_segment if name in WORN else IDENTITY for name in LEGS.segment_names]
     )
-    error_deg = knee_errors_deg(take, mounting)
+    error_deg = knee_errors_deg(take, alignment)
     own_zero_deg = error_deg - error_deg.mean(axis=1, keepdims=True)
     return [
         *figures,

@@ -42,12 +42,12 @@ def whole_way(
 def as_a_suit(seed: int, seconds: float = SECONDS) -> list[Figure]:
     """The same with what only a suit knows: how its units sit, a zero pose first, what elbows cannot do.
 
-    The mounting is as `tandem calibrate mount` leaves it, here of units that sit straight.
+    The alignment is as `tandem calibrate align` leaves it, here of units that sit straight.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "straight.toml"
         made = Made(date=date.today(), recording="none: straight by construction", unit="rad")
-        write_calibration(file, {"mounting": (IDENTITY, made)})
+        write_calibration(file, {"alignment": (IDENTITY, made)})
         master = [f"estimation.zero_pose_s={ZERO_POSE_S}", 'estimation.constraints="online"']
         master += [f"nodes.{name}.calibration={json.dumps(str(file))}" for name in ARMS]
         return whole_way(seed, seconds, (), master)

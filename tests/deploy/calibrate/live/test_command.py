@@ -28,11 +28,11 @@ def test_every_option_reaches_the_guide(tmp_path: Path, monkeypatch: pytest.Monk
         raise TandemError("enough")
 
     monkeypatch.setattr(live_run, "LiveSession", session)
-    asked = "--what mount,mag --still-s 4 --attitudes 30 --coverage 0.7 --tumble-s 50 --limber-s 15"
+    asked = "--what align,mag --still-s 4 --attitudes 30 --coverage 0.7 --tumble-s 50 --limber-s 15"
     with pytest.raises(TandemError, match="enough"):
         run(f"{EXAMPLES}/master.toml --out {tmp_path} {asked}")
     assert heard == [
-        GuideOptions(("mag", "mount"), 4.0, 30, coverage=0.7, tumble_s=50.0, limber_s=15.0, by_word=False)
+        GuideOptions(("mag", "align"), 4.0, 30, coverage=0.7, tumble_s=50.0, limber_s=15.0, by_word=False)
     ]
 
 
@@ -40,6 +40,6 @@ def test_mistakes_are_one_clear_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(TandemError, match=r"--out .*file: cannot be made"):
         run(f"{EXAMPLES}/master.toml --out {tmp_path}/file")
-    with pytest.raises(ConfigError, match="--what = 'legs': expected one or more of imu, mag, mount"):
+    with pytest.raises(ConfigError, match="--what = 'legs': expected one or more of imu, mag, align"):
         run(f"{EXAMPLES}/master.toml --out {tmp_path} --what legs")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -132,13 +132,13 @@ def test_noise_about_one_direction_is_no_sphere() -> None:
 
 
 def test_the_units_in_the_tray_do_not_count_as_worn(readings: Array) -> None:
-    options = GuideOptions(("mount",))
+    options = GuideOptions(("align",))
     tray = readings[: round(60 * RATE_HZ)]
     assert list(led(tray, options).began_s) == ["wear"]
 
 
 def test_the_zero_pose_waits_for_the_word_where_a_person_can_give_it(readings: Array) -> None:
-    options = GuideOptions(("mount",), by_word=True)
+    options = GuideOptions(("align",), by_word=True)
     worn_from = round(led(readings).began_s["wear"] * RATE_HZ)
     run = led(readings[worn_from:], options)
     assert run.guide.step == "zero_pose"

@@ -47,7 +47,7 @@ class Done:
     refusals: list[str]
     said: str
     units: Imperfections
-    mounting: Array
+    alignment: Array
 
 
 def loaded(role: str, *overrides: str) -> Any:
@@ -78,9 +78,9 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
     folder = tmp_path_factory.mktemp("calibration")
     config: MasterConfig = loaded("master", *SLOW)
     names = config.skeleton.segment_names
-    mounting = askew(names)
+    alignment = askew(names)
     suit: SuitConfig = loaded("suit").model_copy(
-        update={"motion": "calibration", "grade": "raw", "seed": SEED, "mounting": mounting}
+        update={"motion": "calibration", "grade": "raw", "seed": SEED, "alignment": alignment}
     )
     suit = suit.model_copy(
         update={"tray": suit.tray.model_copy(update={"attitudes": 22, "still_s": 2.3, "tumble_s": 20.0})}
@@ -99,7 +99,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
         config, led.session, Choice(OPTIONS.what, 9.80665, OPTIONS.still_s, pictures=False), folder, console
     )
     units = Imperfections("raw", len(names), SEED)
-    q = np.array([mounting[name] for name in names])
+    q = np.array([alignment[name] for name in names])
     return Done(config, led, folder, figures, refusals, text.getvalue(), units, q)
 
 
@@ -119,7 +119,7 @@ def worst(done: Done, sensor: int, strength: float) -> tuple[float, float]:
     """The largest error over all nodes and directions, raw and calibrated, of vectors of that length.
 
     The accelerometer's first axis decides what a unit's axes are, so all is compared in axes turned by what
-    brings its calibrated readings nearest to the truth; the mounting takes up that turn.
+    brings its calibrated readings nearest to the truth; the alignment takes up that turn.
     """
     truth = np.random.default_rng(5).standard_normal((200, 3))
     truth /= np.linalg.norm(truth, axis=1, keepdims=True)
@@ -157,11 +157,11 @@ def test_calibrated_units_err_far_less_than_raw_ones(
     assert after < share * before
 
 
-def test_the_mounting_is_found(done: Done) -> None:
+def test_the_alignment_is_found(done: Done) -> None:
     """Against how the simulated units really sit."""
     from common.quaternion import angle_between, conjugate
 
-    for name, q_segment_from_sensor in zip(done.config.skeleton.segment_names, done.mounting, strict=True):
+    for name, q_segment_from_sensor in zip(done.config.skeleton.segment_names, done.alignment, strict=True):
         if name == "pelvis":
             continue
         found = np.array(file(done, name).q_sensor_from_segment)
@@ -173,9 +173,9 @@ def test_every_part_says_how_it_came_about(done: Done) -> None:
     for name in done.config.skeleton.segment_names:
         made = tomllib.loads((done.folder / f"{name}.toml").read_text("utf-8"))["made"]
         assert set(made) >= {"accelerometer", "gyroscope", "magnetometer"}
-        assert ("mounting" in made) == (name != "pelvis")
+        assert ("alignment" in made) == (name != "pelvis")
         assert made["accelerometer"]["recording"] == "tray.mcap"
-        assert "mounting" not in made or made["mounting"]["recording"] == "worn.mcap"
+        assert "alignment" not in made or made["alignment"]["recording"] == "worn.mcap"
         for sensor in ("accelerometer", "gyroscope", "magnetometer"):
             assert made[sensor]["residual_after"] < 0.2 * made[sensor]["residual_before"]
     assert "left_shank" in done.said
@@ -248,7 +248,7 @@ def test_recordings_are_never_written_over(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("imu", ("imu",)), ("mount, imu", ("imu", "mount")), ("mag,imu,mount", ("imu", "mag", "mount"))],
+    [("imu", ("imu",)), ("align, imu", ("imu", "align")), ("mag,imu,align", ("imu", "mag", "align"))],
 )
 def test_what_is_wanted(text: str, expected: tuple[What, ...]) -> None:
     assert parts(text) == expected
@@ -256,5 +256,5 @@ def test_what_is_wanted(text: str, expected: tuple[What, ...]) -> None:
 
 @pytest.mark.parametrize("text", ["", "imu,gyro", ","])
 def test_what_there_is_not_is_one_line(text: str) -> None:
-    with pytest.raises(TandemError, match=r"--what = .*: expected one or more of imu, mag, mount"):
+    with pytest.raises(TandemError, match=r"--what = .*: expected one or more of imu, mag, align"):
         parts(text)

@@ -41,7 +41,7 @@ def test_all_keys(path: Path) -> None:
             'motion = "sweep"',
             "seed = 7",
             "field = { strength_ut = 48.5, dip_deg = -20 }",
-            "mounting = { head = [0, 1, 0, 0] }",
+            "alignment = { head = [0, 1, 0, 0] }",
             'replay = "person.npz"',
             'faults = { corrupt_rate = 0.1, lose = [{ node = "head", from_s = 1, until_s = 2.5 }] }',
             'link.connect = ["tcp/127.0.0.1:7447"]',
@@ -49,7 +49,7 @@ def test_all_keys(path: Path) -> None:
     )
     assert config.replay == path.parent / "person.npz"
     assert config.faults.lose[0].until_s == 2.5
-    assert config.mounting == {"head": [0.0, 1.0, 0.0, 0.0]}
+    assert config.alignment == {"head": [0.0, 1.0, 0.0, 0.0]}
 
 
 @pytest.mark.parametrize(
@@ -67,10 +67,10 @@ def test_all_keys(path: Path) -> None:
             "nodes.left_hand.id = 2: expected an id that nodes.head",
         ),
         ('nodes.left_hand = { id = 3, bus = "can7" }', "nodes.left_hand.bus = 'can7': expected one of suit"),
-        ("mounting.tail = [1, 0, 0, 0]", "mounting.tail = 'tail': expected a segment"),
-        ("mounting.head = [1, 1, 0, 0]", r"mounting.head = \[1.0, 1.0, 0.0, 0.0\]: expected a quaternion"),
-        ("mounting.head = [1, 0, 0]", "mounting.head = .*at least 4 items"),
-        ("mounting.head = [nan, 0, 0, 0]", "mounting.head.0 = nan: expected a finite number"),
+        ("alignment.tail = [1, 0, 0, 0]", "alignment.tail = 'tail': expected a segment"),
+        ("alignment.head = [1, 1, 0, 0]", r"alignment.head = \[1.0, 1.0, 0.0, 0.0\]: expected a quaternion"),
+        ("alignment.head = [1, 0, 0]", "alignment.head = .*at least 4 items"),
+        ("alignment.head = [nan, 0, 0, 0]", "alignment.head.0 = nan: expected a finite number"),
         ("faults.corrupt_rate = 1.1", "faults.corrupt_rate = 1.1: expected less than or equal to 1"),
         ("faults.delay = [{ delay_ms = 0 }]", "faults.delay.0.delay_ms = 0: expected greater than 0"),
         (

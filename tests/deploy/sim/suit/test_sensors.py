@@ -89,23 +89,23 @@ def test_field_strength_and_dip_do_not_depend_on_the_posture(skeleton: Skeleton)
     np.testing.assert_allclose(upward, -np.sin(np.radians(60.0)))
 
 
-def test_a_sensor_mounted_askew_reads_the_same_vectors_in_its_own_frame(skeleton: Skeleton) -> None:
+def test_a_sensor_aligned_askew_reads_the_same_vectors_in_its_own_frame(skeleton: Skeleton) -> None:
     random = np.random.default_rng(4)
     count = len(skeleton.segments)
-    mounting = normalise(random.standard_normal((count, 4)))
+    alignment = normalise(random.standard_normal((count, 4)))
     position = random.uniform(skeleton.lower_rad, skeleton.upper_rad)
     velocity, acceleration = random.standard_normal((2, len(skeleton.joints)))
     aligned = IdealSensors(skeleton, FIELD_UT).read(position, velocity, acceleration)
-    askew = IdealSensors(skeleton, FIELD_UT, mounting).read(position, velocity, acceleration)
+    askew = IdealSensors(skeleton, FIELD_UT, alignment).read(position, velocity, acceleration)
     for sensor in (slice(0, 3), slice(3, 6), slice(6, 9)):
-        np.testing.assert_allclose(rotate(mounting, askew[:, sensor]), aligned[:, sensor], atol=1e-12)
+        np.testing.assert_allclose(rotate(alignment, askew[:, sensor]), aligned[:, sensor], atol=1e-12)
 
 
 def test_a_quarter_turn_about_the_long_axis() -> None:
     """By hand, so that the direction of `q_segment_from_sensor` is not left to convention."""
     skeleton = parse_skeleton(PENDULUM, "pendulum")
-    mounting = from_axis_angle([0.0, 0.0, 1.0], np.pi / 2)[None]
-    reading = IdealSensors(skeleton, FIELD_UT, mounting).read(*np.zeros((3, 1)))[0]
+    alignment = from_axis_angle([0.0, 0.0, 1.0], np.pi / 2)[None]
+    reading = IdealSensors(skeleton, FIELD_UT, alignment).read(*np.zeros((3, 1)))[0]
     # the sensor's x lies along the segment's y, which points north
     np.testing.assert_allclose(reading[6:], [25.0, 0.0, FIELD_UT[2]], atol=1e-12)
 

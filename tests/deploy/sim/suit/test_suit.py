@@ -110,12 +110,12 @@ def test_a_reading_beyond_its_range_is_flagged_on_its_node_only(
     assert decoded.raw[0, 8] == -2047
 
 
-def test_mounting_turns_the_readings_of_its_node_only(
+def test_alignment_turns_the_readings_of_its_node_only(
     config: SuitConfig, protocol: SuitProtocol, skeleton: Skeleton
 ) -> None:
     q = np.array([0.5, 0.5, 0.5, 0.5])
     plain = varied(config, grade="ideal")
-    askew = varied(plain, mounting={"left_hand": q.tolist()})
+    askew = varied(plain, alignment={"left_hand": q.tolist()})
     one, other = (
         raw_of(build_suit(c, protocol).on_sync(0, START_NS), protocol) * protocol.fd.scale
         for c in (plain, askew)

@@ -82,13 +82,13 @@ def wear(
     """Run the estimator over a motion; `bias_rad_s` (t) is added to the gyros, (N, 3)."""
     count = len(skeleton.segments)
     calibration = identity(count)
-    mounting = None
+    alignment = None
     if q_sensor_from_segment is not None:
         calibration = replace(calibration, q_sensor_from_segment=q_sensor_from_segment)
-        mounting = conjugate(q_sensor_from_segment)
+        alignment = conjugate(q_sensor_from_segment)
     room = DisturbanceConfig.model_validate(disturbance or {})
     names = skeleton.segment_names
-    sensors = IdealSensors(skeleton, EARTH_UT, mounting, Disturbance(room, names, EARTH_UT))
+    sensors = IdealSensors(skeleton, EARTH_UT, alignment, Disturbance(room, names, EARTH_UT))
     imperfections = Imperfections("calibrated", count, seed)
     cutoffs = {f"{s}_cutoff_hz": 0.25 * rate_hz for s in ("accelerometer", "gyroscope", "magnetometer")}
     config = EstimationConfig.model_validate(cutoffs | estimation)

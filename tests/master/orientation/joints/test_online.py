@@ -56,9 +56,9 @@ def test_a_disturbed_field_leaves_the_joints_as_they_were(
 
 def test_a_bed_s_rail_that_was_always_there(wear: Any, arms: Skeleton) -> None:
     sway = Sway(arms)
-    # one degree askew, so that the mounting counts as known
-    mounting = np.tile(from_axis_angle([0.0, 0.0, 1.0], np.radians(1.0)), (5, 1))
-    keys = {"zero_pose_s": 1.0, "q_sensor_from_segment": mounting}
+    # one degree askew, so that the alignment counts as known
+    alignment = np.tile(from_axis_angle([0.0, 0.0, 1.0], np.radians(1.0)), (5, 1))
+    keys = {"zero_pose_s": 1.0, "q_sensor_from_segment": alignment}
     quiet, online, off = (
         wear(arms, sway, 25.0, disturbance=room, constraints=constraints, **keys)
         for room, constraints in (({}, "online"), (RAIL, "online"), (RAIL, "off"))
@@ -127,16 +127,16 @@ def test_a_node_that_is_not_usable_neither_corrects_nor_is_corrected(
 
 
 def test_an_error_that_no_heading_explains_counts_hardly_more_than_a_small_one(arms: Skeleton) -> None:
-    """Of headings known to 2° from a zero pose, one cannot be 60° off: then the mounting is wrong."""
+    """Of headings known to 2° from a zero pose, one cannot be 60° off: then the alignment is wrong."""
     found_rad = []
     for off_deg in (6.0, 60.0):
         online = OnlineHeadings(OnlineConfig(), arms, 200.0)
-        nodes, mounting = np.ones(5, dtype=np.bool_), np.tile(IDENTITY, (5, 1))
-        online.stand(nodes, np.zeros(5), mounting, np.full((5, 3), np.nan))
+        nodes, alignment = np.ones(5, dtype=np.bool_), np.tile(IDENTITY, (5, 1))
+        online.stand(nodes, np.zeros(5), alignment, np.full((5, 3), np.nan))
         q = np.stack([IDENTITY, IDENTITY, BENT, IDENTITY, BENT])
         q = multiply(heading_turn(np.radians([0.0, 0.0, off_deg, 0.0, 0.0])), q)
-        online.correct(q, np.full((5, 3), np.nan), mounting, nodes)
-        found_rad.append(angle_between(online.turn, mounting)[2])
+        online.correct(q, np.full((5, 3), np.nan), alignment, nodes)
+        found_rad.append(angle_between(online.turn, alignment)[2])
     assert found_rad[0] > 1e-4
     assert found_rad[1] < 3.0 * found_rad[0]
 
@@ -155,17 +155,17 @@ def test_a_node_that_returns_begins_with_the_heading_it_had_or_its_magnetometer_
 
 def test_goes_on_from_a_snapshot(arms: Skeleton) -> None:
     online = OnlineHeadings(OnlineConfig(), arms, 200.0)
-    nodes, mounting = np.ones(5, dtype=np.bool_), np.tile(IDENTITY, (5, 1))
+    nodes, alignment = np.ones(5, dtype=np.bool_), np.tile(IDENTITY, (5, 1))
     q = Rotation.random(5, rng=0).as_quat(scalar_first=True)
     field = np.random.default_rng(0).normal(size=(5, 3))
-    online.correct(q, field, mounting, nodes)
+    online.correct(q, field, alignment, nodes)
     assert not online.due()
     snapshot = online.snapshot()
     ends = []
     for _ in range(2):
         for _ in range(20):
             if online.due():
-                online.correct(q, field, mounting, nodes)
+                online.correct(q, field, alignment, nodes)
         ends.append(online.turn)
         online.restore(snapshot)
     np.testing.assert_array_equal(ends[0], ends[1])

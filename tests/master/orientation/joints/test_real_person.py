@@ -13,7 +13,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.full_body import RECORDED_AS
 from common.wire.messages import Mask
-from master.calibrate.mounting import find_mounting
+from master.calibrate.alignment import find_alignment
 from master.calibrate.recording import load_recordings
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import Calibration, identity
@@ -59,11 +59,11 @@ def person(request: pytest.FixtureRequest, recordings_folder: Path) -> Person:
     angles = {angle for segment in segments for angle in segment.angles}
     skeleton = Skeleton(whole.name, segments, tuple(j for j in whole.joints if set(j.drives) <= angles))
     nodes = {segment.name: there[RECORDED_AS[segment.name]] for segment in segments}
-    found = find_mounting(nodes, skeleton)
+    found = find_alignment(nodes, skeleton)
     assert found.refused == {}
-    mounting = np.array([found.nodes[segment.name].q_sensor_from_segment for segment in segments])
+    alignment = np.array([found.nodes[segment.name].q_sensor_from_segment for segment in segments])
     known = np.ones(len(segments), dtype=np.bool_)
-    calibration = Calibration(identity(len(segments)).affine, mounting, known)
+    calibration = Calibration(identity(len(segments)).affine, alignment, known)
     rate_hz = next(iter(nodes.values())).rate_hz
     estimator = Estimator(CONFIG, [Node()] * len(segments), rate_hz, calibration, skeleton)
     solver = JointAngles(skeleton)

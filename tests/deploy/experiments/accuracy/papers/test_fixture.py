@@ -21,10 +21,10 @@ from deploy.sim.suit.sensors import IdealSensors
 def test_all_times_at_once_read_as_the_suits_own_sensors() -> None:
     skeleton = load_skeleton("lower_limb")
     motion = load_motion("walk", skeleton)
-    mounting = normalise(np.random.default_rng(0).standard_normal((len(skeleton.segments), 4)))
+    alignment = normalise(np.random.default_rng(0).standard_normal((len(skeleton.segments), 4)))
     t_s = np.arange(4.0, 7.0, 0.01)
-    at_once = ideal_readings(skeleton, motion, t_s, mounting)
-    sensors = IdealSensors(skeleton, FIELD_UT, mounting)
+    at_once = ideal_readings(skeleton, motion, t_s, alignment)
+    sensors = IdealSensors(skeleton, FIELD_UT, alignment)
     one_by_one = np.array([sensors.read(*(part[k] for part in motion.state(t_s))) for k in range(len(t_s))])
     error = np.abs(at_once - one_by_one).max(axis=(0, 1))
     assert error[:3].max() < 5e-4

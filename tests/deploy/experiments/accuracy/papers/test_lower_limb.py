@@ -17,7 +17,7 @@ def test_axes_and_knee_angles_meet_their_targets_with_every_sensor_askew() -> No
         assert row.outcome == "passed", (row.name, row.values)
 
 
-def test_a_mounting_that_is_off_shows_in_the_knees_angle() -> None:
+def test_an_alignment_that_is_off_shows_in_the_knees_angle() -> None:
     q_segment_from_sensor = lower_limb.askew(1)
     whole = lower_limb.walk(1, "ideal", q_segment_from_sensor)
     some = slice(0, 1600)

@@ -1,4 +1,4 @@
-"""`tandem calibrate mount`: how each unit sits on its segment, from a zero pose and a motion."""
+"""`tandem calibrate align`: how each unit sits on its segment, from a zero pose and a motion."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from deploy.calibrate.options import AsJson, OutFolder, RecordingFile, ReportFil
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from master.calibrate.alignment import SuitAlignment
     from master.calibrate.joint_motion import JointMotion
-    from master.calibrate.mounting import Mounting
 
 
 _TIMES = re.compile(r"([0-9]+(?:\.[0-9]*)?):([0-9]+(?:\.[0-9]*)?)")
@@ -32,7 +32,7 @@ def _times(text: str | None) -> str | None:
     return text
 
 
-def mount(
+def align(
     recording: RecordingFile,
     profile: Annotated[str, typer.Option(help="Whose segments the nodes are on.")] = "nursing",
     out: OutFolder = Path("calibration"),
@@ -53,15 +53,15 @@ def mount(
     ten times each while you walk, bow and turn, 20 s or more. No magnetometer is needed. Calibrations of
     `imu` in the folder are applied first.
 
-    Example: `tandem calibrate mount session.mcap --profile nursing --out calibration`
+    Example: `tandem calibrate align session.mcap --profile nursing --out calibration`
     """
     from rich.progress import Progress
 
     from common.skeleton import load_skeleton
-    from deploy.calibrate.mount_picture import draw_angles
+    from deploy.calibrate.align_picture import draw_angles
     from deploy.calibrate.session import make_folder, tell_machines
-    from master.calibrate.mounting import find_mounting
-    from master.calibrate.mounting_files import calibrated, of_profile, write_mounting
+    from master.calibrate.alignment import find_alignment
+    from master.calibrate.alignment_files import calibrated, of_profile, write_alignment
     from master.calibrate.recording import load_recordings
 
     skeleton = load_skeleton(profile)
@@ -71,12 +71,12 @@ def mount(
     between = None if zero_pose is None else (float(zero_pose.split(":")[0]), float(zero_pose.split(":")[1]))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("joints", total=None)
-        found = find_mounting(
+        found = find_alignment(
             nodes, skeleton, between, lambda done, of: bar.update(task, completed=done, total=of)
         )
-    write_mounting(found, recording, out, date.today())
+    write_alignment(found, recording, out, date.today())
     if found.nodes:
-        draw_angles(nodes, skeleton, found, out / "mounting.png")
+        draw_angles(nodes, skeleton, found, out / "alignment.png")
     figures = as_report(found, recording)
     tell_machines(figures, report, to_stdout=as_json)
     if not as_json:
@@ -87,13 +87,13 @@ def mount(
         if found.nodes:
             console.print(
                 f"zero pose {found.zero_pose_s[0]:.1f} to {found.zero_pose_s[1]:.1f} s; written to {out}; "
-                "angles over the recording: mounting.png"
+                "angles over the recording: alignment.png"
             )
     if found.refused:
         raise TandemError("\n".join(f"{recording}: {line}" for line in refusals(found)))
 
 
-def refusals(found: Mounting) -> list[str]:
+def refusals(found: SuitAlignment) -> list[str]:
     """A line for each reason, with the nodes that are not written for it."""
     from deploy.calibrate.session import by_words
 
@@ -103,7 +103,7 @@ def refusals(found: Mounting) -> list[str]:
     ]
 
 
-def as_report(found: Mounting, recording: Path) -> dict[str, Any]:
+def as_report(found: SuitAlignment, recording: Path) -> dict[str, Any]:
     """Everything found, for machines; angles in degrees."""
     return {
         "recording": recording.name,
@@ -139,12 +139,12 @@ def _joint(joint: JointMotion) -> dict[str, Any]:
     }
 
 
-def nodes_table(found: Mounting) -> Table:
+def nodes_table(found: SuitAlignment) -> Table:
     """One row a node: who told its heading, and how well it is known."""
     from rich import box
     from rich.table import Table
 
-    table = Table(title="mounting", box=box.SIMPLE_HEAD)
+    table = Table(title="alignment", box=box.SIMPLE_HEAD)
     for head in ("node", "facing told by", "± °", "axis off level °", ""):
         table.add_column(head, justify="right" if "°" in head else "left")
     for name, node in found.nodes.items():
@@ -155,7 +155,7 @@ def nodes_table(found: Mounting) -> Table:
     return table
 
 
-def joints_table(found: Mounting) -> Table:
+def joints_table(found: SuitAlignment) -> Table:
     """One row a joint: what its motion told."""
     from rich import box
     from rich.table import Table

@@ -10,7 +10,7 @@ import typer
 from common.config.load import load_config
 from common.config.sensor_calibration import NodeCalibration
 from common.errors import TandemError
-from deploy.calibrate.mount import _times, mount
+from deploy.calibrate.align import _times, align
 from tests.master.calibrate.worn import wear
 
 
@@ -24,7 +24,7 @@ def test_a_recording_of_somebody_else_s_segments_is_refused(tmp_path: Path) -> N
     up = np.tile([0.0, 0.0, 9.81], (500, 1))
     np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(500), tail_acc=up, tail_gyr=np.zeros((500, 3)))
     with pytest.raises(TandemError, match=r"no node of the recording \(tail …\) is a segment of the profile"):
-        mount(tmp_path / "s.npz", out=tmp_path / "out")
+        align(tmp_path / "s.npz", out=tmp_path / "out")
 
 
 def test_nodes_that_stood_still_are_refused_by_name_and_not_written(tmp_path: Path) -> None:
@@ -33,7 +33,7 @@ def test_nodes_that_stood_still_are_refused_by_name_and_not_written(tmp_path: Pa
     arrays = {f"{n}_{k}": v for n in ("chest", "head") for k, v in (("acc", up), ("gyr", noise))}
     np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(500), **arrays)  # type: ignore[arg-type]
     with pytest.raises(TandemError, match=r"chest, head are not written: .*hardly moved; walk some steps"):
-        mount(tmp_path / "s.npz", out=tmp_path / "out")
+        align(tmp_path / "s.npz", out=tmp_path / "out")
     assert list((tmp_path / "out").glob("*.toml")) == []
 
 
@@ -53,7 +53,7 @@ def test_evidence_that_contradicts_itself_writes_nothing_and_says_so_once(tmp_pa
         length = len(next(iter(arrays.values())))
         np.savez(tmp_path / "s.npz", t_s=0.01 * np.arange(length), **arrays)  # type: ignore[arg-type]
         with pytest.raises(TandemError, match=said) as error:
-            mount(tmp_path / "s.npz", out=out, report=tmp_path / "report.json")
+            align(tmp_path / "s.npz", out=out, report=tmp_path / "report.json")
         assert list(out.glob("*.toml")) == []
         assert number or len(str(error.value).splitlines()) == 1
         report = json.loads((tmp_path / "report.json").read_text("utf-8"))
@@ -65,11 +65,11 @@ def test_a_real_person_s_suit(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     folder = os.environ.get("TANDEM_DATA")
     if not folder:
         pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    mount(Path(folder) / "human_full_body.npz", out=tmp_path, report=tmp_path / "report.json")
+    align(Path(folder) / "human_full_body.npz", out=tmp_path, report=tmp_path / "report.json")
     report = json.loads((tmp_path / "report.json").read_text("utf-8"))
     assert len(report["nodes"]) == 8
     for name, node in report["nodes"].items():
         said = load_config(tmp_path / f"{name}.toml", NodeCalibration).q_sensor_from_segment
         np.testing.assert_allclose(said, node["q_sensor_from_segment"], atol=1e-9)
-    assert (tmp_path / "mounting.png").stat().st_size > 20_000
+    assert (tmp_path / "alignment.png").stat().st_size > 20_000
     assert "two axes" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""A real person's sensors, worn askew, drive the simulated legs: mounted from the recording itself."""
+"""A real person's sensors, worn askew, drive the simulated legs: aligned from the recording itself."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from deploy.experiments.demo.mounted import mount
+from deploy.experiments.demo.alignment import align
 from deploy.sim.world.whole_way import VirtualRun, World
 
 LEGS = load_skeleton("lower_limb")
@@ -36,14 +36,14 @@ def knees_deg(recording: Path, overrides: list[str]) -> Array:
 
 
 @pytest.mark.recordings
-def test_knees_bend_forwards_once_the_sensors_are_mounted(tmp_path: Path) -> None:
+def test_knees_bend_forwards_once_the_sensors_are_aligned(tmp_path: Path) -> None:
     folder = os.environ.get("TANDEM_DATA")
     if not folder:
         pytest.skip("TANDEM_DATA does not name the folder of recordings")
     recording = Path(folder) / "human_full_body.npz"
-    mounted = mount(recording, LEGS, tmp_path)
-    assert mounted.left == {}
-    knees = knees_deg(recording, mounted.overrides)
+    aligned = align(recording, LEGS, tmp_path)
+    assert aligned.left == {}
+    knees = knees_deg(recording, aligned.overrides)
     assert knees.min() > -10.0
     assert (knees.max(axis=0) > 90.0).all()
     # by the zero pose alone they would bend the wrong way, where the robot's stay at their end
@@ -58,7 +58,7 @@ def test_a_recording_without_a_zero_pose_leaves_all_to_it(tmp_path: Path) -> Non
         arrays[f"{name}_gyr"] = random.standard_normal((600, 3)) * 2.0
     path = tmp_path / "restless.npz"
     np.savez(path, **arrays)
-    mounted = mount(path, LEGS, tmp_path)
-    assert mounted.overrides == []
-    assert set(mounted.left) == set(LEGS.segment_names)
-    assert "stood still" in mounted.left["pelvis"]
+    aligned = align(path, LEGS, tmp_path)
+    assert aligned.overrides == []
+    assert set(aligned.left) == set(LEGS.segment_names)
+    assert "stood still" in aligned.left["pelvis"]

@@ -1,4 +1,4 @@
-"""The joints' angles over a mounting's recording, for a person to judge whether they are plausible."""
+"""The joints' angles over an alignment's recording, for a person to judge whether they are plausible."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from common.quaternion import IDENTITY, Array
 from common.skeleton import Skeleton
 from deploy.report.output import writing
-from master.calibrate.mounting import Mounting, posture
+from master.calibrate.alignment import SuitAlignment, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import NodeRecording
 from master.joint_angles.decomposition import JointAngles
@@ -19,7 +19,7 @@ _PICTURE_HZ = 20.0
 
 
 def solved_angles(
-    recordings: Mapping[str, NodeRecording], skeleton: Skeleton, found: Mounting, at_hz: float
+    recordings: Mapping[str, NodeRecording], skeleton: Skeleton, found: SuitAlignment, at_hz: float
 ) -> tuple[Array, Array]:
     """Times (K,) s and joint angles (K, J) rad over a recording; NaN for joints that need a missing node."""
     suit = orient(recordings, list(found.nodes))
@@ -37,7 +37,7 @@ def solved_angles(
 
 
 def draw_angles(
-    recordings: Mapping[str, NodeRecording], skeleton: Skeleton, found: Mounting, path: Path
+    recordings: Mapping[str, NodeRecording], skeleton: Skeleton, found: SuitAlignment, path: Path
 ) -> None:
     """Write the PNG: a row a joint, its limits dashed, the zero pose shaded."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -4,7 +4,7 @@ import pytest
 from common.quaternion import Array, conjugate, from_rotation_vector, rotate
 from master.calibrate.carried import axes_text, signed_permutations
 from master.calibrate.magnetic import MagneticOptions, calibrate_magnetic
-from master.calibrate.magnetic_axes import axes_matrix
+from master.calibrate.magnetometer_axes import axes_matrix
 from master.calibrate.recording import NodeRecording, RecordingError
 from tests.master.calibrate.test_carried import RATE_HZ, turning
 

@@ -1,4 +1,4 @@
-"""The mounting at the rim: readings as the nodes' files calibrate them, and what is written back to them."""
+"""The nodes' files around an alignment: readings calibrated by them, and the alignment written to them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from common.config.sensor_calibration import Made, NodeCalibration
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.skeleton.full_body import RECORDED_AS
-from master.calibrate.mounting import Mounting
+from master.calibrate.alignment import SuitAlignment
 from master.calibrate.node_file import write_calibration
 from master.calibrate.recording import NodeRecording, RecordingError
 
@@ -69,10 +69,10 @@ def calibrated(recordings: Mapping[str, NodeRecording], folder: Path) -> dict[st
     return out
 
 
-def write_mounting(mounting: Mounting, recording: Path, folder: Path, day: date) -> dict[str, Path]:
-    """Write each node's mounting to its file; other parts of the files stay. Returns the files by node."""
+def write_alignment(alignment: SuitAlignment, recording: Path, folder: Path, day: date) -> dict[str, Path]:
+    """Write each node's alignment to its file; other parts of the files stay. Returns the files by node."""
     written = {}
-    for name, node in mounting.nodes.items():
+    for name, node in alignment.nodes.items():
         made = Made(
             date=day,
             recording=recording.name,
@@ -81,7 +81,7 @@ def write_mounting(mounting: Mounting, recording: Path, folder: Path, day: date)
             sigma=[[min(node.sigma_rad, math.pi)]],
         )
         written[name] = node_file(folder, name)
-        write_calibration(written[name], {"mounting": (node.q_sensor_from_segment, made)})
+        write_calibration(written[name], {"alignment": (node.q_sensor_from_segment, made)})
     return written
 
 

@@ -1,4 +1,4 @@
-"""A recorded person's sensors sit askew: the demo mounts them first, from the recording itself."""
+"""A recorded person's sensors sit askew: the demo aligns them first, from the recording itself."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from common.skeleton import Skeleton
 
 
 @dataclass(frozen=True, slots=True)
-class Mounted:
-    """What a recording's mounting brings about."""
+class RecordedAlignment:
+    """What the master needs to know of how a recording's sensors sit."""
 
     overrides: list[str]
     """Of the master's file: the calibration of each node that the motion told of."""
@@ -19,23 +19,23 @@ class Mounted:
     """The other nodes, and why; the zero pose alone must do for them."""
 
 
-def mount(recording: Path, skeleton: Skeleton, folder: Path) -> Mounted:
+def align(recording: Path, skeleton: Skeleton, folder: Path) -> RecordedAlignment:
     """Find how the sensors of a full-body recording sit, and write a file a node into `folder`.
 
     A segment that was not recorded goes by the one it hangs on, as in the replay: a flat, stiff hand.
     Where nothing can be said, as of a recording without a zero pose, every node is among the `left`.
     Raises RecordingError for a file that is none.
     """
+    from master.calibrate.alignment import find_alignment
+    from master.calibrate.alignment_files import of_profile, write_alignment
     from master.calibrate.hinge import PoorMotionError
-    from master.calibrate.mounting import find_mounting
-    from master.calibrate.mounting_files import of_profile, write_mounting
     from master.calibrate.recording import load_recordings
 
     try:
-        found = find_mounting(of_profile(load_recordings(recording), skeleton), skeleton)
+        found = find_alignment(of_profile(load_recordings(recording), skeleton), skeleton)
     except PoorMotionError as error:
-        return Mounted([], dict.fromkeys(skeleton.segment_names, str(error)))
-    files = write_mounting(found, recording, folder, date.today())
+        return RecordedAlignment([], dict.fromkeys(skeleton.segment_names, str(error)))
+    files = write_alignment(found, recording, folder, date.today())
     overrides, left = [], dict(found.refused)
     for name in skeleton.segment_names:
         source = _recorded(name, skeleton, {*files, *left})
@@ -43,7 +43,7 @@ def mount(recording: Path, skeleton: Skeleton, folder: Path) -> Mounted:
             overrides.append(f'nodes.{name}.calibration="{files[source].resolve()}"')
         elif name not in left:
             left[name] = left.get(source, "nobody recorded it")
-    return Mounted(overrides, left)
+    return RecordedAlignment(overrides, left)
 
 
 def _recorded(name: str, skeleton: Skeleton, known: set[str]) -> str:
