@@ -176,20 +176,15 @@ def demo(
     Example: `tandem demo --profile hand --seconds 20 --report report.json --plots fingers.png`
     """
     from deploy.experiments.demo.draw_curves import as_png
-    from deploy.experiments.demo.run import DemoOptions, run_demo
+    from deploy.experiments.demo.options import DemoOptions
+    from deploy.experiments.demo.run import run_demo
     from deploy.experiments.demo.view import print_report
 
     console = Console()
     options = DemoOptions(
         profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
-        strategy=strategy, filter=filter_, seed=seed, servos=servos, camera=camera,
+        strategy=strategy, filter=filter_, seed=seed, robots=robots, servos=servos, camera=camera,
     )  # fmt: skip
-
-    if robots > 1:
-        from deploy.experiments.demo.many import show_many
-
-        run_until_stopped(lambda stop: show_many(options, robots, stop, console, report))
-        return
 
     async def tell(stop: asyncio.Event) -> None:
         result = await run_demo(options, stop, console)

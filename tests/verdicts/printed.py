@@ -31,13 +31,10 @@ def printed(make: Make) -> set[tuple[str, str]]:
         *(("demo", target.name) for targets in BY_PROFILE.values() for target in targets),
         *(
             ("demo", words)
-            for words in texts("deploy/experiments/demo/report.py", "make_report", _is_problem)
+            for file, function in (("report", "_problems"), ("robots", "robot_problems"))
+            for words in texts(f"deploy/experiments/demo/{file}.py", function, _is_problem)
         ),
         *(("demo", words) for words in texts("deploy/harness/operator.py", "gives_up", _is_return)),
-        *(
-            ("demo --robots", words)
-            for words in texts("deploy/experiments/demo/many_report.py", "make_many_report", _is_problem)
-        ),
         *(("bench", target.name) for target in BENCH),
         *(("soak", name) for name in soak_names(make)),
         *(("trial", limit.words) for limit in LIMITS),

@@ -20,7 +20,7 @@ SIDES = ("left_", "right_")
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class JointCurves:
     """Angles and angular velocities on the grid, (K, J) each; NaN where there is nothing to go by."""
 
     angle_deg: Array
@@ -28,7 +28,7 @@ class Course:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class CurveGroup:
     """Joints that belong in one plot: those of a finger, or one joint of both sides."""
 
     title: str
@@ -42,11 +42,11 @@ class Curves:
 
     time_s: Array
     """(K,) from the beginning of the first stretch in `track`, every GRID_S."""
-    robot: Course
+    robot: JointCurves
     """What the encoders showed."""
-    operator: Course | None
+    operator: JointCurves | None
     """The truth; None where nobody knows it."""
-    groups: tuple[Group, ...]
+    groups: tuple[CurveGroup, ...]
 
 
 def curves(truth: TruthSeries, moved: MovedSeries, skeleton: Skeleton) -> Curves | None:
@@ -57,14 +57,14 @@ def curves(truth: TruthSeries, moved: MovedSeries, skeleton: Skeleton) -> Curves
     begin_ns, end_ns = int(tracked_ns.min()), int(tracked_ns.max())
     time_s = np.arange(0.0, to_s(end_ns - begin_ns), GRID_S)
     known = moved.tracking & moved.valid.all(axis=1)
-    robot = _course(time_s, moved.encoder_ns[known] - begin_ns, moved.position_rad[known])
+    robot = _on_grid(time_s, moved.encoder_ns[known] - begin_ns, moved.position_rad[known])
     operator = None
     if len(truth.sampled_ns) > 1:
-        operator = _course(time_s, truth.sampled_ns - begin_ns, truth.position_rad)
+        operator = _on_grid(time_s, truth.sampled_ns - begin_ns, truth.position_rad)
     return Curves(time_s, robot, operator, groups(skeleton))
 
 
-def groups(skeleton: Skeleton) -> tuple[Group, ...]:
+def groups(skeleton: Skeleton) -> tuple[CurveGroup, ...]:
     """The joints of each synergy together; without synergies, those that differ only by their side."""
     names = skeleton.joint_names
     together: dict[str, list[str]] = {s.name: list(s.drives) for s in skeleton.synergies}
@@ -73,7 +73,7 @@ def groups(skeleton: Skeleton) -> tuple[Group, ...]:
             side = next((side for side in SIDES if name.startswith(side)), "")
             together.setdefault(name.removeprefix(side), []).append(name)
     return tuple(
-        Group(
+        CurveGroup(
             title=title.replace("_", " "),
             joints=tuple(names.index(member) for member in members),
             labels=tuple(_label(member, title) for member in members),
@@ -88,7 +88,7 @@ def _label(member: str, title: str) -> str:
     return rest or member
 
 
-def _course(time_s: Array, at_ns: Nanoseconds, position_rad: Array) -> Course:
+def _on_grid(time_s: Array, at_ns: Nanoseconds, position_rad: Array) -> JointCurves:
     """On the grid; velocities through the filter that roughness is judged by, as encoders have steps."""
     order = np.argsort(at_ns, kind="stable")
     at_s, position_deg = to_s(1) * at_ns[order], np.degrees(position_rad[order])
@@ -98,4 +98,4 @@ def _course(time_s: Array, at_ns: Nanoseconds, position_rad: Array) -> Course:
     in_gap = at_s[after] - at_s[after - 1] > GAP_S
     beyond = (time_s < at_s[0] - GAP_S) | (time_s > at_s[-1] + GAP_S)
     angle[in_gap | beyond] = rate[in_gap | beyond] = np.nan
-    return Course(angle, np.asarray(rate))
+    return JointCurves(angle, np.asarray(rate))

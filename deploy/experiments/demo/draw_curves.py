@@ -1,48 +1,17 @@
-"""The curves of a run for a person: in the terminal, and as a PNG."""
+"""The curves of a run as a PNG."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Group as Lines
-from rich.console import RenderableType
-from rich.table import Table
-from rich.text import Text
-
 from common.quaternion import Array
-from deploy.experiments.demo.braille import COLOURS, plot
-from deploy.experiments.demo.curves import Curves, Group
-from deploy.measure.roughness import GRID_S
+from deploy.experiments.demo.curves import CurveGroup, Curves
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MOST_GROUPS = 6
-"""A robot with more of them would push the verdicts off the screen: a PNG shows those."""
-NEWEST_S = 15.0
-"""The terminal shows the end of a longer run."""
-_COLUMNS, _ROWS = 31, 5
 _PNG_DPI = 110
-
-
-def in_terminal(drawn: Curves) -> RenderableType | None:
-    """What the encoders showed, a row a group: angles, and angular velocities; 80 columns wide."""
-    if len(drawn.groups) > MOST_GROUPS:
-        return None
-    rows = slice(-round(NEWEST_S / GRID_S), None)
-    table = Table.grid(padding=(0, 2))
-    for group in drawn.groups:
-        title = Text(f"{group.title}: ", "bold")
-        for label, colour in zip(group.labels, COLOURS, strict=False):
-            title.append(f"{label} ", colour)
-        table.add_row(title, Text("angular velocity, °/s", "dim"))
-        columns = list(group.joints)
-        angle, rate = drawn.robot.angle_deg[rows][:, columns], drawn.robot.rate_deg_s[rows][:, columns]
-        table.add_row(plot(list(angle.T), _COLUMNS, _ROWS, "°"), plot(list(rate.T), _COLUMNS, _ROWS, ""))
-    time_s = drawn.time_s[rows]
-    head = f"angle and angular velocity of each joint, {time_s[0]:.1f} to {time_s[-1]:.1f} s of the run"
-    return Lines(Text(head, "italic"), table)
 
 
 def as_png(drawn: Curves, path: Path) -> None:
@@ -68,7 +37,7 @@ def as_png(drawn: Curves, path: Path) -> None:
     figure.savefig(path, format="png", dpi=_PNG_DPI)
 
 
-def _draw(place: Axes, time_s: Array, robot: Array, operator: Array | None, group: Group) -> None:
+def _draw(place: Axes, time_s: Array, robot: Array, operator: Array | None, group: CurveGroup) -> None:
     for k, (joint, label) in enumerate(zip(group.joints, group.labels, strict=True)):
         place.plot(time_s, robot[:, joint], f"C{k}", linewidth=1.2, label=label)
         if operator is not None:

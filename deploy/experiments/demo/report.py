@@ -1,4 +1,4 @@
-"""What a demo found, as one plain tree for machines and tables."""
+"""What a demo found: judged figures, and one plain tree for machines and tables."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from common.skeleton.synergy import synergy_positions
 from common.wire.messages import Mask
 from deploy.examples.profiles import example
 from deploy.experiments.demo.curves import Curves, curves
+from deploy.experiments.demo.options import DemoOptions
+from deploy.experiments.demo.plain import tree_or_none, trees
+from deploy.experiments.demo.robots import robot_problems, robot_row
+from deploy.harness.observer import Observer
 from deploy.harness.rig import ROBOT, Rig
 from deploy.measure import Accuracy, Motion, SolvedSeries, TruthSeries, accuracy, motion
 from deploy.measure.baseline import MOST_S, Comparison, arrivals, compare
 from deploy.measure.estimated import LEAST_ESTIMATED
-from deploy.sim.suit.config import SuitConfig
 from slave.config import SlaveConfig
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
-
-    from deploy.experiments.demo.run import DemoOptions
 
 
 REPLAYED = (
@@ -37,20 +38,20 @@ REPLAYED = (
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """What the operator and the bare loops saw."""
+class RunNotes:
+    """What the operators and the reference loops noted during a run."""
 
     holds: list[dict[str, Any]] = field(default_factory=list)
-    """Each time the robot held by itself, as `operator.Operator.row` tells it."""
+    """Each time a robot held by itself, as `operator.Operator.row` gives it."""
     host: dict[str, Any] = field(default_factory=dict)
     """What the host itself missed; {} where it was not measured."""
     problem: str = ""
-    """Why the operator gave up, empty where he did not."""
+    """Why an operator gave up; empty where none did."""
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
-    """Judged figures, and the JSON tree made of them."""
+class DemoReport:
+    """The judged figures of the first robot, and the JSON tree of all."""
 
     accuracy: Accuracy
     motion: Motion | None
@@ -59,54 +60,79 @@ class Report:
     curves: Curves | None
     """What to draw; None where the robot never tracked."""
     tree: dict[str, Any]
-    problems: list[str] = field(default_factory=list)
+    problems: list[str]
     """Why the run counts as failed, empty where it does not."""
 
 
 def make_report(
-    options: DemoOptions, rig: Rig, statuses: dict[str, int | None], seen: Seen | None = None
-) -> Report:
+    options: DemoOptions, rig: Rig, statuses: dict[str, int | None], notes: RunNotes | None = None
+) -> DemoReport:
     """Judge a finished run from what was observed and what the processes counted."""
-    observer, children = rig.observer, rig.children.values()
-    seen = seen or Seen()
-    names = observer.trace.joint_names
-    skeleton = load_skeleton(options.profile)
-    truth, solved, moved = observer.trace.truth(), observer.trace.solved(), observer.trace.moved()
-    solved_right = accuracy(truth, solved, names)
-    moved_right = motion(truth, moved, names)
+    notes = notes or RunNotes()
+    observer, trace, master = rig.observer, rig.observer.trace, rig.children["master"].metrics(MasterMetrics)
+    truth, solved, moved = trace.truth(), trace.solved(), trace.moved()
+    solved_right = accuracy(truth, solved, trace.joint_names)
+    moved_right = motion(truth, moved, trace.joint_names)
     slave_config = load_config(example("slave", options.profile), SlaveConfig)
     accepted = arrivals(observer.commands, observer.states)
     compared = compare(truth, moved, accepted, slave_config) if moved_right else None
-    by_role = {child.role: child for child in children}
-    master = by_role["master"].metrics(MasterMetrics)
-    slave = by_role["slave"].metrics(SlaveMetrics)
-    of_robot = master.robots.get(ROBOT) if master else None
-    problems = [f"{role} ended with status {status}" for role, status in statuses.items() if status != 0]
-    problems += [
-        f"{role} left no figures" for role, one in (("master", master), ("slave", slave)) if one is None
-    ]
-    if slave is not None and not slave.guard.received:
-        problems.append("no command reached the robot: nothing below was judged")
-    if not observer.commands:
-        problems.append("no command was observed: nothing below was judged")
-    if "track" not in observer.guards_seen:
-        problems.append("the robot never reached track")
-    if seen.problem:
-        problems.append(seen.problem)
+    skeleton = load_skeleton(options.profile)
+    robots = {
+        robot: robot_row(one, rig.children[slave], truth)
+        for slave, (robot, one) in zip(rig.slaves, rig.observers.items(), strict=True)
+    }
+    problems = _problems(statuses, master, observer, robots)
+    problems += [notes.problem] if notes.problem else []
     tree = {
-        "options": {
-            "profile": options.profile,
-            "seconds": options.seconds,
-            "transport": options.transport,
-            "motion": _what_moved(options),
-            "strategy": options.strategy,
-            "filter": options.filter,
-            "seed": options.seed,
-            "servos": options.servos,
-        },
+        "options": options.tree(),
+        "host": notes.host,
+        "holds": notes.holds,
+        **_of_processes(rig, master),
+        **_motion_tree(moved_right, compared),
+        **_accuracy_tree(solved_right),
+        "synergies": _synergies(truth, solved, skeleton),
+        "one_way_plus_lag_ms": _answers_within(
+            rig.children[rig.slaves[0]].metrics(SlaveMetrics), moved_right
+        ),
+        "encoders_read": dict(moved_right.read) if moved_right else {},
+        # the newest published while it tracked: at its end nobody is left to see anything
+        "video": tree_or_none(observer.video),
+        "guards_seen": observer.guards_seen,
+        "robots": robots,
+        "exit_status": statuses,
+        "problems": problems,
+    }
+    return DemoReport(solved_right, moved_right, compared, curves(truth, moved, skeleton), tree, problems)
+
+
+def _problems(
+    statuses: Mapping[str, int | None],
+    master: MasterMetrics | None,
+    observer: Observer,
+    robots: Mapping[str, Mapping[str, Any]],
+) -> list[str]:
+    """Why the run counts as failed."""
+    problems = [f"{name} ended with status {status}" for name, status in statuses.items() if status != 0]
+    if master is None:
+        problems.append("the master left no metrics")
+    if not observer.commands:
+        problems.append("no command was observed: nothing was judged")
+    for robot, row in robots.items():
+        problems += robot_problems(robot, row)
+    return problems
+
+
+def _first_slave(rig: Rig) -> SlaveMetrics | None:
+    return rig.children[rig.slaves[0]].metrics(SlaveMetrics)
+
+
+def _of_processes(rig: Rig, master: MasterMetrics | None) -> dict[str, Any]:
+    """What the processes counted; of several robots the first one's."""
+    slave = _first_slave(rig)
+    of_robot = master.robots.get(ROBOT) if master else None
+    return {
         "ticks": tree_or_none(master and master.ticks),
-        "host": seen.host,
-        "holds": seen.holds,
+        "slave_ticks": tree_or_none(slave and slave.ticks),
         "commands": _commands(of_robot, slave),
         "states_missing": of_robot.robot.missing if of_robot else None,
         "stages_ms": trees(slave.stages_ms if slave else {}),
@@ -114,51 +140,13 @@ def make_report(
         "end_to_end_ms": tree_or_none(slave and slave.end_to_end_ms),
         "one_way_ms": _one_way(slave),
         "round_trip_ms": tree_or_none(of_robot and of_robot.round_trip_ms),
-        "one_way_plus_lag_ms": _answers_within(slave, moved_right),
-        "motion_lag_ms": moved_right.lag_ms if moved_right else None,
-        "motion": _motion(moved_right),
-        "motion_by_strategy": _motion_by_strategy(compared),
-        "motion_by_strategy_is": REPLAYED,
-        "rmse_over_latest": compared.rmse_over_latest if compared else None,
-        "accuracy": _accuracy(solved_right),
-        "estimated": dict(solved_right.estimated),
-        "estimated_fast": dict(solved_right.estimated_fast),
-        "encoders_read": dict(moved_right.read) if moved_right else {},
-        "worst_joint": _worst_joint(solved_right),
-        "synergies": _synergies(truth, solved, skeleton),
-        "eta_percent": solved_right.eta_percent,
-        "table_1": _table_1(solved_right),
-        # the newest told while it tracked: at its end nobody is left to see anything
-        "video": tree_or_none(observer.video),
-        "cpu_percent": {child.role: round(child.cpu_percent, 1) for child in children},
-        "rss_mb": {child.role: round(child.rss_mb, 1) for child in children},
+        "cpu_percent": {name: round(child.cpu_percent, 1) for name, child in rig.children.items()},
+        "rss_mb": {name: round(child.rss_mb, 1) for name, child in rig.children.items()},
         "guard": tree_or_none(slave and slave.guard),
-        "guards_seen": observer.guards_seen,
         "nodes": master.nodes if master else None,
         "buses": master.buses if master else None,
         "servos": tree_or_none(slave and slave.servos),
-        "slave_ticks": tree_or_none(slave and slave.ticks),
-        "exit_status": statuses,
-        "problems": problems,
     }
-    drawn = curves(truth, moved, skeleton)
-    return Report(solved_right, moved_right, compared, drawn, tree, problems)
-
-
-def _what_moved(options: DemoOptions) -> str:
-    if options.replay is not None:
-        return options.replay.name
-    return options.motion or load_config(example("suit", options.profile), SuitConfig).motion
-
-
-def tree_or_none(metrics: DataclassInstance | None) -> dict[str, Any] | None:
-    """Plain values; None where the process did not publish them."""
-    return None if metrics is None else to_tree(metrics)
-
-
-def trees(parts: Mapping[str, DataclassInstance]) -> dict[str, Any]:
-    """Plain values of each."""
-    return {name: to_tree(part) for name, part in parts.items()}
 
 
 def _commands(of_robot: CommandedMetrics | None, slave: SlaveMetrics | None) -> dict[str, Any]:
@@ -196,6 +184,19 @@ def _answers_within(slave: SlaveMetrics | None, judged: Motion | None) -> float 
     return None if p99 is None or lag_ms is None else p99 + max(0.0, lag_ms)
 
 
+def _motion_tree(judged: Motion | None, compared: Comparison | None) -> dict[str, Any]:
+    replayed = compared.replayed if compared else {}
+    return {
+        "motion": _motion(judged),
+        "motion_lag_ms": judged.lag_ms if judged else None,
+        "motion_by_strategy": {
+            strategy: {**_motion(one), "lag_ms": one.lag_ms} for strategy, one in replayed.items()
+        },
+        "motion_by_strategy_is": REPLAYED,
+        "rmse_over_latest": compared.rmse_over_latest if compared else None,
+    }
+
+
 def _motion(judged: Motion | None) -> dict[str, float | None]:
     return {
         "rmse_deg": judged.rmse_deg if judged else None,
@@ -204,17 +205,19 @@ def _motion(judged: Motion | None) -> dict[str, float | None]:
     }
 
 
-def _motion_by_strategy(compared: Comparison | None) -> dict[str, dict[str, float | None]]:
-    if compared is None:
-        return {}
+def _accuracy_tree(judged: Accuracy) -> dict[str, Any]:
     return {
-        strategy: {**_motion(judged), "lag_ms": judged.lag_ms}
-        for strategy, judged in compared.replayed.items()
+        "accuracy": _joint_rows(judged.joints),
+        "table_1": _joint_rows(judged.fast),
+        "estimated": dict(judged.estimated),
+        "estimated_fast": dict(judged.estimated_fast),
+        "worst_joint": _worst_joint(judged),
+        "eta_percent": judged.eta_percent,
     }
 
 
-def _accuracy(judged: Accuracy) -> dict[str, dict[str, float] | None]:
-    return {name: None if row is None else asdict(row) for name, row in judged.joints.items()}
+def _joint_rows(rows: Mapping[str, DataclassInstance | None]) -> dict[str, dict[str, float] | None]:
+    return {name: None if row is None else asdict(row) for name, row in rows.items()}
 
 
 def _worst_joint(judged: Accuracy) -> dict[str, float]:
@@ -226,15 +229,12 @@ def _worst_joint(judged: Accuracy) -> dict[str, float]:
 
 
 def _synergies(truth: TruthSeries, solved: SolvedSeries, skeleton: Skeleton) -> dict[str, Any]:
-    """What a coarser robot, such as the nursing robot's hand, would be told; {} without one in the table."""
+    """What a coarser robot, such as the nursing robot's hand, would receive; {} without one in the table."""
     if not skeleton.synergies:
         return {}
     position_rad = synergy_positions(skeleton, solved.position_rad)
     whole: Mask = np.repeat(solved.valid.all(axis=1, keepdims=True), position_rad.shape[1], axis=1)
-    told = SolvedSeries(solved.tick, position_rad, whole)
+    reduced = SolvedSeries(solved.tick, position_rad, whole)
     true = TruthSeries(truth.tick, truth.sampled_ns, synergy_positions(skeleton, truth.position_rad))
-    return _accuracy(accuracy(true, told, [synergy.name for synergy in skeleton.synergies]))
-
-
-def _table_1(judged: Accuracy) -> dict[str, dict[str, float] | None]:
-    return {name: None if row is None else asdict(row) for name, row in judged.fast.items()}
+    names = [synergy.name for synergy in skeleton.synergies]
+    return _joint_rows(accuracy(true, reduced, names).joints)

@@ -1,73 +1,32 @@
-"""The story of one demo: start, wait, engage, watch, disengage, stop, judge."""
+"""The story of one demo: start, wait, engage, follow, disengage, stop, judge. Open this file first."""
 
 from __future__ import annotations
 
 import asyncio
 import tempfile
 from contextlib import AsyncExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from rich.console import Console
 from rich.live import Live
 
-from common.clock import monotonic_ns
-from common.config.load import load_config
+from common.clock import monotonic_ns, to_s
 from common.errors import TandemError
 from common.skeleton import load_skeleton
-from deploy.examples.profiles import NURSING, example
 from deploy.experiments.demo.alignment import align
 from deploy.experiments.demo.operators import DemoOperators
-from deploy.experiments.demo.report import Report, Seen, make_report
+from deploy.experiments.demo.options import DemoOptions
+from deploy.experiments.demo.report import DemoReport, RunNotes, make_report
 from deploy.experiments.demo.view import draw
 from deploy.harness.host import Host, watch_host
 from deploy.harness.rig import Rig, open_rig
 from deploy.harness.start import start_all
-from deploy.sim.suit.config import SuitConfig
-from master.config import MasterConfig
-from slave.config import SlaveConfig
 
-START_S = 30.0
-"""Processes up, filters settled, clock trusted, lease held."""
+START_S, START_EACH_S = 30.0, 2.0
+"""How long a demo may take to start, and so much more for each robot: they share this machine's cores."""
 
 
-@dataclass(frozen=True, slots=True)
-class DemoOptions:
-    """What the command line chose."""
-
-    profile: str = NURSING
-    seconds: float = 20.0
-    transport: str = "tcp"
-    replay: Path | None = None
-    motion: str | None = None
-    """None: the one in the profile's example file."""
-    strategy: str = "predict"
-    filter: str = "vqf"
-    seed: int = 1
-    servos: Literal["mujoco", "canopen"] = "mujoco"
-    """`canopen`: simulated drives in a process of their own, on two CAN buses."""
-    camera: bool = True
-    """Whether the robot shows what it sees."""
-
-    def overrides(self) -> dict[str, list[str]]:
-        """What it changes in the processes' files."""
-        suit = [f"seed={self.seed}"]
-        if self.motion is not None:
-            suit.append(f'motion="{self.motion}"')
-        # simulated and recorded operators begin in the zero pose: zeroed there, as the paper's reference was
-        master = [f'estimation.filter="{self.filter}"', "estimation.zero_pose_s=1.0"]
-        if self.replay is not None:
-            suit.append(f'replay="{self.replay.resolve()}"')
-        slave = [f'track.strategy="{self.strategy}"', f'camera.source="{"robot" if self.camera else "off"}"']
-        overrides = {"slave": slave, "suit": suit, "master": master}
-        if self.servos == "canopen":
-            slave.append('servos.backend="canopen"')
-            overrides["drives"] = []
-        return overrides
-
-
-async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
+async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) -> DemoReport:
     """Run it and judge it. Raises TandemError when a process fails or does not become ready."""
     try:
         return await _story(options, stop, console)
@@ -78,32 +37,25 @@ async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) 
         raise
 
 
-def check(options: DemoOptions) -> None:
-    """Read the files as the processes will. Raises ConfigError for what they would refuse."""
-    overrides = options.overrides()
-    load_config(example("suit", options.profile), SuitConfig, overrides["suit"])
-    load_config(example("slave", options.profile), SlaveConfig, overrides["slave"])
-    load_config(example("master", options.profile), MasterConfig, overrides["master"])
-
-
-async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> Report:
-    check(options)
+async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> DemoReport:
+    options.check()
     async with AsyncExitStack() as stack:
         overrides = options.overrides()
         if options.replay is not None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-alignment-"))
             overrides["master"] += await _align(options, options.replay, Path(folder), console)
         host = await stack.enter_async_context(watch_host())
-        rig = await stack.enter_async_context(open_rig(options.transport, overrides, options.profile))
+        rigging = open_rig(options.transport, overrides, options.profile, options.robots)
+        rig = await stack.enter_async_context(rigging)
         with Live(console=console, refresh_per_second=4, transient=True) as live:
             show = _Show(rig, host, stop, live)
-            await start_all(rig, START_S, show.look)
+            await start_all(rig, START_S + START_EACH_S * options.robots, show.look)
             operators = DemoOperators(rig, host, show.look, lambda line: console.print(line, style="yellow"))
             await operators.follow(options.seconds, show.begin)
             if not operators.problem:
                 await operators.let_go()
-        seen = Seen(operators.rows(), host.figures(monotonic_ns()), operators.problem)
-        return make_report(options, rig, await rig.stop(), seen)
+        notes = RunNotes(operators.rows(), host.figures(monotonic_ns()), operators.problem)
+        return make_report(options, rig, await rig.stop(), notes)
 
 
 async def _align(options: DemoOptions, replay: Path, folder: Path, console: Console) -> list[str]:
@@ -135,8 +87,8 @@ class _Show:
         """Fail early, measure, and draw."""
         if self._stop.is_set():
             raise TandemError("interrupted")
+        self._rig.check()
         for child in self._rig.children.values():
-            child.check()
             child.measure()
-        elapsed_s = (monotonic_ns() - self._began_ns) / 1e9 if self._began_ns else 0.0
+        elapsed_s = to_s(monotonic_ns() - self._began_ns) if self._began_ns else 0.0
         self._live.update(draw(self._rig, self._host.missed, elapsed_s))

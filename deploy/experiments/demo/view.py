@@ -6,8 +6,9 @@ import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
-from deploy.experiments.demo.draw_curves import in_terminal
-from deploy.experiments.demo.report import Report, trees
+from deploy.experiments.demo.plain import trees
+from deploy.experiments.demo.report import DemoReport
+from deploy.experiments.demo.robots import robots_table
 from deploy.experiments.demo.targets import of_demo
 from deploy.harness.rig import Rig
 from deploy.measure.tables import (
@@ -27,7 +28,7 @@ from deploy.measure.verdict import verdict_table
 
 
 def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
-    """The live view of a running rig."""
+    """The live view of a running rig: the first robot, and of several each one's guard state."""
     observer = rig.observer
     master, slave = observer.master, observer.slave
     state = observer.state
@@ -54,11 +55,21 @@ def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
     words = [f"{name} {value:.0f}" for name, value in usage.items()]
     if video:
         words.append(video.fault or f"video {video.fps:.0f} Hz, {video.kb_s:.0f} kB/s")
-    return Group(view, Text("   ".join(words), "dim"))
+    guards = [f"{robot} {one.guard}" for robot, one in rig.observers.items()]
+    each = [Text("   ".join(guards))] if len(guards) > 1 else []
+    return Group(view, *each, Text("   ".join(words), "dim"))
 
 
-def print_report(report: Report, console: Console) -> None:
-    """Latency budget, accuracy beside the paper's, motion, curves, and the targets met or missed."""
+def print_report(report: DemoReport, console: Console) -> None:
+    """Of one robot all tables, and the targets met or missed; of several a row each."""
+    if len(report.tree["robots"]) > 1:
+        console.print(robots_table(report.tree))
+    else:
+        _print_tables(report, console)
+
+
+def _print_tables(report: DemoReport, console: Console) -> None:
+    """Latency budget, accuracy beside the paper's, motion, and the targets met or missed."""
     tree = report.tree
     console.print(latency_table(tree["stages_ms"], tree["end_to_end_ms"], tree["one_way_ms"]))
     if tree["video"]:
@@ -73,9 +84,6 @@ def print_report(report: Report, console: Console) -> None:
         console.print(synergy_table(tree["synergies"]))
     console.print(ticks_text({"master": tree["ticks"], "robot": tree["slave_ticks"]}, tree["host"]))
     console.print(holds_text(tree["holds"]))
-    shown = None if report.curves is None else in_terminal(report.curves)
-    if shown is not None:
-        console.print(shown)
     options = tree["options"]
     targets = of_demo(options["profile"], options["servos"])
     console.print(verdict_table("targets", judge_targets(tree, targets)))

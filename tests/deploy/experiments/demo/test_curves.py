@@ -1,19 +1,15 @@
-"""A run's curves: what is computed, what a terminal shows, and the picture."""
+"""A run's curves: what is computed, and the picture."""
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
-from rich.text import Text
 
 from common.skeleton import load_skeleton
-from deploy.experiments.demo.braille import plot
 from deploy.experiments.demo.curves import Curves, curves, groups
-from deploy.experiments.demo.draw_curves import MOST_GROUPS, as_png, in_terminal
+from deploy.experiments.demo.draw_curves import as_png
 from deploy.measure import MovedSeries, TruthSeries
 from deploy.measure.trace import Nanoseconds
 
@@ -99,30 +95,6 @@ def test_without_synergies_both_sides_of_a_joint_stand_together() -> None:
     assert sum(len(g.joints) for g in body) == 25
 
 
-def shown(drawn: Curves) -> str:
-    out = io.StringIO()
-    found = in_terminal(drawn)
-    assert found is not None
-    Console(file=out, width=80, color_system=None).print(found)
-    return out.getvalue()
-
-
-def test_the_terminal_shows_every_finger_with_its_range_in_80_columns() -> None:
-    text = shown(known())
-    assert max(len(line.rstrip()) for line in text.splitlines()) <= 80
-    assert len(text.splitlines()) <= 40
-    for finger in ("thumb: mpj ipj", "index: mpj pipj dipj", "little: mpj pipj dipj"):
-        assert f"right {finger}" in text
-    assert "34°" in text  # 0.6 rad
-    assert text.count("angular velocity, °/s") == 5
-
-
-def test_a_robot_of_many_groups_is_left_to_the_picture() -> None:
-    drawn = known()
-    many = Curves(drawn.time_s, drawn.robot, drawn.operator, drawn.groups[:1] * (MOST_GROUPS + 1))
-    assert in_terminal(many) is None
-
-
 @pytest.mark.parametrize("with_truth", [True, False])
 def test_the_picture_is_a_png_of_a_row_a_finger(tmp_path: Path, with_truth: bool) -> None:
     from matplotlib.image import imread
@@ -134,48 +106,3 @@ def test_the_picture_is_a_png_of_a_row_a_finger(tmp_path: Path, with_truth: bool
     assert picture.shape[0] > 1000
     assert picture.shape[1] > 1000
     assert picture.std() > 0.05
-
-
-def dots(text: Text) -> list[list[int]]:
-    """The bits of each line's characters behind the label."""
-    return [[ord(c) - 0x2800 for c in line[7:]] for line in text.plain.split("\n")]
-
-
-def test_a_rising_line_goes_from_the_lower_left_to_the_upper_right_dot() -> None:
-    found = dots(plot([np.linspace(0.0, 100.0, 400)], columns=8, rows=4, unit="°"))
-    assert found[3][0] & 0x40
-    assert found[0][7] & 0x08
-    assert found[0][0] == 0
-    assert found[3][7] == 0
-    # unbroken: every column of characters has dots
-    assert all(any(row[c] for row in found) for c in range(8))
-
-
-def test_a_flat_line_is_level_and_no_values_are_no_dots() -> None:
-    flat = dots(plot([np.full(100, 7.0)], columns=6, rows=3, unit="°"))
-    assert sum(any(row) for row in flat) == 1
-    assert not any(map(any, dots(plot([np.full(100, np.nan)], columns=6, rows=3, unit="°"))))
-
-
-def test_a_gap_stays_empty_and_colours_tell_the_curves_apart() -> None:
-    values = np.sin(np.linspace(0.0, 6.0, 300))
-    values[100:200] = np.nan
-    text = plot([values, values + 5.0], columns=30, rows=4, unit="")
-    assert not any(row[c] for row in dots(text) for c in range(11, 19))
-    assert {span.style for span in text.spans} >= {"cyan", "magenta"}
-
-
-def test_what_comes_after_a_gap_is_not_joined_to_what_was_before() -> None:
-    step = np.r_[np.zeros(100), np.full(100, np.nan), np.full(100, 50.0)]
-    found = dots(plot([step], columns=30, rows=4, unit=""))
-    assert not any(any(row) for row in found[1:3])
-    joined = dots(plot([np.r_[np.zeros(150), np.full(150, 50.0)]], columns=30, rows=4, unit=""))
-    assert all(any(row) for row in joined)
-
-
-def test_the_extremes_are_written_and_zero_has_no_sign() -> None:
-    lines = plot([np.linspace(-0.4, 123.4, 50)], columns=5, rows=3, unit="°").plain.split("\n")
-    assert (lines[0][:7], lines[2][:7]) == ("  123° ", "    0° ")
-    small = plot([np.linspace(-0.01, 2.5, 50)], columns=5, rows=3, unit="°").plain
-    assert "2.5°" in small
-    assert " 0.0°" in small

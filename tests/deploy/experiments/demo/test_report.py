@@ -16,8 +16,8 @@ from common.metrics.parts import Summary, Ticks
 from common.metrics.slave import SlaveMetrics
 from common.wire.messages import Action
 from deploy.experiments.bench.targets import BENCH
-from deploy.experiments.demo.report import Report, Seen, make_report
-from deploy.experiments.demo.run import DemoOptions
+from deploy.experiments.demo.options import DemoOptions
+from deploy.experiments.demo.report import DemoReport, RunNotes, make_report
 from deploy.experiments.demo.targets import BY_PROFILE, DEMO, of_demo
 from deploy.experiments.demo.view import print_report
 from deploy.harness.rig import Rig
@@ -67,7 +67,10 @@ def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
         trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen, video=None
     )
     children = {role: FakeChild(role, told_by(run.slave)) for role in ENDED_WELL}
-    return cast(Rig, SimpleNamespace(observer=observer, children=children))
+    observers = {"robot-1": observer}
+    return cast(
+        Rig, SimpleNamespace(observer=observer, observers=observers, slaves=("slave",), children=children)
+    )
 
 
 def followed(profile: str, seconds: float) -> VirtualRun:
@@ -88,17 +91,17 @@ def tracked() -> VirtualRun:
 
 
 @pytest.fixture(scope="module")
-def report(tracked: VirtualRun) -> Report:
+def report(tracked: VirtualRun) -> DemoReport:
     return make_report(DemoOptions(), rig(tracked, ["hold", "align", "track"]), ENDED_WELL)
 
 
-def text(report: Report) -> str:
+def text(report: DemoReport) -> str:
     out = io.StringIO()
     print_report(report, Console(file=out, width=80, color_system=None))
     return out.getvalue()
 
 
-def test_a_good_run_has_no_problem_and_is_plain_json(report: Report) -> None:
+def test_a_good_run_has_no_problem_and_is_plain_json(report: DemoReport) -> None:
     assert report.problems == []
     assert "the robot never held by itself" in text(report)
     assert "the host itself was not measured" in " ".join(text(report).split())
@@ -107,13 +110,13 @@ def test_a_good_run_has_no_problem_and_is_plain_json(report: Report) -> None:
     assert report.tree["motion_lag_ms"] == pytest.approx(predict["lag_ms"], abs=3.0)
 
 
-def test_the_replay_of_the_run_s_own_strategy_moves_as_the_run_did(report: Report) -> None:
+def test_the_replay_of_the_run_s_own_strategy_moves_as_the_run_did(report: DemoReport) -> None:
     motion, replayed = report.tree["motion"], report.tree["motion_by_strategy"]["predict"]
     for figure in ("rmse_deg", "aligned_rmse_deg", "roughness"):
         assert replayed[figure] == pytest.approx(motion[figure], rel=0.1), figure
 
 
-def test_predict_shows_a_third_of_hold_s_error_in_the_same_run(report: Report) -> None:
+def test_predict_shows_a_third_of_the_error_of_latest_in_the_same_run(report: DemoReport) -> None:
     latest = report.tree["motion_by_strategy"]["latest"]
     over_latest = report.tree["rmse_over_latest"]
     assert over_latest == pytest.approx(report.tree["motion"]["rmse_deg"] / latest["rmse_deg"])
@@ -138,13 +141,14 @@ def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualRun) -> None:
 def test_every_problem_is_named(tracked: VirtualRun) -> None:
     failed = rig(tracked, ["hold"])
     failed.observer.trace = Trace(tracked.trace.joint_names)
+    failed.observer.states = []
     cast(FakeChild, failed.children["slave"]).published = False
-    seen = Seen(problem="robot-1 held 3 times within 20 s")
-    problems = make_report(DemoOptions(), failed, {**ENDED_WELL, "slave": -9}, seen).problems
+    notes = RunNotes(problem="robot-1 held 3 times within 20 s")
+    problems = make_report(DemoOptions(), failed, {**ENDED_WELL, "slave": -9}, notes).problems
     assert problems == [
         "slave ended with status -9",
-        "slave left no figures",
-        "the robot never reached track",
+        "robot-1 left no metrics",
+        "robot-1 never reached track",
         "robot-1 held 3 times within 20 s",
     ]
 
@@ -163,7 +167,7 @@ def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: Virt
         "lasted_s": 1.7,
         "host": "the host kept its time",
     }
-    report = make_report(DemoOptions(), rig(tracked, ["track"]), ENDED_WELL, Seen([row], host))
+    report = make_report(DemoOptions(), rig(tracked, ["track"]), ENDED_WELL, RunNotes([row], host))
     assert (report.tree["holds"], report.tree["host"], report.problems) == ([row], host, [])
     shown = " ".join(text(report).split())
     assert "ticks missed: master 0 of 5, robot 0 of 5; by the host itself, of a bare loop: 40 of 90" in shown
@@ -183,7 +187,7 @@ def test_a_hand_s_report_has_its_five_joints_its_curves_and_paper_b_s_targets() 
     assert found["finger joint's RMSE, the worst (paper B)"]
     assert found["finger joint's error, the largest (paper B)"]
     shown = text(report)
-    for words in ("right_little_dipj", "as a robot's joints", "angular velocity, °/s", "(paper B)"):
+    for words in ("right_little_dipj", "as a robot's joints", "(paper B)"):
         assert words in shown
     for words in ("η", "elbow"):
         assert words not in shown
@@ -222,7 +226,7 @@ def test_a_run_in_which_no_command_reached_the_robot_failed(tracked: VirtualRun)
     child = cast(FakeChild, deaf.children["slave"])
     child.slave = replace(child.slave, guard=replace(child.slave.guard, received=0))
     assert make_report(DemoOptions(), deaf, ENDED_WELL).problems == [
-        "no command reached the robot: nothing below was judged"
+        "no command reached robot-1: it was not judged"
     ]
 
 
@@ -230,7 +234,7 @@ def test_a_run_in_which_no_command_was_observed_failed(tracked: VirtualRun) -> N
     deaf = rig(tracked, ["track"])
     deaf.observer.commands = []
     assert make_report(DemoOptions(), deaf, ENDED_WELL).problems == [
-        "no command was observed: nothing below was judged"
+        "no command was observed: nothing was judged"
     ]
 
 
@@ -246,7 +250,7 @@ def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
     assert "it does not tell how soon the robot answers" in " ".join(text(report).split())
 
 
-def test_paper_b_s_60_ms_are_of_one_way_and_lag_and_fail_where_the_link_is_slow(report: Report) -> None:
+def test_paper_b_s_60_ms_are_of_one_way_and_lag_and_fail_where_the_link_is_slow(report: DemoReport) -> None:
     tree = report.tree
     lag_ms = max(0.0, tree["motion_lag_ms"])
     assert tree["one_way_plus_lag_ms"] == pytest.approx(tree["one_way_ms"]["corrected"]["p99"] + lag_ms)

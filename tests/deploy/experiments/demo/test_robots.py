@@ -1,4 +1,4 @@
-"""What a run of several robots says of each, and when it counts as failed."""
+"""What a demo of several robots reports of each, and when it counts as failed."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+import pytest
 from rich.console import Console
 
+from common.errors import TandemError
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Summary, Ticks
 from common.metrics.slave import SlaveMetrics
-from common.wire.messages import RobotState
-from deploy.experiments.demo.many_report import ManyReport, make_many_report, many_table
-from deploy.experiments.demo.report import Seen
-from deploy.experiments.demo.run import DemoOptions
+from common.wire.messages import Command, CommandStamps, RobotState
+from deploy.experiments.demo.options import DemoOptions
+from deploy.experiments.demo.report import DemoReport, RunNotes, make_report
+from deploy.experiments.demo.robots import robots_table
 from deploy.harness.rig import Rig, robot_name, slave_name
 from deploy.measure import Trace
 from tests.published import guard_metrics, master_metrics, slave_metrics
@@ -37,6 +39,9 @@ COUNTED = slave_metrics(
     end_to_end_ms=Summary(140, p99=30.5),
 )
 WELL = master_metrics()
+COMMAND = Command(
+    "robot-1", 1, 0, 0, CommandStamps(0, 0, 0, 0), True, np.ones(1, np.bool_), np.zeros(1), np.zeros(1)
+)
 
 
 def state(guard: str) -> RobotState:
@@ -50,7 +55,7 @@ def report(
     problem: str = "",
     counted_last: SlaveMetrics | None = COUNTED,
     master: MasterMetrics | None = WELL,
-) -> ManyReport:
+) -> DemoReport:
     """Of a run in which robot 1 was engaged first, and one robot was in `track` for half of the time only."""
 
     def child(counted: MasterMetrics | SlaveMetrics | None) -> SimpleNamespace:
@@ -62,7 +67,10 @@ def report(
             guards = ["hold"] * 100
         if number == 1:
             guards = ["hold"] * 50 + guards
-        return SimpleNamespace(trace=Trace(JOINTS), states=[state(guard) for guard in guards])
+        states = [state(guard) for guard in guards]
+        return SimpleNamespace(
+            trace=Trace(JOINTS), states=states, commands=[COMMAND], guards_seen=["track"], video=None
+        )
 
     numbers = range(1, ROBOTS + 1)
     slaves = [slave_name(n) for n in numbers]
@@ -72,8 +80,8 @@ def report(
     rig = SimpleNamespace(
         slaves=slaves, observers=observers, observer=observers["robot-1"], children=children
     )
-    statuses = dict.fromkeys(children, 0) | (ended or {})
-    return make_many_report(DemoOptions(), cast(Rig, rig), statuses, Seen([HELD], {}, problem))
+    statuses: dict[str, int | None] = {**dict.fromkeys(children, 0), **(ended or {})}
+    return make_report(DemoOptions(robots=ROBOTS), cast(Rig, rig), statuses, RunNotes([HELD], {}, problem))
 
 
 def test_each_robot_has_its_own_figures() -> None:
@@ -101,19 +109,28 @@ def test_a_robot_that_never_tracked_is_a_problem() -> None:
     assert report(lost_by=-2).problems == ["robot-2 never reached track"]
 
 
-def test_a_process_without_figures_and_a_robot_without_commands_are_problems() -> None:
-    assert report(counted_last=None).problems == ["robot-8 left no figures"]
+def test_a_process_without_metrics_and_a_robot_without_commands_are_problems() -> None:
+    assert report(counted_last=None).problems == ["robot-8 left no metrics"]
     deaf = replace(COUNTED, guard=replace(COUNTED.guard, received=0))
-    assert report(counted_last=deaf).problems == ["no command reached robot-8: nothing of it was judged"]
-    assert report(master=None).problems == ["the master left no figures"]
+    assert report(counted_last=deaf).problems == ["no command reached robot-8: it was not judged"]
+    assert report(master=None).problems == ["the master left no metrics"]
 
 
 def test_the_table_has_a_row_each_and_fits() -> None:
     out = io.StringIO()
-    Console(file=out, width=80).print(many_table(report(lost_by=3).tree))
+    Console(file=out, width=80).print(robots_table(report(lost_by=3).tree))
     lines = out.getvalue().splitlines()
     assert max(map(len, lines)) <= 80
     rows = {line.split()[0]: line.split()[1:] for line in lines if "robot-" in line and "%" in line}
     assert rows["robot-2"] == ["100%", "3", "4000", "12", "1.2", "30.5", "–", "–"]
     assert rows["robot-3"][0] == "50%"
     assert "robot-3 held at 2.0 s for 1.0 s: no encoder" in out.getvalue()
+
+
+def test_several_robots_have_neither_cameras_nor_priority_and_follow_the_simulated_operator() -> None:
+    slave = DemoOptions(robots=2).overrides()["slave"]
+    assert 'camera.source="off"' in slave
+    assert "process.realtime_priority=0" in slave
+    assert 'camera.source="robot"' in DemoOptions().overrides()["slave"]
+    with pytest.raises(TandemError, match="--robots 2: several robots need the simulated operator"):
+        DemoOptions(robots=2, servos="canopen").check()

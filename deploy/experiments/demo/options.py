@@ -1,0 +1,79 @@
+"""What a person may choose of a demo, and what it changes in the processes' files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from common.config.load import load_config
+from common.errors import TandemError
+from deploy.examples.profiles import NURSING, example
+from deploy.sim.suit.config import SuitConfig
+from master.config import MasterConfig
+from slave.config import SlaveConfig
+
+
+@dataclass(frozen=True, slots=True)
+class DemoOptions:
+    """What the command line chose."""
+
+    profile: str = NURSING
+    seconds: float = 20.0
+    transport: str = "tcp"
+    replay: Path | None = None
+    motion: str | None = None
+    """None: the one in the profile's example file."""
+    strategy: str = "predict"
+    filter: str = "vqf"
+    seed: int = 1
+    robots: int = 1
+    """How many robots follow the one operator; several show no pictures of their cameras."""
+    servos: Literal["mujoco", "canopen"] = "mujoco"
+    """`canopen`: simulated drives in a process of their own, on two CAN buses."""
+    camera: bool = True
+    """Whether the robot shows what it sees."""
+
+    def overrides(self) -> dict[str, list[str]]:
+        """What it changes in the processes' files."""
+        suit = [f"seed={self.seed}"]
+        if self.motion is not None:
+            suit.append(f'motion="{self.motion}"')
+        # simulated and recorded operators begin in the zero pose: zeroed there, as the paper's reference was
+        master = [f'estimation.filter="{self.filter}"', "estimation.zero_pose_s=1.0"]
+        if self.replay is not None:
+            suit.append(f'replay="{self.replay.resolve()}"')
+        camera = "robot" if self.camera and self.robots == 1 else "off"
+        slave = [f'track.strategy="{self.strategy}"', f'camera.source="{camera}"']
+        if self.robots > 1:
+            # robots have hosts of their own; here, with priority, they would starve the processes that watch
+            slave.append("process.realtime_priority=0")
+        overrides = {"slave": slave, "suit": suit, "master": master}
+        if self.servos == "canopen":
+            slave.append('servos.backend="canopen"')
+            overrides["drives"] = []
+        return overrides
+
+    def check(self) -> None:
+        """Read the files as the processes will. Raises TandemError for what cannot be run."""
+        if self.robots > 1 and (self.replay is not None or self.servos != "mujoco"):
+            expected = "the simulated operator and MuJoCo: omit --replay and --servos"
+            raise TandemError(f"--robots {self.robots}: several robots need {expected}")
+        overrides = self.overrides()
+        for role, model in (("suit", SuitConfig), ("slave", SlaveConfig), ("master", MasterConfig)):
+            load_config(example(role, self.profile), model, overrides[role])
+
+    def tree(self) -> dict[str, Any]:
+        """A report's `options`."""
+        motion = self.motion or load_config(example("suit", self.profile), SuitConfig).motion
+        return {
+            "profile": self.profile,
+            "seconds": self.seconds,
+            "transport": self.transport,
+            "motion": motion if self.replay is None else self.replay.name,
+            "strategy": self.strategy,
+            "filter": self.filter,
+            "seed": self.seed,
+            "servos": self.servos,
+            "robots": self.robots,
+        }
