@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from common.quaternion import IDENTITY, Array
 from common.skeleton import Skeleton
-from deploy.report.output import writing
+from deploy.report.plots import save_png
 from master.calibrate.alignment import SuitAlignment, posture
 from master.calibrate.oriented import orient
 from master.calibrate.recording import NodeRecording
 from master.joint_angles.decomposition import JointAngles
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _PICTURE_HZ = 20.0
 
@@ -40,25 +44,22 @@ def draw_angles(
     recordings: Mapping[str, NodeRecording], skeleton: Skeleton, found: SuitAlignment, path: Path
 ) -> None:
     """Write the PNG: a row a joint, its limits dashed, the zero pose shaded."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     if not found.nodes:
         return
     time_s, angles = solved_angles(recordings, skeleton, found, _PICTURE_HZ)
     shown = [j for j in range(len(skeleton.joints)) if np.isfinite(angles[:, j]).all()]
     if not shown:
         return
-    figure = Figure(figsize=(10.0, 1.0 + 1.1 * len(shown)), layout="constrained")
-    FigureCanvasAgg(figure)
-    for axes, j in zip(figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0], shown, strict=True):
-        joint = skeleton.joints[j]
-        axes.plot(time_s, np.degrees(angles[:, j]), linewidth=0.7)
-        for limit in (joint.lower_rad, joint.upper_rad):
-            axes.axhline(np.degrees(limit), color="k", linestyle="--", linewidth=0.6)
-        axes.axvspan(*found.zero_pose_s, color="k", alpha=0.1)
-        axes.set_ylabel(f"{joint.name} °", fontsize=7, rotation=0, ha="right")
-        axes.grid(alpha=0.3)
-    figure.axes[-1].set_xlabel("s")
-    with writing(path):
-        figure.savefig(path, dpi=100, format="png")
+
+    def draw(figure: Figure) -> None:
+        rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, j in zip(rows, shown, strict=True):
+            joint = skeleton.joints[j]
+            axes.plot(time_s, np.degrees(angles[:, j]), linewidth=0.7)
+            for limit in (joint.lower_rad, joint.upper_rad):
+                axes.axhline(np.degrees(limit), color="k", linestyle="--", linewidth=0.6)
+            axes.axvspan(*found.zero_pose_s, color="k", alpha=0.1)
+            axes.set_ylabel(f"{joint.name} °", fontsize=7, rotation=0, ha="right")
+        rows[-1].set_xlabel("s")
+
+    save_png(path, draw, 10.0, 1.0 + 1.1 * len(shown))

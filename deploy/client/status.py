@@ -28,7 +28,7 @@ from common.wire.topics import STATE, STATISTICS
 from deploy.client.answer import Answer
 from deploy.client.ask import ask
 from deploy.client.reach import ROUTER_S, Reach
-from deploy.measure.tables import GUARD_STYLE, UNKNOWN, plain_table
+from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 
 LISTEN_S = 1.5
 """Statistics come once a second."""

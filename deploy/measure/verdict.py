@@ -10,7 +10,7 @@ from enum import StrEnum
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from deploy.measure.tables import UNKNOWN, plain_table
+from deploy.report.tables import plain_table, with_unit
 
 
 class Outcome(StrEnum):
@@ -76,13 +76,6 @@ def counts(verdicts: Iterable[Verdict]) -> str:
     """How many there are of each outcome, such as `3 passed, 0 failed, 1 not judged`."""
     outcomes = [verdict.outcome for verdict in verdicts]
     return ", ".join(f"{outcomes.count(outcome)} {outcome}" for outcome in Outcome)
-
-
-def with_unit(value: float | None, unit: str = "") -> str:
-    """A value for people, with four digits and its unit; a dash where there is none."""
-    if value is None:
-        return UNKNOWN
-    return "never" if math.isinf(value) else f"{value:.4g} {unit}".rstrip()
 
 
 STYLES = {Outcome.PASSED: "green", Outcome.FAILED: "bold red", Outcome.NOT_JUDGED: "yellow"}

@@ -12,9 +12,13 @@ from rich.console import Console
 
 from common.quaternion import Array
 from deploy.calibrate.options import AsJson, ReportFile
-from deploy.report.output import in_a_folder, writing
+from deploy.report.output import in_a_folder
+from deploy.report.plots import save_png
+from deploy.report.tables import plain_table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from master.calibrate.hinge_pair import HingePair
     from master.calibrate.recording import NodeRecording
 
@@ -130,33 +134,21 @@ def as_report(pair: HingePair, angle_rad: Array, sign: float, file: Path, rate_h
 
 def draw(angle_rad: Array, deviation_rad: Array, rate_hz: float, path: Path) -> None:
     """Write the PNG: the angle over time with its standard deviation."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    time_s = np.arange(len(angle_rad)) / rate_hz
+    angle, spread = np.degrees(angle_rad), np.degrees(deviation_rad)
 
-    figure = Figure(figsize=(10.0, 3.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    time_s, angle, spread = (
-        np.arange(len(angle_rad)) / rate_hz,
-        np.degrees(angle_rad),
-        np.degrees(deviation_rad),
-    )
-    axes.fill_between(time_s, angle - spread, angle + spread, alpha=0.3)
-    axes.plot(time_s, angle, linewidth=0.8)
-    axes.set_xlabel("s")
-    axes.set_ylabel("hinge angle, °")
-    axes.grid(alpha=0.3)
-    with writing(path):
-        figure.savefig(path, dpi=110, format="png")
+    def draw_angle(figure: Figure) -> None:
+        axes = figure.subplots()
+        axes.fill_between(time_s, angle - spread, angle + spread, alpha=0.3)
+        axes.plot(time_s, angle, linewidth=0.8)
+        axes.set(xlabel="s", ylabel="hinge angle, °")
+
+    save_png(path, draw_angle, 10.0, 3.5)
 
 
 def _print(figures: dict[str, Any], console: Console) -> None:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(title=f"hinge, {figures['duration_s']:.0f} s", box=box.SIMPLE_HEAD)
-    for head in ("unit", "axis x", "y", "z", "± °", "rates alone differ °"):
-        table.add_column(head, justify="right")
+    heads = ("axis x", "y", "z", "± °", "rates alone differ °")
+    table = plain_table("unit", *heads, title=f"hinge, {figures['duration_s']:.0f} s")
     for i in (0, 1):
         axis = figures[f"axis{i + 1}"]
         table.add_row(

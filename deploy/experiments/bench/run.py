@@ -16,10 +16,10 @@ from common.wire.topics import COMMAND
 from deploy.experiments.bench.capture import capture
 from deploy.experiments.bench.link import link
 from deploy.experiments.bench.loop import RATE_HZ, loop
+from deploy.experiments.bench.table import bench_table
 from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.bench.transports import transports
 from deploy.experiments.bench.worker import BenchError, in_worker
-from deploy.measure.tables import bench_table
 from deploy.measure.target import judge_targets
 from deploy.measure.timing import total
 from deploy.measure.verdict import verdict_table

@@ -10,10 +10,11 @@ from rich.text import Text
 
 from common.metrics.slave import SlaveMetrics
 from deploy.experiments.demo.plain import tree_or_none
+from deploy.experiments.demo.tables import holds_text, ticks_text
 from deploy.harness.child import Child
 from deploy.harness.observer import Observer
 from deploy.measure import TruthSeries, motion
-from deploy.measure.tables import UNKNOWN, holds_text, plain_table, ticks_text
+from deploy.report.tables import UNKNOWN, plain_table
 
 
 def robot_row(observer: Observer, child: Child, truth: TruthSeries) -> dict[str, Any]:

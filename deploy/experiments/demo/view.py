@@ -6,23 +6,22 @@ import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
+from deploy.experiments.demo.live_view import Live, live_view
 from deploy.experiments.demo.plain import trees
 from deploy.experiments.demo.report import DemoReport
 from deploy.experiments.demo.robots import robots_table
-from deploy.experiments.demo.targets import of_demo
-from deploy.harness.rig import Rig
-from deploy.measure.tables import (
-    Live,
+from deploy.experiments.demo.tables import (
     accuracy_table,
     holds_text,
     latency_table,
-    live_view,
     motion_table,
     strategies_table,
     synergy_table,
     ticks_text,
     video_table,
 )
+from deploy.experiments.demo.targets import of_demo
+from deploy.harness.rig import Rig
 from deploy.measure.target import judge_targets
 from deploy.measure.verdict import verdict_table
 

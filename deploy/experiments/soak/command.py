@@ -56,7 +56,7 @@ def soak(
     from deploy.experiments.soak.faults import FAULTS, chosen
     from deploy.experiments.soak.files.options import SoakOptions, seconds
     from deploy.experiments.soak.judge.judge import judge_soak
-    from deploy.measure.tables import plain_table
+    from deploy.report.tables import plain_table
 
     console = Console()
     if faults == "help":

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from deploy.experiments.soak.files.events import Event
 from deploy.experiments.soak.files.options import in_words
-from deploy.measure.tables import GUARD_STYLE, UNKNOWN, plain_table
+from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 
 if TYPE_CHECKING:
     from deploy.experiments.soak.files.log import SoakLog

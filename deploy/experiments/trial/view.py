@@ -11,8 +11,8 @@ from rich.text import Text
 from deploy.experiments.trial.cell.figures import BY_NAME, printed
 from deploy.experiments.trial.report.spread import Row
 from deploy.experiments.trial.report.write import Findings
-from deploy.measure.tables import plain_table
 from deploy.measure.verdict import verdict_table
+from deploy.report.tables import plain_table
 
 SHOWN = ("one_way_p50_ms", "one_way_bound_ms", "rmse_deg", "rmse_over_latest", "roughness", "flow_s")
 

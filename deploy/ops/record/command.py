@@ -75,8 +75,8 @@ def recording(
 
     Example: `tandem recording morning.mcap --json`
     """
-    from deploy.measure.tables import UNKNOWN, plain_table
     from deploy.ops.record.contents import survey
+    from deploy.report.tables import UNKNOWN, plain_table
 
     contents = survey(file)
     if as_json:

@@ -8,7 +8,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from deploy.measure.tables import UNKNOWN, plain_table
+from deploy.report.tables import UNKNOWN, plain_table
 from deploy.sim.network.figures import Measured, WayMeasured
 from deploy.sim.network.profile import Profile, Way
 

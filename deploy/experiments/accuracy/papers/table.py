@@ -5,27 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rich import box
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from deploy.experiments.accuracy.papers.figures import Experiment, Row
-from deploy.measure.tables import UNKNOWN
 from deploy.measure.verdict import STYLES
+from deploy.report.tables import UNKNOWN, plain_table
 
 
 def experiment_table(experiment: Experiment, rows: Sequence[Row]) -> RenderableType:
     """One experiment: the paper's figure beside ours, mean and worst over seeds, and the target."""
-    table = Table(
-        title=f"{experiment.key}  {experiment.title}",
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-    )
-    table.add_column("", overflow="fold")
-    for head in ("paper", "mean", "worst", "at most", ""):
-        table.add_column(head, justify="right", no_wrap=True)
+    heads = ("paper", "mean", "worst", "at most", "")
+    table = plain_table("", *heads, title=f"{experiment.key}  {experiment.title}")
     for row in rows:
         table.add_row(
             f"{row.name}, {row.unit}" if row.unit else row.name,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -12,9 +11,11 @@ from common.quaternion import Array
 from deploy.experiments.soak.files.events import of_kind
 from deploy.experiments.soak.files.samples import Samples
 from deploy.experiments.soak.judge.evidence import SoakEvidence
+from deploy.report.plots import png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 GAP_S = 4.0
 """A curve is not drawn through a longer silence."""
@@ -40,16 +41,13 @@ FAULT_COLOURS = (
 
 def draw(seen: SoakEvidence) -> bytes:
     """A PNG of the whole soak."""
-    import matplotlib
+    return png(lambda figure: _draw(figure, seen), 13.0, 15.0, dpi=100)
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
 
+def _draw(figure: Figure, seen: SoakEvidence) -> None:
     samples = seen.samples
     unit_s, unit = (3600.0, "h") if len(samples) > 7200 else (60.0, "min")
-    figure, panels = plt.subplots(
-        5, 1, figsize=(13, 15), sharex=True, layout="constrained", height_ratios=(3, 2, 3, 2, 2)
-    )
+    panels = figure.subplots(5, 1, sharex=True, height_ratios=(3, 2, 3, 2, 2))
     _latency(panels[0], samples, unit_s)
     _wrong(panels[1], samples, unit_s)
     _of_processes(panels[2], samples, "rss_mb", "resident memory, MB", unit_s)
@@ -58,10 +56,6 @@ def draw(seen: SoakEvidence) -> bytes:
     _faults(list(panels), seen, unit_s)
     panels[-1].set_xlabel(f"time since the soak began, {unit}")
     panels[-1].set_xlim(0.0, max(1.0, float(samples.at_s[-1]) if len(samples) else 1.0) / unit_s)
-    image = io.BytesIO()
-    figure.savefig(image, format="png", dpi=100)
-    plt.close(figure)
-    return image.getvalue()
 
 
 def with_gaps(at: Array, values: Array, gap: float) -> tuple[Array, Array]:
@@ -133,11 +127,10 @@ def _faults(panels: list[Axes], seen: SoakEvidence, unit_s: float) -> None:
     for panel in panels:
         handles, labels = panel.get_legend_handles_labels()
         if handles:
-            panel.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+            panel.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         for event in faults:
             colour = colours[str(event.what["fault"])]
             panel.axvline(event.at_s / unit_s, color=colour, linewidth=0.8, alpha=0.7)
-        panel.grid(alpha=0.25)
     for window in seen.explained.faults:
         until_s = min(window.until_s, float(seen.samples.at_s[-1]) if len(seen.samples) else window.from_s)
         panels[0].axvspan(window.from_s / unit_s, until_s / unit_s, color="0.5", alpha=0.08, linewidth=0)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, Figure, printed
 from deploy.experiments.trial.cell.plan import Plan
 from deploy.experiments.trial.report.plots import Plot
 from deploy.experiments.trial.report.ranking import Ranking
 from deploy.experiments.trial.report.spread import Row, Spread
-from deploy.measure.verdict import Verdict, with_unit
+from deploy.measure.verdict import Verdict
+from deploy.report.page import render
 
 GROUPS = {
     "latency": "One way",
@@ -40,25 +39,12 @@ def as_html(
     about: dict[str, str],
 ) -> str:
     """The whole page; texts are escaped by the template."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("deploy.experiments.trial.report", "."),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {
-        "cell": _cell,
-        "spread": _range,
-        "image": _image,
-        "plain": _plain,
-        "unit": with_unit,
-    }
     expected = len(plan.cells())
     finished = sum(cell.settled for row in rows for cell in row.cells)
-    return environment.get_template("report.html.jinja").render(
+    return render(
+        "deploy.experiments.trial.report",
+        "report.html.jinja",
+        {"cell": _cell, "spread": _range, "plain": _plain},
         plan=plan,
         about=about,
         rows=rows,
@@ -122,9 +108,5 @@ def _range(row: Row, name: str) -> str:
     return "" if low == high else f"{low} … {high}"
 
 
-def _image(plot: Plot) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(plot.svg.encode("utf-8")).decode("ascii")
-
-
-def _plain(value: Any) -> str:
+def _plain(value: float) -> str:
     return f"{value:g}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,42 +9,24 @@ from typing import TYPE_CHECKING, Any
 from deploy.experiments.trial.cell.figures import BY_NAME
 from deploy.experiments.trial.cell.result import Status
 from deploy.experiments.trial.report.spread import Row
+from deploy.report.plots import BAR_COLOUR, INK, LIMIT_COLOUR, colour, svg
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Picture
+    from matplotlib.figure import Figure
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Okabe and Ito's, which people with colour-blindness tell apart."""
-BAR, HIGH, INK = "#9fb3c8", "#cf1124", "#102a43"
 MARKS = "osD^vPX*"
-STYLE: dict[Any, Any] = {
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e4e7eb",
-    "axes.axisbelow": True,
-    "axes.edgecolor": "#7b8794",
-    "axes.labelcolor": "#323f4b",
-    "xtick.color": "#52606d",
-    "ytick.color": "#52606d",
-    "legend.frameon": False,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "tandem",
-}
 
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """One picture."""
+    """One figure."""
 
     title: str
     caption: str
-    svg: str
+    image: str
 
 
 def plots(rows: Sequence[Row]) -> list[Plot]:
@@ -80,12 +61,12 @@ def _per_setup(
     def draw(axes: Axes) -> None:
         places = _places(axes, shown)
         for row, x in zip(shown, places, strict=True):
-            colour = COLOURS[strategies.index(row.setup.strategy) % len(COLOURS)]
-            axes.bar(x, row.spreads[name].median, width=0.7, color=colour, alpha=0.45, linewidth=0)
+            tint = colour(strategies.index(row.setup.strategy))
+            axes.bar(x, row.spreads[name].median, width=0.7, color=tint, alpha=0.45, linewidth=0)
             values = [value for cell in row.done if (value := cell.values.get(name)) is not None]
-            axes.plot([x] * len(values), values, "o", color=colour, markersize=4, zorder=3)
+            axes.plot([x] * len(values), values, "o", color=tint, markersize=4, zorder=3)
         if line is not None:
-            axes.axhline(line, color=HIGH, linestyle="--", linewidth=1)
+            axes.axhline(line, color=LIMIT_COLOUR, linestyle="--", linewidth=1)
         axes.set_ylabel(f"{figure.title}, {figure.unit}" if figure.unit else figure.title)
         axes.set_ylim(bottom=0)
         axes.grid(axis="x", visible=False)
@@ -109,11 +90,11 @@ def _trade(rows: Sequence[Row]) -> Plot | None:
                 x.median, y.median,
                 xerr=[[x.median - x.low], [x.high - x.median]],
                 yerr=[[y.median - y.low], [y.high - y.median]],
-                color=COLOURS[strategies.index(row.setup.strategy) % len(COLOURS)],
+                color=colour(strategies.index(row.setup.strategy)),
                 marker=MARKS[profiles.index(row.setup.profile) % len(MARKS)],
                 markersize=6, linewidth=0.8, alpha=0.85,
             )  # fmt: skip
-        axes.axvline(3.0, color=HIGH, linestyle="--", linewidth=1)
+        axes.axvline(3.0, color=LIMIT_COLOUR, linestyle="--", linewidth=1)
         axes.set_xlabel("roughness: RMS acceleration, robot over operator")
         axes.set_ylabel("RMSE at the same instant, °")
         axes.set_ylim(bottom=0)
@@ -136,25 +117,25 @@ def _latency(rows: Sequence[Row]) -> Plot | None:
     profiles = _names(row.setup.profile for row in shown)
     groups = [[row for row in shown if row.setup.profile == profile] for profile in profiles]
 
-    def draw_all(picture: Picture) -> None:
+    def draw_all(figure: Figure) -> None:
         sizes = [len(group) + 1.5 for group in groups]
-        grid = picture.subplots(1, len(groups), squeeze=False, width_ratios=sizes)[0]
+        grid = figure.subplots(1, len(groups), squeeze=False, width_ratios=sizes)[0]
         for group, axes in zip(groups, grid, strict=True):
             for row, x in zip(group, _places(axes, group), strict=True):
                 _one_way(axes, row, x)
             axes.set_ylim(bottom=0)
             axes.grid(axis="x", visible=False)
         grid[0].set_ylabel("one way, ms")
-        grid[0].bar(0, 0, color=BAR, label="p50 by the measured offset; whisker: its bound")
-        grid[0].plot([], [], "_", color=HIGH, markeredgewidth=1.6, label="p99")
+        grid[0].bar(0, 0, color=BAR_COLOUR, label="p50 by the measured offset; whisker: its bound")
+        grid[0].plot([], [], "_", color=LIMIT_COLOUR, markeredgewidth=1.6, label="p99")
         grid[0].plot([], [], "o", color=INK, markersize=4, label="true p50, by the shared clock")
-        picture.legend(loc="outside lower left", ncols=3, fontsize=8)
+        figure.legend(loc="outside lower left", ncols=3)
 
     size = (max(6.5, 1.0 + 0.32 * len(shown) + 0.55 * len(groups)), 3.3)
     return Plot(
         "One-way latency of commands",
         "Where the dot lies within the whisker, the bound held. Each network has its own scale.",
-        _render(draw_all, size),
+        svg(draw_all, *size),
     )
 
 
@@ -162,10 +143,10 @@ def _one_way(axes: Axes, row: Row, x: float) -> None:
     p50, bound = row.spreads["one_way_p50_ms"].median, row.median("one_way_bound_ms") or 0.0
     # a way is never shorter than nothing, whatever the bound
     below_above = [[min(bound, p50)], [bound]]
-    axes.bar(x, p50, width=0.7, color=BAR, yerr=below_above, ecolor="#52606d", capsize=2, linewidth=0)
+    axes.bar(x, p50, width=0.7, color=BAR_COLOUR, yerr=below_above, ecolor="#52606d", capsize=2, linewidth=0)
     p99, true = row.median("one_way_p99_ms"), row.median("true_one_way_p50_ms")
     if p99 is not None:
-        axes.plot(x, p99, "_", color=HIGH, markersize=9, markeredgewidth=1.6)
+        axes.plot(x, p99, "_", color=LIMIT_COLOUR, markersize=9, markeredgewidth=1.6)
     if true is not None:
         axes.plot(x, true, "o", color=INK, markersize=4)
 
@@ -181,8 +162,8 @@ def _motion(rows: Sequence[Row]) -> Plot | None:
         return None
     profiles, strategies = _names(p for p, _ in first), _names(s for _, s in first)
 
-    def draw_all(picture: Picture) -> None:
-        grid = picture.subplots(len(profiles), len(strategies), squeeze=False, sharey=True)
+    def draw_all(figure: Figure) -> None:
+        grid = figure.subplots(len(profiles), len(strategies), squeeze=False, sharey=True)
         for i, profile in enumerate(profiles):
             for j, strategy in enumerate(strategies):
                 axes = grid[i][j]
@@ -191,20 +172,20 @@ def _motion(rows: Sequence[Row]) -> Plot | None:
                     axes.axis("off")
                     continue
                 axes.plot(excerpt.at_s, excerpt.operator_deg, color=INK, linewidth=1.0, label="operator")
-                axes.plot(excerpt.at_s, excerpt.robot_deg, color=COLOURS[j % len(COLOURS)], linewidth=1.2,
+                axes.plot(excerpt.at_s, excerpt.robot_deg, color=colour(j), linewidth=1.2,
                           label="robot (coloured by strategy)")  # fmt: skip
                 axes.set_title(f"{profile}, {setup.transport}, {strategy}", fontsize=8.5, loc="left")
                 if j == 0:
                     axes.set_ylabel(f"{excerpt.joint.replace('_', ' ')}, °")
                 if i == len(profiles) - 1:
                     axes.set_xlabel("time, s")
-        picture.legend(*grid[0][0].get_legend_handles_labels(), loc="outside lower left", ncols=2, fontsize=8)
+        figure.legend(*grid[0][0].get_legend_handles_labels(), loc="outside lower left", ncols=2)
 
     size = (3.1 * len(strategies) + 0.4, 1.9 * len(profiles) + 0.4)
     return Plot(
         "One joint, operator and robot",
         "The last seconds of a repeat's judged time, in the joint that moved furthest.",
-        _render(draw_all, size),
+        svg(draw_all, *size),
     )
 
 
@@ -223,14 +204,14 @@ def _places(axes: Axes, rows: Sequence[Row]) -> list[float]:
         places.append(x)
         labels.append(row.setup.transport)
         x += 1.0
-    axes.set_xticks(places, labels, rotation=60, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.set_xticks(places, labels, rotation=60, ha="right", rotation_mode="anchor")
     axes.set_xlim(-0.8, x - 0.2)
     return places
 
 
 def _legend(axes: Axes, strategies: Sequence[str], profiles: Sequence[str] = ()) -> None:
     for i, strategy in enumerate(strategies):
-        axes.plot([], [], "s", color=COLOURS[i % len(COLOURS)], label=strategy)
+        axes.plot([], [], "s", color=colour(i), label=strategy)
     for i, profile in enumerate(profiles):
         axes.plot([], [], MARKS[i % len(MARKS)], color="#7b8794", label=profile)
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -241,18 +222,4 @@ def _names(names: Iterator[str] | Any) -> list[str]:
 
 
 def _svg(draw: Callable[[Axes], None], width: float = 6.5, height: float = 3.1) -> str:
-    return _render(lambda picture: draw(picture.subplots()), (width, height))
-
-
-def _render(draw: Callable[[Picture], None], size: tuple[float, float]) -> str:
-    import matplotlib as mpl
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure as Picture
-
-    with mpl.rc_context(STYLE):
-        picture = Picture(figsize=size, layout="constrained")
-        FigureCanvasSVG(picture)
-        draw(picture)
-        out = io.StringIO()
-        picture.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
-    return out.getvalue()
+    return svg(lambda figure: draw(figure.subplots()), width, height)

@@ -14,7 +14,7 @@ from deploy.experiments.trial.report.ranking import rank, rankings
 from deploy.experiments.trial.report.spread import Spread, rows, spread
 from deploy.experiments.trial.report.targets import SetupLimit, judge
 from deploy.experiments.trial.report.tasks import TASKS, Criterion, load_tasks
-from deploy.measure.verdict import with_unit
+from deploy.report.tables import with_unit
 from tests.deploy.experiments.trial.made_up import PLAN, cells
 
 TASK = {task.name: task for task in load_tasks()}

@@ -5,15 +5,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from deploy.measure import MovedSeries, SolvedSeries, TruthSeries, accuracy, motion
-from deploy.measure.tables import (
-    Live,
+from deploy.experiments.demo.live_view import Live, live_view
+from deploy.experiments.demo.tables import (
     accuracy_table,
     latency_table,
-    live_view,
     motion_table,
     strategies_table,
 )
+from deploy.measure import MovedSeries, SolvedSeries, TruthSeries, accuracy, motion
 from deploy.measure.verdict import at_most, verdict_table
 
 NAMES = [
