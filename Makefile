@@ -1,14 +1,19 @@
 # Two commands on a fresh machine: `make demo` and `make test`. Each sets up its own .venv.
+# `make test` is what one runs while working; `make test-all` is everything, and what .ci/run calls.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check bench clean
+.PHONY: demo test test-all check bench clean
 demo: $(VENV)/.ready
 	$(BIN)/tandem demo $(ARGS)
 
 test: $(VENV)/.ready
-	$(BIN)/python -m pytest -m "not bench" $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m "not live and not bench" -n auto --dist worksteal $(ARGS)
+
+# one after the other: two tests of real processes at a time would take each other's cores
+test-all: test
+	$(BIN)/python -m pytest -m "live and not bench" $(ARGS)
 
 bench: $(VENV)/.ready
 	$(BIN)/tandem bench $(ARGS)

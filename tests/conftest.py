@@ -26,6 +26,8 @@ settings.register_profile(
 settings.load_profile("tandem")
 
 TRIES = 4
+WHOLE = ("", "not bench", "not live and not bench", "live and not bench")
+"""What `-m` may be for a run of all tests, or of one of the two halves that the Makefile runs."""
 
 Story = Callable[[Host], Awaitable[None]]
 OnThisHost = Callable[[Story], None]
@@ -68,6 +70,13 @@ def default_signals() -> Iterator[None]:
     signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
     for number, handler in before.items():
         signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whoever needs a kernel's feature or network namespaces is live."""
+    for item in items:
+        if any(item.get_closest_marker(name) for name in ("net", "kernel_can")):
+            item.add_marker("live")
 
 
 @pytest.fixture(autouse=True)
@@ -134,11 +143,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
 
 def _whole(config: pytest.Config) -> bool:
-    """Whether the whole suite is run; the benches are always apart."""
+    """Whether the whole suite is run, or one of its two halves; the benches are always apart."""
     option = config.option
     return (
         config.args_source is pytest.Config.ArgsSource.TESTPATHS
-        and option.markexpr in ("", "not bench")
+        and option.markexpr in WHOLE
         and not option.keyword
         and not option.collectonly
     )

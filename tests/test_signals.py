@@ -51,7 +51,7 @@ def test_a_test_that_leaves_a_process_behind_fails_and_the_next_does_not(tmp_pat
     assert "left running, now killed: sleep 60" in ended.stdout
 
 
-@pytest.mark.hosts
+@pytest.mark.live
 def test_a_slice_of_the_suite_passes_in_the_background_of_a_script() -> None:
     environment = {key: value for key, value in os.environ.items() if key != "CI"}
     ended = subprocess.run(

@@ -61,7 +61,7 @@ def namespaces() -> bool:
     return subprocess.run([*NAMESPACE, "true"], capture_output=True, check=False).returncode == 0
 
 
-@pytest.mark.hosts
+@pytest.mark.live
 @pytest.mark.skipif(
     not namespaces(), reason="needs `unshare` and `ip`, and leave to make a network namespace"
 )

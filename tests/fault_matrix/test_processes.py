@@ -8,7 +8,7 @@ import pytest
 
 from deploy.experiments.faults.processes import PROCESS_FAULTS, ProcessFault, tried
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 
 
 @pytest.mark.parametrize("fault", PROCESS_FAULTS, ids=lambda fault: fault.row.name)

@@ -16,7 +16,7 @@ from deploy.examples.profiles import EXAMPLES
 from deploy.harness.endpoints import local_endpoints
 from master.calibrate.recording import load_recordings
 
-pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("default_signals")]
 
 WORN = ("left_thigh", "left_shank")
 """Of the legs' seven nodes these two answer; the others are silent, and not waited for."""

@@ -17,7 +17,7 @@ from deploy.harness.start import start_tracking
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 SEEN_S = 1.0
 """How long the robot is watched after the kill."""
 

@@ -17,7 +17,7 @@ from deploy.harness.start import start_all
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 
 
 async def started(rig: Rig, lines: list[str], patience: Patience) -> DemoOperators:

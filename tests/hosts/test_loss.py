@@ -19,7 +19,7 @@ from deploy.harness.start import start_tracking
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 
 COMMAND_TIMEOUT_S = 0.2
 STATE_PERIOD_S = 0.02

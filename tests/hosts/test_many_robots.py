@@ -18,7 +18,7 @@ from deploy.harness.start import start_all
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(600)]
 
 ELBOW = "right_elbow_pitch"
 ZERO_COUNTS = 1000

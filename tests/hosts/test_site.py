@@ -28,7 +28,7 @@ from master.suit.protocol import SHIPPED_DBC
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(600)]
 
 ALIGN_S, LOOK_S = 30.0, 0.1
 

@@ -15,7 +15,7 @@ import pytest
 
 from deploy.experiments.soak.files.events import of_kind, read_events
 
-pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("default_signals")]
 
 SOAK = [sys.executable, "-m", "deploy", "soak"]
 

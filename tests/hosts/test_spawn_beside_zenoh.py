@@ -19,7 +19,7 @@ from common.link.config import LinkConfig
 from common.wire.topics import STATE
 from deploy.harness.spawn import Spawned
 
-pytestmark = pytest.mark.hosts
+pytestmark = pytest.mark.live
 
 STARTS = 150
 FLOOD = """

@@ -20,7 +20,7 @@ from deploy.harness.start import start_tracking
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 
 
 @pytest.mark.parametrize("routed", [False, True], ids=["direct", "routed"])

@@ -20,7 +20,7 @@ from deploy.harness.host import Host
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
 
-pytestmark = [pytest.mark.hosts, pytest.mark.timeout(400), pytest.mark.usefixtures("default_signals")]
+pytestmark = [pytest.mark.live, pytest.mark.timeout(400), pytest.mark.usefixtures("default_signals")]
 
 
 def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(

@@ -30,7 +30,7 @@ from tests.link.parties import (
     tls,
 )
 
-pytestmark = pytest.mark.hosts
+pytestmark = pytest.mark.live
 COMMANDS = 20
 REFUSED_AT_THE_DOOR = {
     "rogue": "certificate: ",

@@ -8,7 +8,7 @@ import pytest
 
 from common.process.runtime import EXIT_HUNG
 
-pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("default_signals")]
 
 HEAD = """
 import asyncio, os, signal, sys, threading, time

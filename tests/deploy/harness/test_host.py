@@ -110,7 +110,7 @@ def test_steal_is_read_by_core(core: int, stolen_ms: int) -> None:
     assert stolen_ns(stat, core, 100) == stolen_ms * NS_PER_MS
 
 
-@pytest.mark.hosts
+@pytest.mark.live
 def test_real_loops_tick_on_every_core_and_end_with_the_block() -> None:
     async def story() -> Host:
         async with watch_host() as host:

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import pytest
 
-pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("default_signals")]
 
 DEMO = """
 import functools, sys

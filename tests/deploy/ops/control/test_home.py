@@ -18,7 +18,7 @@ from common.wire.topics import CONTROL, STOP
 from slave.guard import State
 from tests.slave.guard.conftest import KEY, ROBOT, Rig
 
-pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("default_signals")]
 
 
 def endpoint() -> str:

@@ -17,7 +17,7 @@ from common.link.config import LinkConfig
 from common.wire.stop import StopAnswer, pack_stop_answer
 from common.wire.topics import STOP
 
-pytestmark = [pytest.mark.hosts, pytest.mark.usefixtures("default_signals")]
+pytestmark = [pytest.mark.live, pytest.mark.usefixtures("default_signals")]
 
 LATE_S = 1.0
 
