@@ -130,7 +130,9 @@ def test_an_address_that_is_none_is_told_and_ignored(caplog: pytest.LogCaptureFi
 
 
 @pytest.mark.parametrize(
-    ("pid", "pings"), [(None, True), (str(os.getpid()), True), (str(os.getpid() + 1), False)]
+    ("pid", "pings"),
+    [(None, True), (str(os.getpid()), True), (str(os.getpid() + 1), False)],
+    ids=["not said", "this one", "another"],
 )
 def test_a_watchdog_that_is_set_for_another_process_is_not_ours(
     pid: str | None, pings: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -26,7 +26,7 @@ def test_estop_wins_in_every_state(state: State) -> None:
     assert next_state(state, Event.ESTOP) is State.ESTOP
 
 
-@pytest.mark.parametrize("event", set(Event) - {Event.RESET})
+@pytest.mark.parametrize("event", sorted(set(Event) - {Event.RESET}))
 def test_nothing_but_reset_leaves_estop(event: Event) -> None:
     assert next_state(State.ESTOP, event) is State.ESTOP
 
@@ -37,7 +37,7 @@ def test_reset_leads_to_hold_and_only_from_estop() -> None:
         assert next_state(state, Event.RESET) is state
 
 
-@pytest.mark.parametrize("state", MOVING)
+@pytest.mark.parametrize("state", sorted(MOVING))
 @pytest.mark.parametrize("event", [Event.LOSS, Event.DISENGAGE])
 def test_every_loss_while_moving_holds(state: State, event: Event) -> None:
     assert next_state(state, event) is State.HOLD

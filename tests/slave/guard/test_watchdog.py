@@ -21,7 +21,7 @@ def without(name: str) -> Any:
     return [watch for watch in ARRIVAL_WATCHES if watch.name != name]
 
 
-@pytest.mark.parametrize("state", MOVING)
+@pytest.mark.parametrize("state", sorted(MOVING))
 def test_commands_may_be_silent_up_to_the_time_out_and_no_longer(rig: Any, state: State) -> None:
     rig.to(state)
     assert rig.send().accepted
@@ -60,7 +60,7 @@ def test_a_lease_that_lapses_holds_by_itself(make_rig: MakeRig) -> None:
     assert rig.guard.counters.losses == {"lease": 1}
 
 
-@pytest.mark.parametrize("state", MOVING)
+@pytest.mark.parametrize("state", sorted(MOVING))
 def test_commands_may_be_without_a_valid_joint_up_to_the_time_out_and_no_longer(
     rig: Any, state: State
 ) -> None:
@@ -173,7 +173,7 @@ def test_one_lost_encoder_holds_the_whole_robot(rig: Any, joint: int, fault: str
         (Body(base="tilts by 12.0°, limit 10.0°"), "base", "tilts by 12.0°"),
     ],
 )
-@pytest.mark.parametrize("state", MOVING)
+@pytest.mark.parametrize("state", sorted(MOVING))
 def test_a_body_that_is_not_well_holds_the_whole_robot_at_once(
     rig: Any, state: State, body: Body, loss: str, words: str
 ) -> None:
@@ -246,7 +246,7 @@ def test_an_own_clock_that_is_stepped_holds_and_does_not_jump(rig: Any, step_s: 
     assert rig.guard.state is State.ALIGN
 
 
-@pytest.mark.parametrize("state", MOVING)
+@pytest.mark.parametrize("state", sorted(MOVING))
 def test_after_a_loss_only_engage_moves_again_and_through_align(rig: Any, state: State) -> None:
     rig.to(state)
     rig.run(0.3, commands=False)
