@@ -12,6 +12,7 @@ from rich.console import Console
 
 from common.config.load import load_config
 from common.errors import TandemError
+from common.process.extras import missing_extra
 from common.process.logs import describe_exception, flush_log, print_error
 from common.process.runtime import run as run_until_stopped
 from common.process.streams import lost_output, secure
@@ -255,6 +256,9 @@ def _run() -> int:
     except Exception as error:
         if debugging():
             raise
+        if isinstance(error, ModuleNotFoundError) and (missing := missing_extra(error)):
+            print_error("tandem", missing)
+            return 1
         fault = f"a fault of tandem itself: {describe_exception(error)}; with --debug it shows the traceback"
         print_error("tandem", fault)
         return EXIT_FAULT

@@ -9,7 +9,8 @@ from typing import TypeVar
 from pydantic import ConfigDict, ValidationInfo, create_model, field_validator, model_validator
 
 from common.config.section import Section, one_of
-from common.errors import NOT_SET, ConfigError, ConfigMistake
+from common.errors import NOT_SET, ConfigError, ConfigMistake, RobotError
+from common.process.extras import missing_extra
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
 from slave.servos.backend import BackendConfig
@@ -80,7 +81,13 @@ class ServosConfig(Section):
         self, skeleton: Skeleton, encoders: EncoderConfig, last_known_rad: LastKnownAngles | None = None
     ) -> Servos:
         """The chosen backend's servos, not started yet. Raises RobotError where they cannot be had."""
-        return self.entry.open(self, skeleton, encoders, last_known_rad or {})
+        try:
+            return self.entry.open(self, skeleton, encoders, last_known_rad or {})
+        except ModuleNotFoundError as error:
+            missing = missing_extra(error)
+            if missing is None:
+                raise
+            raise RobotError(f"servos.backend {self.backend!r}: {missing}") from None
 
 
 LastKnownAngles = Mapping[str, float]

@@ -8,13 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dynamixel_sdk import COMM_SUCCESS, PacketHandler
-
 from common.errors import RobotError
+from common.process.extras import missing_extra
 from slave.servos.dynamixel.port import Port
 from slave.servos.dynamixel.registers import Register
 
 _PROTOCOL = 2.0
+_COMM_SUCCESS = 0
+"""The SDK's COMM_SUCCESS."""
 _TRIES = 3
 _ALERT = 0x80
 """In a status packet's error byte: the servo has a hardware error."""
@@ -50,6 +51,11 @@ class Bus:
     """One open serial bus. All methods raise PortLostError where the port has gone."""
 
     def __init__(self, port: Port) -> None:
+        try:
+            # imported here: a host without such servos does not need the package
+            from dynamixel_sdk import PacketHandler
+        except ModuleNotFoundError as error:
+            raise RobotError(missing_extra(error) or str(error)) from None
         self._port = port
         self._packets: Any = PacketHandler(_PROTOCOL)
         self.broken = 0
@@ -90,7 +96,7 @@ class Bus:
         def ask() -> tuple[list[int], int, int]:
             data, result, error = self._packets.readTxRx(self._port, servo, register.address, register.size)
             # an answer to another read, or one that is cut short within a valid checksum
-            short = result == COMM_SUCCESS and not error & ~_ALERT and len(data) != register.size
+            short = result == _COMM_SUCCESS and not error & ~_ALERT and len(data) != register.size
             return data, -1 if short else result, error
 
         return bytes(self._asked(ask, tries)[0])
@@ -131,13 +137,13 @@ class Bus:
         result = self._packets.syncReadTx(
             port, register.address, register.size, list(servos), len(servos), False
         )
-        if result != COMM_SUCCESS:
+        if result != _COMM_SUCCESS:
             port.is_using = False
             return out
         port.setPacketTimeout(len(servos) * (_STATUS_BYTES + register.size))
         while len(out) < len(asked):
             packet, result = self._packets.rxPacket(port, False)
-            if result == COMM_SUCCESS:
+            if result == _COMM_SUCCESS:
                 servo, data = packet[_ID], bytes(packet[_PARAMETERS : _PARAMETERS + register.size])
                 length = packet[_LENGTH] | packet[_LENGTH + 1] << 8
                 # an answer to something else, that came too late for it, has another length
@@ -158,7 +164,7 @@ class Bus:
             answer = ask()
             took_s = time.monotonic() - asked_s
             result, error = answer[-2:]
-            if result == COMM_SUCCESS:
+            if result == _COMM_SUCCESS:
                 self.quickest_s = min(self.quickest_s or took_s, took_s)
                 refusal = error & ~_ALERT
                 if not refusal:
