@@ -100,7 +100,7 @@ def _options(
 
 @app.command()
 def master(config: ConfigFile, set_: Overrides = None, figures: Figures = None) -> None:
-    """Run the operator's side: read the suit, solve the joints, command the robot.
+    """Run the operator's side: read the suit, compute the joint angles, command the robot.
 
     Example: `tandem master deploy/examples/master.toml`
     """

@@ -26,7 +26,7 @@ from common.process.ticker import ticks
 from common.wire.topics import STATISTICS
 from common.wire.version import software
 from master.config import MasterConfig
-from master.pipeline import MasterPipeline, Solved
+from master.pipeline import JointAngleSample, MasterPipeline
 from master.robot import CommandedRobot
 from master.suit.doubt import DoubtLog, as_figures
 from master.suit.protocol import SuitProtocol
@@ -42,7 +42,7 @@ class Master:
         self._config = config
         self._notifier = notifier or Notifier()
         self._pipeline = MasterPipeline(config, SuitProtocol.load(config.capture.dbc))
-        self._stages = StageTimes("sampled→frames in", "frames in→solved", "solved→put")
+        self._stages = StageTimes("sampled→frames in", "frames in→joint angles", "joint angles→put")
         self._frames_in_to_put = Durations()
         self._ticks_expected = 0
         self._ticks_missed = 0
@@ -100,29 +100,29 @@ class Master:
 
     def _on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
         if self._pipeline.frame(bus, frame_id, data, now_ns):
-            solved = self._pipeline.close(now_ns)
-            if solved is not None:
-                self._send(solved)
+            angles = self._pipeline.close(now_ns)
+            if angles is not None:
+                self._send(angles)
 
     def _on_bus(self, bus: str, up: bool) -> None:
         if not up:
             self._pipeline.bus_down(bus)
 
-    def _send(self, solved: Solved) -> None:
-        solved_ns = monotonic_ns()
+    def _send(self, angles: JointAngleSample) -> None:
+        angles_ns = monotonic_ns()
         for line in self._pipeline.to_tell:
             log.warning("%s", line)
         held = self._config.operator.deadman == "always_held"
         for robot in self._robots:
             if robot.name in self._given_up:
                 continue
-            robot.send(solved, held, solved_ns)
+            robot.send(angles, held, angles_ns)
             done_ns = monotonic_ns()
             self._stages.record(
-                solved.frames_in_ns - solved.sampled_ns, solved_ns - solved.frames_in_ns, done_ns - solved_ns
+                angles.frames_in_ns - angles.sampled_ns, angles_ns - angles.frames_in_ns, done_ns - angles_ns
             )
-            self._frames_in_to_put.record(done_ns - solved.frames_in_ns)
-        for line in self._doubt_log.lines(self._pipeline.doubts, solved_ns):
+            self._frames_in_to_put.record(done_ns - angles.frames_in_ns)
+        for line in self._doubt_log.lines(self._pipeline.doubts, angles_ns):
             log.warning("%s", line)
 
     async def _tell(self) -> None:

@@ -1,6 +1,6 @@
 """The master's whole way for one sample, without a clock, a bus or a link: frames in, commands out.
 
-poll ▸ calibrate ▸ low-pass ▸ fuse ▸ (every 16th tick) solve ▸ command
+poll ▸ calibrate ▸ low-pass ▸ orientation ▸ (every 16th tick) joint angles ▸ command
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOST_BRIDGED = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Solved:
+class JointAngleSample:
     """The operator's joint angles at one deciding tick."""
 
     tick: int
@@ -60,8 +60,8 @@ class MasterPipeline:
         self.solver = JointSolver(self.skeleton)
         self.beyond_reach = BeyondReach(self.skeleton.segment_names)
         self.to_tell: list[str] = []
-        """What the operator is to be told of the last solve."""
-        self._solved_ns: int | None = None
+        """What the operator is to be told of the last joint angles."""
+        self._angles_ns: int | None = None
         self.plausibility = Plausibility(
             config.capture.plausibility, len(nodes), config.capture.rate_hz, protocol.fd.scale,
             self.estimator.affine,
@@ -73,9 +73,9 @@ class MasterPipeline:
         self._decided_period = -1
         self._parts: tuple[Callable[[], Doubts], ...] = (self._of_suit, self._of_estimator)
         self.doubts: Doubts = {}
-        """Nodes that were not believed, or not wholly, when the last posture was solved."""
+        """Nodes that were not believed, or not wholly, when joint angles were last computed."""
 
-    def tick(self, tick: int, now_ns: int) -> tuple[Frame, Solved | None]:
+    def tick(self, tick: int, now_ns: int) -> tuple[Frame, JointAngleSample | None]:
         """Open a tick: the SYNC frame for every bus, and what the last window gave if it was still open."""
         late = self.close(now_ns) if self._window_open else None
         self._window_open = True
@@ -96,7 +96,7 @@ class MasterPipeline:
             for name, health in zip(self.skeleton.segment_names, self.poll.health, strict=True)
         }
 
-    def close(self, now_ns: int) -> Solved | None:
+    def close(self, now_ns: int) -> JointAngleSample | None:
         """Take the tick's answers through the filters; the joint angles if this tick decides."""
         self._window_open = False
         sweep = self.poll.close_window(now_ns)
@@ -117,9 +117,9 @@ class MasterPipeline:
         if period == self._decided_period and not (disbelieved & ~before).any():
             return None
         self._decided_period = period
-        return self._solve(sweep)
+        return self._joint_angles(sweep)
 
-    def _solve(self, sweep: Sweep) -> Solved:
+    def _joint_angles(self, sweep: Sweep) -> JointAngleSample:
         posture = self.estimator.posture()
         self.doubts = together(*(part() for part in self._parts))
         known_nodes = posture.valid & self._believed()
@@ -127,14 +127,14 @@ class MasterPipeline:
         if not known_nodes.all():
             # of a node that is not heard, or not believed, the solver must not remember anything either
             q = np.where(known_nodes[:, None], q, np.nan)
-        before_ns, self._solved_ns = self._solved_ns, sweep.sampled_ns
+        before_ns, self._angles_ns = self._angles_ns, sweep.sampled_ns
         elapsed_s = math.inf if before_ns is None else to_s(sweep.sampled_ns - before_ns)
         position, velocity = self.solver.solve(q, posture.rate_rad_s, elapsed_s)
         self.to_tell = self.beyond_reach.note(sweep.sampled_ns, self.solver.short_rad)
         # a joint is known only if the nodes on both its segments are
         missing = self.skeleton.joint_needs_node @ ~known_nodes
         known = np.isfinite(position) & np.isfinite(velocity) & ~missing
-        return Solved(
+        return JointAngleSample(
             tick=sweep.tick,
             sampled_ns=sweep.sampled_ns,
             frames_in_ns=sweep.frames_in_ns,
@@ -208,10 +208,10 @@ class CommandWriter:
 
     def write(
         self,
-        solved: Solved,
+        angles: JointAngleSample,
         lease: int,
         deadman_held: bool,
-        solved_ns: int,
+        angles_ns: int,
         put_ns: int,
         seen: tuple[int, int] = (0, 0),
     ) -> Command:
@@ -221,18 +221,18 @@ class CommandWriter:
         """
         self._sequence += 1
         self.sent += 1
-        stamps = CommandStamps(solved.sampled_ns, solved.frames_in_ns, solved_ns, put_ns)
+        stamps = CommandStamps(angles.sampled_ns, angles.frames_in_ns, angles_ns, put_ns)
         return Command(
             robot=self._robot,
             lease=lease,
             sequence=self._sequence,
-            tick=solved.tick,
+            tick=angles.tick,
             stamps=stamps,
             deadman_held=deadman_held,
-            valid=solved.valid,
-            position_rad=solved.position_rad,
-            velocity_rad_s=solved.velocity_rad_s,
+            valid=angles.valid,
+            position_rad=angles.position_rad,
+            velocity_rad_s=angles.velocity_rad_s,
             seen_frame=seen[0],
             seen_ns=seen[1],
-            doubt=solved.doubt,
+            doubt=angles.doubt,
         )

@@ -25,7 +25,7 @@ from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
 from master.homonyms import Homonyms
 from master.lease import LeaseKeeper
 from master.picture import VideoWatch
-from master.pipeline import CommandWriter, Solved
+from master.pipeline import CommandWriter, JointAngleSample
 from master.robot_watch import RobotWatch
 
 log = logging.getLogger(__name__)
@@ -66,10 +66,10 @@ class CommandedRobot:
             tasks.create_task(self._keep_lease())
             tasks.create_task(self._keep_clock())
 
-    def send(self, solved: Solved, deadman_held: bool, solved_ns: int) -> None:
+    def send(self, angles: JointAngleSample, deadman_held: bool, angles_ns: int) -> None:
         """Put the posture on this robot's topic. It never blocks."""
-        seen = self.video.seen_by(solved.sampled_ns)
-        command = self._writer.write(solved, self._lease.token, deadman_held, solved_ns, monotonic_ns(), seen)
+        seen = self.video.seen_by(angles.sampled_ns)
+        command = self._writer.write(angles, self._lease.token, deadman_held, angles_ns, monotonic_ns(), seen)
         self._put_command(encode(command))
 
     def publish_metrics(self, now_ns: int, shared: MasterMetrics) -> None:

@@ -87,7 +87,7 @@ class Journeys:
             Passage(
                 sampled_ns=stamps.sampled_ns,
                 frames_in_ns=stamps.frames_in_ns,
-                solved_ns=stamps.solved_ns,
+                angles_ns=stamps.angles_ns,
                 put_ns=stamps.put_ns,
                 received_ns=underway.received_ns,
                 accepted_ns=underway.accepted_ns,

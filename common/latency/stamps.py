@@ -10,8 +10,8 @@ from common.latency.one_way import one_way_ns
 
 STAGES = (
     "sampled→frames in",
-    "frames in→solved",
-    "solved→put",
+    "frames in→joint angles",
+    "joint angles→put",
     "put→received",
     "received→accepted",
     "accepted→written",
@@ -27,7 +27,7 @@ class Passage:
     sampled_ns: int
     """Master's clock, as the next three."""
     frames_in_ns: int
-    solved_ns: int
+    angles_ns: int
     put_ns: int
     """Right before the command is encoded, since it is in the command: `put→received` holds the encoding."""
     received_ns: int
@@ -51,6 +51,6 @@ class Passage:
         add up to the whole.
         """
         on_slave = (self.received_ns, self.accepted_ns, self.written_ns, self.moved_ns)
-        on_master = (self.sampled_ns, self.frames_in_ns, self.solved_ns, self.put_ns)
+        on_master = (self.sampled_ns, self.frames_in_ns, self.angles_ns, self.put_ns)
         stamps = accumulate((*on_master, *map(offset.remote_ns, on_slave)), max)
         return [after - before for before, after in pairwise(stamps)]

@@ -93,7 +93,7 @@ def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
 def _pack_command(m: Command) -> tuple[Any, ...]:
     s = m.stamps
     return (
-        m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.solved_ns, s.put_ns,
+        m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.angles_ns, s.put_ns,
         m.deadman_held, fields.pack_mask(m.valid), fields.pack_floats(m.position_rad, m.velocity_rad_s),
         m.seen_frame, m.seen_ns, fields.shorten(m.doubt, MAX_DOUBT),
     )  # fmt: skip
@@ -101,14 +101,14 @@ def _pack_command(m: Command) -> tuple[Any, ...]:
 
 def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
     fields.length(f, 14)
-    lease, sequence, tick, sampled_ns, frames_in_ns, solved_ns, put_ns = fields.counts(f[1:8])
+    lease, sequence, tick, sampled_ns, frames_in_ns, angles_ns, put_ns = fields.counts(f[1:8])
     position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
     return Command(
         fields.text(f[0], MAX_NAME),
         lease,
         sequence,
         tick,
-        CommandStamps(sampled_ns, frames_in_ns, solved_ns, put_ns),
+        CommandStamps(sampled_ns, frames_in_ns, angles_ns, put_ns),
         fields.flag(f[8]),
         fields.mask(f[9], joints),
         position_rad,

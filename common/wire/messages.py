@@ -23,7 +23,7 @@ class CommandStamps:
     """SYNC sent: the nodes sample on it."""
     frames_in_ns: int
     """Last frame of the deciding tick arrived, or its window closed."""
-    solved_ns: int
+    angles_ns: int
     """Joint angles known."""
     put_ns: int
     """Handed to the link."""

@@ -28,15 +28,15 @@ class BeyondReach:
         self._names = tuple(segment_names)
         count = len(self._names)
         self._times: NDArray[np.int64] = np.zeros(count, np.int64)
-        self._solves = 0
+        self._computed = 0
         self._now_rad: Array = np.zeros(count)
         self._most_rad: Array = np.zeros(count)
         self._since_ns: dict[int, int] = {}
         self._told_ns: dict[int, int] = {}
 
     def note(self, now_ns: int, short_rad: Array) -> list[str]:
-        """Take what is left of each segment (N,) after a solve; what there is to tell the operator now."""
-        self._solves += 1
+        """Take what each segment (N,) lacks of its posture; returns what to tell the operator."""
+        self._computed += 1
         self._now_rad = short = np.nan_to_num(short_rad)
         beyond = short > COUNTED_RAD
         if not beyond.any() and not self._since_ns:
@@ -59,7 +59,7 @@ class BeyondReach:
         """The segments that were beyond reach."""
         return {
             self._names[i]: Unreached(
-                percent=round(100.0 * int(self._times[i]) / self._solves, 2),
+                percent=round(100.0 * int(self._times[i]) / self._computed, 2),
                 now_deg=round(math.degrees(self._now_rad[i]), 1),
                 most_deg=round(math.degrees(self._most_rad[i]), 1),
             )

@@ -17,7 +17,7 @@ from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.motion import load_motion
 from deploy.sim.suit.suit import SimulatedSuit, build_suit
 from master.config import MasterConfig
-from master.pipeline import MOST_BRIDGED, CommandWriter, MasterPipeline, Solved, bridged
+from master.pipeline import MOST_BRIDGED, CommandWriter, JointAngleSample, MasterPipeline, bridged
 from master.suit.doubt import NodeDoubt, Weight
 from master.suit.protocol import SuitProtocol
 
@@ -43,8 +43,8 @@ class Bench:
     def now_ns(self) -> int:
         return NS_PER_S + self.tick * PERIOD_NS + self.late_ns
 
-    def run(self, ticks: int) -> list[Solved]:
-        """What was solved in so many ticks."""
+    def run(self, ticks: int) -> list[JointAngleSample]:
+        """What was angles in so many ticks."""
         found = []
         for _ in range(ticks):
             self.tick += 1
@@ -59,7 +59,7 @@ class Bench:
             if any(complete):
                 assert complete.index(True) == len(complete) - 1, "only the last frame completes the tick"
                 found.append(self.pipeline.close(self.now_ns + NS_PER_MS))
-        return [solved for solved in found if solved is not None]
+        return [angles for angles in found if angles is not None]
 
 
 @pytest.fixture
@@ -70,10 +70,10 @@ def settled() -> Bench:
 
 
 def test_one_of_sixteen_ticks_is_solved(settled: Bench) -> None:
-    solved = settled.run(160)
-    assert [s.tick % 16 for s in solved] == [0] * 10
-    assert all(s.valid.all() for s in solved)
-    assert all(s.frames_in_ns - s.sampled_ns == NS_PER_MS for s in solved)
+    angles = settled.run(160)
+    assert [s.tick % 16 for s in angles] == [0] * 10
+    assert all(s.valid.all() for s in angles)
+    assert all(s.frames_in_ns - s.sampled_ns == NS_PER_MS for s in angles)
 
 
 def test_nothing_is_valid_before_the_filters_have_settled() -> None:
@@ -112,10 +112,10 @@ def worst_finger_deg(late_ns: NDArray[np.int_], missed: Mask) -> float:
             bench.tick += 1
             continue
         bench.late_ns = int(late_ns[tick]) if tick > 300 else 0
-        for solved in bench.run(1):
-            true_rad, _, _ = motion.state(1e-9 * (solved.sampled_ns - first_ns))
-            if solved.valid.all():
-                errors_rad.append(solved.position_rad - true_rad)
+        for angles in bench.run(1):
+            true_rad, _, _ = motion.state(1e-9 * (angles.sampled_ns - first_ns))
+            if angles.valid.all():
+                errors_rad.append(angles.position_rad - true_rad)
     assert len(errors_rad) > 80
     return math.degrees(np.abs(errors_rad).max())
 
@@ -135,21 +135,21 @@ def test_a_short_gap_is_bridged_evenly_and_a_long_one_not(settled: Bench, gap: i
 def test_a_failed_bus_means_no_valid_joint_but_commands_go_on(settled: Bench) -> None:
     settled.silent = True
     settled.pipeline.bus_down("suit")
-    solved = settled.run(161)  # an open window closes at the next tick
-    assert len(solved) == 10
-    assert not any(s.valid.any() for s in solved)
+    angles = settled.run(161)  # an open window closes at the next tick
+    assert len(angles) == 10
+    assert not any(s.valid.any() for s in angles)
     settled.silent = False
     assert settled.run(320)[-1].valid.all(), "it comes back"
 
 
 def test_the_sequence_counts_up_and_the_lease_is_carried(settled: Bench) -> None:
     writer = CommandWriter("r")
-    solved = settled.run(16)[0]
-    first = writer.write(solved, 5, True, 10, 11)
-    second = writer.write(solved, 6, False, 20, 21)
+    angles = settled.run(16)[0]
+    first = writer.write(angles, 5, True, 10, 11)
+    second = writer.write(angles, 6, False, 20, 21)
     assert (first.sequence, second.sequence) == (1, 2)
     assert (first.lease, second.lease, second.deadman_held) == (5, 6, False)
-    assert (second.stamps.solved_ns, second.stamps.put_ns) == (20, 21)
+    assert (second.stamps.angles_ns, second.stamps.put_ns) == (20, 21)
 
 
 def test_a_doubted_node_s_joints_are_invalid_and_what_refuses_engage_is_in_the_command(
@@ -158,29 +158,29 @@ def test_a_doubted_node_s_joints_are_invalid_and_what_refuses_engage_is_in_the_c
     node = settled.pipeline.skeleton.segment_names.index("left_forearm")
     doubts = {node: NodeDoubt("it repeats one reading", Weight.INVALID)}
     monkeypatch.setattr(settled.pipeline.estimator, "doubts", lambda: doubts)
-    solved = settled.run(16)[-1]
+    angles = settled.run(16)[-1]
     names = settled.pipeline.skeleton.joint_names
-    gone = {name for name, ok in zip(names, solved.valid, strict=True) if not ok}
+    gone = {name for name, ok in zip(names, angles.valid, strict=True) if not ok}
     assert gone == {"left_elbow_pitch", "left_elbow_roll", "left_wrist_yaw"}
-    assert solved.doubt == ""
+    assert angles.doubt == ""
     assert settled.pipeline.doubts == {"left_forearm": doubts[node]}
     doubts[node] = NodeDoubt("two nodes answer", Weight.REFUSED)
-    solved = settled.run(16)[-1]
-    assert CommandWriter("r").write(solved, 1, True, 0, 0).doubt == "left_forearm: two nodes answer"
+    angles = settled.run(16)[-1]
+    assert CommandWriter("r").write(angles, 1, True, 0, 0).doubt == "left_forearm: two nodes answer"
     doubts[node] = NodeDoubt("its field is odd", Weight.TOLD)
-    solved = settled.run(16)[-1]
-    assert solved.valid.all()
-    assert solved.doubt == ""
+    angles = settled.run(16)[-1]
+    assert angles.valid.all()
+    assert angles.doubt == ""
 
 
 def test_nobody_engages_before_a_zero_pose_was_good() -> None:
     config = ("estimation.zero_pose_s=0.5",)
     still = Bench(master=config)
-    solved = still.run(400)
-    assert "waits for the zero pose" in solved[15].doubt
-    assert not solved[15].valid.any()
-    assert solved[-1].doubt == ""
-    assert solved[-1].valid.all()
+    angles = still.run(400)
+    assert "waits for the zero pose" in angles[15].doubt
+    assert not angles[15].valid.any()
+    assert angles[-1].doubt == ""
+    assert angles[-1].valid.all()
     # it stands for 3.5 s before it reaches for the bottle
     last = Bench('motion="bottle"', master=("estimation.zero_pose_s=3.0",)).run(1000)[-1]
     assert "zero pose refused: turned" in last.doubt

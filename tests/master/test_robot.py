@@ -32,7 +32,7 @@ from common.wire.presence import Presence
 from common.wire.topics import CLOCK, CONTROL, STATE, Topic
 from master.app import Master
 from master.config import MasterConfig
-from master.pipeline import Solved
+from master.pipeline import JointAngleSample
 from master.robot import CommandedRobot
 from tests.published import master_metrics
 
@@ -103,8 +103,8 @@ class FakeSession:
         return self.links[robot]
 
 
-def solved() -> Solved:
-    return Solved(16, 1, 2, np.zeros(JOINTS), np.zeros(JOINTS), np.ones(JOINTS, np.bool_))
+def solved() -> JointAngleSample:
+    return JointAngleSample(16, 1, 2, np.zeros(JOINTS), np.zeros(JOINTS), np.ones(JOINTS, np.bool_))
 
 
 def master_of(**links: FakeLink) -> Master:

@@ -47,14 +47,14 @@ def pipeline(seconds: float) -> dict[str, Any]:
         "nodes_36_mahony": ticks(0.15 * seconds, 36, filter_name="mahony"),
         "nodes_36_ekf": ticks(0.15 * seconds, 36, filter_name="ekf"),
         "believe_us": believe(0.05 * seconds, 36),
-        "solve_us": solve(0.1 * seconds),
-        "solve_beyond_us": solve(0.05 * seconds, beyond=True),
+        "joint_angles_us": joint_angles(0.1 * seconds),
+        "joint_angles_beyond_us": joint_angles(0.05 * seconds, beyond=True),
         "codec_us": codec(0.15 * seconds),
     }
 
 
 def ticks(seconds: float, count: int, fd: bool = True, filter_name: str = "vqf") -> dict[str, Any]:
-    """µs a tick: `decode_us` from frames to SI units, `fuse_us` to calibrate, low-pass and fuse."""
+    """µs a tick: `decode_us` from frames to SI units, `orientation_us` to calibrate, low-pass and filter."""
     protocol = SuitProtocol.load()
     poll = Poll(nodes(count), protocol, LOST_AFTER, {BUS: fd})
     estimator = Estimator(EstimationConfig(filter=filter_name), nodes(count), RATE_HZ)
@@ -63,14 +63,14 @@ def ticks(seconds: float, count: int, fd: bool = True, filter_name: str = "vqf")
         _sweep(poll, estimator, tick, frames)
     freeze_heap()
     decode_ns: list[int] = []
-    fuse_ns: list[int] = []
+    orientation_ns: list[int] = []
     end_ns = time.perf_counter_ns() + round(seconds * 1e9)
     while time.perf_counter_ns() < end_ns:
         for tick, frames in enumerate(prepared):
-            decoded, fused = _sweep(poll, estimator, tick, frames)
+            decoded, oriented = _sweep(poll, estimator, tick, frames)
             decode_ns.append(decoded)
-            fuse_ns.append(fused)
-    return {"decode_us": spread_us(decode_ns), "fuse_us": spread_us(fuse_ns)}
+            orientation_ns.append(oriented)
+    return {"decode_us": spread_us(decode_ns), "orientation_us": spread_us(orientation_ns)}
 
 
 def believe(seconds: float, count: int) -> dict[str, Any]:
@@ -102,8 +102,8 @@ def answers(protocol: SuitProtocol, count: int, tick: int, fd: bool) -> list[Fra
     return frames
 
 
-def solve(seconds: float, beyond: bool = False) -> dict[str, Any]:
-    """µs for one solve of all joints with their velocities.
+def joint_angles(seconds: float, beyond: bool = False) -> dict[str, Any]:
+    """µs to compute all joint angles and their velocities once.
 
     The operator goes to and fro about the middle of the robot's range; or `beyond`, where trunk, head, both
     shoulders and both forearms cannot be followed, and must be projected each time.

@@ -94,11 +94,16 @@ def core_percent(report: dict[str, Any]) -> dict[str, float | None]:
 
     None where a bench did not give its part.
     """
-    a_command = total((_median(report, "pipeline", "solve_us"), _median(report, "pipeline", "codec_us")))
+    a_command = total(
+        (_median(report, "pipeline", "joint_angles_us"), _median(report, "pipeline", "codec_us"))
+    )
 
     def master(heard: str, nodes: str) -> float | None:
         a_tick = total(
-            (_median(report, "capture", heard, "cpu_us"), _median(report, "pipeline", nodes, "fuse_us"))
+            (
+                _median(report, "capture", heard, "cpu_us"),
+                _median(report, "pipeline", nodes, "orientation_us"),
+            )
         )
         if a_tick is None or a_command is None:
             return None

@@ -5,9 +5,9 @@ from __future__ import annotations
 from deploy.measure.target import Target
 
 BENCH = (
-    Target("fuse + filter, 36 nodes", ("pipeline", "nodes_36", "fuse_us", "median"), 200.0, "µs"),
-    Target("the same with ekf", ("pipeline", "nodes_36_ekf", "fuse_us", "median"), 400.0, "µs"),
-    Target("solve 25 joints", ("pipeline", "solve_us", "median"), 150.0, "µs"),
+    Target("orientations of 36 nodes", ("pipeline", "nodes_36", "orientation_us", "median"), 200.0, "µs"),
+    Target("the same with ekf", ("pipeline", "nodes_36_ekf", "orientation_us", "median"), 400.0, "µs"),
+    Target("25 joint angles", ("pipeline", "joint_angles_us", "median"), 150.0, "µs"),
     Target("encode + decode a command", ("pipeline", "codec_us", "median"), 15.0, "µs"),
     Target("put → received / bare Zenoh", ("link", "over_bare_zenoh"), 1.5),
     Target("the same over tcp, p99", ("transports", "tcp_p99_over_bare_zenoh"), 2.0),

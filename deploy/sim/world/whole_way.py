@@ -30,7 +30,7 @@ from deploy.sim.world.link import VirtualLink
 from deploy.sim.world.troubles import Troubles, Way
 from master.config import MasterConfig
 from master.lease import LeaseKeeper
-from master.pipeline import CommandWriter, MasterPipeline, Solved
+from master.pipeline import CommandWriter, JointAngleSample, MasterPipeline
 from master.suit.protocol import SuitProtocol
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline
@@ -39,7 +39,7 @@ from slave.servos.mujoco.simulated import SimulatedRobot
 PERIOD_NS = 5 * NS_PER_MS
 NODE_NS = NS_PER_MS
 """From SYNC to a node's answer."""
-SOLVE_NS = NS_PER_MS // 2
+ANGLES_NS = NS_PER_MS // 2
 SLAVE_PHASE_NS = 2_300_000
 """The slave's ticks do not fall on the master's."""
 
@@ -168,18 +168,18 @@ class VirtualRun:
     def _on_frames(self, frames: list[Outgoing]) -> None:
         for bus, frame, _ in frames:
             if self._master.frame(bus, frame.id, frame.data, self.master_ns):
-                solved = self._master.close(self.master_ns)
-                if solved is not None:
-                    self._put(solved)
+                angles = self._master.close(self.master_ns)
+                if angles is not None:
+                    self._put(angles)
 
-    def _put(self, solved: Solved) -> None:
-        put_ns = self.master_ns + SOLVE_NS
-        command = self._writer.write(solved, self._lease.token, True, put_ns, put_ns)
+    def _put(self, angles: JointAngleSample) -> None:
+        put_ns = self.master_ns + ANGLES_NS
+        command = self._writer.write(angles, self._lease.token, True, put_ns, put_ns)
         self.commands.append(command)
         self.trace.add(command)
         payload = encode(command)
         if self.deliver(payload):
-            self._carry(Way.COMMAND, payload, self.on_command, SOLVE_NS)
+            self._carry(Way.COMMAND, payload, self.on_command, ANGLES_NS)
 
     def on_command(self, payload: bytes) -> None:
         """A command reaches the slave now."""

@@ -17,7 +17,7 @@ from tests.published import guard_metrics, master_metrics, slave_metrics
 
 CAMERA = CameraMetrics(1, 2.0, 3.0, 4.0, 5, 6.0, 7, 8, 9, Summary(0), Summary(0), Summary(0), "")
 WHOLE: dict[type, Any] = {
-    MasterMetrics: master_metrics(stages_ms={"solved→put": Summary(3, 1.0, 1.0, 2.0, 2.0)}),
+    MasterMetrics: master_metrics(stages_ms={"joint angles→put": Summary(3, 1.0, 1.0, 2.0, 2.0)}),
     SlaveMetrics: slave_metrics(guard=guard_metrics(dropped={"age": 2}), video=CAMERA),
 }
 

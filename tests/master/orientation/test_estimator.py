@@ -116,12 +116,12 @@ def test_a_person_s_motion_through_perfect_sensors_gives_the_joints_back() -> No
     acc = (places[0] - 2.0 * places[1] + places[2]) / h**2 + GRAVITY
     rate = to_rotation_vector(multiply(conjugate(q_before), q_after)) / (2.0 * h)
     velocity = (pose(t_s + h) - pose(t_s - h)) / (2.0 * h)
-    fuse, solver = estimator(len(node_m)), JointAngles(skeleton)
+    subject, solver = estimator(len(node_m)), JointAngles(skeleton)
     errors, velocity_errors = [], []
     for tick in range(len(t_s)):
-        fuse.update(seen_by(q[tick], rate[tick], acc[tick]))
+        subject.update(seen_by(q[tick], rate[tick], acc[tick]))
         if tick > 800 and tick % 16 == 0:
-            posture = fuse.posture()
+            posture = subject.posture()
             assert posture.valid.all()
             position_now, velocity_now = solver.solve(posture.q_world_from_segment, posture.rate_rad_s)
             errors.append(np.degrees(position_now - pose(t_s[tick : tick + 1])[0]))
@@ -136,14 +136,14 @@ def test_a_person_s_motion_through_perfect_sensors_gives_the_joints_back() -> No
 @pytest.mark.parametrize("name", ["vqf", "mahony"])
 def test_the_gyro_low_pass_s_delay_is_made_good(cutoff_hz: float, name: str) -> None:
     cutoffs = {f"{s}_cutoff_hz": cutoff_hz for s in ("accelerometer", "gyroscope", "magnetometer")}
-    fuse = estimator(6, EstimationConfig.model_validate({"filter": name, "settle_s": 0.1, **cutoffs}))
+    subject = estimator(6, EstimationConfig.model_validate({"filter": name, "settle_s": 0.1, **cutoffs}))
     turning = Turning(6, amplitude_rad_s=2.0)
     along = []
     for tick in range(800):
         readings = turning.readings()
-        fuse.update(readings)
+        subject.update(readings)
         if tick > 200:
-            error = to_rotation_vector(multiply(conjugate(turning.q), fuse.posture().q_world_from_segment))
+            error = to_rotation_vector(multiply(conjugate(turning.q), subject.posture().q_world_from_segment))
             along.append((error * readings.gyr_rad_s, readings.gyr_rad_s**2))
     lag_s = -np.sum([e for e, _ in along]) / np.sum([r for _, r in along])
     # uncorrected it is 2.5 ms early without a low-pass, and 2 ms late at 50 Hz, 12 ms at 15 Hz
@@ -151,18 +151,18 @@ def test_the_gyro_low_pass_s_delay_is_made_good(cutoff_hz: float, name: str) -> 
 
 
 def test_a_node_is_valid_once_it_has_settled() -> None:
-    fuse, truth = estimator(2), attitudes(2)
-    rest(fuse, truth, SETTLE_TICKS)
-    assert not fuse.posture().valid.any()
-    rest(fuse, truth, 1)
-    assert fuse.posture().valid.all()
-    assert np.max(angle_between(fuse.posture().q_world_from_segment, truth)) < np.radians(0.5)
+    subject, truth = estimator(2), attitudes(2)
+    rest(subject, truth, SETTLE_TICKS)
+    assert not subject.posture().valid.any()
+    rest(subject, truth, 1)
+    assert subject.posture().valid.all()
+    assert np.max(angle_between(subject.posture().q_world_from_segment, truth)) < np.radians(0.5)
 
 
 def test_a_late_node_goes_on_at_the_rate_last_heard() -> None:
     truth = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-    fuse = estimator(2)
-    rest(fuse, truth, 200)
+    subject = estimator(2)
+    rest(subject, truth, 200)
     spin = np.tile([0.0, 0.0, 1.0], (2, 1))
     late, held = np.array([[False], [True]]), seen_by(truth, spin)
     for tick in range(20):
@@ -178,8 +178,8 @@ def test_a_late_node_goes_on_at_the_rate_last_heard() -> None:
             fresh=~late[:, 0] | (tick < 10),
             lost=now.lost,
         )
-        fuse.update(readings)
-    posture = fuse.posture()
+        subject.update(readings)
+    posture = subject.posture()
     assert posture.valid.all()
     assert np.max(angle_between(posture.q_world_from_segment, truth)) < np.radians(0.5)
 
@@ -200,27 +200,27 @@ def test_a_lost_node_is_invalid_at_once_and_its_neighbours_do_not_notice() -> No
 
 
 def test_a_lost_node_rests_and_does_not_spin_on() -> None:
-    fuse, turning = estimator(1), Turning(1)
+    subject, turning = estimator(1), Turning(1)
     for _ in range(60):
         readings = turning.readings()
-        fuse.update(readings)
+        subject.update(readings)
     gone = replace(readings, fresh=np.array([False]), lost=np.array([True]))
     for _ in range(50):
-        fuse.update(gone)
-    assert np.linalg.norm(fuse.posture().rate_rad_s) < 0.2
+        subject.update(gone)
+    assert np.linalg.norm(subject.posture().rate_rad_s) < 0.2
 
 
 def test_a_node_that_returns_starts_anew_and_settles_first() -> None:
-    fuse = estimator(2)
+    subject = estimator(2)
     before, after = attitudes(2, 1), attitudes(2, 2)
     lost = np.array([False, True])
-    rest(fuse, before, 60)
-    rest(fuse, before, 10, fresh=~lost, lost=lost)
+    rest(subject, before, 60)
+    rest(subject, before, 10, fresh=~lost, lost=lost)
     moved = np.where(lost[:, None], after, before)
-    rest(fuse, moved, SETTLE_TICKS)
-    assert fuse.posture().valid.tolist() == [True, False]
-    rest(fuse, moved, 1)
-    posture = fuse.posture()
+    rest(subject, moved, SETTLE_TICKS)
+    assert subject.posture().valid.tolist() == [True, False]
+    rest(subject, moved, 1)
+    posture = subject.posture()
     assert posture.valid.all()
     # not dragged from where it was: the old filter would need seconds
     assert np.max(angle_between(posture.q_world_from_segment, moved)) < np.radians(0.5)
@@ -228,31 +228,31 @@ def test_a_node_that_returns_starts_anew_and_settles_first() -> None:
 
 @pytest.mark.parametrize("name", ["vqf", "mahony"])
 def test_without_a_magnetometer_a_returning_node_keeps_the_heading_it_had(name: str) -> None:
-    fuse = estimator(2, EstimationConfig.model_validate({"filter": name, "settle_s": 0.1}))
+    subject = estimator(2, EstimationConfig.model_validate({"filter": name, "settle_s": 0.1}))
     no_field = np.full((2, 3), np.nan)
     spin = np.tile([0.0, 0.0, 1.0], (2, 1))
     truth = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-    rest(fuse, truth, 40, mag_ut=no_field)
+    rest(subject, truth, 40, mag_ut=no_field)
     for _ in range(200):
         truth = multiply(truth, from_rotation_vector(spin / RATE_HZ))
-        fuse.update(replace(seen_by(truth, spin), mag_ut=no_field))
+        subject.update(replace(seen_by(truth, spin), mag_ut=no_field))
     lost = np.array([False, True])
-    rest(fuse, truth, 5, mag_ut=no_field, fresh=~lost, lost=lost)
+    rest(subject, truth, 5, mag_ut=no_field, fresh=~lost, lost=lost)
     # back for less than it takes to settle, which tells nothing
-    rest(fuse, truth, SETTLE_TICKS // 2, mag_ut=no_field)
-    rest(fuse, truth, 5, mag_ut=no_field, fresh=~lost, lost=lost)
+    rest(subject, truth, SETTLE_TICKS // 2, mag_ut=no_field)
+    rest(subject, truth, 5, mag_ut=no_field, fresh=~lost, lost=lost)
     leaning = multiply(truth, from_rotation_vector(np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])))
-    rest(fuse, np.where(lost[:, None], leaning, truth), SETTLE_TICKS + 1, mag_ut=no_field)
-    posture = fuse.posture()
+    rest(subject, np.where(lost[:, None], leaning, truth), SETTLE_TICKS + 1, mag_ut=no_field)
+    posture = subject.posture()
     assert posture.valid.all()
     assert angle_between(posture.q_world_from_segment, leaning)[1] < np.radians(3.0)
 
 
 def test_a_node_never_heard_gives_finite_numbers_and_is_invalid() -> None:
-    fuse = estimator(2)
+    subject = estimator(2)
     silent = np.array([False, True])
     rest(
-        fuse,
+        subject,
         attitudes(2),
         60,
         acc_m_s2=np.where(silent[:, None], 0.0, rotate(conjugate(attitudes(2)), np.tile(GRAVITY, (2, 1)))),
@@ -260,7 +260,7 @@ def test_a_node_never_heard_gives_finite_numbers_and_is_invalid() -> None:
         fresh=~silent,
         lost=silent,
     )
-    posture = fuse.posture()
+    posture = subject.posture()
     assert posture.valid.tolist() == [True, False]
     assert np.all(np.isfinite(posture.q_world_from_segment))
     assert np.all(np.isfinite(posture.rate_rad_s))
@@ -296,42 +296,42 @@ def test_an_alignment_that_is_calibrated_gives_the_segment_s_posture_and_rate() 
 def test_readings_are_calibrated_before_all_else() -> None:
     calibration = identity(1)
     calibration.affine[1, 0, :, 3] = [0.3, -0.2, 0.1]
-    fuse, truth = estimator(1, QUICK, calibration), attitudes(1)
-    rest(fuse, truth, 100, gyr_rad_s=np.array([[-0.3, 0.2, -0.1]]))
-    assert np.max(angle_between(fuse.posture().q_world_from_segment, truth)) < np.radians(0.1)
-    assert np.allclose(fuse.posture().rate_rad_s, 0.0, atol=1e-3)
+    subject, truth = estimator(1, QUICK, calibration), attitudes(1)
+    rest(subject, truth, 100, gyr_rad_s=np.array([[-0.3, 0.2, -0.1]]))
+    assert np.max(angle_between(subject.posture().q_world_from_segment, truth)) < np.radians(0.1)
+    assert np.allclose(subject.posture().rate_rad_s, 0.0, atol=1e-3)
 
 
 def test_the_gyro_s_bias_that_the_filter_learns_is_no_motion() -> None:
-    fuse, truth = estimator(1), attitudes(1)
-    rest(fuse, truth, 1600, gyr_rad_s=np.array([[0.01, -0.01, 0.005]]))
-    assert np.allclose(fuse.posture().rate_rad_s, 0.0, atol=1e-3)
+    subject, truth = estimator(1), attitudes(1)
+    rest(subject, truth, 1600, gyr_rad_s=np.array([[0.01, -0.01, 0.005]]))
+    assert np.allclose(subject.posture().rate_rad_s, 0.0, atol=1e-3)
 
 
 def test_calibrations_are_read_from_the_files_that_the_nodes_name(tmp_path: Path) -> None:
     path = tmp_path / "node.toml"
     path.write_text("q_sensor_from_segment = [0, 1, 0, 0]")
-    fuse = Estimator(QUICK, [Node(), Node(calibration=path)], RATE_HZ)
-    rest(fuse, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), 60)
-    turned = angle_between(np.array([1.0, 0.0, 0.0, 0.0]), fuse.posture().q_world_from_segment)
+    subject = Estimator(QUICK, [Node(), Node(calibration=path)], RATE_HZ)
+    rest(subject, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), 60)
+    turned = angle_between(np.array([1.0, 0.0, 0.0, 0.0]), subject.posture().q_world_from_segment)
     assert np.allclose(turned, [0.0, np.pi], atol=0.01)
 
 
 def test_a_zero_pose_zeroes_sensors_worn_askew_for_an_operator_who_faces_a_known_way() -> None:
     config = EstimationConfig(settle_s=0.1, zero_pose_s=0.5, zero_pose_heading_deg=40.0)
     alignment, facing = attitudes(5, 3), np.radians(40.0)
-    fuse = estimator(5, config)
+    subject = estimator(5, config)
     standing = multiply(heading_turn(np.full(5, facing)), conjugate(alignment))
-    rest(fuse, standing, SETTLE_TICKS + 99)
-    assert not fuse.posture().valid.any()
-    rest(fuse, standing, 1)
-    assert fuse.posture().valid.all()
+    rest(subject, standing, SETTLE_TICKS + 99)
+    assert not subject.posture().valid.any()
+    rest(subject, standing, 1)
+    assert subject.posture().valid.all()
     q = heading_turn(np.full(5, facing))
     rate = np.random.default_rng(4).normal(size=(5, 3))
     for _ in range(100):
         q = multiply(q, from_rotation_vector(rate / RATE_HZ))
-        fuse.update(seen_by(multiply(q, conjugate(alignment)), rotate(alignment, rate)))
-    posture = fuse.posture()
+        subject.update(seen_by(multiply(q, conjugate(alignment)), rotate(alignment, rate)))
+    posture = subject.posture()
     assert np.max(angle_between(posture.q_world_from_segment, q)) < np.radians(1.0)
     assert np.allclose(posture.rate_rad_s, rate, atol=0.05)
 
@@ -350,22 +350,22 @@ def test_each_node_may_have_its_own_filter() -> None:
 
 
 def test_goes_on_from_a_snapshot() -> None:
-    fuse, turning = estimator(3), Turning(3)
+    subject, turning = estimator(3), Turning(3)
     ticks = [turning.readings() for _ in range(80)]
     for readings in ticks[:15]:
-        fuse.update(readings)
-    snapshot = fuse.snapshot()
+        subject.update(readings)
+    snapshot = subject.snapshot()
     ends = []
     for _ in range(2):
         for readings in ticks[15:]:
-            fuse.update(readings)
-        ends.append(fuse.posture())
-        fuse.restore(snapshot)
+            subject.update(readings)
+        ends.append(subject.posture())
+        subject.restore(snapshot)
     assert np.array_equal(ends[0].q_world_from_segment, ends[1].q_world_from_segment)
     assert np.array_equal(ends[0].rate_rad_s, ends[1].rate_rad_s)
-    assert not fuse.posture().valid.any()
+    assert not subject.posture().valid.any()
     with pytest.raises(TypeError, match="not a snapshot"):
-        fuse.restore(())
+        subject.restore(())
 
 
 def test_a_cutoff_must_lie_below_half_the_rate() -> None:
@@ -382,16 +382,16 @@ def test_a_cutoff_must_lie_below_half_the_rate() -> None:
 def test_with_constraints_it_finds_the_same_headings_and_goes_on_from_a_snapshot(name: str) -> None:
     config = EstimationConfig.model_validate({"filter": name, "settle_s": 0.1, "constraints": "online"})
     skeleton = load_skeleton("lower_limb")
-    fuse = Estimator(config, [Node()] * 7, RATE_HZ, identity(7), skeleton)
+    subject = Estimator(config, [Node()] * 7, RATE_HZ, identity(7), skeleton)
     rng = np.random.default_rng(0)
     truth = orientations(skeleton, rng.uniform(skeleton.lower_rad, skeleton.upper_rad)[None], 0.4)[0]
-    rest(fuse, truth, 100)
-    assert np.max(angle_between(fuse.posture().q_world_from_segment, truth)) < np.radians(0.5)
-    snapshot, ends = fuse.snapshot(), []
+    rest(subject, truth, 100)
+    assert np.max(angle_between(subject.posture().q_world_from_segment, truth)) < np.radians(0.5)
+    snapshot, ends = subject.snapshot(), []
     for _ in range(2):
-        rest(fuse, truth, 40, mag_ut=np.tile([9.0, 30.0, 4.0], (7, 1)))
-        ends.append(fuse.posture().q_world_from_segment)
-        fuse.restore(snapshot)
+        rest(subject, truth, 40, mag_ut=np.tile([9.0, 30.0, 4.0], (7, 1)))
+        ends.append(subject.posture().q_world_from_segment)
+        subject.restore(snapshot)
     assert np.array_equal(ends[0], ends[1])
 
 
@@ -399,9 +399,9 @@ def test_with_constraints_a_zero_pose_gives_nodes_without_magnetometer_their_hea
     config = EstimationConfig(settle_s=0.1, zero_pose_s=0.2, zero_pose_heading_deg=40.0, constraints="online")
     alignment = attitudes(7, 5)
     calibration = replace(identity(7), q_sensor_from_segment=alignment)
-    fuse = Estimator(config, [Node()] * 7, RATE_HZ, calibration, load_skeleton("lower_limb"))
+    subject = Estimator(config, [Node()] * 7, RATE_HZ, calibration, load_skeleton("lower_limb"))
     facing = heading_turn(np.full(7, np.radians(40.0)))
-    rest(fuse, multiply(facing, conjugate(alignment)), 80, mag_ut=np.full((7, 3), np.nan))
-    posture = fuse.posture()
+    rest(subject, multiply(facing, conjugate(alignment)), 80, mag_ut=np.full((7, 3), np.nan))
+    posture = subject.posture()
     assert posture.valid.all()
     assert np.max(angle_between(posture.q_world_from_segment, facing)) < np.radians(0.5)

@@ -65,37 +65,37 @@ def test_one_wrong_value_leaves_no_trace_behind_the_low_pass(name: str, value: f
     config = EstimationConfig.model_validate({"filter": name, "settle_s": 0.1})
     for sensor in ("gyr_rad_s", "acc_m_s2", "mag_ut"):
         truth = attitudes(2)
-        fuse = Estimator(config, [Node()] * 2, RATE_HZ, identity(2))
+        subject = Estimator(config, [Node()] * 2, RATE_HZ, identity(2))
         sound = seen_by(truth, np.zeros((2, 3)))
         for tick in range(300):
             spoilt = getattr(sound, sensor).copy()
             if tick == 200:
                 spoilt[0, 1] = value
-            fuse.update(replace(sound, **{sensor: spoilt}))
+            subject.update(replace(sound, **{sensor: spoilt}))
             if tick >= 100:
-                posture = fuse.posture()
+                posture = subject.posture()
                 assert np.max(angle_between(posture.q_world_from_segment, truth)) < np.radians(1.0)
                 assert np.abs(posture.rate_rad_s).max() < 0.1
 
 
 def test_a_node_that_gives_no_numbers_is_named_and_invalid() -> None:
     truth = attitudes(2)
-    fuse = Estimator(QUICK, [Node()] * 2, RATE_HZ, identity(2))
+    subject = Estimator(QUICK, [Node()] * 2, RATE_HZ, identity(2))
     sound = seen_by(truth, np.zeros((2, 3)))
     for _ in range(200):
-        fuse.update(sound)
-    assert fuse.doubts() == {}
+        subject.update(sound)
+    assert subject.doubts() == {}
     acc = sound.acc_m_s2.copy()
     acc[1, 2] = np.nan
-    fuse.update(replace(sound, acc_m_s2=acc))
+    subject.update(replace(sound, acc_m_s2=acc))
     for _ in range(41):
-        fuse.update(sound)
-    (doubt,) = fuse.doubts().values()
+        subject.update(sound)
+    (doubt,) = subject.doubts().values()
     assert doubt.weight is Weight.TOLD
     assert doubt.words == "1 readings were no numbers, or beyond any sensor's range"
     for _ in range(41):
-        fuse.update(replace(sound, acc_m_s2=acc))
-    assert fuse.doubts()[1].weight is Weight.INVALID
+        subject.update(replace(sound, acc_m_s2=acc))
+    assert subject.doubts()[1].weight is Weight.INVALID
 
 
 def test_sound_readings_are_handed_on_as_they_are() -> None:

@@ -92,7 +92,7 @@ def wear(
     imperfections = Imperfections("calibrated", count, seed)
     cutoffs = {f"{s}_cutoff_hz": 0.25 * rate_hz for s in ("accelerometer", "gyroscope", "magnetometer")}
     config = EstimationConfig.model_validate(cutoffs | estimation)
-    fuse = Estimator(config, [Node()] * count, rate_hz, calibration, skeleton)
+    subject = Estimator(config, [Node()] * count, rate_hz, calibration, skeleton)
     solver = JointAngles(skeleton)
     fresh, lost = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     t_s, errors = [], []
@@ -102,9 +102,9 @@ def wear(
         read = imperfections.apply(sensors.read(*state, now_s))
         gyr = read[:, 3:6] + (bias_rad_s(now_s) if bias_rad_s else 0.0)
         mag = read[:, 6:] if magnetometers else np.full((count, 3), np.nan)
-        fuse.update(Readings(read[:, :3], gyr, mag, fresh, lost))
+        subject.update(Readings(read[:, :3], gyr, mag, fresh, lost))
         if tick % DECIDE_TICKS == 0:
-            posture = fuse.posture()
+            posture = subject.posture()
             solved, _ = solver.solve(posture.q_world_from_segment, posture.rate_rad_s)
             t_s.append(now_s)
             errors.append(np.degrees(solved - state[0]))
