@@ -15,7 +15,7 @@ from common.errors import CodecError, LinkError
 from common.link import Link
 from common.metrics.master import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
 from common.process.pacing import TickGrid
-from common.process.throttle import Throttle
+from common.process.throttle import LogThrottle
 from common.process.ticker import ticks
 from common.wire.codec import decode, encode
 from common.wire.instance import draw_instance
@@ -51,7 +51,7 @@ class CommandedRobot:
         self._homonyms = Homonyms(name, operator)
         self._undecodable = 0
         self._unread, self._unread_ns = "", 0
-        self._throttle = Throttle()
+        self._throttle = LogThrottle()
         self._put_command: Callable[[bytes], None] = link.publish(COMMAND)
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
         self.video = VideoWatch()

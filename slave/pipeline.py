@@ -16,7 +16,7 @@ from common.latency.arrivals import Arrivals
 from common.latency.durations import StreamedDurations
 from common.latency.one_way import one_way_ns
 from common.link.namesakes import Namesakes
-from common.process.throttle import Throttle
+from common.process.throttle import LogThrottle
 from common.quaternion import Array
 from common.wire.codec import decode, encode
 from common.wire.control import OPEN
@@ -65,7 +65,7 @@ class SlavePipeline:
         self.place = place
         self.tell: Callable[[str], None] = lambda _: None
         """What hears, at most once a second, of messages that cannot be read."""
-        self._throttle = Throttle()
+        self._throttle = LogThrottle()
         self.namesakes = Namesakes(self.instance)
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)

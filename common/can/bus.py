@@ -19,7 +19,6 @@ from common.can.config import BusConfig
 from common.can.echo import Echo
 from common.can.frame import Frame
 from common.can.interface import descriptor, error_number, open_bus
-from common.can.quiet import OncePerSecond
 from common.can.reader import DescriptorReader, Reader, ThreadReader
 from common.can.state import (
     CANNOT_SPEAK,
@@ -33,6 +32,7 @@ from common.can.state import (
 )
 from common.clock import monotonic_ns
 from common.errors import BusError
+from common.process.throttle import LogThrottle
 
 FIRST_WAIT_S = 0.1
 LONGEST_WAIT_S = 2.0
@@ -121,7 +121,7 @@ class CanBus:
         self._attempt = 0
         self._reopening: asyncio.Task[None] | None = None
         self._closing = asyncio.Event()
-        self._may_log = OncePerSecond()
+        self._throttle = LogThrottle()
 
     @property
     def up(self) -> bool:
@@ -348,7 +348,7 @@ class CanBus:
         return True
 
     def _say(self, key: str, text: str) -> None:
-        times = self._may_log.ask(key, monotonic_ns())
+        times = self._throttle.passes(monotonic_ns(), key)
         if times:
             log.warning("bus %s: %s%s", self.name, text, f" ({times} times)" if times > 1 else "")
 

@@ -12,7 +12,7 @@ from common.clock import monotonic_ns
 from common.errors import CodecError
 from common.metrics.link import TopicCounters
 from common.process.mailbox import Mailbox
-from common.process.throttle import Throttle
+from common.process.throttle import LogThrottle
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ class Inbox:
         self._loop = loop
         self._counters = counters
         self._mailbox: Mailbox[tuple[bytes, int]] = Mailbox()
-        self._throttle = Throttle()
+        self._throttle = LogThrottle()
         self._closed = False
 
     def on_sample(self, sample: zenoh.Sample) -> None:

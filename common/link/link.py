@@ -16,7 +16,7 @@ from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
 from common.link.waiting import count_peers, wait_for_peer
 from common.metrics.link import TopicCounters
-from common.process.throttle import Throttle
+from common.process.throttle import LogThrottle
 from common.wire.presence import Presence, present
 from common.wire.topics import ALIVE, Topic
 
@@ -56,7 +56,7 @@ class Link:
             raise ValueError(f"{topic.name} would block under congestion, and stall the loop")
         topic = self._quality(topic)
         counters = self._count(topic)
-        throttle = Throttle()
+        throttle = LogThrottle()
         publisher = self._session.declare_publisher(
             topic.key_for(self.robot),
             congestion_control=zenoh.CongestionControl.DROP,

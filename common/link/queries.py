@@ -14,7 +14,7 @@ from common.clock import monotonic_ns
 from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link.inbox import wake
 from common.metrics.link import TopicCounters
-from common.process.throttle import Throttle
+from common.process.throttle import LogThrottle
 from common.wire.stop import read_stop
 from common.wire.topics import Topic
 
@@ -44,7 +44,7 @@ class Answerer:
         self._handler = handler
         self._loop = loop
         self._counters = counters
-        self._throttle = Throttle()
+        self._throttle = LogThrottle()
         self._arrived = 0
         self._done = 0
         self._closed = False

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from common.clock import to_ns
 from common.metrics.link import RefusalMetrics
-from common.process.throttle import Throttle
+from common.process.throttle import LogThrottle
 
 REPEAT_S = 10.0
 """What keeps being refused is said once in so long."""
@@ -65,7 +65,7 @@ class Refusals:
         self._gone: dict[str, None] = {}
         """Of those, who is not connected any more, in the order in which they went."""
         self._pending: dict[str, Refusal] = {}
-        self._throttles: dict[Refusal, Throttle] = {}
+        self._throttle = LogThrottle(to_ns(REPEAT_S))
 
     def feed(self, line: str, now_ns: int) -> str | None:
         """Take one line without colours; words for a person's log, at most every REPEAT_S for each kind."""
@@ -76,8 +76,8 @@ class Refusals:
             self.more += 1
             return None
         self.counts[refusal] += 1
-        throttle = self._throttles.setdefault(refusal, Throttle(to_ns(REPEAT_S)))
-        return f"{refusal} ({self.counts[refusal]} so far)" if throttle.passes(now_ns) else None
+        passes = self._throttle.passes(now_ns, refusal)
+        return f"{refusal} ({self.counts[refusal]} so far)" if passes else None
 
     def _read(self, line: str) -> Refusal | None:
         for pattern in _HANDSHAKE:

@@ -15,7 +15,7 @@ import serial
 
 from common.clock import Clock, monotonic_ns
 from common.errors import RobotError
-from common.process.throttle import Throttle
+from common.process.throttle import LogThrottle
 from common.wire.messages import BaseAttitude
 from slave.attitude.attitude import turned
 from slave.attitude.base import base_attitude, less
@@ -56,7 +56,7 @@ class FrameReader:
         self._clock = clock
         self._parser = FrameParser()
         self._failures = 0
-        self._say = Throttle()
+        self._say = LogThrottle()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 

@@ -11,8 +11,8 @@ import can
 
 from common.can.bus import CanBus
 from common.can.config import BusConfig
-from common.can.deaf import open_deaf_to
 from common.can.frame import Frame
+from common.can.without_echo import open_without_function_code
 from common.clock import monotonic_ns
 from common.process.heap import freeze_heap
 from common.process.pacing import TickGrid
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 def _open(config: BusConfig) -> can.BusABC:
-    return open_deaf_to(config, TPDO1)
+    return open_without_function_code(config, TPDO1)
 
 
 async def run(config: SlaveConfig, stop: asyncio.Event, faults: Sequence[Planned] = ()) -> dict[str, object]:

@@ -9,11 +9,11 @@ import can
 
 from common.can.bus import CanBus
 from common.can.config import BusConfig
+from common.can.without_echo import open_without_longer_than
 from common.clock import to_s
 from common.metrics.suit import SuitMetrics
 from common.process.realtime import enter_real_time
 from deploy.sim.suit.config import SuitConfig
-from deploy.sim.suit.echo import open_deaf_to_answers
 from deploy.sim.suit.faults import Outgoing
 from deploy.sim.suit.peer import NewestSync, PublishTruth, SuitPeer
 from deploy.sim.suit.suit import SimulatedSuit, build_suit
@@ -45,7 +45,8 @@ async def run(
             bus.send(outgoing.frame)
 
     def opener(bus: BusConfig) -> can.BusABC:
-        return open_deaf_to_answers(bus, protocol.sync(0))
+        # its own answers, which it need not hear, are longer than a SYNC
+        return open_without_longer_than(bus, protocol.sync(0))
 
     peer = SuitPeer(suit, protocol, send, publish_truth)
     newest = NewestSync(protocol.sync_id, peer.on_frame, loop.call_soon)

@@ -15,9 +15,9 @@ import numpy as np
 
 from common.can.bus import CanBus
 from common.can.config import BusConfig
-from common.can.deaf import open_deaf_to
 from common.can.frame import Frame
 from common.can.state import Controller, ask_kernel
+from common.can.without_echo import open_without_function_code
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
 from common.errors import RobotError
 from common.latency.durations import Durations
@@ -46,9 +46,9 @@ log = logging.getLogger(__name__)
 Opener = Callable[[BusConfig], can.BusABC]
 
 
-def open_deaf_to_targets(config: BusConfig) -> can.BusABC:
+def open_without_targets(config: BusConfig) -> can.BusABC:
     """A bus that does not hear the targets it sends."""
-    return open_deaf_to(config, RPDO1)
+    return open_without_function_code(config, RPDO1)
 
 
 class CanopenServos:
@@ -63,7 +63,7 @@ class CanopenServos:
         config: CanopenConfig,
         skeleton: Skeleton,
         clock: Clock = monotonic_ns,
-        opener: Opener = open_deaf_to_targets,
+        opener: Opener = open_without_targets,
         *,
         encoders: EncoderConfig | None = None,
         last_known_rad: Mapping[str, float] | None = None,

@@ -6,8 +6,9 @@ import can
 import pytest
 
 from common.can.config import BusConfig
-from common.can.deaf import open_deaf_to
+from common.can.frame import Frame
 from common.can.interface import open_bus
+from common.can.without_echo import open_without_function_code, open_without_longer_than
 
 
 def group(channel: str, port: int) -> BusConfig:
@@ -34,7 +35,7 @@ def heard(bus: can.BusABC) -> list[int]:
 @pytest.mark.parametrize("code", [0x180, 0x200])
 def test_one_function_code_is_not_heard_and_all_others_are(port: int, code: int) -> None:
     config = group("239.74.163.41", port)
-    bus, other = open_deaf_to(config, code), open_bus(config)
+    bus, other = open_without_function_code(config, code), open_bus(config)
     try:
         ids = [
             0x000,
@@ -60,6 +61,19 @@ def test_one_function_code_is_not_heard_and_all_others_are(port: int, code: int)
         other.shutdown()
 
 
+def test_frames_longer_than_the_longest_are_not_heard(port: int) -> None:
+    config, sync = group("239.74.163.41", port), Frame(0x080, bytes(4), fd=False)
+    bus, other = open_without_longer_than(config, sync), open_bus(config)
+    try:
+        for frame_id, length in ((0x080, 4), (0x105, 5), (0x106, 8), (0x081, 0)):
+            bus.send(can.Message(arbitration_id=frame_id, is_extended_id=False, data=bytes(length)))
+        assert heard(bus) == [0x080, 0x081]
+        assert heard(other) == [0x080, 0x105, 0x106, 0x081]
+    finally:
+        bus.shutdown()
+        other.shutdown()
+
+
 def test_two_groups_at_one_port_do_not_hear_each_other(port: int) -> None:
     left, right = (open_bus(group(f"239.74.163.{n}", port)) for n in (42, 43))
     try:
@@ -73,8 +87,8 @@ def test_two_groups_at_one_port_do_not_hear_each_other(port: int) -> None:
 
 
 def test_other_interfaces_are_left_alone() -> None:
-    config = BusConfig(name="drives", interface="virtual", channel="deaf", fd=False)
-    bus, other = open_deaf_to(config, 0x200), open_bus(config)
+    config = BusConfig(name="drives", interface="virtual", channel="echo", fd=False)
+    bus, other = open_without_function_code(config, 0x200), open_bus(config)
     try:
         other.send(can.Message(arbitration_id=0x201, is_extended_id=False))
         assert heard(bus) == [0x201]
