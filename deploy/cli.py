@@ -12,10 +12,10 @@ from rich.console import Console
 
 from common.config.load import load_config
 from common.errors import TandemError
+from common.log.handler import describe_exception, flush_log, print_error
+from common.log.streams import lost_output, secure
 from common.process.extras import missing_extra
-from common.process.logs import describe_exception, flush_log, print_error
 from common.process.runtime import run as run_until_stopped
-from common.process.streams import lost_output, secure
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.calibrate.live.command import live
 from deploy.experiments.accuracy.commands import app as accuracy_app

@@ -9,7 +9,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from common.process.logs import log_level, start_log
+from common.log.handler import log_level, start_log
 
 Debug = Annotated[
     bool,

@@ -13,9 +13,9 @@ from common.clock import monotonic_ns, to_ns
 from common.clock_sync import MasterExchange
 from common.errors import CodecError, LinkError
 from common.link import Link
+from common.log.throttle import LogThrottle
 from common.metrics.master import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
 from common.process.pacing import TickGrid
-from common.process.throttle import LogThrottle
 from common.process.ticker import ticks
 from common.wire.codec import decode, encode
 from common.wire.instance import draw_instance

@@ -16,7 +16,7 @@ from common.latency.arrivals import Arrivals
 from common.latency.durations import StreamedDurations
 from common.latency.one_way import one_way_ns
 from common.link.namesakes import Namesakes
-from common.process.throttle import LogThrottle
+from common.log.throttle import LogThrottle
 from common.quaternion import Array
 from common.wire.codec import decode, encode
 from common.wire.control import OPEN

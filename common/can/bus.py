@@ -32,7 +32,7 @@ from common.can.state import (
 )
 from common.clock import monotonic_ns
 from common.errors import BusError
-from common.process.throttle import LogThrottle
+from common.log.throttle import LogThrottle
 
 FIRST_WAIT_S = 0.1
 LONGEST_WAIT_S = 2.0

@@ -10,9 +10,9 @@ import zenoh
 
 from common.clock import monotonic_ns
 from common.errors import CodecError
+from common.link.mailbox import Mailbox
+from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
-from common.process.mailbox import Mailbox
-from common.process.throttle import LogThrottle
 
 log = logging.getLogger(__name__)
 

@@ -15,8 +15,8 @@ from common.link.inbox import Inbox, wake
 from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
 from common.link.waiting import count_peers, wait_for_peer
+from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
-from common.process.throttle import LogThrottle
 from common.wire.presence import Presence, present
 from common.wire.topics import ALIVE, Topic
 

@@ -18,7 +18,7 @@ import zenoh
 
 from common.clock import monotonic_ns
 from common.link.refusals import HANDSHAKES, MESSAGES, Refusals
-from common.process.streams import lossy
+from common.log.streams import lossy
 
 PIPE_BYTES = 1 << 20
 LOOK_S = 0.1

@@ -13,8 +13,8 @@ from zenoh.handlers import Callback
 from common.clock import monotonic_ns
 from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link.inbox import wake
+from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
-from common.process.throttle import LogThrottle
 from common.wire.stop import read_stop
 from common.wire.topics import Topic
 

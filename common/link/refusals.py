@@ -12,8 +12,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 from common.clock import to_ns
+from common.log.throttle import LogThrottle
 from common.metrics.link import RefusalMetrics
-from common.process.throttle import LogThrottle
 
 REPEAT_S = 10.0
 """What keeps being refused is said once in so long."""

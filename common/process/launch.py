@@ -9,9 +9,9 @@ from pathlib import Path
 
 from common.config.load import Model, load_config
 from common.errors import TandemError
-from common.process.logs import log_level, print_error, start_log
+from common.log.handler import log_level, print_error, start_log
+from common.log.streams import secure
 from common.process.runtime import run
-from common.process.streams import secure
 
 WriteFigures = Callable[[dict[str, object]], None]
 """What a side hands its counters to when it stops."""

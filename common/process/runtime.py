@@ -15,8 +15,8 @@ from typing import Any
 
 import uvloop
 
+from common.log.handler import in_journal, with_priority
 from common.process.heap import freeze_heap, use_one_arena
-from common.process.logs import in_journal, with_priority
 
 SHUTDOWN_S = 3.0
 EXIT_HUNG = 70

@@ -15,7 +15,7 @@ import serial
 
 from common.clock import Clock, monotonic_ns
 from common.errors import RobotError
-from common.process.throttle import LogThrottle
+from common.log.throttle import LogThrottle
 from common.wire.messages import BaseAttitude
 from slave.attitude.attitude import turned
 from slave.attitude.base import base_attitude, less

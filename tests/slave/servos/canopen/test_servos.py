@@ -141,7 +141,7 @@ def drives_thread(config: CanopenConfig) -> Iterator[None]:
     )
     loop, stop = uvloop.new_event_loop(), asyncio.Event()
     thread = threading.Thread(target=lambda: loop.run_until_complete(run_drives(slave, stop)))
-    log, heard = logging.getLogger("tandem.drives"), Heard()
+    log, heard = logging.getLogger("deploy.sim.drives.app"), Heard()
     log.addHandler(heard)
     level = log.level
     log.setLevel(logging.INFO)

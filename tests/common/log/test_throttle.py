@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from common.process.throttle import LogThrottle
+from common.log.throttle import LogThrottle
 
 
 def test_it_passes_at_once_then_once_a_period_and_counts_what_it_held_back() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-HEAD = "import sys\nfrom common.process.streams import lossy, lost_output, secure\nsecure()\n"
+HEAD = "import sys\nfrom common.log.streams import lossy, lost_output, secure\nsecure()\n"
 
 
 def run(body: str, **how: object) -> subprocess.CompletedProcess[str]:
@@ -94,7 +94,7 @@ def test_a_terminal_that_somebody_made_non_blocking_loses_nothing() -> None:
 
 
 def test_a_stream_that_was_replaced_is_let_be(capsys: pytest.CaptureFixture[str]) -> None:
-    from common.process.streams import secure
+    from common.log.streams import secure
 
     before = sys.stdout, sys.stderr
     secure()

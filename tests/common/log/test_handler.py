@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import TandemError
-from common.process.logs import (
+from common.log.handler import (
     MAX_WAITING,
     LogFormatter,
     ThreadedLogHandler,
@@ -80,7 +80,7 @@ def test_a_blocked_log_delays_nobody_and_counts_the_lines_it_lost(pipe: tuple[in
     os.close(pipe[1])
     taking.join(10.0)
     text = b"".join(out).decode()
-    assert re.search(r"Z WARNING common\.process\.logs: \d+ log lines lost", text)
+    assert re.search(r"Z WARNING common\.log\.handler: \d+ log lines lost", text)
     assert text.endswith("common.x: the last\n")
 
 
@@ -145,7 +145,7 @@ def test_an_exception_is_one_line_with_its_place() -> None:
     failed = record("handler of r failed", caught("no such joint"))
     line = ON_TERMINAL.format(failed)
     assert "\n" not in line
-    assert "handler of r failed: ValueError: no such joint (test_logs.py:" in line
+    assert "handler of r failed: ValueError: no such joint (test_handler.py:" in line
     assert "Traceback" in LogFormatter(tracebacks=True, journal=False).format(failed)
     assert describe_exception(ValueError("no place")) == "ValueError: no place"
 

@@ -1,6 +1,6 @@
 import threading
 
-from common.process.mailbox import Mailbox
+from common.link.mailbox import Mailbox
 
 
 def test_the_newest_value_is_taken_once() -> None:

@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from common.errors import TandemError
-from common.process.streams import LossyRaw
+from common.log.streams import LossyRaw
 
 MAX_WAITING = 1000
 """Lines that wait to be written; further ones are lost and counted."""
