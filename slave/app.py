@@ -173,8 +173,8 @@ class Slave:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
             metrics = replace(
                 self.metrics(),
-                one_way_recent_us=self._pipeline.one_way.take_recent(),
-                one_way_missing_recent_us=self._pipeline.due.recent.take_recent(),
+                one_way_recent_us=self._pipeline.traffic.one_way.take_recent(),
+                one_way_missing_recent_us=self._pipeline.traffic.due.recent.take_recent(),
             )
             self._put_statistics(encode(Statistics(due.scheduled_ns, metrics)))
 
@@ -190,14 +190,14 @@ class Slave:
             ticks=Ticks(self._ticks_expected, self._ticks_missed),
             guard=guard.counters.metrics(str(guard.state), guard.reason),
             lease=guard.lease.metrics(monotonic_ns()),
-            stages_ms=pipeline.journeys.budget.summary(),
-            end_to_end_ms=pipeline.journeys.budget.total(),
-            one_way_ms=pipeline.one_way.summary(),
-            one_way_corrected_ms=pipeline.due.corrected.summary(),
-            commands=pipeline.arrivals.metrics(),
-            due=pipeline.due.metrics(),
-            early=pipeline.one_way.clamped,
-            unmoved=pipeline.journeys.unmoved,
+            stages_ms=pipeline.traffic.journeys.budget.summary(),
+            end_to_end_ms=pipeline.traffic.journeys.budget.total(),
+            one_way_ms=pipeline.traffic.one_way.summary(),
+            one_way_corrected_ms=pipeline.traffic.due.corrected.summary(),
+            commands=pipeline.traffic.arrivals.metrics(),
+            due=pipeline.traffic.due.metrics(),
+            early=pipeline.traffic.one_way.clamped,
+            unmoved=pipeline.traffic.journeys.unmoved,
             offset=OffsetMetrics(to_ms(offset.offset_ns), to_ms(offset.bound_ns), offset.trusted),
             undecodable=dict(pipeline.undecodable),
             base=self._base.counters() if self._base else {},

@@ -1,6 +1,7 @@
-"""The slave's whole way for one command, without a clock, a link or a servo: bytes in, setpoints out.
+"""The slave's pipeline, without a clock, a link or a servo: gate ▸ track ▸ limit ▸ write.
 
-decode ▸ guard (gates) ▸ track ▸ limit ▸ servos ▸ encoders ▸ state
+`on_command` takes a command through the gates to the tracker. `tick` asks the guard what may move, the
+tracker where to, and the limits how far; the caller writes the setpoint to the servos.
 """
 
 from __future__ import annotations
@@ -12,9 +13,6 @@ import numpy as np
 
 from common.clock_sync import Offset, SlaveExchange
 from common.errors import CodecError
-from common.latency.arrivals import Arrivals
-from common.latency.durations import StreamedDurations
-from common.latency.one_way import one_way_ns
 from common.link.namesakes import Namesakes
 from common.log.throttle import LogThrottle
 from common.quaternion import Array
@@ -29,19 +27,24 @@ from common.wire.messages import (
     Command,
     ControlReply,
     ControlRequest,
+    Mask,
     RobotState,
 )
 from common.wire.stop import StopAnswer, pack_stop_answer, read_stop
 from slave.config import SlaveConfig
-from slave.due import Due
 from slave.encoders.counts import Encoders
-from slave.guard import Guard, Setpoint
+from slave.guard import Admission, Guard, Permission
 from slave.guard.body import WELL, Body
+from slave.guard.control import Control
 from slave.guard.lease import DrawToken, random_token
-from slave.guard.states import MOVING
-from slave.journey import Journeys
+from slave.guard.states import MOVING, State
+from slave.limit.limit import Setpoint, SetpointLimiter
+from slave.limit.nearest import NearestPosture
+from slave.limit.pace import Pace
 from slave.servos.servos import EncoderReading
+from slave.track import Target, Tracker
 from slave.track.config import make_tracker
+from slave.traffic import CommandTraffic
 
 
 class SlavePipeline:
@@ -55,10 +58,12 @@ class SlavePipeline:
         place: str = "",
         *,
         last_known_rad: Mapping[str, float] | None = None,
+        guard: Guard | None = None,
+        tracker: Tracker | None = None,
     ) -> None:
         """`instance`: this process's number, drawn where it is 0; `place`: where it is, for people.
 
-        `last_known_rad`: where the joints stood last, by joint.
+        `last_known_rad`: where the joints stood last, by joint. `guard`, `tracker`: others than configured.
         """
         self.robot = config.robot
         self.instance = instance or draw_instance()
@@ -69,23 +74,23 @@ class SlavePipeline:
         self.namesakes = Namesakes(self.instance)
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
-        self.guard = Guard(
+        self.guard = guard or Guard(
             config.robot,
             self.skeleton,
             config.guard,
-            make_tracker(config.track, config.servos.chosen.bus_lag_s),
             last_known_rad=(last_known_rad or {}) if config.servos.entry.single_reading else None,
             draw_token=draw_token,
         )
+        self.control = Control(config.guard.reset_key)
+        limits = config.guard.limits(self.skeleton)
+        self.nearest = NearestPosture(self.skeleton, limits)
+        self.tracker = tracker or make_tracker(config.track, config.servos.chosen.bus_lag_s)
+        self.pace = Pace(limits, config.guard)
+        self.limiter = SetpointLimiter(self.skeleton.joint_names, limits)
+        self._episode = 0
+        """The guard's when the tracker was reset last."""
         self.clock = SlaveExchange()
-        self.journeys = Journeys()
-        self.one_way = StreamedDurations()
-        """From put to received, of every command of the lease's holder while the offset was trusted."""
-        self.due = Due()
-        """The same with the commands that were due and did not come."""
-        self._master_clock = 0
-        self.arrivals = Arrivals()
-        """Of the commands of the lease's holder, by their numbers."""
+        self.traffic = CommandTraffic()
         self.undecodable: dict[str, int] = {}
         self.on_accepted: Callable[[Command, int, Offset], None] | None = None
         """Called with every command that the guard accepts, now_ns, and the clocks' offset."""
@@ -109,16 +114,26 @@ class SlavePipeline:
         offset = self.clock.estimator.estimate(now_ns)
         # another operator's stamps are of another clock
         if command.lease and command.lease == self.guard.lease.token:
-            self.arrivals.note(command.lease, command.sequence)
-            put_ns = command.stamps.put_ns
-            transit_ns = one_way_ns(put_ns, received_ns, offset)
-            if transit_ns is not None:
-                self.one_way.record(transit_ns)
-            self.due.note(self._master_clock, command.sequence, put_ns, transit_ns)
-        if self.guard.on_command(command, received_ns, now_ns, offset).accepted:
-            self.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
+            self.traffic.received(command, received_ns, offset)
+        if self.take(command, received_ns, now_ns, offset).accepted:
+            self.traffic.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
             if self.on_accepted is not None:
                 self.on_accepted(command, now_ns, offset)
+
+    def take(self, command: Command, received_ns: int, now_ns: int, offset: Offset) -> Admission:
+        """Take a command: gate ▸ nearest posture within the site's limits ▸ tracker."""
+        admission = self.guard.admit(command, received_ns, now_ns, offset)
+        if admission.accepted:
+            self._begin_anew()
+            asked = command.position_rad
+            # by the master's own stamps: what is thought of its clock may step
+            position_rad, velocity_rad_s = self.nearest.of(
+                command.stamps.sampled_ns, asked, command.velocity_rad_s, command.valid
+            )
+            self.guard.clamped(self.nearest.clamps(now_ns, asked, position_rad))
+            sampled_ns = offset.local_ns(command.stamps.sampled_ns)
+            self.tracker.accept(sampled_ns, now_ns, position_rad, velocity_rad_s)
+        return admission
 
     def on_stop(self, payload: bytes, now_ns: int) -> bytes:
         """Answer whoever may only stop the robot, or ask how it is; never with silence."""
@@ -126,7 +141,7 @@ class SlavePipeline:
 
     def _stopped(self, by: str, now_ns: int) -> bytes:
         """Stop, and answer in the form that every version reads."""
-        reply = self.guard.on_control(ControlRequest(self.robot, Action.ESTOP, by), now_ns)
+        reply = self.control.answer(self.guard, ControlRequest(self.robot, Action.ESTOP, by), now_ns)
         return pack_stop_answer(StopAnswer(reply.done, reply.guard, reply.text, self.instance))
 
     def on_control(
@@ -147,15 +162,14 @@ class SlavePipeline:
         if request.action not in allowed:
             text = f"{request.action} is for the robot's operators: ask it where they do"
             return self._reply(ControlReply(False, self.guard.state, text))
-        reply = self.guard.on_control(request, now_ns)
+        reply = self.control.answer(self.guard, request, now_ns)
         if request.action is Action.NAMESAKE and reply.done:
             self.namesakes.on_notice(request.key, now_ns)
         if request.action is Action.CLAIM and reply.done:
             self.clock.follow(request.clock)
-            self._master_clock = request.clock
-            self.journeys.forget()
+            self.traffic.claimed(request.clock)
         if request.action is Action.RELEASE and reply.done:
-            self.due.forget()
+            self.traffic.released()
         return self._reply(reply)
 
     def _reply(self, reply: ControlReply) -> bytes:
@@ -172,16 +186,70 @@ class SlavePipeline:
         body = body if namesake is None else replace(body, namesake=namesake)
         self._reading, self._body = reading, body
         self._position_rad = self.encoders.position_rad(reading.counts)
-        self.journeys.read(reading)
-        self._setpoint = self.guard.step(
+        self.traffic.journeys.read(reading)
+        self._setpoint = self.step(
             now_ns, self._position_rad, reading.valid, reading.read_ns, body, drive_rad=reading.drive_rad
         )
         return self._setpoint
 
+    def step(
+        self,
+        now_ns: int,
+        position_rad: Array,
+        valid: Mask,
+        read_ns: int,
+        body: Body = WELL,
+        *,
+        drive_rad: Array | None = None,
+    ) -> Setpoint:
+        """Gate ▸ track ▸ limit, for joint angles (J,) as read at `read_ns`."""
+        permission = self.guard.step(now_ns, position_rad, valid, read_ns, body, drive_rad=drive_rad)
+        self._begin_anew()
+        if permission.seat_rad is not None:
+            self.limiter.seat(permission.seat_rad)
+        if not permission.ready:
+            return Setpoint(position_rad.copy(), np.zeros_like(position_rad), ready=False)
+        target = self._track(now_ns, permission)
+        if target is None:
+            self.limiter.stop(permission.dt_s)
+        else:
+            self._limit(now_ns, permission, target)
+        setpoint = self.limiter.setpoint
+        self.guard.written(now_ns, setpoint.position_rad, setpoint.velocity_rad_s)
+        return setpoint
+
+    def _track(self, now_ns: int, permission: Permission) -> Target | None:
+        """Where the operator is now; None: nowhere that the robot may go."""
+        target = self.tracker.target(now_ns) if permission.moving else None
+        if target is not None and not target.finite:
+            self.guard.lose(now_ns, "target", "the tracker's target is not finite")
+            return None
+        return target
+
+    def _limit(self, now_ns: int, permission: Permission, target: Target) -> None:
+        """Move the setpoint towards the target, as far and as fast as each joint may in this step."""
+        error_rad = self.limiter.limits.reachable(target.position_rad) - self.limiter.position_rad
+        if permission.state is State.ALIGN:
+            most = self.pace.aligning(now_ns, permission.free)
+        else:
+            most = self.pace.tracking(now_ns, error_rad, permission.free)
+        clamps = self.limiter.step(
+            now_ns, permission.dt_s, target.position_rad, target.velocity_rad_s, ~permission.free, *most
+        )
+        self.guard.clamped(clamps)
+        self.guard.approached(now_ns, error_rad)
+
+    def _begin_anew(self) -> None:
+        """After a loss, a stop or an engage: what the operator did before must not move the robot."""
+        if self._episode != self.guard.episode:
+            self._episode = self.guard.episode
+            self.tracker.reset()
+            self.nearest.forget()
+
     def written(self, now_ns: int) -> None:
         """Note that the setpoint of this turn has reached the servos."""
         if self._reading is not None and self.guard.state in MOVING:
-            self.journeys.written(now_ns, self._reading.counts)
+            self.traffic.journeys.written(now_ns, self._reading.counts)
 
     def state(self, now_ns: int) -> bytes:
         """Encode what the robot does now."""
@@ -200,7 +268,7 @@ class SlavePipeline:
                 encoder_valid=reading.valid if reading else np.zeros(len(self.skeleton.joints), np.bool_),
                 position_rad=self._position_rad,
                 setpoint_rad=self._setpoint.position_rad,
-                echo=self.journeys.echo,
+                echo=self.traffic.journeys.echo,
                 master_offset_ns=offset.offset_ns,
                 offset_bound_ns=offset.bound_ns if offset.trusted else -1,
                 faults=self._faults(),

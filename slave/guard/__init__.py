@@ -1,8 +1,9 @@
-"""Between a command and the servos: who may move the robot, when, how far and how fast."""
+"""Between a command and the servos: who may move the robot, and when."""
 
-from slave.guard.admit import GATES, Verdict
+from slave.guard.admit import GATES, Admission
 from slave.guard.config import GuardConfig
-from slave.guard.guard import Guard, Setpoint
+from slave.guard.guard import Guard
+from slave.guard.permission import Permission
 from slave.guard.states import State
 
-__all__ = ["GATES", "Guard", "GuardConfig", "Setpoint", "State", "Verdict"]
+__all__ = ["GATES", "Admission", "Guard", "GuardConfig", "Permission", "State"]

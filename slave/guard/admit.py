@@ -48,7 +48,7 @@ class Gate:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Admission:
     """What became of a command: accepted, or the gate that refused it and why."""
 
     accepted: bool
@@ -121,10 +121,10 @@ GATES: tuple[Gate, ...] = (
 """In this order, so that the deadman of a stranger's, stale or replayed command stops nobody."""
 
 
-def admit(command: Command, at: Situation, gates: Sequence[Gate] = GATES) -> Verdict:
-    """Judge a command: the first gate that refuses it names the verdict."""
+def admit(command: Command, at: Situation, gates: Sequence[Gate] = GATES) -> Admission:
+    """Judge a command: the first gate that refuses it is the one that the answer names."""
     for gate in gates:
         reason = gate.refusal(command, at)
         if reason is not None:
-            return Verdict(False, gate.name, reason)
-    return Verdict(True)
+            return Admission(False, gate.name, reason)
+    return Admission(True)

@@ -12,7 +12,7 @@ from pydantic import Field
 from common.config.section import Section
 from common.errors import ConfigMistake
 from common.skeleton import Joint, Skeleton
-from slave.limit.limit import Limits
+from slave.guard.limits import MotionLimits
 
 _Limit = Annotated[float | None, Field(allow_inf_nan=False)]
 
@@ -94,7 +94,7 @@ class GuardConfig(Section):
             for key, value, expected in (*self._contradictions(), *self._loosened(skeleton))
         ]
 
-    def limits(self, skeleton: Skeleton) -> Limits:
+    def limits(self, skeleton: Skeleton) -> MotionLimits:
         """The skeleton's limits, tightened."""
         joints = skeleton.joints
         tighter = [self.joints.get(joint.name, JointLimits()) for joint in joints]
@@ -106,7 +106,7 @@ class GuardConfig(Section):
                 for joint, v in zip(joints, values, strict=True)
             ]
 
-        return Limits(
+        return MotionLimits(
             lower_rad=np.array(pick("lower_deg", "lower_rad")),
             upper_rad=np.array(pick("upper_deg", "upper_rad")),
             max_velocity_rad_s=self.velocity_scale

@@ -5,9 +5,31 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from common.metrics.slave import GuardMetrics
-from slave.limit.clamp import Clamp
+
+
+class Rule(StrEnum):
+    """Which limit a clamp kept."""
+
+    POSITION = "position"
+    """rad: where the joint was asked to be or would have come to rest, and the limit."""
+    VELOCITY = "velocity"
+    """rad/s"""
+    ACCELERATION = "acceleration"
+    """rad/s²"""
+
+
+@dataclass(frozen=True, slots=True)
+class Clamp:
+    """A joint began to be given less than was asked; asked and given are in the rule's unit."""
+
+    at_ns: int
+    joint: str
+    rule: Rule
+    asked: float
+    given: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,7 +75,7 @@ class Past:
         return low, high
 
 
-class Plausibility:
+class EncoderPlausibility:
     """Which encoders are doubted, until they agree again and somebody engages anew."""
 
     def __init__(self, joint_names: Sequence[str], fastest_rad_s: Array, config: GuardConfig) -> None:

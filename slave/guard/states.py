@@ -20,7 +20,7 @@ class State(StrEnum):
     """Brakes to standstill and stays there until it is reset."""
 
 
-class Event(StrEnum):
+class GuardEvent(StrEnum):
     """What makes a state change."""
 
     ENCODERS_VALID = "all encoders valid"
@@ -32,16 +32,16 @@ class Event(StrEnum):
     RESET = "reset"
 
 
-TRANSITIONS: dict[tuple[State, Event], State] = {
-    (State.BOOT, Event.ENCODERS_VALID): State.HOLD,
-    (State.HOLD, Event.ENGAGE): State.ALIGN,
-    (State.ALIGN, Event.ALIGNED): State.TRACK,
-    (State.ALIGN, Event.DISENGAGE): State.HOLD,
-    (State.ALIGN, Event.LOSS): State.HOLD,
-    (State.TRACK, Event.DISENGAGE): State.HOLD,
-    (State.TRACK, Event.LOSS): State.HOLD,
-    **{(state, Event.ESTOP): State.ESTOP for state in State},
-    (State.ESTOP, Event.RESET): State.HOLD,
+TRANSITIONS: dict[tuple[State, GuardEvent], State] = {
+    (State.BOOT, GuardEvent.ENCODERS_VALID): State.HOLD,
+    (State.HOLD, GuardEvent.ENGAGE): State.ALIGN,
+    (State.ALIGN, GuardEvent.ALIGNED): State.TRACK,
+    (State.ALIGN, GuardEvent.DISENGAGE): State.HOLD,
+    (State.ALIGN, GuardEvent.LOSS): State.HOLD,
+    (State.TRACK, GuardEvent.DISENGAGE): State.HOLD,
+    (State.TRACK, GuardEvent.LOSS): State.HOLD,
+    **{(state, GuardEvent.ESTOP): State.ESTOP for state in State},
+    (State.ESTOP, GuardEvent.RESET): State.HOLD,
 }
 """Every change there is. A pair that is not listed changes nothing."""
 
@@ -49,7 +49,7 @@ MOVING = frozenset({State.ALIGN, State.TRACK})
 """The only states in which the robot follows anybody."""
 
 
-def next_state(state: State, event: Event) -> State:
+def next_state(state: State, event: GuardEvent) -> State:
     """The state after an event."""
     return TRANSITIONS.get((state, event), state)
 

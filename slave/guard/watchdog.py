@@ -71,7 +71,7 @@ class Signs:
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class LossWatch:
     """One thing that must not be lost. `loss` says in words what was, or None where nothing is amiss."""
 
     name: str
@@ -122,24 +122,24 @@ def _namesake(signs: Signs) -> str | None:
     return signs.body.namesake
 
 
-ARRIVAL_WATCHES: tuple[Watch, ...] = (
-    Watch("command", _command),
-    Watch("lease", _lease),
+ARRIVAL_WATCHES: tuple[LossWatch, ...] = (
+    LossWatch("command", _command),
+    LossWatch("lease", _lease),
     # commands without one valid joint come from nobody: a suit that is heard again must not move the robot
-    Watch("valid", _valid),
+    LossWatch("valid", _valid),
 )
 """Looked at in every step, and before a command is judged: what comes after a gap must not hide the gap."""
-BODY_WATCHES: tuple[Watch, ...] = (
-    Watch("encoder", _encoder),
-    Watch("plausible", _plausible),
-    Watch("drive", _drive),
-    Watch("base", _base),
-    Watch("namesake", _namesake),
+BODY_WATCHES: tuple[LossWatch, ...] = (
+    LossWatch("encoder", _encoder),
+    LossWatch("plausible", _plausible),
+    LossWatch("drive", _drive),
+    LossWatch("base", _base),
+    LossWatch("namesake", _namesake),
 )
 """Looked at in every step, right after the encoders were read."""
 
 
-def first_loss(watches: Sequence[Watch], signs: Signs) -> tuple[str, str] | None:
+def first_loss(watches: Sequence[LossWatch], signs: Signs) -> tuple[str, str] | None:
     """Name and words of the first loss, or None."""
     for watch in watches:
         reason = watch.loss(signs)

@@ -9,37 +9,33 @@ import numpy as np
 
 from common.quaternion import Array
 from common.wire.messages import Mask
-from slave.limit.clamp import Clamp, Rule
+from slave.guard.events import Clamp, Rule
+from slave.guard.limits import MotionLimits
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """What each joint may do at most, (J,) each."""
+class Setpoint:
+    """Where the servos are to go now. (J,) each, read-only."""
 
-    lower_rad: Array
-    upper_rad: Array
-    max_velocity_rad_s: Array
-    max_acceleration_rad_s2: Array
-
-    def reachable(self, position_rad: Array) -> Array:
-        """Positions (J,) brought within the position limits."""
-        out: Array = np.minimum(np.maximum(position_rad, self.lower_rad), self.upper_rad)
-        return out
+    position_rad: Array
+    velocity_rad_s: Array
+    ready: bool = True
+    """False until the guard knows where every joint stands: write it to no servo."""
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class LimiterStep:
     """A setpoint under way, and what it may do in the step at hand; (J,) each."""
 
     position_rad: Array
     velocity_rad_s: Array
     dt_s: float
-    limits: Limits
+    limits: MotionLimits
     max_velocity_rad_s: Array
     max_acceleration_rad_s2: Array
 
 
-Envelope = Callable[[Motion], tuple[Array, Array]]
+Envelope = Callable[[LimiterStep], tuple[Array, Array]]
 """The lowest and the highest velocity (J,) that keep a rule in this step."""
 
 
@@ -69,7 +65,7 @@ def approach(error_rad: Array, acceleration_rad_s2: Array, dt_s: float) -> Array
     return out
 
 
-def _position(motion: Motion) -> tuple[Array, Array]:
+def _position(motion: LimiterStep) -> tuple[Array, Array]:
     limits = motion.limits
     room = np.empty((2, len(limits.lower_rad)))
     np.subtract(motion.position_rad, limits.lower_rad, out=room[0])
@@ -80,11 +76,11 @@ def _position(motion: Motion) -> tuple[Array, Array]:
     return -speed[0], speed[1]
 
 
-def _velocity(motion: Motion) -> tuple[Array, Array]:
+def _velocity(motion: LimiterStep) -> tuple[Array, Array]:
     return -motion.max_velocity_rad_s, motion.max_velocity_rad_s
 
 
-def _acceleration(motion: Motion) -> tuple[Array, Array]:
+def _acceleration(motion: LimiterStep) -> tuple[Array, Array]:
     # gently up to speed where the caller wants it so; but braking may use all the joint has,
     # or a gentle limit that comes while the joint is fast would carry it beyond its position limit
     v = motion.velocity_rad_s
@@ -113,7 +109,7 @@ class SetpointLimiter:
     beyond a limit only ever moves back.
     """
 
-    def __init__(self, joint_names: Sequence[str], limits: Limits) -> None:
+    def __init__(self, joint_names: Sequence[str], limits: MotionLimits) -> None:
         self._names = tuple(joint_names)
         self._none: Mask = np.zeros(len(self._names), np.bool_)
         self.limits = limits
@@ -128,6 +124,11 @@ class SetpointLimiter:
         self.position_rad.flags.writeable = self.velocity_rad_s.flags.writeable = False
         self._clamped = dict.fromkeys(Rule, self._none)
         self._clamping = False
+
+    @property
+    def setpoint(self) -> Setpoint:
+        """The setpoint now."""
+        return Setpoint(self.position_rad, self.velocity_rad_s)
 
     @property
     def at_rest(self) -> bool:
@@ -164,7 +165,7 @@ class SetpointLimiter:
         goal_rad_s = np.where(beyond, 0.0, target_rad_s)
         error = goal - self.position_rad - goal_rad_s * dt_s
         wish = np.where(held, 0.0, goal_rad_s + approach(error, max_acceleration_rad_s2, dt_s))
-        motion = Motion(
+        motion = LimiterStep(
             self.position_rad, self.velocity_rad_s, dt_s, self.limits,
             max_velocity_rad_s, max_acceleration_rad_s2,
         )  # fmt: skip
@@ -187,7 +188,13 @@ class SetpointLimiter:
         self.position_rad, self.velocity_rad_s = after, velocity_rad_s
 
     def _clamps(
-        self, now_ns: int, target_rad: Array, beyond: Mask, free: Mask, given: list[Array], motion: Motion
+        self,
+        now_ns: int,
+        target_rad: Array,
+        beyond: Mask,
+        free: Mask,
+        given: list[Array],
+        motion: LimiterStep,
     ) -> list[Clamp]:
         """Those that began in this step. A held joint brakes by order, and is not clamped by a rule."""
         clamps: list[Clamp] = []
@@ -210,7 +217,7 @@ class SetpointLimiter:
         asked_rad_s: float,
         given_rad_s: float,
         target_rad: Array,
-        motion: Motion,
+        motion: LimiterStep,
     ) -> tuple[float, float]:
         """What was asked and what was given, in the rule's unit."""
         if rule is Rule.VELOCITY:

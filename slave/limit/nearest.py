@@ -19,8 +19,8 @@ from common.reach import Reach
 from common.skeleton import Skeleton
 from common.skeleton.kinematics import relative_orientations
 from common.wire.messages import Mask
-from slave.limit.clamp import Clamp, Rule
-from slave.limit.limit import Limits
+from slave.guard.events import Clamp, Rule
+from slave.guard.limits import MotionLimits
 
 _H_S = 1e-4
 """Of the central difference that gives the segments' rates."""
@@ -30,7 +30,7 @@ _NOTICED_RAD = math.radians(0.1)
 class NearestPosture:
     """What the operator's commands become where a limit of several joints of one segment is tightened."""
 
-    def __init__(self, skeleton: Skeleton, limits: Limits) -> None:
+    def __init__(self, skeleton: Skeleton, limits: MotionLimits) -> None:
         self._skeleton = skeleton
         self._names: Sequence[str] = skeleton.joint_names
         self._reach = Reach(skeleton, limits.lower_rad, limits.upper_rad)

@@ -15,7 +15,8 @@ import numpy as np
 
 from common.clock import to_ns
 from common.quaternion import Array
-from slave.limit.limit import Limits, SetpointLimiter
+from slave.guard.limits import MotionLimits
+from slave.limit.limit import SetpointLimiter
 from slave.track.config import TrackConfig, make_tracker
 from slave.track.tracker import Tracker
 
@@ -177,7 +178,7 @@ def _samples(operator: Operator, world: World) -> Iterator[tuple[float, tuple[fl
 
 def _limiter(world: World, position_rad: Array) -> SetpointLimiter:
     one = np.ones(world.joints)
-    limits = Limits(
+    limits = MotionLimits(
         -math.pi * one,
         math.pi * one,
         math.radians(world.max_velocity_deg_s) * one,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,6 +17,14 @@ class Target:
     """(J,)"""
     velocity_rad_s: Array
     """(J,) rate of change of `position_rad`; for feed-forward and for judging, not for integration."""
+
+    @property
+    def finite(self) -> bool:
+        """Whether every value is a number."""
+        # a sum of squares is finite only if every value is, and costs a third of asking each
+        return math.isfinite(
+            self.position_rad @ self.position_rad + self.velocity_rad_s @ self.velocity_rad_s
+        )
 
 
 class Tracker(Protocol):

@@ -20,6 +20,7 @@ SAMPLE_PATH = [
     "slave/app.py",
     "slave/pipeline.py",
     "slave/guard/guard.py",
+    "slave/guard/commands.py",
     "slave/guard/admit.py",
     "slave/track/predict.py",
     "slave/track/estimate.py",

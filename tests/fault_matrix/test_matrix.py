@@ -17,7 +17,7 @@ from deploy.experiments.faults.trial import run_trial
 from slave.encoders.agreement import Agreement
 from slave.encoders.unbidden import UnbiddenMotion
 from slave.guard import GATES, states
-from slave.guard.states import Event
+from slave.guard.states import GuardEvent
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES
 
 TABLE = {fault.name: fault for fault in FAULTS}
@@ -102,7 +102,9 @@ def test_a_row_of_the_estimate_fails_without_its_setting(name: str, without: str
 def test_an_emergency_stop_fails_without_its_transition(monkeypatch: pytest.MonkeyPatch) -> None:
     fault = TABLE["emergency stop in track"]
     # a table without it, not the table itself: put back, it would stand at another place
-    rest = {pair: after for pair, after in states.TRANSITIONS.items() if pair != (fault.begins, Event.ESTOP)}
+    rest = {
+        pair: after for pair, after in states.TRANSITIONS.items() if pair != (fault.begins, GuardEvent.ESTOP)
+    }
     monkeypatch.setattr(states, "TRANSITIONS", rest)
     assert run_trial(fault).wrong
 

@@ -90,7 +90,7 @@ def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
     slave = app.Slave(
         SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"])), link, servos
     )
-    slave._pipeline.one_way.record(3_000_000)
+    slave._pipeline.traffic.one_way.record(3_000_000)
     asyncio.run(slave._tell())
     assert words == [(3000,), ()]
 

@@ -71,7 +71,7 @@ def test_a_query_that_is_no_query_changes_nothing(pipeline: SlavePipeline) -> No
 
 
 def test_a_new_holder_never_sees_the_echo_of_the_last_ones_commands(pipeline: SlavePipeline) -> None:
-    pipeline.journeys.echo = CommandEcho(9, 1, 2, 3, 4)
+    pipeline.traffic.journeys.echo = CommandEcho(9, 1, 2, 3, 4)
     assert claim(pipeline, "anna", 8, NS_PER_S).done
     state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
     assert state.operator == "anna"
@@ -79,7 +79,7 @@ def test_a_new_holder_never_sees_the_echo_of_the_last_ones_commands(pipeline: Sl
 
 
 def test_the_state_names_a_joint_whose_encoder_is_not_believed(pipeline: SlavePipeline) -> None:
-    pipeline.guard._plausible.words["neck_yaw"] = "the encoder jumps"
+    pipeline.guard._joints.plausible.words["neck_yaw"] = "the encoder jumps"
     state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
     assert state.faults["neck_yaw"] == "the encoder jumps"
 

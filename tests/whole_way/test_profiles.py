@@ -11,7 +11,7 @@ from common.skeleton.synergy import synergy_positions
 from common.wire.messages import Action
 from deploy.measure import Accuracy, Motion, accuracy, motion
 from deploy.sim.world.whole_way import VirtualRun, World
-from slave.limit.limit import Limits
+from slave.guard.limits import MotionLimits
 
 ZERO_POSE = {"master": ["estimation.zero_pose_s=1.0"]}
 
@@ -69,7 +69,7 @@ def test_the_whole_robot_moves_and_late_by_less_than_25_ms(either: Run) -> None:
 
 def test_the_setpoint_stays_within_every_limit(either: Run) -> None:
     config = either.run.slave_config
-    limits: Limits = config.guard.limits(config.skeleton)
+    limits: MotionLimits = config.guard.limits(config.skeleton)
     setpoints = np.array([state.setpoint_rad for state in either.run.states])
     assert (setpoints >= limits.lower_rad - 1e-6).all()
     assert (setpoints <= limits.upper_rad + 1e-6).all()

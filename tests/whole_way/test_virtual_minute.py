@@ -56,7 +56,7 @@ def test_the_slave_knows_the_masters_clock_within_its_bound(minute: VirtualRun) 
 
 
 def test_the_latency_budget_adds_up(minute: VirtualRun) -> None:
-    budget = minute.slave.journeys.budget
+    budget = minute.slave.traffic.journeys.budget
     stages = budget.summary()
     assert sum(stage.mean or 0.0 for stage in stages.values()) == pytest.approx(budget.total().mean)
     assert stages["put→received"].mean == pytest.approx(2.0, abs=0.1)

@@ -14,7 +14,7 @@ STILL_S = 5.0
 def stood_still() -> VirtualRun:
     run = engaged(World())
     run.run(20.0)
-    assert run.slave.due.metrics().missing == 0
+    assert run.slave.traffic.due.metrics().missing == 0
     run.stand_still(STILL_S)
     run.run(10.0)
     return run
@@ -22,13 +22,13 @@ def stood_still() -> VirtualRun:
 
 def test_no_number_tells_of_it_and_time_does(stood_still: VirtualRun) -> None:
     slave = stood_still.slave
-    assert slave.arrivals.metrics().lost == 0
-    assert slave.due.metrics().missing == pytest.approx(12.5 * STILL_S, abs=4)
+    assert slave.traffic.arrivals.metrics().lost == 0
+    assert slave.traffic.due.metrics().missing == pytest.approx(12.5 * STILL_S, abs=4)
 
 
 def test_the_raw_one_way_hides_it_and_the_corrected_one_shows_it(stood_still: VirtualRun) -> None:
     slave = stood_still.slave
-    raw, corrected = slave.one_way.summary(), slave.due.corrected.summary()
+    raw, corrected = slave.traffic.one_way.summary(), slave.traffic.due.corrected.summary()
     assert raw.max is not None
     assert raw.max < 10.0
     assert corrected.max == pytest.approx(1e3 * STILL_S, abs=300.0)

@@ -22,9 +22,9 @@ from deploy.measure.stillness import Course
 from deploy.sim.suit.motion import Motion, parse_motion
 from deploy.sim.world.whole_way import VirtualRun, World
 from slave.encoders.counts import Encoders
-from slave.guard import Guard, Setpoint, State
+from slave.guard import Guard, State
+from slave.limit.limit import Setpoint
 from slave.servos.servos import EncoderReading
-from slave.track.config import make_tracker
 
 RESET_KEY = "kept at the robot"
 UP_NS = 7_200 * NS_PER_S
@@ -63,7 +63,7 @@ class Scene:
         config = self.run.slave_config
         self.skeleton = config.skeleton
         self.run.slave.guard = Guard(
-            config.robot, self.skeleton, config.guard, make_tracker(config.track),
+            config.robot, self.skeleton, config.guard,
             draw_token=itertools.count(TODAYS_TOKENS).__next__, **guard_options,
         )  # fmt: skip
         self.foul = 0
@@ -138,7 +138,7 @@ class Scene:
         """The same, had the codec let it pass."""
         now_ns = self.run.slave_ns
         offset = self.run.slave.clock.estimator.estimate(now_ns)
-        self.foul += self.guard.on_command(command, now_ns, now_ns, offset).accepted
+        self.foul += self.run.slave.take(command, now_ns, now_ns, offset).accepted
 
     def ask(self, action: Action, operator: str) -> None:
         """Ask for what must be refused."""

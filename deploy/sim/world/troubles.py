@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from common.quaternion import Array
-from slave.guard import Setpoint
 from slave.guard.body import WELL, Body
+from slave.limit.limit import Setpoint
 from slave.servos.servos import EncoderReading
 
 

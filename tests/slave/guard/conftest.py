@@ -10,12 +10,16 @@ import numpy as np
 import pytest
 
 from common.clock_sync import Offset
+from common.link.config import LinkConfig
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.control import CHALLENGED
 from common.wire.messages import Action, Command, CommandStamps, ControlReply, ControlRequest
-from slave.guard import Guard, GuardConfig, Setpoint, State, Verdict
+from slave.config import SlaveConfig
+from slave.guard import Admission, Guard, GuardConfig, State
 from slave.guard.body import WELL
+from slave.limit.limit import Setpoint
+from slave.pipeline import SlavePipeline
 from slave.track import Target
 
 ROBOT = "robot-1"
@@ -58,7 +62,12 @@ class Rig:
         self.tracker = NewestTracker()
         self.tokens = iter(range(1001, 1_000_000))
         guard_options.setdefault("draw_token", lambda: next(self.tokens))
-        self.guard = Guard(ROBOT, self.skeleton, self.config, self.tracker, **guard_options)
+        self.guard = Guard(ROBOT, self.skeleton, self.config, **guard_options)
+        self.pipeline = SlavePipeline(
+            SlaveConfig(robot=ROBOT, link=LinkConfig(), guard=self.config),
+            guard=self.guard,
+            tracker=self.tracker,
+        )
         self.now_ns = 10_000_000_000
         self.measured = 0.5 * (self.skeleton.lower_rad + self.skeleton.upper_rad)
         self.encoder_valid = np.ones(self.joints, np.bool_)
@@ -88,11 +97,11 @@ class Rig:
         )  # fmt: skip
         return replace(good, **changes)
 
-    def give(self, command: Command, received_ns: int | None = None) -> Verdict:
+    def give(self, command: Command, received_ns: int | None = None) -> Admission:
         received_ns = self.now_ns if received_ns is None else received_ns
-        return self.guard.on_command(command, received_ns, self.now_ns, self.offset)
+        return self.pipeline.take(command, received_ns, self.now_ns, self.offset)
 
-    def send(self, **changes: Any) -> Verdict:
+    def send(self, **changes: Any) -> Admission:
         """The master's next command."""
         self.sequence += 1
         return self.give(self.command(**changes))
@@ -108,9 +117,11 @@ class Rig:
         """Ask in the way of `common.wire.control`, or with a challenge of one's own."""
         request = ControlRequest(robot, action, operator, key, challenge=challenge or 0)
         if challenge is None and action in CHALLENGED:
-            given = self.guard.on_control(replace(request, action=Action.STATUS), self.now_ns).challenge
+            given = self.pipeline.control.answer(
+                self.guard, replace(request, action=Action.STATUS), self.now_ns
+            ).challenge
             request = replace(request, challenge=given)
-        return self.guard.on_control(request, self.now_ns)
+        return self.pipeline.control.answer(self.guard, request, self.now_ns)
 
     def claim(self, operator: str = "anna") -> ControlReply:
         reply = self.ask(Action.CLAIM, operator)
@@ -123,7 +134,7 @@ class Rig:
         read_ns = self.now_ns - self.encoder_delay_ns
         shown = self.shown()
         drive_rad = None if self.drive_off_rad is None else shown + self.drive_off_rad
-        setpoint = self.guard.step(
+        setpoint = self.pipeline.step(
             self.now_ns, shown, self.encoder_valid, read_ns, self.body, drive_rad=drive_rad
         )
         if self.coupled and setpoint.ready:

@@ -109,7 +109,7 @@ def encoder_lost(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.HOLD
 
 
-@about("watch plausible", "Plausibility.too_many")
+@about("watch plausible", "EncoderPlausibility.too_many")
 def many_liars(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
     rig.lies = {joint: lambda true: true + 0.2 for joint in range(5)}
@@ -203,8 +203,8 @@ about("condition _valid")(
 about("condition _encoder")(not_engaged(deaf))
 about("condition _body")(not_engaged(sick))
 about("condition _rest")(not_engaged(braking))
-about("condition _strayed", "Guard._strayed")(not_engaged(astray))
-about("condition _unsettled", "Plausibility.unsettled")(not_engaged(doubtful))
+about("condition _strayed", "JointReadings.strayed")(not_engaged(astray))
+about("condition _unsettled", "EncoderPlausibility.unsettled")(not_engaged(doubtful))
 
 
 # limits
@@ -247,7 +247,7 @@ def target_at_the_limit(make_rig: MakeRig) -> None:
     never_stopped_by_force(rig)
 
 
-@about("Limits.reachable")
+@about("MotionLimits.reachable")
 def target_beyond(make_rig: MakeRig) -> None:
     """Who reaches beyond what the robot can is aligned where it stands at its limit."""
     rig = make_rig().to_leased()
@@ -278,7 +278,7 @@ def late_step(make_rig: MakeRig) -> None:
     assert (moved <= rig.skeleton.max_velocity_rad_s * rig.config.max_step_s + 1e-9).all()
 
 
-@about("guard._finite")
+@about("Target.finite")
 def broken_tracker(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
     rig.tracker.newest = type(rig.tracker.newest)(np.full(rig.joints, np.nan), np.zeros(rig.joints))
@@ -289,7 +289,7 @@ def broken_tracker(make_rig: MakeRig) -> None:
 # align
 
 
-@about("Alignment.done")
+@about("AlignProgress.done")
 def slow_first(make_rig: MakeRig) -> None:
     rig = make_rig().to_leased()
     rig.target = rig.target + 0.3
@@ -299,7 +299,7 @@ def slow_first(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.ALIGN
 
 
-@about("Alignment.overdue")
+@about("AlignProgress.overdue")
 def never_there(make_rig: MakeRig) -> None:
     rig = make_rig(GuardConfig(align_timeout_s=0.5)).to_leased()
     rig.target = rig.target + 0.6
@@ -308,7 +308,7 @@ def never_there(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.HOLD
 
 
-@about("Rejoin.maxima")
+@about("Pace.tracking")
 def slowly_back(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
     lost = np.ones(rig.joints, np.bool_)
@@ -333,7 +333,7 @@ def lost_joint(make_rig: MakeRig) -> None:
 # encoders that lie
 
 
-@about("Plausibility.judge", "Past.span")
+@about("EncoderPlausibility.judge", "Past.span")
 def liar(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
     rig.lies[ELBOW] = lambda true: true + 0.15
@@ -345,7 +345,7 @@ def liar(make_rig: MakeRig) -> None:
     assert rig.setpoints[-1].position_rad[ELBOW] == held
 
 
-@about("Plausibility._jumps")
+@about("EncoderPlausibility._jumps")
 def jumper(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
     turn = iter(range(10**6))
@@ -354,7 +354,7 @@ def jumper(make_rig: MakeRig) -> None:
     assert rig.guard.doubts
 
 
-@about("Plausibility.trust")
+@about("EncoderPlausibility.trust")
 def mended(make_rig: MakeRig) -> None:
     rig = make_rig()
     doubtful(rig)

@@ -22,7 +22,7 @@ def with_value(rig: Any, value: float) -> Any:
 
 
 def newest(rig: Any) -> int:
-    return int(rig.guard._newest_sequence)
+    return int(rig.guard._commands._newest_sequence)
 
 
 def oldest_ns(rig: Any) -> int:

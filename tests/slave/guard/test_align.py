@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from slave.guard import State, align
-from slave.guard.align import Alignment, Rejoin
+from slave.guard.align import AlignProgress
 from slave.guard.config import GuardConfig
+from slave.limit.pace import Pace
 from slave.track.config import TrackConfig, make_tracker
 
 MakeRig = Callable[..., Any]
@@ -18,13 +19,13 @@ CONFIG = GuardConfig(align_window_rad=0.05, align_dwell_s=0.2, align_timeout_s=1
 
 
 @pytest.fixture
-def alignment() -> Alignment:
-    out = Alignment(["a", "b", "c"], CONFIG)
+def alignment() -> AlignProgress:
+    out = AlignProgress(["a", "b", "c"], CONFIG)
     out.begin(0)
     return out
 
 
-def test_it_is_done_after_the_dwell_time_and_not_before(alignment: Alignment) -> None:
+def test_it_is_done_after_the_dwell_time_and_not_before(alignment: AlignProgress) -> None:
     near = np.array([0.05, -0.05, 0.0])
     assert not alignment.done(10 * MS, near, ALL)
     assert not alignment.done(210 * MS - 1, near, ALL)
@@ -32,13 +33,13 @@ def test_it_is_done_after_the_dwell_time_and_not_before(alignment: Alignment) ->
 
 
 @pytest.mark.parametrize("error", [0.0500001, -0.0500001, 3.0, -3.0])
-def test_a_joint_outside_on_either_side_is_waited_for(alignment: Alignment, error: float) -> None:
+def test_a_joint_outside_on_either_side_is_waited_for(alignment: AlignProgress, error: float) -> None:
     """A start gate without abs() would let a robot start that is far off on one side."""
     for ms in range(0, 1000, 5):
         assert not alignment.done(ms * MS, np.array([0.0, error, 0.0]), ALL)
 
 
-def test_leaving_the_window_begins_the_dwell_time_anew(alignment: Alignment) -> None:
+def test_leaving_the_window_begins_the_dwell_time_anew(alignment: AlignProgress) -> None:
     assert not alignment.done(0, np.zeros(3), ALL)
     assert not alignment.done(150 * MS, np.array([0.0, 0.1, 0.0]), ALL)
     assert not alignment.done(155 * MS, np.zeros(3), ALL)
@@ -46,18 +47,18 @@ def test_leaving_the_window_begins_the_dwell_time_anew(alignment: Alignment) -> 
     assert alignment.done(355 * MS, np.zeros(3), ALL)
 
 
-def test_joints_that_are_not_valid_are_not_waited_for(alignment: Alignment) -> None:
+def test_joints_that_are_not_valid_are_not_waited_for(alignment: AlignProgress) -> None:
     error, valid = np.array([0.0, 9.0, 0.0]), np.array([True, False, True])
     alignment.done(0, error, valid)
     assert alignment.done(200 * MS, error, valid)
 
 
-def test_with_no_valid_joint_at_all_it_never_is(alignment: Alignment) -> None:
+def test_with_no_valid_joint_at_all_it_never_is(alignment: AlignProgress) -> None:
     for ms in range(0, 1000, 5):
         assert not alignment.done(ms * MS, np.zeros(3), ~ALL)
 
 
-def test_it_gives_up_after_its_time_out_and_names_the_farthest_joint(alignment: Alignment) -> None:
+def test_it_gives_up_after_its_time_out_and_names_the_farthest_joint(alignment: AlignProgress) -> None:
     alignment.done(0, np.array([0.1, -0.3, 0.2]), ALL)
     assert alignment.overdue(15_000 * MS) is None
     assert alignment.overdue(15_000 * MS + 1) == "not aligned within 15 s: b is 0.30 rad away"
@@ -231,13 +232,13 @@ def test_all_nodes_lost_stops_every_joint_before_the_robot_holds(rig: Any) -> No
     assert rig.guard.state is State.TRACK
     rig.run(0.2, valid=np.zeros(rig.joints, np.bool_))
     assert rig.guard.state is State.HOLD
-    assert rig.guard._limiter.at_rest
+    assert rig.pipeline.limiter.at_rest
 
 
 @pytest.mark.parametrize("strategy", ["latest", "interpolate", "predict"])
 def test_a_target_that_sweeps_past_a_held_joint_does_not_let_it_go(rig: Any, strategy: str) -> None:
     # the master says 0 of a lost joint: on return the target comes from there, past where it is held
-    rig.guard._tracker = make_tracker(TrackConfig.model_validate({"strategy": strategy}))
+    rig.pipeline.tracker = make_tracker(TrackConfig.model_validate({"strategy": strategy}))
     rig.target[6] = 0.4
     rig.measured = rig.measured.copy()
     rig.measured[6] = 0.4
@@ -252,11 +253,11 @@ def test_a_target_that_sweeps_past_a_held_joint_does_not_let_it_go(rig: Any, str
     assert max(abs(s.velocity_rad_s[6]) for s in back) <= rig.config.align_velocity_rad_s + 1e-12
 
 
-def test_without_rejoin_it_would_come_back_at_full_speed(rig: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: Rejoin, now_ns: int, error_rad: Any, valid: Any) -> Any:
+def test_without_pace_it_would_come_back_at_full_speed(rig: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: Pace, now_ns: int, error_rad: Any, valid: Any) -> Any:
         return self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2
 
-    monkeypatch.setattr(Rejoin, "maxima", full)
+    monkeypatch.setattr(Pace, "tracking", full)
     rig.to_track()
     rig.target = rig.target + 0.7
     rig.run(1.0, valid=lost(rig, 6))

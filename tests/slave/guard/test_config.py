@@ -10,7 +10,6 @@ from common.config.load import check_config
 from common.errors import ConfigError
 from common.skeleton import load_skeleton
 from slave.guard import Guard, GuardConfig
-from slave.track import Tracker
 
 SKELETON = load_skeleton("nursing")
 
@@ -123,7 +122,6 @@ def test_single_joints_are_tightened() -> None:
     assert limits.max_velocity_rad_s[1] == pytest.approx(0.5 * SKELETON.max_velocity_rad_s[1])
 
 
-def test_a_guard_cannot_be_made_of_a_wrong_configuration(rig: Any) -> None:
-    tracker: Tracker = rig.tracker
+def test_a_guard_cannot_be_made_of_a_wrong_configuration() -> None:
     with pytest.raises(ConfigError, match=r"robot-1: guard\.lease_timeout_s"):
-        Guard("robot-1", SKELETON, GuardConfig(command_timeout_s=1.5), tracker)
+        Guard("robot-1", SKELETON, GuardConfig(command_timeout_s=1.5))

@@ -7,7 +7,7 @@ from common.skeleton import load_skeleton
 from slave.encoders.counts import Encoders
 from slave.guard import GuardConfig
 from slave.guard.placed import Placement
-from slave.guard.plausible import Plausibility
+from slave.guard.plausible import EncoderPlausibility
 from slave.limit.limit import SetpointLimiter
 from slave.servos.mujoco.simulated import SimulatedRobot
 
@@ -22,7 +22,7 @@ def test_a_joint_flung_to_and_fro_at_its_limits_is_believed(profile: str) -> Non
     target = np.clip(np.zeros(len(names)), skeleton.lower_rad, skeleton.upper_rad)
     robot = SimulatedRobot(skeleton, position_rad=target)
     limiter, encoders = SetpointLimiter(names, limits), Encoders(skeleton)
-    part = Plausibility(names, skeleton.max_velocity_rad_s, config)
+    part = EncoderPlausibility(names, skeleton.max_velocity_rad_s, config)
     placement = Placement(names, skeleton.lower_rad, skeleton.upper_rad)
     limiter.seat(target)
     part.note(0, target)

@@ -23,14 +23,17 @@ from slave.guard import (
     control,
     engage,
     guard,
+    joints,
     lease,
+    limits,
     placed,
     plausible,
     states,
     tilt,
     watchdog,
 )
-from slave.limit import limit
+from slave.limit import limit, pace
+from slave.track import tracker
 
 from .scenarios import SCENARIOS
 
@@ -109,28 +112,28 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (lease.Lease, "lapse", lambda *_: False),
     (lease.Lease, "claim", free_for_all),
     (limit.SetpointLimiter, "stop", nothing),
-    (limit.Limits, "reachable", lambda _, position_rad: position_rad),
-    (align.Alignment, "done", lambda *_: True),
-    (align.Alignment, "overdue", nothing),
+    (limits.MotionLimits, "reachable", lambda _, position_rad: position_rad),
+    (align.AlignProgress, "done", lambda *_: True),
+    (align.AlignProgress, "overdue", nothing),
     (
-        align.Rejoin,
-        "maxima",
+        pace.Pace,
+        "tracking",
         lambda self, *_: (self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2),
     ),
-    (plausible.Plausibility, "judge", lambda *_: []),
-    (plausible.Plausibility, "_jumps", lambda self, *_: np.zeros(len(self._names), np.bool_)),
-    (plausible.Plausibility, "too_many", nothing),
-    (plausible.Plausibility, "unsettled", nothing),
-    (plausible.Plausibility, "trust", nothing),
+    (plausible.EncoderPlausibility, "judge", lambda *_: []),
+    (plausible.EncoderPlausibility, "_jumps", lambda self, *_: np.zeros(len(self._names), np.bool_)),
+    (plausible.EncoderPlausibility, "too_many", nothing),
+    (plausible.EncoderPlausibility, "unsettled", nothing),
+    (plausible.EncoderPlausibility, "trust", nothing),
     (plausible.Past, "span", lambda self, _: (self._low.min(0) - 9.0, self._high.max(0) + 9.0)),
     (agreement.Agreement, "judge", nothing),
     (placed.Placement, "unplaced", nothing),
     (unbidden.UnbiddenMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_)),
     (unbidden.UnbiddenMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_)),
-    (guard.Guard, "_strayed", nothing),
+    (joints.JointReadings, "strayed", nothing),
     (guard.Guard, "_elapsed_s", unbounded_s),
-    (guard.Guard, "_believed", lambda self: np.ones_like(self._valid)),
-    (guard, "_finite", lambda _: True),
+    (guard.Guard, "_believed", lambda self: np.ones_like(self._commands.valid)),
+    (tracker.Target, "finite", True),
 )
 """What stands in no list: owner, its attribute, and what it does once it is taken away."""
 

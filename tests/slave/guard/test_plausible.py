@@ -10,7 +10,7 @@ from common.skeleton import load_skeleton
 from common.wire.messages import Action
 from slave.guard import GuardConfig, State
 from slave.guard.body import WELL
-from slave.guard.plausible import JUMP_SLACK_RAD, Past, Plausibility
+from slave.guard.plausible import JUMP_SLACK_RAD, EncoderPlausibility, Past
 from slave.guard.watchdog import BODY_WATCHES
 
 MakeRig = Callable[..., Any]
@@ -59,11 +59,11 @@ def lying(rig: Any) -> Lying:
 # the part by itself
 
 
-def plausibility(**changes: Any) -> Plausibility:
-    return Plausibility(JOINTS, SKELETON.max_velocity_rad_s, GuardConfig(**changes))
+def plausibility(**changes: Any) -> EncoderPlausibility:
+    return EncoderPlausibility(JOINTS, SKELETON.max_velocity_rad_s, GuardConfig(**changes))
 
 
-def feed(part: Plausibility, off_rad: Any, readings: int, start: int = 0) -> int:
+def feed(part: EncoderPlausibility, off_rad: Any, readings: int, start: int = 0) -> int:
     """Standing setpoints at 0 and one joint off by that much; the reading that raised the doubt, or 0."""
     for i in range(start + 1, start + readings + 1):
         part.note(i * TICK, np.zeros(len(JOINTS)))
@@ -191,7 +191,7 @@ def test_a_stuck_encoder_holds_its_joint_alone(lying: Lying, rate: float) -> Non
 
 
 def test_without_the_doubt_it_would_move_on(lying: Lying, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Plausibility, "_doubt", lambda *_: [])
+    monkeypatch.setattr(EncoderPlausibility, "_doubt", lambda *_: [])
     stuck = float(lying.true_rad[LEFT])
     lying.lies[LEFT] = lambda _: stuck
     lying.run(0.8, 1.0)

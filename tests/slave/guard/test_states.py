@@ -4,48 +4,48 @@ import pytest
 
 import slave.guard
 from slave.guard import GATES, State
-from slave.guard.states import MOVING, TRANSITIONS, Event, mermaid, next_state
+from slave.guard.states import MOVING, TRANSITIONS, GuardEvent, mermaid, next_state
 
 README = (Path(slave.guard.__file__).parent / "README.md").read_text("utf-8")
 
 
 def test_only_engage_from_hold_begins_to_move() -> None:
     assert {pair for pair, after in TRANSITIONS.items() if after is State.ALIGN} == {
-        (State.HOLD, Event.ENGAGE)
+        (State.HOLD, GuardEvent.ENGAGE)
     }
 
 
 def test_only_alignment_leads_to_track() -> None:
     assert {pair for pair, after in TRANSITIONS.items() if after is State.TRACK} == {
-        (State.ALIGN, Event.ALIGNED)
+        (State.ALIGN, GuardEvent.ALIGNED)
     }
 
 
 @pytest.mark.parametrize("state", State)
 def test_estop_wins_in_every_state(state: State) -> None:
-    assert next_state(state, Event.ESTOP) is State.ESTOP
+    assert next_state(state, GuardEvent.ESTOP) is State.ESTOP
 
 
-@pytest.mark.parametrize("event", sorted(set(Event) - {Event.RESET}))
-def test_nothing_but_reset_leaves_estop(event: Event) -> None:
+@pytest.mark.parametrize("event", sorted(set(GuardEvent) - {GuardEvent.RESET}))
+def test_nothing_but_reset_leaves_estop(event: GuardEvent) -> None:
     assert next_state(State.ESTOP, event) is State.ESTOP
 
 
 def test_reset_leads_to_hold_and_only_from_estop() -> None:
-    assert next_state(State.ESTOP, Event.RESET) is State.HOLD
+    assert next_state(State.ESTOP, GuardEvent.RESET) is State.HOLD
     for state in set(State) - {State.ESTOP}:
-        assert next_state(state, Event.RESET) is state
+        assert next_state(state, GuardEvent.RESET) is state
 
 
 @pytest.mark.parametrize("state", sorted(MOVING))
-@pytest.mark.parametrize("event", [Event.LOSS, Event.DISENGAGE])
-def test_every_loss_while_moving_holds(state: State, event: Event) -> None:
+@pytest.mark.parametrize("event", [GuardEvent.LOSS, GuardEvent.DISENGAGE])
+def test_every_loss_while_moving_holds(state: State, event: GuardEvent) -> None:
     assert next_state(state, event) is State.HOLD
 
 
 def test_a_pair_that_is_not_listed_changes_nothing() -> None:
     for state in State:
-        for event in Event:
+        for event in GuardEvent:
             if (state, event) not in TRANSITIONS:
                 assert next_state(state, event) is state
 

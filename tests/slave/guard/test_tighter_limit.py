@@ -10,7 +10,7 @@ import numpy as np
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from slave.guard.config import GuardConfig, JointLimits
-from slave.limit.clamp import Rule
+from slave.guard.events import Rule
 
 NAMES = load_skeleton("nursing").joint_names
 ROLL = NAMES.index("left_shoulder_roll")

@@ -9,9 +9,10 @@ from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.messages import Mask
 from slave.guard import GuardConfig
+from slave.guard.events import Clamp, Rule
+from slave.guard.limits import MotionLimits
 from slave.limit import limit
-from slave.limit.clamp import Clamp, Rule
-from slave.limit.limit import Limits, SetpointLimiter
+from slave.limit.limit import SetpointLimiter
 
 SKELETON = load_skeleton("nursing")
 LIMITS = GuardConfig().limits(SKELETON)
@@ -217,7 +218,7 @@ def test_a_joint_seated_beyond_its_limit_does_not_jump_and_only_moves_back() -> 
 
 def test_a_joint_beyond_its_limit_has_no_room_outwards() -> None:
     beyond = LIMITS.upper_rad + 0.1
-    motion = limit.Motion(
+    motion = limit.LimiterStep(
         beyond, np.zeros(JOINTS), DT, LIMITS, LIMITS.max_velocity_rad_s, LIMITS.max_acceleration_rad_s2
     )
     low, high = dict(limit.RULES)[Rule.POSITION](motion)
@@ -362,6 +363,6 @@ def test_without_any_one_rule_its_promise_is_broken(missing: Rule) -> None:
 
 def test_scaled_limits_are_tighter() -> None:
     half = GuardConfig(velocity_scale=0.5, acceleration_scale=0.25).limits(SKELETON)
-    assert isinstance(half, Limits)
+    assert isinstance(half, MotionLimits)
     assert np.allclose(half.max_velocity_rad_s, 0.5 * LIMITS.max_velocity_rad_s)
     assert np.allclose(half.max_acceleration_rad_s2, 0.25 * LIMITS.max_acceleration_rad_s2)

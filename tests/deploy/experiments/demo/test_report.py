@@ -49,16 +49,16 @@ class FakeChild:
 
 def told_by(slave: SlavePipeline) -> SlaveMetrics:
     """What the slave of a run on the virtual clock would have published."""
-    budget, counters = slave.journeys.budget, slave.guard.counters
+    budget, counters = slave.traffic.journeys.budget, slave.guard.counters
     return slave_metrics(
         ticks=Ticks(5, 0),
         guard=counters.metrics(str(slave.guard.state), slave.guard.reason),
         stages_ms=budget.summary(),
         end_to_end_ms=budget.total(),
-        one_way_ms=slave.one_way.summary(),
-        one_way_corrected_ms=slave.due.corrected.summary(),
-        commands=slave.arrivals.metrics(),
-        due=slave.due.metrics(),
+        one_way_ms=slave.traffic.one_way.summary(),
+        one_way_corrected_ms=slave.traffic.due.corrected.summary(),
+        commands=slave.traffic.arrivals.metrics(),
+        due=slave.traffic.due.metrics(),
     )
 
 

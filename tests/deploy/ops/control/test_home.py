@@ -39,7 +39,7 @@ class Dialogue:
     def answer(self, payload: bytes, _: int) -> bytes:
         request = decode(payload, ControlRequest)
         self.asked.append(request.action)
-        reply = encode(self.rig.guard.on_control(request, self.rig.now_ns))
+        reply = encode(self.rig.pipeline.control.answer(self.rig.guard, request, self.rig.now_ns))
         self.rig.step()
         return reply
 

@@ -1,0 +1,59 @@
+"""How fast each joint may follow: slowly in `align` and while it comes back, else at its own limits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.clock import to_ns
+from common.quaternion import Array
+from common.wire.messages import Mask
+from slave.guard.align import within
+from slave.guard.config import GuardConfig
+from slave.guard.limits import MotionLimits
+
+
+class Pace:
+    """The velocity and acceleration of each joint, step by step.
+
+    In `track` a joint that was held and is valid again is slow until it is near its target. Where the target
+    of any joint is so far away that it jumped, all come back slowly: all together at their limits would shake
+    the light ones off their drives.
+
+    Near means near for the dwell time, as in `align`. The tracker's target of a lost joint comes from
+    elsewhere (the master sends 0) and crosses the window: it must not let the joint go as it passes.
+    """
+
+    def __init__(self, limits: MotionLimits, config: GuardConfig) -> None:
+        self._limits = limits
+        self._window_rad = config.align_window_rad
+        self._jump_rad = config.jump_window_rad
+        self._dwell_ns = to_ns(config.align_dwell_s)
+        self._slow = (
+            np.minimum(limits.max_velocity_rad_s, config.align_velocity_rad_s),
+            np.minimum(limits.max_acceleration_rad_s2, config.align_acceleration_rad_s2),
+        )
+        self._away: Mask = np.zeros(len(limits.lower_rad), np.bool_)
+        """(J,) joints that have not come back yet."""
+        self._outside_ns: NDArray[np.int64] = np.zeros(len(limits.lower_rad), np.int64)
+
+    def aligning(self, now_ns: int, valid: Mask) -> tuple[Array, Array]:
+        """Velocity and acceleration (J,) for this step of `align`.
+
+        Joints that are not valid do not align with the rest: they come back in `track`.
+        """
+        self._away = ~valid
+        self._outside_ns.fill(now_ns)
+        return self._slow
+
+    def tracking(self, now_ns: int, error_rad: Array, valid: Mask) -> tuple[Array, Array]:
+        """Velocity and acceleration (J,) for this step of `track`; `error_rad` (J,): setpoint to target."""
+        fast = self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2
+        jumped = bool((valid & ~self._away & ~within(error_rad, self._jump_rad)).any())
+        if not jumped and valid.all() and not self._away.any():
+            return fast
+        outside = ~valid | ~within(error_rad, self._window_rad)
+        np.copyto(self._outside_ns, now_ns, where=outside)
+        not_yet = outside | (now_ns - self._outside_ns < self._dwell_ns)
+        self._away = ~valid | jumped | (self._away & not_yet)
+        return np.where(self._away, self._slow[0], fast[0]), np.where(self._away, self._slow[1], fast[1])
