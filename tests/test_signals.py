@@ -35,7 +35,7 @@ def test_every_file_that_names_a_signal_sets_it_up() -> None:
     assert [name for name, text in sending.items() if "default_signals" not in text] == []
 
 
-def test_a_test_that_leaves_a_process_behind_fails_and_the_next_does_not(tmp_path: Path) -> None:
+def test_a_test_that_leaves_a_process_fails_and_the_next_does_not(tmp_path: Path) -> None:
     file = tmp_path / "test_leaves.py"
     file.write_text(
         "import subprocess\n\n\n"

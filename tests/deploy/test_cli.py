@@ -123,7 +123,7 @@ def test_a_mistake_is_one_line_and_status_1(tandem: Tandem, line: str, parts: li
         assert part in said
 
 
-def test_a_file_of_the_other_side_is_one_line_a_key_that_does_not_belong(tandem: Tandem) -> None:
+def test_a_file_of_the_other_side_is_one_line_naming_the_key(tandem: Tandem) -> None:
     status, said = tandem(f"slave {EXAMPLES}/master.toml")
     assert status == 1
     lines = said.splitlines()

@@ -69,7 +69,7 @@ def test_a_zenohd_gets_the_same_keys_and_rules() -> None:
     assert written["access_control"]["default_permission"] == "deny"
 
 
-def test_a_person_at_the_operator_s_host_has_the_file_s_keys_and_not_its_door() -> None:
+def test_a_person_at_the_operator_s_host_has_keys_but_no_door() -> None:
     where = reach(None, None, master=SITE / "operator.toml")
     assert where.link.tls is not None
     assert where.link.tls.certificate == SITE / "keys" / "operator-nurse-1.pem"
@@ -79,7 +79,7 @@ def test_a_person_at_the_operator_s_host_has_the_file_s_keys_and_not_its_door() 
     assert (elsewhere.link.connect, elsewhere.link.tls) == (["tls/10.0.0.9:7447"], where.link.tls)
 
 
-def test_containers_run_commands_that_there_are_on_files_that_there_are() -> None:
+def test_containers_run_commands_and_files_that_exist() -> None:
     for service in compose()["services"].values():
         command, file = service["command"]
         model = MODELS[command]

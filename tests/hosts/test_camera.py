@@ -33,7 +33,7 @@ def ages(video: CameraMetrics | None) -> int:
     return 0 if video is None else video.action_to_observation_ms.count
 
 
-def test_a_camera_killed_while_the_robot_tracks_is_a_word_in_the_state_and_nothing_else(
+def test_a_killed_camera_changes_one_word_in_the_state_and_nothing_else(
     on_this_host: OnThisHost,
 ) -> None:
     async def story(host: Host) -> None:

@@ -63,7 +63,7 @@ def test_killed_master_leaves_the_robot_holding_until_engaged_anew(on_this_host:
     on_this_host(story)
 
 
-def test_killed_slave_is_told_by_the_master_and_resumes_only_when_engaged(on_this_host: OnThisHost) -> None:
+def test_a_killed_slave_is_reported_and_resumes_only_when_engaged(on_this_host: OnThisHost) -> None:
     async def story(host: Host) -> None:
         async with open_rig() as rig:
             observer = rig.observer

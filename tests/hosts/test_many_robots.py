@@ -45,7 +45,7 @@ def states(rig: Rig) -> dict[str, RobotState]:
     return {robot: state for robot, state in heard.items() if state is not None}
 
 
-def test_who_is_engaged_follows_and_what_befalls_one_does_not_reach_the_others(
+def test_a_fault_on_one_robot_does_not_affect_the_others(
     on_this_host: OnThisHost,
 ) -> None:
     async def story(host: Host) -> None:

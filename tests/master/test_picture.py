@@ -11,7 +11,7 @@ def payload(number: int) -> bytes:
     return encode_frame(VideoFrame(number, number, number, 320, 240, b"\xff\xd8\xff\xd9"))
 
 
-def test_a_posture_is_of_the_newest_picture_that_was_here_when_it_was_sampled() -> None:
+def test_a_posture_is_of_the_newest_picture_here_at_its_sampling() -> None:
     watch = VideoWatch()
     assert watch.seen_by(10**12) == (0, 0)
     for number, arrived_ns in ((5, 100), (6, 200), (7, 300)):
@@ -22,7 +22,7 @@ def test_a_posture_is_of_the_newest_picture_that_was_here_when_it_was_sampled() 
     assert watch.seen_by(1000) == (7, 300)
 
 
-def test_what_comes_late_twice_or_broken_is_counted_and_changes_nothing() -> None:
+def test_late_repeated_and_broken_ones_are_counted_and_change_nothing() -> None:
     watch = VideoWatch()
     watch.on_payload(payload(5), 100)
     for wrong in (payload(4), payload(5), b"", payload(6)[:-1]):

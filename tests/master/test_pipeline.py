@@ -152,7 +152,7 @@ def test_the_sequence_counts_up_and_the_lease_is_carried(settled: Bench) -> None
     assert (second.stamps.angles_ns, second.stamps.put_ns) == (20, 21)
 
 
-def test_a_doubted_node_s_joints_are_invalid_and_what_refuses_engage_is_in_the_command(
+def test_a_doubted_node_invalidates_its_joints_and_refuses_engage(
     settled: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = settled.pipeline.skeleton.segment_names.index("left_forearm")

@@ -131,7 +131,7 @@ async def served(master: Master, until: Callable[[], bool]) -> None:
             raise result
 
 
-def test_each_robot_gets_the_same_posture_under_its_own_name_lease_and_number() -> None:
+def test_each_robot_gets_the_posture_under_its_own_name() -> None:
     links = {"a": FakeLink(token=7), "b": FakeLink(token=8)}
     master = master_of(**links)
 

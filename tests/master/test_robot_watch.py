@@ -22,14 +22,14 @@ def state(sent_ns: int = 0, echo: CommandEcho | None = None) -> RobotState:
     return RobotState("r", 1, sent_ns, 1, "hold", "", "", np.ones(25, np.bool_), zeros, zeros, echo, 0, 1)
 
 
-def test_silence_begins_just_after_the_time_out_whatever_the_sender_stamps() -> None:
+def test_silence_begins_after_the_time_out_whatever_is_stamped() -> None:
     watch = RobotWatch()
     watch.on_state(state(sent_ns=SLAVE_AHEAD_NS), 1000)
     assert not watch.silent(1000 + TIMEOUT_NS)
     assert watch.silent(1001 + TIMEOUT_NS)
 
 
-def test_states_that_never_came_are_counted_by_their_numbers_and_a_new_robot_s_begin_anew() -> None:
+def test_states_that_never_came_are_counted_by_their_numbers() -> None:
     watch = RobotWatch()
     for instance, sequence in ((1, 40), (1, 41), (1, 2242), (2, 1), (2, 2), (2, 4), (2, 3)):
         watch.on_state(replace(state(), instance=instance, sequence=sequence), 0)
@@ -49,7 +49,7 @@ def test_people_are_told_once_a_change() -> None:
     assert watch.times_lost == 1
 
 
-def test_a_round_trip_takes_off_the_time_on_the_slave_and_needs_no_common_clock() -> None:
+def test_a_round_trip_excludes_the_slave_s_time_and_needs_no_clock() -> None:
     watch = RobotWatch()
     received_ns = SLAVE_AHEAD_NS + 3 * NS_PER_MS
     echo = CommandEcho(5, 1 * NS_PER_MS, received_ns, received_ns, received_ns)

@@ -74,7 +74,7 @@ async def reached(host: Host, address: str) -> str:
     return failed.decode()
 
 
-def test_the_caller_reaches_both_hosts_and_they_each_other_only_over_the_link() -> None:
+def test_the_caller_reaches_both_hosts_and_they_each_other_by_the_link() -> None:
     async def story() -> None:
         async with open_network(QUIET) as network:
             for host in (network.operator, network.robot):

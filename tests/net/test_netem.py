@@ -35,7 +35,7 @@ def _netem() -> None:
         pytest.skip("this kernel has no netem: tests/net/test_on_kernel.py runs these on one that has")
 
 
-def test_the_link_is_the_profile_s_is_cut_counted_and_takes_every_profile() -> None:
+def test_the_link_has_its_profile_and_is_cut_and_counted() -> None:
     async def story() -> None:
         async with open_network(MIXED) as network:
             assert network.backend == "netem"  # by itself: nothing in it that netem does otherwise

@@ -13,7 +13,7 @@ from deploy.experiments.soak.files.events import of_kind, read_events
 
 
 @pytest.mark.timeout(200)
-def test_an_outage_stops_the_robot_and_its_end_starts_the_commands_only(tmp_path: Path) -> None:
+def test_an_outage_stops_the_robot_and_its_end_only_the_commands(tmp_path: Path) -> None:
     report = tmp_path / "report"
     options = ["--duration", "40s", "--every", "12", "--faults", "outage", "--profile", "4g"]
     soak = [sys.executable, "-m", "deploy", "soak", *options, "--report", str(report)]

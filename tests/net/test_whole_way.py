@@ -25,7 +25,7 @@ HOLD_S = 1.0
 
 
 @pytest.mark.timeout(400)
-def test_the_robot_holds_in_an_outage_and_moves_again_only_when_engaged(on_this_host: OnThisHost) -> None:
+def test_the_robot_holds_in_an_outage_and_moves_only_when_engaged(on_this_host: OnThisHost) -> None:
     async def story(_: Host) -> None:
         async with open_network(load_profile("4g")) as network, open_rig("tcp", network=network) as rig:
             await tracks(rig)

@@ -46,7 +46,7 @@ class StillServos:
         return EncoderReading(0, np.zeros(25, np.int64), np.zeros(25, np.bool_))
 
 
-def test_a_loop_that_always_misses_every_second_tick_still_tells_the_state(
+def test_a_loop_that_misses_every_second_tick_still_sends_the_state(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async def odd_ticks(grid: TickGrid) -> AsyncIterator[Due]:
@@ -109,7 +109,7 @@ class StuckServos(StillServos):
         return super().read()
 
 
-def test_the_watchdog_is_fed_by_the_servo_loop_itself_at_the_end_of_each_tick(
+def test_the_servo_loop_feeds_the_watchdog_at_the_end_of_each_tick(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async def some_ticks(grid: TickGrid) -> AsyncIterator[Due]:

@@ -102,7 +102,7 @@ def test_a_mistake_names_the_key_in_the_section(
     assert said in str(raised.value)
 
 
-def test_a_section_that_must_be_set_is_asked_for_only_where_its_backend_is_chosen() -> None:
+def test_a_required_section_is_asked_for_only_with_its_backend() -> None:
     assert load({}).mistakes_for(HAND, EncoderConfig()) == []
     (mistake,) = load({"backend": "dynamixel"}).mistakes_for(HAND, EncoderConfig())
     assert mistake.key == "servos.dynamixel"

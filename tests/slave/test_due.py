@@ -28,13 +28,13 @@ def grid(*ticks: int, period_ns: int = PERIOD_NS) -> list[int]:
     return [tick * period_ns for tick in ticks]
 
 
-def test_nothing_is_missing_of_an_unbroken_row_and_the_figures_are_the_raw_ones() -> None:
+def test_an_unbroken_row_misses_nothing_and_its_figures_are_raw() -> None:
     due = followed(*grid(*range(1, 200)))
     assert (due.metrics().expected, due.metrics().missing) == (199, 0)
     assert due.corrected.summary().max == 0.5
 
 
-def test_both_sides_still_for_5_s_miss_62_commands_though_no_number_is_skipped() -> None:
+def test_a_common_still_of_5_s_misses_62_commands() -> None:
     ticks = [*range(1, 101), *range(163, 263)]
     due = followed(*grid(*ticks))
     assert due.metrics().missing == 62
@@ -69,7 +69,7 @@ def test_a_master_of_another_rate_is_held_to_its_own(period_ns: int) -> None:
     assert due.metrics().missing - before == 10
 
 
-def test_another_master_s_clock_begins_anew_and_the_same_one_s_new_lease_does_not() -> None:
+def test_another_master_s_clock_begins_anew_a_new_lease_does_not() -> None:
     due = followed(*grid(1, 2, 3))
     due.note(2, 1, 10**15, ONE_WAY_NS)
     assert due.metrics().missing == 0
@@ -84,7 +84,7 @@ def test_nothing_is_due_of_a_robot_that_was_given_back() -> None:
     assert due.metrics().missing == 0
 
 
-def test_a_gap_counts_although_the_offset_is_no_longer_trusted_after_it() -> None:
+def test_a_gap_counts_although_the_offset_lost_trust_after_it() -> None:
     due = followed(*grid(1, 2, 3))
     due.note(1, 4, 14 * PERIOD_NS, None)
     assert due.metrics().missing == 10

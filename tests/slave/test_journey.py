@@ -89,7 +89,7 @@ def test_a_command_that_moved_nothing_is_counted_when_the_next_comes() -> None:
     assert journeys.budget.total().count == 0
 
 
-def test_a_command_accepted_while_the_robot_holds_is_echoed_but_not_followed() -> None:
+def test_a_command_accepted_in_hold_is_echoed_but_not_followed() -> None:
     journeys = Journeys()
     journeys.accepted(command(), at(5), at(6), OFFSET, moving=False)
     # engaged meanwhile: what is written now is not of that command

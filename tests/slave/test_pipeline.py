@@ -84,7 +84,7 @@ def test_the_state_names_a_joint_whose_encoder_is_not_believed(pipeline: SlavePi
     assert state.faults["neck_yaw"] == "the encoder jumps"
 
 
-def test_where_anybody_may_ask_the_robot_is_stopped_and_told_of_but_not_engaged(
+def test_where_anybody_may_ask_the_robot_is_stopped_but_not_engaged(
     pipeline: SlavePipeline,
 ) -> None:
     def ask(action: Action) -> ControlReply:
@@ -111,7 +111,7 @@ def test_where_anybody_may_ask_the_robot_is_stopped_and_told_of_but_not_engaged(
     ],
     ids=["frozen", "misaddressed", "codec", "later"],
 )
-def test_a_stop_of_any_version_stops_on_every_way_in_and_is_answered_in_the_frozen_form(
+def test_a_stop_of_any_version_stops_and_is_answered(
     pipeline: SlavePipeline, way: Callable[..., bytes], payload: bytes
 ) -> None:
     answer = read_stop_answer(way(pipeline, payload, NS_PER_S))
@@ -149,7 +149,7 @@ def test_who_may_only_stop_it_may_not_tell_it_of_a_namesake(pipeline: SlavePipel
     assert pipeline.namesakes.words(NS_PER_S) is None
 
 
-def test_messages_of_another_version_are_counted_and_said_once_a_second(pipeline: SlavePipeline) -> None:
+def test_other_versions_are_counted_and_reported_once_a_second(pipeline: SlavePipeline) -> None:
     said: list[str] = []
     pipeline.tell = said.append
     later = msgpack.packb(["command", VERSION + 1, "robot-1", 0])

@@ -76,7 +76,7 @@ def there_and_back() -> VirtualRun:
     return run
 
 
-def test_a_delay_that_jumps_and_comes_back_neither_stops_nor_shakes_the_robot(
+def test_a_delay_that_jumps_and_returns_neither_stops_nor_shakes_the_robot(
     there_and_back: VirtualRun,
 ) -> None:
     run = there_and_back
@@ -100,7 +100,7 @@ def test_nor_does_it_take_a_setpoint_past_a_limit(there_and_back: VirtualRun) ->
 
 
 @pytest.mark.timeout(300)
-def test_after_a_line_became_slow_for_good_the_robot_can_be_engaged_and_tracks() -> None:
+def test_on_a_line_that_became_slow_the_robot_engages_and_tracks() -> None:
     """Seen: 20 ms one way became 190 ms; a minute later every command "may be 382 ms old", for good."""
     run = engaged(World(one_way_ns=20 * NS_PER_MS))
     run.run(5.0)

@@ -103,7 +103,7 @@ def test_the_same_world_gives_the_same_bytes() -> None:
     assert story() == story()
 
 
-def test_a_cut_link_makes_the_robot_hold_and_only_engaging_moves_it_again() -> None:
+def test_after_a_cut_link_only_engaging_moves_the_robot() -> None:
     run = engaged(World())
     run.run(4.0)
     run.deliver = lambda _: False

@@ -92,7 +92,7 @@ def test_the_wait_doubles_up_to_two_seconds() -> None:
 
 
 @pytest.mark.parametrize("number", [errno.ENOBUFS, errno.EAGAIN, None])
-def test_a_full_queue_is_counted_and_brings_the_bus_down_only_when_it_stays_full(number: int | None) -> None:
+def test_a_full_queue_is_counted_and_ends_the_bus_only_if_it_stays(number: int | None) -> None:
     async def test() -> None:
         full = can.CanOperationError("Transmit buffer full", number)
         scene = Scene(opener=lambda: ScriptedBus(full))
@@ -136,7 +136,7 @@ def test_one_send_that_works_starts_the_count_again() -> None:
     ],
     ids=repr,
 )
-def test_any_other_send_error_brings_it_down_at_once_and_is_never_raised(error: Exception) -> None:
+def test_any_other_send_error_ends_the_bus_and_is_never_raised(error: Exception) -> None:
     async def test() -> None:
         scene = Scene(opener=lambda: ScriptedBus(error))
         scene.bus.open()

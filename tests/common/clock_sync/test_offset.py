@@ -105,7 +105,7 @@ def steady(
     return now_ns
 
 
-def test_equal_delays_give_the_offset_itself_and_half_the_round_trip_as_bound() -> None:
+def test_equal_delays_give_the_offset_and_half_the_trip_as_bound() -> None:
     remote = RemoteClock(5 * HOUR, 0.0, 0)
     estimator = OffsetEstimator(RAW_CLOCKS)
     now_ns = steady(estimator, remote, 60)
@@ -262,7 +262,7 @@ def test_a_reply_to_no_question_or_heard_twice_is_ignored() -> None:
     assert master.query(4_000_000) == ClockQuery(4_000_000, 1000, 2_000_000)
 
 
-def test_a_query_that_the_network_doubles_is_measured_by_its_first_reply() -> None:
+def test_a_doubled_query_is_measured_by_its_first_reply() -> None:
     slave_clock = RemoteClock(7 * HOUR, 30.0, 0)
     master, slave = MasterExchange(), SlaveExchange()
     now_ns = 0
@@ -321,7 +321,7 @@ def test_after_a_second_of_silence_the_next_asker_is_followed() -> None:
     assert abs(offset.offset_ns - ahead_ns) <= offset.bound_ns
 
 
-def test_the_asker_who_is_followed_is_measured_though_another_was_there_first() -> None:
+def test_the_asker_who_is_followed_is_measured_not_the_first_one() -> None:
     waiting, holder, slave = MasterExchange(asker=7), MasterExchange(asker=8), SlaveExchange()
     holder_ahead_ns = HOUR
     for i in range(1, 21):

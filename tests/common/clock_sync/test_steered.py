@@ -60,7 +60,7 @@ class World:
 
 
 @pytest.mark.parametrize("most_ppm", [0, 100, 2_000, 10_000, 83_333, 100_000])
-def test_whatever_the_clocks_are_steered_by_the_truth_is_within_the_bound(most_ppm: float) -> None:
+def test_however_clocks_are_steered_the_truth_is_within_the_bound(most_ppm: float) -> None:
     """Rates that change at any moment, delays that step on one way or both; 48,000 looks for each."""
     chance = random.Random(most_ppm)
     outside = 0
@@ -98,7 +98,7 @@ def test_a_steered_clock_is_found_out_where_it_was_taken_for_a_raw_one() -> None
     assert estimator.steps >= 1
 
 
-def test_a_line_that_becomes_slow_for_good_does_not_make_the_offset_unknown() -> None:
+def test_a_line_that_becomes_slow_keeps_the_offset_known() -> None:
     """Seen: 20 ms became 190 ms, and a minute later the best exchange was forgotten."""
     world, estimator = World(jitter_ns=MS), OffsetEstimator(RAW_CLOCKS)
     world.ppm = 12.0

@@ -21,7 +21,7 @@ def test_nothing_is_missing_in_an_unbroken_row_wherever_it_begins() -> None:
     assert noted(*range(41, 60)).metrics() == ArrivalCounts(19, 0, 0, 0)
 
 
-def test_a_gap_is_lost_a_late_one_is_not_and_the_same_again_is_a_repetition() -> None:
+def test_a_gap_is_lost_a_late_one_is_not_and_a_copy_is_a_repetition() -> None:
     assert noted(1, 2, 5).metrics() == ArrivalCounts(3, 2, 0, 0)
     assert noted(1, 2, 5, 4).metrics() == ArrivalCounts(4, 1, 1, 0)
     assert noted(1, 2, 5, 4, 4, 5, 1).metrics() == ArrivalCounts(7, 1, 1, 3)

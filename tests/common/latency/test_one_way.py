@@ -35,7 +35,7 @@ def test_without_a_trusted_offset_there_is_no_one_way_time() -> None:
     assert one_way_ns(1, 2, Offset(0, 0, trusted=False)) is None
 
 
-def test_a_negative_bound_on_the_wire_means_that_the_offset_is_not_trusted() -> None:
+def test_a_negative_bound_on_the_wire_means_no_trust() -> None:
     known = replace(STATE, master_offset_ns=7, offset_bound_ns=3)
     assert master_offset(known) == Offset(7, 3, trusted=True)
     unknown = master_offset(replace(STATE, master_offset_ns=7, offset_bound_ns=-1))

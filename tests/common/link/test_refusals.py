@@ -99,7 +99,7 @@ def test_a_flood_of_different_refusals_costs_no_memory() -> None:
     assert refusals.metrics().total == MAX_KINDS + 5
 
 
-def test_who_is_still_connected_is_remembered_however_many_came_and_went() -> None:
+def test_connected_peers_are_remembered_however_many_came_and_went() -> None:
     refusals = Refusals()
     refusals.learn(ZID, "operator:anna")
     for n in range(2 * MAX_KINDS):

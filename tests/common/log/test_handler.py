@@ -120,7 +120,7 @@ def test_in_the_journal_every_line_of_a_traceback_has_the_priority() -> None:
     assert all(line.startswith("<3>") for line in lines)
 
 
-def test_standard_error_leads_to_the_journal_where_systemd_named_its_device_and_inode(
+def test_standard_error_leads_to_the_journal_that_systemd_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stderr = os.fstat(2)
@@ -132,7 +132,7 @@ def test_standard_error_leads_to_the_journal_where_systemd_named_its_device_and_
     assert not in_journal()
 
 
-def test_the_last_words_of_a_process_have_a_priority_in_the_journal_too(
+def test_last_words_of_a_process_have_a_priority_in_the_journal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stderr = os.fstat(2)

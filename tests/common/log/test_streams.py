@@ -24,7 +24,7 @@ def run(body: str, **how: object) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("closed", [(0,), (1,), (2,), (0, 1), (0, 1, 2)], ids=str)
-def test_closed_descriptors_are_taken_by_nothing_else_and_uvloop_ends_in_order(
+def test_closed_descriptors_stay_closed_and_uvloop_ends_in_order(
     closed: tuple[int, ...], tmp_path: Path
 ) -> None:
     def close() -> None:

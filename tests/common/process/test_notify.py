@@ -57,7 +57,7 @@ def test_over_a_real_socket_of_either_kind(manager: tuple[socket.socket, str]) -
     assert environment == {"HOME": "/"}  # a child must not speak in this process's name
 
 
-def test_the_first_beat_is_readiness_and_pings_follow_four_times_a_period() -> None:
+def test_the_first_beat_is_readiness_and_pings_come_at_a_quarter() -> None:
     notifier, messages = told()
     for tick in range(0, 2 * WATCHDOG_NS, 5_000_000):
         notifier.beat(tick)
@@ -173,7 +173,7 @@ def test_the_same_status_is_said_once() -> None:
     assert messages == ["STATUS=hold", "STATUS=track", "STATUS=hold"]
 
 
-def test_who_waits_for_another_has_its_start_time_out_extended_each_time() -> None:
+def test_a_process_that_waits_has_its_start_time_out_extended() -> None:
     notifier, messages = told()
     for _ in range(2):
         notifier.waits("waits for a router at tls/a:1\nREADY=1")

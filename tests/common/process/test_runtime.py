@@ -167,7 +167,7 @@ def test_a_link_whose_close_hangs_does_not_hold_the_process() -> None:
     assert "did not close within 0.05 s" in done.stderr
 
 
-def test_a_terminal_that_closes_stops_in_order_however_often_it_says_so() -> None:
+def test_a_terminal_that_closes_stops_in_order() -> None:
     done = process(
         """
         async def main(stop):
@@ -183,7 +183,7 @@ def test_a_terminal_that_closes_stops_in_order_however_often_it_says_so() -> Non
 
 
 @pytest.mark.parametrize("number", ["SIGHUP", "SIGINT"])
-def test_a_signal_that_was_inherited_as_ignored_stays_ignored_and_sigterm_stops(number: str) -> None:
+def test_a_signal_inherited_as_ignored_stays_so_and_sigterm_stops(number: str) -> None:
     done = process(
         f"""
         signal.signal(signal.{number}, signal.SIG_IGN)  # as nohup, or a script that starts it with &, does

@@ -91,7 +91,7 @@ def test_what_can_be_reached_is_reached(ends_deg: tuple[tuple[float, float], ...
         np.testing.assert_allclose(found.angles, inside, atol=1e-6)
 
 
-def test_of_two_decompositions_within_the_limits_the_nearer_one_is_kept() -> None:
+def test_of_two_decompositions_the_nearer_one_is_kept() -> None:
     within = boxed(((-190.0, 190.0), (-20.0, 170.0), (-190.0, 190.0)))
     here = np.radians([20.0, 100.0, -30.0])
     other = np.radians([-160.0, 80.0, 150.0])

@@ -188,7 +188,7 @@ class Hanging(io.BytesIO):
             self.go.wait()
 
 
-def test_a_disk_that_hangs_holds_nobody_up_and_what_does_not_fit_is_counted(tmp_path: Path) -> None:
+def test_a_disk_that_hangs_delays_nobody_and_the_overflow_is_counted(tmp_path: Path) -> None:
     disk = Hanging()
     recorder = Recorder(tmp_path / "a.mcap", METADATA, flush_s=0.0, capacity=10, stream=disk)
     disk.hang = True

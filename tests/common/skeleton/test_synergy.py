@@ -19,7 +19,7 @@ FINGERS = ("thumb", "index", "middle", "ring", "little")
 MOST = settings(max_examples=60, deadline=None, derandomize=True)
 
 
-def test_the_hand_has_fifteen_nodes_and_fourteen_joints_of_one_angle_each() -> None:
+def test_the_hand_has_fifteen_nodes_and_fourteen_joints() -> None:
     assert len(HAND.segments) == 15
     assert len(HAND.joints) == 14
     assert all(joint.drives == {joint.name: 1.0} for joint in HAND.joints)
@@ -61,7 +61,7 @@ def test_they_are_the_least_squares_solution(angles: list[float]) -> None:
 
 @MOST
 @given(st.lists(st.floats(0.0, 1.5), min_size=5, max_size=5))
-def test_a_hand_that_moves_as_the_robot_does_gives_the_robot_s_joints_back(joints: list[float]) -> None:
+def test_a_hand_that_moves_as_the_robot_gives_its_joints_back(joints: list[float]) -> None:
     np.testing.assert_allclose(
         synergies_from_joints(HAND) @ (joints_from_synergies(HAND) @ np.array(joints)), joints, atol=1e-12
     )

@@ -37,7 +37,7 @@ def test_nodes_that_stood_still_are_refused_by_name_and_not_written(tmp_path: Pa
     assert list((tmp_path / "out").glob("*.toml")) == []
 
 
-def test_evidence_that_contradicts_itself_writes_nothing_and_says_so_once(tmp_path: Path) -> None:
+def test_evidence_that_contradicts_itself_writes_nothing(tmp_path: Path) -> None:
     """Two nodes exchanged, and every gyroscope in °/s: exit with the cause, and no file."""
     nodes = wear("nursing", 7).nodes
     exchanged = nodes | {"left_forearm": nodes["right_hand"], "right_hand": nodes["left_forearm"]}

@@ -73,9 +73,7 @@ def test_a_secure_endpoint_asks_who_you_are() -> None:
     assert reach(["tcp/127.0.0.1:1"], ["robot-1"]).link.tls is None
 
 
-def test_the_masters_file_lends_its_keys_but_neither_its_doors_nor_its_rules(
-    keys: Path, tmp_path: Path
-) -> None:
+def test_the_master_s_file_lends_its_keys_but_no_doors_or_rules(keys: Path, tmp_path: Path) -> None:
     example = Path("deploy/examples/master.toml").read_text("utf-8")
     own = tls_of(keys, Role.OPERATOR, "nurse-1")
     ends = '["tls/10.0.0.1:1"]\nmode = "client"'
@@ -112,7 +110,7 @@ def test_an_endpoint_that_is_none_is_still_told(keys: Path) -> None:
         reach(["tsl/127.0.0.1:1"], ["r"], certificate=keys / "operator-nurse-1.pem")
 
 
-def test_with_rules_a_robot_is_seen_with_its_instance_and_stopped_by_whoever_is_named(keys: Path) -> None:
+def test_with_rules_a_robot_is_seen_and_stopped_by_those_named(keys: Path) -> None:
     at = endpoint()
 
     async def story() -> list[Answer]:

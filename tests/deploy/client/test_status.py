@@ -84,7 +84,7 @@ def test_with_a_lease_it_waits_for_the_master_s_figures_too() -> None:
     assert told.all.is_set()
 
 
-def test_commands_that_were_due_and_did_not_come_are_said_beside_both_figures() -> None:
+def test_commands_that_were_due_are_counted_beside_both_figures() -> None:
     metrics = slave_metrics(
         due=DueMetrics(1000, 62),
         one_way_ms=Summary(938, p99=0.5),

@@ -28,7 +28,7 @@ def test_the_three_files_of_a_profile_fit_together(profile: str) -> None:
     assert slave.guard.limits(slave.skeleton).lower_rad.shape == (len(slave.skeleton.joints),)
 
 
-def test_a_glove_keeps_its_numbers_and_no_two_nodes_of_a_whole_person_share_one() -> None:
+def test_a_glove_keeps_its_numbers_and_a_person_s_are_unique() -> None:
     nodes = {p: load_config(example("suit", p), SuitConfig).nodes for p in PROFILES}
     assert {name: nodes["nursing"][name] for name in nodes["hand"]} == nodes["hand"]
     person = nodes["nursing"] | nodes["lower_limb"]

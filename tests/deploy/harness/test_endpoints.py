@@ -58,9 +58,7 @@ def test_a_transport_that_the_demo_does_not_know(transport: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize("transport", TRANSPORTS)
-def test_a_secure_transport_has_keys_for_everybody_and_no_other_has_any(
-    transport: str, tmp_path: Path
-) -> None:
+def test_a_secure_transport_has_keys_for_all_and_no_other_has(transport: str, tmp_path: Path) -> None:
     endpoints = local_endpoints(transport, tmp_path, robots=2)
     if transport not in SECURE:
         assert endpoints.keys is None

@@ -38,5 +38,5 @@ def test_the_guards_age_limit_is_the_default_or_what_a_long_line_needs(
     assert needed_age_s(one_way(delay_ms, jitter_ms)) == limit_s
 
 
-def test_every_network_that_comes_with_tandem_can_be_kept_within_the_guards_own_bound() -> None:
+def test_every_network_profile_fits_the_guard_s_bound() -> None:
     assert all(needed_age_s(load_profile(name)) <= 2.0 for name in profile_names())

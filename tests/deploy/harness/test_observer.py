@@ -88,7 +88,7 @@ def test_each_missing_piece_has_its_words(messages: list[Message], words: str) -
     assert words in observer.waiting_for()
 
 
-def test_the_robot_takes_commands_while_the_last_is_younger_than_two_periods() -> None:
+def test_commands_count_while_the_last_is_under_two_periods_old() -> None:
     assert Wire().hear(GOOD_COMMAND, echoed(FRESH_NS - 1)).ready
     assert not Wire().hear(GOOD_COMMAND, echoed(FRESH_NS)).ready
 
@@ -132,7 +132,7 @@ def test_statistics_are_kept_by_role() -> None:
     assert (observer.master, observer.slave) == (new, robot)
 
 
-def test_rates_are_by_the_senders_own_numbers_so_that_unheard_messages_count_too() -> None:
+def test_rates_use_the_senders_numbers_so_unheard_messages_count() -> None:
     wire = Wire()
 
     def command(sequence: int, put_ns: int) -> Command:

@@ -57,7 +57,7 @@ def test_a_hold_is_printed_engaged_again_and_kept() -> None:
     }  # fmt: skip
 
 
-def test_he_engages_only_a_robot_that_holds_and_is_ready_and_waits_between_two_requests() -> None:
+def test_it_engages_only_a_ready_robot_and_waits_between_requests() -> None:
     one = operator()
     assert not one.engages(to_ns(2.5))
     [hold] = see(one, state(3.0, "hold"))
@@ -78,7 +78,7 @@ def test_without_patience_he_never_gives_up() -> None:
     assert len(one.holds) == 4
 
 
-def test_alignment_that_ends_in_hold_is_a_hold_too_and_both_end_with_track() -> None:
+def test_an_alignment_that_ends_in_hold_is_a_hold() -> None:
     one = operator()
     see(one, state(3.0, "hold"), state(3.5, "align"), state(4.0, "hold"), state(4.5, "align"))
     assert [(hold.was, hold.tracked_ns) for hold in one.holds] == [("track", None), ("align", None)]
@@ -109,9 +109,7 @@ def test_three_holds_within_twenty_seconds_are_too_many(last_s: float, fails: bo
         (Lost(0.0, 1.0, Evidence.NONE), True, "not excused: neither real-time priority nor steal"),
     ],
 )
-def test_a_hold_counts_unless_the_host_is_shown_to_have_stood_still_before_it(
-    found: Lost, counts: bool, said: str
-) -> None:
+def test_a_hold_counts_unless_the_host_stalled_before_it(found: Lost, counts: bool, said: str) -> None:
     asked: list[int] = []
 
     def host_lost(at_ns: int) -> Lost:
@@ -138,7 +136,7 @@ def test_what_the_host_says_a_second_late_is_waited_for() -> None:
 
 
 @pytest.mark.parametrize("still_s", [0.0, 1.0])
-def test_a_robot_that_does_not_come_back_is_given_up_whatever_the_host_did(still_s: float) -> None:
+def test_a_robot_that_does_not_come_back_is_given_up(still_s: float) -> None:
     one = operator(lost(still_s))
     see(one, state(3.0, "hold", "no command"))
     one.answered(to_ns(3.0), "still braking")
@@ -153,7 +151,7 @@ def test_going_to_and_fro_between_hold_and_align_is_no_way_back() -> None:
     assert one.gives_up(to_ns(3.1 + BACK_S)) is not None
 
 
-def test_a_robot_that_is_never_heard_or_stopped_by_a_person_is_given_up() -> None:
+def test_a_robot_unheard_or_stopped_by_a_person_is_given_up() -> None:
     one = Operator("robot-1", PATIENCE, wanted_ns=to_ns(1.0))
     assert one.gives_up(to_ns(1.0 + BACK_S)) is None
     assert one.gives_up(to_ns(1.1 + BACK_S)) == "robot-1 did not track for 20 s: silent (not heard)"

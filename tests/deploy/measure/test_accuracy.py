@@ -128,7 +128,7 @@ def test_below_95_percent_a_figure_and_all_over_it_are_withheld(run: Any, missin
     assert found.fast["left_elbow_pitch"] is not None
 
 
-def test_fast_periods_that_were_not_estimated_withhold_eta_and_the_worse_side(run: Any) -> None:
+def test_unestimated_fast_periods_withhold_eta_and_the_worse_side(run: Any) -> None:
     solved, truth = run.solved(error_rad=0.01), run.truth()
     true_deg = np.degrees(truth.position_rad[::16, 2]).astype(np.float64)
     periods = fast_periods(solved.tick, true_deg, np.ones(250, np.bool_))

@@ -102,7 +102,7 @@ def lag_ms(comparison: Comparison, strategy: str) -> float:
     return lag
 
 
-def test_only_commands_that_the_slave_took_are_replayed_in_their_order_of_arrival() -> None:
+def test_only_commands_the_slave_took_are_replayed_in_order() -> None:
     first, refused, second, unheard = commands()[:4]
     echoes = [CommandEcho(c.sequence, 0, 100 * c.sequence, 0, 0) for c in (first, second)]
     states = [state(BEGIN_NS, None), *(state(BEGIN_NS, echo) for echo in echoes for _ in range(4))]
@@ -116,7 +116,7 @@ def test_a_perfect_robot_is_judged_beside_every_strategy(comparison: Comparison)
     assert comparison.rmse_over_latest == comparison.as_run.rmse_deg / comparison.replayed["latest"].rmse_deg
 
 
-def test_latest_is_half_a_period_late_and_more_than_three_times_worse_than_predict(
+def test_latest_is_half_a_period_late_and_3_times_worse_than_predict(
     comparison: Comparison,
 ) -> None:
     latest, predict = comparison.replayed["latest"], comparison.replayed["predict"]
@@ -141,7 +141,7 @@ def test_commands_play_at_their_real_arrival(comparison: Comparison) -> None:
     assert lag_ms(slower, "latest") - lag_ms(comparison, "latest") == pytest.approx(40, abs=4)
 
 
-def test_the_replay_is_read_when_the_real_robot_was_and_is_the_same_each_time() -> None:
+def test_the_replay_reads_when_the_robot_was_read_and_repeats() -> None:
     one, other = (replay(accepted(), moved(), "predict", CONFIG) for _ in range(2))
     late_ns = moved().encoder_ns - one.encoder_ns
     assert len(late_ns) == len(moved().encoder_ns)
@@ -167,7 +167,7 @@ def test_only_the_end_of_a_long_run_is_replayed(monkeypatch: pytest.MonkeyPatch)
         assert 100 < judged.samples < 3 * 50
 
 
-def test_without_commands_tracking_or_truth_there_is_nothing_to_compare() -> None:
+def test_without_commands_tracking_or_truth_nothing_is_compared() -> None:
     still = replace(moved(), tracking=np.zeros(len(moved().tracking), np.bool_))
     nothing = TruthSeries(truth().tick[:0], truth().sampled_ns[:0], truth().position_rad[:0])
     assert compare(truth(), moved(), [], CONFIG) is None

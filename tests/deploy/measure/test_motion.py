@@ -92,7 +92,7 @@ def test_each_hand_over_settles_anew(run: Any) -> None:
 
 
 @pytest.mark.parametrize(("percent", "judged"), [(4.9, True), (5.3, False)])
-def test_a_bad_encoder_s_share_is_told_and_below_95_percent_nothing_is_judged(
+def test_a_bad_encoder_is_named_and_below_95_percent_nothing_is_judged(
     run: Any, percent: float, judged: bool
 ) -> None:
     whole = motion(run.truth(), run.moved(), run.names)

@@ -54,7 +54,7 @@ def test_the_truth_lies_in_the_interval_as_often_as_promised() -> None:
     assert inside >= 0.93 * 400
 
 
-def test_a_wandering_series_that_goes_nowhere_is_mostly_not_called_growing() -> None:
+def test_a_wandering_series_is_mostly_not_called_growing() -> None:
     def called_growing(y: np.ndarray) -> bool:
         found = slope([(np.arange(len(y), dtype=float), y)])
         return found is not None and found.low > 0.0

@@ -14,7 +14,7 @@ def text(verdicts: list[Verdict]) -> str:
     return out.getvalue()
 
 
-def test_a_value_at_its_limit_passes_above_it_fails_and_none_is_not_judged() -> None:
+def test_at_its_limit_it_passes_above_it_fails_and_none_is_not_judged() -> None:
     judged = [at_most("lag", value, 1.5) for value in (1.5, 1.5001, None)]
     assert [v.outcome for v in judged] == [Outcome.PASSED, Outcome.FAILED, Outcome.NOT_JUDGED]
     assert [v.passed for v in judged] == [True, False, None]

@@ -91,9 +91,7 @@ def test_the_arms_work_with_sensors_askew_and_no_magnetometer(
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_an_elbow_whose_bending_does_not_tell_the_sign_goes_by_the_other_one(
-    upper_body: Worn, side: str
-) -> None:
+def test_an_elbow_without_a_sign_takes_the_other_one_s(upper_body: Worn, side: str) -> None:
     """One that could bend either way stays within its limits whatever the sign of its axis."""
     at = f"{side}_elbow_pitch"
     joints = [
@@ -283,7 +281,7 @@ def test_a_recording_of_a_moment_is_refused() -> None:
 
 
 @pytest.mark.recordings
-def test_one_arm_alone_does_not_tell_how_the_trunk_or_the_other_arm_faces(recordings_folder: Path) -> None:
+def test_one_arm_alone_leaves_trunk_and_other_arm_open(recordings_folder: Path) -> None:
     """This person's arms are turned in by 36° each: only both together face ahead."""
     skeleton = load_skeleton("nursing")
     there = load_recordings(recordings_folder / "human_full_body.npz")

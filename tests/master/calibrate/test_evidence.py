@@ -5,7 +5,7 @@ import math
 from master.calibrate.evidence import at_most, first_contradiction, not_judged
 
 
-def test_a_figure_at_its_limit_agrees_and_beyond_it_contradicts_with_advice() -> None:
+def test_a_figure_at_its_limit_agrees_and_beyond_it_contradicts() -> None:
     assert at_most("a with b", 1.0, 1.0, "s", advice="do").verdict == "agrees"
     assert at_most("a with b", 1.0, 1.0, "s", advice="do").advice == ""
     beyond = at_most("a with b", 1.0 + 1e-9, 1.0, "s", advice="do")

@@ -81,7 +81,7 @@ def test_missing_samples_are_left_out() -> None:
     assert apart_deg(find_hinge(gyr1, gyr2, RATE_HZ).axis1, axis1) < 0.5
 
 
-def test_a_limb_that_keeps_still_but_for_the_bending_leaves_the_still_unit_s_axis_open() -> None:
+def test_a_limb_that_hardly_moves_leaves_the_still_unit_s_axis_open() -> None:
     gyr1, gyr2, _, axis2 = hinge_rates(5, limb=0.0)
     noise = NOISE_RAD_S * np.random.default_rng(0).normal(size=(2, *gyr1.shape))
     found = find_hinge(gyr1 + noise[0], gyr2 + noise[1], RATE_HZ)

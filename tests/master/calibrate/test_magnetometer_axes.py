@@ -26,7 +26,7 @@ def recorded(axes: Array, earth: Array = NORTH, gyro_axes: Array | None = None) 
 
 
 @pytest.mark.parametrize("way", range(48))
-def test_of_all_48_ways_one_is_written_23_are_offered_24_are_mirror_images(way: int) -> None:
+def test_of_48_ways_one_is_written_23_offered_24_mirrored(way: int) -> None:
     axes = signed_permutations()[way]
     if way == 0:
         found = calibrate_magnetic(recorded(axes))
@@ -47,7 +47,7 @@ def test_of_all_48_ways_one_is_written_23_are_offered_24_are_mirror_images(way: 
             calibrate_magnetic(recorded(axes))
 
 
-def test_in_the_south_a_sound_unit_needs_the_word_and_a_mirror_image_is_refused() -> None:
+def test_in_the_south_a_sound_unit_needs_the_word() -> None:
     south = MagneticOptions("south")
     with pytest.raises(RecordingError, match=r"62° above the horizon.*say --hemisphere south"):
         calibrate_magnetic(recorded(np.eye(3), SOUTH))
@@ -65,7 +65,7 @@ def test_at_the_magnetic_equator_what_cannot_be_told_is_not_accepted() -> None:
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_gyroscope_whose_axis_is_negated_is_not_the_magnetometers_fault(axis: int) -> None:
+def test_a_negated_gyroscope_axis_is_not_the_magnetometer_s_fault(axis: int) -> None:
     signs = np.ones(3)
     signs[axis] = -1.0
     with pytest.raises(

@@ -8,7 +8,7 @@ from collections import Counter
 from tests.master.calibrate.planted import KINDS, count
 
 
-def test_of_what_is_written_nine_tenths_are_within_the_stated_95_per_cent() -> None:
+def test_nine_tenths_of_what_is_written_lie_within_the_stated_95_percent() -> None:
     found = count(range(2 * len(KINDS)))
     total: Counter[str] = sum(found.values(), Counter())
     assert total["covered"] >= 0.9 * total["written"], found

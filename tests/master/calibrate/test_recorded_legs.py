@@ -98,7 +98,7 @@ def test_no_joint_jumps(person: Person, joint: str) -> None:
         assert np.abs(rate).max() < FASTEST_DEG_S[joint]
 
 
-def test_sitting_hips_and_knees_are_bent_and_standing_they_are_straight(person: Person) -> None:
+def test_sitting_hips_and_knees_are_bent_standing_straight(person: Person) -> None:
     at = {name: angle[[2500, 100]] for name, angle in person.angles_deg.items()}
     for side in SIDES:
         assert 70.0 < at[f"{side}_knee_flexion"][0] < 100.0

@@ -127,7 +127,7 @@ def test_what_contradicts_itself_is_refused(name: str, message: str) -> None:
         calibrate_six_position(changed(name))
 
 
-def test_a_session_without_the_way_from_face_to_face_says_that_signs_are_not_judged(tmp_path: Path) -> None:
+def test_a_session_without_ways_between_faces_judges_no_signs(tmp_path: Path) -> None:
     turns = ((0.0, 0.0, 360.0), FLIPS[0], (0.0, 360.0, 0.0), *FLIPS[1:4], (360.0, 0.0, 0.0), FLIPS[4])
     acc, gyr = session(turns)
     flipped = np.abs(gyr).max(axis=1) > 0.0

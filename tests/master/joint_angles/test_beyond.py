@@ -24,7 +24,7 @@ def test_nothing_is_said_of_an_operator_within_reach() -> None:
     assert beyond.metrics() == {}
 
 
-def test_what_lasts_is_told_once_in_ten_seconds_with_segment_and_degrees() -> None:
+def test_what_lasts_is_reported_every_ten_seconds_with_segment() -> None:
     beyond = BeyondReach(["arm", "hand"])
     lines = told(beyond, [40.0] * 120)
     assert len(lines) == 1

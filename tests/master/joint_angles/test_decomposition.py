@@ -85,7 +85,7 @@ def test_velocities_are_the_derivative_of_the_poses() -> None:
         assert np.allclose(solved, velocity, atol=1e-7)
 
 
-def test_velocities_with_residual_motion_are_the_derivative_of_the_solved_positions() -> None:
+def test_velocities_are_the_derivative_of_the_solved_positions() -> None:
     rng = np.random.default_rng(2)
     h = 1e-6
     for position in random_poses(20, 2):
@@ -130,7 +130,7 @@ def test_a_joint_of_several_angles_follows_them_by_least_squares() -> None:
 
 
 @pytest.mark.parametrize("beyond_rad", [0.0, 1e-300, 1e-12, 1e-6, 0.01, -1e-12, -0.01])
-def test_at_the_middle_angle_s_singularity_all_stays_finite_and_bounded(beyond_rad: float) -> None:
+def test_at_the_middle_angle_s_singularity_all_stays_finite(beyond_rad: float) -> None:
     roll = SKELETON.joint_names.index("left_shoulder_roll")
     position = np.zeros(JOINTS)
     position[roll] = np.pi / 2 + beyond_rad

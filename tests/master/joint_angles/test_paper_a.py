@@ -113,7 +113,7 @@ def test_the_paper_s_arccos_loses_the_sign_and_ours_keeps_it() -> None:
         assert solved["shoulder_pitch"] == pytest.approx(sign * 30.0)
 
 
-def test_the_paper_s_arccos_is_ill_conditioned_near_zero_and_ours_is_not() -> None:
+def test_the_paper_s_arccos_is_ill_conditioned_and_ours_is_not() -> None:
     tiny_deg = 1e-7
     (upper, fore), solved = right_arm(elbow_pitch=tiny_deg)
     cosine = min(1.0, float(along(upper, M_X) @ along(fore, M_X)))

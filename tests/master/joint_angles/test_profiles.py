@@ -48,7 +48,7 @@ def test_the_solver_inverts_the_kinematics_of_every_profile(profile: str, seed: 
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_hand_s_synergies_are_nursing_s_finger_joints_for_the_same_glove(seed: int) -> None:
+def test_the_hand_s_synergies_are_nursing_s_for_the_same_glove(seed: int) -> None:
     """Whatever the phalanges do, abduction and twist that neither robot follows included."""
     rng = np.random.default_rng(seed)
     position, _ = moving(HAND, rng)

@@ -75,7 +75,7 @@ def test_an_arm_raised_ahead_past_overhead_stays_up(to_deg: float) -> None:
 
 @pytest.mark.parametrize("across_deg", [0.0, 0.5, 1.0, 2.0, 5.0])
 @pytest.mark.parametrize("frequency_hz", [1.0, 4.0, 6.0])
-def test_tremor_beside_the_pole_is_told_at_three_times_its_speed_at_most(
+def test_tremor_beside_the_pole_gets_at_most_three_times_its_speed(
     across_deg: float, frequency_hz: float
 ) -> None:
     """Sideways at 88°, ±3° up and down and some across, so that the pole is passed at any distance."""
@@ -124,7 +124,7 @@ def test_what_the_robot_cannot_follow_is_said_in_degrees() -> None:
         np.testing.assert_allclose(list(short.values()), 0.0, atol=1e-6)
 
 
-def test_a_wrist_bent_far_is_followed_about_the_axis_that_the_robot_has() -> None:
+def test_a_wrist_bent_far_is_followed_about_the_robot_s_axis() -> None:
     """The decomposition has a pole where the hand is bent by 90°; the nearest posture does not."""
     bent = np.linspace(-100.0, 100.0, 80)
     position, _ = told(angles_of("left_hand", np.stack([np.full(80, 20.0), bent, 0 * bent], axis=1)))
@@ -160,7 +160,7 @@ def test_a_lost_node_begins_anew_and_touches_no_other_joint() -> None:
 
 
 @pytest.mark.parametrize("elapsed_s", [0.0, -1.0, 0.51, 100.0, np.inf])
-def test_after_a_long_gap_or_a_clock_that_went_back_nothing_is_remembered(elapsed_s: float) -> None:
+def test_after_a_long_gap_or_a_clock_set_back_nothing_is_remembered(elapsed_s: float) -> None:
     solver = JointSolver(SKELETON)
     q = orientations(SKELETON, np.zeros(len(NAMES)))
     solver.solve(q, STILL)
@@ -187,7 +187,7 @@ def test_within_the_limits_it_says_what_the_decomposition_says() -> None:
         np.testing.assert_allclose(velocity[whole], reference_rate[whole], rtol=1e-6, atol=1e-6)
 
 
-def test_another_robot_s_order_of_axes_and_ratios_is_read_from_its_table() -> None:
+def test_another_robot_s_axes_and_ratios_come_from_its_table() -> None:
     """Yaw, roll, pitch with a roll that goes past the pole, one joint geared down and one turned round."""
     text = """
     name = "other"

@@ -78,7 +78,7 @@ def test_the_transition_is_the_derivative_of_the_propagation(seed: int) -> None:
 
 @few
 @given(seed=seeds)
-def test_the_measurements_are_the_derivatives_that_the_updates_take_them_for(seed: int) -> None:
+def test_the_measurements_have_the_derivatives_that_updates_use(seed: int) -> None:
     """The tilt sees the world's x and y of φ, the azimuth its z: both by finite differences."""
     q, step = attitudes(4, seed), 1e-6
 
@@ -114,7 +114,7 @@ def test_one_measurement_after_the_other_is_eq_40_for_all_at_once(seed: int) -> 
 
 @few
 @given(seed=seeds)
-def test_the_heading_s_update_leaves_all_else_and_keeps_an_honest_covariance(seed: int) -> None:
+def test_the_heading_update_keeps_an_honest_covariance(seed: int) -> None:
     rng = np.random.default_rng(seed)
     p, variance = covariances(5, seed), rng.uniform(0.1, 2.0, size=5)
     residual, correction = 0.1 * rng.normal(size=5), np.zeros((5, 6))

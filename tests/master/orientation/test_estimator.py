@@ -97,7 +97,7 @@ class Turning:
         return seen_by(self.q, self.rate_at(self._tick))
 
 
-def test_a_person_s_motion_through_perfect_sensors_gives_the_joints_back() -> None:
+def test_perfect_sensors_give_a_person_s_joints_back() -> None:
     skeleton = load_skeleton("nursing")
     node_m = np.array([segment.node_m for segment in skeleton.segments])
     middle = 0.5 * (skeleton.lower_rad + skeleton.upper_rad)
@@ -184,7 +184,7 @@ def test_a_late_node_goes_on_at_the_rate_last_heard() -> None:
     assert np.max(angle_between(posture.q_world_from_segment, truth)) < np.radians(0.5)
 
 
-def test_a_lost_node_is_invalid_at_once_and_its_neighbours_do_not_notice() -> None:
+def test_a_lost_node_is_invalid_and_its_neighbours_do_not_notice() -> None:
     alone, turning = estimator(3), Turning(3)
     beside, twin = estimator(3), Turning(3)
     lost = np.array([False, True, False])
@@ -227,7 +227,7 @@ def test_a_node_that_returns_starts_anew_and_settles_first() -> None:
 
 
 @pytest.mark.parametrize("name", ["vqf", "mahony"])
-def test_without_a_magnetometer_a_returning_node_keeps_the_heading_it_had(name: str) -> None:
+def test_without_a_magnetometer_a_returning_node_keeps_its_heading(name: str) -> None:
     subject = estimator(2, EstimationConfig.model_validate({"filter": name, "settle_s": 0.1}))
     no_field = np.full((2, 3), np.nan)
     spin = np.tile([0.0, 0.0, 1.0], (2, 1))
@@ -280,7 +280,7 @@ def test_a_missing_magnetometer_leaves_the_other_nodes_alone() -> None:
     assert found.valid.all()
 
 
-def test_an_alignment_that_is_calibrated_gives_the_segment_s_posture_and_rate() -> None:
+def test_an_alignment_gives_the_segment_s_posture_and_rate() -> None:
     alignment = attitudes(4, 9)
     askew = estimator(4, QUICK, replace(identity(4), q_sensor_from_segment=alignment))
     turning = Turning(4)
@@ -317,7 +317,7 @@ def test_calibrations_are_read_from_the_files_that_the_nodes_name(tmp_path: Path
     assert np.allclose(turned, [0.0, np.pi], atol=0.01)
 
 
-def test_a_zero_pose_zeroes_sensors_worn_askew_for_an_operator_who_faces_a_known_way() -> None:
+def test_a_zero_pose_zeroes_sensors_worn_askew() -> None:
     config = EstimationConfig(settle_s=0.1, zero_pose_s=0.5, zero_pose_heading_deg=40.0)
     alignment, facing = attitudes(5, 3), np.radians(40.0)
     subject = estimator(5, config)
@@ -379,7 +379,7 @@ def test_a_cutoff_must_lie_below_half_the_rate() -> None:
 
 
 @pytest.mark.parametrize("name", ["vqf", "mahony", "ekf"])
-def test_with_constraints_it_finds_the_same_headings_and_goes_on_from_a_snapshot(name: str) -> None:
+def test_with_constraints_it_finds_the_same_headings_after_a_snapshot(name: str) -> None:
     config = EstimationConfig.model_validate({"filter": name, "settle_s": 0.1, "constraints": "online"})
     skeleton = load_skeleton("lower_limb")
     subject = Estimator(config, [Node()] * 7, RATE_HZ, identity(7), skeleton)
@@ -395,7 +395,7 @@ def test_with_constraints_it_finds_the_same_headings_and_goes_on_from_a_snapshot
     assert np.array_equal(ends[0], ends[1])
 
 
-def test_with_constraints_a_zero_pose_gives_nodes_without_magnetometer_their_headings() -> None:
+def test_a_zero_pose_with_constraints_gives_headings_without_a_field() -> None:
     config = EstimationConfig(settle_s=0.1, zero_pose_s=0.2, zero_pose_heading_deg=40.0, constraints="online")
     alignment = attitudes(7, 5)
     calibration = replace(identity(7), q_sensor_from_segment=alignment)

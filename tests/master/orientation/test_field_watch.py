@@ -77,7 +77,7 @@ def test_the_share_is_the_bound(factor: float, doubted: bool) -> None:
     assert not watch.doubted[0]
 
 
-def test_what_all_nodes_of_a_suit_see_is_another_place_and_not_their_fault() -> None:
+def test_what_all_nodes_see_is_another_place_and_not_their_fault() -> None:
     watch, field = FieldWatch(0.1, 5), np.tile(FIELD_UT, (5, 1))
     looks(watch, field, 30.0)
     looks(watch, 1.3 * field, 30.0)

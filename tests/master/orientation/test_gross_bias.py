@@ -95,7 +95,7 @@ def test_a_steady_turn_is_no_bias(name: str, deg_s: float, axis: int) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_without_a_field_a_turn_that_wavers_as_a_person_does_is_no_bias(name: str) -> None:
+def test_without_a_field_a_wavering_turn_is_no_bias(name: str) -> None:
     filter_, rng, n = FILTERS[name]().make(RATE_HZ, 1), np.random.default_rng(1), 1
     up = rotate(conjugate(attitudes(n)), np.tile([0.0, 0.0, 1.0], (n, 1)))
     acc = rotate(conjugate(attitudes(n)), np.broadcast_to(GRAVITY, (n, 3)))
@@ -120,7 +120,7 @@ def test_it_goes_on_from_a_snapshot(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_until_it_is_learnt_a_steady_rate_is_undecided_and_beyond_the_setting_for_ever(name: str) -> None:
+def test_a_steady_rate_is_undecided_until_it_is_learnt(name: str) -> None:
     filter_, still = FILTERS[name]().make(RATE_HZ, 3), np.zeros((3, 3))
     biases = np.array([[0.0, 12.0, 0.0], [0.0, 0.0, 25.0], [0.5, 0.0, 0.0]])
     run(filter_, biases, 1.0, field=True, turn=still)
@@ -139,9 +139,7 @@ def test_a_person_who_turns_is_not_undecided(name: str) -> None:
 
 
 @pytest.mark.parametrize(("deg_s", "weight"), [(12.0, Weight.REFUSED), (25.0, Weight.INVALID)])
-def test_a_node_with_a_gross_bias_does_not_keep_the_others_from_their_zero_pose(
-    deg_s: float, weight: Weight
-) -> None:
+def test_a_gross_bias_does_not_keep_others_from_their_zero_pose(deg_s: float, weight: Weight) -> None:
     config = EstimationConfig(settle_s=1.0, zero_pose_s=1.5)
     estimator = Estimator(config, [Node()] * 3, RATE_HZ, identity(3))
     noise, bias = np.random.default_rng(2), np.zeros((3, 3))

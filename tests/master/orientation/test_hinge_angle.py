@@ -174,7 +174,7 @@ def vectors(scale: float) -> st.SearchStrategy[Array]:
 
 @settings(max_examples=60)
 @given(st.floats(-3.1, 3.1), vectors(1.0), vectors(1.0), vectors(2.0), vectors(2.0), vectors(20.0))
-def test_any_force_across_the_axis_gives_the_angle_between_any_two_nodes(
+def test_any_force_across_the_axis_gives_the_angle_of_two_nodes(
     angle: float, axis: Array, zero: Array, askew1: Array, askew2: Array, force: Array
 ) -> None:
     """Against scipy: node 2 is turned by the angle about the axis, both sit as they like."""

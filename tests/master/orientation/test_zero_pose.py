@@ -106,7 +106,7 @@ def test_heading_memory_goes_on_from_a_snapshot() -> None:
         memory.restore(None)
 
 
-def test_of_aligned_nodes_it_takes_the_heading_and_says_how_far_they_lean() -> None:
+def test_of_aligned_nodes_it_takes_the_heading_and_their_lean() -> None:
     aligned = np.array([True, True, False])
     zero_pose = ZeroPose(ASKEW, 2, 0.7, aligned)
     # the heading is arbitrary; the second node's segment leans by 3° besides
@@ -202,7 +202,7 @@ def test_a_node_that_comes_later_needs_the_whole_pose_again() -> None:
     assert zero_pose.known.all()
 
 
-def test_who_begins_later_does_not_delay_the_others_but_refuses_for_them_if_it_leans() -> None:
+def test_a_later_node_delays_no_other_and_refuses_if_it_leans() -> None:
     first = np.array([True, True, False])
     for deg, known in ((0.0, [True, True, False]), (20.0, [False, False, False])):
         zero_pose = ZeroPose(ASKEW, 4, 0.0, ALL)

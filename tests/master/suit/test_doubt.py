@@ -17,7 +17,7 @@ def test_the_heaviest_doubt_comes_first_and_weighs_for_the_whole() -> None:
     assert as_figures(doubts)["head"] == "its field is not the earth's"
 
 
-def test_only_what_refuses_is_in_the_refusal_and_only_a_few_nodes_are_named() -> None:
+def test_only_what_refuses_is_in_the_refusal_and_few_are_named() -> None:
     assert refusal({"waist": FIELD, "head": FROZEN}) == ""
     assert refusal({"waist": MOVED, "head": FIELD}) == "waist: moved in the zero pose"
     many = {f"node{i}": MOVED for i in range(5)}

@@ -67,9 +67,7 @@ def test_a_liar_is_named_within_a_fifth_of_a_second(
 
 
 @pytest.mark.parametrize(("begins_s", "within_s"), [(3.0, 0.55), (4.6, 0.2)], ids=["at rest", "turning"])
-def test_a_stuck_axis_of_a_gyro_is_named_as_soon_as_chance_is_ruled_out(
-    begins_s: float, within_s: float
-) -> None:
+def test_a_stuck_gyro_axis_is_named_once_chance_is_ruled_out(begins_s: float, within_s: float) -> None:
     """At rest a gyro's reading repeats by chance, and one that stands near zero does no harm yet."""
     bench = Bench('motion="bottle"', f'faults.lie=[{{node="{NODE}",kind="stuck",axis=4,from_s={begins_s}}}]')
     after_s = invalid_after_s(bench, begins_s=begins_s)
@@ -100,7 +98,7 @@ def test_sound_nodes_are_believed(motion: str, grade: str) -> None:
     assert bench.pipeline.plausibility.doubts() == {}
 
 
-def test_a_magnetometer_that_hangs_is_left_out_and_its_joints_stay_valid() -> None:
+def test_a_magnetometer_that_hangs_is_left_out_and_joints_stay_valid() -> None:
     bench = lying("frozen_mag", "bottle")
     assert invalid_after_s(bench) is None
     doubt = bench.pipeline.plausibility.doubts()[bench.pipeline.skeleton.segment_names.index(NODE)]
@@ -116,7 +114,7 @@ def test_what_no_magnetometer_can_read_is_no_reading(kind: LieKind) -> None:
     assert np.isnan(bench.pipeline.poll.readings[node, 6:]).all()
 
 
-def test_a_liar_that_is_mended_settles_before_its_joints_are_valid_again() -> None:
+def test_a_mended_liar_settles_before_its_joints_are_valid() -> None:
     bench = lying("frozen", "calibration_pose", ",until_s=3.5")
     assert invalid_after_s(bench) is not None
     valid_at = next(s.tick / 200 for _ in range(1200) for s in bench.run(1) if s.valid.all() and not s.doubt)
@@ -172,7 +170,7 @@ def test_a_quiet_gyro_at_rest_is_not_stuck() -> None:
     assert judged(still_counts()) == []
 
 
-def test_readings_without_any_noise_are_frozen_unless_they_are_declared() -> None:
+def test_readings_without_noise_are_frozen_unless_declared() -> None:
     exact = np.repeat([[0.0, 0.0, 4096.0, 0.0, 0.0, 0.0, 200.0, 0.0, -470.0]], 400, axis=0)
     assert "frozen" in judged(exact)[0]
     assert judged(exact, noise_free=True) == []

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tests.master.suit.conftest import Suit
 
 
-def test_late_becomes_lost_at_exactly_lost_after_and_one_answer_brings_it_back(suit: Suit) -> None:
+def test_late_becomes_lost_at_lost_after_and_one_answer_restores_it(suit: Suit) -> None:
     suit.settle()
     for missed in range(1, suit.lost_after + 3):
         sweep = suit.window(suit.answers(suit.tick + 1, without=(2,)))

@@ -18,7 +18,7 @@ def present(lost_after: int) -> Presence:
     return presence
 
 
-def test_a_node_that_never_answered_is_lost_but_was_not_lost_from_sight() -> None:
+def test_a_node_that_never_answered_is_lost_but_never_left_sight() -> None:
     presence = Presence(2, 3)
     assert presence.lost.all()
     assert presence.awaited.all()

@@ -144,7 +144,7 @@ def test_a_turntable_that_hardly_turns_determines_nothing() -> None:
         fit_affine(up[:3], up[:3])
 
 
-def test_smoothing_begins_with_the_mean_and_ends_with_its_time_constant() -> None:
+def test_smoothing_begins_with_the_mean_and_ends_with_its_constant() -> None:
     smoother = Smoother(1.0)
     values = [np.array([float(n % 2), 0.0, 0.0]) for n in range(10)]
     for n, value in enumerate(values):

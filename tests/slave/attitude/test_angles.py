@@ -83,7 +83,7 @@ def test_an_orientation_has_the_angles_it_was_made_of(
 
 @quick
 @given(st.floats(0.1, math.pi - 0.1), turns, turns)
-def test_spinning_about_its_own_axis_moves_neither_inclination_nor_azimuth(
+def test_spinning_about_its_axis_moves_no_inclination_or_azimuth(
     inclination: float, azimuth: float, spin: float
 ) -> None:
     still = orientation(np.asarray(inclination), np.asarray(azimuth), np.asarray(0.0))
@@ -146,7 +146,7 @@ def test_a_vertical_axis_has_no_azimuth_and_no_gravity_tool_face(inclination: fl
     assert magnetic_tool_face_rad(field) == pytest.approx(math.atan2(10.0, 20.0))
 
 
-def test_a_vertical_field_tells_no_azimuth_and_a_field_along_the_axis_no_turn() -> None:
+def test_a_vertical_field_has_no_azimuth_and_an_axial_one_no_turn() -> None:
     up = np.array([3.0, -4.0, 5.0])
     assert np.isnan(azimuth_rad(up, -7.0 * up))
     assert np.isnan(azimuth_rad(up, np.zeros(3)))

@@ -37,9 +37,7 @@ class Clock:
 
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(st.sampled_from(["ahead", "up"]), st.floats(0.0, math.tau), st.floats(0.0, math.pi))
-def test_tilt_is_the_angle_the_base_was_tipped_by_whatever_the_direction(
-    axis: Axis, direction: float, tip: float
-) -> None:
+def test_tilt_is_the_angle_the_base_tipped_in_any_direction(axis: Axis, direction: float, tip: float) -> None:
     about = [math.cos(direction), math.sin(direction), 0.0]
     q = multiply(from_axis_angle(about, tip), LEVEL[axis])
     up = rotate(conjugate(q), np.array([0.0, 0.0, 9.8]))
@@ -100,7 +98,7 @@ def test_no_base_sensor_is_none() -> None:
     assert open_base(BaseConfig()) is None
 
 
-def test_a_calibration_that_is_not_there_is_said_before_anything_is_opened(tmp_path: Path) -> None:
+def test_a_missing_calibration_is_reported_before_anything_is_opened(tmp_path: Path) -> None:
     config = BaseConfig(source="simulated", calibration=tmp_path / "none.toml")
     with pytest.raises(ConfigError, match=r"none\.toml"):
         open_base(config)

@@ -143,7 +143,7 @@ def test_the_base_keeps_its_last_attitude_with_its_age(line: Any) -> None:
     assert base.read() is found
 
 
-def test_a_frame_without_a_tool_face_does_not_tell_the_tilt_of_an_axis_ahead() -> None:
+def test_a_frame_without_a_tool_face_leaves_the_next_axis_open() -> None:
     config = BaseConfig(source="serial", port="x")
     assert of_frame(FrameAngles(900, 0, None), 1, config) is None
     upward = of_frame(FrameAngles(900, 0, None), 1, BaseConfig(source="serial", port="x", axis="up"))
@@ -151,7 +151,7 @@ def test_a_frame_without_a_tool_face_does_not_tell_the_tilt_of_an_axis_ahead() -
     assert upward.tilt_rad == pytest.approx(math.pi / 2)
 
 
-def test_another_instruments_azimuth_near_the_vertical_is_not_passed_on() -> None:
+def test_another_azimuth_near_the_vertical_is_not_passed_on() -> None:
     found = of_frame(FrameAngles(30, 1234, 567), 1, BaseConfig(source="serial", port="x", axis="up"))
     assert found is not None
     assert found.azimuth_rad is None

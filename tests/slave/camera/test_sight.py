@@ -36,7 +36,7 @@ def test_every_command_has_an_age_but_a_picture_is_acknowledged_once() -> None:
     assert sight.transit.count == 1
 
 
-def test_pictures_of_another_run_and_clocks_that_are_not_trusted_measure_nothing() -> None:
+def test_pictures_of_another_run_and_untrusted_clocks_measure_nothing() -> None:
     sight = Sight()
     sight.sent(7, 100 * MS, 110 * MS)
     assert sight.on_command(command(0, 0, 5200), 300 * MS, AHEAD) is None

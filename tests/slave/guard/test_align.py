@@ -103,7 +103,7 @@ def test_it_comes_slowly_from_either_side_and_tracks_when_near(rig: Any, end: st
     assert (np.abs(rig.target - last.position_rad) <= rig.config.align_window_rad).all()
 
 
-def test_an_operator_beyond_the_robots_limits_is_aligned_with_at_the_limit(rig: Any) -> None:
+def test_an_operator_beyond_the_limits_aligns_at_the_limit(rig: Any) -> None:
     rig.to_align()
     rig.target[6] = rig.skeleton.lower_rad[6] - 0.2
     rig.run(4.0)
@@ -163,7 +163,7 @@ def test_a_joint_that_was_lost_while_aligning_comes_back_slowly_too(rig: Any) ->
     assert max(abs(s.velocity_rad_s[6]) for s in rig.run(1.0)) <= rig.config.align_velocity_rad_s + 1e-12
 
 
-def test_a_joint_that_returns_at_the_very_start_of_track_comes_back_slowly(rig: Any) -> None:
+def test_a_joint_that_returns_at_the_start_of_track_comes_slowly(rig: Any) -> None:
     rig.to_align()
     rig.target[6] += 0.8
     while rig.guard.state is State.ALIGN:
@@ -184,7 +184,7 @@ def leap(rig: Any, rad: float) -> float:
     return max(float(abs(s.velocity_rad_s[6])) for s in steps)
 
 
-def test_a_target_that_jumps_beyond_the_window_is_followed_slowly_all_the_way(make_rig: MakeRig) -> None:
+def test_a_target_that_jumps_beyond_the_window_is_followed_slowly(make_rig: MakeRig) -> None:
     """On either side: a robot that leaps to where a fault says the operator is hurts somebody."""
     for sign in (1.0, -1.0):
         rig = make_rig(GuardConfig(jump_window_rad=0.5))
@@ -193,9 +193,7 @@ def test_a_target_that_jumps_beyond_the_window_is_followed_slowly_all_the_way(ma
 
 
 @pytest.mark.parametrize("returning", [False, True])
-def test_one_jump_makes_all_joints_slow_but_a_returning_joint_only_itself(
-    make_rig: MakeRig, returning: bool
-) -> None:
+def test_one_jump_slows_all_joints_a_returning_joint_only_itself(make_rig: MakeRig, returning: bool) -> None:
     rig = make_rig(GuardConfig(jump_window_rad=0.5)).to_track()
     slow = rig.config.align_velocity_rad_s + 1e-12
     rig.target = rig.target.copy()
@@ -209,7 +207,7 @@ def test_one_jump_makes_all_joints_slow_but_a_returning_joint_only_itself(
     assert (shoulder > 1.0) if returning else (shoulder <= slow)
 
 
-def test_a_joint_that_jumped_is_as_fast_as_the_rest_again_once_it_is_there(make_rig: MakeRig) -> None:
+def test_a_joint_that_jumped_regains_full_speed_once_there(make_rig: MakeRig) -> None:
     rig = make_rig(GuardConfig(jump_window_rad=0.5))
     leap(rig, 0.6)
     rig.target[6] += 0.4

@@ -157,7 +157,7 @@ def test_reset_waits_for_the_encoders(rig: Any) -> None:
     assert "waist_pitch" in rig.ask(Action.RESET, "anna", KEY).text
 
 
-def test_an_estop_before_the_encoders_are_known_is_reset_only_once_they_are(rig: Any) -> None:
+def test_an_estop_before_known_encoders_resets_only_with_them(rig: Any) -> None:
     rig.guard.estop(rig.now_ns)
     assert not rig.ask(Action.RESET, "anna", KEY).done
     rig.step()

@@ -54,7 +54,7 @@ def test_an_earlier_arrival_does_not_shorten_it(lease: Lease) -> None:
     assert not lease.lapse(2 * S)
 
 
-def test_a_lapsed_lease_does_not_revive_when_the_clock_comes_past_again(lease: Lease) -> None:
+def test_a_lapsed_lease_does_not_revive_when_the_clock_returns(lease: Lease) -> None:
     lease.claim("anna", 100 * S)
     assert lease.lapse(50 * S)
     lease.renew(50 * S)

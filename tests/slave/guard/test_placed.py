@@ -81,7 +81,7 @@ def stopped_after_s(rig: Any, state: State, rate_deg_s: float, wander_rad_s: flo
 @pytest.mark.parametrize("rate_deg_s", [-300.0, -30.0, 60.0, 300.0])
 @pytest.mark.parametrize("wander_rad_s", [0.0, -0.3])
 @pytest.mark.parametrize("state", [State.ALIGN, State.TRACK])
-def test_whoever_moves_against_its_setpoint_while_the_robot_moves_is_stopped_within_50_ms(
+def test_motion_against_the_setpoint_stops_within_50_ms(
     make_rig: MakeRig, state: State, rate_deg_s: float, wander_rad_s: float
 ) -> None:
     assert 0.0 <= stopped_after_s(make_rig(), state, rate_deg_s, wander_rad_s) <= 0.05
@@ -114,7 +114,7 @@ def test_an_arm_that_sags_under_a_load_while_it_follows_is_not_stopped(
     assert not rig.guard.counters.losses
 
 
-def test_called_settled_while_it_follows_a_sagging_arm_would_be_stopped(
+def test_called_settled_too_early_a_sagging_arm_would_be_stopped(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judge = UnbiddenMotion.judge
@@ -153,7 +153,7 @@ def out_for(ms: int, width_rad: float, lately_ms: int = 0) -> bool:
         (SHAKES_RAD + 1e-9, SHAKEN_NS // NS_PER_MS, PATIENCE.plain_ns),
     ],
 )
-def test_who_is_thrown_by_others_is_given_longer_and_no_longer_than_that(
+def test_a_joint_thrown_by_others_is_given_longer_and_no_more(
     width_rad: float, lately_ms: int, may_ns: int
 ) -> None:
     # the first reading beyond may be the second one outwards
@@ -180,7 +180,7 @@ def test_the_setpoint_is_seated_where_the_drives_say_and_does_not_walk(make_rig:
     assert np.array_equal(rig.setpoints[-1].position_rad, rig.measured + 0.03)
 
 
-def test_a_robot_whose_drive_and_encoder_differ_at_the_start_is_not_held_anywhere(make_rig: MakeRig) -> None:
+def test_a_robot_whose_drive_and_encoder_differ_is_held_nowhere(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.drive_off_rad = np.zeros(rig.joints)
     rig.drive_off_rad[ELBOW] = -math.radians(40.0)
@@ -219,7 +219,7 @@ def test_a_joint_that_stands_may_move_by_less_than_the_window(off_rad: float) ->
     assert part.judge(2 * TICK, still, np.array([off_rad]), ONE)[0] == (off_rad > STILL_RAD)
 
 
-def test_what_sags_slowly_is_not_called_moving_and_what_creeps_on_faster_is() -> None:
+def test_a_slow_sag_is_not_moving_and_a_faster_creep_is() -> None:
     for rate_deg_s, moves in ((0.2, False), (1.0, True)):
         part = UnbiddenMotion(["a"])
         part.begin(0, ONE, np.zeros(1))
@@ -240,7 +240,7 @@ def test_a_joint_that_is_shaken_by_one_that_moves_is_not_called_moving() -> None
         assert not part.judge(i * TICK, (high - [0.0, 0.2], high), shaken, both).any()
 
 
-def test_a_joint_that_lags_within_the_span_s_margin_is_not_called_against() -> None:
+def test_a_joint_that_lags_within_the_span_is_not_against() -> None:
     part = UnbiddenMotion(["a"])
     for i in range(1, 400):
         high = 0.01 * i
@@ -271,9 +271,7 @@ def test_without_a_last_known_position_a_person_confirms(make_rig: MakeRig) -> N
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_near_the_last_known_position_nobody_is_asked_and_just_beyond_it_somebody_is(
-    make_rig: MakeRig, sign: int
-) -> None:
+def test_near_the_last_known_position_nobody_is_asked(make_rig: MakeRig, sign: int) -> None:
     for off, asked in ((NEAR_RAD - 1e-9, False), (NEAR_RAD + 1e-9, True)):
         rig = make_rig()
         known = dict(zip(rig.skeleton.joint_names, rig.measured.tolist(), strict=True))
@@ -284,9 +282,7 @@ def test_near_the_last_known_position_nobody_is_asked_and_just_beyond_it_somebod
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_little_beyond_its_range_a_joint_is_held_and_far_beyond_it_is_not(
-    make_rig: MakeRig, sign: int
-) -> None:
+def test_a_little_beyond_its_range_a_joint_is_held_far_beyond_not(make_rig: MakeRig, sign: int) -> None:
     for beyond, held in ((BEYOND_RAD - 1e-9, True), (BEYOND_RAD + 1e-9, False)):
         rig = make_rig()
         rig.measured = rig.measured.copy()

@@ -75,7 +75,7 @@ def feed(part: EncoderPlausibility, off_rad: Any, readings: int, start: int = 0)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_at_the_window_believed_and_just_beyond_doubted_after_the_patience(sign: int) -> None:
+def test_at_the_window_believed_beyond_it_doubted_after_patience(sign: int) -> None:
     assert feed(plausibility(), sign * CONFIG.follow_window_rad, 1000) == 0
     part = plausibility()
     doubted = feed(part, sign * (CONFIG.follow_window_rad + 1e-9), 1000)
@@ -160,7 +160,7 @@ def test_the_past_reaches_back_as_far_as_it_says_and_little_further(period_ms: i
         assert low[0] >= stood - max(2 * period_ms, 13 + period_ms)
 
 
-def test_a_setpoint_that_stood_long_belongs_to_the_past_when_it_moves_on() -> None:
+def test_a_setpoint_that_stood_long_becomes_past_when_it_moves() -> None:
     past = Past(1, 100 * MS)
     past.restart(0, np.array([3.0]))
     past.add(10_000 * MS, np.array([4.0]))
@@ -249,7 +249,7 @@ def test_without_its_watch_any_number_would_be_held_one_by_one(make_rig: MakeRig
     assert lying.rig.guard.state is State.TRACK
 
 
-def test_a_held_joint_moves_again_only_after_its_encoder_agreed_and_a_new_engage(lying: Lying) -> None:
+def test_a_held_joint_moves_after_its_encoder_agreed_and_a_new_engage(lying: Lying) -> None:
     rig = lying.rig
     lying.lies[LEFT] = lambda true: true + 0.15
     lying.run(0.3)
@@ -280,7 +280,7 @@ def test_engage_waits_until_the_encoder_has_agreed_for_a_while(lying: Lying) -> 
     rig.engage()
 
 
-def test_a_reset_does_not_send_a_joint_where_a_lying_encoder_says_it_is(lying: Lying) -> None:
+def test_a_reset_does_not_move_a_joint_to_a_lying_encoder_s_angle(lying: Lying) -> None:
     rig = lying.rig
     lying.lies[LEFT] = lambda true: true + 0.5
     lying.run(0.3)

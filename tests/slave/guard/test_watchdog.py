@@ -34,7 +34,7 @@ def test_commands_may_be_silent_up_to_the_time_out_and_no_longer(rig: Any, state
     assert rig.guard.counters.losses == {"command": 1}
 
 
-def test_without_its_watch_a_silent_master_would_be_followed_until_the_lease_lapses(
+def test_without_its_watch_a_silent_master_is_followed_until_the_lease_ends(
     make_rig: MakeRig,
 ) -> None:
     rig = make_rig(arrival_watches=without("command")).to_track()
@@ -61,9 +61,7 @@ def test_a_lease_that_lapses_holds_by_itself(make_rig: MakeRig) -> None:
 
 
 @pytest.mark.parametrize("state", sorted(MOVING))
-def test_commands_may_be_without_a_valid_joint_up_to_the_time_out_and_no_longer(
-    rig: Any, state: State
-) -> None:
+def test_commands_may_lack_a_valid_joint_up_to_the_time_out(rig: Any, state: State) -> None:
     rig.to(state)
     assert rig.send().accepted
     nobody = np.zeros(rig.joints, np.bool_)
@@ -89,7 +87,7 @@ def test_one_valid_joint_is_somebody(rig: Any) -> None:
     assert rig.guard.state is State.TRACK
 
 
-def test_without_its_watch_a_suit_that_is_heard_again_would_move_the_robot(make_rig: MakeRig) -> None:
+def test_without_its_watch_a_suit_heard_again_would_move_the_robot(make_rig: MakeRig) -> None:
     rig = make_rig(arrival_watches=without("valid")).to_track()
     rig.run(5.0, valid=np.zeros(rig.joints, np.bool_))
     rig.run(0.1)
@@ -130,7 +128,7 @@ def test_a_command_after_a_gap_does_not_hide_the_gap(rig: Any) -> None:
     assert rig.guard.state is State.HOLD
 
 
-def test_a_command_that_arrived_in_time_but_was_read_late_hides_nothing_either(rig: Any) -> None:
+def test_a_command_in_time_but_read_late_hides_nothing(rig: Any) -> None:
     rig.to_track()
     rig.send()
     arrived_ns = rig.now_ns + 80_000_000

@@ -140,7 +140,7 @@ def test_a_feasible_target_is_followed_without_any_lag(phase: Array, rate_hz: fl
     assert not watched.clamps
 
 
-def test_a_moving_target_is_caught_up_with_from_rest_and_then_followed_exactly() -> None:
+def test_a_moving_target_is_caught_up_with_and_followed_exactly() -> None:
     watched = Watched(MID)
     rate = np.full(JOINTS, 0.3)
     for i in range(1, 100):
@@ -200,7 +200,7 @@ def test_stop_brakes_at_the_acceleration_limit_to_standstill() -> None:
     assert watched.limiter.position_rad is still
 
 
-def test_a_joint_seated_beyond_its_limit_does_not_jump_and_only_moves_back() -> None:
+def test_a_joint_beyond_its_limit_does_not_jump_and_moves_back() -> None:
     start = MID.copy()
     start[5] = LIMITS.upper_rad[5] + 0.1
     watched = Watched(start)
@@ -245,7 +245,7 @@ def test_gentle_maxima_bound_speeding_up_and_cruise() -> None:
         assert (np.abs(w) - np.abs(v) <= 0.1 * LIMITS.max_acceleration_rad_s2 * DT + EPS).all()
 
 
-def test_gentle_maxima_that_come_at_full_speed_near_a_limit_do_not_carry_it_through() -> None:
+def test_gentle_maxima_do_not_carry_a_fast_joint_through_a_limit() -> None:
     watched = Watched(LIMITS.lower_rad)
     while watched.limiter.position_rad[3] < LIMITS.upper_rad[3] - 0.25:
         watched.step(LIMITS.upper_rad)
@@ -277,7 +277,7 @@ def one(clamps: list[Clamp], joint: str, rule: Rule) -> Clamp:
     return clamp
 
 
-def test_a_target_beyond_the_limit_is_told_once_with_the_angle_asked_and_the_limit() -> None:
+def test_a_target_beyond_the_limit_is_reported_once_with_both_angles() -> None:
     watched = Watched()
     target = MID.copy()
     target[4] = LIMITS.upper_rad[4] + 0.3
@@ -290,7 +290,7 @@ def test_a_target_beyond_the_limit_is_told_once_with_the_angle_asked_and_the_lim
     assert len([c for c in watched.clamps if c.rule is Rule.POSITION]) == 2
 
 
-def test_a_target_that_would_run_into_the_limit_is_told_with_where_it_would_have_stopped() -> None:
+def test_a_target_that_would_hit_the_limit_is_reported_with_its_stop() -> None:
     watched = Watched()
     rate = np.zeros(JOINTS)
     rate[4] = LIMITS.max_velocity_rad_s[4]

@@ -63,7 +63,7 @@ def test_within_the_tighter_limits_a_command_is_what_it_was() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_beyond_them_it_is_nearer_than_joint_by_joint_and_moves_no_other_joint(seed: int) -> None:
+def test_beyond_limits_it_is_nearer_than_joint_by_joint(seed: int) -> None:
     rng = np.random.default_rng(seed)
     tighter = GuardConfig(
         joints={

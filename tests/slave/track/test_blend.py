@@ -27,9 +27,7 @@ def test_a_change_begins_on_the_old_course_and_ends_on_the_new(
 @pytest.mark.parametrize(
     ("error_rad", "times"), [(0.25, 1.0), (0.5, 2.0), (-0.625, 2.5), (0.7, 2.8), (0.701, 1.0), (-2.0, 1.0)]
 )
-def test_a_large_difference_takes_longer_in_proportion_but_a_jump_is_shown_to_the_guard_at_once(
-    error_rad: float, times: float
-) -> None:
+def test_a_large_difference_takes_longer_but_the_guard_sees_a_jump(error_rad: float, times: float) -> None:
     blend, new = Blend(0.08), np.zeros((2, 1))
     old = np.array([[error_rad], [0.0]])
     blend.begin(0, old, new)

@@ -14,7 +14,7 @@ def test_to_go_on_twice_is_to_go_on_once_for_both(a: float, b: float) -> None:
 
 
 @given(st.floats(0.01, 1.0))
-def test_each_row_is_the_slope_of_the_one_above_it_and_the_last_obeys_the_model(span_s: float) -> None:
+def test_each_row_is_the_slope_of_the_one_above_it(span_s: float) -> None:
     h = 1e-6
     slope = (relaxed(span_s + h) - relaxed(span_s - h)) / (2 * h)
     here, rate = relaxed(span_s), RELAX_PER_S
@@ -33,7 +33,7 @@ gaps_ns = st.lists(st.integers(1, 400_000_000), min_size=1, max_size=40)
 
 @settings(deadline=None)
 @given(gaps_ns, st.booleans(), st.integers(0, 2**32 - 1))
-def test_however_samples_come_it_stays_finite_and_its_covariance_positive(
+def test_however_samples_come_the_covariance_stays_positive(
     gaps: list[int], velocity_known: bool, seed: int
 ) -> None:
     random = np.random.default_rng(seed)
@@ -45,7 +45,7 @@ def test_however_samples_come_it_stays_finite_and_its_covariance_positive(
         assert np.linalg.eigvalsh(estimate.covariance).min() > -1e-12
 
 
-def test_a_thousand_regular_samples_leave_the_covariance_symmetric_and_positive() -> None:
+def test_regular_samples_leave_the_covariance_symmetric_and_positive() -> None:
     estimate = first(0, np.zeros(1), np.ones(1))
     for _ in range(1000):
         estimate = corrected(estimate, estimate.sampled_ns + 80_000_000, np.zeros(1), np.ones(1))

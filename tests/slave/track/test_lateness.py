@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from slave.track.lateness import Lateness
 
 
-def test_nothing_is_late_before_there_is_a_measurement_nor_after_a_reset() -> None:
+def test_nothing_is_late_before_a_measurement_or_after_a_reset() -> None:
     lateness = Lateness()
     assert lateness.mean_s is None
     assert lateness.late_s == 0.0

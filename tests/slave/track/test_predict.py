@@ -45,7 +45,7 @@ def test_a_reset_forgets_the_difference_being_worked_off() -> None:
 
 
 @pytest.mark.parametrize("speed", [-2.0, 0.0, 1.5])
-def test_constant_velocity_is_followed_to_now_and_ahead_by_the_servo_lag_but_for_what_may_not_last(
+def test_constant_velocity_is_followed_and_aimed_ahead(
     speed: float,
 ) -> None:
     tracker = fresh()
@@ -105,7 +105,7 @@ def test_the_velocity_is_the_slope_of_the_position() -> None:
         assert (after - before) / 2e-5 == pytest.approx(velocity, abs=5e-3)
 
 
-def test_without_samples_it_is_at_rest_from_the_horizon_on_and_not_before() -> None:
+def test_without_samples_it_is_at_rest_from_the_horizon_on() -> None:
     tracker = fresh()
     feed(tracker, 0, 0.0, 2.0)
     rest_ms = 1e3 * (HORIZON_S - LAG_S)
@@ -140,7 +140,7 @@ def test_the_horizon_follows_the_link_up_to_the_ceiling(transit: int) -> None:
     assert tracker.horizon_s == pytest.approx(min(usual_s, 0.25), abs=0.002)
 
 
-def test_after_a_silence_past_the_horizon_the_estimate_starts_afresh_but_the_robot_does_not_jump() -> None:
+def test_after_a_long_silence_the_estimate_restarts_without_a_jump() -> None:
     tracker = fresh()
     for k in range(4):
         feed(tracker, k, 0.1 * k, 0.1 / 0.08)
@@ -181,7 +181,7 @@ def test_what_the_caller_does_to_its_arrays_does_not_move_the_robot() -> None:
     assert course(tracker, 1.0)[0] == pytest.approx(1.0)
 
 
-def test_two_samples_at_nearly_one_instant_make_no_enormous_acceleration() -> None:
+def test_two_samples_at_nearly_one_instant_cause_no_acceleration() -> None:
     """A late master makes up for a missed tick, or a better offset moves a stamp next to the one before."""
     tracker = fresh()
     for k in range(5):

@@ -51,7 +51,7 @@ def test_predict_without_velocities_still_beats_latest(judged: dict[Strategy, Fi
 
 
 @pytest.mark.parametrize("strategy", ["interpolate", "predict"])
-def test_what_a_smooth_strategy_asks_for_is_the_integral_of_its_velocity(
+def test_a_smooth_strategy_asks_for_the_integral_of_its_velocity(
     runs: dict[Strategy, Run], strategy: Strategy
 ) -> None:
     done = runs[strategy]

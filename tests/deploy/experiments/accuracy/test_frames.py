@@ -57,7 +57,7 @@ def test_an_error_that_nothing_explains_gets_no_hint() -> None:
     assert hint(turns(3)[0], truth, ALL) is None
 
 
-def test_a_score_says_what_was_not_estimated_and_is_withheld_below_its_bound() -> None:
+def test_a_score_names_what_was_not_estimated_and_has_a_bound() -> None:
     truth, estimate = turns(4)
     for gaps, told in ((0, True), (15, True), (16, False), (200, False)):
         holed = estimate.copy()

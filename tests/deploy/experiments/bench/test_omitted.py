@@ -13,7 +13,7 @@ from deploy.experiments.bench.loop import with_missed
 PERIOD_NS = 5_000_000
 
 
-def test_ticks_that_were_missed_are_late_by_all_the_time_until_the_next_ran() -> None:
+def test_missed_ticks_are_late_until_the_next_one_ran() -> None:
     assert with_missed(100_000, 0, PERIOD_NS) == [100_000]
     assert with_missed(100_000, 2, PERIOD_NS) == [100_000, 100_000 + PERIOD_NS, 100_000 + 2 * PERIOD_NS]
 

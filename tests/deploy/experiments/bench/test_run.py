@@ -49,7 +49,7 @@ def test_a_share_of_which_a_part_is_missing_is_not_known(missing: str) -> None:
     assert core_percent(report)["total"] is None
 
 
-def test_a_bench_that_fails_leaves_its_reason_and_the_others_their_figures(
+def test_a_failed_bench_leaves_its_reason_and_the_others_their_figures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def fail(_: float) -> Any:

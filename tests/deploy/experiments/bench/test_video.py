@@ -17,7 +17,7 @@ def run(video: str, seconds: float) -> dict[str, Any]:
     return measured
 
 
-def test_video_delays_no_command_and_states_hardly_but_would_if_nothing_held_it_back() -> None:
+def test_video_delays_no_command_and_hardly_a_state() -> None:
     without, beside, unheld = (run(video, 2.5) for video in ("off", "controlled", "uncontrolled"))
     assert beside["video"]["fps"] > 1
     assert beside["command_ms"]["p50"] < 1.5 * without["command_ms"]["p50"]

@@ -45,7 +45,7 @@ def known() -> Curves:
     return found
 
 
-def test_angles_and_velocities_of_robot_and_operator_are_those_of_the_motion() -> None:
+def test_angles_and_velocities_are_those_of_the_motion() -> None:
     found = known()
     at_ns = BEGIN_NS + 1_000_000_000 + np.rint(1e9 * found.time_s).astype(np.int64)
     angle = np.degrees(swing(at_ns))

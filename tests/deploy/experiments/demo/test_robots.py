@@ -93,7 +93,7 @@ def test_each_robot_has_its_own_figures() -> None:
     assert made.tree["cpu_percent"]["slave-8"] == 12.3
 
 
-def test_a_process_that_failed_a_robot_that_never_tracked_and_why_it_was_given_up_are_named() -> None:
+def test_failed_processes_and_robots_that_never_tracked_are_named() -> None:
     made = report(lost_by=3, ended={"slave-5": 1}, problem="robot-3 held 3 times within 20 s")
     assert made.problems == ["slave-5 ended with status 1", "robot-3 held 3 times within 20 s"]
     assert made.tree["robots"]["robot-3"]["in_track"] == 0.5
@@ -109,7 +109,7 @@ def test_a_robot_that_never_tracked_is_a_problem() -> None:
     assert report(lost_by=-2).problems == ["robot-2 never reached track"]
 
 
-def test_a_process_without_metrics_and_a_robot_without_commands_are_problems() -> None:
+def test_missing_metrics_and_missing_commands_are_problems() -> None:
     assert report(counted_last=None).problems == ["robot-8 left no metrics"]
     deaf = replace(COUNTED, guard=replace(COUNTED.guard, received=0))
     assert report(counted_last=deaf).problems == ["no command reached robot-8: it was not judged"]
@@ -127,7 +127,7 @@ def test_the_table_has_a_row_each_and_fits() -> None:
     assert "robot-3 held at 2.0 s for 1.0 s: no encoder" in out.getvalue()
 
 
-def test_several_robots_have_neither_cameras_nor_priority_and_follow_the_simulated_operator() -> None:
+def test_several_robots_follow_the_simulated_operator_only() -> None:
     slave = DemoOptions(robots=2).overrides()["slave"]
     assert 'camera.source="off"' in slave
     assert "process.realtime_priority=0" in slave

@@ -30,6 +30,6 @@ def test_every_fault_of_a_soak_has_a_row_or_is_none_of_the_robots() -> None:
 
 
 @pytest.mark.parametrize(("name", "row"), MATRIX_NAME.items())
-def test_a_fault_makes_the_robot_hold_in_a_soak_where_it_does_in_the_matrix(name: str, row: str) -> None:
+def test_a_fault_makes_the_robot_hold_in_a_soak_as_in_the_matrix(name: str, row: str) -> None:
     rows = {fault.name: fault for fault in (*MATRIX, *(one.row for one in PROCESS_FAULTS))}
     assert FAULTS[name].holds is (rows[row].reaction is Reaction.HOLDS)

@@ -77,7 +77,7 @@ def test_a_disk_that_cannot_be_filled_leaves_the_recorder_running() -> None:
 
 
 @pytest.mark.parametrize("ends", [False, True])
-def test_a_recorder_that_ended_on_a_full_disk_and_was_started_again_did_not_live(
+def test_a_recorder_that_ended_on_a_full_disk_did_not_live(
     ends: bool,
 ) -> None:
     async def story() -> FakeStage:

@@ -104,7 +104,7 @@ def test_a_robot_that_is_silent_is_said_to_be(heard: Heard) -> None:
     assert heard.watch.guard(NS_PER_S) == "silent"
 
 
-def test_guard_s_changes_are_told_once_and_states_that_were_missed_are_counted(heard: Heard) -> None:
+def test_guard_changes_are_reported_once_and_missed_states_counted(heard: Heard) -> None:
     for sequence, guard in ((1, "track"), (2, "track"), (5, "hold"), (6, "hold"), (7, "align")):
         heard.state(sequence, sequence=sequence, guard=guard)
     changes = [(e["from"], e["to"]) for e in heard.of("guard")]
@@ -130,7 +130,7 @@ def test_counters_are_what_came_since_and_begin_anew_with_a_process(heard: Heard
     assert (row["lost"], row["slave_ticks"], row["slave_missed"]) == (5.0, 1000.0, 4.0)
 
 
-def test_a_command_that_comes_after_all_is_not_lost_and_loses_no_others(heard: Heard) -> None:
+def test_a_command_that_comes_after_all_is_not_lost(heard: Heard) -> None:
     """What was lost shrinks then: that is no new process, whose whole count would be new."""
     commands = ArrivalCounts(arrived=100, lost=40, late=0, repeated=0)
     heard.statistics(slave_metrics(commands=commands))
@@ -202,7 +202,7 @@ def test_braking_is_no_straying_but_what_comes_after_is() -> None:
     assert motion(*braking, *later).take_strayed() == pytest.approx(0.05, abs=0.002)
 
 
-def test_another_process_s_robot_stands_elsewhere_and_that_is_no_motion() -> None:
+def test_another_process_s_robot_elsewhere_is_no_motion() -> None:
     before = at_50_hz(2.0, "hold", lambda t: 1.0, from_s=100.0)
     after = at_50_hz(2.0, "hold", lambda t: 0.0)
     assert motion(*before, *after).take_strayed() == 0.0
@@ -213,9 +213,7 @@ def test_of_a_robot_that_follows_nothing_is_said() -> None:
 
 
 @pytest.mark.parametrize(("spoil", "strayed_rad"), [("silent", 0.5), ("nan", math.inf)])
-def test_a_joint_that_is_not_read_hides_no_other_and_one_read_as_no_number_may_be_anywhere(
-    spoil: str, strayed_rad: float
-) -> None:
+def test_an_unread_joint_hides_no_other_and_nan_may_be_anywhere(spoil: str, strayed_rad: float) -> None:
     seen = Motion(SKELETON)
     for sequence in range(100):
         state = replace(STATE, sequence=sequence, sent_ns=sequence * NS_PER_S // 50, guard="hold")

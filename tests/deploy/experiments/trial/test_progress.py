@@ -19,7 +19,7 @@ from tests.deploy.experiments.trial.made_up import PLAN, cell
 S = 1_000_000_000
 
 
-def test_time_left_is_guessed_from_the_plan_and_then_taken_from_what_cells_took() -> None:
+def test_time_left_is_guessed_from_the_plan_then_from_the_cells() -> None:
     progress = Progress(PLAN, total=4)
     key = PLAN.cells()[0]
     assert progress.left_s(0) == 4 * 52.0, "20 s judged, an outage of 2 s and what is around them"
@@ -35,7 +35,7 @@ def test_time_left_is_guessed_from_the_plan_and_then_taken_from_what_cells_took(
     assert progress.left_s(600 * S) == 0.0
 
 
-def test_a_cell_that_cannot_be_run_tells_nothing_of_how_long_others_take() -> None:
+def test_a_cell_that_cannot_run_does_not_enter_the_time_left() -> None:
     progress = Progress(PLAN, total=3)
     progress.begin(PLAN.cells()[0], 0)
     progress.end(ran=False, failed=False, now_ns=1)
@@ -71,7 +71,7 @@ def run(plan: Plan, folder: Folder, act: dict[int, object]) -> tuple[Progress, l
     return asyncio.run(story()), ran, out.getvalue()
 
 
-def test_each_cell_is_on_disk_when_the_next_begins_and_an_interrupt_leaves_them(tmp_path: Path) -> None:
+def test_each_cell_is_on_disk_before_the_next_begins(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     progress, ran, _ = run(PLAN, folder, {4: "stop"})
     assert ran == PLAN.cells()[:4]

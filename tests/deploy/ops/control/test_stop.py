@@ -97,7 +97,7 @@ def test_it_goes_on_while_nobody_answers(trouble: Exception | str) -> None:
     assert 2 <= road.asked <= 11
 
 
-def test_an_acknowledgement_does_not_end_it_before_all_who_are_there_have_shown_themselves() -> None:
+def test_one_acknowledgement_does_not_end_it_before_all_are_seen() -> None:
     road, count = Road(), StopCount("robot-1", 0.1)
     told = asyncio.run(stopped(road, count, within_s=0.1, settled=False))
     assert len(told) == 1
@@ -192,7 +192,7 @@ def test_a_named_one_is_stopped_alone() -> None:
     assert asked["a"] == []
 
 
-def test_a_robot_that_does_not_answer_does_not_hold_up_the_others_and_is_said() -> None:
+def test_a_robot_without_an_answer_is_named_and_delays_no_other() -> None:
     at = {"a": endpoint(), "b": endpoint()}
     answers, _ = stop(at, {"a": at["a"]}, ("a", "b"), everyone=True)
     by_name = {answer.robot: answer for answer in answers}
@@ -209,7 +209,7 @@ def test_all_that_reaches_no_robot_says_so() -> None:
     assert "NOT REACHED" in answers[0].text
 
 
-def test_through_routers_one_that_answers_is_enough_and_none_is_an_error_in_time() -> None:
+def test_through_routers_one_answer_is_enough_and_none_an_error() -> None:
     dead, router = endpoint(), endpoint()
 
     async def story() -> list[Answer]:

@@ -73,7 +73,7 @@ async def hang_up(tandem: asyncio.subprocess.Process) -> None:
 
 
 @pytest.mark.parametrize("output", ["full", "closed pipe", "paused", "hangup"])
-def test_an_estop_reaches_the_second_robot_too_and_its_status_tells_of_the_act(output: str) -> None:
+def test_an_estop_reaches_the_second_robot_and_its_status_says_so(output: str) -> None:
     reading, writing = os.pipe()
     out = writing
     if output == "full":

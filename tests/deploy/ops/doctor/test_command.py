@@ -27,7 +27,7 @@ def test_a_master_s_file_tells_buses_robots_and_name() -> None:
     assert needs.realtime_priority == 20
 
 
-def test_a_master_whose_dbc_gives_two_messages_one_identifier_is_told_before_the_suit_is_worn(
+def test_two_dbc_messages_of_one_identifier_are_refused_at_the_start(
     tmp_path: Path,
 ) -> None:
     text = SHIPPED_DBC.read_text("utf-8")

@@ -134,7 +134,7 @@ def test_every_answer_is_judged_with_what_to_do(answer: Answer) -> None:
     assert bool(finding.advice) != well
 
 
-def test_a_knock_at_a_secure_door_is_told_to_count_as_a_refused_handshake_there() -> None:
+def test_a_secure_knock_counts_as_a_refused_handshake() -> None:
     counts = {e: "refused handshake" in judge_endpoint(EndpointFacts(e, Answer.ACCEPTS)).found for e in
               ("tls/h:1", "tcp/h:1", "ws/h:1")}  # fmt: skip
     assert counts == {"tls/h:1": True, "tcp/h:1": False, "ws/h:1": False}

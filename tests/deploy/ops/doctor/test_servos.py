@@ -42,7 +42,7 @@ def late_by(seconds: float) -> Callable[[bytes], bytes]:
     return garble
 
 
-def test_servos_are_pinged_past_one_that_is_silent_and_nothing_is_written(port: SimulatedPort) -> None:
+def test_servos_are_pinged_past_a_silent_one_and_nothing_is_written(port: SimulatedPort) -> None:
     servo = port.bus.servos[7]
     before = bytes(servo._table)
     found, config = pinged(port, reply_timeout_s=0.1)

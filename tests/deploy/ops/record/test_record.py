@@ -87,7 +87,7 @@ def test_every_topic_is_recorded_as_it_came_until_stopped(tmp_path: Path) -> Non
     run(test)
 
 
-def test_a_robot_that_is_not_there_is_said_and_leaves_a_file_that_is_whole(tmp_path: Path) -> None:
+def test_an_absent_robot_is_reported_and_the_file_is_whole(tmp_path: Path) -> None:
     async def test() -> None:
         out = tmp_path / "a.mcap"
         options = RecordOptions(LinkConfig(connect=[free_endpoint()]), ROBOT, out, seconds=0.05)
@@ -149,9 +149,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("may_miss", [False, True])
-def test_numbered_states_that_never_came_are_said_and_end_with_an_error(
-    tmp_path: Path, may_miss: bool
-) -> None:
+def test_states_that_never_came_are_reported_as_an_error(tmp_path: Path, may_miss: bool) -> None:
     async def test() -> None:
         endpoint, stop, told = free_endpoint(), asyncio.Event(), list[str]()
         figures: dict[str, Any] = {}

@@ -33,7 +33,7 @@ async def filled(tape: Tape, clock: Clock, count: int) -> None:
     await tape.close()
 
 
-def test_a_new_file_begins_when_it_is_time_and_nothing_is_lost_in_between(tmp_path: Path) -> None:
+def test_a_new_file_begins_in_time_and_nothing_is_lost_between(tmp_path: Path) -> None:
     clock, out = Clock(), tmp_path / "night.mcap"
     tape = Tape(out, {"robot": "r"}, 10.0, clock)
     asyncio.run(filled(tape, clock, 25))

@@ -110,7 +110,7 @@ def test_what_runs_is_a_command_that_tandem_has(unit: str) -> None:
 
 
 @pytest.mark.parametrize("unit", SIDES)
-def test_a_stop_is_a_sigterm_and_waits_longer_than_the_process_s_own_deadline(unit: str) -> None:
+def test_a_stop_is_sigterm_and_outlasts_the_process_s_deadline(unit: str) -> None:
     service = settings(unit)
     assert service["KillSignal"] == ["SIGTERM"]
     stop_s = float(service["TimeoutStopSec"][0])

@@ -69,7 +69,7 @@ def test_the_gate_of_the_delay(off_ms: float) -> None:
         assert judge(STEADY, 100, late, 128, 0.5, planned).delay_kept is (abs(off_ms) < DELAY_MS)
 
 
-def test_with_jitter_chance_is_allowed_for_and_what_was_drawn_is_not_off() -> None:
+def test_with_jitter_chance_is_allowed_for() -> None:
     way = Way(delay_ms=30.0, jitter_ms=10.0)
     found = judge(way, 600, arrivals(way, 600), 128, 3.0)
     assert found.delay_bound_ms > 3.0

@@ -116,7 +116,7 @@ def test_the_rate_is_never_exceeded_and_the_queue_is_bounded(
         assert waited_ms.max() * rate_mbit / 8e-3 > way.queue_bytes - 2 * 1500
 
 
-def test_a_full_queue_drops_the_newest_and_a_busy_link_runs_at_its_rate() -> None:
+def test_a_full_queue_drops_the_newest_and_keeps_its_rate() -> None:
     way = Way(rate_mbit=1.0, queue_ms=120.0)  # ten packets of 1500 bytes
     carried = carry(way, [(0, 1500)] * 30)
     assert [number for _, number in carried.arrivals] == list(range(10))
@@ -126,7 +126,7 @@ def test_a_full_queue_drops_the_newest_and_a_busy_link_runs_at_its_rate() -> Non
 
 @pytest.mark.parametrize(("mean_ms", "jitter_ms"), [(30.0, 10.0), (3.0, 2.0), (80.0, 3.0), (310.0, 15.0)])
 @pytest.mark.parametrize("gap_ms", [5.0, 80.0])
-def test_the_delay_has_the_profile_s_mean_and_spread_at_any_packet_rate(
+def test_the_delay_has_the_profile_s_mean_and_spread_at_any_rate(
     mean_ms: float, jitter_ms: float, gap_ms: float
 ) -> None:
     # ten minutes and more: the mean of a process with memory settles slowly

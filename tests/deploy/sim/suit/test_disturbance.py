@@ -74,7 +74,7 @@ def test_a_turned_field_keeps_strength_and_dip() -> None:
     np.testing.assert_allclose(half[:, 2], EARTH_UT[2])
 
 
-def test_a_bed_s_rail_disturbs_the_hand_that_reaches_over_it_and_hardly_the_head() -> None:
+def test_a_bed_rail_disturbs_the_hand_over_it_and_hardly_the_head() -> None:
     skeleton = load_skeleton("nursing")
     config = DisturbanceConfig.model_validate(
         {"dipole": [{"position_m": [0.6, 0.0, 0.7], "moment_a_m2": [0.0, 20.0, 0.0]}]}

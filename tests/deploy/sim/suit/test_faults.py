@@ -43,7 +43,7 @@ def test_without_faults_everything_goes_out_at_once_in_order() -> None:
     assert faults().apply(answers(), 0) == sound()
 
 
-def test_a_lost_node_is_silent_from_the_first_time_until_just_before_the_second() -> None:
+def test_a_lost_node_is_silent_from_its_loss_to_its_return() -> None:
     losing = faults(lose=[{"node": "head", "from_s": 1.0, "until_s": 2.0}])
     begin, end = to_ns(1.0), to_ns(2.0)
     for t_ns, answering in ((begin - 1, 3), (begin, 2), (end - 1, 2), (end, 3)):

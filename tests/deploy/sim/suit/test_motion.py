@@ -55,7 +55,7 @@ def test_the_calibration_pose_is_the_zero_pose(skeleton: Skeleton) -> None:
         np.testing.assert_array_equal(values, 0.0)
 
 
-def test_the_sweep_takes_each_joint_alone_to_one_degree_inside_its_limits(skeleton: Skeleton) -> None:
+def test_the_sweep_takes_each_joint_to_one_degree_inside_its_limits(skeleton: Skeleton) -> None:
     position, velocity, _ = sampled(load_motion("sweep", skeleton))
     np.testing.assert_allclose(position.max(axis=0), skeleton.upper_rad - np.radians(1.0), atol=1e-6)
     np.testing.assert_allclose(position.min(axis=0), skeleton.lower_rad + np.radians(1.0), atol=1e-6)

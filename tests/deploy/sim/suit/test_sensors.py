@@ -39,7 +39,7 @@ max_acceleration_deg_s2 = 10000.0
 """
 
 
-def test_a_pendulum_reads_gravity_centripetal_and_tangential_acceleration() -> None:
+def test_a_pendulum_reads_gravity_and_its_own_acceleration() -> None:
     sensors = IdealSensors(parse_skeleton(PENDULUM, "pendulum"), FIELD_UT)
     angle, rate, push, length = 0.7, 5.0, -40.0, 0.4
     acc, gyr, _ = np.split(sensors.read(np.array([angle]), np.array([rate]), np.array([push]))[0], 3)
@@ -60,9 +60,7 @@ def test_a_body_in_free_fall_along_the_swing_reads_no_force_along_it() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_at_rest_the_readings_are_gravity_and_field_seen_from_the_segment(
-    skeleton: Skeleton, seed: int
-) -> None:
+def test_at_rest_readings_are_gravity_and_field_in_the_segment(skeleton: Skeleton, seed: int) -> None:
     random = np.random.default_rng(seed)
     position = random.uniform(skeleton.lower_rad, skeleton.upper_rad)
     still = np.zeros(len(skeleton.joints))
@@ -89,7 +87,7 @@ def test_field_strength_and_dip_do_not_depend_on_the_posture(skeleton: Skeleton)
     np.testing.assert_allclose(upward, -np.sin(np.radians(60.0)))
 
 
-def test_a_sensor_aligned_askew_reads_the_same_vectors_in_its_own_frame(skeleton: Skeleton) -> None:
+def test_a_sensor_worn_askew_reads_the_same_vectors_in_its_frame(skeleton: Skeleton) -> None:
     random = np.random.default_rng(4)
     count = len(skeleton.segments)
     alignment = normalise(random.standard_normal((count, 4)))
@@ -110,7 +108,7 @@ def test_a_quarter_turn_about_the_long_axis() -> None:
     np.testing.assert_allclose(reading[6:], [25.0, 0.0, FIELD_UT[2]], atol=1e-12)
 
 
-def test_integrated_gyros_follow_the_orientations_through_the_fast_phases(skeleton: Skeleton) -> None:
+def test_integrated_gyros_follow_through_the_fast_phases(skeleton: Skeleton) -> None:
     motion = load_motion("bottle", skeleton)
     sensors = IdealSensors(skeleton, FIELD_UT)
     step_s, begin_s, end_s = 0.002, 3.4, 8.0

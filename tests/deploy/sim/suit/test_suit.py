@@ -149,7 +149,7 @@ def test_faults_act_on_the_suits_own_time(config: SuitConfig, protocol: SuitProt
     assert [len(a.frames) for a in run(suit, 6)] == [36, 36, 35, 35, 36, 36]
 
 
-def test_a_replayed_person_has_no_magnetometer_no_truth_and_no_noise_but_the_last_bit(
+def test_a_replayed_person_has_no_magnetometer_truth_or_noise(
     config: SuitConfig, protocol: SuitProtocol, skeleton: Skeleton, tmp_path: Path
 ) -> None:
     arrays: dict[str, Any] = {"t_s": np.arange(3) * 0.01}

@@ -45,7 +45,7 @@ def test_the_rates_carry_gravity_and_field_from_rest_to_rest(readings: np.ndarra
     assert rotate(conjugate(q), begin[:3]) == pytest.approx(end[:3], abs=0.02)
 
 
-def test_units_feel_their_distance_from_the_middle_as_a_rigid_body_would(readings: np.ndarray) -> None:
+def test_units_feel_their_distance_as_a_rigid_body_would(readings: np.ndarray) -> None:
     """The difference of two units' accelerations, integrated twice in the world, is their lever's course."""
     first, last = readings[:, 0], readings[:, -1]
     assert (first[:, 3:] == last[:, 3:]).all()

@@ -28,9 +28,7 @@ def test_an_undisturbed_field_is_believed() -> None:
 @pytest.mark.parametrize(
     ("turn", "added"), [(0.0, (0.0, 0.0, 20.0)), (0.0, (0.0, 20.0, 0.0)), (0.5, (0.0, 0.0, 0.0))]
 )
-def test_another_strength_dip_or_heading_is_believed_less_and_forgotten_slowly(
-    turn: float, added: tuple[float, ...]
-) -> None:
+def test_another_field_is_believed_less_and_forgotten_slowly(turn: float, added: tuple[float, ...]) -> None:
     field = MagneticHeadings(5, 30.0)
     field.measure(fields(), np.zeros(5), SURE, DT_S)
     _, disturbed = field.measure(fields(turn, added), np.zeros(5), SURE, DT_S)
@@ -40,7 +38,7 @@ def test_another_strength_dip_or_heading_is_believed_less_and_forgotten_slowly(
     assert after[0] == pytest.approx(disturbed[0] / np.e, rel=0.2)
 
 
-def test_where_the_heading_itself_is_unsure_a_turned_field_is_no_disturbance() -> None:
+def test_with_an_unsure_heading_a_turned_field_is_no_disturbance() -> None:
     field = MagneticHeadings(5, 30.0)
     _, disturbed = field.measure(fields(0.5), np.zeros(5), np.full(5, 1.0), DT_S)
     np.testing.assert_allclose(disturbed, 0.0, atol=1e-6)
@@ -59,7 +57,7 @@ def test_a_node_without_a_magnetometer_says_nothing() -> None:
     assert np.isinf(disturbed).all()
 
 
-def test_north_is_where_most_magnetometers_say_once_a_zero_pose_tells_the_headings() -> None:
+def test_north_is_where_most_magnetometers_point_after_a_zero_pose() -> None:
     field = MagneticHeadings(5, 30.0)
     known, nodes = np.full(5, 3.0), np.ones(5, dtype=np.bool_)
     field.set_north(nodes, known, fields(0.8))

@@ -64,7 +64,7 @@ def test_a_steady_drift_is_learnt() -> None:
     assert headings.theta_rad[0] == pytest.approx(0.02 * 39.9, abs=1e-3)
 
 
-def test_a_node_set_anew_forgets_its_neighbours_and_a_snapshot_brings_them_back() -> None:
+def test_a_reset_node_forgets_its_neighbours_until_a_snapshot() -> None:
     headings, _ = example(0)
     headings.correct(np.ones((4, 4)), np.zeros(4))
     snapshot, covariance = headings.snapshot(), headings.covariance.copy()

@@ -126,7 +126,7 @@ def test_a_node_that_is_not_usable_neither_corrects_nor_is_corrected(
     assert (turned[1:3] > 0.01).all() if left_usable else turned[1:3].max() < 1e-7
 
 
-def test_an_error_that_no_heading_explains_counts_hardly_more_than_a_small_one(arms: Skeleton) -> None:
+def test_an_error_no_heading_explains_counts_like_a_small_one(arms: Skeleton) -> None:
     """Of headings known to 2° from a zero pose, one cannot be 60° off: then the alignment is wrong."""
     found_rad = []
     for off_deg in (6.0, 60.0):
@@ -141,7 +141,7 @@ def test_an_error_that_no_heading_explains_counts_hardly_more_than_a_small_one(a
     assert found_rad[1] < 3.0 * found_rad[0]
 
 
-def test_a_node_that_returns_begins_with_the_heading_it_had_or_its_magnetometer_s(arms: Skeleton) -> None:
+def test_a_returning_node_begins_with_its_heading_or_its_field_s(arms: Skeleton) -> None:
     online = OnlineHeadings(OnlineConfig(), arms, 200.0)
     one = of_all(["left_forearm"], arms)
     held = multiply(heading_turn(np.full(5, 0.7)), np.tile(IDENTITY, (5, 1)))

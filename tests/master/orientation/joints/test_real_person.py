@@ -117,7 +117,7 @@ def test_no_joint_jumps(person: Person, fastest_deg_s: Mapping[str, float]) -> N
         assert np.abs(np.diff(angle)).max() * person.rate_hz < fastest_deg_s[kind], name
 
 
-def test_after_a_hundred_seconds_without_a_magnetometer_nothing_has_drifted_away(person: Person) -> None:
+def test_100_s_without_a_magnetometer_nothing_has_drifted(person: Person) -> None:
     """They walk to the end; over the last strides each joint swings about where it did over the first."""
     rate = round(person.rate_hz)
     strides = [slice(56 * rate, 66 * rate), slice(87 * rate, 97 * rate)]

@@ -55,7 +55,7 @@ def test_a_setpoint_is_reached_with_gears_directions_and_zeros(sync_hz: int) -> 
     assert np.abs(wired.read_rad() - wired.setpoint).max() < 0.006
 
 
-def test_a_drive_joins_a_far_setpoint_slowly_and_then_follows_it_exactly(wired: Wired) -> None:
+def test_a_drive_joins_a_far_setpoint_slowly_then_follows_exactly(wired: Wired) -> None:
     wired.up()
     wired.setpoint = small_posture(wired, 0.4)
     wired.run(0.4)
@@ -76,7 +76,7 @@ def test_a_drive_joins_a_far_setpoint_slowly_and_then_follows_it_exactly(wired: 
         (Fault.RESTART, "has restarted"),
     ],
 )
-def test_a_failed_drive_is_named_stays_put_and_only_release_brings_it_back(
+def test_a_failed_drive_is_named_and_only_release_brings_it_back(
     wired: Wired, fault: Fault, said: str
 ) -> None:
     wired.up()
@@ -132,7 +132,7 @@ def test_an_encoder_that_warns_is_not_valid_until_it_is_well_again(
     assert wired.network.reading.valid.all()
 
 
-def test_an_encoder_that_is_stuck_is_found_once_its_joint_has_turned_by_two_degrees(wired: Wired) -> None:
+def test_a_stuck_encoder_is_found_within_two_degrees(wired: Wired) -> None:
     wired.up()
     wired.happen(ELBOW, Fault.ENCODER_STUCK)
     before = wired.read_rad()
@@ -304,7 +304,7 @@ def test_an_emergency_without_a_fault_is_told_until_it_is_over(wired: Wired) -> 
     assert dict(wired.network.faults) == {}
 
 
-def test_a_drive_that_restarts_while_it_is_configured_is_told_everything_again(wired: Wired) -> None:
+def test_a_drive_that_restarts_while_configured_is_configured_anew(wired: Wired) -> None:
     """The heartbeat that it shall watch for among it: or it would not stop when the slave dies."""
     network, now_ns = wired.network, wired.now_ns
     network.start(now_ns)

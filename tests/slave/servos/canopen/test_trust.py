@@ -155,7 +155,7 @@ def stopped_after_s(wired: Wired, elbow_rad_s: float, others_rad_s: float) -> fl
 
 
 @pytest.mark.parametrize("elbow_rad_s", [0.0, 0.1, -0.1, -0.5, -1.0])
-def test_a_drive_that_moves_against_its_setpoint_in_align_and_track_is_stopped_within_50_ms(
+def test_a_drive_that_moves_against_its_setpoint_stops_within_50_ms(
     elbow_rad_s: float,
 ) -> None:
     wired = standing(20.0)
@@ -164,7 +164,7 @@ def test_a_drive_that_moves_against_its_setpoint_in_align_and_track_is_stopped_w
     assert wired.peer.drives[wired.index(ELBOW)].state is Power.QUICK_STOP
 
 
-def test_without_the_astray_window_a_drive_moves_on_against_its_setpoint(
+def test_without_the_astray_window_a_drive_moves_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("slave.encoders.unbidden.ASTRAY_RAD", 9.0)
@@ -195,7 +195,7 @@ def test_what_cannot_be_seen_at_zero_is_seen_at_the_first_degrees(fault: Fault) 
         (Fault.DOUBLE_ID, "has restarted"),
     ],
 )
-def test_an_enabled_drive_that_says_it_does_not_obey_is_stopped_within_50_ms(fault: Fault, said: str) -> None:
+def test_an_enabled_drive_that_does_not_obey_stops_within_50_ms(fault: Fault, said: str) -> None:
     wired = standing(20.0)
     wired.up()
     wired.run(0.5)
@@ -286,7 +286,7 @@ def test_drives_that_are_sent_to_and_fro_at_their_limits_are_believed() -> None:
     assert dict(flung().network.faults) == {}
 
 
-def test_without_the_patience_a_wrist_thrown_by_its_arm_would_be_stopped(
+def test_without_the_patience_a_thrown_wrist_would_be_stopped(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("slave.servos.canopen.watch._PATIENCE", None)
@@ -314,7 +314,7 @@ def test_without_the_watch_a_runaway_runs_on(monkeypatch: pytest.MonkeyPatch) ->
     assert moved_deg(wired) > 12.0
 
 
-def test_without_counting_answers_two_drives_of_one_id_are_not_called_so(
+def test_without_counting_answers_two_drives_of_one_id_look_alike(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(DriveWatch, "answered", lambda *_: "")

@@ -27,7 +27,7 @@ def test_each_state_leads_to_enabled(state: Power, drive_knows_16: bool) -> None
     assert seen[-1] is Power.ENABLED
 
 
-def test_voltage_is_disabled_in_quick_stop_only_and_only_without_transition_16() -> None:
+def test_voltage_is_disabled_only_in_quick_stop_without_transition_16() -> None:
     for state in Power:
         assert towards_enabled(state, ENABLE, True) != DISABLE_VOLTAGE
         expected = state is Power.QUICK_STOP
@@ -42,7 +42,7 @@ def test_a_fault_is_reset_by_rising_edges() -> None:
     assert [word == FAULT_RESET for word in words] == [True, False, True, False, True, False]
 
 
-def test_a_drive_without_transition_16_comes_back_by_reset_and_by_restart(wired: Wired) -> None:
+def test_a_drive_without_transition_16_returns_by_reset_and_restart(wired: Wired) -> None:
     for drive in wired.peer.drives:
         drive.traits.knows_16 = False
     wired.up()

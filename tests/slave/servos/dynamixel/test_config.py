@@ -58,7 +58,7 @@ def test_a_backend_without_its_section_is_refused(tmp_path: Path) -> None:
         load_config(file, SlaveConfig)
 
 
-def test_servos_may_go_as_far_and_as_fast_as_the_table_says_and_little_more() -> None:
+def test_servos_go_as_far_and_fast_as_the_table_and_little_more() -> None:
     config = load_config(EXAMPLE, SlaveConfig, ['encoders.reversed=["neck_pitch"]'])
     encoders = Encoders(config.skeleton, config.encoders)
     found = settings_of(config.servos.section(DynamixelConfig), config.skeleton, encoders)

@@ -100,7 +100,7 @@ def test_a_servo_that_answers_nothing_is_named(make_rig: Callable[..., Rig]) -> 
         rig.driver.start()
 
 
-def test_one_that_falls_silent_is_held_and_named_and_the_others_still_read(rig: Rig) -> None:
+def test_a_silent_encoder_is_held_and_named_and_the_others_read(rig: Rig) -> None:
     rig.driver.start()
     rig.cycles(2)
     rig.wait_for_answers(0.4)
@@ -240,7 +240,7 @@ def test_a_servo_past_the_end_of_its_turn_does_not_go_round(make_rig: Callable[.
     assert rig.driver._goal[0] == rig.driver._servos[0].lowest
 
 
-def test_a_cable_that_is_pulled_is_a_fault_of_all_and_a_new_one_is_taken_in_after_a_reset(rig: Rig) -> None:
+def test_a_pulled_cable_faults_all_and_a_new_one_works_after_a_reset(rig: Rig) -> None:
     opened = []
     open_port = rig.driver._open_port
 

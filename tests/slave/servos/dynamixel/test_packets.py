@@ -81,9 +81,7 @@ def test_a_packet_after_garbage_is_found_once_the_line_was_quiet(
 
 @few
 @given(packets, st.data())
-def test_a_packet_with_a_wrong_bit_or_an_end_that_is_missing_is_never_taken(
-    packet: Packet, data: st.DataObject
-) -> None:
+def test_a_packet_with_a_wrong_bit_or_missing_end_is_never_taken(packet: Packet, data: st.DataObject) -> None:
     whole = frame(packet.servo, packet.instruction, packet.parameters)
     broken = bytearray(whole)
     bit = data.draw(st.integers(0, 8 * len(whole) - 1))

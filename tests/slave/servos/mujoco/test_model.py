@@ -38,7 +38,7 @@ def steps(data: mujoco.MjData, seconds: float) -> Iterator[float]:
         mujoco.mj_step(MODEL, data)
 
 
-def test_actuators_are_the_joints_in_their_order_with_the_tables_limits() -> None:
+def test_actuators_are_the_joints_in_order_with_the_table_s_limits() -> None:
     assert tuple(MODEL.actuator(j).name for j in range(MODEL.nu)) == SKELETON.joint_names
     np.testing.assert_allclose(MODEL.actuator_ctrlrange[:, 0], SKELETON.lower_rad)
     np.testing.assert_allclose(MODEL.actuator_ctrlrange[:, 1], SKELETON.upper_rad)
@@ -52,7 +52,7 @@ def test_every_named_angle_is_a_hinge_on_its_segment_about_its_axis() -> None:
         np.testing.assert_array_equal(hinge.axis, SKELETON.segments[segment].axes[place])
 
 
-def test_mechanical_stops_stand_three_degrees_outside_the_tables_limits() -> None:
+def test_mechanical_stops_stand_three_degrees_outside_the_limits() -> None:
     for joint in SKELETON.joints:
         angle, ratio = leader(joint)
         stops = np.array([joint.lower_rad, joint.upper_rad]) * ratio + np.deg2rad([-3.0, 3.0])
@@ -100,7 +100,7 @@ def test_every_servo_lags_a_ramp_by_28_ms(posture: Array) -> None:
 
 
 @POSTURES
-def test_a_step_is_answered_within_40_ms_and_without_overshoot_above_10_percent(posture: Array) -> None:
+def test_a_step_is_answered_within_40_ms_with_little_overshoot(posture: Array) -> None:
     for j in range(16):
         data = settled(posture)
         began = data.qpos[LEADERS[j]]

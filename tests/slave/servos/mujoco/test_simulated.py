@@ -39,7 +39,7 @@ def test_advance_runs_whole_cycles_and_never_past_the_time_asked() -> None:
     assert robot.now_ns == 7 + 2 * CYCLE_NS
 
 
-def test_a_setpoint_takes_effect_at_the_end_of_the_cycle_it_was_written_in() -> None:
+def test_a_setpoint_takes_effect_at_the_end_of_its_cycle() -> None:
     robot, idle = SimulatedRobot(SKELETON, position_rad=MIDDLE), SimulatedRobot(SKELETON, position_rad=MIDDLE)
     robot.write(MIDDLE + 0.1)
     for r in (robot, idle):
@@ -123,7 +123,7 @@ def test_a_simulation_that_has_diverged_says_that_no_encoder_is_valid() -> None:
     assert reading.counts.shape == (J,)
 
 
-def test_the_lag_that_predict_aims_ahead_is_the_one_of_this_robot_written_at_200_hz() -> None:
+def test_predict_aims_ahead_by_this_robot_s_lag_at_200_hz() -> None:
     robot = SimulatedRobot(SKELETON, position_rad=MIDDLE)
     speed = np.deg2rad(20.0)
     lags = []

@@ -49,7 +49,7 @@ def test_other_processes_find_the_same() -> None:
     assert other == {seed: made_up(seed) for seed in (1, 2)}
 
 
-def test_table_and_report_say_the_papers_figure_ours_and_whether_it_was_reached() -> None:
+def test_table_and_report_name_the_paper_s_figure_and_ours() -> None:
     rows = gather({seed: made_up(seed) for seed in (1, 4)})
     console = Console(width=80, record=True, file=io.StringIO())
     console.print(experiment_table(MADE_UP, rows))

@@ -9,7 +9,7 @@ from deploy.experiments.accuracy.papers.figures import gather
 from deploy.experiments.accuracy.papers.fixture import Take
 
 
-def test_axes_and_knee_angles_meet_their_targets_with_every_sensor_askew() -> None:
+def test_axes_and_knees_meet_their_targets_with_sensors_askew() -> None:
     rows = gather({1: lower_limb.experiment(1)})
     asked = [row for row in rows if row.target is not None]
     assert [row.name for row in asked] == ["hinge axes in both sensors' frames", "knee angle, RMSE"]

@@ -62,9 +62,7 @@ def test_a_soak_in_which_nothing_went_wrong_fails_nothing(make: Make) -> None:
         ("times_lost", "loops: times the master lost the robot, unexplained"),
     ],
 )
-def test_one_that_nothing_explains_fails_and_the_same_in_a_fault_does_not(
-    make: Make, column: str, name: str
-) -> None:
+def test_an_unexplained_hold_fails_and_one_in_a_fault_does_not(make: Make, column: str, name: str) -> None:
     assert failing(make(**{column: at(50)})) == {name}
     assert failing(make(**{column: at(103)})) == set()
     assert failing(make(**{column: at(109.0 + int(AFTER_S))})) == set()
@@ -93,9 +91,7 @@ def test_a_datagram_that_the_network_lost_explains_one_command(
 
 
 @pytest.mark.parametrize(("every_s", "judges"), [(6, True), (5, False)])
-def test_where_little_is_left_unexplained_that_nothing_was_lost_is_no_pass(
-    make: Make, every_s: int, judges: bool
-) -> None:
+def test_with_little_unexplained_nothing_lost_is_no_pass(make: Make, every_s: int, judges: bool) -> None:
     def outcome(name: str, **columns: Any) -> Outcome:
         return judged(make(**columns))[name].outcome
 
@@ -110,9 +106,7 @@ def test_where_little_is_left_unexplained_that_nothing_was_lost_is_no_pass(
 
 
 @pytest.mark.parametrize(("share", "outcome"), [(0.2, Outcome.PASSED), (0.199, Outcome.NOT_JUDGED)])
-def test_a_fifth_left_unexplained_is_enough_to_pass_and_none_is_needed_to_fail(
-    share: float, outcome: Outcome
-) -> None:
+def test_a_fifth_unexplained_suffices_to_pass_and_none_to_fail(share: float, outcome: Outcome) -> None:
     assert of_enough(at_most("lost", 0.0, 0.0), share).outcome is outcome
     assert of_enough(at_most("lost", 1.0, 0.0), share).outcome is Outcome.FAILED
 
@@ -256,7 +250,7 @@ def test_a_hold_on_a_fault_that_asks_for_none_fails(make: Make) -> None:
     assert failing(seen) == {"guard: holds on a fault that asks for none"}
 
 
-def test_missed_ticks_are_judged_by_their_share_without_those_of_the_host(make: Make) -> None:
+def test_missed_ticks_are_judged_without_those_of_the_host(make: Make) -> None:
     # 491 rows outside of windows, 200 ticks each: 98 is just below one in a thousand
     name = "loops: ticks the master missed, unexplained"
     ticks = judged(make())[name]

@@ -36,7 +36,7 @@ def test_what_never_ended_lasts(make: Make) -> None:
     assert explained(make, Event(5.0, "follows"), fault(10.0, 0)).why(1e6) == "suit-kill"
 
 
-def test_what_comes_after_a_robot_left_off_has_a_reason_that_it_left_has_none(make: Make) -> None:
+def test_after_a_robot_left_off_what_comes_has_a_reason(make: Make) -> None:
     left = Event(50.0, "left", {"guard": "hold"})
     events = (*STORY[:6], left, Event(53.0, "recovered", {"fault": "", "number": -1}))
     found = explained(make, *events)
@@ -45,7 +45,7 @@ def test_what_comes_after_a_robot_left_off_has_a_reason_that_it_left_has_none(ma
     assert unexplained_lefts(events, found) == [left]
 
 
-def test_what_the_processes_say_while_they_are_stopped_counts_for_nothing(make: Make) -> None:
+def test_what_is_sent_during_the_stop_counts_for_nothing(make: Make) -> None:
     assert explained(make, *STORY, Event(300.0, "end")).why(301.0) == "end"
 
 
@@ -72,7 +72,7 @@ def test_times_are_accounted_for_as_single_holds_are(lossy_s: tuple[float, ...])
     assert found.accounted(at_s).tolist() == [found.accounts_for_hold(float(s)) for s in at_s]
 
 
-def test_the_network_s_windows_are_the_seconds_in_which_it_did_something(make: Make) -> None:
+def test_the_network_s_windows_are_the_seconds_it_was_active(make: Make) -> None:
     windows = explanation(STORY, make(link_out=at(70, 2)).samples).network
     assert [(w.from_s, w.until_s) for w in windows] == [(69.0, 70.0)]
 

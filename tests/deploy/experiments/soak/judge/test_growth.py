@@ -133,7 +133,7 @@ def test_descriptors_are_held_against_those_after_the_warm_up(make: Make) -> Non
     assert of(handles(make(200, master_fds=more(0.0))), fds).outcome is Outcome.NOT_JUDGED
 
 
-def test_a_leak_of_0_6_mb_an_hour_is_failed_by_half_an_hour_although_resident_memory_hides_it(
+def test_a_leak_of_0_6_mb_an_hour_fails_within_half_an_hour(
     make: Make,
 ) -> None:
     half = 1800

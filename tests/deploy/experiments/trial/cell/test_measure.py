@@ -172,7 +172,7 @@ def test_a_cell_without_a_single_command_failed(without: str) -> None:
     assert whole.status is Status.DONE
 
 
-def test_a_robot_that_was_not_heard_after_the_outage_is_not_called_safe() -> None:
+def test_a_robot_unheard_after_the_outage_is_not_called_safe() -> None:
     outage = Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS)
     deaf = aftermath(replace(after(0.6), states=[]), outage, 0.3)
     assert (deaf["moved_alone"], deaf["stale_accepted"]) == (None, None)
@@ -243,7 +243,7 @@ def test_only_what_grew_in_the_judged_time_is_counted() -> None:
     assert counts(recording()) == {"dropped": {"age": 3}}
 
 
-def test_percentiles_for_the_picture_and_the_excerpt_are_of_accepted_commands_and_one_joint() -> None:
+def test_percentiles_of_the_excerpt_are_of_accepted_commands() -> None:
     percentiles = one_way_percentiles_ms(recording())
     assert len(percentiles) == 101
     assert percentiles[50] == pytest.approx(40.0)
@@ -314,9 +314,7 @@ def test_a_command_is_stale_where_it_is_older_than_the_guard_may_take(age_ms: fl
 
 
 @pytest.mark.parametrize(("unseen", "stale"), [(0, 0.0), (4, 0.0), (5, 1.0), (20, 16.0)])
-def test_a_stale_burst_of_which_the_states_show_the_last_alone_is_proven_by_the_slaves_counter(
-    unseen: int, stale: float
-) -> None:
+def test_a_stale_burst_is_proven_by_the_slave_s_counter(unseen: int, stale: float) -> None:
     heard = after(0.6)
     begun_ns, ended_ns = CUT_NS, BEGIN_NS + 7 * S
     found = {s.echo.sequence: s.echo.accepted_ns for s in heard.states if s.echo is not None}
@@ -341,7 +339,7 @@ def test_a_robot_that_never_comes_back_has_no_times() -> None:
     assert figures["track_again_s"] is None
 
 
-def test_a_robot_that_held_already_when_the_link_was_cut_did_not_hold_for_it() -> None:
+def test_a_robot_already_in_hold_did_not_hold_for_the_cut_link() -> None:
     held = after(0.6)
     held = replace(held, states=[replace(s, guard="hold") if s.sent_ns < ACT_NS else s for s in held.states])
     assert (

@@ -34,7 +34,7 @@ def test_every_setup_is_run_once_a_repeat() -> None:
         assert {cell.setup for cell in turn} == set(PLAN.setups())
 
 
-def test_the_order_differs_from_repeat_to_repeat_and_is_the_same_each_time() -> None:
+def test_the_order_differs_between_repeats_and_is_reproducible() -> None:
     cells = PLAN.cells()
     turns = {tuple(cell.setup for cell in cells[i * 12 : (i + 1) * 12]) for i in range(4)}
     assert len(turns) == 4
@@ -75,9 +75,7 @@ def test_a_plan_survives_json() -> None:
         ({"router": True}, "router was False, is True"),
     ],
 )
-def test_a_plan_whose_cells_would_not_compare_is_refused_with_the_reason(
-    change: dict[str, object], words: str
-) -> None:
+def test_a_plan_whose_cells_would_not_compare_is_refused(change: dict[str, object], words: str) -> None:
     with pytest.raises(TandemError, match=words):
         check_continues(PLAN, replace(PLAN, **change))  # type: ignore[arg-type]
 

@@ -13,7 +13,7 @@ def hold(began_s: float, engaged_s: float | None, refused: str = "") -> UnaskedH
     return UnaskedHold("robot-1", BEGAN_NS + to_ns(began_s), "track", reason, engaged_ns, refused)
 
 
-def test_a_hold_and_the_engagement_after_it_are_remarked_with_their_times() -> None:
+def test_a_hold_and_the_next_engagement_are_noted_with_times() -> None:
     assert hold_remarks([hold(2.0, 2.25), hold(5.0, None)], BEGAN_NS) == [
         "at 2.0 s the robot held: no command for 0.2 s",
         "at 2.2 s the operator engaged again",

@@ -124,7 +124,7 @@ def test_looking_and_paging_are_always_answered(tmp_path: Path) -> None:
         (AssertionError(), "the robot's host failed: AssertionError"),
     ],
 )
-def test_an_act_that_failed_is_told_once_and_is_no_fault_of_what_comes_after(
+def test_a_failed_act_is_reported_once_and_blames_nothing_later(
     tmp_path: Path, error: Exception, words: str
 ) -> None:
     async def refused() -> None:

@@ -52,7 +52,7 @@ def test_a_criterion_scores_between_0_and_100_and_never_more_for_worse(
     assert criterion.score(towards_bad) <= criterion.score(v)
 
 
-def test_reaching_wants_the_hand_where_the_nurses_is_and_holding_a_hand_wants_it_smooth() -> None:
+def test_reaching_judges_the_place_and_holding_the_smoothness() -> None:
     plan = replace(PLAN, strategies=("latest", "interpolate", "predict"))
     found = {(r.task.name, r.profile): r for r in rankings(load_tasks(), rows(plan, cells(plan)))}
     reach, hand = found["reach", "4g"].best, found["hold-a-hand", "4g"].best
@@ -98,7 +98,7 @@ def test_a_setup_that_was_not_run_says_why() -> None:
     assert rank(TASK["reach"], "lan", rows(plan, [])).places[0].barred == ["not run yet"]
 
 
-def test_a_figure_that_nobody_has_counts_for_nobody_and_one_that_others_have_counts_as_0() -> None:
+def test_a_figure_nobody_has_counts_for_nobody_else_as_0() -> None:
     tcp, udp = (Setup(t, "lan", "predict") for t in ("tcp", "udp"))
     plan = replace(PLAN, profiles=("lan",), strategies=("predict",), repeat=1)
     no_outage = rank(TASK["watch"], "lan", rows(plan, with_values(tcp, {"tracked": 100.0})))
@@ -127,7 +127,7 @@ def test_a_limit_of_each_repeat_is_missed_by_one() -> None:
     assert judged.passed is False
 
 
-def test_commands_that_never_flow_again_miss_the_limit_and_no_outage_asks_for_none() -> None:
+def test_commands_that_never_flow_again_miss_the_limit() -> None:
     setup, limits = Setup("tcp", "4g", "predict"), [SetupLimit("flow_s", 1.5)]
     back: dict[str, float | None] = {"flow_s": 0.5, "moved_alone": 0.0}
     never = back | {"flow_s": None}
@@ -160,7 +160,7 @@ def test_a_repeat_that_failed_meets_no_target_it_was_asked_of() -> None:
     assert judge(rows(PLAN, impossible), limits) == []
 
 
-def test_a_robot_that_never_followed_does_not_keep_a_limit_of_how_it_followed() -> None:
+def test_a_robot_that_never_followed_misses_the_following_limit() -> None:
     repeats = with_values(Setup("tcp", "4g", "predict"), {"tracked": 0.0}, {"tracked": 0.0})
     [judged] = judge(rows(PLAN, repeats), [SetupLimit("roughness", 3.0, "predict", "4g")])
     assert judged.passed is False

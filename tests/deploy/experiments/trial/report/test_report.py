@@ -87,9 +87,7 @@ def test_pictures_have_labelled_axes_and_need_nothing_from_elsewhere(whole: Path
         assert all(href.startswith("#") for href in hrefs)
 
 
-def test_the_compared_part_of_two_reports_of_the_same_cells_is_the_same_text(
-    whole: Path, tmp_path: Path
-) -> None:
+def test_reports_of_the_same_cells_compare_as_the_same_text(whole: Path, tmp_path: Path) -> None:
     other = reported(tmp_path / "other", list(reversed(cells()))).path
     one, two = (json.loads((path / JSON).read_text("utf-8"))["compared"] for path in (whole, other))
     assert json.dumps(one) == json.dumps(two)
