@@ -1,0 +1,147 @@
+"""The worked examples of docs/extending.md, taken from the page and run through the contracts."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import shutil
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+
+import common.skeleton.load
+import deploy.examples.profiles
+import slave.backends
+import slave.track.config
+from common.config.load import check_config
+from common.skeleton import load_skeleton
+from common.wire.messages import Action
+from deploy.measure import motion
+from deploy.sim.world.whole_way import VirtualRun, World
+from master.orientation.config import EstimationConfig
+from master.orientation.filter import FilterSection
+from master.orientation.filters import FILTERS
+from slave.backends import BACKENDS, ServosConfig
+from slave.encoders.counts import EncoderConfig
+from slave.track.config import STRATEGIES, TrackConfig, make_tracker
+from tests.master.orientation.filter_contract import FilterContract
+from tests.slave.servos.contract import Subject
+from tests.slave.servos.contract import check as check_servos
+from tests.slave.track.contract import check as check_tracker
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/extending.md").read_text("utf-8")
+BLOCK = re.compile(r"^```(?:python|toml)\n# ([^\n]+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCKS = [(name, text) for name, text in BLOCK.findall(PAGE)]
+
+
+def blocks(name: str) -> list[str]:
+    """The text of every block whose first line is `# name`."""
+    return [text for found, text in BLOCKS if found == name]
+
+
+def module(name: str) -> ModuleType:
+    """The one block of a new Python file, loaded as the module that it would be."""
+    (text,) = blocks(name)
+    made = ModuleType(name.removesuffix(".py").replace("/", "."))
+    sys.modules[made.__name__] = made
+    exec(compile(text, name, "exec"), vars(made))
+    return made
+
+
+COMPLEMENTARY = module("master/orientation/complementary.py")
+RAMP = module("slave/track/ramp.py")
+IDEAL_CONFIG = module("slave/servos/ideal/config.py")
+IDEAL = module("slave/servos/ideal/servos.py")
+
+
+def add_line(patch: pytest.MonkeyPatch, table: dict[str, Any], block: str, **names: object) -> None:
+    """Put a block's line into a table, with the names that its file would import."""
+    (line,) = blocks(block)
+    for key, value in eval("{" + line + "}", dict(names)).items():
+        patch.setitem(table, key, value)
+
+
+class TestFilter(FilterContract):
+    @pytest.fixture
+    def section(self) -> FilterSection:
+        section: FilterSection = COMPLEMENTARY.ComplementaryConfig()
+        return section
+
+
+def toml(section: str) -> dict[str, object]:
+    """The keys of the one block for a person's file that holds `[section]`."""
+    (found,) = (
+        tomllib.loads(text)[section]
+        for name, text in BLOCKS
+        if name in {"master.toml", "slave.toml"} and f"[{section}]" in text
+    )
+    assert isinstance(found, dict)
+    return found
+
+
+def test_a_file_chooses_the_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = "master/orientation/filters.py, in FILTERS"
+    add_line(monkeypatch, FILTERS, line, ComplementaryConfig=COMPLEMENTARY.ComplementaryConfig)
+    config = EstimationConfig.model_validate(toml("estimation"))
+    assert config.mistakes_at(200.0) == []
+    assert config.filter_sections["complementary"] == COMPLEMENTARY.ComplementaryConfig(tau_acc_s=2.0)
+
+
+def test_the_servo_backend_keeps_the_contract(monkeypatch: pytest.MonkeyPatch) -> None:
+    (function,) = blocks("slave/backends.py")
+    scope = {"IdealConfig": IDEAL_CONFIG.IdealConfig, "Backend": slave.backends.Backend}
+    exec(function, scope)
+    add_line(monkeypatch, BACKENDS, "slave/backends.py, in BACKENDS", **scope)
+    config = check_config(Path("slave.toml"), toml("servos"), ServosConfig)
+    skeleton = load_skeleton("hand")
+    assert isinstance(config.open(skeleton, EncoderConfig()), IDEAL.IdealServos)
+    ticks = itertools.count(step=5_000_000)
+    servos = IDEAL.IdealServos(config.chosen, skeleton, EncoderConfig(), clock=lambda: next(ticks))
+    check_servos(Subject(servos, skeleton, EncoderConfig(), pass_time=lambda: None))
+
+
+def test_the_strategy_keeps_the_contract(monkeypatch: pytest.MonkeyPatch) -> None:
+    add_line(monkeypatch, STRATEGIES, "slave/track/config.py, in STRATEGIES", Ramp=RAMP.Ramp)
+    config = check_config(Path("slave.toml"), toml("track"), TrackConfig)
+    check_tracker(lambda: make_tracker(config))
+
+
+@pytest.fixture
+def files_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The page's TOML files beside those that ship."""
+    skeletons, examples = tmp_path / "common/skeleton", tmp_path / "deploy/examples"
+    shutil.copytree(ROOT / "common/skeleton", skeletons)
+    (tmp_path / "master/suit").mkdir(parents=True)
+    shutil.copy(ROOT / "master/suit/suit.dbc", tmp_path / "master/suit")
+    for name, text in BLOCKS:
+        if "/" in name and name.endswith(".toml"):
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name).write_text(text, "utf-8")
+    monkeypatch.setattr(common.skeleton.load, "resources", SimpleNamespace(files=lambda _: skeletons))
+    monkeypatch.setattr(deploy.examples.profiles, "EXAMPLES", examples)
+    yield
+    load_skeleton.cache_clear()
+
+
+@pytest.mark.usefixtures("files_of_the_page")
+def test_a_robot_of_the_profile_follows_the_operator() -> None:
+    run = VirtualRun(World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile="one_arm"))
+    run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
+    run.run(1.0)
+    reply = run.ask(Action.ENGAGE)
+    assert reply.done, reply.text
+    run.run(20.0)
+    assert run.slave.guard.state == "track", run.slave.guard.reason
+    for state in run.states:
+        run.trace.add(state)
+    moved = motion(run.trace.truth(), run.trace.moved(), run.trace.joint_names)
+    assert moved is not None
+    assert set(moved.joints) == {"raise", "bend"}
+    assert moved.lag_ms is not None
+    assert abs(moved.lag_ms) <= 25.0
