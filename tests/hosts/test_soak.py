@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from deploy.experiments.soak.files.events import of_kind, read_events
+from deploy.experiments.soak.files.happenings import FaultBegun
 
 pytestmark = [pytest.mark.live, pytest.mark.usefixtures("default_signals")]
 
@@ -33,7 +34,7 @@ def test_it_comes_back_from_each_fault_and_judges_itself(tmp_path: Path) -> None
     ended = subprocess.run([*SOAK, *options], capture_output=True, text=True, timeout=280, check=False)
     said = ended.stdout + ended.stderr
     events = read_events(report)
-    brought = {event.what["fault"] for event in of_kind(events, "fault")}
+    brought = {event.what.fault for event in of_kind(events, FaultBegun)}
     assert brought == set(faults.split(",")), said
     judged = criteria(report)
     # how soon and how many ticks is this machine's affair today; that it came back, and of whose will, is not

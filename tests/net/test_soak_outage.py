@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from deploy.experiments.soak.files.events import of_kind, read_events
+from deploy.experiments.soak.files.happenings import FaultRecovered
 
 
 @pytest.mark.timeout(200)
@@ -19,12 +20,12 @@ def test_an_outage_stops_the_robot_and_its_end_only_the_commands(tmp_path: Path)
     soak = [sys.executable, "-m", "deploy", "soak", *options, "--report", str(report)]
     ended = subprocess.run(soak, capture_output=True, text=True, timeout=180, check=False)
     said = ended.stdout + ended.stderr
-    outages = [event.what for event in of_kind(read_events(report), "recovered") if event.what["fault"]]
+    outages = [event.what for event in of_kind(read_events(report), FaultRecovered) if event.what.fault]
     assert outages, said
     for outage in outages:
-        assert outage["done"], said
-        assert outage["held_s"] is not None, said
-        assert outage["engaged"] >= 1, said
+        assert outage.done, said
+        assert outage.held_s is not None, said
+        assert outage.engaged >= 1, said
     judged = {c["name"]: c for c in json.loads((report / "report.json").read_text())["criteria"]}
     assert judged["began to move without being engaged"]["outcome"] == "passed", said
     assert judged["moved while it held"]["outcome"] == "passed", said

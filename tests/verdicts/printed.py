@@ -10,17 +10,16 @@ from pathlib import Path
 from common.errors import TandemError
 from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.demo.targets import BY_PROFILE
-from deploy.experiments.soak.files.events import Event
 from deploy.experiments.soak.judge.judge import verdicts_of
 from deploy.experiments.trial.report.targets import LIMITS
-from tests.deploy.experiments.soak.conftest import FAULT, PROCESSES, STORY, Make
+from tests.deploy.experiments.soak.conftest import FAULT, PROCESSES, STORY, Make, happened
 
 ROOT = Path(__file__).parents[2]
 ENDED = (
     *STORY,
-    Event(200.0, "recording", {"after": "kill", "readable": True, "lost_s": 0.1, "why_not": ""}),
-    Event(210.0, "recording", {"after": "disk full", "readable": True, "lived": True, "said": 1}),
-    Event(599.0, "end", {"status": {"master": 0}, "how": "it ran its time", "error": False}),
+    happened(200.0, "recording", {"after": "kill", "readable": True, "lost_s": 0.1, "why_not": ""}),
+    happened(210.0, "recording", {"after": "disk full", "readable": True, "lived": True, "said": 1}),
+    happened(599.0, "end", {"status": {"master": 0}, "how": "it ran its time", "error": False}),
 )
 """A soak in which each criterion has something to judge."""
 

@@ -17,7 +17,7 @@ from common.process.runtime import run as run_until_stopped
 from common.process.runtime import until_stopped
 
 if TYPE_CHECKING:
-    from deploy.experiments.soak.files.events import Event
+    from deploy.experiments.soak.files.events import AnyEvent
     from deploy.experiments.soak.files.options import SoakOptions
     from deploy.experiments.soak.judge.judge import JudgedSoak
 
@@ -94,11 +94,11 @@ def _tell(judged: JudgedSoak, folder: Path | None, console: Console) -> None:
         raise TandemError("the soak failed: " + "; ".join(f"{v.group}: {v.name}" for v in wrong))
 
 
-def _say(event: Event, console: Console) -> None:
+def _say(event: AnyEvent, console: Console) -> None:
     """In a log file, where no table is redrawn, each fault and what came of it is a line."""
     from deploy.experiments.soak.view import HIDDEN, line
 
-    if not console.is_terminal and event.kind not in HIDDEN:
+    if not console.is_terminal and event.what.kind not in HIDDEN:
         console.print(line(event), soft_wrap=True)
 
 
@@ -106,6 +106,7 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
     """Run it; whatever happens, its files are whole and say how it ended."""
     from rich.live import Live
 
+    from deploy.experiments.soak.files.happenings import SoakEnded
     from deploy.experiments.soak.files.log import SoakLog
     from deploy.experiments.soak.run import SOAK, Soak
     from deploy.experiments.soak.stage import Stage
@@ -129,8 +130,8 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
         rigging = open_rig(options.transport, overrides, routed=options.router, network=network)
         rig = await stack.enter_async_context(rigging)
         log: SoakLog | None = None
-        watch = Watch(rig.skeleton, lambda kind, what: log.tell(kind, what) if log else None)
-        stage = Stage(rig, watch, lambda kind, what: log.tell(kind, what) if log else None)
+        watch = Watch(rig.skeleton, lambda what: log.add(what) if log else None)
+        stage = Stage(rig, watch, lambda what: log.add(what) if log else None)
         log = SoakLog(folder, [*stage.names, SOAK], on_event=lambda event: _say(event, console))
         stack.callback(log.close)
         watch.listen(rig.link())
@@ -142,7 +143,7 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
         except TandemError as wrong:
             how, error = str(wrong), True
         finally:
-            log.tell("end", {"how": how, "error": error, "status": await stage.close()})
+            log.add(SoakEnded(how, error, await stage.close()))
             for child in stage.children.values():
                 if child.log.exists():
                     shutil.copy(child.log, folder / child.log.name)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import random
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 from common.errors import ConfigError, ConfigMistake, TandemError
 from deploy.experiments.soak import clock_step
 from deploy.experiments.soak import recorder as recording
+from deploy.experiments.soak.files.happenings import FaultCourse
 from deploy.experiments.soak.stage import Stage
 from deploy.harness.rig import ROUTER
 
@@ -26,10 +26,16 @@ class Case:
 
     stage: Stage
     draw: random.Random
-    told: dict[str, Any]
-    """Goes into the fault's event."""
-    kept: dict[str, Any]
-    """What the fault's end needs of its begin."""
+    step_s: int | None = None
+    """By how much a clock is stepped."""
+    node: str = ""
+    """The suit's node that falls silent."""
+    disk: str = ""
+    """How the small disk was made."""
+    ended_ns: int | None = None
+    """When the process was killed."""
+    recorder_life: int = 0
+    """The recorder's life that met the full disk."""
 
 
 Act = Callable[[Case], Awaitable[None]]
@@ -62,17 +68,15 @@ class Fault:
     needs: Callable[[Stage], Awaitable[str]] = _needs_nothing
     """Empty where this host and this rig can do it; else why not."""
 
-    @property
-    def asks(self) -> dict[str, Any]:
-        """What it asks of the robot, for its events: they are judged by what stands there."""
-        return {
-            "holds": self.holds, "heard": self.lives, "notices_s": self.notices_s,
-            "flow_limit_s": self.flow_s,
-        }  # fmt: skip
+    def course(self, number: int, begun_s: float) -> FaultCourse:
+        """Its course so far, with what it asks of the robot: it is judged by what stands there."""
+        return FaultCourse(
+            self.name, number, self.holds, self.lives, self.notices_s, self.flow_s, begun_s=begun_s
+        )
 
 
 async def _kill(name: str, case: Case) -> None:
-    case.kept["ended_ns"] = await case.stage.kill(name)
+    case.ended_ns = await case.stage.kill(name)
 
 
 async def _start(name: str, case: Case) -> None:
@@ -80,19 +84,19 @@ async def _start(name: str, case: Case) -> None:
 
 
 async def _start_stepped(name: str, case: Case) -> None:
-    case.told["step_s"] = step_s = case.draw.choice(STEPS_S)
-    await case.stage.start(name, clock_step.through(step_s))
+    case.step_s = case.draw.choice(STEPS_S)
+    await case.stage.start(name, clock_step.through(case.step_s))
 
 
 async def _restart_recorder(case: Case) -> None:
-    await case.stage.look_at_recording("kill", ended_ns=case.kept["ended_ns"])
+    case.stage.record(await case.stage.check_recording("kill", case.ended_ns))
     await case.stage.start(recording.NAME)
 
 
 async def _lose_node(case: Case) -> None:
     nodes = case.stage.rig.skeleton.segment_names
-    case.told["node"] = node = case.draw.choice(nodes)
-    await case.stage.tell_suit(f'lose = [{{ node = "{node}" }}]')
+    case.node = case.draw.choice(nodes)
+    await case.stage.tell_suit(f'lose = [{{ node = "{case.node}" }}]')
 
 
 async def _find_node(case: Case) -> None:
@@ -102,14 +106,14 @@ async def _find_node(case: Case) -> None:
 async def _fill_disk(case: Case) -> None:
     stage = case.stage
     await stage.stop(recording.NAME)
-    await stage.look_at_recording("stop")
+    stage.record(await stage.check_recording("stop"))
     try:
-        case.told["disk"] = await stage.recorder.start_on_small_disk()
+        case.disk = await stage.recorder.start_on_small_disk()
     except TandemError:  # the fault does not come about; the recorder goes on as before it
         await stage.recorder.disk.remove()
         await stage.start(recording.NAME)
         raise
-    case.kept["life"] = stage.recorder.child.lifetime
+    case.recorder_life = stage.recorder.child.lifetime
     stage.meant.add(recording.NAME)
 
 
@@ -117,9 +121,10 @@ async def _free_disk(case: Case) -> None:
     stage = case.stage
     child, said = stage.recorder.child, stage.recorder.complaints()
     # one that ended is started again by whoever looks after the processes: that one met no full disk
-    lived = child.running and child.lifetime == case.kept["life"]
+    lived = child.running and child.lifetime == case.recorder_life
     status = await stage.stop(recording.NAME)
-    await stage.look_at_recording("disk full", lived=lived, said=said, status=status)
+    found = await stage.check_recording("disk full")
+    stage.record(replace(found, lived=lived, said=said, status=status))
     await stage.recorder.disk.remove()
     await stage.start(recording.NAME)
 

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from deploy.experiments.soak.counts import Additions
+from deploy.experiments.soak.files.happenings import NetworkNature
 from deploy.harness.link_settings import needed_age_s
 from deploy.sim.network import Network, Profile
 from deploy.sim.network.scheduler import OUTAGE
 
 
-def nature(profile: Profile) -> dict[str, Any]:
+def nature(profile: Profile) -> NetworkNature:
     """Its name, how long a packet to the robot takes at most, but for queues, and the guard's age limit."""
     way = profile.ways.to_robot
-    return {
-        "name": profile.name,
-        "way_s": (way.delay_ms + 4.0 * way.jitter_ms) / 1e3,
-        "max_age_s": needed_age_s(profile),
-    }
+    way_s = (way.delay_ms + 4.0 * way.jitter_ms) / 1e3
+    return NetworkNature(profile.name, way_s, needed_age_s(profile))
 
 
 class LinkLosses:

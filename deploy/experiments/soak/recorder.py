@@ -13,6 +13,7 @@ from typing import Any
 from common.clock import monotonic_ns, to_s
 from common.errors import TandemError
 from common.link.config import LinkConfig
+from deploy.experiments.soak.files.happenings import RecordingChecked
 from deploy.harness.child import Child
 from deploy.harness.spawn import finished
 
@@ -64,7 +65,7 @@ class Recorder:
         """How often this process said that its disk failed."""
         return self.child.said()[self._said_before :].count(ENDS_HERE)
 
-    async def look(self, ended_ns: int | None = None) -> Mapping[str, Any]:
+    async def look(self, ended_ns: int | None = None) -> RecordingChecked:
         """What is in the last file of a process that has ended; all are deleted. `ended_ns`: when it died."""
         files = sorted(
             self.file.parent.glob(f"{self.file.stem}*.mcap"), key=lambda file: file.stat().st_mtime
@@ -76,14 +77,14 @@ class Recorder:
         topics = contents.get("topics", {})
         last_ns = max((topic["last_ns"] for topic in topics.values()), default=None)
         lost_s = None if ended_ns is None or last_ns is None else max(0.0, to_s(ended_ns - last_ns))
-        return {
-            "readable": bool(topics),
-            "messages": sum(topic["count"] for topic in topics.values()),
-            "size_mb": round(size_mb, 3),
-            "cut": contents.get("cut", ""),
-            "lost_s": None if lost_s is None else round(lost_s, 3),
-            "why_not": contents.get("error", ""),
-        }
+        return RecordingChecked(
+            readable=bool(topics),
+            messages=sum(topic["count"] for topic in topics.values()),
+            size_mb=size_mb,
+            cut=contents.get("cut", ""),
+            lost_s=lost_s,
+            why_not=contents.get("error", ""),
+        )
 
     async def kill(self) -> int:
         """End it without a warning; when, by this host's clock."""

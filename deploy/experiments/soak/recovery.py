@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from common.clock import Clock, monotonic_ns, to_ns, to_s
+from deploy.experiments.soak.files.happenings import EngageAnswered
 from deploy.experiments.soak.stage import Stage
 from deploy.harness.engage import EngageDriver, RigRobot
 from deploy.harness.operator import Operator
@@ -37,10 +37,6 @@ class Recovery:
     refused: str = ""
     """What it last answered when it did not engage."""
 
-    def tree(self) -> dict[str, Any]:
-        """Plain values, rounded."""
-        return {k: round(v, 3) if isinstance(v, float) else v for k, v in asdict(self).items()}
-
 
 class SoakRobot(RigRobot):
     """The soak's robot. It is engaged only while it is heard; each request to engage is an event."""
@@ -59,7 +55,7 @@ class SoakRobot(RigRobot):
         """Ask it to engage; its refusal, empty where it engages."""
         refusal = await super().engage()
         self._stage.watch.engaged += not refusal
-        self._stage.tell("engage", {"done": not refusal, "text": refusal})
+        self._stage.record(EngageAnswered(not refusal, refusal))
         return refusal
 
 

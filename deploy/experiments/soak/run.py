@@ -6,9 +6,8 @@ import asyncio
 import math
 import random
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import psutil
 from rich.live import Live
@@ -21,14 +20,25 @@ from common.process.ticker import ticks
 from common.wire.messages import Action
 from deploy.experiments.soak import recorder as recording
 from deploy.experiments.soak.faults import FAULTS, Case, Fault, possible
+from deploy.experiments.soak.files.happenings import (
+    FaultBegun,
+    FaultRecovered,
+    FaultUndone,
+    HostStalled,
+    ProcessEnded,
+    RobotFollowed,
+    RobotLeft,
+    SoakBegun,
+)
 from deploy.experiments.soak.files.log import SoakLog
 from deploy.experiments.soak.files.options import SoakOptions
 from deploy.experiments.soak.link import LinkLosses, nature
+from deploy.experiments.soak.progress import SoakProgress
 from deploy.experiments.soak.recovery import SoakOperator
-from deploy.experiments.soak.schedule import Planned, distance_s, schedule
+from deploy.experiments.soak.schedule import distance_s, schedule
 from deploy.experiments.soak.stage import Stage
 from deploy.experiments.soak.view import draw
-from deploy.harness.child import usage
+from deploy.harness.child import Usage, usage
 from deploy.harness.host import Host
 from deploy.harness.start import start_all
 
@@ -40,19 +50,6 @@ STEADY_S = 3.0
 """The robot follows at least so long between two faults."""
 MOST_ENDS = 5
 """A process that ends by itself more often is not started again."""
-
-
-@dataclass(slots=True)
-class Progress:
-    """Where the soak is, for the screen."""
-
-    duration_s: float
-    began_s: float | None = None
-    """When the robot first followed, seconds of the soak."""
-    planned: list[Planned] = field(default_factory=list)
-    next: int = 0
-    busy: str = "starting"
-    """What is being done; empty while nothing is."""
 
 
 class Soak:
@@ -68,7 +65,7 @@ class Soak:
         self._ends: dict[str, int] = {}
         self._self = psutil.Process()
         self._losses = LinkLosses(stage.rig.network)
-        self.progress = Progress(options.duration_s)
+        self.progress = SoakProgress(options.duration_s)
 
     async def run(self) -> None:
         """Raises TandemError where it cannot even begin, or a process ends again and again."""
@@ -88,15 +85,15 @@ class Soak:
         kinds, left_out = await possible(self._options.faults, self._stage)
         every_s = self._options.every_s or distance_s(self._options.duration_s, len(kinds))
         network = self._stage.rig.network
-        begun = {**self._options.tree(), "every_s": every_s, "faults": kinds, "left_out": left_out}
-        self._log.tell("begin", begun | ({"network": nature(network.profile)} if network else {}))
+        begun = {**asdict(self._options), "every_s": every_s, "faults": tuple(kinds), "left_out": left_out}
+        self._log.add(SoakBegun(**begun, network=nature(network.profile) if network else None))
         await self._start()
         enders = [name for name in kinds if FAULTS[name].ends_process]
         planned = schedule(self._options.duration_s, kinds, enders, every_s, self._options.seed)
         began_s = self._log.now_s
         self.progress.began_s, self.progress.planned = began_s, planned
         self.progress.busy = ""
-        self._log.tell("follows", {"planned": len(planned)})
+        self._log.add(RobotFollowed(len(planned)))
         freeze_heap()
         reserve_heap()
         for number, one in enumerate(planned):
@@ -136,38 +133,36 @@ class Soak:
     async def _recover_unplanned(self) -> None:
         watch, state = self._stage.watch, self._stage.watch.state
         guard = watch.guard(monotonic_ns())
-        self._log.tell(
-            "left", {"guard": guard, "reason": state.reason if state else "", "known": watch.known()}
-        )
+        self._log.add(RobotLeft(guard, state.reason if state else "", watch.known()))
         self.progress.busy = "the robot left off by itself"
         recovery = await self._operator.recover(monotonic_ns())
-        self._log.tell("recovered", {"fault": "", "number": -1, **recovery.tree()})
+        self._log.add(FaultRecovered(**asdict(recovery)))
         self.progress.busy = ""
 
     async def _bring(self, fault: Fault, number: int) -> None:
         """One fault from its begin until the robot follows again."""
         watch, log = self._stage.watch, self._log
         self.progress.busy = fault.words
-        case = Case(self._stage, random.Random(f"{self._options.seed} {number}"), {}, {})
+        case = Case(self._stage, random.Random(f"{self._options.seed} {number}"))
         lasts_s = case.draw.uniform(*fault.lasts_s)
-        figures: dict[str, Any] = {"fault": fault.name, "number": number, **fault.asks}
-        figures["begun_s"] = round(log.now_s, 3)
-        log.tell("fault", {**figures, "lasts_s": round(lasts_s, 3)})
+        course = fault.course(number, log.now_s)
+        log.add(FaultBegun(**asdict(course), lasts_s=lasts_s))
         begun_ns = monotonic_ns()
         robot_ns = watch.motion.newest_ns() + begun_ns - watch.state_ns
         try:
             await fault.begin(case)
             await asyncio.sleep(lasts_s)
             if fault.lives:
-                figures["held_s"] = _since(begun_ns, watch.held_ns)
-                figures["stands_s"] = watch.motion.standstill_s(robot_ns) if fault.holds else None
+                stands_s = watch.motion.standstill_s(robot_ns) if fault.holds else None
+                course = replace(course, held_s=_since(begun_ns, watch.held_ns), stands_s=stands_s)
             await fault.end(case)
         except TandemError as error:
-            figures["failed"] = str(error)
+            course = replace(course, failed=str(error))
         undone_ns = monotonic_ns()
-        log.tell("undone", {**figures, **case.told})
+        course = replace(course, step_s=case.step_s, node=case.node, disk=case.disk)
+        log.add(FaultUndone(**asdict(course)))
         recovery = await self._operator.recover(undone_ns)
-        log.tell("recovered", {**figures, **case.told, **recovery.tree()})
+        log.add(FaultRecovered(**asdict(course), **asdict(recovery)))
         self.progress.busy = ""
 
     async def _end(self) -> None:
@@ -199,20 +194,15 @@ class Soak:
             still_s = to_s(stall.until_ns - stall.from_ns)
             longest_s = max(longest_s, to_s(stall.excused_ns))
             if still_s >= 0.02:
-                told = {
-                    "from_s": round(self._log.at_s(stall.from_ns), 3),
-                    "still_ms": round(1e3 * still_s, 1),
-                    "excused_ms": round(stall.excused_ns / NS_PER_MS, 1),
-                    "evidence": str(stall.evidence),
-                }
-                self._log.tell("still", told)
+                from_s, excused_ms = self._log.at_s(stall.from_ns), stall.excused_ns / NS_PER_MS
+                self._log.add(HostStalled(from_s, 1e3 * still_s, excused_ms, str(stall.evidence)))
         self._host.stalls.clear()
         return 1e3 * longest_s
 
     async def _look_after_processes(self) -> None:
         for name in self._stage.ended():
             child = self._stage.children[name]
-            self._log.tell("ended", {"process": name, "words": child.last_words()})
+            self._log.add(ProcessEnded(name, child.last_words()))
             self._ends[name] = self._ends.get(name, 0) + 1
             if self._ends[name] > MOST_ENDS:
                 raise TandemError(f"the {name} ends again and again: {child.last_words()}")
@@ -220,10 +210,10 @@ class Soak:
 
 
 def _since(begun_ns: int, at_ns: int) -> float | None:
-    return round(to_s(at_ns - begun_ns), 3) if at_ns > begun_ns else None
+    return to_s(at_ns - begun_ns) if at_ns > begun_ns else None
 
 
-def _columns(name: str, life: int, used: Any) -> dict[str, float | str]:
+def _columns(name: str, life: int, used: Usage) -> dict[str, float | str]:
     return {
         f"{name}_life": float(life),
         f"{name}_rss_mb": used.rss_mb,

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
 
 from common.clock import monotonic_ns
 from common.errors import LinkError, TandemError
 from common.wire.topics import FAULTS
 from deploy.experiments.soak import recorder as recording
+from deploy.experiments.soak.files.happenings import ProcessStarted, RecordingChecked
 from deploy.experiments.soak.recorder import Recorder
-from deploy.experiments.soak.watch import Tell, Watch
+from deploy.experiments.soak.watch import Record, Watch
 from deploy.harness.child import Child, Usage
 from deploy.harness.rig import ROBOT, Rig
 
@@ -19,10 +20,10 @@ from deploy.harness.rig import ROBOT, Rig
 class Stage:
     """The processes by name, and which of them are meant to run."""
 
-    def __init__(self, rig: Rig, watch: Watch, tell: Tell) -> None:
+    def __init__(self, rig: Rig, watch: Watch, record: Record) -> None:
         self.rig = rig
         self.watch = watch
-        self.tell = tell
+        self.record = record
         child = Child("record", rig.folder, name=recording.NAME)
         self.recorder = Recorder(child, rig.folder, rig.endpoints.observing, ROBOT)
         self.children: dict[str, Child] = {**rig.children, recording.NAME: child}
@@ -42,7 +43,7 @@ class Stage:
         else:
             await self.rig.start(name, through)
         self.meant.add(name)
-        self.tell("started", {"process": name, "life": self.children[name].lifetime})
+        self.record(ProcessStarted(name, self.children[name].lifetime))
 
     async def kill(self, name: str) -> int:
         """End it as a crash would; when, by this host's clock."""
@@ -79,10 +80,9 @@ class Stage:
         used = {name: (child.lifetime, child.usage) for name, child in self.children.items()}
         return {name: (life, use) for name, (life, use) in used.items() if use is not None}
 
-    async def look_at_recording(self, what: str, **more: Any) -> None:
-        """Say what is in the file of the recorder that has just ended."""
-        told = await self.recorder.look(more.pop("ended_ns", None))
-        self.tell("recording", {"after": what, **told, **more})
+    async def check_recording(self, after: str, ended_ns: int | None = None) -> RecordingChecked:
+        """What is in the file of the recorder that has just ended; `ended_ns`: when it was killed."""
+        return replace(await self.recorder.look(ended_ns), after=after)
 
     async def close(self) -> dict[str, int | None]:
         """End all, the master first; exit statuses."""

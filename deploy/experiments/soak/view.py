@@ -11,20 +11,22 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.files.events import AnyEvent
 from deploy.experiments.soak.files.options import in_words
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 
 if TYPE_CHECKING:
     from deploy.experiments.soak.files.log import SoakLog
-    from deploy.experiments.soak.run import Progress
+    from deploy.experiments.soak.progress import SoakProgress
     from deploy.experiments.soak.stage import Stage
 
 HIDDEN = ("begin", "started", "guard", "lease", "joints", "undone", "still")
 """Events that say little to who watches."""
 
 
-def draw(progress: Progress, stage: Stage, log: SoakLog, row: Mapping[str, float | str]) -> RenderableType:
+def draw(
+    progress: SoakProgress, stage: Stage, log: SoakLog, row: Mapping[str, float | str]
+) -> RenderableType:
     """The live view."""
     guard = str(row.get("guard", "")) or "silent"
     head = Text.assemble(
@@ -37,11 +39,11 @@ def draw(progress: Progress, stage: Stage, log: SoakLog, row: Mapping[str, float
     for name in [*stage.names, "soak"]:
         figures = [_figure(row, f"{name}_{what}") for what in ("life", "rss_mb", "fds", "threads")]
         table.add_row(name, *figures)
-    newest = [line(event) for event in log.newest if event.kind not in HIDDEN]
+    newest = [line(event) for event in log.newest if event.what.kind not in HIDDEN]
     return Group(_bar(progress, log.now_s), head, table, *newest[-4:])
 
 
-def _bar(progress: Progress, now_s: float) -> RenderableType:
+def _bar(progress: SoakProgress, now_s: float) -> RenderableType:
     if progress.began_s is None:
         return Text(f"{in_words(now_s)}: {progress.busy}", "bold")
     gone_s = now_s - progress.began_s
@@ -58,12 +60,11 @@ def _bar(progress: Progress, now_s: float) -> RenderableType:
     return line
 
 
-def line(event: Event) -> Text:
+def line(event: AnyEvent) -> Text:
     """One event, as a line."""
-    what = ", ".join(
-        f"{key} {value}" for key, value in event.what.items() if value not in (None, "", False, True)
-    )
-    return Text(f"{event.at_s:8.1f} s  {event.kind}  {what}", "dim", overflow="ellipsis", no_wrap=True)
+    written = event.what.written().items()
+    what = ", ".join(f"{key} {value}" for key, value in written if value not in (None, "", False, True))
+    return Text(f"{event.at_s:8.1f} s  {event.what.kind}  {what}", "dim", overflow="ellipsis", no_wrap=True)
 
 
 def _figure(row: Mapping[str, Any], name: str, unit: str = "") -> str:

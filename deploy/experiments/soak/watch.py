@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -19,19 +18,20 @@ from common.wire.codec import decode
 from common.wire.messages import Command, RobotState, Statistics
 from common.wire.topics import COMMAND, STATE, STATISTICS
 from deploy.experiments.soak.counts import Additions
+from deploy.experiments.soak.files.happenings import GuardChanged, Happening, JointsUnknown, LeaseChanged
 from deploy.experiments.soak.motion import Motion
 
 FRESH_NS = to_ns(2.0 / COMMAND.rate_hz)
-Tell = Callable[[str, Mapping[str, Any]], None]
-"""Takes an event's kind and what there is to say of it."""
+Record = Callable[[Happening], None]
+"""Takes what has happened."""
 
 
 class Watch:
     """Keeps the newest of each message and the figures of the second that runs. Constant in memory."""
 
-    def __init__(self, skeleton: Skeleton, tell: Tell) -> None:
+    def __init__(self, skeleton: Skeleton, record: Record) -> None:
         self._skeleton = skeleton
-        self._tell = tell
+        self._record = record
         self._added = {role: Additions() for role in ("master", "slave")}
         self.motion = Motion(skeleton)
         self.state: RobotState | None = None
@@ -70,7 +70,7 @@ class Watch:
         invalid = int((~self.command.valid).sum())
         if invalid != self._invalid:
             self._invalid = invalid
-            self._tell("joints", {"unknown": invalid})
+            self._record(JointsUnknown(invalid))
 
     def on_state(self, payload: bytes, arrived_ns: int) -> None:
         """The robot told what it does."""
@@ -86,7 +86,7 @@ class Watch:
         if before is None or state.guard != before.guard:
             self._on_guard("" if before is None else before.guard, state, arrived_ns)
         if before is None or state.lease_id != before.lease_id:
-            self._tell("lease", {"operator": state.operator, "id": state.lease_id})
+            self._record(LeaseChanged(state.operator, state.lease_id))
         self._on_echo(state, arrived_ns)
 
     def _on_guard(self, before: str, state: RobotState, arrived_ns: int) -> None:
@@ -94,7 +94,7 @@ class Watch:
             self.held_ns = arrived_ns
         if state.guard == "align" or (state.guard == "track" and before != "align"):
             self.aligns += 1
-        self._tell("guard", {"from": before, "to": state.guard, "reason": state.reason})
+        self._record(GuardChanged(before, state.guard, state.reason))
 
     def _on_echo(self, state: RobotState, arrived_ns: int) -> None:
         echo = state.echo

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Generic, TextIO, TypeVar
 
 from common.errors import TandemError
+from deploy.experiments.soak.files.happenings import Happening, happening
 from deploy.report.output import writing
 
 FILE = "events.jsonl"
+H = TypeVar("H", bound=Happening, covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class SoakEvent(Generic[H]):
     """One line."""
 
     at_s: float
     """Since the soak's begin."""
-    kind: str
-    """`begin`, `fault`, `recovered`, `guard`, `engage`, `ended`, `still`, `recording`, `end` …"""
-    what: Mapping[str, Any] = field(default_factory=dict)
+    what: H
 
     def line(self) -> str:
         """As JSON."""
-        return json.dumps({"at_s": round(self.at_s, 3), "event": self.kind, **self.what}, ensure_ascii=False)
+        tree = {"at_s": round(self.at_s, 3), "event": self.what.kind, **self.what.written()}
+        return json.dumps(tree, ensure_ascii=False)
+
+
+AnyEvent = SoakEvent[Happening]
 
 
 class EventFile:
@@ -37,7 +41,7 @@ class EventFile:
         with writing(self._path):
             self._file: TextIO = self._path.open("x", encoding="utf-8", buffering=1)
 
-    def add(self, event: Event) -> None:
+    def add(self, event: AnyEvent) -> None:
         """Write one. Raises TandemError where the disk does not take it."""
         with writing(self._path):
             self._file.write(event.line() + "\n")
@@ -47,7 +51,7 @@ class EventFile:
         self._file.close()
 
 
-def read_events(folder: Path) -> list[Event]:
+def read_events(folder: Path) -> list[AnyEvent]:
     """All events in order; a last line that was cut off is left out. Raises TandemError."""
     path = folder / FILE
     try:
@@ -57,14 +61,14 @@ def read_events(folder: Path) -> list[Event]:
     return [event for event in map(_parsed, lines) if event is not None]
 
 
-def of_kind(events: Sequence[Event], kind: str) -> list[Event]:
-    """Those of one kind."""
-    return [event for event in events if event.kind == kind]
+def of_kind(events: Iterable[AnyEvent], kind: type[H]) -> list[SoakEvent[H]]:
+    """The events of one kind."""
+    return [SoakEvent(event.at_s, event.what) for event in events if isinstance(event.what, kind)]
 
 
-def _parsed(line: str) -> Event | None:
+def _parsed(line: str) -> AnyEvent | None:
     try:
         tree = json.loads(line)
-        return Event(float(tree.pop("at_s")), str(tree.pop("event")), tree)
-    except (ValueError, KeyError, AttributeError):
+        return SoakEvent(float(tree.pop("at_s")), happening(tree.pop("event"), tree))
+    except (ValueError, KeyError, AttributeError, TypeError):
         return None

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 from common.clock import Clock, monotonic_ns, to_s
-from deploy.experiments.soak.files.events import Event, EventFile
+from deploy.experiments.soak.files.events import AnyEvent, EventFile, SoakEvent
+from deploy.experiments.soak.files.happenings import Happening
 from deploy.experiments.soak.files.samples import SampleFile
 
 SHOWN = 8
@@ -23,14 +23,14 @@ class SoakLog:
         folder: Path,
         processes: Iterable[str],
         clock: Clock = monotonic_ns,
-        on_event: Callable[[Event], None] = lambda _: None,
+        on_event: Callable[[AnyEvent], None] = lambda _: None,
     ) -> None:
         self._clock = clock
         self._on_event = on_event
         self._begun_ns = clock()
         self._events = EventFile(folder)
         self._samples = SampleFile(folder, processes)
-        self.newest: deque[Event] = deque(maxlen=SHOWN)
+        self.newest: deque[AnyEvent] = deque(maxlen=SHOWN)
         self.counts: dict[str, int] = {}
         """Events by kind."""
 
@@ -43,16 +43,16 @@ class SoakLog:
         """A time of this host's clock as seconds of the soak."""
         return to_s(at_ns - self._begun_ns)
 
-    def tell(self, kind: str, what: Mapping[str, Any]) -> None:
+    def add(self, what: Happening) -> None:
         """Something has happened."""
-        event = Event(self.now_s, kind, what)
+        event: AnyEvent = SoakEvent(self.now_s, what)
         self._events.add(event)
         self.newest.append(event)
-        self.counts[kind] = self.counts.get(kind, 0) + 1
+        self.counts[what.kind] = self.counts.get(what.kind, 0) + 1
         self._on_event(event)
 
     def sample(self, row: Mapping[str, float | str]) -> None:
-        """The figures of the last second."""
+        """The row of the last second."""
         self._samples.add({"at_s": self.now_s, **row})
 
     def close(self) -> None:

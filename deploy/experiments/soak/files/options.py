@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from common.errors import ConfigError, ConfigMistake
 
@@ -27,10 +26,6 @@ class SoakOptions:
     every_s: float | None = None
     """Mean time between faults; None: by duration and kinds."""
     seed: int = 1
-
-    def tree(self) -> dict[str, Any]:
-        """Plain values, for the first event and the report."""
-        return asdict(self)
 
 
 def seconds(text: str) -> float:

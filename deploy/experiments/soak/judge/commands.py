@@ -39,7 +39,7 @@ def _any_came(seen: SoakEvidence) -> Verdict:
 def _counted(seen: SoakEvidence, column: str) -> Verdict:
     all_ = seen.sum("sent")
     # a lost datagram is one command, and the network counts how many packets it lost
-    datagrams = column == "lost" and seen.options.get("transport") in DATAGRAMS
+    datagrams = column == "lost" and seen.begun.transport in DATAGRAMS
     sent = seen.sum("sent", seen.quiet | seen.network_alone if datagrams else seen.quiet)
     count = seen.known_sum(column, seen.quiet)
     if count is not None and datagrams:
@@ -68,7 +68,8 @@ def beyond_the_network(seen: SoakEvidence) -> float:
 def _oldest(seen: SoakEvidence) -> Verdict:
     ages = seen.samples["age_max_ms"]
     oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
-    most_ms = 1e3 * seen.network.get("max_age_s", AGE_MS / 1e3)
+    limit_s = seen.network.max_age_s
+    most_ms = AGE_MS if limit_s is None else 1e3 * limit_s
     verdict = at_most("oldest that was acted on", oldest, most_ms, "ms", why="put → accepted")
     share = _known_share(ages, seen.quiet & (seen.samples["sent"] > 0.0))
     if share >= LEAST_ESTIMATED:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from common.wire.messages import Mask
-from deploy.experiments.soak.files.events import Event, of_kind
+from deploy.experiments.soak.files.events import AnyEvent, of_kind
+from deploy.experiments.soak.files.happenings import FaultRecovered, NetworkNature, SoakBegun
 from deploy.experiments.soak.files.samples import Samples
 from deploy.experiments.soak.judge.explain import Explained, explanation
 from deploy.experiments.soak.judge.windows import explained as in_windows
@@ -23,12 +23,12 @@ LEAST_SHARE = 0.2
 class SoakEvidence:
     """Events, samples, and what explains them."""
 
-    events: Sequence[Event]
+    events: Sequence[AnyEvent]
     samples: Samples
     explained: Explained
 
     @classmethod
-    def of(cls, events: Sequence[Event], samples: Samples) -> SoakEvidence:
+    def of(cls, events: Sequence[AnyEvent], samples: Samples) -> SoakEvidence:
         """The evidence of a soak's two files."""
         return cls(events, samples, explanation(events, samples))
 
@@ -53,21 +53,20 @@ class SoakEvidence:
         return None if np.isnan(self.samples[column]).all() else self.sum(column, of)
 
     @property
-    def recovered(self) -> list[Mapping[str, Any]]:
+    def recovered(self) -> list[FaultRecovered]:
         """The course of each fault that is over."""
-        return [e.what for e in of_kind(self.events, "recovered") if e.what.get("fault")]
+        return [e.what for e in of_kind(self.events, FaultRecovered) if e.what.fault]
 
     @property
-    def options(self) -> Mapping[str, Any]:
-        """What the soak was asked for; empty where it did not begin."""
-        begun = of_kind(self.events, "begin")
-        return begun[0].what if begun else {}
+    def begun(self) -> SoakBegun:
+        """What the soak was asked for; the defaults where it did not begin."""
+        begun = of_kind(self.events, SoakBegun)
+        return begun[0].what if begun else SoakBegun()
 
     @property
-    def network(self) -> Mapping[str, Any]:
-        """What the network between two hosts does by its nature; empty where there is none."""
-        found: Mapping[str, Any] = self.options.get("network") or {}
-        return found
+    def network(self) -> NetworkNature:
+        """What the network between two hosts does by its nature."""
+        return self.begun.network or NetworkNature()
 
 
 def of_enough(verdict: Verdict, share: float) -> Verdict:

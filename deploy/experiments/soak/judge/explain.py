@@ -10,7 +10,16 @@ import numpy as np
 
 from common.quaternion import Array
 from common.wire.messages import Mask
-from deploy.experiments.soak.files.events import Event, of_kind
+from deploy.experiments.soak.files.events import AnyEvent, SoakEvent, of_kind
+from deploy.experiments.soak.files.happenings import (
+    FaultBegun,
+    FaultRecovered,
+    HostStalled,
+    RobotFollowed,
+    RobotLeft,
+    SoakBegun,
+    SoakEnded,
+)
 from deploy.experiments.soak.files.samples import Samples
 from deploy.experiments.soak.judge.windows import Window, explained, reason
 from deploy.harness.excuse import STILL_S
@@ -72,47 +81,45 @@ class Explained:
         return reason(at_s, self.all)
 
 
-def explanation(events: Sequence[Event], samples: Samples) -> Explained:
+def explanation(events: Sequence[AnyEvent], samples: Samples) -> Explained:
     """Read the windows off a soak's files. What begins and never ends lasts to the end."""
-    faults = [Window(0.0, _first(events, "follows"), "start")]
-    for fault in of_kind(events, "fault"):
-        number = fault.what.get("number")
-        ends = [e.at_s for e in of_kind(events, "recovered") if e.what.get("number") == number]
-        faults.append(Window(fault.at_s, ends[0] if ends else math.inf, str(fault.what.get("fault"))))
-    stalls = [window for event in of_kind(events, "still") if (window := _excused(event)) is not None]
+    faults = [Window(0.0, next((e.at_s for e in of_kind(events, RobotFollowed)), math.inf), "start")]
+    for fault in of_kind(events, FaultBegun):
+        number = fault.what.number
+        ends = [e.at_s for e in of_kind(events, FaultRecovered) if e.what.number == number]
+        faults.append(Window(fault.at_s, ends[0] if ends else math.inf, fault.what.fault))
+    stalls = [
+        window for event in of_kind(events, HostStalled) if (window := _excused(event.what)) is not None
+    ]
     own = tuple(faults)
     # what the robot does once it has left off by itself is of one cause; that it left is judged on its own
-    for left in of_kind(events, "left"):
-        ends = [e.at_s for e in of_kind(events, "recovered") if e.at_s > left.at_s]
+    for left in of_kind(events, RobotLeft):
+        ends = [e.at_s for e in of_kind(events, FaultRecovered) if e.at_s > left.at_s]
         faults.append(Window(left.at_s, ends[0] if ends else math.inf, LEFT_OFF))
-    last = [Window(e.at_s, math.inf, "end") for e in of_kind(events, "end")]
+    last = [Window(e.at_s, math.inf, "end") for e in of_kind(events, SoakEnded)]
     return Explained((*own, *faults[len(own) :], *last), tuple(stalls), *_network(events, samples))
 
 
-def _excused(still: Event) -> Window | None:
+def _excused(still: HostStalled) -> Window | None:
     """The end of a stall, as far as it is shown to be the host's; None where that is too short for a hold."""
     # a soak that was recorded before the evidence was kept shows none
-    excused_s = still.what.get("excused_ms", 0.0) / 1e3
-    until_s = still.what["from_s"] + still.what["still_ms"] / 1e3
-    why = f"the host stood still: {still.what.get('evidence')}"
+    excused_s = still.excused_ms / 1e3
+    until_s = still.from_s + still.still_ms / 1e3
+    why = f"the host stood still: {still.evidence}"
     return Window(until_s - excused_s, until_s, why) if excused_s >= STILL_S else None
 
 
-def _network(events: Sequence[Event], samples: Samples) -> tuple[tuple[Window, ...], tuple[float, ...]]:
+def _network(events: Sequence[AnyEvent], samples: Samples) -> tuple[tuple[Window, ...], tuple[float, ...]]:
     lost, out, odd = (np.nan_to_num(samples[f"link_{what}"]) for what in ("lost", "out", "odd"))
     at_s, gone = samples.at_s, lost + out
     windows = [Window(end_s - 1.0, end_s, "the network") for end_s in at_s[gone + odd > 0.0].tolist()]
-    begun = of_kind(events, "begin")
-    enough = LOST_PACKETS.get(str(begun[0].what.get("transport")) if begun else "", 1)
+    begun = of_kind(events, SoakBegun)
+    enough = LOST_PACKETS.get(begun[0].what.transport if begun else "", 1)
     padded = np.pad(gone, 1)
     near = padded[:-2] + gone + padded[2:]
     return tuple(windows), tuple((at_s[(near >= enough) & (gone > 0.0)] - 0.5).tolist())
 
 
-def unexplained_lefts(events: Sequence[Event], explained: Explained) -> list[Event]:
+def unexplained_lefts(events: Sequence[AnyEvent], explained: Explained) -> list[SoakEvent[RobotLeft]]:
     """When the robot left off, and neither fault, host nor network accounts for it."""
-    return [left for left in of_kind(events, "left") if not explained.accounts_for_hold(left.at_s)]
-
-
-def _first(events: Sequence[Event], kind: str) -> float:
-    return next((event.at_s for event in events if event.kind == kind), math.inf)
+    return [left for left in of_kind(events, RobotLeft) if not explained.accounts_for_hold(left.at_s)]

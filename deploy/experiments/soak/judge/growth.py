@@ -9,6 +9,7 @@ import numpy as np
 from common.quaternion import Array
 from common.wire.messages import Mask
 from deploy.experiments.soak.files.events import of_kind
+from deploy.experiments.soak.files.happenings import FaultBegun
 from deploy.experiments.soak.judge.evidence import SoakEvidence
 from deploy.measure.trend import Slope, in_bins, slope
 from deploy.measure.verdict import Outcome, Verdict, at_most
@@ -66,7 +67,7 @@ def memory(seen: SoakEvidence) -> list[Verdict]:
         verdicts.append(
             _not_above(seen, f"{name}'s memory grows", column, lives, everything, RSS_MB_H, "MB/h")
         )
-        if of_kind(seen.events, "fault"):
+        if of_kind(seen.events, FaultBegun):
             words = f"{name} grows between faults"
             verdicts.append(_not_above(seen, words, column, lives, seen.quiet, RSS_MB_H, "MB/h", parts))
     return verdicts

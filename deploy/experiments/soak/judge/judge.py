@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from deploy.experiments.soak.files.events import of_kind, read_events
+from deploy.experiments.soak.files.happenings import FaultRecovered, HostStalled, SoakEnded
 from deploy.experiments.soak.files.samples import read_samples
 from deploy.experiments.soak.judge.commands import commands
 from deploy.experiments.soak.judge.evidence import SoakEvidence
@@ -45,21 +46,21 @@ class JudgedSoak:
     @property
     def ended(self) -> str:
         """How it ended: in its time, interrupted, by an error, or unknown because it was killed."""
-        ends = of_kind(self.seen.events, "end")
-        return str(ends[-1].what.get("how", "")) if ends else "it was killed: nothing says how it ended"
+        ends = of_kind(self.seen.events, SoakEnded)
+        return ends[-1].what.how if ends else "it was killed: nothing says how it ended"
 
     def tree(self) -> dict[str, Any]:
         """The report for machines."""
         events = self.seen.events
-        faults = [event.what for event in of_kind(events, "recovered")]
+        faults = [asdict(event.what) for event in of_kind(events, FaultRecovered)]
         return {
-            "options": dict(self.seen.options),
+            "options": asdict(self.seen.begun),
             "lasted_s": round(max((event.at_s for event in events), default=0.0), 1),
             "ended": self.ended,
             "verdict": "failed" if failed(self.verdicts) else "passed",
             "criteria": [verdict.tree() for verdict in self.verdicts],
             "faults": faults,
-            "host_stalls": len(of_kind(events, "still")),
+            "host_stalls": len(of_kind(events, HostStalled)),
             "samples": len(self.seen.samples),
         }
 

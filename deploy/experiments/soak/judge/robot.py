@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from deploy.experiments.soak.files.events import Event, of_kind
+from deploy.experiments.soak.files.events import SoakEvent, of_kind
+from deploy.experiments.soak.files.happenings import (
+    EngageAnswered,
+    FaultBegun,
+    FaultCourse,
+    GuardChanged,
+    RobotLeft,
+)
 from deploy.experiments.soak.judge.evidence import SoakEvidence, of_enough
 from deploy.experiments.soak.judge.explain import unexplained_lefts
 from deploy.measure.verdict import Outcome, Verdict, at_most
@@ -27,17 +33,18 @@ MOVING = ("align", "track")
 
 def guard(seen: SoakEvidence) -> list[Verdict]:
     """It holds on every fault that asks for it, stands, and never moves by itself."""
-    must_hold = [what for what in seen.recovered if what["holds"] and what["heard"]]
-    way_s = seen.network.get("way_s", 0.0)
-    held, stood = _less_stalls(seen, must_hold, "held_s"), _less_stalls(seen, must_hold, "stands_s")
+    must_hold = [what for what in seen.recovered if what.holds and what.heard]
+    way_s = seen.network.way_s
+    held = [(f.fault, _less_stalls(seen, f, f.held_s)) for f in must_hold]
+    stood = [(f.fault, _less_stalls(seen, f, f.stands_s)) for f in must_hold]
     holds = unexplained_lefts(seen.events, seen.explained)
     explained_share = np.mean(seen.explained.accounted(seen.samples.at_s)) if len(seen.samples) else 0.0
     strayed = seen.samples["strayed_deg"]
     farthest = None if np.isnan(strayed).all() else float(np.nanmax(strayed))
     stray_why = "farthest joint, 0.7 s after it held and later"
     return [
-        slowest("holds on a fault, the slowest", held, "held_s", HOLD_S + way_s),
-        slowest("stands after a fault, the slowest", stood, "stands_s", STANDS_S + way_s),
+        slowest("holds on a fault, the slowest", held, HOLD_S + way_s),
+        slowest("stands after a fault, the slowest", stood, STANDS_S + way_s),
         of_enough(
             at_most("holds that nothing explains", float(len(holds)), 0.0, why=_reasons(holds)),
             1.0 - float(explained_share),
@@ -50,23 +57,23 @@ def guard(seen: SoakEvidence) -> list[Verdict]:
 
 def _needless_holds(seen: SoakEvidence) -> Verdict:
     needless = [
-        what
+        what.fault
         for what in seen.recovered
-        if not what["holds"]
-        and what.get("held_s") is not None
-        and not seen.explained.accounts_for_hold(what["begun_s"] + what["held_s"])
+        if not what.holds
+        and what.held_s is not None
+        and not seen.explained.accounts_for_hold(what.begun_s + what.held_s)
     ]
-    why = ", ".join(sorted({what["fault"] for what in needless}))
+    why = ", ".join(sorted(set(needless)))
     return at_most("holds on a fault that asks for none", float(len(needless)), 0.0, why=why)
 
 
 def _unasked_moves(seen: SoakEvidence) -> Verdict:
     """Moves without an engagement of their own. An engagement that led to none serves for no later move."""
-    engaged_s = [e.at_s for e in of_kind(seen.events, "engage") if e.what.get("done")]
+    engaged_s = [e.at_s for e in of_kind(seen.events, EngageAnswered) if e.what.done]
     moved_s = [
         e.at_s
-        for e in of_kind(seen.events, "guard")
-        if e.what.get("to") in MOVING and e.what.get("from") not in MOVING
+        for e in of_kind(seen.events, GuardChanged)
+        if e.what.to in MOVING and e.what.from_ not in MOVING
     ]
     why = f"engaged {len(engaged_s)} times, began to move {len(moved_s)} times"
     unasked = 0
@@ -82,9 +89,9 @@ def _unasked_moves(seen: SoakEvidence) -> Verdict:
 def recovery(seen: SoakEvidence) -> list[Verdict]:
     """How soon commands flow and the robot follows again, after each kind of fault."""
     done = seen.recovered
-    begun = len(of_kind(seen.events, "fault"))
-    lost = [what for what in done if not what["done"]]
-    failed = [f"{what['fault']}: {what['failed']}" for what in done if what.get("failed")]
+    begun = len(of_kind(seen.events, FaultBegun))
+    lost = [what for what in done if not what.done]
+    failed = [f"{what.fault}: {what.failed}" for what in done if what.failed]
     under_way = " (one under way when the soak ended)" if begun > len(done) else ""
     verdicts = [
         at_most(
@@ -95,43 +102,35 @@ def recovery(seen: SoakEvidence) -> list[Verdict]:
         ),
         at_most("faults that could not be brought about", float(len(failed)), 0.0, why="; ".join(failed[:3])),
     ]
-    limits = {what["fault"]: what["flow_limit_s"] for what in done if what["flow_limit_s"] is not None}
+    limits = {what.fault: what.flow_limit_s for what in done if what.flow_limit_s is not None}
     for fault, limit_s in sorted(limits.items()):
-        like = [what for what in done if what["fault"] == fault]
-        verdicts.append(slowest(f"commands flow again after {fault}", like, "flow_s", limit_s))
-    again = [what for what in done if what.get("track_s") is not None]
-    return [*verdicts, slowest("follows again once engaged", again, "track_s", TRACK_S)]
+        like = [(fault, what.flow_s) for what in done if what.fault == fault]
+        verdicts.append(slowest(f"commands flow again after {fault}", like, limit_s))
+    again = [(what.fault, what.track_s) for what in done if what.track_s is not None]
+    return [*verdicts, slowest("follows again once engaged", again, TRACK_S)]
 
 
-def _less_stalls(
-    seen: SoakEvidence, faults: Sequence[Mapping[str, Any]], key: str
-) -> list[Mapping[str, Any]]:
-    """The faults with a time that starts when the master can see the fault, without the host's stalls."""
-    own: list[Mapping[str, Any]] = []
-    for what in faults:
-        took_s, begun_s = what.get(key), what["begun_s"]
-        if took_s is not None:
-            still_s = seen.explained.still_s(begun_s, begun_s + took_s)
-            took_s = round(took_s - still_s - what.get("notices_s", 0.0), 3)
-        own.append({**what, key: took_s})
-    return own
+def _less_stalls(seen: SoakEvidence, fault: FaultCourse, took_s: float | None) -> float | None:
+    """A time from when the master can see the fault, without the host's stalls in it."""
+    if took_s is None:
+        return None
+    still_s = seen.explained.still_s(fault.begun_s, fault.begun_s + took_s)
+    return round(took_s - still_s - fault.notices_s, 3)
 
 
-def slowest(name: str, faults: Sequence[Mapping[str, Any]], key: str, limit_s: float) -> Verdict:
-    """The longest time. A missing one fails: what should have come did not."""
-    if not faults:
+def slowest(name: str, times: Sequence[tuple[str, float | None]], limit_s: float) -> Verdict:
+    """The longest time, s, of some faults by name. A missing one fails: what should have come did not."""
+    if not times:
         return Verdict(name, Outcome.NOT_JUDGED, limit=limit_s, unit="s", why="no such fault")
-    missing = [what["fault"] for what in faults if what.get(key) is None and "fault" in what]
+    missing = [fault for fault, took_s in times if took_s is None]
     if missing:
         why = f"never after: {', '.join(missing)}"
         return Verdict(name, Outcome.FAILED, limit=limit_s, unit="s", why=why)
-    worst = max(faults, key=lambda what: what[key])
-    values = sorted(what[key] for what in faults)
-    why = f"of {len(faults)}, median {values[len(values) // 2]:.3g}"
-    if "fault" in worst:
-        why += f"; {worst['fault']}"
-    return at_most(name, float(worst[key]), limit_s, "s", why=why)
+    took = sorted((took_s, fault) for fault, took_s in times if took_s is not None)
+    longest_s, fault = took[-1]
+    why = f"of {len(took)}, median {took[len(took) // 2][0]:.3g}; {fault}"
+    return at_most(name, longest_s, limit_s, "s", why=why)
 
 
-def _reasons(lefts: Sequence[Event]) -> str:
-    return "; ".join(f"{e.at_s:.0f} s: {e.what.get('guard')}: {e.what.get('reason')}" for e in lefts[:3])
+def _reasons(lefts: Sequence[SoakEvent[RobotLeft]]) -> str:
+    return "; ".join(f"{e.at_s:.0f} s: {e.what.guard}: {e.what.reason}" for e in lefts[:3])

@@ -9,6 +9,7 @@ import numpy as np
 
 from common.quaternion import Array
 from deploy.experiments.soak.files.events import of_kind
+from deploy.experiments.soak.files.happenings import FaultBegun
 from deploy.experiments.soak.files.samples import Samples
 from deploy.experiments.soak.judge.evidence import SoakEvidence
 from deploy.report.plots import png
@@ -121,15 +122,15 @@ def _of_processes(panel: Axes, samples: Samples, what: str, words: str, unit_s: 
 
 
 def _faults(panels: list[Axes], seen: SoakEvidence, unit_s: float) -> None:
-    faults = of_kind(seen.events, "fault")
-    names = sorted({str(event.what["fault"]) for event in faults})
+    faults = of_kind(seen.events, FaultBegun)
+    names = sorted({event.what.fault for event in faults})
     colours = {name: FAULT_COLOURS[i % len(FAULT_COLOURS)] for i, name in enumerate(names)}
     for panel in panels:
         handles, labels = panel.get_legend_handles_labels()
         if handles:
             panel.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         for event in faults:
-            colour = colours[str(event.what["fault"])]
+            colour = colours[event.what.fault]
             panel.axvline(event.at_s / unit_s, color=colour, linewidth=0.8, alpha=0.7)
     for window in seen.explained.faults:
         until_s = min(window.until_s, float(seen.samples.at_s[-1]) if len(seen.samples) else window.from_s)

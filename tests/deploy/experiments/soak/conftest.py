@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import pytest
 
 from common.quaternion import Array
-from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.files.events import AnyEvent, SoakEvent
+from deploy.experiments.soak.files.happenings import happening
 from deploy.experiments.soak.files.samples import Samples, header
 from deploy.experiments.soak.judge.evidence import SoakEvidence
+
+
+def happened(at_s: float, kind: str, what: Mapping[str, Any] | None = None) -> AnyEvent:
+    """As it is read from a line of the file."""
+    return SoakEvent(at_s, happening(kind, what or {}))
+
 
 PROCESSES = ["master", "slave", "recorder", "soak"]
 Make = Callable[..., SoakEvidence]
@@ -24,17 +31,17 @@ RECOVERED = {
     "engaged": 1,
 }  # fmt: skip
 STORY = (
-    Event(0.0, "begin", {"transport": "tcp", "seed": 1, "left_out": {}}),
-    Event(3.0, "guard", {"from": "", "to": "hold"}),
-    Event(4.0, "engage", {"done": True}),
-    Event(4.1, "guard", {"from": "hold", "to": "align"}),
-    Event(5.0, "guard", {"from": "align", "to": "track"}),
-    Event(5.0, "follows", {}),
-    Event(100.0, "fault", FAULT),
-    Event(100.2, "guard", {"from": "track", "to": "hold"}),
-    Event(106.0, "engage", {"done": True}),
-    Event(106.1, "guard", {"from": "hold", "to": "align"}),
-    Event(109.0, "recovered", RECOVERED),
+    happened(0.0, "begin", {"transport": "tcp", "seed": 1, "left_out": {}}),
+    happened(3.0, "guard", {"from": "", "to": "hold"}),
+    happened(4.0, "engage", {"done": True}),
+    happened(4.1, "guard", {"from": "hold", "to": "align"}),
+    happened(5.0, "guard", {"from": "align", "to": "track"}),
+    happened(5.0, "follows", {}),
+    happened(100.0, "fault", FAULT),
+    happened(100.2, "guard", {"from": "track", "to": "hold"}),
+    happened(106.0, "engage", {"done": True}),
+    happened(106.1, "guard", {"from": "hold", "to": "align"}),
+    happened(109.0, "recovered", RECOVERED),
 )
 """One start, one fault, nothing wrong."""
 
@@ -43,7 +50,7 @@ STORY = (
 def make() -> Make:
     """Makes a soak of so many seconds; columns given are functions of time, or values."""
 
-    def made(seconds: int = 600, events: tuple[Event, ...] = STORY, **columns: Any) -> SoakEvidence:
+    def made(seconds: int = 600, events: tuple[AnyEvent, ...] = STORY, **columns: Any) -> SoakEvidence:
         at_s = np.arange(1.0, seconds + 1.0)
         table: dict[str, Array] = {
             name: np.full(seconds, np.nan) for name in header(PROCESSES) if name != "guard"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import random
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
 from common.errors import TandemError
 from deploy.experiments.soak.faults import FAULTS, Case
+from deploy.experiments.soak.files.happenings import RecordingChecked
 from deploy.experiments.soak.stage import Stage
 
 FULL = FAULTS["disk-full"]
@@ -45,7 +46,7 @@ class FakeStage:
     def __init__(self, small_disk: bool = True) -> None:
         self.recorder = FakeRecorder(small_disk)
         self.meant: set[str] = {"recorder"}
-        self.looked: dict[str, dict[str, Any]] = {}
+        self.checked: dict[str, RecordingChecked] = {}
 
     async def stop(self, name: str) -> int:
         self.recorder.running = False
@@ -56,12 +57,15 @@ class FakeStage:
         await self.recorder.start()
         self.meant.add(name)
 
-    async def look_at_recording(self, what: str, **more: Any) -> None:
-        self.looked[what] = more
+    async def check_recording(self, after: str) -> RecordingChecked:
+        return RecordingChecked(after)
+
+    def record(self, what: RecordingChecked) -> None:
+        self.checked[what.after] = what
 
 
 def case_on(stage: FakeStage) -> Case:
-    return Case(cast(Stage, stage), random.Random(1), {}, {})
+    return Case(cast(Stage, stage), random.Random(1))
 
 
 async def begun(stage: FakeStage) -> None:
@@ -90,5 +94,5 @@ def test_a_recorder_that_ended_on_a_full_disk_did_not_live(
         return stage
 
     stage = asyncio.run(story())
-    assert stage.looked["disk full"]["lived"] is not ends
+    assert stage.checked["disk full"].lived is not ends
     assert stage.recorder.running

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
 from common.clock import NS_PER_S, to_ns
 from common.errors import LinkTimeoutError
 from common.wire.messages import Action, ControlReply
+from deploy.experiments.soak.files.happenings import EngageAnswered
 from deploy.experiments.soak.recovery import GIVE_UP_S, LOOK_S, Recovery, SoakOperator
 from deploy.experiments.soak.stage import Stage
 from deploy.harness.operator import GuardSight
@@ -72,10 +72,10 @@ class Robot:
         self.now_ns += to_ns(seconds)
 
 
-def recovered(robot: Robot) -> tuple[Recovery, list[Mapping[str, Any]]]:
-    told: list[Mapping[str, Any]] = []
+def recovered(robot: Robot) -> tuple[Recovery, list[EngageAnswered]]:
+    told: list[EngageAnswered] = []
     rig = SimpleNamespace(observers={ROBOT: robot}, control=robot.control)
-    stage = SimpleNamespace(watch=robot, rig=rig, tell=lambda _, what: told.append(what))
+    stage = SimpleNamespace(watch=robot, rig=rig, record=told.append)
     operator = SoakOperator(cast(Stage, stage), lambda: robot.now_ns, robot.sleep)
     return asyncio.run(operator.recover(0)), told
 
@@ -88,7 +88,7 @@ def test_it_waits_for_readiness_engages_once_and_sees_it_follow() -> None:
     assert recovery.ready_s == pytest.approx(3.0, abs=LOOK_S)
     assert recovery.track_s == pytest.approx(1.0, abs=0.05)
     assert (recovery.engaged, robot.engaged, len(robot.asked)) == (1, 1, 1)
-    assert told == [{"done": True, "text": ""}]
+    assert told == [EngageAnswered(True)]
 
 
 def test_a_robot_that_went_on_is_not_engaged() -> None:
@@ -102,8 +102,8 @@ def test_a_robot_that_went_on_is_not_engaged() -> None:
 def test_it_asks_again_when_it_was_refused_or_not_answered() -> None:
     recovery, told = recovered(Robot(refuses=2))
     assert recovery.done
-    assert [what["done"] for what in told] == [False, False, True]
-    assert [what["text"] for what in told] == ["no answer", "still braking", ""]
+    assert [what.done for what in told] == [False, False, True]
+    assert [what.text for what in told] == ["no answer", "still braking", ""]
     assert recovery.engaged == 1
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +16,7 @@ from common.metrics.slave import ArrivalCounts, DueMetrics, SlaveMetrics
 from common.skeleton import load_skeleton
 from common.wire.codec import encode
 from common.wire.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics
+from deploy.experiments.soak.files.happenings import GuardChanged, Happening, JointsUnknown
 from deploy.experiments.soak.motion import Motion
 from deploy.experiments.soak.watch import FRESH_NS, Watch
 from tests.published import commanded, guard_metrics, master_metrics, slave_metrics
@@ -36,17 +36,14 @@ class Heard:
     """A watch, its events, and messages to it at times of the own clock."""
 
     def __init__(self) -> None:
-        self.events: list[tuple[str, Mapping[str, Any]]] = []
-        self.watch = Watch(SKELETON, lambda kind, what: self.events.append((kind, what)))
+        self.events: list[Happening] = []
+        self.watch = Watch(SKELETON, self.events.append)
 
     def state(self, arrived_ns: int = 0, **changes: Any) -> None:
         self.watch.on_state(encode(replace(STATE, **changes)), arrived_ns)
 
     def statistics(self, metrics: MasterMetrics | SlaveMetrics) -> None:
         self.watch.on_statistics(encode(Statistics(0, metrics)), 0)
-
-    def of(self, kind: str) -> list[Mapping[str, Any]]:
-        return [what for each, what in self.events if each == kind]
 
 
 @pytest.fixture
@@ -107,7 +104,7 @@ def test_a_robot_that_is_silent_is_said_to_be(heard: Heard) -> None:
 def test_guard_changes_are_reported_once_and_missed_states_counted(heard: Heard) -> None:
     for sequence, guard in ((1, "track"), (2, "track"), (5, "hold"), (6, "hold"), (7, "align")):
         heard.state(sequence, sequence=sequence, guard=guard)
-    changes = [(e["from"], e["to"]) for e in heard.of("guard")]
+    changes = [(e.from_, e.to) for e in heard.events if isinstance(e, GuardChanged)]
     assert changes == [("", "track"), ("track", "hold"), ("hold", "align")]
     assert heard.watch.held_ns == 5
     assert heard.watch.row()["states_missed"] == 2.0
@@ -116,7 +113,7 @@ def test_guard_changes_are_reported_once_and_missed_states_counted(heard: Heard)
 def test_joints_that_are_not_known_are_told(heard: Heard) -> None:
     for valid in (ALL, ALL, ~ALL, ALL):
         heard.watch.on_command(encode(replace(COMMAND, valid=valid)), 0)
-    assert [e["unknown"] for e in heard.of("joints")] == [0, JOINTS, 0]
+    assert [e.unknown for e in heard.events if isinstance(e, JointsUnknown)] == [0, JOINTS, 0]
     assert heard.watch.known()
 
 

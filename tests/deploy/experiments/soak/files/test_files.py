@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from common.errors import TandemError
-from deploy.experiments.soak.files.events import Event, EventFile, of_kind, read_events
+from deploy.experiments.soak.files.events import EventFile, of_kind, read_events
+from deploy.experiments.soak.files.happenings import GuardChanged, HostStalled
 from deploy.experiments.soak.files.log import SHOWN, SoakLog
 from deploy.experiments.soak.files.samples import SampleFile, header, read_samples
+from tests.deploy.experiments.soak.conftest import happened
 
 PROCESSES = ["master", "soak"]
 
@@ -44,7 +46,7 @@ def test_a_row_cut_in_half_is_left_out(tmp_path: Path) -> None:
 def test_rows_are_on_disk_before_the_file_is_closed(tmp_path: Path) -> None:
     samples, events = SampleFile(tmp_path, PROCESSES), EventFile(tmp_path)
     samples.add({"at_s": 1.0})
-    events.add(Event(0.5, "fault", {"fault": "suit-kill"}))
+    events.add(happened(0.5, "fault", {"fault": "suit-kill"}))
     assert len(read_samples(tmp_path)) == 1
     assert len(read_events(tmp_path)) == 1
     samples.close()
@@ -53,8 +55,8 @@ def test_rows_are_on_disk_before_the_file_is_closed(tmp_path: Path) -> None:
 
 def test_events_come_back_and_a_torn_last_line_is_left_out(tmp_path: Path) -> None:
     events = [
-        Event(0.5, "fault", {"fault": "suit-kill"}),
-        Event(1.25, "guard", {"to": "hold", "reason": "für"}),
+        happened(0.5, "fault", {"fault": "suit-kill"}),
+        happened(1.25, "guard", {"to": "hold", "reason": "für"}),
     ]
     file = EventFile(tmp_path)
     for event in events:
@@ -63,7 +65,7 @@ def test_events_come_back_and_a_torn_last_line_is_left_out(tmp_path: Path) -> No
     with (tmp_path / "events.jsonl").open("a") as torn:
         torn.write('{"at_s": 3, "eve')
     assert read_events(tmp_path) == events
-    assert of_kind(events, "guard") == events[1:]
+    assert of_kind(events, GuardChanged) == events[1:]
 
 
 @pytest.mark.parametrize("content", ["", "a,b\n1,2\n"])
@@ -79,7 +81,7 @@ def test_the_log_keeps_only_the_newest_events_and_counts_all(tmp_path: Path) -> 
     now_ns = iter(range(0, 10**12, 10**9)).__next__
     log = SoakLog(tmp_path, PROCESSES, now_ns)
     for _ in range(50):
-        log.tell("still", {"still_ms": 30.0})
+        log.add(HostStalled(still_ms=30.0))
     log.close()
     assert len(log.newest) == SHOWN
     assert log.counts == {"still": 50}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,8 @@ import pytest
 from common.config.load import load_config
 from deploy.examples.profiles import example
 from deploy.experiments.soak.faults import FAULTS, SUIT_LOST_S
-from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.files.events import AnyEvent, SoakEvent
+from deploy.experiments.soak.files.happenings import SoakBegun
 from deploy.experiments.soak.judge.commands import AGE_MS
 from deploy.experiments.soak.judge.evidence import of_enough
 from deploy.experiments.soak.judge.judge import WRONG, verdicts_of
@@ -22,7 +22,7 @@ from deploy.experiments.soak.link import nature
 from deploy.measure.verdict import Outcome, Verdict, at_most
 from deploy.sim.network import load_profile
 from master.config import MasterConfig
-from tests.deploy.experiments.soak.conftest import RECOVERED, STORY, Make
+from tests.deploy.experiments.soak.conftest import RECOVERED, STORY, Make, happened
 
 
 def judged(seen: Any) -> dict[str, Verdict]:
@@ -38,12 +38,15 @@ def at(second: float, value: float = 1.0) -> Any:
     return lambda at_s: np.where(at_s == second, value, 0.0)
 
 
-def retold(**changes: Any) -> tuple[Event, ...]:
-    return tuple(replace(e, what={**RECOVERED, **changes}) if e.kind == "recovered" else e for e in STORY)
+def retold(**changes: Any) -> tuple[AnyEvent, ...]:
+    return tuple(
+        happened(e.at_s, "recovered", {**RECOVERED, **changes}) if e.what.kind == "recovered" else e
+        for e in STORY
+    )
 
 
-def without(events: Sequence[Event], kind: str, index: int = 0) -> tuple[Event, ...]:
-    found = [event for event in events if event.kind == kind][index]
+def without(events: Sequence[AnyEvent], kind: str, index: int = 0) -> tuple[AnyEvent, ...]:
+    found = [event for event in events if event.what.kind == kind][index]
     return tuple(event for event in events if event is not found)
 
 
@@ -80,7 +83,7 @@ def test_a_datagram_that_the_network_lost_explains_one_command(
     make: Make, packets: int, lost: int, fails: bool
 ) -> None:
     def failing_over(transport: str) -> set[str]:
-        events = (replace(STORY[0], what={"transport": transport}), *STORY[1:])
+        events = (happened(0.0, "begin", {"transport": transport}), *STORY[1:])
         # long before, and again in a fault, it lost many: those are of other stretches, or of the fault
         gone = lambda at_s: np.select([at_s == 50, at_s == 30], [packets, 40], 0.0)  # noqa: E731
         gone_of = lambda at_s: np.select([at_s == 51, at_s == 103], [lost, 50], 0.0)  # noqa: E731
@@ -112,7 +115,7 @@ def test_a_fifth_unexplained_suffices_to_pass_and_none_to_fail(share: float, out
 
 
 def test_a_network_s_delay_is_allowed_for(make: Make) -> None:
-    begun = Event(0.0, "begin", {"network": {"name": "4g", "way_s": 0.1}})
+    begun = happened(0.0, "begin", {"network": {"name": "4g", "way_s": 0.1}})
     assert (
         judged(make(events=(begun, *STORY[1:])))["guard: holds on a fault, the slowest"].limit == HOLD_S + 0.1
     )
@@ -126,7 +129,7 @@ def test_a_hold_on_a_gentle_fault_may_be_the_network_s(make: Make) -> None:
 
 def test_a_stall_of_the_host_explains_too_if_it_is_long_enough(make: Make) -> None:
     def failing_with(still_ms: float, **shown: float) -> set[str]:
-        events = (*STORY, Event(50.0, "still", {"from_s": 49.3, "still_ms": still_ms, **shown}))
+        events = (*STORY, happened(50.0, "still", {"from_s": 49.3, "still_ms": still_ms, **shown}))
         return failing(make(events=events, lost=at(50)))
 
     assert failing_with(50.0, excused_ms=50.0) == set()
@@ -144,12 +147,14 @@ def test_a_command_that_was_acted_on_too_late_fails_whenever_it_was(make: Make) 
 
 def test_over_a_long_line_commands_may_be_as_old_as_its_guard_permits(make: Make) -> None:
     network = nature(load_profile("geo-satellite"))
-    assert network["max_age_s"] > 0.5
-    far = (Event(0.0, "begin", {"network": network}), *STORY[1:])
+    limit_s = network.max_age_s
+    assert limit_s is not None
+    assert limit_s > 0.5
+    far = (SoakEvent(0.0, SoakBegun(network=network)), *STORY[1:])
     name = "commands: oldest that was acted on"
-    assert failing(make(events=far, age_max_ms=at(50, 1e3 * network["max_age_s"]))) == set()
-    assert failing(make(events=far, age_max_ms=at(50, 1e3 * network["max_age_s"] + 1.0))) == {name}
-    assert nature(load_profile("4g"))["max_age_s"] == AGE_MS / 1e3
+    assert failing(make(events=far, age_max_ms=at(50, 1e3 * limit_s))) == set()
+    assert failing(make(events=far, age_max_ms=at(50, 1e3 * limit_s + 1.0))) == {name}
+    assert nature(load_profile("4g")).max_age_s == AGE_MS / 1e3
 
 
 @pytest.mark.parametrize(
@@ -170,15 +175,16 @@ def test_times_after_a_fault_are_judged_at_their_limits(
 
 def test_a_stall_of_the_host_is_taken_off_what_the_robot_took(make: Make) -> None:
     slow = retold(held_s=HOLD_S + 0.1)
-    inside = Event(101.0, "still", {"from_s": 100.1, "still_ms": 120.0, "excused_ms": 120.0})
-    before = Event(99.0, "still", {"from_s": 99.0, "still_ms": 120.0, "excused_ms": 120.0})
+    inside = happened(101.0, "still", {"from_s": 100.1, "still_ms": 120.0, "excused_ms": 120.0})
+    before = happened(99.0, "still", {"from_s": 99.0, "still_ms": 120.0, "excused_ms": 120.0})
     assert failing(make(events=(*slow, inside))) == set()
     assert failing(make(events=(*slow, before))) == {"guard: holds on a fault, the slowest"}
 
 
 def test_what_the_master_needs_to_see_a_fault_is_no_time_of_the_robot(make: Make) -> None:
-    def suit_kill(held_s: float) -> tuple[Event, ...]:
-        return retold(held_s=held_s, **FAULTS["suit-kill"].asks | {"flow_limit_s": 15.0})
+    def suit_kill(held_s: float) -> tuple[AnyEvent, ...]:
+        asked = FAULTS["suit-kill"].course(0, 100.0)
+        return retold(held_s=held_s, notices_s=asked.notices_s, holds=asked.holds, heard=asked.heard)
 
     assert failing(make(events=suit_kill(SUIT_LOST_S + HOLD_S))) == set()
     assert failing(make(events=suit_kill(SUIT_LOST_S + HOLD_S + 0.001))) == {
@@ -209,14 +215,16 @@ def test_a_fault_that_could_not_be_brought_about_fails(make: Make) -> None:
 
 def test_a_move_without_an_engagement_fails(make: Make) -> None:
     assert failing(make(events=without(STORY, "engage", 1))) == {"guard: began to move without being engaged"}
-    refused = tuple(replace(e, what={"done": False}) if e.at_s == 106.0 else e for e in STORY)
+    refused = tuple(happened(e.at_s, "engage") if e.at_s == 106.0 else e for e in STORY)
     assert failing(make(events=refused)) == {"guard: began to move without being engaged"}
 
 
 def test_an_engagement_that_led_to_nothing_excuses_no_later_move(make: Make) -> None:
     def moved(engaged_s: float) -> set[str]:
-        engaged = Event(engaged_s, "engage", {"done": True})
-        return failing(make(events=(*STORY, engaged, Event(300.0, "guard", {"from": "hold", "to": "align"}))))
+        engaged = happened(engaged_s, "engage", {"done": True})
+        return failing(
+            make(events=(*STORY, engaged, happened(300.0, "guard", {"from": "hold", "to": "align"})))
+        )
 
     wrong = {"guard: began to move without being engaged"}
     assert moved(297.9) == wrong
@@ -237,11 +245,11 @@ def test_a_joint_that_moves_while_the_robot_holds_fails(make: Make) -> None:
 def test_a_hold_between_faults_fails_unless_the_host_stood_still(make: Make) -> None:
     left = (
         *STORY,
-        Event(200.0, "left", {"guard": "hold", "reason": "no command"}),
-        Event(203.0, "recovered", {"fault": "", "done": True}),
+        happened(200.0, "left", {"guard": "hold", "reason": "no command"}),
+        happened(203.0, "recovered", {"fault": "", "done": True}),
     )
     assert failing(make(events=left)) == {"guard: holds that nothing explains"}
-    still = Event(199.9, "still", {"from_s": 199.6, "still_ms": 250.0, "excused_ms": 250.0})
+    still = happened(199.9, "still", {"from_s": 199.6, "still_ms": 250.0, "excused_ms": 250.0})
     assert failing(make(events=(*left, still))) == set()
 
 
@@ -262,7 +270,7 @@ def test_missed_ticks_are_judged_without_those_of_the_host(make: Make) -> None:
 
 
 def test_a_process_that_ends_by_itself_fails(make: Make) -> None:
-    ended = (*STORY, Event(300.0, "ended", {"process": "suit", "words": "a bug"}))
+    ended = (*STORY, happened(300.0, "ended", {"process": "suit", "words": "a bug"}))
     assert failing(make(events=ended)) == {"loops: processes that ended by themselves"}
 
 
@@ -287,7 +295,7 @@ def test_a_process_that_ends_by_itself_fails(make: Make) -> None:
     ],
 )
 def test_recordings(make: Make, what: dict[str, Any], wrong: set[str]) -> None:
-    assert failing(make(events=(*STORY, Event(150.0, "recording", what)))) == wrong
+    assert failing(make(events=(*STORY, happened(150.0, "recording", what)))) == wrong
 
 
 @pytest.mark.parametrize(
@@ -302,7 +310,7 @@ def test_recordings(make: Make, what: dict[str, Any], wrong: set[str]) -> None:
     ],
 )
 def test_how_it_ended(make: Make, what: dict[str, Any], wrong: set[str]) -> None:
-    assert failing(make(events=(*STORY, Event(599.0, "end", what)))) == wrong
+    assert failing(make(events=(*STORY, happened(599.0, "end", what)))) == wrong
 
 
 def test_without_faults_and_commands_nothing_is_claimed(make: Make) -> None:
@@ -331,7 +339,7 @@ def test_both_sides_still_for_5_s_fail_though_no_number_is_missing(make: Make) -
 
 
 def test_that_the_robot_left_off_explains_no_command_that_was_due(make: Make) -> None:
-    left = Event(305.5, "left", {"guard": "hold", "reason": "no command"})
+    left = happened(305.5, "left", {"guard": "hold", "reason": "no command"})
     seen = make(events=(*STORY, left), gone=at(306.0, 62.0))
     assert judged(seen)["commands: due and never came, unexplained"].outcome is Outcome.FAILED
     assert judged(make(events=(*STORY, left), lost=at(306.0)))["commands: lost, unexplained"].measured == 0.0

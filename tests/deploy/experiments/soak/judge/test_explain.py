@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
-from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.files.events import AnyEvent
 from deploy.experiments.soak.judge.explain import Explained, explanation, unexplained_lefts
 from deploy.experiments.soak.judge.windows import Window
-from tests.deploy.experiments.soak.conftest import STORY, Make
+from tests.deploy.experiments.soak.conftest import STORY, Make, happened
 
 
-def explained(make: Make, *events: Event) -> Explained:
+def explained(make: Make, *events: AnyEvent) -> Explained:
     return explanation(events, make().samples)
 
 
-def fault(at_s: float, number: int) -> Event:
-    return Event(at_s, "fault", {"fault": "suit-kill", "number": number})
+def fault(at_s: float, number: int) -> AnyEvent:
+    return happened(at_s, "fault", {"fault": "suit-kill", "number": number})
 
 
 def test_a_fault_s_window_ends_with_its_own_recovery(make: Make) -> None:
     events = (
-        Event(5.0, "follows"), fault(10.0, 0), Event(14.0, "recovered", {"number": 0}), fault(30.0, 1),
-        Event(39.0, "recovered", {"number": 1}),
+        happened(5.0, "follows"), fault(10.0, 0), happened(14.0, "recovered", {"number": 0}), fault(30.0, 1),
+        happened(39.0, "recovered", {"number": 1}),
     )  # fmt: skip
     windows = [(w.from_s, w.until_s, w.why) for w in explained(make, *events).faults]
     assert windows == [(0.0, 5.0, "start"), (10.0, 14.0, "suit-kill"), (30.0, 39.0, "suit-kill")]
@@ -33,12 +34,12 @@ def test_a_fault_s_window_ends_with_its_own_recovery(make: Make) -> None:
 
 def test_what_never_ended_lasts(make: Make) -> None:
     assert explained(make).faults[0].until_s == math.inf
-    assert explained(make, Event(5.0, "follows"), fault(10.0, 0)).why(1e6) == "suit-kill"
+    assert explained(make, happened(5.0, "follows"), fault(10.0, 0)).why(1e6) == "suit-kill"
 
 
 def test_after_a_robot_left_off_what_comes_has_a_reason(make: Make) -> None:
-    left = Event(50.0, "left", {"guard": "hold"})
-    events = (*STORY[:6], left, Event(53.0, "recovered", {"fault": "", "number": -1}))
+    left = happened(50.0, "left", {"guard": "hold"})
+    events = (*STORY[:6], left, happened(53.0, "recovered", {"fault": "", "number": -1}))
     found = explained(make, *events)
     assert found.why(52.0) == "after it left off"
     assert found.why(60.0) == ""
@@ -46,15 +47,15 @@ def test_after_a_robot_left_off_what_comes_has_a_reason(make: Make) -> None:
 
 
 def test_what_is_sent_during_the_stop_counts_for_nothing(make: Make) -> None:
-    assert explained(make, *STORY, Event(300.0, "end")).why(301.0) == "end"
+    assert explained(make, *STORY, happened(300.0, "end")).why(301.0) == "end"
 
 
 @pytest.mark.parametrize(("transport", "enough"), [("tcp", 1), ("tls", 1), ("udp", 3), ("quic-datagram", 3)])
 def test_a_network_that_lost_enough_explains_a_hold(make: Make, transport: str, enough: int) -> None:
-    begun = Event(0.0, "begin", {"transport": transport})
-    events = (begun, *STORY[1:6], Event(50.0, "left", {"guard": "hold"}))
+    begun = happened(0.0, "begin", {"transport": transport})
+    events = (begun, *STORY[1:6], happened(50.0, "left", {"guard": "hold"}))
 
-    def lefts(**columns: Any) -> list[Event]:
+    def lefts(**columns: Any) -> Sequence[AnyEvent]:
         samples = make(**columns).samples
         return unexplained_lefts(events, explanation(events, samples))
 

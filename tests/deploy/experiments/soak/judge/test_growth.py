@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from deploy.experiments.soak.files.events import Event
+from deploy.experiments.soak.files.events import AnyEvent
 from deploy.experiments.soak.judge.evidence import SoakEvidence
 from deploy.experiments.soak.judge.growth import (
     DRIFT_MS_H,
@@ -20,7 +20,7 @@ from deploy.experiments.soak.judge.growth import (
     memory,
 )
 from deploy.measure.verdict import Outcome, Verdict
-from tests.deploy.experiments.soak.conftest import FAULT, RECOVERED, STORY, Make
+from tests.deploy.experiments.soak.conftest import FAULT, RECOVERED, STORY, Make, happened
 
 LONG = 3600
 
@@ -70,11 +70,11 @@ def test_a_leak_in_every_life_is_found_though_each_begins_anew(make: Make) -> No
     assert rss(make(LONG, **lives)).outcome is Outcome.FAILED
 
 
-def many_faults(seconds: int, every_s: int) -> tuple[Event, ...]:
+def many_faults(seconds: int, every_s: int) -> tuple[AnyEvent, ...]:
     begins = range(200, seconds - 100, every_s)
     faults = [(float(s), FAULT | {"begun_s": float(s), "number": n}) for n, s in enumerate(begins)]
-    told = [Event(s, "fault", what) for s, what in faults]
-    return (*STORY[:6], *told, *(Event(s + 5.0, "recovered", RECOVERED | what) for s, what in faults))
+    told = [happened(s, "fault", what) for s, what in faults]
+    return (*STORY[:6], *told, *(happened(s + 5.0, "recovered", RECOVERED | what) for s, what in faults))
 
 
 def test_what_each_fault_costs_is_told_apart_from_what_grows_with_time(make: Make) -> None:

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from deploy.experiments.soak.files.events import Event, EventFile
+from deploy.experiments.soak.files.events import AnyEvent, EventFile
 from deploy.experiments.soak.files.samples import SampleFile
 from deploy.experiments.soak.judge.judge import JudgedSoak, judge_soak
 from deploy.experiments.soak.report.plots import decimated, with_gaps
 from deploy.experiments.soak.report.write import write_report
 from deploy.measure.verdict import verdict_table
-from tests.deploy.experiments.soak.conftest import STORY
+from tests.deploy.experiments.soak.conftest import STORY, happened
 
-LEFT_OUT = Event(0.0, "begin", {"transport": "tcp", "seed": 4, "left_out": {"outage": "no <network>"}})
+LEFT_OUT = happened(0.0, "begin", {"transport": "tcp", "seed": 4, "left_out": {"outage": "no <network>"}})
 
 
-def judged(folder: Path, *more: Event) -> JudgedSoak:
+def judged(folder: Path, *more: AnyEvent) -> JudgedSoak:
     events, samples = EventFile(folder), SampleFile(folder, ["master", "slave", "soak"])
     for event in (LEFT_OUT, *STORY[1:], *more):
         events.add(event)
@@ -41,7 +41,7 @@ def judged(folder: Path, *more: Event) -> JudgedSoak:
 
 def test_the_json_says_all(tmp_path: Path) -> None:
     write_report(
-        judged(tmp_path, Event(199.0, "end", {"how": "it ran its time", "error": False, "status": {}})),
+        judged(tmp_path, happened(199.0, "end", {"how": "it ran its time", "error": False, "status": {}})),
         tmp_path,
     )
     tree = json.loads((tmp_path / "report.json").read_text())
