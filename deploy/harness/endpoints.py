@@ -59,9 +59,9 @@ def local_endpoints(transport: str, folder: Path, robots: int = 1, routed: bool 
         names = ["router", "master", *(f"robot-{i + 1}" for i in range(robots))]
         router, master, *each = (f"{transport}/{folder / name}.sock" for name in names)
     else:
-        ports = _free_ports(transport, 2 + robots)
+        ports = free_ports(transport, 2 + robots)
         router, master, *each = (f"{transport}/127.0.0.1:{port}" for port in ports)
-    [observer], [can] = _free_ports("tcp", 1), _free_ports("udp", 1)
+    observer, can = free_port("tcp"), free_port("udp")
     door, through = f"tcp/127.0.0.1:{observer}", router if routed else ""
     keys = keys_for(transport, folder, [router, master, *each], robots)
     return Endpoints(tuple(each), master, door, can, through, keys)
@@ -104,12 +104,13 @@ def network_endpoints(
     )
 
 
-def free_port(kind: str) -> int:
-    """A port that nobody listens at now; `kind` is tcp or udp."""
-    return _free_ports(kind, 1)[0]
+def free_port(transport: str) -> int:
+    """A port of this host that nobody listens at now."""
+    return free_ports(transport, 1)[0]
 
 
-def _free_ports(transport: str, count: int) -> list[int]:
+def free_ports(transport: str, count: int) -> list[int]:
+    """Several, each another one."""
     kind = socket.SOCK_DGRAM if transport in ("udp", "quic", "quic-datagram") else socket.SOCK_STREAM
     with ExitStack() as held:  # all at once, so that they differ
         probes = [held.enter_context(socket.socket(socket.AF_INET, kind)) for _ in range(count)]

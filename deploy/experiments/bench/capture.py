@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import resource
-import socket
 from typing import Any
 
 import uvloop
@@ -18,6 +17,7 @@ from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from deploy.experiments.bench.pipeline import BUS, LOST_AFTER, RATE_HZ, answers, nodes
 from deploy.experiments.bench.worker import beside, in_worker
+from deploy.harness.endpoints import free_port
 from deploy.measure.timing import spread, spread_us
 from master.suit.poll import Poll
 from master.suit.protocol import SuitProtocol
@@ -33,9 +33,9 @@ _WRAP = 64
 
 def capture(seconds: float, count: int, fd: bool) -> dict[str, Any]:
     """µs of processor a tick to receive and decode `count` nodes, how long they take, ticks missed."""
-    port = _free_port()
-    with beside("capture:suit", port=port, count=count, fd=fd):
-        result: dict[str, Any] = in_worker("capture:listen", seconds, port=port, count=count, fd=fd)
+    port = free_port("udp")
+    with beside(suit, port=port, count=count, fd=fd):
+        result: dict[str, Any] = in_worker(listen, seconds, port=port, count=count, fd=fd)
         return result
 
 
@@ -138,13 +138,6 @@ def _config(port: int, fd: bool) -> BusConfig:
         fd=fd,
         options={"port": port, "hop_limit": 0},
     )
-
-
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def _processor_s() -> float:

@@ -18,9 +18,9 @@ RATE_HZ = 200
 
 def loop(seconds: float) -> dict[str, Any]:
     """Lateness in µs and ticks missed, `idle` and `busy`; half of the time goes to each."""
-    idle = in_worker("loop:lateness", seconds / 2)
-    with beside("loop:burn"):
-        return {"idle": idle, "busy": in_worker("loop:lateness", seconds / 2)}
+    idle = in_worker(lateness, seconds / 2)
+    with beside(burn):
+        return {"idle": idle, "busy": in_worker(lateness, seconds / 2)}
 
 
 def lateness(seconds: float) -> dict[str, Any]:

@@ -14,11 +14,12 @@ from rich.text import Text
 
 from common.wire.topics import COMMAND
 from deploy.experiments.bench.capture import capture
-from deploy.experiments.bench.link import link
+from deploy.experiments.bench.link import link, transports
 from deploy.experiments.bench.loop import RATE_HZ, loop
+from deploy.experiments.bench.pipeline import pipeline
+from deploy.experiments.bench.robot import robot
 from deploy.experiments.bench.table import bench_table
 from deploy.experiments.bench.targets import BENCH
-from deploy.experiments.bench.transports import transports
 from deploy.experiments.bench.worker import BenchError, in_worker
 from deploy.measure.target import judge_targets
 from deploy.measure.timing import total
@@ -43,10 +44,10 @@ BENCHES = (
     _Bench(
         "capture, 8 classic nodes", ("capture", "nodes_8_classic"), 3.0, lambda s: capture(s, 8, fd=False)
     ),
-    _Bench("the master's steps", ("pipeline",), 10.0, lambda s: in_worker("pipeline:pipeline", s)),
+    _Bench("the master's steps", ("pipeline",), 10.0, lambda s: in_worker(pipeline, s)),
     _Bench("link beside Zenoh and UDP", ("link",), 12.0, link),
     _Bench("link over each transport", ("transports",), 12.0, transports),
-    _Bench("robot", ("robot",), 2.0, lambda s: in_worker("robot:robot", s)),
+    _Bench("robot", ("robot",), 2.0, lambda s: in_worker(robot, s)),
 )
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import socket
 import sys
 from contextlib import AsyncExitStack
 from dataclasses import asdict, dataclass, replace
@@ -32,6 +31,7 @@ from common.wire.codec import decode, encode
 from common.wire.messages import Command, CommandStamps, RobotState
 from common.wire.topics import COMMAND, STATE, VIDEO
 from deploy.experiments.bench.slow_link import SlowLink, SlowLinkOptions
+from deploy.harness.endpoints import free_port
 from master.picture import VideoWatch
 from slave.camera.config import CameraConfig
 from slave.camera.feed import CameraFeed
@@ -88,7 +88,7 @@ class Uncontrolled(RateControl):
 
 async def measure(options: SlowLinkOptions, seconds: float, video: str = "controlled") -> VideoRun:
     """One run. `video`: off, controlled, or uncontrolled. Raises LinkError where no link comes about."""
-    robot_port = _free_port()
+    robot_port = free_port("tcp")
     async with AsyncExitStack() as stack:
         slow = stack.enter_context(SlowLink(robot_port, options))
         robot = await stack.enter_async_context(open_link(_listening(robot_port), ROBOT))
@@ -153,12 +153,6 @@ def _listening(port: int) -> LinkConfig:
 
 def _connecting(port: int) -> LinkConfig:
     return LinkConfig(connect=[f"tcp/127.0.0.1:{port}"])
-
-
-def _free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def main() -> None:

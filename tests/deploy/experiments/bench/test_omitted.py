@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
-from deploy.experiments.bench import link
-from deploy.experiments.bench.link import TIMEOUT_S, Stagger
+from deploy.experiments.bench import round_trips
 from deploy.experiments.bench.loop import with_missed
+from deploy.experiments.bench.round_trips import TIMEOUT_S, Stagger
 
 PERIOD_NS = 5_000_000
 
@@ -37,5 +37,5 @@ def test_an_echo_that_never_came_is_no_fast_one(monkeypatch: pytest.MonkeyPatch)
         figures = await stagger.measure(1.0)
         return figures["one"]["max"]
 
-    monkeypatch.setattr(link, "WARM_UP", 0)
+    monkeypatch.setattr(round_trips, "WARM_UP", 0)
     assert asyncio.run(measured()) == pytest.approx(1e6 * TIMEOUT_S / 2)

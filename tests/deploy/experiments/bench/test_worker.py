@@ -1,19 +1,20 @@
 import subprocess
-import sys
 
 import pytest
 
-from deploy.experiments.bench.worker import BenchError, beside, in_worker
+from deploy.experiments.bench.loop import burn
+from deploy.experiments.bench.pipeline import codec, ticks
+from deploy.experiments.bench.worker import BenchError, beside, command_of, in_worker
 
 
 def test_a_worker_returns_what_its_function_does() -> None:
-    figures = in_worker("pipeline:codec", 0.01)
+    figures = in_worker(codec, 0.01)
     assert set(figures) == {"min", "median", "p99", "max", "count"}
 
 
 def test_a_worker_that_fails_says_why_in_one_line() -> None:
-    with pytest.raises(BenchError, match=r"pipeline:ticks: TypeError: .*count") as caught:
-        in_worker("pipeline:ticks", 0.01)
+    with pytest.raises(BenchError, match=r"ticks: TypeError: .*count") as caught:
+        in_worker(ticks, 0.01)
     assert "\n" not in str(caught.value)
 
 
@@ -26,13 +27,12 @@ def test_a_worker_beside_ends_with_its_block(monkeypatch: pytest.MonkeyPatch) ->
         return started[-1]
 
     monkeypatch.setattr(subprocess, "Popen", start)
-    with beside("loop:burn"):
+    with beside(burn):
         assert started[0].poll() is None
     assert started[0].poll() is not None
 
 
 def test_a_worker_ends_when_its_parent_does() -> None:
     # the pipe that a worker watches ends as it would if the parent were killed
-    command = [sys.executable, "-m", "deploy.experiments.bench.worker", "loop:burn", "{}"]
-    ended = subprocess.run(command, stdin=subprocess.DEVNULL, timeout=30, check=False)
+    ended = subprocess.run(command_of(burn, {}), stdin=subprocess.DEVNULL, timeout=30, check=False)
     assert ended.returncode == 1
