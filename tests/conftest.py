@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, settings
 
 from common.clock import monotonic_ns
 from common.errors import TandemError
-from deploy.harness.host import Host, watch_host
+from deploy.harness.host import HostWatch, watch_host
 
 from .skips import counted, read_allowed, too_many
 
@@ -29,7 +29,7 @@ TRIES = 4
 WHOLE = ("", "not bench", "not live and not bench", "live and not bench")
 """What `-m` may be for a run of all tests, or of one of the two halves that the Makefile runs."""
 
-Story = Callable[[Host], Awaitable[None]]
+Story = Callable[[HostWatch], Awaitable[None]]
 OnThisHost = Callable[[Story], None]
 """The fixture's type."""
 

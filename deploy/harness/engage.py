@@ -11,7 +11,7 @@ from common.clock import Clock, monotonic_ns, to_ns, to_s
 from common.errors import CodecError, LinkError, LinkTimeoutError, TandemError
 from common.wire.messages import Action
 from deploy.harness.observer import Observer
-from deploy.harness.operator import GuardSight, Operator, Patience, UnaskedHold
+from deploy.harness.operator import GuardSight, Operator, OperatorPatience, UnaskedHold
 from deploy.harness.rig import ROBOT, Rig
 
 LOOK_S = 0.25
@@ -132,7 +132,7 @@ async def until_tracking(
     rig: Rig, robot: str = ROBOT, timeout_s: float = TRACK_S, check: Callable[[], None] | None = None
 ) -> None:
     """Engage one robot of a rig until it tracks. Raises TandemError where it does not in time."""
-    operator = Operator(robot, Patience(timeout_s), wanted_ns=monotonic_ns())
+    operator = Operator(robot, OperatorPatience(timeout_s), wanted_ns=monotonic_ns())
     await until_all_track([EngageDriver(operator, RigRobot(rig, robot))], check or rig.check)
 
 

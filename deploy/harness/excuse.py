@@ -21,7 +21,7 @@ in between, by every process at once."""
 WINDOW_S = 0.5
 
 
-class Evidence(StrEnum):
+class StallEvidence(StrEnum):
     """What shows that a stall was the host's; the text is printed."""
 
     PRIORITY = "the reference loop had real-time priority"
@@ -44,17 +44,17 @@ class Stall:
     """Whether the loop had real-time priority."""
 
     @property
-    def evidence(self) -> Evidence:
+    def evidence(self) -> StallEvidence:
         """What shows that it was the host's."""
         if self.priority:
-            return Evidence.PRIORITY
-        return Evidence.STEAL if self.stolen_ns > 0 else Evidence.NONE
+            return StallEvidence.PRIORITY
+        return StallEvidence.STEAL if self.stolen_ns > 0 else StallEvidence.NONE
 
     @property
     def excused_ns(self) -> int:
         """How much of it excuses: all, what was stolen, or nothing; the end of the stall counts."""
         lasted_ns = self.until_ns - self.from_ns
-        return lasted_ns if self.evidence is Evidence.PRIORITY else min(lasted_ns, self.stolen_ns)
+        return lasted_ns if self.evidence is StallEvidence.PRIORITY else min(lasted_ns, self.stolen_ns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Lost:
     """Total stall that was the host's fault: a result may be late by this much."""
     still_s: float
     """The same, whoever's fault it was."""
-    evidence: Evidence
+    evidence: StallEvidence
 
     @property
     def explains_hold(self) -> bool:
@@ -89,7 +89,7 @@ def lost(stalls: Iterable[Stall], since_ns: int, until_ns: int) -> Lost:
     return Lost(
         _union_s(excused, since_ns, until_ns),
         _union_s(((stall.from_ns, stall.until_ns) for stall in near), since_ns, until_ns),
-        next((each for each in Evidence if each in shown), Evidence.NONE),
+        next((each for each in StallEvidence if each in shown), StallEvidence.NONE),
     )
 
 

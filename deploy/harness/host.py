@@ -22,7 +22,7 @@ STOP_S = 1.0
 
 
 @dataclass(slots=True)
-class Host:
+class HostWatch:
     """What the bare loops have told so far. Where they do not run, nothing is known and nothing excused."""
 
     stalls: list[Stall] = field(default_factory=list)
@@ -124,9 +124,9 @@ def _cpu_s() -> tuple[float, float]:
 
 
 @asynccontextmanager
-async def watch_host() -> AsyncIterator[Host]:
-    """Bare loops on every core while the block runs; the Host fills as they tell."""
-    host = Host()
+async def watch_host() -> AsyncIterator[HostWatch]:
+    """Bare loops on every core while the block runs; the HostWatch fills as they tell."""
+    host = HostWatch()
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "deploy.harness.bare_loop",
         stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,

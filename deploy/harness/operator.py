@@ -1,7 +1,7 @@
 """The operator of a robot: engages it, engages it again after a hold, and gives up in time. Pure.
 
 States and time come in, acts come out. `deploy/harness/engage.py` hears the states and sends the acts. Every
-experiment uses this rule; each has its own `Patience`, and decides itself when its robot is ready.
+experiment uses this rule; each has its own `OperatorPatience`, and decides itself when its robot is ready.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from common.clock import to_s
-from deploy.harness.excuse import Evidence, Lost
+from deploy.harness.excuse import Lost, StallEvidence
 
 JUDGED_AFTER_S = 1.0
 """A core that still stands can report a stall only later: a hold is judged no sooner than this."""
@@ -30,7 +30,7 @@ class GuardSight:
 
 
 @dataclass(frozen=True, slots=True)
-class Patience:
+class OperatorPatience:
     """When an operator gives up on a robot. A robot in `estop` is given up at once."""
 
     back_s: float = 20.0
@@ -63,13 +63,13 @@ class Operator:
     """One robot's operator."""
 
     robot: str
-    patience: Patience | None = None
+    patience: OperatorPatience | None = None
     """None: he never gives up."""
     wanted_ns: int = 0
     """Since when the robot is to track."""
     again_s: float = 0.0
     """How long he waits after one request to engage before the next."""
-    host_lost: HostLost = lambda _: Lost(0.0, 0.0, Evidence.NONE)
+    host_lost: HostLost = lambda _: Lost(0.0, 0.0, StallEvidence.NONE)
     guard: str = "silent"
     reason: str = "not heard"
     holds: list[UnaskedHold] = field(default_factory=list)
@@ -138,7 +138,7 @@ class Operator:
             )
         return None
 
-    def _one_too_many(self, patience: Patience, now_ns: int) -> UnaskedHold | None:
+    def _one_too_many(self, patience: OperatorPatience, now_ns: int) -> UnaskedHold | None:
         if patience.holds is None:
             return None
         old = [hold for hold in self.holds if to_s(now_ns - hold.began_ns) > JUDGED_AFTER_S]

@@ -10,7 +10,7 @@ import pytest
 
 from common.clock import to_ns
 from common.metrics.slave import CameraMetrics
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 from deploy.harness.rig import Rig, open_rig
 from deploy.harness.start import start_tracking
 
@@ -36,7 +36,7 @@ def ages(video: CameraMetrics | None) -> int:
 def test_a_killed_camera_changes_one_word_in_the_state_and_nothing_else(
     on_this_host: OnThisHost,
 ) -> None:
-    async def story(host: Host) -> None:
+    async def story(host: HostWatch) -> None:
         async with open_rig(overrides={"slave": ['camera.source="robot"']}) as rig:
             observer = rig.observer
             await start_tracking(rig)

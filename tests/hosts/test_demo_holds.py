@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from deploy.experiments.demo.operators import PATIENCE, DemoOperators
-from deploy.harness.host import Host
-from deploy.harness.operator import Patience
+from deploy.harness.host import HostWatch
+from deploy.harness.operator import OperatorPatience
 from deploy.harness.rig import Rig, open_rig
 from deploy.harness.start import start_all
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 
 
-async def started(rig: Rig, lines: list[str], patience: Patience) -> DemoOperators:
+async def started(rig: Rig, lines: list[str], patience: OperatorPatience) -> DemoOperators:
     await start_all(rig)
-    operators = DemoOperators(rig, Host(), lambda: None, lines.append, patience)
+    operators = DemoOperators(rig, HostWatch(), lambda: None, lines.append, patience)
     await operators.follow(0.0)
     assert not operators.problem
     return operators
 
 
 def test_a_robot_that_held_is_engaged_again_and_the_hold_is_reported(on_this_host: OnThisHost) -> None:
-    async def story(_: Host) -> None:
+    async def story(_: HostWatch) -> None:
         lines: list[str] = []
         async with open_rig() as rig:
             # however often this host stands still
@@ -53,10 +53,10 @@ def test_a_robot_that_held_is_engaged_again_and_the_hold_is_reported(on_this_hos
 
 
 def test_a_robot_whose_master_is_gone_is_given_up(on_this_host: OnThisHost) -> None:
-    async def story(_: Host) -> None:
+    async def story(_: HostWatch) -> None:
         async with open_rig() as rig:
             await start_all(rig)
-            operators = DemoOperators(rig, Host(), lambda: None, print, Patience(back_s=10.0))
+            operators = DemoOperators(rig, HostWatch(), lambda: None, print, OperatorPatience(back_s=10.0))
             await operators.follow(0.0)
             await rig.children["master"].kill()
             await rig.until(lambda: rig.observer.guard == "hold", 10.0, "hold")

@@ -12,7 +12,7 @@ from common.clock import to_ns
 from common.metrics.slave import SlaveMetrics
 from common.wire.messages import RobotState
 from deploy.harness.engage import until_tracking
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 from deploy.harness.rig import open_rig
 from deploy.harness.start import start_tracking
 
@@ -28,7 +28,7 @@ BRAKE_S = 0.35
 
 
 def test_killed_master_leaves_the_robot_holding_until_engaged_anew(on_this_host: OnThisHost) -> None:
-    async def story(host: Host) -> None:
+    async def story(host: HostWatch) -> None:
         async with open_rig() as rig:
             observer = rig.observer
             await start_tracking(rig)
@@ -64,7 +64,7 @@ def test_killed_master_leaves_the_robot_holding_until_engaged_anew(on_this_host:
 
 
 def test_a_killed_slave_is_reported_and_resumes_only_when_engaged(on_this_host: OnThisHost) -> None:
-    async def story(host: Host) -> None:
+    async def story(host: HostWatch) -> None:
         async with open_rig() as rig:
             observer = rig.observer
             await start_tracking(rig)
@@ -87,7 +87,7 @@ def test_a_killed_slave_is_reported_and_resumes_only_when_engaged(on_this_host: 
 @pytest.mark.usefixtures("default_signals")
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_each_process_stops_cleanly(on_this_host: OnThisHost, stop: signal.Signals) -> None:
-    async def story(host: Host) -> None:
+    async def story(host: HostWatch) -> None:
         async with open_rig() as rig:
             await start_tracking(rig)
             statuses = {role: await rig.children[role].stop(stop) for role in ("master", "suit", "slave")}

@@ -11,7 +11,7 @@ import pytest
 from common.quaternion import Array
 from common.wire.messages import Action, RobotState
 from deploy.harness.engage import until_tracking
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 from deploy.harness.rig import Rig, open_rig
 from deploy.harness.start import start_all
 
@@ -34,7 +34,7 @@ OVERRIDES = {
 }
 
 
-def unexplained(states: list[RobotState], host: Host) -> list[str]:
+def unexplained(states: list[RobotState], host: HostWatch) -> list[str]:
     """Why the robot held each time that the host had not stood still just before."""
     held = [b for a, b in pairwise(states) if (a.guard, b.guard) in (("track", "hold"), ("align", "hold"))]
     return [s.reason for s in held if not host.explains(s.sent_ns)]
@@ -48,7 +48,7 @@ def states(rig: Rig) -> dict[str, RobotState]:
 def test_a_fault_on_one_robot_does_not_affect_the_others(
     on_this_host: OnThisHost,
 ) -> None:
-    async def story(host: Host) -> None:
+    async def story(host: HostWatch) -> None:
         async with open_rig(overrides=OVERRIDES, robots=3) as rig:
             await start_all(rig)
             assert len({state.lease_id for state in states(rig).values()}) == 3

@@ -19,7 +19,7 @@ from deploy import cli
 from deploy.certificates.folder import stem, write_pair
 from deploy.certificates.make import new_authority, new_identity
 from deploy.harness.child import Child
-from deploy.harness.host import Host as ThisHost
+from deploy.harness.host import HostWatch
 from deploy.sim.network import Host
 from deploy.sim.network.namespaces import why_not
 from deploy.sim.network.network import open_network
@@ -91,7 +91,7 @@ def test_from_keys_to_a_robot_that_follows_in_two_hosts(tmp_path: Path, on_this_
     if reason is not None:
         pytest.skip(reason)
 
-    async def story(_: ThisHost) -> None:
+    async def story(_: HostWatch) -> None:
         folder = Path(tempfile.mkdtemp(dir=tmp_path))  # of this try
         async with open_network("lan") as network:
             a_site(folder, network.robot.address)

@@ -12,7 +12,7 @@ from common.metrics.link import AccessMetrics
 from common.metrics.master import MasterMetrics
 from common.metrics.slave import SlaveMetrics
 from common.skeleton import load_skeleton
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 from deploy.harness.keys import MASTER, access_override
 from deploy.harness.rig import ROBOT, open_rig
 from deploy.harness.start import start_tracking
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 @pytest.mark.parametrize("routed", [False, True], ids=["direct", "routed"])
 @pytest.mark.parametrize("transport", TRANSPORTS)
 def test_the_robot_tracks_over(on_this_host: OnThisHost, transport: str, routed: bool) -> None:
-    async def story(host: Host) -> None:
+    async def story(host: HostWatch) -> None:
         access = [access_override([ROBOT])] if transport in SECURE else []
         rules = dict.fromkeys(("slave", "master", "router"), access)
         async with open_rig(transport, rules, routed=routed) as rig:
@@ -62,7 +62,7 @@ def test_body_nodes_on_classic_can_and_gloves_on_fd(on_this_host: OnThisHost) ->
     nodes = [f'nodes.{name}.bus="body"' for name in body]
     overrides = {"master": [f"capture.buses={buses}", *nodes], "suit": [f"buses={buses}", *nodes]}
 
-    async def story(host: Host) -> None:
+    async def story(host: HostWatch) -> None:
         async with open_rig(overrides=overrides) as rig:
             await start_tracking(rig)
             statuses = await rig.stop()

@@ -15,7 +15,7 @@ from deploy.experiments.trial.cell.plan import CellKey, Plan, Setup
 from deploy.experiments.trial.cell.result import Status
 from deploy.experiments.trial.remote.operator import run_remote_cell
 from deploy.harness.endpoints import free_port
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
@@ -33,7 +33,7 @@ def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(
         outage_s=0.0, robot="nursing", motion="sweep", seed=1, router=False, max_age_s=0.3, hosts=endpoint,
     )  # fmt: skip
 
-    async def story(_: Host) -> None:
+    async def story(_: HostWatch) -> None:
         with (tmp_path / "serve.log").open("wb") as log:
             server = await asyncio.create_subprocess_exec(
                 sys.executable, "-m", "deploy", "trial", "serve", "--listen", endpoint,

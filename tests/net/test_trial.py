@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 
 if TYPE_CHECKING:
     from tests.conftest import OnThisHost
@@ -32,7 +32,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_a_trial_measures_says_why_not_and_goes_on(tmp_path: Path, on_this_host: OnThisHost) -> None:
-    async def story(_: Host) -> None:
+    async def story(_: HostWatch) -> None:
         folder = Path(tempfile.mkdtemp(dir=tmp_path)) / "report"  # of this try
         first = await asyncio.to_thread(run, *PLAN, "--report", str(folder))
         assert first.returncode == 0, first.stdout + first.stderr

@@ -8,7 +8,7 @@ import pytest
 
 from common.clock import monotonic_ns, to_ns, to_s
 from deploy.harness.engage import until_tracking
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 from deploy.harness.rig import Rig, open_rig
 from deploy.harness.start import start_tracking
 from deploy.sim.network import Network, load_profile, open_network
@@ -26,7 +26,7 @@ HOLD_S = 1.0
 
 @pytest.mark.timeout(400)
 def test_the_robot_holds_in_an_outage_and_moves_only_when_engaged(on_this_host: OnThisHost) -> None:
-    async def story(_: Host) -> None:
+    async def story(_: HostWatch) -> None:
         async with open_network(load_profile("4g")) as network, open_rig("tcp", network=network) as rig:
             await tracks(rig)
             assert rig.observer.slave is not None

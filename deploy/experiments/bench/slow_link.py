@@ -71,7 +71,7 @@ class SlowLink:
                 end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 self._sockets.append(end)
             for medium, source, sink in zip(self._media, (here, there), (there, here), strict=True):
-                way = _Way(medium, source, sink, to_ns(self._options.delay_s))
+                way = _OneDirection(medium, source, sink, to_ns(self._options.delay_s))
                 for name, work in (("send", way.send), ("travel", way.travel)):
                     threading.Thread(target=work, name=f"slow-{name}", daemon=True).start()
 
@@ -91,7 +91,7 @@ class _Medium:
             _sleep_until(self._free_ns)
 
 
-class _Way:
+class _OneDirection:
     """One direction of one connection."""
 
     def __init__(self, medium: _Medium, source: socket.socket, sink: socket.socket, delay_ns: int) -> None:

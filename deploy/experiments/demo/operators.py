@@ -14,11 +14,11 @@ from deploy.harness.engage import (
     keep_engaged,
     until_all_track,
 )
-from deploy.harness.host import Host
-from deploy.harness.operator import Operator, Patience
+from deploy.harness.host import HostWatch
+from deploy.harness.operator import Operator, OperatorPatience
 from deploy.harness.rig import Rig
 
-PATIENCE = Patience(back_s=20.0, holds=3, holds_within_s=20.0)
+PATIENCE = OperatorPatience(back_s=20.0, holds=3, holds_within_s=20.0)
 
 
 class DemoOperators:
@@ -27,10 +27,10 @@ class DemoOperators:
     def __init__(
         self,
         rig: Rig,
-        host: Host,
+        host: HostWatch,
         check: Callable[[], None],
         write: Callable[[str], None],
-        patience: Patience = PATIENCE,
+        patience: OperatorPatience = PATIENCE,
     ) -> None:
         """`check` is called with every look and may raise TandemError; `write` prints a line for a person."""
         self._rig = rig
@@ -39,7 +39,7 @@ class DemoOperators:
         self.problem = ""
 
     def _driver(
-        self, robot: str, host: Host, write: Callable[[str], None], patience: Patience
+        self, robot: str, host: HostWatch, write: Callable[[str], None], patience: OperatorPatience
     ) -> EngageDriver:
         operator = Operator(robot, patience, wanted_ns=monotonic_ns(), host_lost=host.lost_before)
         access = RigRobot(self._rig, robot)

@@ -18,7 +18,7 @@ from deploy.experiments.demo.operators import DemoOperators
 from deploy.experiments.demo.options import DemoOptions
 from deploy.experiments.demo.report import DemoReport, RunNotes, make_report
 from deploy.experiments.demo.view import draw
-from deploy.harness.host import Host, watch_host
+from deploy.harness.host import HostWatch, watch_host
 from deploy.harness.rig import Rig, open_rig
 from deploy.harness.start import start_all
 
@@ -70,7 +70,7 @@ async def _align(options: DemoOptions, replay: Path, folder: Path, console: Cons
 class _Show:
     """Keeps an eye on the processes, the operator's Ctrl-C and the screen."""
 
-    def __init__(self, rig: Rig, host: Host, stop: asyncio.Event, live: Live) -> None:
+    def __init__(self, rig: Rig, host: HostWatch, stop: asyncio.Event, live: Live) -> None:
         self._rig = rig
         self._host = host
         self._stop = stop

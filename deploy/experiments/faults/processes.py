@@ -27,7 +27,7 @@ from deploy.experiments.faults.limits import moved_beyond
 from deploy.experiments.faults.scene import Scene
 from deploy.experiments.faults.trial import Outcome
 from deploy.harness.excuse import Lost
-from deploy.harness.host import Host, watch_host
+from deploy.harness.host import HostWatch, watch_host
 from deploy.harness.rig import DRIVES, Rig, drive_buses, open_rig
 from deploy.harness.start import start_tracking
 from deploy.measure.stillness import Course, stillness
@@ -103,7 +103,7 @@ PROCESS_FAULTS = (
 )  # fmt: skip
 
 
-async def run_process_trial(fault: ProcessFault, host: Host) -> Outcome:
+async def run_process_trial(fault: ProcessFault, host: HostWatch) -> Outcome:
     """Try it. Raises TandemError where the robot does not follow the operator when the fault is to come."""
     overrides = {
         "slave": ['servos.backend="canopen"', 'camera.source="off"'],

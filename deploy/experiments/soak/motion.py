@@ -20,7 +20,7 @@ MOVED_RAD = 4.0 * STILL_RAD
 """0.9°: far above what encoders, servos and shaking neighbours show of a robot that stands."""
 
 
-class Motion:
+class MotionWatch:
     """The newest states' encoders, and the farthest that any joint went while the robot was to stand."""
 
     def __init__(self, skeleton: Skeleton) -> None:

@@ -24,7 +24,7 @@ ENDS_HERE = "the recording ends here"
 """What the recorder logs, once, when its disk fails."""
 
 
-class Recorder:
+class RecorderProcess:
     """Starts and ends `tandem record` of one robot. Files lie in `folder` and are deleted when looked at."""
 
     def __init__(self, child: Child, folder: Path, link: LinkConfig, robot: str) -> None:

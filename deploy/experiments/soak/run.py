@@ -39,7 +39,7 @@ from deploy.experiments.soak.schedule import distance_s, schedule
 from deploy.experiments.soak.stage import Stage
 from deploy.experiments.soak.view import draw
 from deploy.harness.child import Usage, usage
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 from deploy.harness.start import start_all
 
 SOAK = "soak"
@@ -55,7 +55,7 @@ MOST_ENDS = 5
 class Soak:
     """One soak on a stage. `run` returns when the time is over; it may be cancelled at any moment."""
 
-    def __init__(self, options: SoakOptions, stage: Stage, log: SoakLog, host: Host, live: Live) -> None:
+    def __init__(self, options: SoakOptions, stage: Stage, log: SoakLog, host: HostWatch, live: Live) -> None:
         self._options = options
         self._stage = stage
         self._log = log

@@ -11,7 +11,7 @@ from common.errors import LinkError, TandemError
 from common.wire.topics import FAULTS
 from deploy.experiments.soak import recorder as recording
 from deploy.experiments.soak.files.happenings import ProcessStarted, RecordingChecked
-from deploy.experiments.soak.recorder import Recorder
+from deploy.experiments.soak.recorder import RecorderProcess
 from deploy.experiments.soak.watch import Record, Watch
 from deploy.harness.child import Child, Usage
 from deploy.harness.rig import ROBOT, Rig
@@ -25,7 +25,7 @@ class Stage:
         self.watch = watch
         self.record = record
         child = Child("record", rig.folder, name=recording.NAME)
-        self.recorder = Recorder(child, rig.folder, rig.endpoints.observing, ROBOT)
+        self.recorder = RecorderProcess(child, rig.folder, rig.endpoints.observing, ROBOT)
         self.children: dict[str, Child] = {**rig.children, recording.NAME: child}
         self.meant = {name for name, child in self.children.items() if child.running}
         """Processes that nobody has ended; a router runs already."""

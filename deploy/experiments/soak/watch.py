@@ -19,7 +19,7 @@ from common.wire.messages import Command, RobotState, Statistics
 from common.wire.topics import COMMAND, STATE, STATISTICS
 from deploy.experiments.soak.counts import Additions
 from deploy.experiments.soak.files.happenings import GuardChanged, Happening, JointsUnknown, LeaseChanged
-from deploy.experiments.soak.motion import Motion
+from deploy.experiments.soak.motion import MotionWatch
 
 FRESH_NS = to_ns(2.0 / COMMAND.rate_hz)
 Record = Callable[[Happening], None]
@@ -33,7 +33,7 @@ class Watch:
         self._skeleton = skeleton
         self._record = record
         self._added = {role: Additions() for role in ("master", "slave")}
-        self.motion = Motion(skeleton)
+        self.motion = MotionWatch(skeleton)
         self.state: RobotState | None = None
         self.command: Command | None = None
         self.state_ns = 0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 from common.clock import NS_PER_MS, to_ns
-from deploy.harness.excuse import STILL_S, WINDOW_S, Evidence, Lost, Stall, lost, lost_before
+from deploy.harness.excuse import STILL_S, WINDOW_S, Lost, Stall, StallEvidence, lost, lost_before
 
 AT_NS = to_ns(10.0)
 
@@ -23,32 +23,34 @@ def stall(ms: float, stolen_ms: float = 0.0, priority: bool = False, ago_ms: flo
 class Case:
     stalls: tuple[Stall, ...]
     excuses: bool
-    evidence: Evidence
+    evidence: StallEvidence
 
 
 STILL_MS, WINDOW_MS = 1e3 * STILL_S, 1e3 * WINDOW_S
 CASES = {
-    "nothing": Case((), False, Evidence.NONE),
-    "priority, long enough": Case((stall(STILL_MS, priority=True),), True, Evidence.PRIORITY),
-    "priority, too short": Case((stall(STILL_MS - 1, priority=True),), False, Evidence.PRIORITY),
+    "nothing": Case((), False, StallEvidence.NONE),
+    "priority, long enough": Case((stall(STILL_MS, priority=True),), True, StallEvidence.PRIORITY),
+    "priority, too short": Case((stall(STILL_MS - 1, priority=True),), False, StallEvidence.PRIORITY),
     "priority, in pieces": Case(
-        (stall(STILL_MS - 10, priority=True), stall(10, priority=True, ago_ms=300)), True, Evidence.PRIORITY
+        (stall(STILL_MS - 10, priority=True), stall(10, priority=True, ago_ms=300)),
+        True,
+        StallEvidence.PRIORITY,
     ),
     "priority, just within the window": Case(
-        (stall(WINDOW_MS, priority=True, ago_ms=WINDOW_MS - STILL_MS),), True, Evidence.PRIORITY
+        (stall(WINDOW_MS, priority=True, ago_ms=WINDOW_MS - STILL_MS),), True, StallEvidence.PRIORITY
     ),
     "priority, too early": Case(
-        (stall(WINDOW_MS, priority=True, ago_ms=WINDOW_MS - STILL_MS + 1),), False, Evidence.PRIORITY
+        (stall(WINDOW_MS, priority=True, ago_ms=WINDOW_MS - STILL_MS + 1),), False, StallEvidence.PRIORITY
     ),
-    "own load": Case((stall(400),), False, Evidence.NONE),
+    "own load": Case((stall(400),), False, StallEvidence.NONE),
     "own load, again and again": Case(
-        tuple(stall(100, ago_ms=110 * i) for i in range(5)), False, Evidence.NONE
+        tuple(stall(100, ago_ms=110 * i) for i in range(5)), False, StallEvidence.NONE
     ),
-    "stolen": Case((stall(STILL_MS, STILL_MS),), True, Evidence.STEAL),
-    "stolen in part": Case((stall(400, STILL_MS - 10),), False, Evidence.STEAL),
-    "stolen enough": Case((stall(400, STILL_MS),), True, Evidence.STEAL),
-    "stolen before the stall": Case((stall(STILL_MS - 10, 400),), False, Evidence.STEAL),
-    "one stolen, one of own load": Case((stall(20, 20), stall(100, ago_ms=100)), False, Evidence.STEAL),
+    "stolen": Case((stall(STILL_MS, STILL_MS),), True, StallEvidence.STEAL),
+    "stolen in part": Case((stall(400, STILL_MS - 10),), False, StallEvidence.STEAL),
+    "stolen enough": Case((stall(400, STILL_MS),), True, StallEvidence.STEAL),
+    "stolen before the stall": Case((stall(STILL_MS - 10, 400),), False, StallEvidence.STEAL),
+    "one stolen, one of own load": Case((stall(20, 20), stall(100, ago_ms=100)), False, StallEvidence.STEAL),
 }
 
 
@@ -99,7 +101,7 @@ def test_without_any_part_of_the_rule_a_case_comes_out_otherwise(
             lost((stall(60),), 0, AT_NS),
             "a core came back 60 ms late, not excused: neither real-time priority nor",
         ),
-        (Lost(0.0, 0.0, Evidence.NONE), "the host kept its time"),
+        (Lost(0.0, 0.0, StallEvidence.NONE), "the host kept its time"),
     ],
 )
 def test_the_words_say_which_evidence_excused(found: Lost, words: str) -> None:

@@ -10,12 +10,12 @@ import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S, monotonic_ns
 from deploy.harness.bare_loop import PERIOD_NS, stolen_ns
-from deploy.harness.host import Host, watch_host
+from deploy.harness.host import HostWatch, watch_host
 
 
-def told(*stalls: tuple[int, int, int]) -> Host:
+def told(*stalls: tuple[int, int, int]) -> HostWatch:
     """A host whose loops began at 1 s; `stalls` are of a core, from and until ms."""
-    host = Host()
+    host = HostWatch()
     host.hear(json.dumps({"cores": [0, 1], "origin_ns": NS_PER_S, "priority": True}))
     for core, from_ms, until_ms in stalls:
         span = {"from_ns": from_ms * NS_PER_MS, "until_ns": until_ms * NS_PER_MS}
@@ -82,7 +82,7 @@ def test_a_loop_s_word_that_it_ticks_is_no_stall() -> None:
 
 
 def test_without_priority_only_what_was_stolen_excuses() -> None:
-    host = Host()
+    host = HostWatch()
     host.hear(json.dumps({"cores": [0], "origin_ns": NS_PER_S, "priority": False}))
     stall = {"core": 0, "from_ns": 2 * NS_PER_S, "until_ns": 3 * NS_PER_S, "missed": 200}
     host.hear(json.dumps({**stall, "stolen_ns": 0}))
@@ -96,9 +96,9 @@ def test_without_priority_only_what_was_stolen_excuses() -> None:
 
 
 def test_a_host_that_was_not_measured_excuses_nothing() -> None:
-    assert Host().figures(NS_PER_S) == {}
-    assert Host().stood_still_s(0, NS_PER_S) == 0.0
-    assert not Host().explains(NS_PER_S)
+    assert HostWatch().figures(NS_PER_S) == {}
+    assert HostWatch().stood_still_s(0, NS_PER_S) == 0.0
+    assert not HostWatch().explains(NS_PER_S)
 
 
 @pytest.mark.parametrize(("core", "stolen_ms"), [(0, 120), (1, 0), (10, 70), (2, 0), (3, 0)])
@@ -112,7 +112,7 @@ def test_steal_is_read_by_core(core: int, stolen_ms: int) -> None:
 
 @pytest.mark.live
 def test_real_loops_tick_on_every_core_and_end_with_the_block() -> None:
-    async def story() -> Host:
+    async def story() -> HostWatch:
         async with watch_host() as host:
             assert host.began_ns
             await host.known(host.began_ns + 2 * PERIOD_NS)

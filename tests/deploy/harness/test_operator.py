@@ -5,16 +5,23 @@ from __future__ import annotations
 import pytest
 
 from common.clock import to_ns
-from deploy.harness.excuse import STILL_S, Evidence, Lost
-from deploy.harness.operator import JUDGED_AFTER_S, GuardSight, HostLost, Operator, Patience, UnaskedHold
+from deploy.harness.excuse import STILL_S, Lost, StallEvidence
+from deploy.harness.operator import (
+    JUDGED_AFTER_S,
+    GuardSight,
+    HostLost,
+    Operator,
+    OperatorPatience,
+    UnaskedHold,
+)
 
 BACK_S, HOLDS_WITHIN_S = 20.0, 20.0
-PATIENCE = Patience(BACK_S, 3, HOLDS_WITHIN_S)
+PATIENCE = OperatorPatience(BACK_S, 3, HOLDS_WITHIN_S)
 LATE_S = JUDGED_AFTER_S + 0.1
 
 
 def lost(still_s: float) -> HostLost:
-    return lambda at_ns: Lost(still_s, still_s, Evidence.PRIORITY)
+    return lambda at_ns: Lost(still_s, still_s, StallEvidence.PRIORITY)
 
 
 def state(at_s: float, guard: str, reason: str = "because") -> GuardSight:
@@ -100,13 +107,17 @@ def test_three_holds_within_twenty_seconds_are_too_many(last_s: float, fails: bo
     ("found", "counts", "said"),
     [
         (
-            Lost(STILL_S, STILL_S, Evidence.PRIORITY),
+            Lost(STILL_S, STILL_S, StallEvidence.PRIORITY),
             False,
             "does not count: just before, the host stood still",
         ),
-        (Lost(STILL_S, STILL_S, Evidence.STEAL), False, "50 ms: /proc/stat shows steal"),
-        (Lost(STILL_S - 0.001, STILL_S, Evidence.STEAL), True, "counts: just before, the host stood still"),
-        (Lost(0.0, 1.0, Evidence.NONE), True, "not excused: neither real-time priority nor steal"),
+        (Lost(STILL_S, STILL_S, StallEvidence.STEAL), False, "50 ms: /proc/stat shows steal"),
+        (
+            Lost(STILL_S - 0.001, STILL_S, StallEvidence.STEAL),
+            True,
+            "counts: just before, the host stood still",
+        ),
+        (Lost(0.0, 1.0, StallEvidence.NONE), True, "not excused: neither real-time priority nor steal"),
     ],
 )
 def test_a_hold_counts_unless_the_host_stalled_before_it(found: Lost, counts: bool, said: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
 from common.metrics.slave import SlaveMetrics
 from common.wire.messages import CommandEcho
-from deploy.experiments.trial.cell.recording import Outage, Recording, counts, echoes, published
+from deploy.experiments.trial.cell.recording import CellMessages, ScriptedOutage, counts, echoes, published
 
 MOVING = ("align", "track")
 LEFT_S = 0.5
@@ -17,7 +17,7 @@ TELLS_NS = 20 * NS_PER_MS
 """The slave counts for its statistics at most so long after the time they bear."""
 
 
-def aftermath(after: Recording, outage: Outage, max_age_s: float) -> dict[str, float | None]:
+def aftermath(after: CellMessages, outage: ScriptedOutage, max_age_s: float) -> dict[str, float | None]:
     """The outage's figures; `after` is what was heard from the cut on. None: nobody can tell."""
     states = after.states
     accepted = {n: e for n, e in echoes(states).items() if e.accepted_ns > outage.back_ns}
@@ -44,7 +44,7 @@ def aftermath(after: Recording, outage: Outage, max_age_s: float) -> dict[str, f
 
 
 def _stale_accepted(
-    after: Recording, outage: Outage, max_age_s: float, accepted: Mapping[int, CommandEcho]
+    after: CellMessages, outage: ScriptedOutage, max_age_s: float, accepted: Mapping[int, CommandEcho]
 ) -> float | None:
     """None where a command was accepted that the recording does not hold: its age is not known."""
     sampled_ns = {c.sequence: c.stamps.sampled_ns for c in after.commands}
@@ -54,7 +54,7 @@ def _stale_accepted(
     return float(seen + _stale_unseen(after, outage, max_age_s))
 
 
-def _stale_unseen(after: Recording, outage: Outage, max_age_s: float) -> int:
+def _stale_unseen(after: CellMessages, outage: ScriptedOutage, max_age_s: float) -> int:
     """How many that no state echoed were accepted stale, at the least.
 
     Of a burst between two states only the last is echoed. That there were others the slave's counter tells,
@@ -74,7 +74,7 @@ def _stale_unseen(after: Recording, outage: Outage, max_age_s: float) -> int:
     return sum(age_ns > to_ns(max_age_s) for age_ns in sorted(youngest_ns)[:unseen])
 
 
-def _accepted_unseen(after: Recording) -> int:
+def _accepted_unseen(after: CellMessages) -> int:
     """Accepted by the slave's counter and echoed by no state, between its first word and its last."""
     told = [(s.sent_ns, s.metrics.guard.accepted) for s in published(after.told, SlaveMetrics)]
     if len(told) < 2:

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 
 from deploy.experiments.trial.cell.measure import excerpt, measure, one_way_percentiles_ms
 from deploy.experiments.trial.cell.plan import CellKey
-from deploy.experiments.trial.cell.recording import Course, counts, echoes
+from deploy.experiments.trial.cell.recording import CellCourse, counts, echoes
 from deploy.experiments.trial.cell.result import Cell, Status
 from slave.config import SlaveConfig
 
 
 def judged(
-    key: CellKey, course: Course, config: SlaveConfig, settings: Mapping[str, str], remarks: Sequence[str]
+    key: CellKey, course: CellCourse, config: SlaveConfig, settings: Mapping[str, str], remarks: Sequence[str]
 ) -> Cell:
     """`config` is the slave's, for its limits; `remarks` come after the course's own.
 
@@ -33,7 +33,7 @@ def judged(
     )
 
 
-def _nothing_to_judge(course: Course) -> str:
+def _nothing_to_judge(course: CellCourse) -> str:
     """Why, in words; empty where there is something."""
     if not course.judged.commands:
         return "no command was heard in the judged time: nothing to judge"

@@ -17,8 +17,8 @@ from common.metrics.slave import SlaveMetrics
 from deploy.experiments.trial.cell.aftermath import aftermath
 from deploy.experiments.trial.cell.figures import BY_NAME
 from deploy.experiments.trial.cell.recording import (
-    Course,
-    Recording,
+    CellCourse,
+    CellMessages,
     counts,
     echoes,
     latest_bound_ns,
@@ -33,7 +33,7 @@ from slave.config import SlaveConfig
 EXCERPT_S = 6.0
 
 
-def measure(course: Course, config: SlaveConfig) -> dict[str, float | None]:
+def measure(course: CellCourse, config: SlaveConfig) -> dict[str, float | None]:
     """Every figure; None for what this cell could not measure."""
     judged = course.judged
     figures: dict[str, float | None] = dict.fromkeys(BY_NAME)
@@ -51,13 +51,13 @@ def measure(course: Course, config: SlaveConfig) -> dict[str, float | None]:
     return figures
 
 
-def one_way_percentiles_ms(judged: Recording) -> list[float]:
+def one_way_percentiles_ms(judged: CellMessages) -> list[float]:
     """The percentiles 0, 1 … 100 of accepted commands by their stamps; [] where there is none."""
     transits = _transits_ms(judged)
     return np.percentile(transits, np.arange(101)).tolist() if transits else []
 
 
-def excerpt(judged: Recording, config: SlaveConfig) -> Excerpt | None:
+def excerpt(judged: CellMessages, config: SlaveConfig) -> Excerpt | None:
     """The last seconds in track of the joint that the operator moved furthest."""
     trace = judged.trace(config.skeleton)
     truth, moved = trace.truth(), trace.moved()
@@ -79,7 +79,7 @@ def excerpt(judged: Recording, config: SlaveConfig) -> Excerpt | None:
     )
 
 
-def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
+def _latency(judged: CellMessages, shared_clock: bool) -> dict[str, float | None]:
     sampled_ns = {c.sequence: c.stamps.sampled_ns for c in judged.commands}
     ages = [
         (e.written_ns - sampled_ns[n]) / NS_PER_MS
@@ -99,7 +99,7 @@ def _latency(judged: Recording, shared_clock: bool) -> dict[str, float | None]:
     }
 
 
-def _one_way_ms(judged: Recording, missing: bool = False) -> list[float]:
+def _one_way_ms(judged: CellMessages, missing: bool = False) -> list[float]:
     """Each one-way time that the slave published between its first message and its last.
 
     With the `missing`, also what it took for each command that was due and did not come.
@@ -111,14 +111,14 @@ def _one_way_ms(judged: Recording, missing: bool = False) -> list[float]:
     return came + [us / 1000.0 for metrics in all_ for us in metrics.one_way_missing_recent_us]
 
 
-def _round_trip_ms(judged: Recording) -> list[float]:
+def _round_trip_ms(judged: CellMessages) -> list[float]:
     """Each round trip that the master published between its first message and its last."""
     words = published(judged.told, MasterMetrics)[1:]
     robots = [robot for word in words for robot in word.metrics.robots.values()]
     return [us / 1000.0 for robot in robots for us in robot.round_trip_recent_us]
 
 
-def _transits_ms(judged: Recording) -> list[float]:
+def _transits_ms(judged: CellMessages) -> list[float]:
     sent = {c.sequence for c in judged.commands}
     found = echoes(judged.states).items()
     return [(e.received_ns - e.put_ns) / NS_PER_MS for n, e in found if n in sent]
@@ -131,7 +131,7 @@ def _percentiles(name: str, values_ms: Sequence[float]) -> dict[str, float | Non
     return {f"{name}_p50_ms": p50, f"{name}_p99_ms": p99}
 
 
-def _accepted_percent(judged: Recording) -> float | None:
+def _accepted_percent(judged: CellMessages) -> float | None:
     """Of the commands sent up to the newest echo: those after it may still be on their way."""
     found = echoes(judged.states)
     numbers = [c.sequence for c in judged.commands]
@@ -144,7 +144,7 @@ def _accepted_percent(judged: Recording) -> float | None:
     return 100.0 * sum(min(numbers) <= n <= newest for n in found) / sent
 
 
-def _delivered_percent(judged: Recording) -> float | None:
+def _delivered_percent(judged: CellMessages) -> float | None:
     """Between the slave's first and last word: what came, of what was due by numbers and by time."""
     told = published(judged.told, SlaveMetrics)
     if len(told) < 2:
@@ -157,7 +157,7 @@ def _delivered_percent(judged: Recording) -> float | None:
     return 100.0 * came / sent if sent else None
 
 
-def _motion(judged: Recording, config: SlaveConfig) -> dict[str, float | None]:
+def _motion(judged: CellMessages, config: SlaveConfig) -> dict[str, float | None]:
     trace = judged.trace(config.skeleton)
     truth, moved = trace.truth(), trace.moved()
     followed = motion(truth, moved, trace.joint_names)
@@ -178,13 +178,13 @@ def _motion(judged: Recording, config: SlaveConfig) -> dict[str, float | None]:
 
 
 def _over_latest(
-    judged: Recording, truth: TruthSeries, moved: MovedSeries, config: SlaveConfig
+    judged: CellMessages, truth: TruthSeries, moved: MovedSeries, config: SlaveConfig
 ) -> float | None:
     compared = compare(truth, moved, arrivals(judged.commands, judged.states), config)
     return None if compared is None else compared.rmse_over_latest
 
 
-def _guard(judged: Recording) -> dict[str, float | None]:
+def _guard(judged: CellMessages) -> dict[str, float | None]:
     states = judged.states
     if not states:
         return {}
@@ -200,7 +200,7 @@ def _guard(judged: Recording) -> dict[str, float | None]:
     }
 
 
-def _missed_percent(judged: Recording) -> float | None:
+def _missed_percent(judged: CellMessages) -> float | None:
     shares = []
     ticks_of_processes = (
         [word.metrics.ticks for word in published(judged.told, MasterMetrics)],

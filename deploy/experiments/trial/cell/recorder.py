@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from common.wire.messages import Command, RobotState, Statistics, Truth
-from deploy.experiments.trial.cell.recording import Recording
+from deploy.experiments.trial.cell.recording import CellMessages
 from deploy.harness.observer import Heard
 
 
-class Recorder:
+class MessageKeeper:
     """Every message since the last `take`."""
 
     def __init__(self) -> None:
@@ -17,10 +17,10 @@ class Recorder:
         """Keep one."""
         self._heard.append(message)
 
-    def take(self) -> Recording:
+    def take(self) -> CellMessages:
         """All of them by kind, in the order they came; then it begins anew."""
         heard, self._heard = self._heard, []
-        return Recording(
+        return CellMessages(
             commands=[m for m in heard if isinstance(m, Command)],
             states=[m for m in heard if isinstance(m, RobotState)],
             truth=[m for m in heard if isinstance(m, Truth)],

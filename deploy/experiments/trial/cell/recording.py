@@ -18,7 +18,7 @@ _Metrics = TypeVar("_Metrics", MasterMetrics, SlaveMetrics)
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class CellMessages:
     """Messages of a stretch of time, all stamps of one clock: that of the master."""
 
     commands: Sequence[Command]
@@ -37,7 +37,7 @@ class Recording:
 
 
 @dataclass(frozen=True, slots=True)
-class Outage:
+class ScriptedOutage:
     """The scripted outage after the judged time, ns of the master's clock."""
 
     cut_ns: int
@@ -50,17 +50,17 @@ class Outage:
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class CellCourse:
     """A whole cell: judged time, then the outage where there was one."""
 
-    judged: Recording
+    judged: CellMessages
     max_age_s: float
     """The guard's limit."""
     shared_clock: bool
     """Whether both sides' stamps are of one machine's clock, so that one-way figures can be checked."""
-    after: Recording | None = None
+    after: CellMessages | None = None
     """From the cut on."""
-    outage: Outage | None = None
+    outage: ScriptedOutage | None = None
     cpu_percent: dict[str, float] = field(default_factory=dict)
     """By process, over the judged time."""
     up_bytes_s: float | None = None
@@ -119,7 +119,7 @@ def echoes(states: Sequence[RobotState]) -> dict[int, CommandEcho]:
     return {s.echo.sequence: s.echo for s in states if s.echo is not None}
 
 
-def counts(heard: Recording) -> dict[str, dict[str, int]]:
+def counts(heard: CellMessages) -> dict[str, dict[str, int]]:
     """The guard's events between the slave's first and last word, by kind and name, if any."""
     told = published(heard.told, SlaveMetrics)
     if not told:

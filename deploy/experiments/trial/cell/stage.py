@@ -12,8 +12,8 @@ from deploy.examples.profiles import example
 from deploy.experiments.trial.cell.choice import why_impossible
 from deploy.experiments.trial.cell.judge import judged
 from deploy.experiments.trial.cell.plan import CellKey, Plan
-from deploy.experiments.trial.cell.recorder import Recorder
-from deploy.experiments.trial.cell.recording import Course, Outage, Recording
+from deploy.experiments.trial.cell.recorder import MessageKeeper
+from deploy.experiments.trial.cell.recording import CellCourse, CellMessages, ScriptedOutage
 from deploy.experiments.trial.cell.remarks import hold_remarks
 from deploy.experiments.trial.cell.result import Cell, Status
 from deploy.harness.engage import EngageDriver, RigRobot, keep_engaged, until_tracking
@@ -84,18 +84,18 @@ class _Story:
         self._network = network
         self._stop = stop
         self._tell = tell
-        self._recorder = Recorder()
+        self._recorder = MessageKeeper()
         self._remarks: list[str] = []
         rig.observer.listeners.append(self._recorder.hear)
 
-    async def play(self, max_age_s: float) -> Course:
+    async def play(self, max_age_s: float) -> CellCourse:
         """All of it. Raises TandemError."""
         await self._to_track()
         judged, cpu_percent, up, down = await self._judged_time()
         after, outage = None, None
         if self._plan.outage_s:
             after, outage = await self._outage()
-        return Course(
+        return CellCourse(
             judged=judged,
             max_age_s=max_age_s,
             shared_clock=True,
@@ -113,7 +113,7 @@ class _Story:
         self._tell("aligning")
         await until_tracking(self._rig, timeout_s=ALIGN_S, check=self._look)
 
-    async def _judged_time(self) -> tuple[Recording, dict[str, float], float, float]:
+    async def _judged_time(self) -> tuple[CellMessages, dict[str, float], float, float]:
         self._tell(f"following for {self._plan.seconds:g} s")
         children = self._rig.children
         self._recorder.take()
@@ -132,7 +132,7 @@ class _Story:
         down = (after.to_operator.bytes - before.to_operator.bytes) / seconds
         return self._recorder.take(), used, up, down
 
-    async def _outage(self) -> tuple[Recording, Outage]:
+    async def _outage(self) -> tuple[CellMessages, ScriptedOutage]:
         rig, observer = self._rig, self._rig.observer
         self._tell(f"outage of {self._plan.outage_s:g} s")
         cut_ns = monotonic_ns()
@@ -150,7 +150,7 @@ class _Story:
             self._look()
             self._remarks.append(str(error))
         await asyncio.sleep(TOLD_S)
-        return self._recorder.take(), Outage(cut_ns, back_ns, ready_ns, act_ns)
+        return self._recorder.take(), ScriptedOutage(cut_ns, back_ns, ready_ns, act_ns)
 
     def _look(self) -> None:
         """Fail early. Raises TandemError."""

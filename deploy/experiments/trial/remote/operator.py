@@ -23,14 +23,14 @@ from deploy.examples.profiles import example
 from deploy.experiments.trial.cell.choice import why_impossible
 from deploy.experiments.trial.cell.judge import judged
 from deploy.experiments.trial.cell.plan import CellKey, Plan
-from deploy.experiments.trial.cell.recorder import Recorder
-from deploy.experiments.trial.cell.recording import Course, on_masters_clock
+from deploy.experiments.trial.cell.recorder import MessageKeeper
+from deploy.experiments.trial.cell.recording import CellCourse, on_masters_clock
 from deploy.experiments.trial.cell.remarks import hold_remarks
 from deploy.experiments.trial.cell.result import Cell, Status
 from deploy.experiments.trial.remote import talk
 from deploy.harness.endpoints import Endpoints, free_port
 from deploy.harness.engage import EngageDriver, keep_engaged, until_all_track
-from deploy.harness.operator import GuardSight, Operator, Patience
+from deploy.harness.operator import GuardSight, Operator, OperatorPatience
 from deploy.harness.rig import OPERATOR, ROBOT, Rig
 from slave.config import SlaveConfig
 
@@ -46,11 +46,11 @@ class Partner:
         self._link = link
         self._stop = stop
 
-    async def look(self) -> talk.Answer:
+    async def look(self) -> talk.TalkAnswer:
         """How it stands there. Raises TandemError."""
         return await self._ask(talk.Look())
 
-    async def do(self, request: talk.Request) -> talk.Answer:
+    async def do(self, request: talk.Request) -> talk.TalkAnswer:
         """Ask for something and wait until it is over. Raises TandemError where it did not come about."""
         answer = await self._ask(request)
         while answer.busy:
@@ -60,7 +60,9 @@ class Partner:
             raise TandemError(f"the robot's host: {answer.fault}")
         return answer
 
-    async def until(self, reached: Callable[[talk.Answer], bool], timeout_s: float, what: str) -> talk.Answer:
+    async def until(
+        self, reached: Callable[[talk.TalkAnswer], bool], timeout_s: float, what: str
+    ) -> talk.TalkAnswer:
         """Look until something is so. Raises TandemError when it does not come, or the slave is gone."""
         deadline_ns = monotonic_ns() + to_ns(timeout_s)
         while True:
@@ -84,7 +86,7 @@ class Partner:
             if len(states) >= page.total or not page.states:
                 return states, told
 
-    async def _ask(self, request: talk.Request) -> talk.Answer:
+    async def _ask(self, request: talk.Request) -> talk.TalkAnswer:
         if self._stop.is_set():
             raise TandemError("interrupted")
         answer = talk.read_answer(await self._link.ask(talk.TALK, talk.pack(request)))
@@ -167,14 +169,14 @@ async def _farewell(link: Link) -> None:
 
 async def _play(
     plan: Plan, key: CellKey, partner: Partner, tell: Callable[[str], None], tls: TlsConfig | None
-) -> Course:
+) -> CellCourse:
     skeleton = load_skeleton(plan.robot)
     tell("starting the robot over there")
     request = talk.Start(transport=key.setup.transport, strategy=key.setup.strategy, max_age_s=plan.max_age_s)
     there = await partner.do(request)
     robot = f"{key.setup.transport}/{robots_host(plan.hosts)}:{there.port}"
     async with _operators_rig(plan, key, robot, tls) as rig:
-        recorder = Recorder()
+        recorder = MessageKeeper()
         rig.observer.listeners.append(recorder.hear)
         for name in ("suit", "master"):
             await rig.start(name)
@@ -182,7 +184,7 @@ async def _play(
         await partner.until(lambda a: a.taking and _whole(rig), START_S, "readiness of the robot")
         tell("aligning")
         check = partial(_check, rig)
-        wanted = Operator(ROBOT, Patience(ALIGN_S), wanted_ns=monotonic_ns())
+        wanted = Operator(ROBOT, OperatorPatience(ALIGN_S), wanted_ns=monotonic_ns())
         await until_all_track([EngageDriver(wanted, PartnerRobot(partner))], check, LOOK_S)
         tell(f"following for {plan.seconds:g} s")
         await partner.do(talk.Record())
@@ -192,7 +194,7 @@ async def _play(
         began_ns, operator = monotonic_ns(), Operator(ROBOT, guard="track")
         await keep_engaged([EngageDriver(operator, PartnerRobot(partner))], plan.seconds, check, LOOK_S)
         heard = recorder.take()
-        answer = await partner.do(talk.Take())
+        answer = await partner.do(talk.EndRecording())
         for child in rig.children.values():
             child.measure()
         cpu = {"master": rig.children["master"].cpu_percent, "slave": answer.cpu_percent}
@@ -200,7 +202,7 @@ async def _play(
         states, told = await partner.kept(skeleton)
     remarks = tuple(hold_remarks(operator.holds, began_ns))
     judged_time = replace(heard, states=on_masters_clock(states), told=[*heard.told, *told])
-    return Course(judged_time, plan.max_age_s, shared_clock=False, cpu_percent=cpu, remarks=remarks)
+    return CellCourse(judged_time, plan.max_age_s, shared_clock=False, cpu_percent=cpu, remarks=remarks)
 
 
 def _check(rig: Rig) -> None:

@@ -23,8 +23,8 @@ from common.wire.control import ask_control
 from common.wire.messages import Action, ControlRequest
 from common.wire.topics import COMMAND, CONTROL
 from deploy.experiments.trial.cell.choice import strategies
-from deploy.experiments.trial.cell.recorder import Recorder
-from deploy.experiments.trial.cell.recording import Recording
+from deploy.experiments.trial.cell.recorder import MessageKeeper
+from deploy.experiments.trial.cell.recording import CellMessages
 from deploy.experiments.trial.remote import talk
 from deploy.harness.child import Child
 from deploy.harness.endpoints import free_port
@@ -72,8 +72,8 @@ class RobotHost:
         self._child: Child | None = None
         self._link: Link | None = None
         self._observer: Observer | None = None
-        self._recorder = Recorder()
-        self._kept = Recording([], [], [], [])
+        self._recorder = MessageKeeper()
+        self._kept = CellMessages([], [], [], [])
         self._task: asyncio.Task[None] | None = None
         self._fault = ""
         self._asked_ns = monotonic_ns()
@@ -104,7 +104,7 @@ class RobotHost:
         try:
             request = talk.read_request(payload)
         except CodecError as error:
-            return talk.pack(talk.Answer(taken=False, fault=f"not understood: {error}"))
+            return talk.pack(talk.TalkAnswer(taken=False, fault=f"not understood: {error}"))
         if isinstance(request, talk.Page):
             return talk.pack(self._page(request.first))
         refusal = self._take_up(request)
@@ -129,7 +129,7 @@ class RobotHost:
             case talk.Record():
                 self._child.measure(first=True)
                 self._recorder.take()
-            case talk.Take():
+            case talk.EndRecording():
                 self._child.measure()
                 self._kept = self._recorder.take()
             case talk.Stop():
@@ -173,7 +173,7 @@ class RobotHost:
         session = await stack.enter_async_context(open_session(LinkConfig(connect=[here])))
         self._link = session.link(self._config.robot)
         self._observer = Observer(self._link, self._config.skeleton)
-        self._recorder = Recorder()
+        self._recorder = MessageKeeper()
         self._observer.listeners.append(self._recorder.hear)
         self._child = Child("slave", self._folder, name=f"slave-{self._started}")
         stack.push_async_callback(self._child.stop)
@@ -204,13 +204,13 @@ class RobotHost:
         if running is not None:
             await running.aclose()
 
-    def _situation(self, refusal: str) -> talk.Answer:
+    def _situation(self, refusal: str) -> talk.TalkAnswer:
         observer, child = self._observer, self._child
         state = observer.state if observer is not None else None
         taking = False
         if state is not None and state.guard == "hold" and state.echo is not None:
             taking = state.sent_ns - state.echo.received_ns < to_ns(2.0 / COMMAND.rate_hz)
-        return talk.Answer(
+        return talk.TalkAnswer(
             taken=not refusal,
             busy=self._task is not None and not self._task.done(),
             fault=refusal or self._take_fault() or self._died(),
@@ -237,10 +237,10 @@ class RobotHost:
             return str(error)
         return ""
 
-    def _page(self, first: int) -> talk.Answer:
+    def _page(self, first: int) -> talk.TalkAnswer:
         page = self._kept.states[first : first + talk.PAGE]
         told = [] if first else self._kept.told
-        return talk.Answer(
+        return talk.TalkAnswer(
             total=len(self._kept.states),
             states=[encode(state) for state in page],
             told=[encode(word) for word in told],

@@ -49,7 +49,7 @@ class Record(Section):
     do: Literal["record"] = "record"
 
 
-class Take(Section):
+class EndRecording(Section):
     """Keep nothing more."""
 
     do: Literal["take"] = "take"
@@ -68,19 +68,19 @@ class Stop(Section):
     do: Literal["stop"] = "stop"
 
 
-Request = Start | Look | Engage | Record | Take | Page | Stop
+Request = Start | Look | Engage | Record | EndRecording | Page | Stop
 REQUESTS: dict[str, type[Request]] = {
     "start": Start,
     "look": Look,
     "engage": Engage,
     "record": Record,
-    "take": Take,
+    "take": EndRecording,
     "page": Page,
     "stop": Stop,
 }
 
 
-class Answer(Section):
+class TalkAnswer(Section):
     """How it stands. Fields that a question does not concern stay at their defaults."""
 
     taken: bool = True
@@ -103,7 +103,7 @@ class Answer(Section):
     cpu_percent: float = 0.0
 
 
-def pack(message: Request | Answer) -> bytes:
+def pack(message: Request | TalkAnswer) -> bytes:
     """Its bytes."""
     out: bytes = msgpack.packb(message.model_dump())
     return out
@@ -121,10 +121,10 @@ def read_request(payload: bytes) -> Request:
         raise CodecError(_short(error)) from None
 
 
-def read_answer(payload: bytes) -> Answer:
+def read_answer(payload: bytes) -> TalkAnswer:
     """Raises CodecError for what is none."""
     try:
-        return Answer.model_validate(_table(payload))
+        return TalkAnswer.model_validate(_table(payload))
     except ValidationError as error:
         raise CodecError(_short(error)) from None
 

@@ -17,7 +17,7 @@ from common.skeleton import load_skeleton
 from common.wire.codec import encode
 from common.wire.messages import Command, CommandEcho, CommandStamps, RobotState, Statistics
 from deploy.experiments.soak.files.happenings import GuardChanged, Happening, JointsUnknown
-from deploy.experiments.soak.motion import Motion
+from deploy.experiments.soak.motion import MotionWatch
 from deploy.experiments.soak.watch import FRESH_NS, Watch
 from tests.published import commanded, guard_metrics, master_metrics, slave_metrics
 
@@ -161,9 +161,9 @@ def test_what_is_no_message_changes_nothing(heard: Heard) -> None:
 # the robot's joints
 
 
-def motion(*rows: tuple[float, str, float]) -> Motion:
+def motion(*rows: tuple[float, str, float]) -> MotionWatch:
     """Seen: seconds, guard, and where every joint stands, rad."""
-    seen = Motion(SKELETON)
+    seen = MotionWatch(SKELETON)
     for sequence, (at_s, guard, angle_rad) in enumerate(rows):
         at_ns, angles = round(at_s * NS_PER_S), np.full(JOINTS, angle_rad)
         state = replace(STATE, sequence=sequence, sent_ns=at_ns, guard=guard)
@@ -188,7 +188,7 @@ def test_a_robot_that_moves_on_never_stands() -> None:
 
 def test_a_robot_that_was_not_heard_is_not_said_to_stand() -> None:
     assert motion(*at_50_hz(1.2, "track", lambda t: 0.0)).standstill_s(NS_PER_S) is None
-    assert Motion(SKELETON).standstill_s(0) is None
+    assert MotionWatch(SKELETON).standstill_s(0) is None
 
 
 def test_braking_is_no_straying_but_what_comes_after_is() -> None:
@@ -211,7 +211,7 @@ def test_of_a_robot_that_follows_nothing_is_said() -> None:
 
 @pytest.mark.parametrize(("spoil", "strayed_rad"), [("silent", 0.5), ("nan", math.inf)])
 def test_an_unread_joint_hides_no_other_and_nan_may_be_anywhere(spoil: str, strayed_rad: float) -> None:
-    seen = Motion(SKELETON)
+    seen = MotionWatch(SKELETON)
     for sequence in range(100):
         state = replace(STATE, sequence=sequence, sent_ns=sequence * NS_PER_S // 50, guard="hold")
         angles, valid = np.zeros(JOINTS), np.ones(JOINTS, np.bool_)

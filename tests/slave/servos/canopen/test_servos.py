@@ -26,7 +26,7 @@ from common.clock import to_ns
 from common.errors import BusError, RobotError
 from common.link.config import LinkConfig
 from common.skeleton import load_skeleton
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 from deploy.sim.drives.app import run as run_drives
 from deploy.sim.drives.faults import DEMAND, Fault
 from deploy.sim.drives.node import EDS
@@ -354,7 +354,7 @@ import numpy as np
 from pathlib import Path
 from common.config.load import load_config
 from common.skeleton import load_skeleton
-from deploy.harness.host import Host
+from deploy.harness.host import HostWatch
 from slave.config import SlaveConfig
 from slave.servos.canopen.servos import CanopenServos
 config = load_config(Path(sys.argv[1]), SlaveConfig)
@@ -378,11 +378,11 @@ uvloop.run(main())
 
 @pytest.mark.timeout(400)
 def test_kill_9_of_the_slave_and_the_drives_stop_by_themselves(
-    tmp_path: Path, on_this_host: Callable[[Callable[[Host], Awaitable[None]]], None]
+    tmp_path: Path, on_this_host: Callable[[Callable[[HostWatch], Awaitable[None]]], None]
 ) -> None:
     dead_s = 0.5
 
-    async def story(host: Host) -> None:
+    async def story(host: HostWatch) -> None:
         killed_ns, moved_until_ns, states = await asyncio.to_thread(kill_9, tmp_path, dead_s)
         await host.known(moved_until_ns)
         # the ramp and the motor's lag take less than 0.2 s

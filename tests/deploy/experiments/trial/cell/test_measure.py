@@ -18,7 +18,13 @@ from deploy.experiments.trial.cell.aftermath import aftermath
 from deploy.experiments.trial.cell.judge import judged
 from deploy.experiments.trial.cell.measure import excerpt, measure, one_way_percentiles_ms
 from deploy.experiments.trial.cell.plan import CellKey, Setup
-from deploy.experiments.trial.cell.recording import Course, Outage, Recording, counts, on_masters_clock
+from deploy.experiments.trial.cell.recording import (
+    CellCourse,
+    CellMessages,
+    ScriptedOutage,
+    counts,
+    on_masters_clock,
+)
 from deploy.experiments.trial.cell.result import Status
 from slave.config import SlaveConfig
 from tests.published import commanded, guard_metrics, master_metrics, slave_metrics
@@ -80,7 +86,7 @@ def master_told(at_ns: int, round_trip_recent_us: Sequence[int]) -> Statistics:
     return Statistics(at_ns, master_metrics(robot, ticks=Ticks(at_ns // (5 * MS), 0)))
 
 
-def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) -> Recording:
+def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) -> CellMessages:
     """Commands at 12.5 Hz, all accepted but the lost ones; states at 50 Hz; `guards` by number of state."""
     commands = [command(n) for n in range(round(SECONDS * 12.5))]
     echoes = [echo(c) for c in commands if c.sequence not in set(lost)]
@@ -94,7 +100,7 @@ def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) ->
         for t in range(-200, SECONDS * 200)
     ]
     ends = (BEGIN_NS + S, BEGIN_NS + (SECONDS - 1) * S)
-    return Recording(
+    return CellMessages(
         commands,
         states,
         truth,
@@ -105,10 +111,10 @@ def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) ->
 
 @pytest.fixture(scope="module")
 def figures() -> dict[str, float | None]:
-    course = Course(
+    course = CellCourse(
         recording(), max_age_s=0.3, shared_clock=True, cpu_percent={"master": 20.0, "slave": 30.0},
         up_bytes_s=9000.0, down_bytes_s=41_000.0,
-        after=after(0.6), outage=Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS),
+        after=after(0.6), outage=ScriptedOutage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS),
     )  # fmt: skip
     return measure(course, CONFIG)
 
@@ -128,7 +134,7 @@ def test_one_way_and_round_trip_are_of_the_judged_time() -> None:
     for n, us in enumerate(of_seconds):
         at_ns = BEGIN_NS + n * S
         words += [Statistics(at_ns, slave_metrics(one_way_recent_us=tuple(us))), master_told(at_ns, us)]
-    figures = measure(Course(replace(recording(), told=words), 0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(replace(recording(), told=words), 0.3, shared_clock=True), CONFIG)
     assert figures["one_way_p50_ms"] == figures["round_trip_p50_ms"] == pytest.approx(41.5)
     # one that the guard refuses for its age has taken its time all the same
     assert figures["one_way_p99_ms"] == figures["round_trip_p99_ms"] == pytest.approx(400.0, abs=11.0)
@@ -148,7 +154,7 @@ def test_commands_that_were_due_and_never_came_are_in_the_figures() -> None:
             ),
         ),
     ]
-    figures = measure(Course(replace(recording(), told=told), 0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(replace(recording(), told=told), 0.3, shared_clock=True), CONFIG)
     assert figures["delivered"] == pytest.approx(100.0 * 63 / 125)
     assert figures["one_way_p99_ms"] == pytest.approx(40.0)
     corrected = figures["one_way_corrected_p99_ms"]
@@ -165,24 +171,26 @@ def test_a_cell_without_a_single_command_failed(without: str) -> None:
         else replace(heard, states=[replace(s, echo=None) for s in heard.states])
     )
     key = CellKey(Setup("tcp", "lan", "predict"), 0)
-    cell = judged(key, Course(heard, 0.3, shared_clock=True), CONFIG, {}, ())
+    cell = judged(key, CellCourse(heard, 0.3, shared_clock=True), CONFIG, {}, ())
     assert cell.status is Status.FAILED
     assert "no command was" in cell.why
-    whole = judged(key, Course(recording(), 0.3, shared_clock=True), CONFIG, {}, ())
+    whole = judged(key, CellCourse(recording(), 0.3, shared_clock=True), CONFIG, {}, ())
     assert whole.status is Status.DONE
 
 
 def test_a_robot_unheard_after_the_outage_is_not_called_safe() -> None:
-    outage = Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS)
+    outage = ScriptedOutage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS)
     deaf = aftermath(replace(after(0.6), states=[]), outage, 0.3)
     assert (deaf["moved_alone"], deaf["stale_accepted"]) == (None, None)
-    course = Course(recording(), 0.3, shared_clock=True, after=replace(after(0.6), states=[]), outage=outage)
+    course = CellCourse(
+        recording(), 0.3, shared_clock=True, after=replace(after(0.6), states=[]), outage=outage
+    )
     cell = judged(CellKey(Setup("tcp", "lan", "predict"), 0), course, CONFIG, {}, ())
     assert cell.status is Status.FAILED
 
 
 def test_ages_that_nobody_knows_are_not_fresh() -> None:
-    outage = Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS)
+    outage = ScriptedOutage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS)
     assert aftermath(after(0.6), outage, 0.3)["stale_accepted"] == 0.0
     assert aftermath(replace(after(0.6), commands=[]), outage, 0.3)["stale_accepted"] is None
     untold = aftermath(replace(after(0.6), told=[]), outage, 0.3)
@@ -190,12 +198,12 @@ def test_ages_that_nobody_knows_are_not_fresh() -> None:
 
 
 def test_what_the_slave_did_not_tell_is_no_zero() -> None:
-    figures = measure(Course(replace(recording(), told=[]), 0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(replace(recording(), told=[]), 0.3, shared_clock=True), CONFIG)
     assert (figures["refused"], figures["clamps"], figures["delivered"]) == (None, None, None)
 
 
 def test_without_a_shared_clock_nothing_is_called_true() -> None:
-    figures = measure(Course(recording(), max_age_s=0.3, shared_clock=False), CONFIG)
+    figures = measure(CellCourse(recording(), max_age_s=0.3, shared_clock=False), CONFIG)
     assert figures.get("true_one_way_p50_ms") is None
     assert figures["one_way_p50_ms"] == pytest.approx(40.0)
 
@@ -219,7 +227,7 @@ def test_what_was_delivered_is_counted_between_the_slaves_words(figures: dict[st
 
 
 def test_a_lost_command_is_not_accepted_and_one_under_way_is_not_lost() -> None:
-    figures = measure(Course(recording(lost=range(50, 65)), max_age_s=0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(recording(lost=range(50, 65)), max_age_s=0.3, shared_clock=True), CONFIG)
     # the last of 150 are still on their way when the recording ends
     assert figures["accepted"] == pytest.approx(100.0 * (1 - 15 / 150), abs=0.5)
 
@@ -228,7 +236,7 @@ def test_each_time_that_the_guard_leaves_track_counts_once() -> None:
     guards = dict.fromkeys((*range(200, 220), *range(400, 410)), "hold") | dict.fromkeys(
         range(410, 430), "align"
     )
-    figures = measure(Course(recording(guards=guards), max_age_s=0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(recording(guards=guards), max_age_s=0.3, shared_clock=True), CONFIG)
     assert figures["holds"] == 2.0
     assert figures["tracked"] == pytest.approx(100.0 * (1 - 50 / 600))
 
@@ -255,10 +263,10 @@ def test_percentiles_of_the_excerpt_are_of_accepted_commands() -> None:
 
 
 def test_nothing_heard_gives_no_figure_and_no_error() -> None:
-    figures = measure(Course(Recording([], [], [], []), max_age_s=0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(CellMessages([], [], [], []), max_age_s=0.3, shared_clock=True), CONFIG)
     assert all(value is None for value in figures.values())
-    assert excerpt(Recording([], [], [], []), CONFIG) is None
-    assert one_way_percentiles_ms(Recording([], [], [], [])) == []
+    assert excerpt(CellMessages([], [], [], []), CONFIG) is None
+    assert one_way_percentiles_ms(CellMessages([], [], [], [])) == []
 
 
 CUT_NS, BACK_NS, ACT_NS = BEGIN_NS + S, BEGIN_NS + 3 * S, BEGIN_NS + 5 * S
@@ -266,7 +274,7 @@ CUT_NS, BACK_NS, ACT_NS = BEGIN_NS + S, BEGIN_NS + 3 * S, BEGIN_NS + 5 * S
 
 def after(
     first_accepted_s: float, stale_age_ms: float | None = None, moves_at_s: float | None = None
-) -> Recording:
+) -> CellMessages:
     """Hold 0.2 s after the cut, commands from `first_accepted_s` on, engaged at ACT_NS, track 1.5 s later."""
     commands = [command(n) for n in range(round(8 * 12.5))]
     first_ns = BACK_NS + round(first_accepted_s * S)
@@ -288,13 +296,13 @@ def after(
         if moves_at_s is not None and BACK_NS + round(moves_at_s * S) < at_ns < ACT_NS:
             guard = "align"
         states.append(state(at_ns, newest[-1] if newest else None, guard))
-    return Recording(
+    return CellMessages(
         commands, states, [], [slave_told(CUT_NS, 0, 0), slave_told(BEGIN_NS + 7 * S, 0, 0, age=4)]
     )
 
 
-def outage_figures(recorded: Recording, act_ns: int | None = ACT_NS) -> dict[str, float | None]:
-    return aftermath(recorded, Outage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, act_ns), max_age_s=0.3)
+def outage_figures(recorded: CellMessages, act_ns: int | None = ACT_NS) -> dict[str, float | None]:
+    return aftermath(recorded, ScriptedOutage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, act_ns), max_age_s=0.3)
 
 
 def test_an_outage_is_told_from_the_links_return_to_the_operators_act() -> None:
@@ -348,7 +356,7 @@ def test_a_robot_already_in_hold_did_not_hold_for_the_cut_link() -> None:
 
 
 def test_a_robot_that_is_not_heard_at_all_gives_no_error() -> None:
-    assert outage_figures(Recording([], [], [], []), act_ns=None)["flow_s"] is None
+    assert outage_figures(CellMessages([], [], [], []), act_ns=None)["flow_s"] is None
 
 
 def test_a_robots_own_clock_is_brought_onto_the_masters() -> None:

@@ -27,7 +27,7 @@ START = talk.Start(transport="udp", strategy="predict", max_age_s=0.3)
         talk.Look(),
         talk.Engage(operator="nurse-1"),
         talk.Record(),
-        talk.Take(),
+        talk.EndRecording(),
         talk.Page(first=100),
         talk.Stop(),
     ],
@@ -37,7 +37,7 @@ def test_a_request_arrives_as_it_was_sent(request_: talk.Request) -> None:
 
 
 def test_an_answer_arrives_as_it_was_sent() -> None:
-    answer = talk.Answer(guard="hold", taking=True, total=7, states=[b"\x00\xff"], cpu_percent=12.5)
+    answer = talk.TalkAnswer(guard="hold", taking=True, total=7, states=[b"\x00\xff"], cpu_percent=12.5)
     assert talk.read_answer(talk.pack(answer)) == answer
 
 
@@ -70,8 +70,8 @@ def test_what_is_too_long_is_not_even_read() -> None:
         talk.read_answer(bytes(MAX_PAYLOAD + 1))
 
 
-def asked(tmp_path: Path, *requests: talk.Request, payload: bytes | None = None) -> talk.Answer:
-    async def story() -> talk.Answer:
+def asked(tmp_path: Path, *requests: talk.Request, payload: bytes | None = None) -> talk.TalkAnswer:
+    async def story() -> talk.TalkAnswer:
         host = RobotHost(ServeOptions(example("slave"), "tcp/127.0.0.1:1", max_age_s=0.5), tmp_path)
         answer = b""
         for one in requests:
@@ -102,7 +102,9 @@ def test_a_slave_that_may_not_be_started_is_not(
     assert not answer.busy
 
 
-@pytest.mark.parametrize("act", [talk.Engage(operator="nurse-1"), talk.Record(), talk.Take(), talk.Stop()])
+@pytest.mark.parametrize(
+    "act", [talk.Engage(operator="nurse-1"), talk.Record(), talk.EndRecording(), talk.Stop()]
+)
 def test_without_a_slave_there_is_nothing_to_act_on(tmp_path: Path, act: talk.Request) -> None:
     answer = asked(tmp_path, act)
     assert (answer.taken, answer.fault) == (False, "no slave is running")
