@@ -34,6 +34,21 @@ OnThisHost = Callable[[Story], None]
 """The fixture's type."""
 
 
+@pytest.fixture(scope="session")
+def recordings_folder() -> Path:
+    """Real recordings; they are not in the repository."""
+    folder = os.environ.get("TANDEM_DATA")
+    if not folder:
+        pytest.skip("TANDEM_DATA does not name the folder of recordings")
+    return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def real_person(recordings_folder: Path) -> Path:
+    """100 s of a whole person's units at 100 Hz."""
+    return recordings_folder / "human_full_body.npz"
+
+
 @pytest.fixture
 def on_this_host() -> OnThisHost:
     """Runs a story of real processes beside a loop that does nothing but tick.
@@ -73,10 +88,12 @@ def default_signals() -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whoever needs a kernel's feature or network namespaces is live."""
+    """Derive the markers that follow from others, or from what a test asks for."""
     for item in items:
         if any(item.get_closest_marker(name) for name in ("net", "kernel_can")):
             item.add_marker("live")
+        if "recordings_folder" in getattr(item, "fixturenames", ()):
+            item.add_marker("recordings")
 
 
 @pytest.fixture(autouse=True)

@@ -1,22 +1,12 @@
-"""Where real recordings are, and what a person's joints can do."""
+"""What a person's joints can do."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from pathlib import Path
 
 import pytest
 
 Range = tuple[float, float]
-
-
-@pytest.fixture(scope="session")
-def recordings_folder() -> Path:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    return Path(folder)
 
 
 @pytest.fixture(scope="session")

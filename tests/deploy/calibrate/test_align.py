@@ -1,5 +1,4 @@
 import json
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -60,12 +59,8 @@ def test_evidence_that_contradicts_itself_writes_nothing(tmp_path: Path) -> None
         assert any(e["verdict"] == "contradicts" for e in report["evidence"]["left_forearm"])
 
 
-@pytest.mark.recordings
-def test_a_real_person_s_suit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    align(Path(folder) / "human_full_body.npz", out=tmp_path, report=tmp_path / "report.json")
+def test_a_real_person_s_suit(tmp_path: Path, capsys: pytest.CaptureFixture[str], real_person: Path) -> None:
+    align(real_person, out=tmp_path, report=tmp_path / "report.json")
     report = json.loads((tmp_path / "report.json").read_text("utf-8"))
     assert len(report["nodes"]) == 8
     for name, node in report["nodes"].items():

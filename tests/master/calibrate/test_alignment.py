@@ -225,16 +225,15 @@ def test_raw_counts_need_a_calibration_first(upper_body: Worn, tmp_path: Path) -
         calibrated(counts, tmp_path)
 
 
-@pytest.mark.recordings
 @pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
 def test_a_real_person_moves_as_people_can(
     profile: str,
-    recordings_folder: Path,
+    real_person: Path,
     possible_deg: Mapping[str, tuple[float, float]],
     fastest_deg_s: Mapping[str, float],
 ) -> None:
     skeleton = load_skeleton(profile)
-    there = load_recordings(recordings_folder / "human_full_body.npz")
+    there = load_recordings(real_person)
     nodes = {n: there[RECORDED_AS[n]] for n in skeleton.segment_names if n in RECORDED_AS}
     found = find_alignment(nodes, skeleton)
     assert found.refused == {}
@@ -254,11 +253,10 @@ def test_a_real_person_moves_as_people_can(
             assert np.quantile(angles[:, j], 0.05) > -15.0, name
 
 
-@pytest.mark.recordings
-def test_what_the_real_person_s_halves_say_agrees(recordings_folder: Path) -> None:
+def test_what_the_real_person_s_halves_say_agrees(real_person: Path) -> None:
     """Sitting down and standing up, and walking: two motions without a sample in common, one alignment."""
     skeleton = load_skeleton("lower_limb")
-    there = load_recordings(recordings_folder / "human_full_body.npz")
+    there = load_recordings(real_person)
     halves = []
     for part in (slice(0, 5300), np.r_[0:480, 5300:10000]):
         nodes = {
@@ -280,11 +278,10 @@ def test_a_recording_of_a_moment_is_refused() -> None:
         find_alignment(nodes, load_skeleton("nursing"), (0.0, 0.4))
 
 
-@pytest.mark.recordings
-def test_one_arm_alone_leaves_trunk_and_other_arm_open(recordings_folder: Path) -> None:
+def test_one_arm_alone_leaves_trunk_and_other_arm_open(real_person: Path) -> None:
     """This person's arms are turned in by 36° each: only both together face ahead."""
     skeleton = load_skeleton("nursing")
-    there = load_recordings(recordings_folder / "human_full_body.npz")
+    there = load_recordings(real_person)
     nodes = {n: there[RECORDED_AS[n]] for n in skeleton.segment_names if n in RECORDED_AS}
     del nodes["left_forearm"]
     found = find_alignment(nodes, skeleton)

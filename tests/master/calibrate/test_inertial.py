@@ -247,7 +247,6 @@ def imutk(folder: Path) -> NodeRecording:
     return load_recordings(path)["imutk_xsens"]
 
 
-@pytest.mark.recordings
 def test_on_imu_tks_own_samples_the_solver_reaches_its_cost(recordings_folder: Path) -> None:
     """Tedaldi et al.'s detector, and ½ Σ (g - ‖a‖)² over the first hundred samples of each of its rests."""
     counts = imutk(recordings_folder).acc_m_s2
@@ -264,7 +263,6 @@ def test_on_imu_tks_own_samples_the_solver_reaches_its_cost(recordings_folder: P
     assert 0.5 * np.sum(norm_errors(theta, samples, 9.81744) ** 2) <= 0.1203
 
 
-@pytest.mark.recordings
 def test_the_figures_on_a_real_session(recordings_folder: Path) -> None:
     raw = imutk(recordings_folder)
     found = calibrate_inertial(raw, InertialOptions(gravity_m_s2=9.81744))

@@ -1,7 +1,6 @@
 """Whoever sits in another's place is named, whichever two it is; a suit worn as said is not."""
 
 import itertools
-import os
 from pathlib import Path
 
 import numpy as np
@@ -45,14 +44,10 @@ def test_any_two_nodes_of_a_suit_that_are_exchanged_are_named(profile: str, seed
     check_every_pair(*fits_of(worn.nodes, worn.skeleton))
 
 
-@pytest.mark.recordings
 @pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
-def test_any_two_nodes_of_a_real_person_too(profile: str) -> None:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
+def test_any_two_nodes_of_a_real_person_too(profile: str, real_person: Path) -> None:
     skeleton = load_skeleton(profile)
-    nodes = of_profile(load_recordings(Path(folder) / "human_full_body.npz"), skeleton)
+    nodes = of_profile(load_recordings(real_person), skeleton)
     check_every_pair(*fits_of(nodes, skeleton))
 
 

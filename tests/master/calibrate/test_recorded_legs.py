@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +16,6 @@ from master.calibrate.oriented import orient
 from master.calibrate.recording import load_recordings
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.hinge_angle import HingeAngle, HingeAngleConfig, hinge_of
-
-pytestmark = pytest.mark.recordings
 
 LEGS = load_skeleton("lower_limb")
 SIDES = ("left", "right")
@@ -46,11 +43,8 @@ class Person:
 
 
 @pytest.fixture(scope="module")
-def person() -> Person:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    file = load_recordings(Path(folder) / "human_full_body.npz")
+def person(real_person: Path) -> Person:
+    file = load_recordings(real_person)
     recordings = {name: file[RECORDED_AS[name]] for name in LEGS.segment_names}
     alignment = find_alignment(recordings, LEGS)
     assert alignment.refused == {}

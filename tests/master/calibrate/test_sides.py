@@ -1,6 +1,5 @@
 """Everything of the left worn on the right is told, by limits or by where the joints' centres lie."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -32,11 +31,7 @@ def test_exchanged_sides_are_refused(profile: str) -> None:
     check(wear(profile, 2).nodes, profile)
 
 
-@pytest.mark.recordings
 @pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
-def test_a_real_person_s_too(profile: str) -> None:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    units = load_recordings(Path(folder) / "human_full_body.npz")
+def test_a_real_person_s_too(profile: str, real_person: Path) -> None:
+    units = load_recordings(real_person)
     check(of_profile(units, load_skeleton(profile)), profile)

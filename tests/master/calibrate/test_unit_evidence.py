@@ -1,6 +1,5 @@
 """A unit whose own readings contradict each other is told, by the likeliest cause; a sound one never is."""
 
-import os
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -37,12 +36,8 @@ def test_sound_units_are_believed(units: dict[str, NodeRecording]) -> None:
     assert {name: said(unit) for name, unit in units.items()} == dict.fromkeys(units)
 
 
-@pytest.mark.recordings
-def test_a_real_person_s_units_are_believed() -> None:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    units = load_recordings(Path(folder) / "human_full_body.npz")
+def test_a_real_person_s_units_are_believed(real_person: Path) -> None:
+    units = load_recordings(real_person)
     assert {name: said(unit) for name, unit in units.items()} == dict.fromkeys(units)
 
 

@@ -1,6 +1,5 @@
 """Real recordings, and readings that perfect sensors would give."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,14 +12,11 @@ LoadRecording = Callable[[str], dict[str, Array]]
 
 
 @pytest.fixture(scope="session")
-def recording() -> LoadRecording:
+def recording(recordings_folder: Path) -> LoadRecording:
     """Loads one of the recordings by name, as float64."""
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
 
     def load(name: str) -> dict[str, Array]:
-        path = Path(folder) / f"{name}.npz"
+        path = recordings_folder / f"{name}.npz"
         if not path.exists():
             pytest.skip(f"{path.name} is not in TANDEM_DATA")
         with np.load(path) as arrays:

@@ -88,7 +88,6 @@ def test_what_all_nodes_see_is_another_place_and_not_their_fault() -> None:
     assert watch.doubted.tolist() == [False, False, True, False, False]
 
 
-@pytest.mark.recordings
 def test_on_broad_only_a_change_is_told(recording: LoadRecording) -> None:
     for name in TRIALS:
         trial = recording(name)

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import numpy as np
-import pytest
 from vqf import VQF
 
 from common.quaternion import Array, angle_between, conjugate, multiply
@@ -11,8 +10,6 @@ from master.orientation.ekf import EkfConfig, EkfFilter
 from master.orientation.filter import OrientationFilter
 from master.orientation.mahony import MahonyConfig, MahonyFilter
 from master.orientation.vqf import VqfConfig, VqfFilter
-
-pytestmark = pytest.mark.recordings
 
 LoadRecording = Callable[[str], dict[str, Array]]
 

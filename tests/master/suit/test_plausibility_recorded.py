@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,6 @@ from master.suit.plausibility import Plausibility, PlausibilityConfig
 from master.suit.poll import Sweep
 from master.suit.protocol import SuitProtocol
 
-DATA = os.environ.get("TANDEM_DATA")
-pytestmark = pytest.mark.skipif(not DATA, reason="TANDEM_DATA does not name the folder of recordings")
 SCALE = SuitProtocol.load().fd.scale
 BROAD = ("02_undisturbed_slow_rotation_B", "06_undisturbed_fast_rotation_A", "25_disturbed_tapping_B")
 
@@ -34,16 +31,16 @@ def alarms(readings: Array, rate_hz: float) -> dict[int, str]:
     return said
 
 
-def load(name: str) -> dict[str, np.ndarray]:
-    path = Path(str(DATA)) / name
+def load(folder: Path, name: str) -> dict[str, np.ndarray]:
+    path = folder / name
     if not path.exists():
         pytest.skip(f"{name} is not there")
     with np.load(path) as file:
         return {key: file[key].astype(np.float64) for key in file}
 
 
-def test_a_person_who_moves_for_100_s() -> None:
-    data = load("human_full_body.npz")
+def test_a_person_who_moves_for_100_s(recordings_folder: Path) -> None:
+    data = load(recordings_folder, "human_full_body.npz")
     names = [key[:-4] for key in data if key.endswith("_acc")]
     none = np.full((len(data["t_s"]), 3), np.nan)
     six = [np.concatenate([data[f"{n}_acc"], data[f"{n}_gyr"], none], axis=1) for n in names]
@@ -51,14 +48,14 @@ def test_a_person_who_moves_for_100_s() -> None:
 
 
 @pytest.mark.parametrize("name", BROAD)
-def test_a_unit_turned_shaken_and_knocked(name: str) -> None:
-    data = load(f"broad_{name}.npz")
+def test_a_unit_turned_shaken_and_knocked(recordings_folder: Path, name: str) -> None:
+    data = load(recordings_folder, f"broad_{name}.npz")
     nine = np.concatenate([data["acc"], data["gyr"], data["mag"]], axis=1)[:, None]
     assert alarms(nine, float(data["rate_hz"])) == {}
 
 
-def test_a_persons_unit_whose_gyro_is_turned_round_is_found() -> None:
-    data = load("human_full_body.npz")
+def test_a_persons_unit_whose_gyro_is_turned_round_is_found(recordings_folder: Path) -> None:
+    data = load(recordings_folder, "human_full_body.npz")
     none = np.full((len(data["t_s"]), 3), np.nan)
     six = np.concatenate([data["forearm_left_acc"], -data["forearm_left_gyr"], none], axis=1)
     assert "contradicts gravity" in alarms(six[:, None], 100.0)[0]

@@ -1,5 +1,4 @@
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -50,12 +49,8 @@ def test_a_joint_nobody_bent_is_refused_and_nothing_written(tmp_path: Path) -> N
     assert not (tmp_path / "report.json").exists()
 
 
-@pytest.mark.recordings
-def test_a_real_knee(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    with np.load(Path(folder) / "human_full_body.npz") as person:
+def test_a_real_knee(tmp_path: Path, capsys: pytest.CaptureFixture[str], real_person: Path) -> None:
+    with np.load(real_person) as person:
         names = {"1": "upper_leg_left", "2": "lower_leg_left"}
         arrays = {f"{key}{i}": person[f"{name}_{key}"] for i, name in names.items() for key in ("gyr", "acc")}
     np.savez(tmp_path / "knee.npz", rate_hz=100.0, **arrays)

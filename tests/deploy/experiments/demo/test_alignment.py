@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
@@ -35,19 +33,15 @@ def knees_deg(recording: Path, overrides: list[str]) -> Array:
     return positions[:, [LEGS.joint_names.index(f"{side}_knee_flexion") for side in ("left", "right")]]
 
 
-@pytest.mark.recordings
-def test_knees_bend_forwards_once_the_sensors_are_aligned(tmp_path: Path) -> None:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    recording = Path(folder) / "human_full_body.npz"
-    aligned = align(recording, LEGS, tmp_path)
+def test_knees_bend_forwards_once_the_sensors_are_aligned(tmp_path: Path, real_person: Path) -> None:
+
+    aligned = align(real_person, LEGS, tmp_path)
     assert aligned.left == {}
-    knees = knees_deg(recording, aligned.overrides)
+    knees = knees_deg(real_person, aligned.overrides)
     assert knees.min() > -10.0
     assert (knees.max(axis=0) > 90.0).all()
     # by the zero pose alone they would bend the wrong way, where the robot's stay at their end
-    assert (knees_deg(recording, []).max(axis=0) < 10.0).all()
+    assert (knees_deg(real_person, []).max(axis=0) < 10.0).all()
 
 
 def test_a_recording_without_a_zero_pose_leaves_all_to_it(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -139,19 +138,14 @@ def test_a_single_array_and_a_missing_file_are_refused(tmp_path: Path, skeleton:
         load_replay(tmp_path / "none.npz", skeleton, ["head"])
 
 
-@pytest.mark.recordings
 @pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
-def test_the_real_recording_is_resampled_exactly_at_its_knots(profile: str) -> None:
-    folder = os.environ.get("TANDEM_DATA")
-    if not folder:
-        pytest.skip("TANDEM_DATA does not name the folder of recordings")
-    path = Path(folder) / "human_full_body.npz"
+def test_the_real_recording_is_resampled_exactly_at_its_knots(profile: str, real_person: Path) -> None:
     skeleton = load_skeleton(profile)
     recorded = {i: RECORDED_AS[s] for i, s in enumerate(skeleton.segment_names) if s in RECORDED_AS}
     assert len(recorded) == {"nursing": 8, "lower_limb": 7}[profile]
-    replay = load_replay(path, skeleton, skeleton.segment_names)
+    replay = load_replay(real_person, skeleton, skeleton.segment_names)
     assert replay.length_s == pytest.approx(99.99)
-    with np.load(path) as arrays:
+    with np.load(real_person) as arrays:
         for k in (0, 1, 777, 5000, 9999):
             reading = replay.readings(arrays["t_s"][k] - arrays["t_s"][0])
             for i, name in recorded.items():

@@ -20,8 +20,6 @@ from master.orientation.affine import Calibration, identity
 from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
 
-pytestmark = pytest.mark.recordings
-
 CONFIG = EstimationConfig.model_validate(
     {"constraints": "online", "zero_pose_s": 1.0}
     | {f"{sensor}_cutoff_hz": 0.0 for sensor in ("accelerometer", "gyroscope", "magnetometer")}
@@ -52,9 +50,9 @@ class Person:
 
 
 @pytest.fixture(scope="module", params=["nursing", "lower_limb"])
-def person(request: pytest.FixtureRequest, recordings_folder: Path) -> Person:
+def person(request: pytest.FixtureRequest, real_person: Path) -> Person:
     whole = load_skeleton(request.param)
-    there = load_recordings(recordings_folder / "human_full_body.npz")
+    there = load_recordings(real_person)
     segments = tuple(s for s in whole.segments if s.name in RECORDED_AS)
     angles = {angle for segment in segments for angle in segment.angles}
     skeleton = Skeleton(whole.name, segments, tuple(j for j in whole.joints if set(j.drives) <= angles))
