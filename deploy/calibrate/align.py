@@ -12,7 +12,8 @@ import typer
 from rich.console import Console
 
 from common.errors import TandemError
-from deploy.calibrate.options import AsJson, OutFolder, RecordingFile, ReportFile
+from deploy.calibrate.options import OutFolder, RecordingFile
+from deploy.report.options import AsJson, ReportFile
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -34,20 +35,20 @@ def _times(text: str | None) -> str | None:
 
 def align(
     recording: RecordingFile,
-    profile: Annotated[str, typer.Option(help="Whose segments the nodes are on.")] = "nursing",
+    profile: Annotated[str, typer.Option(help="Robot profile whose segments carry the nodes.")] = "nursing",
     out: OutFolder = Path("calibration"),
     zero_pose: Annotated[
         str | None,
         typer.Option(
             metavar="FROM:TO",
-            help="Seconds of the zero pose; left out, the first stretch in which everyone rests.",
+            help="Seconds of the zero pose at the beginning; without it, the first time when all nodes rest.",
             callback=_times,
         ),
     ] = None,
     report: ReportFile = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find how sensors worn askew sit: stand still in the zero pose, then move every joint about.
+    """Find how each worn sensor is turned against its segment: stand in the zero pose, then move every joint.
 
     Stand upright, arms hanging, palms to the thighs, for three seconds; then bend elbows, knees and fingers
     ten times each while you walk, bow and turn, 20 s or more. No magnetometer is needed. Calibrations of

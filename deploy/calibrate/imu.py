@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from deploy.calibrate.options import AsJson, Nodes, OutFolder, RecordingFile, ReportFile
+from deploy.calibrate.options import Nodes, OutFolder, RecordingFile
+from deploy.report.options import AsJson, ReportFile
 
 if TYPE_CHECKING:
     from deploy.calibrate.session import Session
@@ -32,27 +33,33 @@ def imu(
     out: OutFolder = Path("calibration"),
     node: Nodes = None,
     gravity: Annotated[
-        float, typer.Option(help="m/s² where it was recorded.", min=9.7, max=9.9)
+        float, typer.Option(help="Gravity where the recording was made, m/s².", min=9.7, max=9.9)
     ] = _STANDARD_GRAVITY_M_S2,
-    still_s: Annotated[float, typer.Option(help="Shortest rest that counts, s.", min=1.0, max=60.0)] = 2.0,
+    still_s: Annotated[
+        float, typer.Option(help="Shortest rest that counts, in seconds.", min=1.0, max=60.0)
+    ] = 2.0,
     method: Annotated[
         str,
         typer.Option(
             metavar="attitudes|six-position",
-            help="Many attitudes; or six faces and three turns, as the housing's axes have it.",
+            help="`attitudes`: 20 or more attitudes. `six-position`: six faces and three "
+            "turns, which gives the axes of the housing.",
             callback=_method,
         ),
     ] = "attitudes",
     turn_deg: Annotated[
-        float, typer.Option(help="Angle of each of the three turns of six-position, °.", min=90.0, max=3600.0)
+        float,
+        typer.Option(
+            help="Angle in degrees of each of the three turns of six-position.", min=90.0, max=3600.0
+        ),
     ] = 360.0,
     report: ReportFile = None,
     as_json: AsJson = False,
 ) -> None:
     """Calibrate accelerometers and gyroscopes from a recording: 20 or more attitudes, some seconds each.
 
-    With `--method six-position`: the node at rest on each of its six faces, in any order, and turned by a
-    known angle (a whole turn, or `--turn-deg` on a turntable) about each of its axes, from rest to rest.
+    With `--method six-position`, rest the node on each of its six faces, in any order, and turn it by a known
+    angle (a whole turn, or `--turn-deg` on a turntable) about each of its axes, from rest to rest.
 
     Example: `tandem calibrate imu session.npz --out calibration --report imu.json`
     """

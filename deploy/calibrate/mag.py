@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from deploy.calibrate.options import AsJson, HemisphereOption, Nodes, OutFolder, RecordingFile, ReportFile
+from deploy.calibrate.options import HemisphereOption, Nodes, OutFolder, RecordingFile
+from deploy.report.options import AsJson, ReportFile
 
 if TYPE_CHECKING:
     from deploy.calibrate.session import Session
@@ -39,8 +40,8 @@ def mag(
         str | None,
         typer.Option(
             metavar="X,Y,Z",
-            help="Accept axes as soldered: which reading, with its sign, is the node's x, y and "
-            "z, as in y,x,-z.",
+            help="Accept swapped axes: name the readings, with signs, that are the node's "
+            "x, y and z, as in y,x,-z.",
             callback=_axes,
         ),
     ] = None,
@@ -53,10 +54,9 @@ def mag(
 ) -> None:
     """Calibrate magnetometers from a recording: 3 minutes of free rotation through every attitude.
 
-    Where the folder has the node's accelerometer already and the recording has rests in eight attitudes or
-    more, the magnetometer's axes are turned into the accelerometer's. Gyroscope and gravity must agree with
-    how the field turns: swapped axes are refused unless you accept them by --axes, and a mirror image always
-    is.
+    The magnetometer's axes are aligned with the accelerometer's if the folder already has the node's
+    accelerometer calibration and the recording rests in eight attitudes or more. The field must turn as
+    gyroscope and gravity say: swapped axes are refused unless --axes accepts them, mirrored axes always.
 
     Example: `tandem calibrate mag rotation.npz --out calibration --node left_hand`
     """

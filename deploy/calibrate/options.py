@@ -7,19 +7,21 @@ from typing import Annotated
 
 import typer
 
-from deploy.report.output import in_a_folder
-
 RecordingFile = Annotated[
     Path,
-    typer.Argument(metavar="RECORDING", help=".npz or .mcap of one unit or a whole suit.", dir_okay=False),
+    typer.Argument(
+        metavar="RECORDING", help="Recording (.npz or .mcap) of one node or of a whole suit.", dir_okay=False
+    ),
 ]
 OutFolder = Annotated[
-    Path, typer.Option("--out", help="Folder for NODE.toml and its picture; other parts of a file stay.")
+    Path,
+    typer.Option(
+        "--out",
+        help="Folder for the calibration files NODE.toml and their pictures; other "
+        "sections of an existing file stay.",
+    ),
 ]
-Nodes = Annotated[list[str] | None, typer.Option("--node", help="Only this node; may be repeated.")]
-ReportFile = Annotated[
-    Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
-]
+Nodes = Annotated[list[str] | None, typer.Option("--node", help="Calibrate only this node; repeat for more.")]
 
 
 def _hemisphere(text: str) -> str:
@@ -32,8 +34,8 @@ HemisphereOption = Annotated[
     str,
     typer.Option(
         metavar="north|south",
-        help="Where it was recorded: tells a magnetometer's mirror image from the field's dip.",
+        help="Hemisphere where the recording was made; it tells a mirrored "
+        "magnetometer axis from the dip of the field.",
         callback=_hemisphere,
     ),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the figures as JSON instead of a table.")]

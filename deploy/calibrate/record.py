@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from deploy.report.options import Overrides
+
 if TYPE_CHECKING:
     from master.config import MasterConfig
 
@@ -16,14 +18,18 @@ _TELL_S = 0.2
 
 
 def record(
-    config: Annotated[Path, typer.Argument(metavar="MASTER.toml", help="The master's file: nodes, buses.")],
-    out: Annotated[Path, typer.Option(help="New .mcap file.", dir_okay=False)],
-    seconds: Annotated[float | None, typer.Option(help="Stop by itself.", min=0.1)] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
+    config: Annotated[
+        Path,
+        typer.Argument(metavar="MASTER.toml", help="The master's TOML file, which names nodes and buses."),
+    ],
+    out: Annotated[Path, typer.Option(help="New .mcap file to write.", dir_okay=False)],
+    seconds: Annotated[
+        float | None,
+        typer.Option(help="Stop after this many seconds; without it, stop with Ctrl-C.", min=0.1),
     ] = None,
+    set_: Overrides = None,
 ) -> None:
-    """Record the raw readings of all nodes, until Ctrl-C: for `calibrate imu`, `mag` and `align`.
+    """Record the raw readings of all nodes until Ctrl-C, for `calibrate imu`, `mag` and `align`.
 
     Example: `tandem calibrate record deploy/examples/master.toml --out session.mcap --seconds 300`
     """

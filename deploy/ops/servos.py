@@ -12,24 +12,26 @@ from rich.text import Text
 
 from common.config.load import load_config
 from common.errors import TandemError
+from deploy.report.options import Overrides
 
 if TYPE_CHECKING:
     from slave.servos.dynamixel.setup import Looked, SetUp
 
 
 def servos(
-    config: Annotated[Path, typer.Argument(help="The slave's TOML file.")],
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
-    ] = None,
+    config: Annotated[
+        Path,
+        typer.Argument(help="The slave's TOML file; its section [servos.dynamixel] describes the servos."),
+    ],
+    set_: Overrides = None,
     write: Annotated[
-        bool, typer.Option("--write", help="Replace what differs, in memory that lasts without power.")
+        bool, typer.Option("--write", help="Write the settings that differ to the servos' permanent memory.")
     ] = False,
 ) -> None:
-    """Look at every servo of a serial bus: whether it answers, how soon, and what it keeps that must differ.
+    """Check every servo on a serial bus: whether it answers, how fast, and its permanent settings.
 
-    Without --write nothing that lasts is written. With it, only where no servo is refused. Status 1 where a
-    slave would not start.
+    Without --write no permanent setting is changed. With --write they are changed, but only if every
+    servo is usable. It ends with status 1 if the slave would not start.
 
     Example: `tandem servos slave.toml --write`
     """

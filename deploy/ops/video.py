@@ -26,18 +26,20 @@ NOTHING_S = 5.0
 
 
 def video(
-    connect: Annotated[list[str], typer.Option(help="The robot's endpoint.")],
-    robot: Annotated[str, typer.Option(help="The robot's name.")],
+    connect: Annotated[list[str], typer.Option(help="Endpoint of the robot, such as tcp/192.168.7.2:7447.")],
+    robot: Annotated[str, typer.Option(help="Name of the robot.")],
     certificate: Certificate = None,
-    camera: Annotated[str, typer.Option(help="The camera's name.")] = "head",
+    camera: Annotated[str, typer.Option(help="Name of the camera, as in the slave's file.")] = "head",
     save: Annotated[
-        Path | None, typer.Option(help="Keep every picture in this folder, as NUMBER.jpg.", file_okay=False)
+        Path | None, typer.Option(help="Save every picture to this folder as NUMBER.jpg.", file_okay=False)
     ] = None,
-    seconds: Annotated[float, typer.Option(help="How long; 0: until Ctrl-C.", min=0.0)] = 0.0,
+    seconds: Annotated[
+        float, typer.Option(help="Stop after this many seconds; 0: stop with Ctrl-C.", min=0.0)
+    ] = 0.0,
 ) -> None:
-    """Watch what a robot's camera sends: how many pictures, how large; and keep them.
+    """Receive a robot's video: show its rate and size, and save the pictures on request.
 
-    While no operator commands the robot it sends one or two small pictures a second.
+    While no operator commands the robot, it sends one or two small pictures a second.
 
     Example: `tandem video --connect tcp/192.168.7.2:7447 --robot robot-1 --save pictures`
     """

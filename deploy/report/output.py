@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -34,3 +34,13 @@ def write_json(path: Path, tree: Any) -> None:
     text = json.dumps(tree, indent=2, ensure_ascii=False) + "\n"
     with writing(path):
         path.write_text(text, "utf-8")
+
+
+def metrics_writer(path: Path | None) -> Callable[[dict[str, object]], None]:
+    """What a process calls with its counters when it stops: writes them to the file, if there is one."""
+
+    def write(metrics: dict[str, object]) -> None:
+        if path is not None:
+            write_json(path, metrics)
+
+    return write

@@ -8,40 +8,49 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from deploy.calibrate.options import AsJson, HemisphereOption, ReportFile
+from deploy.calibrate.options import HemisphereOption
+from deploy.report.options import AsJson, Overrides, ReportFile
 
 if TYPE_CHECKING:
     from deploy.calibrate.live.guide import What
 
 
 def live(
-    config: Annotated[Path, typer.Argument(metavar="MASTER.toml", help="The master's file: nodes, buses.")],
-    out: Annotated[Path, typer.Option(help="Folder for NODE.toml, pictures and recordings.")] = Path(
-        "calibration"
-    ),
+    config: Annotated[
+        Path,
+        typer.Argument(metavar="MASTER.toml", help="The master's TOML file, which names nodes and buses."),
+    ],
+    out: Annotated[
+        Path, typer.Option(help="Folder for the calibration files NODE.toml, pictures and recordings.")
+    ] = Path("calibration"),
     what: Annotated[
-        str, typer.Option(help="Of imu, mag and align, those to be done, with commas.")
+        str, typer.Option(help="Steps to do, separated by commas: imu, mag, align.")
     ] = "imu,mag,align",
-    still_s: Annotated[float, typer.Option(help="How long to rest in an attitude, s.", min=1.0)] = 3.0,
-    attitudes: Annotated[int, typer.Option(help="How many attitudes to rest in.", min=12, max=100)] = 20,
-    tumble_s: Annotated[float, typer.Option(help="Shortest time to turn about freely, s.", min=0.0)] = 30.0,
+    still_s: Annotated[float, typer.Option(help="Seconds to rest in each attitude.", min=1.0)] = 3.0,
+    attitudes: Annotated[int, typer.Option(help="Number of attitudes to rest in.", min=12, max=100)] = 20,
+    tumble_s: Annotated[
+        float, typer.Option(help="Shortest time of free rotation, in seconds.", min=0.0)
+    ] = 30.0,
     coverage: Annotated[
-        float, typer.Option(help="Share of all directions a magnetometer is to see.", min=0.5, max=0.95)
+        float,
+        typer.Option(
+            help="Share of all directions that each magnetometer must have seen, 0 to 1.", min=0.5, max=0.95
+        ),
     ] = 0.85,
-    limber_s: Annotated[float, typer.Option(help="How long every joint is to move, s.", min=2.0)] = 20.0,
-    gravity: Annotated[float, typer.Option(help="m/s² where you are.", min=9.7, max=9.9)] = 9.80665,
+    limber_s: Annotated[float, typer.Option(help="Seconds in which every joint is to move.", min=2.0)] = 20.0,
+    gravity: Annotated[float, typer.Option(help="Gravity at your place, m/s².", min=9.7, max=9.9)] = 9.80665,
     hemisphere: HemisphereOption = "north",
-    pictures: Annotated[bool, typer.Option(help="Draw every node before and after.")] = True,
+    pictures: Annotated[
+        bool, typer.Option(help="Draw a picture of every node before and after calibration.")
+    ] = True,
     report: ReportFile = None,
     as_json: AsJson = False,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
-    ] = None,
+    set_: Overrides = None,
 ) -> None:
-    """Calibrate the suit, led step by step: what to do now, which node wants what, how good it became.
+    """Calibrate the suit step by step: see what to do, which node needs more, and how good the result is.
 
-    First all units lie in one tray that is put down in many attitudes and turned about; then they are worn.
-    Ctrl-C keeps what was recorded, for `calibrate imu`, `mag` and `align`.
+    First all nodes lie in one tray, which you put down in many attitudes and turn about; then you wear them.
+    Ctrl-C keeps what was recorded for `calibrate imu`, `mag` and `align`.
 
     Example: `tandem calibrate live deploy/examples/master.toml --out calibration --what imu,mag`
     """

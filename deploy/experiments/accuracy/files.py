@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from deploy.report.options import ReportFile
 from deploy.report.output import in_a_folder, write_json
 
 
@@ -14,17 +15,19 @@ def files(
     recordings: Annotated[
         list[Path],
         typer.Argument(
-            metavar="FILE...", help="npz of one unit: gyr, acc, rate_hz, perhaps mag, quat, movement."
+            metavar="FILE...",
+            help="Recordings (.npz) of one node each, with gyr, acc and rate_hz, and if "
+            "known mag, quat and movement.",
         ),
     ],
-    filter_: Annotated[str, typer.Option("--filter", help="vqf, mahony, ekf or all.")] = "all",
-    report: Annotated[
-        Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
-    ] = None,
+    filter_: Annotated[
+        str, typer.Option("--filter", help="Orientation filter to score: vqf, mahony, ekf or all.")
+    ] = "all",
+    report: ReportFile = None,
     plot: Annotated[
         Path | None,
         typer.Option(
-            help="Draw the errors over time (PNG); beside the report unless told.",
+            help="Draw the errors over time into this PNG file; by default beside the report.",
             dir_okay=False,
             callback=in_a_folder,
         ),
@@ -33,17 +36,19 @@ def files(
         bool,
         typer.Option(
             "--align",
-            help="Take one constant rotation each side (world, sensor) out of the truth, and print it.",
+            help="Remove one constant rotation in the world frame and one in the sensor "
+            "frame before scoring, and print them.",
         ),
     ] = False,
     jobs: Annotated[
-        int | None, typer.Option(help="Processes at once; one a core (at most 4) without it.", min=1)
+        int | None,
+        typer.Option(help="Number of processes at once; by default one per core, at most 4.", min=1),
     ] = None,
 ) -> None:
     """Score the orientation filters on recordings, sample by sample, by BROAD's measure.
 
-    µs a sample are measured apart, one filter at a time, over each recording's first 2,000 samples.
-    Where a file has no optical truth (`quat`), how far the filters are from the first of them.
+    The cost in µs per sample is measured separately, one filter at a time, over the first 2,000 samples.
+    If a file has no optical truth (`quat`), the filters are compared with the first filter.
 
     Example: `tandem accuracy recording.npz --filter all --report scores.json --plot errors.png`
     """

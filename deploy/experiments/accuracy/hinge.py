@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 
 from common.quaternion import Array
-from deploy.calibrate.options import AsJson, ReportFile
+from deploy.report.options import AsJson, ReportFile
 from deploy.report.output import in_a_folder
 from deploy.report.plots import save_png
 from deploy.report.tables import plain_table
@@ -28,20 +28,24 @@ def hinge(
         Path,
         typer.Argument(
             metavar="FILE",
-            help="npz with gyr1 gyr2 rad/s, acc1 acc2 m/s², (T, 3), and rate_hz.",
+            help="Recording (.npz) of two nodes: gyr1 and gyr2 in rad/s, acc1 and acc2 in "
+            "m/s², (T, 3) each, and rate_hz.",
             dir_okay=False,
         ),
     ],
     report: ReportFile = None,
     picture: Annotated[
-        Path | None, typer.Option(help="Write the angle as PNG.", dir_okay=False, callback=in_a_folder)
+        Path | None,
+        typer.Option(
+            help="Draw the angle over time into this PNG file.", dir_okay=False, callback=in_a_folder
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print a hinge joint's axes in both units' frames, how well they are known, and its angle.
+    """Print a hinge joint's axis in the frames of both nodes, how well it is known, and the joint's angle.
 
-    The units may sit anyhow on the two segments; there is no magnetometer. Angle 0 is the pose at the
-    beginning, and the axes' sign is the one by which the joint bends farther to the positive side.
+    The nodes may sit in any orientation on the two segments; no magnetometer is used. Angle 0 is the pose at
+    the beginning. The sign of the axis is chosen so that the joint bends farther to the positive side.
 
     Example: `tandem accuracy hinge knee.npz --report knee.json --picture knee.png`
     """

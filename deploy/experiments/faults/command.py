@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import track
 
 from common.errors import TandemError
+from deploy.report.options import ReportFile
 
 if TYPE_CHECKING:
     from deploy.experiments.faults.fault import Fault
@@ -19,14 +20,20 @@ if TYPE_CHECKING:
 
 
 def faults(
-    only: Annotated[list[str] | None, typer.Argument(help="Rows whose names contain this; all else.")] = None,
-    report: Annotated[Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False)] = None,
+    only: Annotated[
+        list[str] | None, typer.Argument(help="Try only the faults whose names contain this text.")
+    ] = None,
+    report: ReportFile = None,
     page: Annotated[
         Path | None,
-        typer.Option(help="Write the matrix into this page, between its marks.", dir_okay=False, exists=True),
+        typer.Option(
+            help="Write the table into this Markdown page, between its two marks.",
+            dir_okay=False,
+            exists=True,
+        ),
     ] = None,
 ) -> None:
-    """Try what can fail on the simulated robot: what it does, how soon it stands, how fast it was.
+    """Inject every known fault into a simulated robot, and measure how it reacts and how soon it stops.
 
     Example: `tandem faults "link" --report faults.json`
     """

@@ -26,30 +26,51 @@ REPORT_S = 60.0
 
 
 def soak(
-    duration: Annotated[str, typer.Option(help="How long the robot is to follow: 8h, 30m, 90s.")] = "10m",
-    transport: Annotated[str, typer.Option(help="tcp udp tls quic quic-datagram ws unixsock-stream")] = "tcp",
+    duration: Annotated[
+        str, typer.Option(help="How long the robot follows the operator, such as 8h, 30m or 90s.")
+    ] = "10m",
+    transport: Annotated[
+        str,
+        typer.Option(
+            help="Transport between master and slave: tcp, udp, tls, quic, quic-datagram, "
+            "ws or unixsock-stream."
+        ),
+    ] = "tcp",
     profile: Annotated[
         str | None,
-        typer.Option(help="Two hosts made here, and a network between them: 4g, wifi …, or a file."),
+        typer.Option(
+            help="Run on two emulated hosts with this network between them: a profile "
+            "such as 4g or wifi, or a TOML file (needs root)."
+        ),
     ] = None,
-    router: Annotated[bool, typer.Option("--router", help="Master and robot meet at a router.")] = False,
+    router: Annotated[
+        bool, typer.Option("--router", help="Connect master and slave through a router.")
+    ] = False,
     faults: Annotated[
-        str, typer.Option(help="all, none, or names with commas; `--faults help` lists them.")
+        str,
+        typer.Option(
+            help="Faults to inject: all, none, or names separated by commas; `--faults help` lists them."
+        ),
     ] = "all",
     every: Annotated[
         float | None,
-        typer.Option(help="Mean seconds between faults; else each kind comes twice.", min=5.0),
+        typer.Option(
+            help="Mean number of seconds between faults; without it, each kind comes twice.", min=5.0
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the plan: the same seed, the same faults.")] = 1,
+    seed: Annotated[
+        int, typer.Option(help="Random seed for the fault schedule; the same seed gives the same faults.")
+    ] = 1,
     report: Annotated[
-        Path | None, typer.Option(help="A new folder for what is seen.", file_okay=False)
+        Path | None,
+        typer.Option(help="New folder for the report and everything that is recorded.", file_okay=False),
     ] = None,
     judge: Annotated[
         Path | None,
-        typer.Option(help="Run nothing: judge the report of a killed soak.", exists=True),
+        typer.Option(help="Do not run: judge the report folder of an earlier soak.", exists=True),
     ] = None,
 ) -> None:
-    """Run the whole way for hours with faults, and judge what it lost, how it came back and what grew.
+    """Run the whole system for hours, inject faults, and judge losses, recovery and memory growth.
 
     Example: `tandem soak --duration 30m --faults all --report soak-1`
     """

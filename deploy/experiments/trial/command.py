@@ -22,7 +22,9 @@ app = typer.Typer(invoke_without_command=True, no_args_is_help=False, rich_marku
 Tasks = Annotated[
     Path | None,
     typer.Option(
-        help="What each care task needs (TOML), instead of the project's.", exists=True, dir_okay=False
+        help="TOML file of what each care task needs, instead of the built-in one.",
+        exists=True,
+        dir_okay=False,
     ),
 ]
 SHORTEST_OUTAGE_S = 1.0
@@ -34,28 +36,46 @@ STOP_S = 30.0
 @app.callback()
 def trial(
     context: typer.Context,
-    transports: Annotated[str, typer.Option(help="Comma-separated, or `all`.")] = "tcp,udp",
+    transports: Annotated[str, typer.Option(help="Transports, separated by commas, or `all`.")] = "tcp,udp",
     profiles: Annotated[
-        str, typer.Option(help="Networks: names, or TOML files of your own, comma-separated, or `all`.")
+        str, typer.Option(help="Network profiles or TOML files of your own, separated by commas, or `all`.")
     ] = "4g",
     strategies: Annotated[
-        str, typer.Option(help="latest, interpolate, predict; comma-separated, or `all`.")
+        str,
+        typer.Option(
+            help="Tracking strategies: latest, interpolate, predict, separated by commas, or `all`."
+        ),
     ] = ("latest,predict"),
-    repeat: Annotated[int, typer.Option(help="How often each setup is run.", min=1, max=100)] = 3,
-    seconds: Annotated[float, typer.Option(help="Judged in each cell.", min=3.0, max=3600.0)] = 20.0,
+    repeat: Annotated[int, typer.Option(help="Number of runs of each combination.", min=1, max=100)] = 3,
+    seconds: Annotated[
+        float, typer.Option(help="Seconds that are judged in each run.", min=3.0, max=3600.0)
+    ] = 20.0,
     outage: Annotated[
         float,
         typer.Option(
-            help="Seconds without a link, after the judged time, at least 1; 0: none.", min=0.0, max=60.0
+            help="Seconds of link outage after the judged time, at least 1; 0: no outage.", min=0.0, max=60.0
         ),
     ] = 2.0,
-    motion: Annotated[str, typer.Option(help="The simulated operator's: bottle, sweep.")] = "bottle",
-    seed: Annotated[int, typer.Option(help="Of sensors' errors, network and order.")] = 1,
-    router: Annotated[bool, typer.Option("--router", help="The two sides meet at a router.")] = False,
+    motion: Annotated[
+        str, typer.Option(help="Motion of the simulated operator: bottle or sweep.")
+    ] = "bottle",
+    seed: Annotated[
+        int, typer.Option(help="Random seed for sensor errors, the network and the order of the runs.")
+    ] = 1,
+    router: Annotated[
+        bool, typer.Option("--router", help="Connect master and slave through a router.")
+    ] = False,
     max_age: Annotated[
-        float, typer.Option(help="The guard's age limit in s; 0: what the network needs.", min=0.0, max=2.0)
+        float,
+        typer.Option(
+            help="Age in seconds at which the guard refuses a command; 0: as much as the network needs.",
+            min=0.0,
+            max=2.0,
+        ),
     ] = 0.0,
-    report: Annotated[Path, typer.Option(help="The report's folder.", file_okay=False)] = Path("trial"),
+    report: Annotated[
+        Path, typer.Option(help="Folder for the report and the results of every run.", file_okay=False)
+    ] = Path("trial"),
     tasks: Tasks = None,
     remote: Annotated[
         str | None,
@@ -68,17 +88,17 @@ def trial(
     link: Annotated[
         Path | None,
         typer.Option(
-            help="With --remote and a secure transport: the master's file whose `[link.tls]` has the keys.",
+            help="With --remote over tls or quic: the master's TOML file whose `[link.tls]` names the keys.",
             exists=True,
             dir_okay=False,
         ),
     ] = None,
 ) -> None:
-    """Run each transport over each network with each tracking strategy, and say which suits a task.
+    """Run each transport over each network with each tracking strategy, and rank them for each care task.
 
-    Each cell is a fresh master and robot on two hosts (network namespaces; needs root) with an emulated link,
-    the same motion, then an outage. Every cell is repeated. The folder gets `report.html`, `report.json` and
-    `cells.csv`; run the same command again to go on after a Ctrl-C.
+    Each run starts a fresh master and robot on two emulated hosts (network namespaces, needs root), plays the
+    same motion, then an outage. The folder gets `report.html`, `report.json` and `cells.csv`. After Ctrl-C,
+    run the same command again to continue.
 
     Example: `tandem trial --transports tcp,udp,quic --profiles lan,4g --repeat 3 --report trial`
     """
@@ -106,21 +126,25 @@ def trial(
 def serve(
     config: Annotated[
         Path | None,
-        typer.Argument(help="The robot's own TOML file; without it, the simulated robot.", exists=True),
+        typer.Argument(help="The robot's TOML file; without it, the simulated robot is used.", exists=True),
     ] = None,
-    listen: Annotated[str, typer.Option(help="Where the operator's host asks.")] = "tcp/0.0.0.0:7440",
-    address: Annotated[str, typer.Option(help="On which the slaves listen.")] = "0.0.0.0",
-    port: Annotated[int, typer.Option(help="And at which port.", min=1, max=65535)] = 7447,
+    listen: Annotated[
+        str, typer.Option(help="Endpoint at which this host waits for `tandem trial --remote`.")
+    ] = "tcp/0.0.0.0:7440",
+    address: Annotated[str, typer.Option(help="Address at which the slaves listen.")] = "0.0.0.0",
+    port: Annotated[int, typer.Option(help="Port at which the slaves listen.", min=1, max=65535)] = 7447,
     max_age: Annotated[
         float,
         typer.Option(
-            help="The most that the guard's age limit may be set to from afar, s.", min=0.05, max=2.0
+            help="Largest age limit, in seconds, that the operator's host may set for the guard.",
+            min=0.05,
+            max=2.0,
         ),
     ] = 1.0,
 ) -> None:
-    """Serve a trial on the robot's host: start a fresh slave for each cell that the operator's host asks for.
+    """Serve a trial on the robot's host: start a fresh slave for each run that the operator's host asks for.
 
-    Whoever reaches the endpoint can start a slave and engage the robot: use it on a network you trust, or
+    Anyone who reaches the endpoint can start a slave and engage the robot. Use it on a network you trust, or
     listen at tls/… with keys in the robot's file.
 
     Example: `tandem trial serve slave.toml --listen tcp/0.0.0.0:7440`
@@ -135,10 +159,10 @@ def serve(
 
 @app.command()
 def report(
-    folder: Annotated[Path, typer.Argument(help="A trial's report folder.", exists=True, file_okay=False)],
+    folder: Annotated[Path, typer.Argument(help="Report folder of a trial.", exists=True, file_okay=False)],
     tasks: Tasks = None,
 ) -> None:
-    """Build the report again from the cells that are in the folder, with other weights if you like.
+    """Build the report again from the results in the folder, with other weights if you like.
 
     Example: `tandem trial report trial --tasks my-tasks.toml`
     """

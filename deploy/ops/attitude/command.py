@@ -10,33 +10,50 @@ from rich.console import Console
 
 from common.process.runtime import run as run_until_stopped
 
-_WHERE = "Of the simulated one, °."
-
 
 def attitude(
     port: Annotated[
         str | None,
-        typer.Argument(metavar="[PORT]", help="The instrument's serial port, such as /dev/ttyUSB0."),
+        typer.Argument(metavar="[PORT]", help="Serial port of the instrument, such as /dev/ttyUSB0."),
     ] = None,
-    simulate: Annotated[bool, typer.Option("--simulate", help="Without an instrument.")] = False,
-    baud: Annotated[int, typer.Option(help="Of the port.", min=300)] = 9600,
+    simulate: Annotated[
+        bool, typer.Option("--simulate", help="Simulate the instrument instead of reading one.")
+    ] = False,
+    baud: Annotated[int, typer.Option(help="Baud rate of the serial port.", min=300)] = 9600,
     declination: Annotated[
         float,
-        typer.Option(help="Where you are, °, positive where the needle points east.", min=-180, max=180),
+        typer.Option(
+            help="Magnetic declination at your place in degrees, positive where the "
+            "needle points east of north.",
+            min=-180,
+            max=180,
+        ),
     ] = 0.0,
     to: Annotated[
-        str | None, typer.Option(metavar="PORT", help="Send the simulated one's frames there, as it would.")
+        str | None,
+        typer.Option(metavar="PORT", help="Write the simulated instrument's frames to this serial port."),
     ] = None,
-    inclination: Annotated[float, typer.Option(help=_WHERE, min=0, max=180)] = 10.0,
-    azimuth: Annotated[float, typer.Option(help=_WHERE, min=0, max=360)] = 235.0,
-    tool_face: Annotated[float, typer.Option(help=_WHERE, min=0, max=360)] = 56.0,
+    inclination: Annotated[
+        float, typer.Option(help="Inclination of the simulated instrument in degrees.", min=0, max=180)
+    ] = 10.0,
+    azimuth: Annotated[
+        float, typer.Option(help="Azimuth of the simulated instrument in degrees.", min=0, max=360)
+    ] = 235.0,
+    tool_face: Annotated[
+        float, typer.Option(help="Tool-face of the simulated instrument in degrees.", min=0, max=360)
+    ] = 56.0,
     seconds: Annotated[
-        float | None, typer.Option(help="How long; else until Ctrl-C.", min=0.1, show_default=False)
+        float | None,
+        typer.Option(
+            help="Stop after this many seconds; without it, stop with Ctrl-C.", min=0.1, show_default=False
+        ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object a reading, angles in °.")] = False,
-    seed: Annotated[int, typer.Option(help="Of the simulated one's noise.")] = 1,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object per reading, with angles in degrees.")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Random seed for the simulated instrument's noise.")] = 1,
 ) -> None:
-    """Show inclination, azimuth and tool-face of the robot's base.
+    """Show the attitude of the robot's base, live: inclination, azimuth and tool-face.
 
     Example: `tandem attitude /dev/ttyUSB0 --declination -2.5`, or `tandem attitude --simulate --seconds 10`
     """

@@ -17,14 +17,18 @@ from common.wire.messages import Action
 from deploy.client.certificate import Certificate
 from deploy.client.reach import Reach, reach
 from deploy.ops.control.teller import Say, telling
+from deploy.report.options import AsJson
 
-Connect = Annotated[list[str] | None, typer.Option(help="A robot's endpoint; may be given several times.")]
-Robot = Annotated[list[str] | None, typer.Option(help="A robot's name; may be given several times.")]
-Operator = Annotated[str, typer.Option(help="Your name, as in the master's file.")]
+Connect = Annotated[
+    list[str] | None,
+    typer.Option(help="Endpoint of a robot, such as tcp/192.168.7.2:7447; repeat for more robots."),
+]
+Robot = Annotated[list[str] | None, typer.Option(help="Name of a robot; repeat for more robots.")]
+Operator = Annotated[str, typer.Option(help="Your name as an operator, the same as in the master's file.")]
 MasterFile = Annotated[
     Path | None,
     typer.Option(
-        "--master", help="The master's TOML file: endpoints, robots, operator from there.", dir_okay=False
+        "--master", help="Take endpoints, robots and operator from this master's TOML file.", dir_okay=False
     ),
 ]
 
@@ -36,7 +40,7 @@ def engage(
     master: MasterFile = None,
     certificate: Certificate = None,
 ) -> None:
-    """Let robots follow: each moves slowly to the operator's posture, then tracks.
+    """Let robots follow the operator: each moves slowly to the operator's posture, then tracks it.
 
     Example: `tandem engage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
     """
@@ -50,7 +54,7 @@ def disengage(
     master: MasterFile = None,
     certificate: Certificate = None,
 ) -> None:
-    """Let robots hold where they are.
+    """Make robots hold their position and stop following the operator.
 
     Example: `tandem disengage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
     """
@@ -61,13 +65,13 @@ def estop(
     connect: Connect = None,
     robot: Robot = None,
     all_: Annotated[
-        bool, typer.Option("--all", help="Every robot that is reached at the endpoints.")
+        bool, typer.Option("--all", help="Stop every robot that answers at the endpoints.")
     ] = False,
     operator: Operator = "",
     master: MasterFile = None,
     certificate: Certificate = None,
 ) -> None:
-    """Stop robots now. Anyone may. It is repeated until each has acknowledged it; a reset ends it.
+    """Stop robots now; anyone may. Repeats until each robot has acknowledged. `tandem reset` ends the stop.
 
     Example: `tandem estop --connect tcp/192.168.7.2:7447 --connect tcp/192.168.7.3:7447 --all`
     """
@@ -90,14 +94,19 @@ def estop(
 
 
 def reset(
-    key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
+    key: Annotated[
+        str,
+        typer.Option(
+            envvar="TANDEM_RESET_KEY", help="The reset key, `guard.reset_key` in the slave's TOML file."
+        ),
+    ],
     connect: Connect = None,
     robot: Robot = None,
     operator: Operator = "",
     master: MasterFile = None,
     certificate: Certificate = None,
 ) -> None:
-    """Leave an emergency stop: the robot then holds, it does not move.
+    """End an emergency stop: the robot then holds its position until it is engaged.
 
     Example: `tandem reset --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
     """
@@ -105,17 +114,24 @@ def reset(
 
 
 def home(
-    key: Annotated[str, typer.Option(envvar="TANDEM_RESET_KEY", help="The key from the robot's file.")],
+    key: Annotated[
+        str,
+        typer.Option(
+            envvar="TANDEM_RESET_KEY", help="The reset key, `guard.reset_key` in the slave's TOML file."
+        ),
+    ],
     connect: Connect = None,
     robot: Robot = None,
     operator: Operator = "",
     master: MasterFile = None,
     certificate: Certificate = None,
-    yes: Annotated[bool, typer.Option("--yes", help="You have looked at the robot already.")] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Do not ask for confirmation: you have already looked at the robot.")
+    ] = False,
 ) -> None:
-    """Confirm that a robot stands as it says, where it has no second reading. It then holds there.
+    """Confirm the joint angles of a robot that cannot check them by a second encoder.
 
-    Look at the robot first. It tells which joints it means, and where each says it is.
+    Look at the robot first. The command prints each such joint and the angle that the robot reports.
 
     Example: `tandem home --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
     """
@@ -132,9 +148,9 @@ def status(
     robot: Robot = None,
     master: MasterFile = None,
     certificate: Certificate = None,
-    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Ask robots what they do: guard, why, who commands, faults, base, offset, latency.
+    """Show what robots are doing: guard state and reason, operator, faults, base tilt, latency.
 
     Example: `tandem status --connect tcp/192.168.7.2:7447 --robot robot-1 --json`
     """

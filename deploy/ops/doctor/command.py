@@ -11,22 +11,28 @@ import typer
 from rich.console import Console
 
 from common.errors import TandemError
+from deploy.report.options import AsJson, Overrides
 
 
 def doctor(
     config: Annotated[
-        Path | None, typer.Argument(help="The host's TOML file; without it, what every host needs.")
+        Path | None,
+        typer.Argument(
+            help="TOML file of this host's role; without it, only what every host needs is checked."
+        ),
     ] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
-    reach: Annotated[bool, typer.Option(help="Whether to ask the robots and routers of the file.")] = True,
-    recordings: Annotated[Path, typer.Option(help="Where recordings are to be written.")] = Path(),
+    set_: Overrides = None,
+    as_json: AsJson = False,
+    reach: Annotated[
+        bool, typer.Option(help="Also connect to the robots and routers that the file names.")
+    ] = True,
+    recordings: Annotated[
+        Path, typer.Option(help="Folder for recordings; its free space is checked.")
+    ] = Path(),
 ) -> None:
-    """Check whether this host is ready for its role, and say what to do. It changes nothing.
+    """Check whether this host is ready for its role, and print what to do. It changes nothing.
 
-    Status 1 where something must be mended first.
+    It ends with status 1 if something must be fixed first.
 
     Example: `tandem doctor /etc/tandem/operator.toml --recordings /var/lib/tandem`
     """

@@ -45,7 +45,7 @@ class Options:
     """What a person asked for beside the file."""
 
     recordings: Path = Path()
-    """Where recordings are to be written."""
+    """Folder for recordings; its free space is checked."""
     reach: bool = True
     """Whether to ask the other hosts."""
 

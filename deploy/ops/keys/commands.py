@@ -16,6 +16,7 @@ from rich.text import Text
 from common.link.config import NAME
 from common.link.roles import Role, role_of
 from deploy.certificates import AUTHORITY, KeysError
+from deploy.report.options import AsJson
 
 if TYPE_CHECKING:
     from deploy.certificates.folder import Shown
@@ -28,16 +29,18 @@ app = typer.Typer(
 )
 SOON_DAYS = 30
 MOST_DAYS = 36_500.0
-Folder = Annotated[Path, typer.Argument(help="Where the authority's files lie.", file_okay=False)]
+Folder = Annotated[Path, typer.Argument(help="Folder of the authority's files.", file_okay=False)]
 
 
 @app.command()
 def authority(
     folder: Folder,
-    name: Annotated[str, typer.Option(help="Whose authority it is.")] = "tandem",
-    days: Annotated[float, typer.Option(help="Until it expires.", min=1.0, max=MOST_DAYS)] = 3650.0,
+    name: Annotated[str, typer.Option(help="Name of the authority, for people.")] = "tandem",
+    days: Annotated[
+        float, typer.Option(help="Number of days until the certificate expires.", min=1.0, max=MOST_DAYS)
+    ] = 3650.0,
 ) -> None:
-    """Make a private authority: ca.pem goes to every host, ca.key stays here, offline.
+    """Make a private certificate authority. Copy ca.pem to every host; keep ca.key offline.
 
     Example: `tandem keys authority keys --name "Clinic North"`
     """
@@ -58,17 +61,24 @@ def authority(
 def make(
     folder: Folder,
     who: Annotated[
-        str, typer.Argument(metavar="ROLE:NAME", help="operator:…, robot:…, observer:… or router:…")
+        str,
+        typer.Argument(
+            metavar="ROLE:NAME",
+            help="Role and name of the certificate's owner: operator:NAME, robot:NAME, "
+            "observer:NAME or router:NAME.",
+        ),
     ],
     host: Annotated[
         list[str] | None,
-        typer.Option(help="Address or name under which others connect to it; may be given several times."),
+        typer.Option(help="Address or host name under which others connect to the owner; repeat for more."),
     ] = None,
-    days: Annotated[float, typer.Option(help="Until it expires.", min=0.001, max=MOST_DAYS)] = 365.0,
+    days: Annotated[
+        float, typer.Option(help="Number of days until the certificate expires.", min=0.001, max=MOST_DAYS)
+    ] = 365.0,
 ) -> None:
-    """Make a certificate and its key, of the folder's authority. It never overwrites one.
+    """Make a certificate and its key, signed by the folder's authority. It never overwrites a file.
 
-    To renew one, move the old files away and make it again: the names in [link.access] stay the same.
+    To renew a certificate, move the old files away and make it again; [link.access] stays as it is.
 
     Example: `tandem keys make keys robot:robot-1 --host 192.168.7.2 --host robot-1.local`
     """
@@ -95,12 +105,14 @@ def make(
 
 @app.command()
 def show(
-    paths: Annotated[list[Path], typer.Argument(help="Certificates, or folders of them.", exists=True)],
-    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+    paths: Annotated[
+        list[Path], typer.Argument(help="Certificate files, or folders of certificates.", exists=True)
+    ],
+    as_json: AsJson = False,
 ) -> None:
-    """Show whose certificates these are, for which addresses, and when they expire.
+    """Show the owner, the addresses and the expiry date of certificates.
 
-    It ends with status 1 where one has expired.
+    It ends with status 1 if one has expired.
 
     Example: `tandem keys show keys`
     """

@@ -12,36 +12,45 @@ from rich.console import Console
 
 from common.errors import TandemError
 from common.process.runtime import run as run_until_stopped
+from deploy.report.options import AsJson, MetricsFile
 from deploy.report.output import in_a_folder, write_json
 
 
 def record(
-    robot: Annotated[str, typer.Option(help="The robot's name.")],
-    out: Annotated[Path, typer.Option(help="New .mcap file.", dir_okay=False, callback=in_a_folder)],
+    robot: Annotated[str, typer.Option(help="Name of the robot.")],
+    out: Annotated[Path, typer.Option(help="New .mcap file to write.", dir_okay=False, callback=in_a_folder)],
     connect: Annotated[
-        list[str] | None, typer.Option(help="An endpoint; may be given several times.")
+        list[str] | None,
+        typer.Option(help="Endpoint to connect to, such as tcp/192.168.7.2:7447; repeat for more."),
     ] = None,
     link: Annotated[
         Path | None,
-        typer.Option(help="Or a TOML file whose [link] says where, and with which keys.", dir_okay=False),
+        typer.Option(
+            help="Take endpoints and keys from the section [link] of this TOML file.", dir_okay=False
+        ),
     ] = None,
-    video: Annotated[list[str] | None, typer.Option(help="Also the pictures of this camera: `head`.")] = None,
+    video: Annotated[
+        list[str] | None, typer.Option(help="Also record the pictures of this camera, such as `head`.")
+    ] = None,
     minutes_per_file: Annotated[
-        float, typer.Option(help="Then a new file begins, FILE-2.mcap and so on; 0: never.", min=0.0)
+        float,
+        typer.Option(
+            help="Begin a new file (FILE-2.mcap, …) after this many minutes; 0: keep one file.", min=0.0
+        ),
     ] = 60.0,
-    seconds: Annotated[float | None, typer.Option(help="Stop by itself.", min=0.1)] = None,
-    may_miss: Annotated[
-        bool, typer.Option("--may-miss", help="End with 0 although numbered messages never came.")
-    ] = False,
-    figures: Annotated[
-        Path | None,
-        typer.Option(help="Write what was counted, as JSON, when stopped.", callback=in_a_folder),
+    seconds: Annotated[
+        float | None,
+        typer.Option(help="Stop after this many seconds; without it, stop with Ctrl-C.", min=0.1),
     ] = None,
+    may_miss: Annotated[
+        bool, typer.Option("--may-miss", help="End with status 0 even if numbered messages are missing.")
+    ] = False,
+    figures: MetricsFile = None,
 ) -> None:
-    """Record a live robot's commands, states and statistics, until Ctrl-C; it changes nothing.
+    """Record a live robot's commands, states and statistics until Ctrl-C. It changes nothing.
 
-    Commands are heard at an endpoint where the master listens (`[link] listen` in its file), or at a router;
-    states at the robot's. Ends with 1 where the disk failed, or messages are missing by their own numbers.
+    The robot's endpoint gives states. Commands come from an endpoint where the master listens (`[link]
+    listen` in its file), or from a router. It ends with status 1 if the disk failed or messages are missing.
 
     Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
     """
@@ -68,10 +77,10 @@ def record(
 
 
 def recording(
-    file: Annotated[Path, typer.Argument(help="An .mcap file of ours.")],
-    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+    file: Annotated[Path, typer.Argument(help="An .mcap file that `tandem record` wrote.")],
+    as_json: AsJson = False,
 ) -> None:
-    """Show what is in a recording: topics, rates, silences, what never came, and whether it ends early.
+    """Show what is in a recording: topics, rates, silences, missing messages, and whether it ends early.
 
     Example: `tandem recording morning.mcap --json`
     """

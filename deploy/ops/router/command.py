@@ -10,29 +10,29 @@ import typer
 from common.config.load import load_config
 from common.errors import TandemError
 from common.process.runtime import run as run_until_stopped
-from deploy.report.output import in_a_folder, write_json, writing
+from deploy.report.options import MetricsFile, Overrides
+from deploy.report.output import in_a_folder, metrics_writer, writing
 
 
 def router(
-    config: Annotated[Path, typer.Argument(help="TOML file; deploy/examples/router.toml is one.")],
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
-    ] = None,
+    config: Annotated[
+        Path, typer.Argument(help="The router's TOML file; start from deploy/examples/router.toml.")
+    ],
+    set_: Overrides = None,
     zenohd: Annotated[
         Path | None,
         typer.Option(
-            metavar="OUT.json5", help="Write the same for a site's own zenohd, and end.", callback=in_a_folder
+            metavar="OUT.json5",
+            help="Do not run: write the same rules as a configuration file for zenohd.",
+            callback=in_a_folder,
         ),
     ] = None,
-    figures: Annotated[
-        Path | None,
-        typer.Option(help="Write what was counted, as JSON, when stopped.", callback=in_a_folder),
-    ] = None,
+    figures: MetricsFile = None,
 ) -> None:
-    """Route between masters and robots that cannot reach each other, and enforce who may do what.
+    """Connect masters and robots that cannot reach each other, and enforce who may do what.
 
-    Masters and robots connect to it with `[link] mode = "client"`. It sees what it routes: run it where you
-    would trust a host to command the robots.
+    Masters and robots connect to it with `[link] mode = "client"`. It reads all messages: run it on a
+    host that you would trust to command the robots.
 
     Example: `tandem router deploy/examples/router.toml`
     """
@@ -45,11 +45,7 @@ def router(
             zenohd.write_text(zenohd_text(checked), "utf-8")
         return
 
-    def write_figures(tree: dict[str, object]) -> None:
-        if figures is not None:
-            write_json(figures, tree)
-
     try:
-        run_until_stopped(lambda stop: run(checked, stop, write_figures))
+        run_until_stopped(lambda stop: run(checked, stop, metrics_writer(figures)))
     except TandemError as error:
         raise TandemError(f"{config}: {error}") from None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -11,13 +10,15 @@ import typer
 
 from common.config.load import load_config
 from common.process.runtime import run as run_until_stopped
+from deploy.report.options import MetricsFile, Overrides
+from deploy.report.output import metrics_writer
 
 
 def drives(
-    config: Annotated[Path, typer.Argument(help="The slave's TOML file, for its [servos.canopen].")],
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set one key over the file.")
-    ] = None,
+    config: Annotated[
+        Path, typer.Argument(help="The slave's TOML file; its section [servos.canopen] describes the drives.")
+    ],
+    set_: Overrides = None,
     fault: Annotated[
         list[str] | None,
         typer.Option(
@@ -28,13 +29,11 @@ def drives(
             "warns, wrong-mode, position-stuck, or none, which ends what lasts.",
         ),
     ] = None,
-    figures: Annotated[
-        Path | None, typer.Option(help="Write what was counted, as JSON, when stopped.", dir_okay=False)
-    ] = None,
+    figures: MetricsFile = None,
 ) -> None:
-    """Run the simulated drives: CiA 402 drives as CANopen nodes that turn the simulated robot.
+    """Simulate the robot's drives: CiA 402 drives on CANopen buses, which move the simulated robot.
 
-    Faults also on demand: write their number to object 2010h of a drive. The slave takes whoever does so
+    To inject a fault while it runs, write its number to object 2010h of a drive. The slave takes the sender
     for a second master, and stops.
 
     Example: `tandem drives deploy/examples/slave.toml --fault left_elbow_pitch=over-current@10`
@@ -51,5 +50,4 @@ def drives(
         counted.update(await run(checked, stop, faults))
 
     run_until_stopped(main)
-    if figures is not None:
-        figures.write_text(json.dumps(counted, ensure_ascii=False), "utf-8")
+    metrics_writer(figures)(counted)

@@ -27,9 +27,11 @@ def _group() -> None:
 
 @app.command("list")
 def list_profiles(
-    profiles: Annotated[list[str] | None, typer.Argument(help="Names or files; all that there are.")] = None,
+    profiles: Annotated[
+        list[str] | None, typer.Argument(help="Names of profiles, or TOML files; without any, all profiles.")
+    ] = None,
 ) -> None:
-    """Show the profiles, or those named, with where their figures are from.
+    """Show the network profiles, and the source of each number.
 
     Example: `tandem network list 4g`
     """
@@ -46,10 +48,14 @@ def list_profiles(
 
 @app.command()
 def verify(
-    profiles: Annotated[list[str] | None, typer.Argument(help="Names or files; all that there are.")] = None,
-    seconds: Annotated[float, typer.Option(help="How long each is measured.", min=1.0, max=600.0)] = 10.0,
+    profiles: Annotated[
+        list[str] | None, typer.Argument(help="Names of profiles, or TOML files; without any, all profiles.")
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(help="Seconds for which each profile is measured.", min=1.0, max=600.0)
+    ] = 10.0,
     backend: Annotated[
-        Literal["auto", "forwarder", "netem"], typer.Option(help="What emulates the link.")
+        Literal["auto", "forwarder", "netem"], typer.Option(help="Program that emulates the link.")
     ] = "auto",
     report: Annotated[
         Path | None,
@@ -58,9 +64,10 @@ def verify(
         ),
     ] = None,
 ) -> None:
-    """Measure the emulated link beside its profile: 200 packets/s both ways, then more than its rate.
+    """Measure the emulated link and compare it with its profile.
 
-    Needs root. Exit status 1 where it is not within 1 ms and 0.5 points of loss of the profile.
+    It sends 200 packets/s both ways, then more than the link's rate. It needs root. It ends with status 1 if
+    delay differs by more than 1 ms or loss by more than 0.5 percentage points.
 
     Example: `tandem network verify 4g adsl --seconds 30 --report network.json`
     """

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from deploy.report.output import in_a_folder, write_json
+from deploy.report.options import ReportFile
+from deploy.report.output import write_json
 
 
 def papers(
-    seeds: Annotated[int, typer.Option(help="Seeds 1 to N, each with sensors of its own.", min=1)] = 5,
+    seeds: Annotated[
+        int, typer.Option(help="Number of random seeds; each gives other sensor errors.", min=1)
+    ] = 5,
     only: Annotated[
-        str | None, typer.Option(metavar="KEYS", help="Experiments to run, such as `A,C`; all without it.")
+        str | None, typer.Option(metavar="KEYS", help="Run only these experiments, such as `A,C`.")
     ] = None,
-    report: Annotated[
-        Path | None, typer.Option(help="Write the figures as JSON.", dir_okay=False, callback=in_a_folder)
-    ] = None,
+    report: ReportFile = None,
     strict: Annotated[bool, typer.Option(help="Exit with status 1 if a target fails.")] = False,
     jobs: Annotated[
-        int | None, typer.Option(help="Processes at once; one a core (at most 4) without it.", min=1)
+        int | None,
+        typer.Option(help="Number of processes at once; by default one per core, at most 4.", min=1),
     ] = None,
 ) -> None:
-    """Repeat the papers' experiments on the simulated suit, beside the papers' figures.
+    """Repeat the papers' experiments on the simulated suit, and print the results beside the papers'.
 
     Example: `tandem accuracy papers --seeds 5 --only A,B --report papers.json`
     """

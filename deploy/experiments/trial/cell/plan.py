@@ -54,7 +54,7 @@ class Plan:
     strategies: tuple[str, ...]
     repeat: int
     seconds: float
-    """Judged in each cell."""
+    """Seconds that are judged in each run."""
     outage_s: float
     """Of the outage after it; 0: none."""
     robot: str

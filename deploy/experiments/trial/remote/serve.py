@@ -47,7 +47,7 @@ class ServeOptions:
     config: Path
     """The robot's own file."""
     listen: str
-    """Where the operator's host asks."""
+    """Endpoint at which this host waits for `tandem trial --remote`."""
     address: str = "0.0.0.0"
     """On which slaves listen."""
     port: int = 7447

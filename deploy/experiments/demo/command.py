@@ -1,0 +1,96 @@
+"""`tandem demo`."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+
+from common.errors import TandemError
+from common.process.runtime import run as run_until_stopped
+from deploy.report.options import PlotsFile, ReportFile
+from deploy.report.output import write_json
+
+
+def demo(
+    seconds: Annotated[
+        float, typer.Option(help="How many seconds the robot follows the operator.", min=3.0)
+    ] = 20.0,
+    report: ReportFile = None,
+    transport: Annotated[
+        str,
+        typer.Option(
+            help="Transport between master and slave: tcp, udp, tls, quic, quic-datagram, "
+            "ws or unixsock-stream."
+        ),
+    ] = "tcp",
+    replay: Annotated[
+        Path | None,
+        typer.Option(
+            help="Play this recording of a person (.npz) instead of a simulated motion.", exists=True
+        ),
+    ] = None,
+    profile: Annotated[str, typer.Option(help="Robot profile: nursing, hand or lower_limb.")] = "nursing",
+    motion: Annotated[
+        str | None,
+        typer.Option(
+            help="Motion of the simulated operator: sweep, calibration_pose, or the "
+            "profile's own (bottle, grasp or walk), which is the default.",
+            show_default=False,
+        ),
+    ] = None,
+    strategy: Annotated[
+        str, typer.Option(help="Tracking strategy of the slave: predict, interpolate or latest.")
+    ] = "predict",
+    filter_: Annotated[
+        str, typer.Option("--filter", help="Orientation filter of the master: vqf, mahony or ekf.")
+    ] = "vqf",
+    seed: Annotated[int, typer.Option(help="Random seed for the simulated sensor errors.")] = 1,
+    robots: Annotated[
+        int,
+        typer.Option(
+            help="Number of robots that follow the one operator; with several, the cameras are off.",
+            min=1,
+            max=32,
+        ),
+    ] = 1,
+    servos: Annotated[
+        Literal["mujoco", "canopen"],
+        typer.Option(
+            help="Servo backend: mujoco simulates the robot inside the slave, canopen "
+            "simulates drives on CAN buses."
+        ),
+    ] = "mujoco",
+    camera: Annotated[bool, typer.Option(help="Send video from the robot's camera.")] = True,
+    plots: PlotsFile = None,
+) -> None:
+    """Run simulated suit, master and robot on this machine, and judge how well the robot follows.
+
+    Example: `tandem demo --profile hand --seconds 20 --report report.json --plots fingers.png`
+    """
+    from deploy.experiments.demo.draw_curves import as_png
+    from deploy.experiments.demo.options import DemoOptions
+    from deploy.experiments.demo.run import run_demo
+    from deploy.experiments.demo.view import print_report
+
+    console = Console()
+    options = DemoOptions(
+        profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
+        strategy=strategy, filter=filter_, seed=seed, robots=robots, servos=servos, camera=camera,
+    )  # fmt: skip
+
+    async def tell(stop: asyncio.Event) -> None:
+        result = await run_demo(options, stop, console)
+        if report is not None:
+            write_json(report, result.tree)
+        print_report(result, console)
+        if plots is not None and result.curves is not None:
+            as_png(result.curves, plots)
+            console.print(f"every joint's curves: {plots}", highlight=False)
+        if result.problems:
+            raise TandemError("the demo failed: " + "; ".join(result.problems))
+
+    run_until_stopped(tell)

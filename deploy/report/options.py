@@ -1,0 +1,54 @@
+"""Options that many commands share, so that each is explained by the same words everywhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from deploy.report.output import in_a_folder
+
+
+def _a_png(path: Path | None) -> Path | None:
+    if path is not None and path.suffix.lower() != ".png":
+        raise typer.BadParameter(f"{path.name}: expected a name that ends in .png")
+    return in_a_folder(path)
+
+
+ConfigFile = Annotated[
+    Path, typer.Argument(help="The TOML file of this process; start from the one in deploy/examples.")
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Replace one key of the file for this run, as in `--set 'robot=\"robot-2\"'`; repeat for more.",
+    ),
+]
+MetricsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--figures",
+        help="On exit, write all counters and timings to this JSON file.",
+        dir_okay=False,
+        callback=in_a_folder,
+    ),
+]
+ReportFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--report", help="Write the results to this JSON file.", dir_okay=False, callback=in_a_folder
+    ),
+]
+PlotsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--plots",
+        help="Draw every joint's angle and angular velocity into this PNG file.",
+        dir_okay=False,
+        callback=_a_png,
+    ),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
