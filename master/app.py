@@ -154,7 +154,7 @@ class Master:
             nodes=self._pipeline.node_counts(),
             doubts=as_figures(self._pipeline.doubts),
             beyond_reach=self._pipeline.beyond_reach.metrics(),
-            buses={bus.name: bus.summary() for bus in self._buses},
+            buses={bus.name: bus.metrics() for bus in self._buses},
             robots={},
         )
 

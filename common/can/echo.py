@@ -14,7 +14,7 @@ KEPT_NS = NS_PER_S
 _Key = tuple[int, bytes]
 
 
-class Echo:
+class SentFrames:
     """The frames that were sent lately and have not come back yet."""
 
     def __init__(self, comes_back: bool) -> None:
@@ -35,7 +35,7 @@ class Echo:
         key = (frame_id, data)
         self._now[key] = self._now.get(key, 0) + 1
 
-    def is_ours(self, frame_id: int, data: bytes, now_ns: int) -> bool:
+    def is_echo(self, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Whether a frame that is heard is an echo; a second frame like it is not."""
         if not self._comes_back:
             return False

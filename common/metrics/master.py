@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from common.metrics.bus import BusMetrics
 from common.metrics.link import AccessMetrics, TopicCounters
 from common.metrics.parts import HeapMetrics, Software, Summary, Ticks
 from common.metrics.tree import Metrics
@@ -77,8 +78,8 @@ class MasterMetrics(Metrics):
     """Why a node's readings are not believed, by segment."""
     beyond_reach: dict[str, Unreached]
     """Segments that the robot could not bring to the operator's posture, by segment."""
-    buses: dict[str, dict[str, bool | int | str]]
-    """Each bus's counters and last error (`common.can.bus.CanBus.summary`)."""
+    buses: dict[str, BusMetrics]
+    """By name."""
     robots: dict[str, CommandedMetrics]
     access: AccessMetrics | None = None
     """In the file at the end only."""

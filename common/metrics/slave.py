@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from common.metrics.bus import BusMetrics
 from common.metrics.link import AccessMetrics, TopicCounters
 from common.metrics.parts import HeapMetrics, Software, Summary, Ticks
 from common.metrics.tree import Metrics
@@ -73,7 +74,7 @@ class ServoMetrics(Metrics):
 
     counters: dict[str, int] = field(default_factory=dict)
     times_ms: dict[str, Summary] = field(default_factory=dict)
-    buses: dict[str, dict[str, bool | int | str]] = field(default_factory=dict)
+    buses: dict[str, BusMetrics] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from common.metrics.bus import BusMetrics
 from common.metrics.tree import Metrics
 
 
@@ -16,4 +17,4 @@ class SuitMetrics(Metrics):
     ticks: int
     frames: int
     stale_syncs: int
-    buses: dict[str, dict[str, bool | int | str]]
+    buses: dict[str, BusMetrics]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.clock import monotonic_ns
+from common.metrics.tree import to_tree
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from master.suit.nodes import NodeConfig
@@ -70,7 +71,7 @@ class SuitCapture:
         return {
             "ticks": {"expected": self.counters.expected, "missed": self.counters.missed},
             "nodes": self._poll.summary(),
-            "buses": {bus.name: bus.summary() for bus in self._buses},
+            "buses": {bus.name: to_tree(bus.metrics()) for bus in self._buses},
         }
 
     def _on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:

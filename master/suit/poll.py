@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.can.bus import BusCounters
 from common.can.frame import Frame
+from common.metrics.bus import BusCounters
 from common.quaternion import Array
 from common.wire.messages import Mask
 from master.suit.clash import Clashes

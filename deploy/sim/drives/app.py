@@ -14,6 +14,7 @@ from common.can.config import BusConfig
 from common.can.frame import Frame
 from common.can.without_echo import open_without_function_code
 from common.clock import monotonic_ns
+from common.metrics.tree import to_tree
 from common.process.heap import freeze_heap
 from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
@@ -62,4 +63,4 @@ async def run(config: SlaveConfig, stop: asyncio.Event, faults: Sequence[Planned
         await until_stopped(stop, move())
     finally:
         await asyncio.gather(*(bus.close() for bus in buses.values()))
-    return {**asdict(peer.counters), "buses": {name: bus.summary() for name, bus in buses.items()}}
+    return {**asdict(peer.counters), "buses": {name: to_tree(bus.metrics()) for name, bus in buses.items()}}

@@ -64,5 +64,5 @@ async def run(
         ticks=counted.ticks,
         frames=counted.frames,
         stale_syncs=newest.stale,
-        buses={name: bus.summary() for name, bus in buses.items()},
+        buses={name: bus.metrics() for name, bus in buses.items()},
     )

@@ -15,8 +15,9 @@ import numpy as np
 
 from common.can.bus import CanBus
 from common.can.config import BusConfig
+from common.can.controller import Controller
 from common.can.frame import Frame
-from common.can.state import Controller, ask_kernel
+from common.can.netlink import ask_kernel
 from common.can.without_echo import open_without_function_code
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
 from common.errors import RobotError
@@ -161,7 +162,7 @@ class CanopenServos:
                 "sync_to_positions": self._answered.summary(),
                 "sync_period": self._period.summary(),
             },
-            buses={name: bus.summary() for name, bus in self._buses.items()},
+            buses={name: bus.metrics() for name, bus in self._buses.items()},
         )
 
     def _check_load(self, bus: BusConfig) -> None:

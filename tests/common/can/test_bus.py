@@ -14,10 +14,11 @@ import msgpack
 import pytest
 import uvloop
 
-from common.can.bus import LONGEST_WAIT_S, SEND_ERRORS_IN_A_ROW, CanBus, wait_s
+from common.can.bus import SEND_ERRORS_IN_A_ROW, CanBus
 from common.can.config import BusConfig
 from common.can.frame import Frame
 from common.can.interface import open_bus
+from common.can.kept_open import LONGEST_WAIT_S, wait_s
 from common.errors import BusError
 
 SYNC = Frame(0x080, b"1234", fd=False)
@@ -343,7 +344,7 @@ def test_a_bus_that_is_not_there_at_the_start_is_opened_once_it_is(caplog: pytes
 
     with caplog.at_level("WARNING"):
         run(test())
-    assert "it is tried again until it opens" in caplog.text
+    assert "bus suit: cannot open socketcan can0: No such device; retrying" in caplog.text
 
 
 def test_a_bus_that_no_waiting_can_open_is_an_error_at_once() -> None:

@@ -55,7 +55,7 @@ def test_it_answers_and_tells_the_truth_until_it_is_stopped(
     assert heard == [0x100 + i for _ in range(3) for i in range(1, 37)]
     assert [truth.tick for truth in truths] == [0, 1, 2]
     assert (figures.syncs, figures.ticks, figures.frames) == (3, 3, 108)
-    assert figures.buses["suit"]["sent"] == 108
+    assert figures.buses["suit"].sent == 108
 
 
 def test_a_delayed_answer_still_comes(config: SuitConfig, protocol: SuitProtocol) -> None:

@@ -1,10 +1,9 @@
-"""A controller's state in words, by error frames and the kernel's own message; when a bus is up again."""
+"""When a bus whose controller left the bus counts as up again."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import struct
 from collections.abc import Callable
 
 import can
@@ -12,76 +11,9 @@ import pytest
 
 from common.can.bus import CanBus
 from common.can.config import BusConfig
-from common.can.state import (
-    Controller,
-    Link,
-    ask_kernel,
-    bus_off_words,
-    error_words,
-    of_error_frame,
-    read_link,
-)
+from common.can.controller import Controller
 from common.errors import BusError
 from tests.common.can.test_bus import ScriptedBus, run
-
-
-@pytest.mark.parametrize(
-    ("error_id", "detail", "state", "words"),
-    [
-        (0x004, 0x04, Controller.ERROR_WARNING, "the controller is error-warning"),
-        (0x004, 0x08, Controller.ERROR_WARNING, "the controller is error-warning"),
-        (0x004, 0x10, Controller.ERROR_PASSIVE, "the controller is error-passive"),
-        (0x004, 0x2C, Controller.ERROR_PASSIVE, "the controller is error-passive"),
-        (0x004, 0x40, Controller.ERROR_ACTIVE, "the controller is error-active"),
-        (0x004, 0x01, None, "the controller lost frames that came in"),
-        (0x040, 0x00, Controller.BUS_OFF, "the controller is bus-off"),
-        (0x100, 0x00, Controller.ERROR_ACTIVE, "the controller was restarted"),
-        (0x020, 0x00, None, "nobody acknowledges: no other node on the bus, or the wire is cut"),
-        (0x008, 0x00, None, "frames are destroyed: look at the bit rate, the wiring, 120 Ω at both ends"),
-        (0x001, 0x00, None, "error frame 0x1"),
-    ],
-)
-def test_error_frames_in_words(error_id: int, detail: int, state: Controller | None, words: str) -> None:
-    data = bytes([0, detail, 0, 0, 0, 0, 0, 0])
-    assert of_error_frame(error_id, data) is state
-    assert error_words(error_id, data) == words
-    counted = bytes([0, detail, 0, 0, 0, 0, 130, 7])
-    assert error_words(error_id | 0x200, counted).endswith("130 errors of sending and 7 of receiving counted")
-    assert of_error_frame(error_id, b"") in (None, state)
-
-
-def attribute(kind: int, data: bytes) -> bytes:
-    return struct.pack("=HH", 4 + len(data), kind) + data + bytes(-len(data) % 4)
-
-
-def newlink(state: int, restart_ms: int = 0, kind: int = 16) -> bytes:
-    """As the kernel builds it: name, then linkinfo with the kind and the controller's data."""
-    bittiming = struct.pack("=8I", 1_000_000, 750, 50, 7, 7, 5, 1, 1)
-    told = attribute(1, bittiming) + attribute(4, struct.pack("=I", state))
-    told += attribute(6, struct.pack("=I", restart_ms))
-    info = attribute(1, b"can\0") + attribute(2, told)
-    body = struct.pack("=BxHiII", 0, 280, 3, 0, 0) + attribute(3, b"can0\0") + attribute(18, info)
-    return struct.pack("=IHHII", 16 + len(body), kind, 0, 1, 0) + body
-
-
-@pytest.mark.parametrize(("number", "state"), list(enumerate(Controller)))
-def test_the_kernel_s_message_is_read(number: int, state: Controller) -> None:
-    assert read_link(newlink(number, 100)) == Link(state, 1_000_000, 100)
-
-
-def test_messages_that_tell_nothing() -> None:
-    assert read_link(newlink(0, kind=2)) is None
-    assert read_link(newlink(9)) == Link(None, 1_000_000, 0)
-    whole = newlink(3)
-    for end in range(len(whole)):
-        read_link(whole[:end])  # never raises
-    assert ask_kernel("lo") is None
-    assert ask_kernel("no-such-can") is None
-
-
-def test_bus_off_says_how_the_controller_comes_back() -> None:
-    assert "the kernel restarts it after 100 ms" in bus_off_words("can0", Link(Controller.BUS_OFF, 0, 100))
-    assert "`ip link set can0 type can restart`" in bus_off_words("can0", Link(Controller.BUS_OFF))
 
 
 class Story:
@@ -173,7 +105,7 @@ def test_error_passive_is_in_the_figures() -> None:
         story.bus.open()
         story.hear(0x04, error=True, data=bytes([0, 0x20, 0, 0, 0, 0, 128, 0]))
         await story.until(lambda: story.bus.counters.error_frames == 1)
-        assert story.bus.summary()["state"] == "error-passive"
+        assert story.bus.metrics().state == "error-passive"
         assert story.bus.up
         await story.bus.close()
 
