@@ -97,7 +97,7 @@ def _six_position(
 ) -> None:
     from deploy.calibrate import session as sessions
     from deploy.calibrate.views import notes, six_position_table
-    from master.calibrate.six_session import (
+    from master.calibrate.six_position_session import (
         SixPositionCalibration,
         SixPositionOptions,
         calibrate_six_position,

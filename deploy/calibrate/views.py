@@ -15,7 +15,7 @@ from common.quaternion import Array
 from deploy.calibrate.session import Found, by_words
 from master.calibrate.inertial import InertialCalibration
 from master.calibrate.magnetic import MagneticCalibration
-from master.calibrate.six_session import SixPositionCalibration
+from master.calibrate.six_position_session import SixPositionCalibration
 
 
 def inertial_table(found: Mapping[str, InertialCalibration]) -> Table:

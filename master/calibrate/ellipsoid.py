@@ -176,21 +176,6 @@ def coverage(fit: Ellipsoid, readings: Array) -> float:
     return len(seen) / CELLS
 
 
-def amplification(fit: Ellipsoid, readings: Array) -> float:
-    """How far an error of ‖h_o‖ in every cell seen carries into the centre: 1σ over that error.
-
-    1σ of the worst of the centre's axes, were each cell seen one observation with an error of 1. About 0.2
-    for the whole sphere; it grows without bound as the part seen gets smaller.
-    """
-    directions = (readings - fit.centre) @ fit.shape
-    _, first = np.unique(cells(directions), return_index=True)
-    slope = parameter_slopes(fit, readings[first]) * fit.field_ut
-    if len(first) <= UNKNOWNS:
-        return float("inf")
-    cov = covariance(slope, np.zeros(len(slope)), 1, least_variance=1.0)
-    return float(np.sqrt(np.diag(cov)[6:].max()))
-
-
 def _constrained(m: Array) -> tuple[Array, Array]:
     """The algebraic fit: unit-sphere shape (3, 3) and centre (3,)."""
     from scipy.linalg import eig

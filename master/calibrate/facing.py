@@ -40,6 +40,8 @@ class Axis:
     """False: its sign is open, the facing may be half a turn off."""
 
 
+Ends = Mapping[str, tuple[float, Array]]
+"""Of each aligned node the heading of its own earth frame, rad, and `q_sensor_from_segment`."""
 Island = dict[str, tuple[float, float]]
 """Nodes whose headings are known against each other: offset into the island's frame, and its variance."""
 
@@ -118,27 +120,39 @@ def _excess(
     if limits is None:
         return 0.0
     turns = {name: facing_rad - island[name][0] for name in (joint.parent, joint.segment)}
-    angle = joint_angles(skeleton, suit, i, {
+    ends = {
         name: (island[name][0], multiply(conjugate(q_zero_pose[name]), heading_turn(turn)))
         for name, turn in turns.items()
-    })[first]  # fmt: skip
-    return float(np.mean(np.maximum(limits[0] - angle, 0.0) + np.maximum(angle - limits[1], 0.0)))
+    }
+    return float(np.mean(beyond(joint_angles(skeleton, suit, i, ends)[first], limits)))
 
 
-def joint_angles(
-    skeleton: Skeleton, suit: Oriented, i: int, ends: Mapping[str, tuple[float, Array]]
-) -> Array:
+def joint_angles(skeleton: Skeleton, suit: Oriented, i: int, ends: Ends) -> Array:
     """Intrinsic angles (3, K) of a joint at some 20 Hz, for heading and alignment by name."""
-    entry = skeleton.segments[i]
-    step = max(1, round(suit.rate_hz / 20.0))
-    q = [
-        multiply(multiply(heading_turn(ends[n][0]), suit.q[suit.names.index(n)][::step]), ends[n][1])
-        for n in (entry.parent, entry.name)
-    ]
+    entry, step = skeleton.segments[i], max(1, round(suit.rate_hz / 20.0))
+    parent, child = (segment_orientation(suit, ends, name, step) for name in (entry.parent, entry.name))
+    return angles_at(skeleton, i, parent, child)
+
+
+def segment_orientation(suit: Oriented, ends: Ends, name: str, step: int) -> Array:
+    """A segment's orientation (K, 4) in the common frame, of every `step`-th sample."""
+    heading_rad, q_sensor_from_segment = ends[name]
+    q = suit.q[suit.names.index(name)][::step]
+    return multiply(multiply(heading_turn(heading_rad), q), q_sensor_from_segment)
+
+
+def angles_at(skeleton: Skeleton, i: int, parent: Array, child: Array) -> Array:
+    """Intrinsic angles (3, K) at the joint of segment `i`, for orientations (K, 4) of both sides."""
     frame = skeleton.axis_frames[i]
-    angles = intrinsic_angles(frame.T @ to_matrix(multiply(conjugate(q[0]), q[1])) @ frame)
+    angles = intrinsic_angles(frame.T @ to_matrix(multiply(conjugate(parent), child)) @ frame)
     angles[2] *= skeleton.axis_handedness[i]
     return angles
+
+
+def beyond(angle: Array, limits: tuple[float, float]) -> Array:
+    """How far angles (K,) are outside their limits, rad."""
+    out: Array = np.maximum(limits[0] - angle, 0.0) + np.maximum(angle - limits[1], 0.0)
+    return out
 
 
 def limits_of(skeleton: Skeleton, angle: str | None) -> tuple[float, float] | None:

@@ -9,13 +9,13 @@ better than the readings as they are names the fault.
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from common.quaternion import Array, from_rotation_vector, multiply, rotate
+from master.calibrate.carried import confusion, signed_permutations
 from master.calibrate.evidence import Evidence, at_most, not_judged
 
 WINDOW_S = 6.0
@@ -42,7 +42,7 @@ _UNITS = {_DEG: "°/s", 1e-3 * _DEG: "thousandths of °/s", 1.0 / _DEG: "radians
 
 
 @dataclass(frozen=True, slots=True)
-class Agreement:
+class GravityAgreement:
     """How the gyroscope and gravity agree, and what would explain it better."""
 
     scatter: float
@@ -59,7 +59,7 @@ class Agreement:
     """Median scatter of all wrong guesses: near 0 where the unit hardly turned."""
 
 
-def gyro_gravity(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> Agreement | None:
+def gyro_gravity(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> GravityAgreement | None:
     """Compare over a recording (T, 3), its gaps bridged; None where it is too short."""
     thin = max(1, round(rate_hz / _THINNED_HZ))
     length = len(acc_m_s2) // thin * thin
@@ -81,7 +81,7 @@ def gyro_gravity(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> Agreement
     best = int(np.argmin(scatter))
     clearly = scatter[best] < _BETTER * scatter[0] and scatter[0] - scatter[best] > _LEAST_GAIN
     best = best if clearly else 0
-    return Agreement(
+    return GravityAgreement(
         float(scatter[0]),
         by_window[0],
         samples / rate_hz,
@@ -92,7 +92,7 @@ def gyro_gravity(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> Agreement
     )
 
 
-def judge_agreement(found: Agreement | None) -> list[Evidence]:
+def judge_agreement(found: GravityAgreement | None) -> list[Evidence]:
     """Units of the gyroscope first, then its axes, then whatever else makes both contradict each other."""
     of_unit, of_axes = "the gyroscope's unit, by gravity's turns", "the gyroscope's axes, by gravity's turns"
     if found is None:
@@ -180,17 +180,8 @@ def slipped(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> Evidence:
 def describe(guess: Array) -> str:
     """In words, what a signed permutation (3, 3) times the readings would put right."""
     if np.array_equal(guess, -np.eye(3)):
-        return "all its axes, or all the accelerometer's, seem mirrored (a left-handed frame)"
-    signs = guess.sum(axis=1)
-    source = np.argmax(np.abs(guess), axis=1)
-    said = []
-    moved = [i for i in range(3) if source[i] != i]
-    if moved:
-        said.append(f"its axes {' and '.join('xyz'[i] for i in moved)} seem exchanged with each other")
-    negated = [i for i in range(3) if signs[i] < 0]
-    if negated:
-        said.append(f"its axis {' and '.join('xyz'[source[i]] for i in negated)} seems negated")
-    return ", ".join(said)
+        return "all its axes, or all the accelerometer's, are mirrored (a left-handed frame)"
+    return confusion(guess)
 
 
 def _bias(gyr: Array, rate_hz: float) -> Array:
@@ -211,14 +202,8 @@ def _unit(scale: float) -> str:
 
 def _guesses() -> Array:
     """(G, 3, 3), the identity first, then the other signed permutations, then other units."""
-    turns = []
-    for place in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            matrix = np.zeros((3, 3))
-            matrix[range(3), place] = signs
-            turns.append(matrix)
-    # itertools begins with the identity
-    return np.array([*turns, *(_DEG * turn for turn in turns), 1e-3 * _DEG * np.eye(3), np.eye(3) / _DEG])
+    turns = signed_permutations()
+    return np.array([*turns, *(_DEG * turns), 1e-3 * _DEG * np.eye(3), np.eye(3) / _DEG])
 
 
 def _scatter(force: Array, turn_rad: Array, guesses: Array) -> Array:

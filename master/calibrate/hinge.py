@@ -3,19 +3,27 @@
 Whatever the limb as a whole does, both units share the part of the rotation that is not about the hinge: at
 every instant ‖g1 × j1‖ = ‖g2 × j2‖ (Seel, Schauer and Raisch 2012, Eq. 3; Seel, Raisch and Schauer 2014,
 Eq. 1). j1 and j2 are the unit vectors that come nearest to it over all samples. Each is found up to its sign.
+
+The axes by all readings (`joint_fit.py`) should agree with these. There the rates are those that neighbours
+share, low-passed in the earth frame (`oriented.py`): as the sensors read them, skin that shakes under a thigh
+turns the axes from the rates alone by 80°. What both are apart widens the stated uncertainty, and beyond a
+limit it refuses the answer.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from common.errors import TandemError
 from common.quaternion import Array
+from master.calibrate.evidence import Evidence, at_most, not_judged
 from master.calibrate.gauss_newton import Minimum, along_sphere, gauss_newton, half_sphere, tangents
+from master.calibrate.joint_fit import JointFit
+from master.calibrate.joint_residuals import Moving
 
 _STARTS = 6
 """Directions tried for each of the two axes: 36 starts."""
@@ -38,12 +46,18 @@ _WORST_MISFIT = 0.5
 """Misfit as a share of the bending: a knee's is 0.1 to 0.3; a joint that turns every way is near 1."""
 
 
+WORST_APART_RAD = math.radians(30.0)
+"""A real person's thigh, the worst segment for skin, is 13 to 28° apart; a simulated one 0.2°."""
+_SHARE = 1.0 / 3.0
+"""Of what both ways are apart, one standard deviation of either."""
+
+
 class PoorMotionError(TandemError):
     """The motion recorded does not tell what was asked; the text says which motion would."""
 
 
 @dataclass(frozen=True, slots=True)
-class Hinge:
+class HingeAxes:
     """What was found of a hinge, and how well it is known."""
 
     axis1: Array
@@ -66,7 +80,7 @@ class Hinge:
 Axes = tuple[Array, Array]
 
 
-def find_hinge(gyr1_rad_s: Array, gyr2_rad_s: Array, rate_hz: float) -> Hinge:
+def find_hinge(gyr1_rad_s: Array, gyr2_rad_s: Array, rate_hz: float) -> HingeAxes:
     """Gauss-Newton from several starts over rates (T, 3) of two units in their own frames.
 
     Rows with NaN are left out. Whether the answer can be trusted is for `check` to say.
@@ -86,7 +100,7 @@ def find_hinge(gyr1_rad_s: Array, gyr2_rad_s: Array, rate_hz: float) -> Hinge:
     covariance = variance * np.linalg.pinv(best.normal, rcond=1e-14).astype(np.float64)
     about1, about2 = gyr1 @ axis1, gyr2 @ axis2
     bending = min(float(np.mean((about1 - sign * about2) ** 2)) for sign in (1.0, -1.0))
-    return Hinge(
+    return HingeAxes(
         axis1,
         axis2,
         _sigma(covariance[:2, :2], eigenvalues),
@@ -98,7 +112,7 @@ def find_hinge(gyr1_rad_s: Array, gyr2_rad_s: Array, rate_hz: float) -> Hinge:
     )
 
 
-def check(hinge: Hinge, joint: str) -> None:
+def check(hinge: HingeAxes, joint: str) -> None:
     """Raise PoorMotionError where the hinge cannot be trusted, saying what to do."""
     check_moved(hinge, joint)
     sigma = max(hinge.sigma1_rad, hinge.sigma2_rad)
@@ -110,7 +124,7 @@ def check(hinge: Hinge, joint: str) -> None:
         raise PoorMotionError(f"{joint}: a quite different axis explains the motion as well; {again(joint)}")
 
 
-def check_moved(hinge: Hinge, joint: str) -> None:
+def check_moved(hinge: HingeAxes, joint: str) -> None:
     """Raise PoorMotionError where nobody moved the joint, or it moves like no hinge."""
     if hinge.bending_rad_s < _LEAST_RATE_RAD_S:
         raise PoorMotionError(
@@ -128,6 +142,38 @@ def check_moved(hinge: Hinge, joint: str) -> None:
 def again(joint: str) -> str:
     """What to do about poor motion."""
     return f"record again: bend {joint} ten times through its range while the whole limb moves about"
+
+
+def check_rates(fit: JointFit, parent: Moving, child: Moving, spacing_s: float) -> tuple[JointFit, Evidence]:
+    """The answer with its uncertainty widened by what the rates alone say, and the comparison itself."""
+    compared = "the hinge's axes against the rates alone"
+    assert fit.axes is not None
+    try:
+        found = find_hinge(_in_sensor(parent), _in_sensor(child), 1.0 / spacing_s)
+        check(found, "the joint")
+    except PoorMotionError as error:
+        return fit, not_judged(compared, f"the rates alone do not tell: {error}")
+    apart = [_angle(a, b) for a, b in zip((found.axis1, found.axis2), fit.axes, strict=True)]
+    sigma = (
+        max(fit.axis_sigma_rad[0], _SHARE * apart[0]),
+        max(fit.axis_sigma_rad[1], _SHARE * apart[1]),
+    )
+    evidence = at_most(
+        compared,
+        math.degrees(max(apart)),
+        math.degrees(WORST_APART_RAD),
+        "°",
+        advice=f"its axes by all readings are {math.degrees(max(apart)):.0f}° from those by the rates alone: "
+        "one of the two units is loose, clipped or on another segment. Fix both, and record ten slow bends "
+        "through the whole range",
+    )
+    return replace(fit, axis_sigma_rad=sigma), evidence
+
+
+def _in_sensor(unit: Moving) -> Array:
+    """The shared rates (K, 3) in the sensor's own frame."""
+    out: Array = np.einsum("kji,kj->ki", unit.r, unit.rate)
+    return out
 
 
 def residuals(gyr1: Array, gyr2: Array, axis1: Array, axis2: Array) -> tuple[Array, Array]:
@@ -182,7 +228,11 @@ def _minimum(gyr1: Array, gyr2: Array, start: Axes, most_steps: int = 50) -> Min
 
 def _apart(one: Axes, other: Axes) -> float:
     """The larger of the two axes' angles, whatever their signs."""
-    return max(math.acos(min(1.0, abs(float(a @ b)))) for a, b in zip(one, other, strict=True))
+    return max(_angle(a, b) for a, b in zip(one, other, strict=True))
+
+
+def _angle(one: Array, other: Array) -> float:
+    return math.acos(min(1.0, abs(float(one @ other))))
 
 
 def _sigma(covariance: Array, eigenvalues: Array) -> float:

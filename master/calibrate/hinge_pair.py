@@ -18,11 +18,9 @@ from common.quaternion import heading_turn, to_matrix
 from master.calibrate.clock_lag import WORST_LAG_S, joint_lag
 from master.calibrate.evidence import Evidence, first_contradiction
 from master.calibrate.gauss_newton import tangents
-from master.calibrate.hinge import Hinge as FoundHinge
-from master.calibrate.hinge import PoorMotionError, again, check_moved, find_hinge
+from master.calibrate.hinge import HingeAxes, PoorMotionError, again, check_moved, check_rates, find_hinge
 from master.calibrate.joint_fit import JointFit, fit_joint
 from master.calibrate.oriented import bridged, moving, orient, rows_moving
-from master.calibrate.rates_alone import check_rates
 from master.calibrate.recording import NodeRecording
 from master.calibrate.unit_evidence import unit_evidence
 from master.orientation.hinge_angle import Hinge
@@ -36,7 +34,7 @@ _WORST_RIVAL = 1.15
 class HingePair:
     """A hinge between two units."""
 
-    found: FoundHinge
+    found: HingeAxes
     """Axes from the rates alone (paper C), signs as the answer's."""
     fit: JointFit
     """The answer: axes, heading offset and joint centre from all readings together."""
@@ -95,7 +93,7 @@ def find_hinge_pair(one: NodeRecording, two: NodeRecording) -> HingePair:
     zero2 = (turn @ child.r_zero_pose).T @ (parent.r_zero_pose @ zero1)
     zero2 -= axis2 * (zero2 @ axis2)
     hinge = Hinge(axis1, axis2, zero1, zero2, fit.levers_m[0], fit.levers_m[1])
-    signed = FoundHinge(
+    signed = HingeAxes(
         first, second, found.sigma1_rad, found.sigma2_rad, found.condition, found.misfit_rad_s,
         found.bending_rad_s, found.rival,
     )  # fmt: skip

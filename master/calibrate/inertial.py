@@ -14,21 +14,18 @@ from master.calibrate import accelerometer as acc
 from master.calibrate import gyroscope as gyr
 from master.calibrate import inertial_evidence as compare
 from master.calibrate.evidence import Evidence, refuse_contradictions
+from master.calibrate.inertial_readings import STANDARD_GRAVITY_M_S2, made, sound_readings
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
-from master.calibrate.soundness import check_inertial, check_samples, filled, without_zeros
 from master.calibrate.still import (
     THRESHOLDS,
     Intervals,
     distinct_attitudes,
     interval_means,
-    motion_level,
     still_intervals,
-    stillest_level,
 )
 from master.calibrate.turns import moving_readings
 
-STANDARD_GRAVITY_M_S2 = 9.80665
 FEWEST_STILL = 12
 FEWEST_ATTITUDES = 9
 FEWEST_MOVES = 9
@@ -36,9 +33,6 @@ PAPER_ATTITUDES = 20
 _AS_GOOD = 1.2
 """A threshold whose residual is within this ratio of the best one's is as good; the lowest such is taken."""
 _LONGEST_MOVE_S = 30.0
-_LONGEST_GAP_S = 0.05
-_CLIP_WATCH = 40.0
-"""Only what turns this many times faster than rest can be at the end of a gyro's range."""
 _TRIAL_ERROR_M_S2 = 0.01
 _WORST_GAIN, _WORST_BIAS_M_S2 = 0.02, 0.1
 """What an error of that size in every still interval may make of the fit."""
@@ -84,26 +78,13 @@ class InertialCalibration:
     def parts(self, day: date, recording: str) -> dict[Part, tuple[Array, Made]]:
         """As `write_calibration` takes them."""
         a, g = self.accelerometer, self.gyroscope
-        return {
-            "accelerometer": (
-                a.affine,
-                _made(
-                    day,
-                    recording,
-                    "m/s²",
-                    self.acc_before_m_s2,
-                    a.residuals_m_s2,
-                    a.hold_out_m_s2,
-                    a.affine_sigma,
-                ),
-            ),
-            "gyroscope": (
-                g.affine,
-                _made(
-                    day, recording, "rad", self.gyr_before_rad, g.errors_rad, g.hold_out_rad, g.affine_sigma
-                ),
-            ),
-        }
+        acc_made = made(
+            day, recording, "m/s²", self.acc_before_m_s2, a.residuals_m_s2, a.affine_sigma, a.hold_out_m_s2
+        )
+        gyr_made = made(
+            day, recording, "rad", self.gyr_before_rad, g.errors_rad, g.affine_sigma, g.hold_out_rad
+        )
+        return {"accelerometer": (a.affine, acc_made), "gyroscope": (g.affine, gyr_made)}
 
 
 def calibrate_inertial(
@@ -115,18 +96,10 @@ def calibrate_inertial(
 
     `progress` hears what share is done.
     """
-    recording = without_zeros(recording)
-    check_samples("accelerometer", recording.acc_m_s2)
-    check_samples("gyroscope", recording.gyr_rad_s)
-    gravity = options.gravity_m_s2
-    evidence = [] if recording.counts else [compare.known_unit(_median_norm(recording), gravity)]
-    refuse_contradictions(evidence)
-    rates = filled(recording.gyr_rad_s, round(_LONGEST_GAP_S * recording.rate_hz))
-    level = motion_level(rates, recording.rate_hz)
-    rest = stillest_level(level, floor=1.0 if recording.counts else 1e-3)
-    check_inertial(recording, level, _CLIP_WATCH * rest)
-    evidence += refuse_contradictions(compare.ranges(recording, rates[level < 2.0 * rest]))
-    still, readings, first = _best_stills(recording, level, rest, options)
+    sound = sound_readings(recording, options.gravity_m_s2)
+    recording, rates, gravity = sound.recording, sound.rates, options.gravity_m_s2
+    evidence = [*sound.evidence]
+    still, readings, first = _best_stills(recording, sound.level, sound.rest, options)
     fit = acc.fit_accelerometer(readings, gravity, first)
     attitudes = _check_attitudes(fit, readings, gravity)
     progress(0.1)
@@ -159,11 +132,6 @@ def calibrate_inertial(
         notes=(*recording.notes, *_notes(recording, attitudes, len(moves.counts), len(still) - 1)),
         evidence=tuple(evidence),
     )
-
-
-def _median_norm(recording: NodeRecording) -> float:
-    norms = np.linalg.norm(recording.acc_m_s2, axis=1)
-    return float(np.median(norms[np.isfinite(norms)]))
 
 
 def _best_stills(
@@ -290,21 +258,6 @@ def _notes(recording: NodeRecording, attitudes: int, moves: int, between: int) -
     if recording.counts:
         notes.append("the readings are raw counts: the maps take counts to m/s² and rad/s")
     return tuple(notes)
-
-
-def _made(
-    day: date, recording: str, unit: str, before: Array, after: Array, held: Array, sigma: Array
-) -> Made:
-    hold_out = float(np.mean(np.abs(held)))
-    return Made(
-        date=day,
-        recording=recording,
-        unit=unit,
-        residual_before=float(np.mean(np.abs(before))),
-        residual_after=float(np.mean(np.abs(after))),
-        hold_out=hold_out if np.isfinite(hold_out) else None,
-        sigma=sigma.tolist(),
-    )
 
 
 def _unit(v: Array) -> Array:

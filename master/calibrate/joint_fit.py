@@ -32,7 +32,7 @@ import numpy as np
 from common.quaternion import Array, heading_turn, rotate
 from master.calibrate.gauss_newton import half_sphere
 from master.calibrate.joint_residuals import Axes, JointProblem, Moving, Unknowns
-from master.calibrate.steadiness import Steadiness, steadiness
+from master.calibrate.steadiness import Steadiness, steadiness, worst_sigma
 
 _INDEPENDENT_S = 0.2
 """Samples nearer than that to each other say the same."""
@@ -83,24 +83,10 @@ def fit_joint(
     """
     count = len(parent.r)
     few, many = (np.arange(0, count, max(1, -(-count // most))) for most in (_COARSE, _MOST))
-    offsets = np.arange(_OFFSETS) * 2.0 * math.pi / _OFFSETS
-    if zero_axes is not None:
-        ball = fit_joint(parent, child, None, spacing_s)
-        if ball.offset_sigma_rad < _SURE_RAD and ball.rival > _SURE_RIVAL:
-            offsets = np.array([ball.offset_rad, ball.offset_rad + math.pi])
     stood = near is None
-    if zero_axes is None:
-        starts = [Unknowns(None, float(offset), np.zeros(6)) for offset in offsets]
-    elif near is None:
-        starts = _starts_of_zero_pose(parent, child, zero_axes, offsets)
-    else:
-        starts = [Unknowns(axes, float(offset), np.zeros(6)) for axes in near for offset in offsets]
-        starts += _starts_anywhere(parent, child, offsets)
+    starts = _starts(parent, child, zero_axes, spacing_s, near)
     coarse = JointProblem(parent.some(few), child.some(few), zero_axes, stood)
-    tried = sorted(
-        (coarse.descend(start, most_steps=12) for start in starts),
-        key=lambda m: m[1],
-    )
+    tried = sorted((coarse.descend(start, most_steps=12) for start in starts), key=lambda m: m[1])
     kept: list[Unknowns] = []
     for unknowns, _, _ in tried:
         if not any(_same_offset(unknowns, k) and _same_axes(unknowns, k) for k in kept):
@@ -115,7 +101,9 @@ def fit_joint(
     scale = max(0.25, 2.0 * cost / fine.rows)
     covariance = scale * independent * np.linalg.pinv(normal, rcond=1e-12).astype(np.float64)
     axes = 4 if zero_axes is not None else 0
-    formal = (_worst(covariance[:2, :2]), _worst(covariance[2:4, 2:4])) if axes else (math.pi, math.pi)
+    formal = (math.pi, math.pi)
+    if axes:
+        formal = (worst_sigma(covariance[:2, :2]), worst_sigma(covariance[2:4, 2:4]))
     steady = steadiness(fine, best)
     return JointFit(
         best.axes,
@@ -146,6 +134,26 @@ def _same_axes(one: Unknowns, other: Unknowns) -> bool:
     return all(abs(float(a @ b)) > math.cos(_ALIKE_RAD) for a, b in zip(one.axes, other.axes, strict=True))
 
 
+def _starts(
+    parent: Moving,
+    child: Moving,
+    zero_axes: Sequence[Array] | None,
+    spacing_s: float,
+    near: Sequence[Axes] | None,
+) -> list[Unknowns]:
+    """Where the descent begins: many headings, and many axes of a joint that has some."""
+    offsets = np.arange(_OFFSETS) * 2.0 * math.pi / _OFFSETS
+    if zero_axes is None:
+        return [Unknowns(None, float(offset), np.zeros(6)) for offset in offsets]
+    ball = fit_joint(parent, child, None, spacing_s)
+    if ball.offset_sigma_rad < _SURE_RAD and ball.rival > _SURE_RIVAL:
+        offsets = np.array([ball.offset_rad, ball.offset_rad + math.pi])
+    if near is None:
+        return _starts_of_zero_pose(parent, child, zero_axes, offsets)
+    starts = [Unknowns(axes, float(offset), np.zeros(6)) for axes in near for offset in offsets]
+    return starts + _starts_anywhere(parent, child, offsets)
+
+
 def _starts_of_zero_pose(
     parent: Moving, child: Moving, zero_axes: Sequence[Array], offsets: Array
 ) -> list[Unknowns]:
@@ -173,10 +181,6 @@ def _starts_anywhere(parent: Moving, child: Moving, offsets: Array) -> list[Unkn
 def _true(formal: float, steady: Steadiness, end: int) -> float:
     """An axis's standard deviation: the least that any of the ways to tell it leaves."""
     return max(formal, steady.axis_sigma_rad[end], 0.5 * steady.axis_change_rad[end])
-
-
-def _worst(covariance: Array) -> float:
-    return min(math.pi, math.sqrt(max(0.0, float(np.linalg.eigvalsh(covariance)[-1]))))
 
 
 def _wrap(angle_rad: float) -> float:

@@ -9,10 +9,10 @@ import numpy as np
 
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from master.calibrate.hinge import check_rates
 from master.calibrate.joint_fit import JointFit, fit_joint
 from master.calibrate.joint_residuals import Moving
 from master.calibrate.oriented import rows_moving
-from master.calibrate.rates_alone import check_rates
 
 _WORST_AXIS_RAD = math.radians(10.0)
 _WORST_OFFSET_RAD = math.radians(8.0)

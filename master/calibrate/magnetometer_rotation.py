@@ -33,8 +33,6 @@ class MagnetometerRotation:
 
     q_acc_from_mag: Array
     """(4,): turns calibrated magnetometer readings into the calibrated accelerometer's axes."""
-    dip_rad: float
-    """Of the field below the horizon, in the mean of all attitudes."""
     before_rad: float
     """RMS over the attitudes of the dip's error with the axes as they were; and now."""
     after_rad: float
@@ -86,7 +84,6 @@ def align_magnetometer(acc: Array, mag: Array) -> MagnetometerRotation:
     covariance = variance * np.linalg.inv(jacobian.T @ jacobian)[:3, :3]
     found = MagnetometerRotation(
         q,
-        -float(np.mean(np.arcsin(np.clip(product, -1.0, 1.0)))),
         float(np.sqrt(np.mean(before**2))),
         float(np.sqrt(np.mean(after**2))),
         float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),

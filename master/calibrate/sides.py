@@ -8,25 +8,20 @@ recording tells it, the left joint's centre must also lie to the left of the rig
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
-from common.quaternion import IDENTITY, Array, conjugate, heading_turn, multiply, rotate, to_matrix
+from common.quaternion import IDENTITY, conjugate, rotate
 from common.skeleton import Skeleton
 from master.calibrate.evidence import Evidence, at_most, not_judged
-from master.calibrate.facing import limits_of
+from master.calibrate.facing import Ends, angles_at, beyond, limits_of, segment_orientation
 from master.calibrate.joint_motion import JointMotion
 from master.calibrate.oriented import Oriented
-from master.joint_angles.angles import intrinsic_angles
 
 _WORST_RAD = math.radians(0.5)
 """Mean excess over the limits by which the other side must be better, and less than half of it."""
 _KNOWN_M = 0.05
 """Centres nearer than that to each other, sideways, tell nothing."""
-
-Ends = Mapping[str, tuple[float, Array]]
-"""Of each aligned node the heading of its own earth frame, rad, and `q_sensor_from_segment`."""
 
 
 def check_sides(skeleton: Skeleton, suit: Oriented, joints: list[JointMotion], ends: Ends) -> Evidence:
@@ -70,24 +65,12 @@ def _excess(skeleton: Skeleton, suit: Oriented, ends: Ends, rows: tuple[int, int
     """Mean excess, rad, of segment rows[0]'s orientations by the joint of segment rows[1]."""
     entry, judge = skeleton.segments[rows[0]], skeleton.segments[rows[1]]
     step = max(1, round(suit.rate_hz / 10.0))
-    child = _segment(suit, ends, entry.name, step)
+    child = segment_orientation(suit, ends, entry.name, step)
     # a trunk that does not tell how it moves stands upright, as everyone faced in the zero pose
-    parent = _segment(suit, ends, entry.parent, step) if entry.parent in ends else IDENTITY
-    frame = skeleton.axis_frames[rows[1]]
-    angles = intrinsic_angles(frame.T @ to_matrix(multiply(conjugate(parent), child)) @ frame)
-    angles[2] *= skeleton.axis_handedness[rows[1]]
-    total = np.zeros(angles.shape[1])
-    for angle, name in zip(angles, judge.angles, strict=True):
-        limits = limits_of(skeleton, name)
-        if limits is not None:
-            total += np.maximum(limits[0] - angle, 0.0) + np.maximum(angle - limits[1], 0.0)
-    return float(np.mean(total))
-
-
-def _segment(suit: Oriented, ends: Ends, name: str, step: int) -> Array:
-    heading_rad, q_sensor_from_segment = ends[name]
-    q = suit.q[suit.names.index(name)][::step]
-    return multiply(multiply(heading_turn(heading_rad), q), q_sensor_from_segment)
+    parent = segment_orientation(suit, ends, entry.parent, step) if entry.parent in ends else IDENTITY
+    angles = angles_at(skeleton, rows[1], parent, child)
+    limits = [limits_of(skeleton, name) for name in judge.angles]
+    return sum(float(np.mean(beyond(a, of))) for a, of in zip(angles, limits, strict=True) if of)
 
 
 def _wrong_way(joints: list[JointMotion], ends: Ends) -> bool | None:

@@ -1,4 +1,7 @@
-"""Whether a recording can be calibrated from at all: each refusal says what is wrong and what to do."""
+"""Whether a recording can be calibrated from at all: missing, constant, zero and clipped readings.
+
+Each refusal says what is wrong and what to do.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,16 @@ import numpy as np
 from common.quaternion import Array
 from common.wire.messages import Mask
 from master.calibrate.recording import NodeRecording, RecordingError
+from master.calibrate.still import runs
 
 _MOST_MISSING = 0.1
 _CLIPPED_S = 0.06
 _CLIPPED_RUN = 3
 """So many equal readings in a row at the end of the range are no coincidence while the node turns."""
+_NOISY_RUN = 2
+"""So many equal largest readings in a row are none either while the reading is noisy."""
+_SAME = 1e-6
+"""Relative difference up to which two readings are the same: a recording in single precision."""
 _AXES = "xyz"
 
 
@@ -55,7 +63,7 @@ def check_clipped(sensor: str, samples: Array, watched: Mask, shortest: int, rem
     for name, values in zip(_AXES, samples.T, strict=True):
         for end in (np.nanmax(values), np.nanmin(values)):
             at_end = (values == end) & watched
-            if len(at_end) >= shortest and _longest_run(at_end) >= shortest:
+            if np.max(np.diff(runs(at_end)), initial=0) >= shortest:
                 raise RecordingError(
                     f"the {sensor} is clipped on {name}: {int(at_end.sum())} readings are at its limit "
                     f"of {end:g}; {remedy}"
@@ -95,21 +103,47 @@ def _noisy(samples: Array, watched: Mask) -> bool:
     return float(np.median([np.median(axis) if len(axis) else 0.0 for axis in axes])) > 0.0
 
 
-def _longest_run(flags: Mask) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))).reshape(-1, 2)
-    return int(np.max(edges[:, 1] - edges[:, 0], initial=0))
-
-
 def filled(samples: Array, longest: int) -> Array:
     """Gaps of at most `longest` samples bridged by straight lines, (T, 3); longer ones stay NaN."""
     missing = np.any(~np.isfinite(samples), axis=1)
     if not missing.any():
         return samples
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], missing.astype(np.int8), [0]]))).reshape(-1, 2)
     known = np.flatnonzero(~missing)
     out = np.where(missing[:, None], np.nan, samples)
-    for a, b in edges:
+    for a, b in runs(missing):
         if b - a <= longest and a > 0 and b < len(samples):
             for axis in range(3):
                 out[a:b, axis] = np.interp(np.arange(a, b), known, samples[known, axis])
     return out
+
+
+def clipped(samples: Array, least: float, run: int = _NOISY_RUN) -> Mask:
+    """Which of the readings (T, 3) stand at an end of their axis's range, (T,).
+
+    An end beyond `least` is one where the extreme value comes in a `run`: what a converter limits is flat,
+    what a person moves is a peak. Missing readings are not clipped.
+    """
+    out = np.zeros(len(samples), dtype=np.bool_)
+    for values in samples.T:
+        if not np.isfinite(values).any():
+            continue
+        for end in (float(np.nanmax(values)), float(np.nanmin(values))):
+            if abs(end) < least:
+                continue
+            at = np.abs(values - end) <= _SAME * abs(end)
+            for begin, stop in runs(at):
+                out[begin:stop] |= stop - begin >= run
+    return out
+
+
+def range_ends(samples: Array, where: Mask) -> str:
+    """The axes that were clipped and at which value, for a message."""
+    said = []
+    for name, values in zip(_AXES, samples.T, strict=True):
+        if not where.any() or not np.isfinite(values).any():
+            continue
+        for end in (float(np.nanmax(values)), float(np.nanmin(values))):
+            at = np.abs(values - end) <= _SAME * abs(end)
+            if int((at & where).sum()) >= _NOISY_RUN:
+                said.append(f"{name} at {end:.4g}")
+    return ", ".join(said)

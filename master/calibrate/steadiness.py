@@ -58,13 +58,13 @@ def steadiness(problem: JointProblem, best: Unknowns) -> Steadiness:
         apart, together = x2 - x1, c1 + c2
         places = [slice(at, at + 1), *((slice(0, 2), slice(2, 4)) if at else ())]
         for k, place in enumerate(places):
-            sigma = _worst(together[place, place])
+            sigma = worst_sigma(together[place, place])
             if sigma < _KNOWN_RAD:
                 changes[split, k] = max(0.0, float(np.linalg.norm(apart[place])) - _CHANCE * sigma)
     worst = np.minimum(changes.max(axis=0), math.pi)
     return Steadiness(
-        _worst(covariance[at : at + 1, at : at + 1]),
-        (_worst(covariance[:2, :2]), _worst(covariance[2:4, 2:4])) if at else (math.pi, math.pi),
+        worst_sigma(covariance[at : at + 1, at : at + 1]),
+        (worst_sigma(covariance[:2, :2]), worst_sigma(covariance[2:4, 2:4])) if at else (math.pi, math.pi),
         float(worst[0]),
         (float(worst[1]), float(worst[2])),
         float(np.argmax(changes.max(axis=1))) / _BLOCKS,
@@ -80,5 +80,6 @@ def _scatter(scores: Array, normals: Array, prior: Array) -> tuple[Array, Array]
     return own, inverse @ (left.T @ left) @ inverse * count / max(1, count - 1)
 
 
-def _worst(covariance: Array) -> float:
+def worst_sigma(covariance: Array) -> float:
+    """Standard deviation along the least known direction, at most π."""
     return min(math.pi, math.sqrt(max(0.0, float(np.linalg.eigvalsh(covariance)[-1]))))

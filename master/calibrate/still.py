@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 Intervals = NDArray[np.intp]
 """(K, 2): first sample and one past the last."""
@@ -59,14 +60,18 @@ def still_intervals(level: Array, limit: float, rate_hz: float, shortest_s: floa
 
     Both ends are cut by half a window, within which motion hides in the average.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (level < limit).astype(np.int8), [0]])))
-    found = edges.reshape(-1, 2)
+    found = runs(level < limit)
     # a rest is longer by a window than what lies below the limit
     long_enough = found[:, 1] - found[:, 0] >= (shortest_s - WINDOW_S) * rate_hz
     half = round(0.5 * WINDOW_S * rate_hz)
     cut = found[long_enough] + np.array([half, -half])
     out: Intervals = cut[cut[:, 1] - cut[:, 0] >= 2]
     return out
+
+
+def runs(flags: Mask) -> Intervals:
+    """The stretches (K, 2) in which flags (T,) are true."""
+    return np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))).reshape(-1, 2)
 
 
 def interval_means(samples: Array, intervals: Intervals) -> Array:

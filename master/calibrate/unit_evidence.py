@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from common.quaternion import Array
-from master.calibrate.clipped import clipped, range_ends
 from master.calibrate.evidence import Evidence, at_most, not_judged
 from master.calibrate.gyro_gravity import gyro_gravity, judge_agreement, slipped
 from master.calibrate.oriented import LONGEST_GAP_S, bridged, longest_gap
 from master.calibrate.recording import NodeRecording
+from master.calibrate.soundness import clipped, range_ends
 
 GRAVITY_M_S2 = 9.80665
 WORST_GRAVITY = 0.06

@@ -6,6 +6,7 @@ import numpy as np
 
 from common.quaternion import Array
 from master.calibrate.hinge import PoorMotionError
+from master.calibrate.still import runs
 
 _STILL_RAD_S = 0.15
 """Nobody who stands still turns a segment faster; sway is a fifth of it."""
@@ -24,10 +25,8 @@ def find_zero_pose(gyr_rad_s: Array, rate_hz: float) -> slice:
     width = max(1, round(0.2 * rate_hz))
     window = np.ones(width) / width
     smooth = np.stack([np.convolve(row, window, mode="same") for row in norm])
-    still = np.concatenate([[False], (smooth < _STILL_RAD_S).all(axis=0), [False]])
-    begins, ends = (np.flatnonzero(np.diff(still.astype(np.int8)) == sign) for sign in (1, -1))
     edge = round(_EDGE_S * rate_hz)
-    for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
+    for begin, end in runs(np.max(smooth, axis=0) < _STILL_RAD_S).tolist():
         if end - begin >= (_LEAST_S + 2.0 * _EDGE_S) * rate_hz:
             return slice(begin + edge, min(end - edge, begin + edge + round(_LONGEST_S * rate_hz)))
     raise PoorMotionError(

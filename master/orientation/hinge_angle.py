@@ -85,12 +85,6 @@ def hinge_of(skeleton: Skeleton, segments: list[str], q_sensor_from_segment: Arr
     )
 
 
-def hinge_rate(hinge: Hinge, gyr1_rad_s: Array, gyr2_rad_s: Array) -> Array:
-    """How fast the angle grows, rad/s, (...), of rates (..., 3)."""
-    out: Array = np.sum(gyr2_rad_s * hinge.axis2, axis=-1) - np.sum(gyr1_rad_s * hinge.axis1, axis=-1)
-    return out
-
-
 def force_at_joint(acc_m_s2: Array, gyr_rad_s: Array, gyr_change_rad_s2: Array, lever_m: Array) -> Array:
     """Specific force at the joint's centre, f − ω̇ × r − ω × (ω × r), sensor frame; shapes (..., 3)."""
     swing = cross(gyr_change_rad_s2, lever_m)

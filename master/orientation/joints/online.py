@@ -172,11 +172,6 @@ class OnlineHeadings:
     def _turn(self) -> None:
         self.turn = heading_turn(self._headings.theta_rad)
 
-    @property
-    def sd_rad(self) -> Array:
-        """(N,) standard deviation of each heading."""
-        return np.sqrt(self._headings.variance)
-
     def snapshot(self) -> object:
         """The state, to be given to `restore`."""
         return (

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from common.quaternion import Array
 from master.calibrate.gauss_newton import along_sphere
-from master.calibrate.hinge import Hinge, PoorMotionError, check, find_hinge, residuals
+from master.calibrate.hinge import HingeAxes, PoorMotionError, check, find_hinge, residuals
 
 RATE_HZ = 50.0
 NOISE_RAD_S = math.radians(0.05)
@@ -116,6 +116,6 @@ def test_too_little_data_is_refused() -> None:
 
 
 def test_what_is_told_is_told_for_both_axes() -> None:
-    found: Hinge = find_hinge(*hinge_rates(9)[:2], RATE_HZ)
+    found: HingeAxes = find_hinge(*hinge_rates(9)[:2], RATE_HZ)
     assert found.misfit_rad_s < 0.01 * found.bending_rad_s
     assert found.rival > 10.0

@@ -36,7 +36,6 @@ def test_a_known_rotation_is_found_within_its_own_uncertainty(
     found = align_magnetometer(*attitudes(seed, 26, apart, noise=0.05))
     assert float(angle_between(found.q_acc_from_mag, apart)) < 5.0 * found.sigma_rad
     assert found.sigma_rad < np.radians(0.2)
-    assert np.degrees(found.dip_rad) == pytest.approx(60.0, abs=0.2)
 
 
 def test_without_noise_it_is_exact_and_the_map_turns_with_it() -> None:

@@ -6,7 +6,7 @@ import pytest
 from common.quaternion import Array, conjugate, from_rotation_vector, multiply, rotate
 from master.calibrate.inertial import calibrate_inertial
 from master.calibrate.recording import NodeRecording, RecordingError
-from master.calibrate.six_session import SixPositionOptions, calibrate_six_position
+from master.calibrate.six_position_session import SixPositionOptions, calibrate_six_position
 
 RATE_HZ = 100.0
 ACC_GAIN: Array = np.array([[1.03, 0.012, -0.008], [0.02, 0.98, 0.015], [-0.01, 0.004, 1.01]])

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array, from_axis_angle, normalise, rotate
-from master.calibrate.clipped import clipped
 from master.calibrate.evidence import first_contradiction
 from master.calibrate.gyro_gravity import describe
 from master.calibrate.recording import NodeRecording, load_recordings
+from master.calibrate.soundness import clipped
 from master.calibrate.unit_evidence import unit_evidence
 from tests.master.calibrate.worn import wear
 
@@ -54,9 +54,9 @@ SPOILT: list[tuple[str, Spoil, str]] = [
     ("gyro converted twice", lambda acc, gyr: (acc, np.radians(gyr)), "converted twice"),
     ("gyro dead", lambda acc, gyr: (acc, 0.0 * gyr), "says the same all the time on x, y, z"),
     ("gyro y stuck", lambda acc, gyr: (acc, gyr * [1, 0, 1]), "says the same all the time on y;"),
-    ("gyro x negated", lambda acc, gyr: (acc, gyr * [-1, 1, 1]), "its axis x seems negated"),
-    ("gyro z negated", lambda acc, gyr: (acc, gyr * [1, 1, -1]), "its axis z seems negated"),
-    ("gyro yz exchanged", lambda acc, gyr: (acc, gyr[:, [0, 2, 1]]), "axes y and z seem exchanged"),
+    ("gyro x negated", lambda acc, gyr: (acc, gyr * [-1, 1, 1]), "its x axis is negated"),
+    ("gyro z negated", lambda acc, gyr: (acc, gyr * [1, 1, -1]), "its z axis is negated"),
+    ("gyro yz exchanged", lambda acc, gyr: (acc, gyr[:, [0, 2, 1]]), "its y and z axes are swapped"),
     ("mirrored", lambda acc, gyr: (acc * [1, -1, 1], gyr * [1, -1, 1]), "left-handed frame"),
     ("gyro clipped", limited(100.0), "gyroscope is clipped for"),
 ]
@@ -99,8 +99,8 @@ def test_only_flat_tops_are_clipped() -> None:
 
 
 def test_the_words_name_the_axes() -> None:
-    assert describe(np.diag([1.0, -1.0, 1.0])) == "its axis y seems negated"
-    assert describe(np.eye(3)[[1, 0, 2]]) == "its axes x and y seem exchanged with each other"
+    assert describe(np.diag([1.0, -1.0, 1.0])) == "its y axis is negated"
+    assert describe(np.eye(3)[[1, 0, 2]]) == "its x and y axes are swapped"
     assert "left-handed" in describe(-np.eye(3))
 
 

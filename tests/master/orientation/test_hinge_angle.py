@@ -22,7 +22,6 @@ from master.orientation.hinge_angle import (
     force_at_joint,
     hinge_angles,
     hinge_of,
-    hinge_rate,
 )
 
 RATE_HZ = 200.0
@@ -77,12 +76,6 @@ def test_the_knee_is_within_its_target_with_sensors_askew() -> None:
 def test_with_perfect_sensors_only_quantised_time_is_left() -> None:
     walked = walk(0, "ideal")
     np.testing.assert_allclose(followed(walked), walked.knees, atol=np.radians(0.02))
-
-
-def test_the_rate_is_the_knees() -> None:
-    walked = walk(1, "ideal")
-    rate = hinge_rate(walked.hinge, walked.gyr[:, NEAR], walked.gyr[:, FAR])
-    np.testing.assert_allclose(rate, walked.rates, atol=1e-9)
 
 
 def test_both_nodes_feel_one_force_at_the_joint() -> None:

@@ -150,7 +150,7 @@ def test_a_returning_node_begins_with_its_heading_or_its_field_s(arms: Skeleton)
     assert angle_between(online.turn, heading_turn(0.7 * one)).max() < 1e-7
     online.find(one, np.tile(IDENTITY, (5, 1)), np.full(5, -0.4))
     assert angle_between(online.turn, heading_turn(-0.4 * one)).max() < 1e-7
-    assert np.degrees(online.sd_rad[2]) == pytest.approx(10.0)
+    assert np.degrees(np.sqrt(online._headings.variance[2])) == pytest.approx(10.0)
 
 
 def test_goes_on_from_a_snapshot(arms: Skeleton) -> None:

@@ -8,11 +8,11 @@ import pytest
 
 from common.skeleton import load_skeleton
 from master.calibrate.gauss_newton import along_sphere
+from master.calibrate.hinge import check_rates
 from master.calibrate.joint_fit import JointFit, fit_joint
 from master.calibrate.joint_motion import zero_axes
 from master.calibrate.joint_residuals import Moving
 from master.calibrate.oriented import moving, orient, rows_moving
-from master.calibrate.rates_alone import check_rates
 from tests.master.calibrate.worn import wear
 
 LEGS = load_skeleton("lower_limb")

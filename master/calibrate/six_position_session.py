@@ -12,24 +12,21 @@ from common.quaternion import Array
 from master.calibrate import inertial_evidence as compare
 from master.calibrate.carried import carried
 from master.calibrate.evidence import Evidence, agrees, at_most, not_judged, refuse_contradictions, unjudged
+from master.calibrate.inertial_readings import STANDARD_GRAVITY_M_S2, InertialReadings, made, sound_readings
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
 from master.calibrate.six_position import SixFaces, ThreeTurns, check_tilt, fit_faces, fit_turns, turn_scale
-from master.calibrate.soundness import check_inertial, check_samples, filled, without_zeros
 from master.calibrate.still import (
     Intervals,
     interval_means,
-    motion_level,
     still_intervals,
     stillest_level,
     variation,
 )
 
-_LONGEST_GAP_S = 0.05
 _CALM = 6.0
 """Times the stillest, up to which a node rests."""
 _LEAST_CALM_M_S2 = 0.05
-_CLIP_WATCH = 40.0
 _COMPARED = "gyroscope's axes against gravity's turns"
 
 
@@ -37,7 +34,7 @@ _COMPARED = "gyroscope's axes against gravity's turns"
 class SixPositionOptions:
     """What a person may choose."""
 
-    gravity_m_s2: float = 9.80665
+    gravity_m_s2: float = STANDARD_GRAVITY_M_S2
     turn_rad: float = 2.0 * np.pi
     """Of each of the three turns."""
     shortest_still_s: float = 1.5
@@ -57,21 +54,9 @@ class SixPositionCalibration:
     def parts(self, day: date, recording: str) -> dict[Part, tuple[Array, Made]]:
         """As `write_calibration` takes them."""
         a, g = self.accelerometer, self.gyroscope
-
-        def made(unit: str, before: Array, after: Array, sigma: Array) -> Made:
-            first, then = float(np.mean(np.abs(before))), float(np.mean(np.abs(after)))
-            return Made(
-                date=day,
-                recording=recording,
-                unit=unit,
-                residual_before=first,
-                residual_after=then,
-                sigma=sigma.tolist(),
-            )
-
         return {
-            "accelerometer": (a.affine, made("m/s²", a.before_m_s2, a.after_m_s2, a.sigma)),
-            "gyroscope": (g.affine, made("rad", g.before_rad, g.after_rad, g.sigma)),
+            "accelerometer": (a.affine, made(day, recording, "m/s²", a.before_m_s2, a.after_m_s2, a.sigma)),
+            "gyroscope": (g.affine, made(day, recording, "rad", g.before_rad, g.after_rad, g.sigma)),
         }
 
 
@@ -79,17 +64,10 @@ def calibrate_six_position(
     recording: NodeRecording, options: SixPositionOptions = SixPositionOptions()
 ) -> SixPositionCalibration:
     """Find the maps of both sensors. Raises RecordingError when the recording does not determine them."""
-    recording = without_zeros(recording)
-    check_samples("accelerometer", recording.acc_m_s2)
-    check_samples("gyroscope", recording.gyr_rad_s)
-    rates = filled(recording.gyr_rad_s, round(_LONGEST_GAP_S * recording.rate_hz))
-    level = motion_level(rates, recording.rate_hz)
-    rest = stillest_level(level, floor=1.0 if recording.counts else 1e-3)
-    check_inertial(recording, level, _CLIP_WATCH * rest)
-    evidence = [] if recording.counts else [compare.known_unit(_median_norm(recording), options.gravity_m_s2)]
-    evidence += compare.ranges(recording, rates[level < 2.0 * rest])
-    refuse_contradictions(evidence)
-    still = _rests(recording, level / (_CALM * rest), options)
+    sound = sound_readings(recording, options.gravity_m_s2)
+    recording, rates = sound.recording, sound.rates
+    evidence = [*sound.evidence]
+    still = _rests(sound, options)
     readings = interval_means(recording.acc_m_s2, still)
     faces = fit_faces(readings, options.gravity_m_s2, counts=recording.counts)
     evidence += refuse_contradictions([check_tilt(faces.tilt_rad)])
@@ -109,10 +87,10 @@ def calibrate_six_position(
     )
 
 
-def _rests(recording: NodeRecording, turning: Array, options: SixPositionOptions) -> Intervals:
-    """Rests (K, 2) by both sensors, for the gyro's level over its limit (T,)."""
-    acc = filled(recording.acc_m_s2, round(_LONGEST_GAP_S * recording.rate_hz))
-    moved = variation(acc, recording.rate_hz)
+def _rests(sound: InertialReadings, options: SixPositionOptions) -> Intervals:
+    """Rests (K, 2) by both sensors."""
+    recording, turning = sound.recording, sound.level / (_CALM * sound.rest)
+    moved = variation(sound.force_bridged(), recording.rate_hz)
     least = 2.0 if recording.counts else _LEAST_CALM_M_S2
     shaking = moved / (_CALM * stillest_level(moved, floor=least / _CALM))
     still = still_intervals(
@@ -145,8 +123,3 @@ def _axes(recording: NodeRecording, rates: Array, faces: SixFaces, turns: ThreeT
             "face, about all axes",
         )
     return agrees(_COMPARED, 0.0, 0.0)
-
-
-def _median_norm(recording: NodeRecording) -> float:
-    norms = np.linalg.norm(recording.acc_m_s2, axis=1)
-    return float(np.median(norms[np.isfinite(norms)]))
