@@ -1,1 +1,1 @@
-"""The running processes of one experiment, and who watches them."""
+"""Starts the processes of an experiment, observes them, engages their robots, and watches the host."""

@@ -1,4 +1,4 @@
-"""A process of a rig: started, measured, killed, started again, stopped by SIGTERM, its last words kept."""
+"""A process of a rig: start it, measure it, kill it, start it again, stop it; its log is kept."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Usage:
 
 
 class Child:
-    """One `tandem ROLE FILE` process. Its log and its figures lie in the run's folder."""
+    """One `tandem ROLE FILE` process. Its log and its metrics file lie in the run's folder."""
 
     def __init__(
         self,
@@ -85,21 +85,18 @@ class Child:
         return usage(self._usage) if self._usage is not None and self.running else None
 
     def check(self) -> None:
-        """Raise TandemError with the process's last words if it has ended."""
+        """Raise TandemError with the end of the process's log if it has ended."""
         process = self._process
         if process is not None and process.returncode is not None:
-            raise TandemError(f"the {self.name} ended with status {process.returncode}: {self.last_words()}")
+            raise TandemError(f"the {self.name} ended with status {process.returncode}: {self.last_lines()}")
 
     def measure(self, first: bool = False) -> None:
         """Take a sample of CPU time and memory; `first` begins the period that `cpu_percent` covers."""
-        if self._usage is None or self._process is None or self._process.returncode is not None:
+        used = self.usage
+        if used is None:  # it has ended: `check` raises
             return
-        try:
-            with self._usage.oneshot():
-                times, self.rss_mb = self._usage.cpu_times(), self._usage.memory_info().rss / 1e6
-        except psutil.Error:  # it has just ended: `check` will tell
-            return
-        self._cpu_to = (asyncio.get_running_loop().time(), times.user + times.system)
+        self.rss_mb = used.rss_mb
+        self._cpu_to = (asyncio.get_running_loop().time(), used.cpu_s)
         if first:
             self._cpu_from = self._cpu_to
 
@@ -144,14 +141,14 @@ class Child:
             return None
         return from_tree(kind, tree)
 
-    def said(self) -> str:
+    def log_text(self) -> str:
         """Everything it has logged so far."""
         return self.log.read_text("utf-8", errors="replace")
 
-    def last_words(self) -> str:
+    def last_lines(self) -> str:
         """The end of its log."""
-        lines = self.said().strip().splitlines()
-        return " | ".join(lines[-3:]) or "it said nothing"
+        lines = self.log_text().strip().splitlines()
+        return " | ".join(lines[-3:]) or "its log is empty"
 
 
 def usage(process: psutil.Process) -> Usage | None:

@@ -1,4 +1,4 @@
-"""Zenoh endpoints and a CAN port that nobody else uses: on this machine, or on two emulated hosts."""
+"""Free Zenoh endpoints and a free CAN port: on this machine, or on two emulated hosts."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from deploy.harness.keys import MASTER, make_keys, tls_of
 from deploy.sim.network import Network
 
 PORT, MANAGEMENT_PORT, CAN_PORT = 7447, 7547, 43113
-"""On emulated hosts, whose addresses nobody else has: of the router and the robots on the link, of everything
-on the management network, of the suit's bus."""
+"""On emulated hosts, whose addresses are their own: the router and the robots on the link, everything on the
+management network, the suit's bus."""
 
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """Who listens where: each robot for the master, the master and the observer for those who watch."""
+    """Where each party listens: the robots for the master, the master and the observer for observers."""
 
     robots: tuple[str, ...]
     master: str
     observer: str
     can_port: int
     router: str = ""
-    """Where the router listens through which all goes; empty where they reach each other directly."""
+    """Where the router listens; empty where master and robots reach each other directly."""
     keys: Path | None = None
-    """The folder of their certificates, where the transport needs some."""
+    """The folder of their certificates; None for a transport that needs none."""
     watched: tuple[str, ...] = ()
     """Where each robot, or the router, listens for the observer; empty: where it does for the others."""
 
@@ -76,10 +76,10 @@ def keys_for(transport: str, folder: Path, endpoints: list[str], robots: int) ->
 def network_endpoints(
     transport: str, network: Network, folder: Path, robots: int = 1, routed: bool = False
 ) -> Endpoints:
-    """Endpoints on two hosts: what master and robots say to each other, and only that, crosses the link.
+    """Endpoints on two hosts: only the messages between master and robots cross the emulated link.
 
-    Observer, truth and acts go over the management network. A router stands on the operator's host: then what
-    the observer hears and asks of the robots crosses the link too, as clients have no other door. Raises
+    Observer, truth and requests use the management network. With a router, which runs on the operator's host,
+    the observer's traffic with the robots crosses the link too, as clients know no other endpoint. Raises
     ConfigError for a transport that does not reach another host.
     """
     known = [each for each in TRANSPORTS if each != "unixsock-stream"]
@@ -105,12 +105,12 @@ def network_endpoints(
 
 
 def free_port(transport: str) -> int:
-    """A port of this host that nobody listens at now."""
+    """A free port of this host."""
     return free_ports(transport, 1)[0]
 
 
 def free_ports(transport: str, count: int) -> list[int]:
-    """Several, each another one."""
+    """Several free ports, all different."""
     kind = socket.SOCK_DGRAM if transport in ("udp", "quic", "quic-datagram") else socket.SOCK_STREAM
     with ExitStack() as held:  # all at once, so that they differ
         probes = [held.enter_context(socket.socket(socket.AF_INET, kind)) for _ in range(count)]

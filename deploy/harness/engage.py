@@ -1,4 +1,4 @@
-"""Drives operators: hears the robots, and sends the requests to engage that each operator decides on."""
+"""Drives operators: receives the robots' states, and sends the requests that the operators decide on."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class EngageAccess(Protocol):
 
 
 class RigRobot:
-    """A robot of a rig, heard by the rig's observer and asked over the link."""
+    """A robot of a rig, seen by the rig's observer and asked over the link."""
 
     def __init__(self, rig: Rig, robot: str = ROBOT, waits_until_ready: bool = False) -> None:
         """`waits_until_ready`: it is asked only while it takes commands and every joint is known."""
@@ -67,7 +67,7 @@ class RigRobot:
         return new if state is None else [*new, GuardSight(state.sent_ns, state.guard, state.reason)]
 
     async def engage(self) -> str:
-        """Ask over the link. A robot that still brakes or hears no operator yet refuses."""
+        """Ask over the link. A robot that still brakes or receives no command yet refuses."""
         try:
             reply = await self._rig.control(Action.ENGAGE, robot=self._robot)
         except (LinkError, CodecError) as error:

@@ -1,9 +1,8 @@
 """When a stall of the host excuses a failure: the one rule, pure.
 
-A core that came back late may have been taken by the host, or kept busy by tandem itself. Only the first
-excuses a failure, so it must be shown: the reference loop had real-time priority, above all programs of
-tandem, and then the whole stall is the host's; or `/proc/stat` shows steal, and then as much of the stall as
-was stolen. Without either, a failure stays a failure.
+A core that comes back late was taken by the host, or kept busy by tandem itself. Only the host's part excuses
+a failure, so it needs evidence. If the reference loop had real-time priority, above all programs of tandem,
+the whole stall is the host's. If `/proc/stat` shows steal, the stolen part is. Otherwise nothing is excused.
 """
 
 from __future__ import annotations
@@ -15,14 +14,13 @@ from enum import StrEnum
 from common.clock import to_ns, to_s
 
 STILL_S = 0.05
-"""A host that stood still for so long within WINDOW_S may have made a guard hold: half of the shortest
-time-out by which one does, the encoders' 0.1 s. In one go or in pieces: what waited has to be made up for
-in between, by every process at once."""
+"""A host that stood still for so long within WINDOW_S may have made a guard hold: half of its shortest
+time-out, 0.1 s of the encoders. Pieces count together: after each, every process catches up at once."""
 WINDOW_S = 0.5
 
 
 class StallEvidence(StrEnum):
-    """What shows that a stall was the host's; the text is printed."""
+    """What shows that the host caused a stall; the text is printed."""
 
     PRIORITY = "the reference loop had real-time priority"
     STEAL = "/proc/stat shows steal"
@@ -31,7 +29,7 @@ class StallEvidence(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """One core came back only at `until_ns`, awaited at `from_ns`; of this host's monotonic clock."""
+    """A core came back at `until_ns` and was due at `from_ns`, by this host's monotonic clock."""
 
     core: int
     from_ns: int
@@ -45,14 +43,14 @@ class Stall:
 
     @property
     def evidence(self) -> StallEvidence:
-        """What shows that it was the host's."""
+        """What shows that the host caused it."""
         if self.priority:
             return StallEvidence.PRIORITY
         return StallEvidence.STEAL if self.stolen_ns > 0 else StallEvidence.NONE
 
     @property
     def excused_ns(self) -> int:
-        """How much of it excuses: all, what was stolen, or nothing; the end of the stall counts."""
+        """How much of it excuses: all of it, the stolen part, or nothing; taken from its end."""
         lasted_ns = self.until_ns - self.from_ns
         return lasted_ns if self.evidence is StallEvidence.PRIORITY else min(lasted_ns, self.stolen_ns)
 
@@ -62,9 +60,9 @@ class Lost:
     """What a host lost between two times."""
 
     excused_s: float
-    """Total stall that was the host's fault: a result may be late by this much."""
+    """Of the stalls the part that the host caused: a result may be late by this much."""
     still_s: float
-    """The same, whoever's fault it was."""
+    """All stalls, whatever caused them."""
     evidence: StallEvidence
 
     @property
@@ -73,7 +71,7 @@ class Lost:
         return self.excused_s >= STILL_S
 
     def __str__(self) -> str:
-        """In words, with the evidence."""
+        """For a person, with the evidence."""
         if self.excused_s > 0.0:
             return f"the host stood still for {1e3 * self.excused_s:.0f} ms: {self.evidence}"
         if self.still_s > 0.0:

@@ -1,4 +1,4 @@
-"""When the host itself stood still: a virtual machine may lose its cores, and no program of ours can help."""
+"""When the host itself stood still: a virtual machine may lose its cores, whatever its programs do."""
 
 from __future__ import annotations
 
@@ -13,57 +13,53 @@ from typing import Any
 import psutil
 
 from common.clock import monotonic_ns, to_s
-from deploy.harness.bare_loop import PERIOD_NS
 from deploy.harness.excuse import Lost, Stall, lost, lost_before
+from deploy.harness.reference_loop import PERIOD_NS
 
 START_S = 10.0
-"""A host on which a bare loop does not start within this long is not measured."""
+"""A host on which a reference loop does not start within this long is not measured."""
 STOP_S = 1.0
 
 
 @dataclass(slots=True)
 class HostWatch:
-    """What the bare loops have told so far. Where they do not run, nothing is known and nothing excused."""
+    """What the reference loops have reported so far. Where they do not run, nothing is excused."""
 
     stalls: list[Stall] = field(default_factory=list)
     known_ns: dict[int, int] = field(default_factory=dict)
-    """Up to when each core has told."""
+    """Up to when each core has reported."""
     began_ns: int = 0
     """When the loops began to tick; 0 where they did not."""
     priority: bool = False
-    """Whether they come before our own programs: if not, our own load may make them late too, and what was
-    late excuses only as far as it was stolen."""
+    """Whether the loops run before tandem's programs. If not, tandem's load may make them late too, and only
+    the stolen part of a stall excuses."""
     cpu_s: tuple[float, float] = (0.0, 0.0)
-    """When they began, of all cores: time that the machine beneath took, and all time."""
+    """Of all cores when the loops began: stolen time, and all time."""
 
-    _word: asyncio.Event = field(default_factory=asyncio.Event)
+    _reported: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def hear(self, line: str) -> None:
+    def take(self, line: str) -> None:
         """Take one line of the loops' output."""
-        self._word.set()
-        told: dict[str, Any] = json.loads(line)
-        if "origin_ns" in told:
-            self.began_ns, self.priority, self.cpu_s = told["origin_ns"], told["priority"], _cpu_s()
-            self.known_ns = dict.fromkeys(told["cores"], self.began_ns)
+        self._reported.set()
+        report: dict[str, Any] = json.loads(line)
+        if "origin_ns" in report:
+            self.began_ns, self.priority, self.cpu_s = report["origin_ns"], report["priority"], _cpu_s()
+            self.known_ns = dict.fromkeys(report["cores"], self.began_ns)
             return
-        stall = Stall(**told, priority=self.priority)
+        stall = Stall(**report, priority=self.priority)
         self.known_ns[stall.core] = stall.until_ns
         if stall.missed:
             self.stalls.append(stall)
 
     def end(self) -> None:
-        """Nothing more will be told: nobody waits for a word."""
+        """The loops have ended: `known` waits no longer."""
         self.known_ns.clear()
-        self._word.set()
+        self._reported.set()
 
     def stood_still_s(self, since_ns: int, until_ns: int) -> float:
         """The longest that any one core stood still without a break, as far as it lies between the two."""
         spans = (min(s.until_ns, until_ns) - max(s.from_ns, since_ns) for s in reversed(self.stalls))
         return to_s(max(0, max(spans, default=0)))
-
-    def lost_s(self, since_ns: int, until_ns: int) -> float:
-        """For how long between the two the host is shown to have stood still: so late a result may be."""
-        return self.lost(since_ns, until_ns).excused_s
 
     def lost(self, since_ns: int, until_ns: int) -> Lost:
         """What the host lost between the two, with the evidence."""
@@ -74,10 +70,10 @@ class HostWatch:
         return lost_before(self.stalls, at_ns, since_ns)
 
     async def known(self, until_ns: int) -> None:
-        """Wait until every core has told up to then; where nothing is measured, not at all."""
+        """Wait until every core has reported up to then; return at once where nothing is measured."""
         while min(self.known_ns.values(), default=until_ns) < until_ns:
-            self._word.clear()
-            await self._word.wait()
+            self._reported.clear()
+            await self._reported.wait()
 
     async def excuse(self, since_ns: int) -> str:
         """Why a trial from then to now does not count, with the evidence; empty where it counts.
@@ -89,10 +85,6 @@ class HostWatch:
         within = [stall.until_ns for stall in self.stalls if stall.until_ns >= since_ns]
         found = (self.lost_before(min(until_ns, now_ns), since_ns) for until_ns in within)
         return next((str(each) for each in found if each.explains_hold), "")
-
-    def explains(self, at_ns: int) -> bool:
-        """Whether it is shown to have stood still, just before, for long enough to make a guard hold then."""
-        return self.lost_before(at_ns).explains_hold
 
     @property
     def missed(self) -> int:
@@ -125,10 +117,10 @@ def _cpu_s() -> tuple[float, float]:
 
 @asynccontextmanager
 async def watch_host() -> AsyncIterator[HostWatch]:
-    """Bare loops on every core while the block runs; the HostWatch fills as they tell."""
+    """Run reference loops on every core during the block; the HostWatch collects what they report."""
     host = HostWatch()
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "deploy.harness.bare_loop",
+        sys.executable, "-m", "deploy.harness.reference_loop",
         stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.DEVNULL,
     )  # fmt: skip
     stdin, stdout = process.stdin, process.stdout
@@ -138,7 +130,7 @@ async def watch_host() -> AsyncIterator[HostWatch]:
 
     async def listen() -> None:
         while line := await stdout.readline():
-            host.hear(line.decode())
+            host.take(line.decode())
             begun.set()
         host.end()
         begun.set()

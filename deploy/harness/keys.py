@@ -1,4 +1,4 @@
-"""Keys for one run over a secure transport: an authority as short-lived as the run, and certificates."""
+"""Keys for one run over a secure transport: a short-lived authority, and a certificate for each party."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from deploy.certificates.make import new_authority, new_identity
 VALID = timedelta(days=7)
 """Longer than any soak."""
 MASTER, ROUTER = "nurse-1", "router-1"
-"""Who watches a run also engages it: with the operator's certificate."""
+"""The observer of a run also engages its robots, with the operator's certificate."""
 
 
 def make_keys(folder: Path, endpoints: Iterable[str], robots: Sequence[str]) -> Path:
-    """Write them all to a folder of their own, good for the endpoints' addresses; returns that folder."""
+    """Write keys for the endpoints' addresses to a new folder below `folder`, and return that folder."""
     keys = folder / "keys"
     now = datetime.now(UTC)
     authority = new_authority("rig", now, VALID)

@@ -18,8 +18,8 @@ WANDERS = 4.0
 def needed_age_s(profile: Profile) -> float:
     """The guard's age limit: the default where commands can keep it, or what they need.
 
-    The guard adds the offset's bound, half the least round trip, to a command's age. Over a long line that
-    alone is beyond the default, and a robot that takes no command would tell nothing about the line.
+    The guard adds the offset's bound, half the least round trip, to a command's age. Over a long line this
+    bound alone exceeds the default, and a robot that accepts no command shows nothing about the line.
     """
     to_robot, to_operator = profile.ways.to_robot, profile.ways.to_operator
     bound_ms = 0.5 * (to_robot.delay_ms + to_operator.delay_ms)

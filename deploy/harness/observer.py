@@ -1,4 +1,4 @@
-"""Watches a run from outside: hears commands, states, truth and statistics, and changes nothing."""
+"""Observes a run: receives commands, states, truth and statistics, and changes nothing."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ RATE_OVER_NS = 900_000_000
 
 
 class Observer:
-    """Keeps the newest of each message and, while recording, all that judging needs."""
+    """Keeps the newest of each message and, while recording, everything that a report needs."""
 
     def __init__(self, link: Link, skeleton: Skeleton) -> None:
         self._joints = len(skeleton.joints)
@@ -45,7 +45,7 @@ class Observer:
         self.commands: list[Command] = []
         """While recording."""
         self.video: CameraMetrics | None = None
-        """What the robot last counted of its camera while recording; None where it has none."""
+        """What the robot last published of its camera while recording; None where it has none."""
         self.listeners: list[Callable[[Heard], None]] = []
         """Each is called with every message, whether recording or not."""
         self._known_from = -1
@@ -53,7 +53,7 @@ class Observer:
         self._news = asyncio.Event()
         self._marks: dict[str, tuple[int, int]] = {}
         self.rates_hz: dict[str, float] = {}
-        """By the senders' own numbers and clocks: this side hears only the newest of what waits."""
+        """By the senders' numbers and clocks: this side receives only the newest of several that wait."""
         link.subscribe(COMMAND, lambda payload, _: self._take(payload, Command))
         link.subscribe(STATE, lambda payload, _: self._take(payload, RobotState))
         link.subscribe(TRUTH, lambda payload, _: self._take(payload, Truth))
@@ -116,7 +116,7 @@ class Observer:
 
     @property
     def guard(self) -> str:
-        """The guard's state as last told."""
+        """The guard's newest state."""
         return self.state.guard if self.state else "not heard"
 
     @property
@@ -136,12 +136,12 @@ class Observer:
         if command is None or state is None or state.echo is None or state.guard != "hold":
             return False
         taken_ns = state.sent_ns - state.echo.received_ns
-        # the robot has it later than this observer, who may be nearer to the master
+        # this observer may be nearer to the master than the robot is
         known = 0 <= self._known_from <= state.echo.sequence
         return known and taken_ns < to_ns(2.0 / COMMAND.rate_hz)
 
     def waiting_for(self) -> str:
-        """What is missing until `ready`, in words."""
+        """What is missing until `ready`, for a person."""
         command, state = self.command, self.state
         if state is None:
             return "the robot is not heard"

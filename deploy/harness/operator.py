@@ -1,7 +1,7 @@
 """The operator of a robot: engages it, engages it again after a hold, and gives up in time. Pure.
 
-States and time come in, acts come out. `deploy/harness/engage.py` hears the states and sends the acts. Every
-experiment uses this rule; each has its own `OperatorPatience`, and decides itself when its robot is ready.
+States and time come in, decisions come out; `deploy/harness/engage.py` carries them out. All experiments use
+this rule. Each has its own `OperatorPatience`, and decides itself when its robot is ready.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from common.clock import to_s
 from deploy.harness.excuse import Lost, StallEvidence
 
 JUDGED_AFTER_S = 1.0
-"""A core that still stands can report a stall only later: a hold is judged no sooner than this."""
+"""A hold is judged this much later: a core that stands still reports its stall only when it runs again."""
 
 HostLost = Callable[[int], Lost]
 """What the host lost just before a time of its clock, ns."""

@@ -1,4 +1,4 @@
-"""Suit, master and slave as processes on one machine, and an observer beside them: for demo and tests."""
+"""Suit, master and slaves as processes on this machine or on two emulated hosts, and an observer."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def slave_name(number: int) -> str:
 
 
 class Rig:
-    """The running processes by name, what is heard of each robot, and the way to ask them."""
+    """The running processes by name, an observer for each robot, and the requests to them."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Rig:
         """The hosts on which the processes run; None: this machine itself."""
         self.skeleton = load_skeleton(profile)
         self.folder = folder
-        """Where the processes' logs lie; it goes with the rig."""
+        """Where the processes' logs lie; it is deleted with the rig."""
         self._overrides = overrides
         self._endpoints = endpoints
         self._session = session
@@ -66,7 +66,7 @@ class Rig:
             robot: Observer(session.link(robot), self.skeleton) for robot in map(robot_name, numbers)
         }
         self.observer = self.observers[ROBOT]
-        """Of the first robot; the suit tells the truth under its name."""
+        """Of the first robot; the suit publishes the truth under its name."""
         self.slaves = tuple(map(slave_name, numbers))
         children = [Child("slave", folder, name=name) for name in self.slaves]
         others = [*ROLES[1:], *([DRIVES] if DRIVES in overrides else [])]
@@ -113,13 +113,13 @@ class Rig:
         for child in self.children.values():
             child.check()
 
-    async def logged(self, name: str, text: str, timeout_s: float) -> None:
+    async def until_logged(self, name: str, text: str, timeout_s: float) -> None:
         """Wait until a process has logged something. Raises TandemError where it does not."""
         deadline_ns = monotonic_ns() + to_ns(timeout_s)
-        while text not in self.children[name].said():
+        while text not in self.children[name].log_text():
             self.children[name].check()
             if monotonic_ns() > deadline_ns:
-                raise TandemError(f"the {name} did not start: {self.children[name].last_words()}")
+                raise TandemError(f"the {name} did not start: {self.children[name].last_lines()}")
             await asyncio.sleep(0.05)
 
     async def control(
@@ -137,7 +137,7 @@ class Rig:
         what: str,
         each: Callable[[], None] = lambda: None,
     ) -> None:
-        """Wait for a condition on what the observer hears. Raises TandemError when it does not come."""
+        """Wait for a condition on what the observer received. Raises TandemError where it takes too long."""
         deadline_ns = monotonic_ns() + to_ns(timeout_s)
         while not reached():
             each()
@@ -146,7 +146,7 @@ class Rig:
             await at_most(self.observer.news(), 0.25)
 
     async def stop(self) -> dict[str, int | None]:
-        """Stop all, the master first, so that the robot shows that it holds by itself; exit statuses."""
+        """Stop all, the master first, so that the robot holds by itself; their exit statuses."""
         last = [name for name in (DRIVES, ROUTER) if name in self.children]
         return {name: await self.children[name].stop() for name in ("master", "suit", *self.slaves, *last)}
 
@@ -160,13 +160,12 @@ async def open_rig(
     routed: bool = False,
     network: Network | None = None,
 ) -> AsyncIterator[Rig]:
-    """Open a rig on free local endpoints; nothing is started yet, everything is stopped at the end.
+    """Open a rig on free endpoints. No process runs yet but the router; all are stopped at the end.
 
-    `routed`: through a router, which is started at once. A secure transport gets keys of its own.
-    With a `network` suit, master and router run on the operator's host and the slaves on the robot's, and
-    only what these say to each other crosses the emulated link.
-    `overrides` are by role, and where there are several robots by the process's name too.
-    Raises ConfigError for a transport or a profile that there is not.
+    `routed`: master and robots meet at a router, which is started at once. A secure transport gets new keys.
+    `network`: suit, master and router run on its operator's host, the slaves on its robot's host.
+    `overrides`: of the example files, by role or by the process's name.
+    Raises ConfigError for an unknown transport or profile.
     """
     load_skeleton(profile)
     async with AsyncExitStack() as stack:
@@ -192,7 +191,7 @@ async def at_most(wait: Awaitable[object], seconds: float) -> None:
 
 
 def drive_buses(port: int) -> list[str]:
-    """The slave's two buses to its drives, on this host, at a port that nobody else uses."""
+    """The override for the slave's two buses to its drives, at a free port of this host."""
     buses = [
         f'{{ name = "{name}", interface = "udp_multicast", channel = "{group}", fd = false, '
         f"options = {{ port = {port}, hop_limit = 0 }} }}"
@@ -230,7 +229,7 @@ def _link(
     connect: Sequence[str] = (),
     through: str | None = None,
 ) -> list[str]:
-    """One party's [link]: its own door and whom it calls, or the router in place of both."""
+    """One party's [link]: where it listens and connects, or the router in place of both."""
     router = endpoints.router if through is None else through
     keys = [tls_override(endpoints.keys, role, name)] if endpoints.keys else []
     if router:

@@ -1,9 +1,8 @@
 """Starts processes from a loop beside which Zenoh's threads run.
 
-Not by the loop's own `create_subprocess_exec`: under uvloop the copy of this process, before it becomes the
-other program, runs Python's own after-fork work, and waits there for ever for a lock that some other thread
-held at that moment; the loop waits for the copy. Beside a flood of messages that took fewer than 100 starts.
-`subprocess` does nothing in between (vfork, exec).
+The loop's own `create_subprocess_exec` may hang: under uvloop the forked copy runs Python's after-fork work
+before it becomes the other program, and waits for ever for a lock that another thread held during the fork.
+Beside a flood of messages this happened within 100 starts. `subprocess` uses vfork and exec alone.
 """
 
 from __future__ import annotations
@@ -17,10 +16,10 @@ from typing import IO
 
 
 class Spawned:
-    """A process that was started, and what became of it."""
+    """A process that was started, and how it ended."""
 
     def __init__(self, argv: Sequence[str], output: IO[bytes]) -> None:
-        """Start it, with nothing to read; what it says goes to a file. Raises OSError."""
+        """Start it without an input; its output goes to a file. Raises OSError."""
         self._process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=output, stderr=output)
         self.pid = self._process.pid
 
@@ -45,7 +44,7 @@ class Spawned:
 
 
 async def finished(argv: Sequence[str]) -> tuple[int, bytes, bytes]:
-    """Run a short command to its end: status, output, errors. Raises OSError where there is none such."""
+    """Run a short command to its end: status, output, errors. Raises OSError where it does not exist."""
 
     def run() -> subprocess.CompletedProcess[bytes]:
         return subprocess.run(argv, stdin=subprocess.DEVNULL, capture_output=True, check=False)
@@ -55,7 +54,7 @@ async def finished(argv: Sequence[str]) -> tuple[int, bytes, bytes]:
 
 
 async def _gone(pid: int) -> None:
-    """Until a child has ended; it is not reaped. The kernel tells, no thread waits."""
+    """Wait until a child has ended, without a thread; it is not reaped."""
     loop = asyncio.get_running_loop()
     descriptor = os.pidfd_open(pid)
     ended: asyncio.Future[None] = loop.create_future()

@@ -26,7 +26,7 @@ async def start_all(
     observers = rig.observers.values()
     if DRIVES in rig.children:
         await start(DRIVES)
-        await rig.logged(DRIVES, "drives on", timeout_s)
+        await rig.until_logged(DRIVES, "drives on", timeout_s)
     for name in (*rig.slaves, "suit"):
         await start(name)
     await rig.until(lambda: all(o.state for o in observers), timeout_s, "state of every robot", check)

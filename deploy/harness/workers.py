@@ -17,8 +17,8 @@ _HEAR_S = 0.2
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-Tell = Callable[[int], object]
-"""Takes how much was done since it was told last."""
+OnProgress = Callable[[int], object]
+"""Takes how much was done since the last call."""
 
 
 def jobs_here() -> int:
@@ -27,19 +27,19 @@ def jobs_here() -> int:
 
 
 def run_each(
-    call: Callable[[Item, Tell], Result],
+    call: Callable[[Item, OnProgress], Result],
     items: Sequence[Item],
     jobs: int,
-    told: Tell = lambda _: None,
+    on_progress: OnProgress = lambda _: None,
 ) -> Iterator[tuple[Item, Result]]:
-    """`call(item, tell)` of every item, as they finish; what it tells reaches `told` in this process.
+    """`call(item, tell)` of every item, as they finish; `tell` passes progress on to `on_progress` here.
 
     One job works in this process; of more, `call`, items and results travel between processes. The first
     error of a call ends all of it and passes through.
     """
     if jobs == 1 or len(items) <= 1:
         for item in items:
-            yield item, call(item, told)
+            yield item, call(item, on_progress)
         return
     others = set(multiprocessing.active_children())
     # spawn: a fork would copy this process's threads' locks
@@ -52,11 +52,11 @@ def run_each(
         while open_:
             done, _ = wait(open_, _HEAR_S, FIRST_COMPLETED)
             now = counter.value
-            told(now - heard)
+            on_progress(now - heard)
             heard = now
             for future in done:
                 yield open_.pop(future), future.result()
-    except BaseException:  # Ctrl-C too: nobody wants to wait for what runs
+    except BaseException:  # Ctrl-C too: it does not wait for the calls that run
         for child in set(multiprocessing.active_children()) - others:
             child.terminate()
         raise
@@ -69,7 +69,7 @@ _counter: Any = None
 
 
 def _begin(counter: Any) -> None:
-    """In a new process: Ctrl-C is for the first one to handle, and without that one there is no work."""
+    """Prepare a new process: the first process handles Ctrl-C, and this one ends with it."""
     global _counter
     _counter = counter
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -83,7 +83,7 @@ def _begin(counter: Any) -> None:
     threading.Thread(target=watch, name="parent-watch", daemon=True).start()
 
 
-def _call(call: Callable[[Item, Tell], Result], item: Item) -> Result:
+def _call(call: Callable[[Item, OnProgress], Result], item: Item) -> Result:
     return call(item, _tell)
 
 

@@ -32,9 +32,7 @@ Rooms on one line do not import each other, but for those of the slave, where on
 
 KNOWN_WRONG: set[tuple[str, str]] = set()
 """Imports against the order that still stand. Delete an entry with its import; the end is an empty set."""
-KNOWN_CIRCLES: Sequence[set[str]] = [
-    {"deploy.experiments.demo.report", "deploy.experiments.demo.run", "deploy.experiments.demo.view"},
-]
+KNOWN_CIRCLES: Sequence[set[str]] = []
 """Circles of files and of folders that still stand, or a part of each. The end is an empty list."""
 
 IMPURE = [

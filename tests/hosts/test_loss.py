@@ -41,14 +41,14 @@ def test_killed_master_leaves_the_robot_holding_until_engaged_anew(on_this_host:
             assert held.echo is not None
             waited_s = (held.sent_ns - held.echo.received_ns) / 1e9
             await host.known(held.sent_ns)
-            host_s = host.lost_s(held.echo.received_ns, held.sent_ns)
+            host_s = host.lost(held.echo.received_ns, held.sent_ns).excused_s
             assert waited_s < COMMAND_TIMEOUT_S + 2 * STATE_PERIOD_S + host_s
             assert "no command" in held.reason
 
             braked_ns = held.sent_ns + to_ns(BRAKE_S)
             await rig.until(lambda: observer.sent_ns > braked_ns + to_ns(1.0), 5.0, "more states")
             await host.known(braked_ns)
-            still_from_ns = braked_ns + to_ns(host.lost_s(held.sent_ns, braked_ns))
+            still_from_ns = braked_ns + to_ns(host.lost(held.sent_ns, braked_ns).excused_s)
             assert spread_rad([s for s in observer.states if s.sent_ns > still_from_ns]) < np.radians(0.3)
 
             await rig.start("master")
@@ -69,12 +69,14 @@ def test_a_killed_slave_is_reported_and_resumes_only_when_engaged(on_this_host: 
             observer = rig.observer
             await start_tracking(rig)
             await rig.children["slave"].kill()
-            await rig.until(lambda: "is silent" in rig.children["master"].said(), 5.0, "word from the master")
+            await rig.until(
+                lambda: "is silent" in rig.children["master"].log_text(), 5.0, "word from the master"
+            )
 
             await rig.start("slave")
             await rig.until(lambda: observer.ready, 30.0, "readiness with the new slave")
             assert observer.guard == "hold"
-            assert "is heard" in rig.children["master"].said()
+            assert "is heard" in rig.children["master"].log_text()
             resumed_ns = observer.sent_ns
             observer.recording = True
             await rig.until(lambda: observer.sent_ns > resumed_ns + to_ns(1.0), 5.0, "a second of states")
@@ -92,7 +94,7 @@ def test_each_process_stops_cleanly(on_this_host: OnThisHost, stop: signal.Signa
             await start_tracking(rig)
             statuses = {role: await rig.children[role].stop(stop) for role in ("master", "suit", "slave")}
             assert statuses == {"master": 0, "suit": 0, "slave": 0}, {
-                role: child.last_words() for role, child in rig.children.items()
+                role: child.last_lines() for role, child in rig.children.items()
             }
             counted = rig.children["slave"].metrics(SlaveMetrics)
             assert counted is not None

@@ -37,7 +37,7 @@ OVERRIDES = {
 def unexplained(states: list[RobotState], host: HostWatch) -> list[str]:
     """Why the robot held each time that the host had not stood still just before."""
     held = [b for a, b in pairwise(states) if (a.guard, b.guard) in (("track", "hold"), ("align", "hold"))]
-    return [s.reason for s in held if not host.explains(s.sent_ns)]
+    return [s.reason for s in held if not host.lost_before(s.sent_ns).explains_hold]
 
 
 def states(rig: Rig) -> dict[str, RobotState]:
@@ -79,7 +79,7 @@ def test_a_fault_on_one_robot_does_not_affect_the_others(
             assert unexplained(first.states[since - 1 :], host) == []
             assert states(rig)["robot-2"].guard == "estop"
             await rig.until(
-                lambda: "robot-3: the robot is silent" in rig.children["master"].said(), 5.0, "word"
+                lambda: "robot-3: the robot is silent" in rig.children["master"].log_text(), 5.0, "word"
             )
 
             # each engages anew by itself

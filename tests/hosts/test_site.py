@@ -73,17 +73,17 @@ async def follow(host: Host, operator: Path, robot: Child) -> None:
     """Engage, and let it align undisturbed until it tracks: each command typed takes a core for a while."""
     said = ""
     for _ in range(3):
-        before = len(robot.said())
+        before = len(robot.log_text())
         _, said = await tandem(host, "engage", "--master", str(operator))
         for _ in range(round(ALIGN_S / LOOK_S)):
-            if ": track: " in robot.said()[before:]:
+            if ": track: " in robot.log_text()[before:]:
                 status = await until(lambda s: s["guard"] in ("hold", "track"), host, operator)
                 assert status["guard"] == "track", status
                 return
-            if ": hold: " in robot.said()[before:]:
+            if ": hold: " in robot.log_text()[before:]:
                 break
             await asyncio.sleep(LOOK_S)
-    raise AssertionError(f"never tracked: {said}; {robot.last_words()}")
+    raise AssertionError(f"never tracked: {said}; {robot.last_lines()}")
 
 
 def test_from_keys_to_a_robot_that_follows_in_two_hosts(tmp_path: Path, on_this_host: OnThisHost) -> None:
@@ -122,6 +122,6 @@ def test_from_keys_to_a_robot_that_follows_in_two_hosts(tmp_path: Path, on_this_
                 await follow(network.operator, operator, at_robot)
             finally:
                 statuses = [await child.stop() for child in (master, suit, at_robot)]
-        assert statuses == [0, 0, 0], at_robot.last_words()
+        assert statuses == [0, 0, 0], at_robot.last_lines()
 
     on_this_host(story)

@@ -17,7 +17,7 @@ from deploy.experiments.accuracy.frames import fit, hint
 from deploy.experiments.accuracy.online import Run, run_online
 from deploy.experiments.accuracy.picture import Panel
 from deploy.experiments.accuracy.recording import Trial, load_trial
-from deploy.harness.workers import Tell, jobs_here, run_each
+from deploy.harness.workers import OnProgress, jobs_here, run_each
 from master.orientation.filter import OrientationFilter
 from master.orientation.filters import FILTERS
 
@@ -78,7 +78,7 @@ def judge(
     return Judged(tree, panels)
 
 
-def _run(work: tuple[Path, str], tell: Tell) -> Array:
+def _run(work: tuple[Path, str], tell: OnProgress) -> Array:
     """Orientations (T, 4) of one recording by one filter."""
     path, name = work
     trial = load_trial(path)

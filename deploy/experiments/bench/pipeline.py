@@ -46,7 +46,7 @@ def pipeline(seconds: float) -> dict[str, Any]:
         "nodes_8": ticks(0.1 * seconds, 8),
         "nodes_36_mahony": ticks(0.15 * seconds, 36, filter_name="mahony"),
         "nodes_36_ekf": ticks(0.15 * seconds, 36, filter_name="ekf"),
-        "believe_us": believe(0.05 * seconds, 36),
+        "plausibility_us": plausibility(0.05 * seconds, 36),
         "joint_angles_us": joint_angles(0.1 * seconds),
         "joint_angles_beyond_us": joint_angles(0.05 * seconds, beyond=True),
         "codec_us": codec(0.15 * seconds),
@@ -73,7 +73,7 @@ def ticks(seconds: float, count: int, fd: bool = True, filter_name: str = "vqf")
     return {"decode_us": spread_us(decode_ns), "orientation_us": spread_us(orientation_ns)}
 
 
-def believe(seconds: float, count: int) -> dict[str, Any]:
+def plausibility(seconds: float, count: int) -> dict[str, Any]:
     """µs a tick to judge whether that many nodes lie, at rest; over the two ways a judgement takes turns."""
     scale = SuitProtocol.load().fd.scale
     watch = Plausibility(PlausibilityConfig(), count, RATE_HZ, scale)

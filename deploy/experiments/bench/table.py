@@ -25,7 +25,7 @@ _BENCH_ROWS = (
     ("the same with mahony, µs", ("pipeline", "nodes_36_mahony", "orientation_us")),
     ("the same with ekf, µs", ("pipeline", "nodes_36_ekf", "orientation_us")),
     ("25 joint angles, µs", ("pipeline", "joint_angles_us")),
-    ("judge whether 36 nodes lie, µs a tick", ("pipeline", "believe_us")),
+    ("plausibility of 36 nodes, µs a tick", ("pipeline", "plausibility_us")),
     ("joint angles beyond the robot's limits, µs", ("pipeline", "joint_angles_beyond_us")),
     ("encode + decode, µs", ("pipeline", "codec_us")),
     ("one way, tandem, µs", ("link", "one_way_us", "tandem")),

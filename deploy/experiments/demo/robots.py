@@ -14,7 +14,7 @@ from deploy.experiments.demo.tables import holds_text, ticks_text
 from deploy.harness.child import Child
 from deploy.harness.observer import Observer
 from deploy.measure import TruthSeries, motion
-from deploy.report.tables import UNKNOWN, plain_table
+from deploy.report.tables import UNKNOWN, number, plain_table
 
 
 def robot_row(observer: Observer, child: Child, truth: TruthSeries) -> dict[str, Any]:
@@ -67,10 +67,10 @@ def robots_table(tree: Mapping[str, Any]) -> RenderableType:
             str(ticks.get("missed", UNKNOWN)),
             str(ticks.get("expected", UNKNOWN)),
             f"{row['cpu_percent']:.0f}",
-            _number((row["one_way_ms"] or {}).get("p99"), 1),
-            _number((row["end_to_end_ms"] or {}).get("p99"), 1),
-            _number(row["rmse_deg"], 2),
-            _number(row["motion_lag_ms"], 0),
+            number((row["one_way_ms"] or {}).get("p99"), 1),
+            number((row["end_to_end_ms"] or {}).get("p99"), 1),
+            number(row["rmse_deg"], 2),
+            number(row["motion_lag_ms"], 0),
         )
     loops = {"master": tree["ticks"]}
     missed = {robot: row["ticks"]["missed"] for robot, row in robots.items() if row["ticks"]}
@@ -82,7 +82,7 @@ def robots_table(tree: Mapping[str, Any]) -> RenderableType:
 
 
 def _master_words(tree: Mapping[str, Any]) -> str:
-    put_ms = _number((tree["frames_in_to_put_ms"] or {}).get("p99"), 2)
+    put_ms = number((tree["frames_in_to_put_ms"] or {}).get("p99"), 2)
     cpu = tree["cpu_percent"]["master"]
     return f"master: {cpu:.0f} % of a core, last frame in → put p99 {put_ms} ms; times in ms, p99"
 
@@ -91,7 +91,3 @@ def _missing_words(robots: Mapping[str, Mapping[str, Any]]) -> str:
     missing = {robot: row["due"]["missing"] for robot, row in robots.items() if row["due"] is not None}
     named = ", ".join(f"{robot} {count}" for robot, count in missing.items() if count)
     return f"; commands not there when they were due: {named}" if named else ""
-
-
-def _number(value: float | None, digits: int) -> str:
-    return UNKNOWN if value is None else f"{value:.{digits}f}"

@@ -167,7 +167,7 @@ def ticks_text(ours: Mapping[str, Mapping[str, int] | None], host: Mapping[str, 
         return Text(f"ticks missed: {missed}; the host itself was not measured", "dim")
     first = "" if host["priority"] else " (without real-time priority: only steal excuses)"
     return Text(
-        f"ticks missed: {missed}; by the host itself, of a bare loop{first}: {_missed(host['ticks'])}, "
+        f"ticks missed: {missed}; by the host itself, of a reference loop{first}: {_missed(host['ticks'])}, "
         f"still for {host['longest_ms']:.0f} ms at most, {host['steal_percent']:.1f} % of its time stolen",
         "dim",
     )

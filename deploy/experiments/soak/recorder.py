@@ -51,7 +51,7 @@ class RecorderProcess:
     async def start(self, through: Sequence[str] = (), folder: Path | None = None) -> None:
         """Record into a new file."""
         self._number += 1
-        self._said_before = len(self.child.said()) if self.child.log.exists() else 0
+        self._said_before = len(self.child.log_text()) if self.child.log.exists() else 0
         self.file = (folder or self._folder) / f"recording-{self._number:04}.mcap"
         await self.child.run([*self._arguments, "--out", str(self.file)], through)
 
@@ -63,7 +63,7 @@ class RecorderProcess:
 
     def complaints(self) -> int:
         """How often this process said that its disk failed."""
-        return self.child.said()[self._said_before :].count(ENDS_HERE)
+        return self.child.log_text()[self._said_before :].count(ENDS_HERE)
 
     async def look(self, ended_ns: int | None = None) -> RecordingChecked:
         """What is in the last file of a process that has ended; all are deleted. `ended_ns`: when it died."""

@@ -202,10 +202,10 @@ class Soak:
     async def _look_after_processes(self) -> None:
         for name in self._stage.ended():
             child = self._stage.children[name]
-            self._log.add(ProcessEnded(name, child.last_words()))
+            self._log.add(ProcessEnded(name, child.last_lines()))
             self._ends[name] = self._ends.get(name, 0) + 1
             if self._ends[name] > MOST_ENDS:
-                raise TandemError(f"the {name} ends again and again: {child.last_words()}")
+                raise TandemError(f"the {name} ends again and again: {child.last_lines()}")
             await self._stage.start(name)
 
 

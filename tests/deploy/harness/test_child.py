@@ -83,7 +83,7 @@ def test_sigterm_ends_one_that_listens(tmp_path: Path) -> None:
     async def test(child: Child) -> None:
         child.check()
         assert await child.stop() == 0
-        assert "sorted out" in child.said()
+        assert "sorted out" in child.log_text()
         assert await child.stop() == 0
 
     program = "signal.signal(signal.SIGTERM, lambda *_: (print('sorted out'), sys.exit(0)))\n" + STAY
@@ -96,13 +96,13 @@ def test_one_that_ignores_sigterm_is_killed(tmp_path: Path, monkeypatch: pytest.
 
     async def test(child: Child) -> None:
         assert await child.stop() == -signal.SIGKILL
-        with pytest.raises(TandemError, match="the master ended with status -9: it said nothing"):
+        with pytest.raises(TandemError, match="the master ended with status -9: its log is empty"):
             child.check()
 
     run(tmp_path, "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n" + STAY, test)
 
 
-def test_one_that_exits_leaves_its_last_words(tmp_path: Path) -> None:
+def test_one_that_exits_leaves_its_last_lines(tmp_path: Path) -> None:
     async def test(child: Child) -> None:
         await ended(child)
         with pytest.raises(

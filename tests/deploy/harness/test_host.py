@@ -1,4 +1,4 @@
-"""What the bare loops tell of the host."""
+"""What the reference loops tell of the host."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import os
 import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S, monotonic_ns
-from deploy.harness.bare_loop import PERIOD_NS, stolen_ns
 from deploy.harness.host import HostWatch, watch_host
+from deploy.harness.reference_loop import PERIOD_NS, stolen_ns
 
 
 def told(*stalls: tuple[int, int, int]) -> HostWatch:
     """A host whose loops began at 1 s; `stalls` are of a core, from and until ms."""
     host = HostWatch()
-    host.hear(json.dumps({"cores": [0, 1], "origin_ns": NS_PER_S, "priority": True}))
+    host.take(json.dumps({"cores": [0, 1], "origin_ns": NS_PER_S, "priority": True}))
     for core, from_ms, until_ms in stalls:
         span = {"from_ns": from_ms * NS_PER_MS, "until_ns": until_ms * NS_PER_MS}
-        host.hear(json.dumps({"core": core, "missed": (until_ms - from_ms) // 5, **span}))
+        host.take(json.dumps({"core": core, "missed": (until_ms - from_ms) // 5, **span}))
     return host
 
 
@@ -55,7 +55,7 @@ def test_time_lost_is_that_in_which_any_core_stood_still_counted_once(
     since_ms: int, until_ms: int, lost_ms: int
 ) -> None:
     host = told((0, 1100, 1140), (1, 2000, 2300), (0, 1200, 1230), (0, 2100, 2200), (1, 1110, 1130))
-    assert host.lost_s(since_ms * NS_PER_MS, until_ms * NS_PER_MS) == pytest.approx(lost_ms / 1e3)
+    assert host.lost(since_ms * NS_PER_MS, until_ms * NS_PER_MS).excused_s == pytest.approx(lost_ms / 1e3)
 
 
 @pytest.mark.parametrize(
@@ -71,34 +71,34 @@ def test_time_lost_is_that_in_which_any_core_stood_still_counted_once(
 )
 def test_a_hold_is_explained_by_what_was_lost_just_before(at_ms: int, explained: bool) -> None:
     host = told((0, 1000, 1050), (1, 2700, 2720), (0, 2710, 2730), (1, 3030, 3100))
-    assert host.explains(at_ms * NS_PER_MS) is explained
+    assert host.lost_before(at_ms * NS_PER_MS).explains_hold is explained
 
 
 def test_a_loop_s_word_that_it_ticks_is_no_stall() -> None:
     host = told((0, 1100, 1140))
-    host.hear(json.dumps({"core": 1, "from_ns": 7, "until_ns": 8 * NS_PER_S, "missed": 0}))
+    host.take(json.dumps({"core": 1, "from_ns": 7, "until_ns": 8 * NS_PER_S, "missed": 0}))
     assert [stall.core for stall in host.stalls] == [0]
     assert host.known_ns == {0: 1140 * NS_PER_MS, 1: 8 * NS_PER_S}
 
 
 def test_without_priority_only_what_was_stolen_excuses() -> None:
     host = HostWatch()
-    host.hear(json.dumps({"cores": [0], "origin_ns": NS_PER_S, "priority": False}))
+    host.take(json.dumps({"cores": [0], "origin_ns": NS_PER_S, "priority": False}))
     stall = {"core": 0, "from_ns": 2 * NS_PER_S, "until_ns": 3 * NS_PER_S, "missed": 200}
-    host.hear(json.dumps({**stall, "stolen_ns": 0}))
+    host.take(json.dumps({**stall, "stolen_ns": 0}))
     host.end()
-    assert not host.explains(3 * NS_PER_S)
+    assert not host.lost_before(3 * NS_PER_S).explains_hold
     assert asyncio.run(host.excuse(NS_PER_S)) == ""
-    host.hear(json.dumps({**stall, "stolen_ns": 50 * NS_PER_MS}))
+    host.take(json.dumps({**stall, "stolen_ns": 50 * NS_PER_MS}))
     host.end()
-    assert host.explains(3 * NS_PER_S)
+    assert host.lost_before(3 * NS_PER_S).explains_hold
     assert asyncio.run(host.excuse(NS_PER_S)) == "the host stood still for 50 ms: /proc/stat shows steal"
 
 
 def test_a_host_that_was_not_measured_excuses_nothing() -> None:
     assert HostWatch().figures(NS_PER_S) == {}
     assert HostWatch().stood_still_s(0, NS_PER_S) == 0.0
-    assert not HostWatch().explains(NS_PER_S)
+    assert not HostWatch().lost_before(NS_PER_S).explains_hold
 
 
 @pytest.mark.parametrize(("core", "stolen_ms"), [(0, 120), (1, 0), (10, 70), (2, 0), (3, 0)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from deploy.experiments.accuracy.papers.figures import Experiment, Figure
-from deploy.harness.workers import Tell, jobs_here, run_each
+from deploy.harness.workers import OnProgress, jobs_here, run_each
 
 Done = tuple[Experiment, int, list[Figure]]
 
@@ -19,6 +19,6 @@ def run_all(
         yield experiment, seed, figures
 
 
-def _run(work: tuple[Experiment, int], _: Tell) -> list[Figure]:
+def _run(work: tuple[Experiment, int], _: OnProgress) -> list[Figure]:
     experiment, seed = work
     return experiment.run(seed)

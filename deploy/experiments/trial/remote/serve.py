@@ -186,7 +186,7 @@ class RobotHost:
         while self._observer.state is None:
             self._child.check()
             if monotonic_ns() > deadline_ns:
-                raise TandemError(f"the slave says nothing: {self._child.last_words()}")
+                raise TandemError(f"the slave says nothing: {self._child.last_lines()}")
             await asyncio.sleep(LOOK_S)
         log.info("slave %d: %s at %s", self._started, start.strategy, there)
 

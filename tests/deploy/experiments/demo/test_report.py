@@ -170,7 +170,10 @@ def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: Virt
     report = make_report(DemoOptions(), rig(tracked, ["track"]), ENDED_WELL, RunNotes([row], host))
     assert (report.tree["holds"], report.tree["host"], report.problems) == ([row], host, [])
     shown = " ".join(text(report).split())
-    assert "ticks missed: master 0 of 5, robot 0 of 5; by the host itself, of a bare loop: 40 of 90" in shown
+    assert (
+        "ticks missed: master 0 of 5, robot 0 of 5; by the host itself, of a reference loop: 40 of 90"
+        in shown
+    )
     assert "still for 143 ms at most, 4.2 % of its time stolen" in shown
     assert "robot-1 held at 6.3 s for 1.7 s: no encoder (the host kept its time)" in shown
 

@@ -11,7 +11,7 @@ import pytest
 
 
 def run(video: str, seconds: float) -> dict[str, Any]:
-    command = [sys.executable, "-m", "deploy.experiments.bench.video", video, "--seconds", str(seconds)]
+    command = [sys.executable, "-m", "tests.slave.camera.video_bench", video, "--seconds", str(seconds)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     measured: dict[str, Any] = json.loads(done.stdout)
     return measured

@@ -1,8 +1,8 @@
-"""A loop on each core that does nothing but tick, in a process of its own: what it misses, the host missed.
+"""The reference loops: one a core, in a process of their own, that only tick; the host misses what they miss.
 
-`python -m deploy.harness.bare_loop` writes a JSON line when it starts, one each time that it came late by
-a tick or more, and one a core four times a second; it ends when its standard input does. At real-time
-priority, where the host permits it, it comes before all programs of tandem: what it misses then is the host's
+`python -m deploy.harness.reference_loop` writes a JSON line when it starts, one each time that a loop is late
+by a tick or more, and one a core four times a second; it ends when its standard input does. At real-time
+priority, where the host permits it, it runs before all programs of tandem: what it misses then is the host's
 alone. Without it, only the steal that the kernel counts meanwhile is the host's (deploy/harness/excuse.py).
 """
 
@@ -22,8 +22,8 @@ from common.process.realtime import enter_real_time
 
 PERIOD_NS = 5_000_000
 """As the master's capture and the slave's loop."""
-WORD_TICKS = 50
-"""After so many ticks a loop says that it still ticks, so that silence is not taken for time kept."""
+REPORT_TICKS = 50
+"""After so many ticks a loop reports that it still ticks: silence does not mean that it was in time."""
 PRIORITY = 90
 """Above what `[process] realtime_priority` may ask for."""
 
@@ -31,11 +31,11 @@ PRIORITY = 90
 def main() -> None:
     """Tick on every core until standard input ends."""
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for whoever started this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one handles Ctrl-C
     first = enter_real_time(PRIORITY)
     cores = sorted(os.sched_getaffinity(0))
     origin_ns = monotonic_ns() + PERIOD_NS
-    _say({"cores": cores, "origin_ns": origin_ns, "priority": first})
+    _write({"cores": cores, "origin_ns": origin_ns, "priority": first})
     for core in cores:
         threading.Thread(target=_tick, args=(core, TickGrid(origin_ns, PERIOD_NS)), daemon=True).start()
     sys.stdin.buffer.read()
@@ -50,28 +50,28 @@ def _tick(core: int, grid: TickGrid) -> None:
         time.sleep(max(0, awaited_ns - monotonic_ns()) / NS_PER_S)
         now_ns = monotonic_ns()
         due = grid.due(now_ns)
-        word = due is not None and due.tick % WORD_TICKS == 0
-        if late or word:
+        regular = due is not None and due.tick % REPORT_TICKS == 0
+        if late or regular:
             # a tick after the stall: the kernel counts what was stolen only once it runs again
             stolen_ns = _stolen_ns(core)
             if late:
-                _say({**late, "stolen_ns": stolen_ns - before_ns})
+                _write({**late, "stolen_ns": stolen_ns - before_ns})
             before_ns, late = stolen_ns, {}
-        if due is not None and (due.missed or word):
-            told: dict[str, object] = {
+        if due is not None and (due.missed or regular):
+            report: dict[str, object] = {
                 "core": core,
                 "from_ns": awaited_ns,
                 "until_ns": now_ns,
                 "missed": due.missed,
             }
             if due.missed:
-                late = told
+                late = report
             else:
-                _say(told)
+                _write(report)
 
 
 def stolen_ns(stat: str, core: int, ticks_per_s: int) -> int:
-    """What the machine beneath took of a core since boot, by `/proc/stat` (proc(5)); 0 where not told."""
+    """The time stolen from a core since boot, by `/proc/stat` (proc(5)); 0 where it is not given."""
     for line in stat.splitlines():
         name, *times = line.split()
         if name == f"cpu{core}":
@@ -86,7 +86,7 @@ def _stolen_ns(core: int) -> int:
         return 0
 
 
-def _say(line: dict[str, object]) -> None:
+def _write(line: dict[str, object]) -> None:
     sys.stdout.write(json.dumps(line) + "\n")  # one write: two threads' lines must not mix
     sys.stdout.flush()
 

@@ -3,7 +3,7 @@
 The camera is a stand-in that fills whatever it is allowed to: the worst that a picture can be. One run a
 process, for what is left in a link's queue at its end must not meet the next run:
 
-    python -m deploy.experiments.bench.video controlled --kb-s 125 --seconds 20
+    python -m tests.slave.camera.video_bench controlled --kb-s 125 --seconds 20
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from common.skeleton import load_skeleton
 from common.wire.codec import decode, encode
 from common.wire.messages import Command, CommandStamps, RobotState
 from common.wire.topics import COMMAND, STATE, VIDEO
-from deploy.experiments.bench.slow_link import SlowLink, SlowLinkOptions
 from deploy.harness.endpoints import free_port
 from master.picture import VideoWatch
 from slave.camera.config import CameraConfig
 from slave.camera.feed import CameraFeed
 from slave.camera.pipe import Answer, Reply, Request
 from slave.camera.rate import RateControl
+from tests.slave.camera.slow_link import SlowLink, SlowLinkOptions
 
 ROBOT = "video-bench"
 FIXED_BYTES = 30_000
@@ -157,7 +157,7 @@ def _connecting(port: int) -> LinkConfig:
 
 def main() -> None:
     """One run, as JSON on standard output."""
-    parser = argparse.ArgumentParser(prog="python -m deploy.experiments.bench.video")
+    parser = argparse.ArgumentParser(prog="python -m tests.slave.camera.video_bench")
     parser.add_argument("video", choices=("off", "controlled", "uncontrolled"))
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--kb-s", type=float, default=125.0, help="in each direction")
