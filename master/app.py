@@ -10,7 +10,7 @@ from common.can.bus import CanBus
 from common.clock import monotonic_ns
 from common.latency.budget import StageTimes
 from common.latency.durations import Durations
-from common.link import Session, open_session
+from common.link import LinkSession, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
 from common.metrics.master import MasterMetrics
@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 class Master:
     """One operator's capture loop: each posture is solved once, and sent to every robot it commands."""
 
-    def __init__(self, config: MasterConfig, session: Session, notifier: Notifier | None = None) -> None:
+    def __init__(self, config: MasterConfig, session: LinkSession, notifier: Notifier | None = None) -> None:
         self._config = config
         self._notifier = notifier or Notifier()
         self._pipeline = MasterPipeline(config, SuitProtocol.load(config.capture.dbc))

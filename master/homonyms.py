@@ -5,7 +5,7 @@ from __future__ import annotations
 from common.clock import to_ns
 from common.link.namesakes import NOTICE_S
 from common.wire.messages import Action, ControlRequest
-from common.wire.presence import Presence, several_bear
+from common.wire.presence import ProcessPresence, several_bear
 
 HEARD_S = 0.5
 """A robot that was not heard for so long counts no more: one that starts anew takes longer than that."""
@@ -18,11 +18,11 @@ class Homonyms:
         self._robot = robot
         self._operator = operator
         self._heard: dict[int, int] = {}
-        self._shown: dict[int, Presence] = {}
+        self._shown: dict[int, ProcessPresence] = {}
         self._next_notice_ns = 0
         self._said: str | None = None
 
-    def on_presence(self, presence: Presence, here: bool) -> None:
+    def on_presence(self, presence: ProcessPresence, here: bool) -> None:
         """A process of the robot's name showed itself, or went."""
         if presence.role == "slave" and presence.instance and here:
             self._shown[presence.instance] = presence

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.clock import to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
@@ -75,7 +75,7 @@ class MasterPipeline:
         self.doubts: Doubts = {}
         """Nodes that were not believed, or not wholly, when joint angles were last computed."""
 
-    def tick(self, tick: int, now_ns: int) -> tuple[Frame, JointAngleSample | None]:
+    def tick(self, tick: int, now_ns: int) -> tuple[CanFrame, JointAngleSample | None]:
         """Open a tick: the SYNC frame for every bus, and what the last window gave if it was still open."""
         late = self.close(now_ns) if self._window_open else None
         self._window_open = True

@@ -20,7 +20,7 @@ from common.process.ticker import ticks
 from common.wire.codec import decode, encode
 from common.wire.instance import draw_instance
 from common.wire.messages import ClockReply, ControlReply, RobotState, Statistics
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
 from master.homonyms import Homonyms
 from master.lease import LeaseKeeper
@@ -122,7 +122,7 @@ class CommandedRobot:
                 await self._link.ask_all(CONTROL, encode(notice))
         return self._homonyms.words(now_ns) is not None
 
-    def _on_presence(self, presence: Presence, here: bool) -> None:
+    def _on_presence(self, presence: ProcessPresence, here: bool) -> None:
         self._homonyms.on_presence(presence, here)
         if here and presence.role == "slave" and presence.other_version:
             log.warning("%s: %s", self.name, presence.other_version)

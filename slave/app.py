@@ -26,7 +26,7 @@ from common.process.ticker import ticks
 from common.wire.codec import encode
 from common.wire.messages import Statistics
 from common.wire.path_probe import answer_probe
-from common.wire.presence import Presence, place
+from common.wire.presence import ProcessPresence, place
 from common.wire.topics import CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, video
 from common.wire.version import software
 from slave.attitude.open import open_base
@@ -152,7 +152,7 @@ class Slave:
             self._stopped = stop
             self._servos.quick_stop(stop)
 
-    def _on_presence(self, presence: Presence, here: bool) -> None:
+    def _on_presence(self, presence: ProcessPresence, here: bool) -> None:
         self._pipeline.namesakes.on_presence(presence, here)
         if here and presence.other_version and presence.role == "master":
             log.warning("%s: %s", self._config.robot, presence.other_version)

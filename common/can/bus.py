@@ -14,7 +14,7 @@ import can
 from common.can.config import BusConfig
 from common.can.controller import RESTARTED, Controller, error_words, of_error_frame
 from common.can.echo import SentFrames
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.can.interface import error_number, open_bus
 from common.can.kept_open import KeptOpenBus, OnChange, Opener, StateOf
 from common.can.netlink import state_of
@@ -55,7 +55,7 @@ class CanBus(KeptOpenBus):
         state = "" if self.state is None else str(self.state)
         return BusMetrics(**asdict(self.counters), up=self.up, state=state, last_error=self.last_error)
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: CanFrame) -> None:
         """Send without waiting. Never raises: what cannot be sent is counted, and brings the bus down."""
         self._sent_ids.add(frame.id)
         if self._on_second_sender is not None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class CanFrame:
     """One data frame with an 11-bit identifier; up to 8 bytes on classic CAN, up to 64 where `fd`."""
 
     id: int

@@ -16,7 +16,7 @@ import can
 from can.interfaces.udp_multicast.utils import pack_message
 
 from common.can.config import BusConfig
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.can.interface import descriptor, open_bus
 
 _SO_ATTACH_FILTER = getattr(socket, "SO_ATTACH_FILTER", 26)
@@ -49,7 +49,7 @@ def open_without_function_code(config: BusConfig, function_code: int) -> can.Bus
     )
 
 
-def open_without_longer_than(config: BusConfig, longest: Frame) -> can.BusABC:
+def open_without_longer_than(config: BusConfig, longest: CanFrame) -> can.BusABC:
     """A bus that hears no frame whose datagram is longer than that of `longest`."""
     message = can.Message(arbitration_id=longest.id, data=longest.data, is_extended_id=False)
     length = _UDP_HEADER_BYTES + len(pack_message(message))

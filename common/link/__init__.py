@@ -4,6 +4,6 @@ Read configuration (what Zenoh is told), inbox (foreign thread → loop), querie
 """
 
 from common.link.link import Link
-from common.link.session import Session, open_link, open_session
+from common.link.session import LinkSession, open_link, open_session
 
-__all__ = ["Link", "Session", "open_link", "open_session"]
+__all__ = ["Link", "LinkSession", "open_link", "open_session"]

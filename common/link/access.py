@@ -45,7 +45,7 @@ _ALL = ("publish", "hear", "ask", "answer", "live", "watch", "watched")
 
 def access_control(access: AccessConfig) -> dict[str, Any]:
     """Zenoh's `access_control`: rules, subjects and policies of everybody who is named."""
-    table = _Table()
+    table = _AccessRules()
     for router in access.routers:
         table.allow([common_name(Role.ROUTER, router)], _ALL, ["tandem/**"])
     for robot in access.robots:
@@ -65,7 +65,7 @@ def named(access: AccessConfig) -> set[str]:
     return of_people | robots | {common_name(Role.ROUTER, router) for router in access.routers}
 
 
-def _robot(table: _Table, access: AccessConfig, robot: str) -> None:
+def _robot(table: _AccessRules, access: AccessConfig, robot: str) -> None:
     me = [common_name(Role.ROBOT, robot)]
     operators = _named(Role.OPERATOR, access.operators, robot)
     viewers = _named(Role.OBSERVER, access.viewers, robot)
@@ -97,7 +97,7 @@ def _alive(robot: str, role: str) -> str:
     return f"{ALIVE.key_for(robot)}/{role}"
 
 
-class _Table:
+class _AccessRules:
     """Rules as they are allowed, each with those to whom it applies."""
 
     def __init__(self) -> None:

@@ -9,7 +9,7 @@ from common.link.access import named
 from common.link.config import LinkConfig
 from common.link.listening import hear_refusals
 from common.link.refusals import Refusals
-from common.link.session import Session
+from common.link.session import LinkSession
 from common.metrics.link import AccessMetrics
 
 log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ class Audit:
                 "[link.access] is not set: anyone with a certificate of this authority may command the robot"
             )
 
-    def attach(self, session: Session) -> None:
+    def attach(self, session: LinkSession) -> None:
         """Hear of everybody who is connected, and who comes and goes."""
         if self._refusals is not None:
             session.watch_peers(self._on_change)

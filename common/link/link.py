@@ -17,7 +17,7 @@ from common.link.queries import Answered, Answerer, Asking
 from common.link.waiting import count_peers, wait_for_peer
 from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
-from common.wire.presence import Presence, present
+from common.wire.presence import ProcessPresence, present
 from common.wire.topics import ALIVE, Topic
 
 CONNECT_TIMEOUT_S = 3.0
@@ -141,7 +141,7 @@ class Link:
             keys.append(present(self.robot, role, instance, endpoints).key)
         self._held += [self._session.liveliness().declare_token(key) for key in keys]
 
-    def watch_presence(self, on_change: Callable[[Presence, bool], None]) -> None:
+    def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None]) -> None:
         """Call `on_change(presence, alive)` on the loop as processes of this robot's name come and go.
 
         Those already alive are reported at once, this session's own among them.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from common.clock import to_ns
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 
 NOTICE_S = 2.0
 """How long a master's word that two answer to the name counts; it repeats it every NOTICE_S / 4."""
@@ -15,11 +15,11 @@ class Namesakes:
     def __init__(self, own: int) -> None:
         """`own`: this process's instance number."""
         self._own = own
-        self._shown: dict[int, Presence] = {}
+        self._shown: dict[int, ProcessPresence] = {}
         self._notice = ""
         self._noticed_ns: int | None = None
 
-    def on_presence(self, presence: Presence, here: bool) -> None:
+    def on_presence(self, presence: ProcessPresence, here: bool) -> None:
         """A process showed itself, or went."""
         if presence.role != "slave" or presence.instance in (0, self._own):
             return

@@ -9,7 +9,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from common.link.inbox import wake
-from common.wire.presence import Presence, read_presence
+from common.wire.presence import ProcessPresence, read_presence
 from common.wire.topics import ALIVE
 
 
@@ -17,7 +17,7 @@ def watch_presence(
     session: zenoh.Session,
     loop: asyncio.AbstractEventLoop,
     robot: str,
-    on_change: Callable[[Presence, bool], None],
+    on_change: Callable[[ProcessPresence, bool], None],
     held: list[object],
 ) -> None:
     """Call `on_change(presence, alive)` on the loop; those already there at once. `robot` may be `*`.

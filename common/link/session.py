@@ -23,7 +23,7 @@ from common.link.link import Link
 from common.link.opening import open_zenoh
 from common.link.presence import watch_presence
 from common.link.waiting import count_peers
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 from common.wire.topics import ALIVE, Topic
 
 CLOSE_TIMEOUT_S = 1.0
@@ -38,7 +38,7 @@ async def open_session(
     mode: str = "",
     router_within_s: float = math.inf,
     waits: Callable[[str], None] = lambda _: None,
-) -> AsyncIterator[Session]:
+) -> AsyncIterator[LinkSession]:
     """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later.
 
     `mode`: `router`, in place of the configuration's own. `router_within_s`: how long it waits for a router,
@@ -52,7 +52,7 @@ async def open_session(
     if algorithm is not None:
         check_congestion_control(algorithm)
     opened = await open_zenoh(config, mode, router_within_s, waits)
-    session = Session(opened, asyncio.get_running_loop(), config.quality)
+    session = LinkSession(opened, asyncio.get_running_loop(), config.quality)
     if algorithm is not None:
         set_congestion_control(algorithm)  # what the listening sockets accept inherits it
         session.watch_peers(partial(_choose_congestion, algorithm))
@@ -80,7 +80,7 @@ def check_robot_name(robot: str) -> None:
         raise LinkError(f"robot {robot!r}: expected a name of at most 64 letters, digits, '_', '.' and '-'")
 
 
-class Session:
+class LinkSession:
     """One Zenoh session. `link(robot)` gives the topics of a robot; all links end with the session."""
 
     def __init__(
@@ -120,7 +120,7 @@ class Session:
             )
         )
 
-    def watch_presence(self, on_change: Callable[[Presence, bool], None], robot: str = "*") -> None:
+    def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None], robot: str = "*") -> None:
         """Call `on_change(presence, alive)` on the loop as processes come and go, of every robot's name."""
         watch_presence(self._session, self._loop, robot, on_change, self._held)
 

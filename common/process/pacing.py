@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Due:
+class DueTick:
     """The tick to run now, and how many were skipped to get to it."""
 
     tick: int
@@ -29,11 +29,11 @@ class TickGrid:
         """When the next tick falls due."""
         return self.origin_ns + self._next * self.period_ns
 
-    def due(self, now_ns: int) -> Due | None:
+    def due(self, now_ns: int) -> DueTick | None:
         """The newest tick that has fallen due and not been run, or None if it is too early."""
         newest = (now_ns - self.origin_ns) // self.period_ns
         if newest < self._next:
             return None
         missed = newest - self._next
         self._next = newest + 1
-        return Due(newest, self.origin_ns + newest * self.period_ns, missed)
+        return DueTick(newest, self.origin_ns + newest * self.period_ns, missed)

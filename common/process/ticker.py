@@ -8,7 +8,7 @@ import os
 from collections.abc import AsyncGenerator
 
 from common.clock import NS_PER_S, Clock, monotonic_ns
-from common.process.pacing import Due, TickGrid
+from common.process.pacing import DueTick, TickGrid
 
 _CLOCK_MONOTONIC = 1
 _EXPIRATIONS_BYTES = 8
@@ -22,7 +22,7 @@ class _Itimerspec(ctypes.Structure):
     _fields_ = (("it_interval", _Timespec), ("it_value", _Timespec))
 
 
-async def ticks(grid: TickGrid, clock: Clock = monotonic_ns) -> AsyncGenerator[Due, None]:
+async def ticks(grid: TickGrid, clock: Clock = monotonic_ns) -> AsyncGenerator[DueTick, None]:
     """Each tick of the grid when it falls due; a late caller gets the newest, with the count of the missed.
 
     The loop runs between any two ticks, however late the caller is. `clock` must be this host's monotonic

@@ -1,6 +1,6 @@
 """Which postures a robot can take, and which of them is the nearest to the operator's."""
 
+from common.reach.follower import NOMINAL_S, PostureFollower
 from common.reach.nearest import nearest_angles
-from common.reach.reach import NOMINAL_S, Reach
 
-__all__ = ["NOMINAL_S", "Reach", "nearest_angles"]
+__all__ = ["NOMINAL_S", "PostureFollower", "nearest_angles"]

@@ -44,7 +44,7 @@ _FORMS: dict[tuple[int, ...], list[list[int]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class JointGroup:
     """A segment that two or three independent angles turn: what is beyond a limit is projected together."""
 
     segment: int
@@ -85,7 +85,7 @@ class Chart:
     """(3 N,): middle of each angle's range: of angles a whole turn apart the one nearest to it is meant."""
     segment_of_joint: NDArray[np.intp]
     """(J, K): the segments of those angles."""
-    groups: tuple[Group, ...]
+    groups: tuple[JointGroup, ...]
 
 
 def make_chart(skeleton: Skeleton, lower_rad: Array, upper_rad: Array) -> Chart:
@@ -140,7 +140,7 @@ def _row(live: tuple[int, ...], place: int) -> int:
 
 def _groups(
     skeleton: Skeleton, lives: list[tuple[int, ...]], lower_rad: Array, upper_rad: Array
-) -> tuple[Group, ...]:
+) -> tuple[JointGroup, ...]:
     alone = {next(iter(joint.drives)): j for j, joint in enumerate(skeleton.joints) if len(joint.drives) == 1}
     groups = []
     for i, segment in enumerate(skeleton.segments):
@@ -153,7 +153,7 @@ def _groups(
 
 def _group(
     skeleton: Skeleton, index: int, alone: dict[str, int], lower_rad: Array, upper_rad: Array, heading: bool
-) -> Group:
+) -> JointGroup:
     """The group of one segment. `alone`: the joint of each angle; `heading`: the first angle is free."""
     joints: list[int | None] = [None, None, None]
     scale, ends = [1.0, 1.0, 1.0], [(0.0, 0.0)] * 3
@@ -167,7 +167,7 @@ def _group(
         elif k == 0 and heading:
             ends[k] = (-math.inf, math.inf)
     middle = [0.5 * (low + high) if math.isfinite(low) else 0.0 for low, high in ends]
-    return Group(
+    return JointGroup(
         index,
         (joints[0], joints[1], joints[2]),
         (scale[0], scale[1], scale[2]),

@@ -23,7 +23,7 @@ class Entry(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class McapRecording:
     """A file's content, in the order in which it was written."""
 
     metadata: dict[str, str]
@@ -83,11 +83,11 @@ class RecordingStream:
                 self.metadata = dict(record.metadata)
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path) -> McapRecording:
     """Read a whole file, or one that was cut off, up to its last whole chunk.
 
     Raises RecordingError where it cannot be opened or is no recording of ours.
     """
     stream = RecordingStream(path)
     entries = list(stream)
-    return Recording(stream.metadata or {}, entries, stream.cut)
+    return McapRecording(stream.metadata or {}, entries, stream.cut)

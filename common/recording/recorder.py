@@ -59,7 +59,7 @@ class RecorderCounters:
     """Why nothing is written any more; empty while all is well."""
 
 
-class Recorder:
+class McapRecorder:
     """One file, from opening to `close`. `put` is for one thread, as a rule the event loop's."""
 
     def __init__(

@@ -20,7 +20,7 @@ _MOST_PLACE = 160
 
 
 @dataclass(frozen=True, slots=True)
-class Presence:
+class ProcessPresence:
     """One process that shows itself."""
 
     robot: str
@@ -62,19 +62,19 @@ class Presence:
         return f"{where} (instance {self.instance:08x})" if self.instance else where
 
 
-def read_presence(key: str) -> Presence | None:
+def read_presence(key: str) -> ProcessPresence | None:
     """What a token's key tells; None where it is no token of tandem's. It raises on no key."""
     parts = key.split("/")
     if len(parts) < 4 or parts[0] != "tandem" or parts[2] != "alive":
         return None
     robot, role, more = parts[1], parts[3], parts[4:]
     if not more:
-        return Presence(robot, role)
+        return ProcessPresence(robot, role)
     try:
         instance = int(more[0], 16)
         schema, _, software = more[1].partition("-")
         # what a later version appends to the key is let be
-        return Presence(robot, role, instance, int(schema), unquote(software), unquote(more[2]))
+        return ProcessPresence(robot, role, instance, int(schema), unquote(software), unquote(more[2]))
     except (ValueError, IndexError):
         return None
 
@@ -85,9 +85,9 @@ def place(endpoints: Sequence[str]) -> str:
     return f"{host}, {', '.join(endpoints)}" if endpoints else host
 
 
-def present(robot: str, role: str, instance: int, endpoints: Sequence[str]) -> Presence:
+def present(robot: str, role: str, instance: int, endpoints: Sequence[str]) -> ProcessPresence:
     """How a process shows itself."""
-    return Presence(robot, role, instance, SCHEMA, installed("tandem"), place(endpoints))
+    return ProcessPresence(robot, role, instance, SCHEMA, installed("tandem"), place(endpoints))
 
 
 def several_bear(robot: str, places: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from common.errors import TandemError
 from common.quaternion import Array
-from common.recording import Recorder
+from common.recording import McapRecorder
 from master.config import MasterConfig
 from master.suit.capture import OnSweep, SuitCapture
 from master.suit.poll import Sweep
@@ -30,12 +30,12 @@ def open_capture(config: MasterConfig, on_sweep: OnSweep) -> SuitCapture:
     return SuitCapture(nodes, capture.buses, protocol, capture.rate_hz, capture.lost_after, on_sweep)
 
 
-def open_recorder(config: MasterConfig, path: Path) -> Recorder:
+def open_recorder(config: MasterConfig, path: Path) -> McapRecorder:
     """A new recording of that suit. Raises RecordingError."""
-    return Recorder(path, describe(config.profile, names(config), config.capture.rate_hz))
+    return McapRecorder(path, describe(config.profile, names(config), config.capture.rate_hz))
 
 
-def record(recorder: Recorder, sweep: Sweep) -> None:
+def record(recorder: McapRecorder, sweep: Sweep) -> None:
     """Put one tick."""
     recorder.put(TOPIC, encode_sweep(sweep), sweep.sampled_ns)
 
@@ -47,7 +47,7 @@ def readings(sweep: Sweep) -> Array:
     return out
 
 
-def check_written(recorder: Recorder) -> None:
+def check_written(recorder: McapRecorder) -> None:
     """Raise TandemError for a recording that is not whole."""
     counters = recorder.counters
     missing = counters.refused + counters.lost

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from common.clock import monotonic_ns, to_ns
 from common.errors import TandemError
-from common.link import Link, Session, open_session
+from common.link import Link, LinkSession, open_session
 from common.link.roles import Role
 from common.skeleton import load_skeleton
 from common.wire.control import ask_control, topic_for
@@ -49,7 +49,7 @@ class Rig:
         folder: Path,
         endpoints: Endpoints,
         overrides: Mapping[str, Sequence[str]],
-        session: Session,
+        session: LinkSession,
         profile: str = NURSING,
         network: Network | None = None,
     ) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.metrics.bus import BusCounters
 from common.quaternion import Array
 from common.wire.messages import Mask
@@ -113,7 +113,7 @@ class Poll:
         self._awaited_keys: set[int] = set()
         self._set_tests()
 
-    def open_window(self, tick: int, now_ns: int) -> Frame:
+    def open_window(self, tick: int, now_ns: int) -> CanFrame:
         """Begin a tick, at the time at which SYNC is sent; returns the SYNC for every bus."""
         self._tick = tick
         self._number = number_of(tick)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
 from master.suit.layout import AnswerLayout, LayoutError, Raw
@@ -129,9 +129,9 @@ class SuitProtocol:
         """How nodes answer on a bus of that kind."""
         return self.fd if fd else self.classic
 
-    def sync(self, tick: int) -> Frame:
+    def sync(self, tick: int) -> CanFrame:
         """The master's question: sample now, and answer with this tick. Classic on either kind of bus."""
-        return Frame(self.sync_id, (tick & TICK_MASK).to_bytes(4, "little"), fd=False)
+        return CanFrame(self.sync_id, (tick & TICK_MASK).to_bytes(4, "little"), fd=False)
 
     def parse_sync(self, data: bytes) -> int:
         """The tick of a SYNC. Raises ValueError where the length is wrong."""
@@ -139,7 +139,7 @@ class SuitProtocol:
             raise ValueError(f"a SYNC has 4 bytes, not {len(data)}")
         return int.from_bytes(data, "little")
 
-    def encode_sample(self, node_id: int, raw: Raw, tick: int, status: int, fd: bool) -> list[Frame]:
+    def encode_sample(self, node_id: int, raw: Raw, tick: int, status: int, fd: bool) -> list[CanFrame]:
         """The answer of a node: raw (9,) counts (ACC, GYR, MAG), in one frame on CAN FD, else in three."""
         form = self.answer_format(fd)
         step = form.readings_a_part
@@ -147,7 +147,7 @@ class SuitProtocol:
         for place, part in enumerate(form.parts):
             frame_id = part.base_id + node_id
             readings = raw[step * place : step * (place + 1)]
-            frames.append(Frame(frame_id, part.encode(frame_id, readings, tick, status), fd))
+            frames.append(CanFrame(frame_id, part.encode(frame_id, readings, tick, status), fd))
         return frames
 
 

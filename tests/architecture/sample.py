@@ -12,7 +12,7 @@ SAMPLE_PATH = [
     "master/orientation/lowpass.py",
     "master/orientation/vqf.py",
     "master/joint_angles/solver.py",
-    "common/reach/reach.py",
+    "common/reach/follower.py",
     "common/reach/nearest.py",
     "master/robot.py",
     "common/wire/codec.py",

@@ -16,7 +16,7 @@ import uvloop
 
 from common.can.bus import CanBus
 from common.can.config import BusConfig
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 
 if TYPE_CHECKING:
     from tests.contract.conftest import Wire
@@ -87,9 +87,9 @@ async def stranger(wire: Wire) -> AsyncIterator[can.BusABC]:
         bus.shutdown()
 
 
-def frames_of_all_lengths(fd: bool) -> list[Frame]:
+def frames_of_all_lengths(fd: bool) -> list[CanFrame]:
     lengths = [*range(9), *((12, 16, 20, 24, 32, 48, 64) if fd else ())]
-    return [Frame(0x101 + n, bytes((7 * n + k) % 256 for k in range(n)), fd) for n in lengths]
+    return [CanFrame(0x101 + n, bytes((7 * n + k) % 256 for k in range(n)), fd) for n in lengths]
 
 
 def test_frames_arrive_in_order_and_unchanged_both_ways(wire: Wire) -> None:
@@ -98,7 +98,7 @@ def test_frames_arrive_in_order_and_unchanged_both_ways(wire: Wire) -> None:
             for sender, receiver in ((far, near), (near, far)):
                 # ids of its own for each direction: an end does not hear the ids that it sends
                 sent = [
-                    Frame(frame.id + (0x200 if sender is near else 0), frame.data, frame.fd)
+                    CanFrame(frame.id + (0x200 if sender is near else 0), frame.data, frame.fd)
                     for frame in frames_of_all_lengths(wire.fd) * 4
                 ]
                 for first in range(0, len(sent), 8):  # a CAN card's own queue holds 10
@@ -116,9 +116,9 @@ def test_an_end_does_not_hear_itself(wire: Wire) -> None:
     async def test() -> None:
         async with both_ends(wire) as (near, far):
             for number in range(5):
-                near.bus.send(Frame(0x080, bytes([number]), fd=False))
+                near.bus.send(CanFrame(0x080, bytes([number]), fd=False))
             await far.have(5)
-            far.bus.send(Frame(0x101, b"answer", wire.fd))
+            far.bus.send(CanFrame(0x101, b"answer", wire.fd))
             await near.have(1)
             # the answer came after its own frames on the same wire, so these have been passed over
             assert near.frames == [(0x101, b"answer")]
@@ -144,9 +144,9 @@ def test_a_bus_that_disappears_is_reopened_and_nothing_is_raised(wire: Wire) -> 
     async def test() -> None:
         async with both_ends(wire) as (near, far):
             wire.disappear()
-            near.bus.send(Frame(0x080, b"lost", fd=False))
+            near.bus.send(CanFrame(0x080, b"lost", fd=False))
             await near.until(lambda: not near.bus.up)
-            near.bus.send(Frame(0x080, b"lost", fd=False))
+            near.bus.send(CanFrame(0x080, b"lost", fd=False))
             assert near.bus.counters.send_errors >= 1
             assert near.bus.counters.times_down == 1
             assert near.bus.last_error
@@ -158,7 +158,7 @@ def test_a_bus_that_disappears_is_reopened_and_nothing_is_raised(wire: Wire) -> 
             before = len(near.frames)
             # the far end may not have noticed yet that its bus was away: it repeats itself until heard
             while len(near.frames) == before:
-                far.bus.send(Frame(0x101, b"back", wire.fd))
+                far.bus.send(CanFrame(0x101, b"back", wire.fd))
                 await asyncio.wait({asyncio.create_task(near.have(before + 1))}, timeout=0.2)
             assert near.frames[-1] == (0x101, b"back")
 
@@ -169,7 +169,7 @@ def test_a_bus_that_stays_away_does_not_hold_up_close(wire: Wire) -> None:
     async def test() -> None:
         async with both_ends(wire) as (near, _):
             wire.disappear()
-            near.bus.send(Frame(0x080, b"lost", fd=False))
+            near.bus.send(CanFrame(0x080, b"lost", fd=False))
             await near.until(lambda: not near.bus.up)
             await near.bus.close()
             assert not near.bus.up
@@ -184,7 +184,7 @@ def test_close_may_be_called_again_and_before_open(wire: Wire) -> None:
         end.bus.open()
         await end.bus.close()
         await end.bus.close()
-        end.bus.send(Frame(0x080, b"late", fd=False))
+        end.bus.send(CanFrame(0x080, b"late", fd=False))
         assert end.bus.counters.send_errors == 1
         await End(wire, wire.near).bus.close()
 

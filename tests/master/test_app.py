@@ -11,7 +11,7 @@ import pytest
 
 from common.config.load import load_config
 from common.process.notify import Notifier
-from common.process.pacing import Due, TickGrid
+from common.process.pacing import DueTick, TickGrid
 from common.wire.topics import Topic
 from master import app
 from master.config import MasterConfig
@@ -51,9 +51,9 @@ class Counting(Notifier):
 
 @pytest.fixture
 def master(monkeypatch: pytest.MonkeyPatch) -> tuple[app.Master, Counting]:
-    async def some_ticks(grid: TickGrid) -> AsyncIterator[Due]:
+    async def some_ticks(grid: TickGrid) -> AsyncIterator[DueTick]:
         for tick in range(1, 6):
-            yield Due(tick, grid.origin_ns, 0)
+            yield DueTick(tick, grid.origin_ns, 0)
 
     monkeypatch.setattr(app, "ticks", some_ticks)
     session: Any = FakeSession()

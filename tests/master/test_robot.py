@@ -28,7 +28,7 @@ from common.wire.messages import (
     RobotState,
     Statistics,
 )
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 from common.wire.topics import CLOCK, CONTROL, STATE, Topic
 from master.app import Master
 from master.config import MasterConfig
@@ -60,7 +60,7 @@ class FakeLink:
 
     def declare_alive(self, role: str, instance: int, endpoints: Sequence[str]) -> None: ...
 
-    def watch_presence(self, on_change: Callable[[Presence, bool], None]) -> None:
+    def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None]) -> None:
         self.shown = on_change
 
     async def ask_all(self, topic: Topic, payload: bytes) -> list[Any]:
@@ -201,8 +201,8 @@ def test_each_round_trip_is_told_once() -> None:
 def test_while_two_bear_the_name_both_are_told_and_neither_is_claimed() -> None:
     link: Any = FakeLink()
     master = master_of(a=link)
-    link.shown(Presence("a", "slave", 1, 3, "1.0", "room 1"), True)
-    link.shown(Presence("a", "slave", 2, 3, "1.0", "room 2"), True)
+    link.shown(ProcessPresence("a", "slave", 1, 3, "1.0", "room 1"), True)
+    link.shown(ProcessPresence("a", "slave", 2, 3, "1.0", "room 2"), True)
 
     def until() -> bool:
         for instance in (1, 2):

@@ -12,7 +12,7 @@ import pytest
 from common.link.config import LinkConfig
 from common.metrics.slave import ServoMetrics, SlaveMetrics
 from common.process.notify import Notifier
-from common.process.pacing import Due, TickGrid
+from common.process.pacing import DueTick, TickGrid
 from common.wire.codec import decode
 from common.wire.messages import Statistics
 from common.wire.topics import Topic
@@ -49,9 +49,9 @@ class StillServos:
 def test_a_loop_that_misses_every_second_tick_still_sends_the_state(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    async def odd_ticks(grid: TickGrid) -> AsyncIterator[Due]:
+    async def odd_ticks(grid: TickGrid) -> AsyncIterator[DueTick]:
         for tick in range(1, 41, 2):
-            yield Due(tick, grid.origin_ns, 1)
+            yield DueTick(tick, grid.origin_ns, 1)
 
     monkeypatch.setattr(app, "ticks", odd_ticks)
     link: Any = FakeLink()
@@ -80,9 +80,9 @@ def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
         def metrics(self) -> ServoMetrics:
             return ServoMetrics()
 
-    async def two_seconds(grid: TickGrid) -> AsyncIterator[Due]:
+    async def two_seconds(grid: TickGrid) -> AsyncIterator[DueTick]:
         for tick in range(2):
-            yield Due(tick, grid.origin_ns, 0)
+            yield DueTick(tick, grid.origin_ns, 0)
 
     monkeypatch.setattr(app, "ticks", two_seconds)
     link: Any = Keeping()
@@ -112,9 +112,9 @@ class StuckServos(StillServos):
 def test_the_servo_loop_feeds_the_watchdog_at_the_end_of_each_tick(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    async def some_ticks(grid: TickGrid) -> AsyncIterator[Due]:
+    async def some_ticks(grid: TickGrid) -> AsyncIterator[DueTick]:
         for tick in range(1, 6):
-            yield Due(tick, grid.origin_ns, 0)
+            yield DueTick(tick, grid.origin_ns, 0)
 
     beats: list[int] = []
 

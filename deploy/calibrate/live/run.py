@@ -14,7 +14,7 @@ from rich.live import Live
 from common.errors import TandemError
 from common.process.runtime import until_stopped
 from common.quaternion import Array
-from common.recording import Recorder
+from common.recording import McapRecorder
 from deploy.calibrate import capture as shared
 from deploy.calibrate.live.guide import Guide, GuideOptions, StepName, View
 from deploy.calibrate.live.screen import line, screen
@@ -56,8 +56,8 @@ class LiveSession:
             options,
         )
         self._block: list[Array] = []
-        self._recorder: Recorder | None = None
-        self._recorders: list[Recorder] = []
+        self._recorder: McapRecorder | None = None
+        self._recorders: list[McapRecorder] = []
         self._ticks = 0
         self._said_s = -_LOG_S
         self.session = Session()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.process.heap import freeze_heap
 from common.skeleton import load_skeleton
 from common.skeleton.kinematics import orientations
@@ -89,10 +89,10 @@ def plausibility(seconds: float, count: int) -> dict[str, Any]:
     return time_calls(lambda: watch.take(next(sweeps), next(rows), no), seconds, batch=2 * BLOCK)
 
 
-def answers(protocol: SuitProtocol, count: int, tick: int, fd: bool) -> list[Frame]:
+def answers(protocol: SuitProtocol, count: int, tick: int, fd: bool) -> list[CanFrame]:
     """What that many nodes, moving gently, answer at a tick."""
     rng = np.random.default_rng(tick)
-    frames: list[Frame] = []
+    frames: list[CanFrame] = []
     for number in range(1, count + 1):
         # gravity on z, some tens of °/s, and a field to the north and down
         si = np.array([0.0, 0.0, 9.81, 0.0, 0.0, 0.0, 0.0, 20.0, -43.0])
@@ -135,7 +135,7 @@ def example_command() -> Command:
     return Command("robot-1", 1 << 40, 1000, 16000, stamps, True, np.ones(count, np.bool_), angles, angles)
 
 
-def _sweep(poll: Poll, estimator: Estimator, tick: int, frames: Sequence[Frame]) -> tuple[int, int]:
+def _sweep(poll: Poll, estimator: Estimator, tick: int, frames: Sequence[CanFrame]) -> tuple[int, int]:
     begin_ns = time.perf_counter_ns()
     poll.open_window(tick, begin_ns)
     for frame in frames:

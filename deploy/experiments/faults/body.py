@@ -11,7 +11,7 @@ from common.clock import NS_PER_S
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.messages import Action, BaseAttitude
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 from deploy.examples.profiles import NURSING
 from deploy.experiments.faults.scene import Scene
 from deploy.experiments.faults.setting import Setting
@@ -201,7 +201,7 @@ def base_tilted(scene: Scene) -> None:
 
 def namesake(scene: Scene) -> None:
     """Another process shows itself under the robot's name."""
-    other = Presence(scene.run.robot, "slave", 2, 1, "1.0", "another room, tcp/192.168.7.9:7447")
+    other = ProcessPresence(scene.run.robot, "slave", 2, 1, "1.0", "another room, tcp/192.168.7.9:7447")
     scene.run.slave.namesakes.on_presence(other, here=True)
 
 

@@ -13,9 +13,9 @@ from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
 from common.errors import LinkError
-from common.link import Session, open_session
+from common.link import LinkSession, open_session
 from common.link.queries import Answered
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 from common.wire.stop import pack_stop, read_stop_answer
 from common.wire.topics import STOP
 from deploy.client.answer import Answer
@@ -103,7 +103,7 @@ async def stop_robots(
 class _Stopping:
     """The stops under way, one a name."""
 
-    def __init__(self, session: Session, operator: str, tell: Tell, within_s: float) -> None:
+    def __init__(self, session: LinkSession, operator: str, tell: Tell, within_s: float) -> None:
         self._session = session
         self._operator = operator
         self._tell = tell
@@ -113,7 +113,7 @@ class _Stopping:
         self._counts: dict[str, StopCount] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
-    def on_presence(self, presence: Presence, here: bool, everyone: bool) -> None:
+    def on_presence(self, presence: ProcessPresence, here: bool, everyone: bool) -> None:
         """Somebody showed himself: a robot is stopped if it is named, or everybody is."""
         if presence.role != "slave" or not here:
             return
@@ -149,7 +149,7 @@ class _Stopping:
             log.warning("%s", namesakes)
 
 
-async def _until_all_showed(session: Session, endpoints: int, within_s: float) -> None:
+async def _until_all_showed(session: LinkSession, endpoints: int, within_s: float) -> None:
     loop = asyncio.get_running_loop()
     until_s = loop.time() + within_s
     while session.peers < endpoints and loop.time() < until_s:  # noqa: ASYNC110

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from common.wire.presence import Presence, several_bear
+from common.wire.presence import ProcessPresence, several_bear
 from common.wire.stop import StopAnswer
 from deploy.client.answer import Answer
 
@@ -13,11 +13,11 @@ class StopCount:
     def __init__(self, robot: str, within_s: float) -> None:
         self._robot = robot
         self._within_s = within_s
-        self._shown: dict[int, Presence] = {}
+        self._shown: dict[int, ProcessPresence] = {}
         self._stopped: dict[int | str, Answer] = {}
         """By instance; by session, where the robot is of schema 2 and has no instance number."""
 
-    def expect(self, presence: Presence) -> None:
+    def expect(self, presence: ProcessPresence) -> None:
         """A process of this name showed itself. One that goes again is not known to be stopped."""
         if presence.instance:
             self._shown[presence.instance] = presence
@@ -61,5 +61,5 @@ class StopCount:
     def _several(self) -> bool:
         return len(self._shown.keys() | self._stopped.keys()) > 1
 
-    def _silent(self) -> list[Presence]:
+    def _silent(self) -> list[ProcessPresence]:
         return [presence for number, presence in self._shown.items() if number not in self._stopped]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from common.clock import Clock, monotonic_ns, to_ns
 from common.errors import RecordingError
-from common.recording import Recorder, RecorderCounters
+from common.recording import McapRecorder, RecorderCounters
 
 log = logging.getLogger(__name__)
 
@@ -30,7 +30,7 @@ class Tape:
         self._clock = clock
         self._closed = RecorderCounters()
         self._refused = 0
-        self._recorder: Recorder | None = Recorder(out, metadata)
+        self._recorder: McapRecorder | None = McapRecorder(out, metadata)
         self._begun_ns = clock()
         self.files = [out]
         """One name an hour, or so."""
@@ -56,7 +56,7 @@ class Tape:
             return
         path = self._out.with_name(f"{self._out.stem}-{1 + len(self.files)}{self._out.suffix}")
         try:
-            self._recorder = Recorder(path, {**self._metadata, "continues": self.files[-1].name})
+            self._recorder = McapRecorder(path, {**self._metadata, "continues": self.files[-1].name})
         except RecordingError as error:
             log.error("%s; the recording ends here; the rest goes on", error)
             self._recorder, self._closed.failed = None, str(error)
@@ -71,7 +71,7 @@ class Tape:
         if recorder is not None:
             await self._end(recorder)
 
-    async def _end(self, recorder: Recorder) -> None:
+    async def _end(self, recorder: McapRecorder) -> None:
         await asyncio.to_thread(recorder.close)
         all_, one = self._closed, recorder.counters
         for name in ("put", "written", "refused", "lost"):

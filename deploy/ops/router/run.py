@@ -11,7 +11,7 @@ from common.clock import NS_PER_S, monotonic_ns
 from common.link.audit import Audit
 from common.link.configuration import zenoh_configuration
 from common.link.router import RouterConfig
-from common.link.session import Session, open_session
+from common.link.session import LinkSession, open_session
 from common.metrics.tree import to_tree
 from common.process.launch import WriteFigures
 from common.process.notify import Notifier, open_notifier
@@ -58,7 +58,7 @@ async def _route(config: RouterConfig, write_figures: WriteFigures) -> None:
             write_figures(to_tree(audit.metrics()))
 
 
-async def tend(session: Session, notifier: Notifier) -> None:
+async def tend(session: LinkSession, notifier: Notifier) -> None:
     """Tell the service manager that Zenoh itself still answers: it routes in threads of its own."""
     async for _ in ticks(TickGrid(monotonic_ns(), NS_PER_S)):
         connected = session.peers  # were Zenoh hung this would not return, and nobody would beat

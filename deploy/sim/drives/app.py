@@ -11,7 +11,7 @@ import can
 
 from common.can.bus import CanBus
 from common.can.config import BusConfig
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.can.without_echo import open_without_function_code
 from common.clock import monotonic_ns
 from common.metrics.tree import to_tree
@@ -44,7 +44,7 @@ async def run(config: SlaveConfig, stop: asyncio.Event, faults: Sequence[Planned
 
     def send(bus: str, frame_id: int, data: bytes) -> None:
         if bus in buses:
-            buses[bus].send(Frame(frame_id, data, False))
+            buses[bus].send(CanFrame(frame_id, data, False))
 
     peer = DrivePeer(canopen, config.skeleton, config.encoders, send, monotonic_ns(), faults)
     enter_real_time(config.process.realtime_priority)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from deploy.sim.suit.imperfections import Counts
 from master.suit.layout import AnswerLayout
 from master.suit.protocol import AnswerFormat
@@ -20,14 +20,14 @@ class BatchEncoder:
         self._form = form
         self._parts = [_PartEncoder(part, node_ids) for part in form.parts]
 
-    def encode(self, counts: Counts, tick: int, status: NDArray[np.integer]) -> list[list[Frame]]:
+    def encode(self, counts: Counts, tick: int, status: NDArray[np.integer]) -> list[list[CanFrame]]:
         """Each node's frames, for counts (n, 9), and status (n,), in the order of the nodes."""
         step = self._form.readings_a_part
         fd = self._form.fd
         columns = []
         for place, part in enumerate(self._parts):
             data = part.encode(counts[:, step * place : step * (place + 1)], tick, status)
-            columns.append([Frame(id_, d, fd) for id_, d in zip(part.frame_ids, data, strict=True)])
+            columns.append([CanFrame(id_, d, fd) for id_, d in zip(part.frame_ids, data, strict=True)])
         return [list(frames) for frames in zip(*columns, strict=True)]
 
 

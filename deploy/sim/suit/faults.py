@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.clock import NS_PER_MS, to_s
 from common.config.section import Section
 from common.errors import ConfigMistake
@@ -68,14 +68,14 @@ class NodeAnswer(NamedTuple):
 
     node: str
     bus: str
-    frames: list[Frame]
+    frames: list[CanFrame]
 
 
 class Outgoing(NamedTuple):
     """A frame, the bus it goes to, and how long after the SYNC it is sent."""
 
     bus: str
-    frame: Frame
+    frame: CanFrame
     delay_ns: int
 
 

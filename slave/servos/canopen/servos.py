@@ -16,7 +16,7 @@ import numpy as np
 from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.can.controller import Controller
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.can.netlink import ask_kernel
 from common.can.without_echo import open_without_function_code
 from common.clock import NS_PER_MS, Clock, monotonic_ns, to_ns
@@ -247,7 +247,7 @@ class CanopenServos:
         name, frame_id, data = outgoing
         bus = self._buses.get(name)
         if bus is not None:
-            bus.send(Frame(frame_id, data, False))
+            bus.send(CanFrame(frame_id, data, False))
 
     def _on_frame(self, name: str, frame_id: int, data: bytes, now_ns: int) -> None:
         network = self._network

@@ -16,13 +16,13 @@ import uvloop
 
 from common.can.bus import SEND_ERRORS_IN_A_ROW, CanBus
 from common.can.config import BusConfig
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.can.interface import open_bus
 from common.can.kept_open import LONGEST_WAIT_S, wait_s
 from common.errors import BusError
 
-SYNC = Frame(0x080, b"1234", fd=False)
-NODE = Frame(0x105, bytes(24), fd=True)
+SYNC = CanFrame(0x080, b"1234", fd=False)
+NODE = CanFrame(0x105, bytes(24), fd=True)
 
 
 def run(test: Coroutine[Any, Any, None]) -> None:

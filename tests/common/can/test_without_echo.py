@@ -6,7 +6,7 @@ import can
 import pytest
 
 from common.can.config import BusConfig
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.can.interface import open_bus
 from common.can.without_echo import open_without_function_code, open_without_longer_than
 
@@ -62,7 +62,7 @@ def test_one_function_code_is_not_heard_and_all_others_are(port: int, code: int)
 
 
 def test_frames_longer_than_the_longest_are_not_heard(port: int) -> None:
-    config, sync = group("239.74.163.41", port), Frame(0x080, bytes(4), fd=False)
+    config, sync = group("239.74.163.41", port), CanFrame(0x080, bytes(4), fd=False)
     bus, other = open_without_longer_than(config, sync), open_bus(config)
     try:
         for frame_id, length in ((0x080, 4), (0x105, 5), (0x106, 8), (0x081, 0)):

@@ -9,7 +9,7 @@ import zenoh
 
 from common.link.access import access_control, named
 from common.link.config import AccessConfig
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 
 ACCESS = AccessConfig(
     operators={"anna": ["r1", "r2"], "ben": ["r2"]},
@@ -80,11 +80,11 @@ def test_an_empty_table_lets_nobody_do_anything() -> None:
 def test_each_shows_itself_in_both_forms_and_everybody_may_see_it() -> None:
     for who, robot, role, own in (("robot:r1", "r1", "slave", True), ("operator:ben", "r1", "master", False)):
         for presence in (
-            Presence(robot, role),
-            Presence(robot, role, 7, 3, "1.0", "host, tls/10.0.0.2:7447"),
+            ProcessPresence(robot, role),
+            ProcessPresence(robot, role, 7, 3, "1.0", "host, tls/10.0.0.2:7447"),
         ):
             assert may(who, "liveliness_token", presence.key) is own
-    assert may("operator:anna", "liveliness_token", Presence("r1", "master", 7, 3, "1.0", "host").key)
+    assert may("operator:anna", "liveliness_token", ProcessPresence("r1", "master", 7, 3, "1.0", "host").key)
     for who in EVERYBODY:
         assert may(who, "declare_liveliness_subscriber", "tandem/*/alive/**")
-        assert may(who, "liveliness_token", Presence("r1", "slave", 7, 3, "1.0", "host").key, "egress")
+        assert may(who, "liveliness_token", ProcessPresence("r1", "slave", 7, 3, "1.0", "host").key, "egress")

@@ -15,7 +15,7 @@ from zenoh.handlers import Callback
 
 from common.clock import monotonic_ns
 from common.errors import LinkError, LinkTimeoutError
-from common.link import Link, Session, open_link, open_session
+from common.link import Link, LinkSession, open_link, open_session
 from common.link.config import LinkConfig, TopicConfig
 from common.link.queries import MAX_WAITING, Answerer
 from common.metrics.link import TopicCounters
@@ -417,7 +417,7 @@ class HangingSession:
 def test_closing_is_bounded_and_off_the_loop() -> None:
     async def test() -> None:
         session: Any = HangingSession()
-        link = Session(session, asyncio.get_running_loop())
+        link = LinkSession(session, asyncio.get_running_loop())
         turns = 0
 
         async def other_work() -> None:
@@ -551,7 +551,7 @@ def test_who_goes_is_named_as_he_came_and_forgotten_then() -> None:
 
     async def test() -> None:
         links = Links()
-        session = Session(links, asyncio.get_running_loop())  # type: ignore[arg-type]
+        session = LinkSession(links, asyncio.get_running_loop())  # type: ignore[arg-type]
         session.watch_peers(lambda *change: heard.append(change))
         links.tell("a", True, "operator:anna")
         links.tell("a", True, "operator:anna")  # a second link, as quic-datagram may have

@@ -4,9 +4,9 @@ import pytest
 
 from common.clock import to_ns
 from common.link.namesakes import NOTICE_S, Namesakes
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 
-OTHER = Presence("r", "slave", 2, 3, "1.0", "room 2")
+OTHER = ProcessPresence("r", "slave", 2, 3, "1.0", "room 2")
 
 
 def test_one_that_shows_itself_counts_until_it_goes() -> None:
@@ -19,9 +19,11 @@ def test_one_that_shows_itself_counts_until_it_goes() -> None:
 
 
 @pytest.mark.parametrize(
-    "shown", [Presence("r", "slave", 1), Presence("r", "slave"), Presence("r", "master", 9)], ids=str
+    "shown",
+    [ProcessPresence("r", "slave", 1), ProcessPresence("r", "slave"), ProcessPresence("r", "master", 9)],
+    ids=str,
 )
-def test_oneself_and_masters_are_no_namesakes(shown: Presence) -> None:
+def test_oneself_and_masters_are_no_namesakes(shown: ProcessPresence) -> None:
     known = Namesakes(own=1)
     known.on_presence(shown, here=True)
     assert known.words(0) is None

@@ -2,24 +2,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.process.pacing import Due, TickGrid
+from common.process.pacing import DueTick, TickGrid
 
 
 def test_a_tick_is_due_at_its_time_and_not_before() -> None:
     grid = TickGrid(origin_ns=1000, period_ns=10)
     assert grid.due(999) is None
-    assert grid.due(1000) == Due(0, 1000, 0)
+    assert grid.due(1000) == DueTick(0, 1000, 0)
     assert grid.due(1009) is None
     assert grid.next_ns == 1010
-    assert grid.due(1010) == Due(1, 1010, 0)
+    assert grid.due(1010) == DueTick(1, 1010, 0)
 
 
 def test_a_late_loop_gets_the_newest_tick_and_the_count_of_the_missed() -> None:
     grid = TickGrid(0, 10)
     grid.due(0)
-    assert grid.due(49) == Due(4, 40, 3)
+    assert grid.due(49) == DueTick(4, 40, 3)
     assert grid.due(49) is None
-    assert grid.due(50) == Due(5, 50, 0)
+    assert grid.due(50) == DueTick(5, 50, 0)
 
 
 @given(

@@ -151,14 +151,14 @@ def test_a_deadline_that_was_met_does_not_strike_later() -> None:
 def test_a_link_whose_close_hangs_does_not_hold_the_process() -> None:
     done = process(
         """
-        from common.link.session import Session
+        from common.link.session import LinkSession
 
         class HangingSession:
             def close(self):
                 time.sleep(60)
 
         async def main(stop):
-            session = Session(HangingSession(), asyncio.get_running_loop())
+            session = LinkSession(HangingSession(), asyncio.get_running_loop())
             assert not await session.close(timeout_s=0.05)
         """,
         shutdown_s=10,

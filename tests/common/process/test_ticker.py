@@ -8,7 +8,7 @@ import pytest
 import uvloop
 
 from common.clock import monotonic_ns
-from common.process.pacing import Due, TickGrid
+from common.process.pacing import DueTick, TickGrid
 from common.process.ticker import ticks
 
 PERIOD_NS = 2_000_000
@@ -29,8 +29,8 @@ def timers() -> list[int]:
     return sorted(found)
 
 
-async def take(grid: TickGrid, count: int, busy_ns: int = 0) -> list[Due]:
-    taken: list[Due] = []
+async def take(grid: TickGrid, count: int, busy_ns: int = 0) -> list[DueTick]:
+    taken: list[DueTick] = []
     async with aclosing(ticks(grid)) as due_ticks:
         async for due in due_ticks:
             assert monotonic_ns() >= due.scheduled_ns

@@ -14,14 +14,14 @@ from typing import Any
 import pytest
 
 from common.errors import RecordingError
-from common.recording import Recorder, read_recording
+from common.recording import McapRecorder, read_recording
 
 METADATA = {"profile": "nursing", "rate_hz": "200"}
 
 
 def test_what_is_put_is_read_back_in_order_with_both_times(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    with Recorder(path, METADATA, wall=iter(range(10**18, 10**18 + 9)).__next__) as recorder:
+    with McapRecorder(path, METADATA, wall=iter(range(10**18, 10**18 + 9)).__next__) as recorder:
         for i in range(3):
             assert recorder.put("suit", bytes([i]) * 5, 100 + i)
         recorder.put("other", b"x", 7)
@@ -41,7 +41,7 @@ def test_any_reader_of_mcap_finds_its_index(tmp_path: Path) -> None:
     from mcap.reader import make_reader
 
     path = tmp_path / "a.mcap"
-    with Recorder(path, METADATA) as recorder:
+    with McapRecorder(path, METADATA) as recorder:
         recorder.put("suit", b"payload", 1)
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
@@ -53,8 +53,8 @@ def test_any_reader_of_mcap_finds_its_index(tmp_path: Path) -> None:
 WRITER = """
 import sys, time
 from pathlib import Path
-from common.recording import Recorder
-recorder = Recorder(Path(sys.argv[1]), {"profile": "nursing"})
+from common.recording import McapRecorder
+recorder = McapRecorder(Path(sys.argv[1]), {"profile": "nursing"})
 i = 0
 while True:
     recorder.put("suit", i.to_bytes(8, "little") + bytes(1300), time.monotonic_ns())
@@ -91,7 +91,7 @@ def test_a_killed_process_loses_less_than_a_second(tmp_path: Path) -> None:
 def chunks(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, int]:
     """A file of several chunks, and how many messages it has."""
     path = tmp_path_factory.mktemp("whole") / "a.mcap"
-    recorder = Recorder(path, METADATA, flush_s=0.0)  # a chunk a message
+    recorder = McapRecorder(path, METADATA, flush_s=0.0)  # a chunk a message
     for i in range(20):
         recorder.put("suit", i.to_bytes(8, "little") + os.urandom(50), i)
     recorder.close()
@@ -133,13 +133,13 @@ def test_a_file_that_is_there_is_never_written_over(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_bytes(b"precious")
     with pytest.raises(RecordingError, match="is there already"):
-        Recorder(path, METADATA)
+        McapRecorder(path, METADATA)
     assert path.read_bytes() == b"precious"
 
 
 def test_no_folder_no_recording(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="cannot be written"):
-        Recorder(tmp_path / "nowhere" / "a.mcap", METADATA)
+        McapRecorder(tmp_path / "nowhere" / "a.mcap", METADATA)
 
 
 @pytest.mark.parametrize("content", [b"", b"not mcap at all", b"\x89MCAP0\r\n"])
@@ -162,7 +162,7 @@ class FullDisk(io.BytesIO):
 def test_a_full_disk_is_said_once_and_the_process_goes_on(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    recorder = Recorder(tmp_path / "a.mcap", METADATA, flush_s=0.0, stream=FullDisk())
+    recorder = McapRecorder(tmp_path / "a.mcap", METADATA, flush_s=0.0, stream=FullDisk())
     for i in range(200):
         recorder.put("suit", os.urandom(100), i)
     recorder.close()
@@ -190,7 +190,7 @@ class Hanging(io.BytesIO):
 
 def test_a_disk_that_hangs_delays_nobody_and_the_overflow_is_counted(tmp_path: Path) -> None:
     disk = Hanging()
-    recorder = Recorder(tmp_path / "a.mcap", METADATA, flush_s=0.0, capacity=10, stream=disk)
+    recorder = McapRecorder(tmp_path / "a.mcap", METADATA, flush_s=0.0, capacity=10, stream=disk)
     disk.hang = True
     taken = [recorder.put("suit", b"x", i) for i in range(100)]
     assert taken[0]

@@ -5,15 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.wire.codec import VERSION
-from common.wire.presence import Presence, present, read_presence, several_bear
+from common.wire.presence import ProcessPresence, present, read_presence, several_bear
 
 KEY = "tandem/robot-1/alive/slave/0abcdef1/3-1.2.3/host, tcp%2F10.0.0.2:7447"
 
 
 def test_the_keys_are_as_they_always_were() -> None:
     place = "host, tcp/10.0.0.2:7447"
-    assert Presence("robot-1", "slave", 0xABCDEF1, 3, "1.2.3", place).key == KEY
-    assert Presence("robot-1", "slave").key == "tandem/robot-1/alive/slave"
+    assert ProcessPresence("robot-1", "slave", 0xABCDEF1, 3, "1.2.3", place).key == KEY
+    assert ProcessPresence("robot-1", "slave").key == "tandem/robot-1/alive/slave"
 
 
 def test_a_later_version_may_add_to_it() -> None:
@@ -33,7 +33,7 @@ def test_what_is_no_token_is_none(key: str) -> None:
 @given(st.text(max_size=300))
 def test_any_host_s_name_makes_a_key(name: str) -> None:
     name = name.encode("utf-8", "replace").decode()
-    key = Presence("r", "slave", 1, 3, name, name).key
+    key = ProcessPresence("r", "slave", 1, 3, name, name).key
     assert not set("*$#?") & set(key)
     assert "//" not in key
     assert read_presence(key) is not None
@@ -52,8 +52,8 @@ def test_two_of_a_name_are_told_by_place_in_one_order() -> None:
 
 def test_another_version_is_named_with_its_place_and_the_own_is_not() -> None:
     assert present("r", "slave", 5, ["tcp/10.0.0.2:7447"]).other_version == ""
-    assert Presence("r", "slave").other_version == ""  # the short form tells no version
-    said = Presence("r", "master", 5, VERSION + 1, "9.9", "host, 10.0.0.3").other_version
+    assert ProcessPresence("r", "slave").other_version == ""  # the short form tells no version
+    said = ProcessPresence("r", "master", 5, VERSION + 1, "9.9", "host, 10.0.0.3").other_version
     assert "the master at host, 10.0.0.3 (instance 00000005) runs tandem 9.9" in said
     assert f"schema {VERSION + 1}" in said
     assert f"with schema {VERSION}" in said

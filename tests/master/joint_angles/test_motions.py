@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array, conjugate, rotate
-from common.reach import reach
+from common.reach import follower, step
 from common.skeleton import Skeleton, load_skeleton
 from master.joint_angles.solver import JointSolver
 
@@ -164,19 +164,19 @@ def test_back_from_the_end_of_range_the_robot_is_where_it_was() -> None:
 
 MUTANTS: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], Callable[[Run], None]]] = {
     "no limits": (
-        lambda m: m.setattr(reach.Reach, "_project", lambda *_: None),
+        lambda m: m.setattr(follower.PostureFollower, "_project", lambda *_: None),
         lambda run: nearest_at_rest(run),
     ),
     "no bound of the joints' steps": (
-        lambda m: m.setattr(reach._Step, "limit", lambda *_: None),
+        lambda m: m.setattr(step.Step, "limit", lambda *_: None),
         no_joint_jumps,
     ),
     "no bound of the segments' turns": (
-        lambda m: m.setattr(reach._Step, "limit_turn", lambda *_: None),
+        lambda m: m.setattr(step.Step, "limit_turn", lambda *_: None),
         no_segment_jumps,
     ),
     "no bound of the told speed": (
-        lambda m: m.setattr(reach, "MOST_GAIN", 1e9),
+        lambda m: m.setattr(follower, "MOST_GAIN", 1e9),
         no_joint_is_told_to_race,
     ),
 }

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array, from_rotation_vector, multiply
-from common.reach import reach
+from common.reach import choice, follower
 from common.skeleton import load_skeleton
 from common.skeleton.kinematics import orientations
 from common.skeleton.load import parse_skeleton
@@ -230,12 +230,12 @@ def arms_stay() -> None:
 
 MUTANTS: dict[str, Callable[[pytest.MonkeyPatch], None]] = {
     "nearest without the decomposition kept": lambda m: m.setattr(
-        reach, "_chosen", lambda wanted, nearest, kept: nearest
+        follower, "choose", lambda wanted, nearest, kept: nearest
     ),
     "turned along the pole's valley for nothing": lambda m: m.setattr(
-        reach, "_worth_turning", lambda wanted, group, aim, last: aim
+        follower, "worth_turning", lambda wanted, group, aim, last: aim
     ),
-    "kept without being unwrapped": lambda m: m.setattr(reach, "_TURN", 1e6),
+    "kept without being unwrapped": lambda m: m.setattr(choice, "TURN", 1e6),
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from master.suit.health import NodeHealth
 from master.suit.nodes import NodeConfig
 from master.suit.number import number_of
@@ -35,13 +35,13 @@ class Suit:
         self.tick = 0
         self.complete: list[bool] = []
 
-    def answer(self, node_id: int, tick: int, seed: int = 0, status: int = 0) -> list[Frame]:
+    def answer(self, node_id: int, tick: int, seed: int = 0, status: int = 0) -> list[CanFrame]:
         return PROTOCOL.encode_sample(node_id, raw(seed), number_of(tick), status, self.fd)
 
-    def answers(self, tick: int, seed: int = 0, without: tuple[int, ...] = ()) -> list[Frame]:
+    def answers(self, tick: int, seed: int = 0, without: tuple[int, ...] = ()) -> list[CanFrame]:
         return [f for n in self.nodes if n.id not in without for f in self.answer(n.id, tick, seed)]
 
-    def window(self, frames: list[Frame]) -> Sweep:
+    def window(self, frames: list[CanFrame]) -> Sweep:
         """Ask for the next tick and take these frames as what came."""
         self.open()
         return self.close(frames)
@@ -50,7 +50,7 @@ class Suit:
         self.tick += 1
         assert self.poll.open_window(self.tick, self.tick * 5_000_000) == PROTOCOL.sync(number_of(self.tick))
 
-    def close(self, frames: list[Frame]) -> Sweep:
+    def close(self, frames: list[CanFrame]) -> Sweep:
         start = self.tick * 5_000_000
         self.complete = [
             self.poll.on_frame("arm", f.id, f.data, start + 1000 * k) for k, f in enumerate(frames, 1)

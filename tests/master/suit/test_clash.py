@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from master.suit.clash import CLEAR, NOTICED, TWICE_IN_A_ROW, WITHIN
 from master.suit.number import number_of
 
@@ -38,7 +38,7 @@ def test_a_second_suit_whose_answers_come_after_the_window_closed(suit: Suit) ->
     """The first three answers close it; the others are found in the next window, with the last tick."""
     suit.settle()
 
-    def frames(tick: int) -> list[Frame]:
+    def frames(tick: int) -> list[CanFrame]:
         late = suit.answers(tick - 1, seed=(tick - 1) % 50 + 60)
         return [*late, *suit.answers(tick, seed=tick % 50)]
 
@@ -49,7 +49,7 @@ def test_a_second_suit_whose_answers_come_after_the_window_closed(suit: Suit) ->
 def test_a_frame_that_the_bus_repeats_is_no_second_node(suit: Suit) -> None:
     suit.settle()
 
-    def frames(tick: int) -> list[Frame]:
+    def frames(tick: int) -> list[CanFrame]:
         mine = suit.answers(tick, seed=tick % 50)
         again = [] if tick % 10 else mine
         late = [] if tick % 7 else suit.answers(tick - 1, seed=(tick - 1) % 50)
@@ -67,7 +67,7 @@ def test_twice_the_rate_is_a_second_node_even_if_it_says_the_same(suit: Suit) ->
 def test_a_late_answer_is_no_second_node(suit: Suit) -> None:
     suit.settle()
 
-    def frames(tick: int) -> list[Frame]:
+    def frames(tick: int) -> list[CanFrame]:
         late = suit.answer(1, tick - 1, seed=(tick - 1) % 50)
         return [*late, *suit.answers(tick, seed=tick % 50, without=(1,))]
 
@@ -77,7 +77,7 @@ def test_a_late_answer_is_no_second_node(suit: Suit) -> None:
 def test_seldom_differences_are_not_named(suit: Suit) -> None:
     suit.settle()
 
-    def frames(tick: int) -> list[Frame]:
+    def frames(tick: int) -> list[CanFrame]:
         more = [] if tick % WITHIN else suit.answer(1, tick, seed=3)
         return [*suit.answers(tick, seed=tick % 50 + 4), *more]
 

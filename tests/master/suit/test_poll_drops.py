@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from master.suit.crc import frame_crc
 from master.suit.number import number_of
 
@@ -18,28 +18,28 @@ if TYPE_CHECKING:
     from tests.master.suit.conftest import Suit
 
 
-def spoil_checksum(frame: Frame) -> Frame:
+def spoil_checksum(frame: CanFrame) -> CanFrame:
     return replace(frame, data=frame.data[:-1] + bytes([frame.data[-1] ^ 1]))
 
 
-def spoil_reading(frame: Frame) -> Frame:
+def spoil_reading(frame: CanFrame) -> CanFrame:
     return replace(frame, data=bytes([frame.data[0] ^ 0x80]) + frame.data[1:])
 
 
-def wrong_number(frame: Frame) -> Frame:
+def wrong_number(frame: CanFrame) -> CanFrame:
     """Node 1's frame sent under node 2's identifier."""
     return replace(frame, id=frame.id + 1)
 
 
-def shorter(frame: Frame) -> Frame:
+def shorter(frame: CanFrame) -> CanFrame:
     return replace(frame, data=frame.data[:-1])
 
 
-def longer(frame: Frame) -> Frame:
+def longer(frame: CanFrame) -> CanFrame:
     return replace(frame, data=frame.data + b"\0")
 
 
-def empty(frame: Frame) -> Frame:
+def empty(frame: CanFrame) -> CanFrame:
     return replace(frame, data=b"")
 
 
@@ -56,7 +56,7 @@ SPOILERS = [
 @pytest.mark.parametrize(("spoil", "blamed", "counter"), SPOILERS, ids=[s[0].__name__ for s in SPOILERS])
 @pytest.mark.parametrize("part", [0, -1], ids=["first part", "last part"])
 def test_an_unsound_frame_never_changes_a_value(
-    suit: Suit, spoil: Callable[[Frame], Frame], blamed: int, counter: str, part: int
+    suit: Suit, spoil: Callable[[CanFrame], CanFrame], blamed: int, counter: str, part: int
 ) -> None:
     suit.settle()
     mine = suit.answer(1, 2, seed=9)
@@ -111,7 +111,7 @@ def test_a_tick_is_told_apart_as_far_as_its_frame_carries_it(suit: Suit, fd: boo
     span = 2**32 if fd else 64
     suit.tick = span - 1
 
-    def shown(ahead: int) -> list[Frame]:
+    def shown(ahead: int) -> list[CanFrame]:
         number = number_of(suit.tick + 1) + ahead
         encode = suit.protocol.encode_sample
         return [f for n in suit.nodes for f in encode(n.id, suit.raw(0), number, 0, fd)]
@@ -126,10 +126,10 @@ def test_an_unknown_identifier_is_counted_for_the_bus(suit: Suit, fd: bool) -> N
     good = suit.answers(2, seed=3)
     strangers = [
         *suit.answer(4, 2),
-        Frame(0x080, b"1234", fd=False),
-        Frame(0, b"", fd=False),
-        Frame(0x7FF, bytes(8), fd=False),
-        Frame(0x10105, bytes(24), fd=True),
+        CanFrame(0x080, b"1234", fd=False),
+        CanFrame(0, b"", fd=False),
+        CanFrame(0x7FF, bytes(8), fd=False),
+        CanFrame(0x10105, bytes(24), fd=True),
         *suit.protocol.encode_sample(1, suit.raw(0), 2, 0, not fd),
     ]
     sweep = suit.window([*strangers, *good])
@@ -175,7 +175,7 @@ def test_a_classic_answer_needs_all_three_frames(new_suit: type[Suit], missing: 
 def test_a_babbling_bus_cannot_fill_the_memory(new_suit: type[Suit]) -> None:
     suit = new_suit(fd=True, count=2)
     room = 2 * 16
-    stranger = Frame(0x7FF, bytes(8), fd=False)
+    stranger = CanFrame(0x7FF, bytes(8), fd=False)
     assert suit.window([stranger] * room).lost.all()
     assert suit.poll.bus_health["arm"].overflow == 0
     suit.window([stranger] * (room + 5))
@@ -193,7 +193,7 @@ def test_random_traffic_only_ever_yields_what_was_soundly_answered(
     fates = st.sampled_from(["good", "good", "good", "absent", "spoilt", "stale", "short", "twice"])
     for _ in range(data.draw(st.integers(1, 8))):
         tick = suit.tick + 1
-        frames: list[Frame] = []
+        frames: list[CanFrame] = []
         answered = []
         for node in suit.nodes:
             fate = data.draw(fates)

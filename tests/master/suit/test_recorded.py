@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RecordingError
-from common.recording import Recorder
+from common.recording import McapRecorder
 from master.calibrate.recording import load_recordings
 from master.suit.poll import Sweep
 from master.suit.recorded import TOPIC, describe, encode_sweep, read_sweeps
@@ -29,7 +29,7 @@ def sweep(tick: int, fresh: tuple[bool, ...] = (True, True, True)) -> Sweep:
 
 def written(path: Path, payloads: list[bytes], metadata: dict[str, str] | None = None) -> Path:
     said = describe("hand", NODES, 200.0) if metadata is None else metadata
-    with Recorder(path, said) as recorder:
+    with McapRecorder(path, said) as recorder:
         for stamp, payload in enumerate(payloads):
             recorder.put(TOPIC, payload, stamp)
     return path
@@ -115,7 +115,7 @@ def test_a_recording_that_was_cut_off_is_used_and_said(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "a.mcap"
-    recorder = Recorder(path, describe("hand", NODES, 200.0), flush_s=0.0)
+    recorder = McapRecorder(path, describe("hand", NODES, 200.0), flush_s=0.0)
     for tick in range(50):
         recorder.put(TOPIC, encode_sweep(sweep(tick)), tick)
     recorder.close()

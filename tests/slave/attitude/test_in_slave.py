@@ -12,7 +12,7 @@ import pytest
 
 from common.link.config import LinkConfig
 from common.metrics.slave import ServoMetrics, SlaveMetrics
-from common.process.pacing import Due, TickGrid
+from common.process.pacing import DueTick, TickGrid
 from common.wire.codec import decode
 from common.wire.messages import BaseAttitude, RobotState
 from common.wire.topics import Topic
@@ -65,9 +65,9 @@ class FakeBase:
 
 
 def state_with(base: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[RobotState, SlaveMetrics]:
-    async def four_ticks(grid: TickGrid) -> AsyncIterator[Due]:
+    async def four_ticks(grid: TickGrid) -> AsyncIterator[DueTick]:
         for tick in range(4):
-            yield Due(tick, grid.origin_ns, 0)
+            yield DueTick(tick, grid.origin_ns, 0)
 
     monkeypatch.setattr(app, "ticks", four_ticks)
     monkeypatch.setattr(app, "monotonic_ns", lambda: NOW_NS)

@@ -15,7 +15,7 @@ from common.link.config import LinkConfig
 from common.link.queries import Answered
 from common.wire.codec import encode
 from common.wire.messages import ControlReply
-from common.wire.presence import Presence
+from common.wire.presence import ProcessPresence
 from common.wire.stop import StopAnswer, pack_stop, pack_stop_answer, read_stop
 from common.wire.topics import STOP
 from deploy.client.answer import Answer
@@ -51,8 +51,8 @@ class Road:
             on_answer(Answered(answer, 0, "s"))
 
 
-def shown(instance: int) -> Presence:
-    return Presence("robot-1", "slave", instance, 3, "1.0", f"room {instance}")
+def shown(instance: int) -> ProcessPresence:
+    return ProcessPresence("robot-1", "slave", instance, 3, "1.0", f"room {instance}")
 
 
 async def stopped(road: Road, count: StopCount, within_s: float = 20.0, settled: bool = True) -> list[Answer]:

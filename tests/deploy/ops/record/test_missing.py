@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from common.clock import NS_PER_S
-from common.recording import Recorder
+from common.recording import McapRecorder
 from common.wire.codec import encode
 from common.wire.messages import Command
 from common.wire.numbering import Number, number_of
@@ -94,7 +94,7 @@ def test_what_a_robot_really_says_is_numbered_without_a_gap() -> None:
 
 def test_the_file_shows_what_is_missing(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    with Recorder(path, {"robot": "robot-1"}) as recorder:
+    with McapRecorder(path, {"robot": "robot-1"}) as recorder:
         for number in (1, 2, 3, 9, 10):
             recorder.put("tandem/robot-1/state", state(number), number * STATE_NS)
         recorder.put("tandem/robot-1/statistics", b"no number", 0)

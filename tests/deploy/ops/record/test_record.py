@@ -17,7 +17,7 @@ from common.link import open_link
 from common.link.config import LinkConfig
 from common.metrics.recorder import RecorderMetrics
 from common.metrics.tree import from_tree
-from common.recording import Recorder, read_recording
+from common.recording import McapRecorder, read_recording
 from common.wire.topics import COMMAND, STATE, STATISTICS, video
 from deploy import cli
 from deploy.ops.record.contents import survey
@@ -115,7 +115,7 @@ def test_commands_that_nobody_sends_there_are_missed_in_words(tmp_path: Path) ->
 
 
 def written(path: Path) -> None:
-    with Recorder(path, {"robot": ROBOT}) as recorder:
+    with McapRecorder(path, {"robot": ROBOT}) as recorder:
         for i in range(5):
             recorder.put(
                 "tandem/robot-1/state", bytes(10), i * 1_000_000_000 + (3_000_000_000 if i == 4 else 0)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from common.process.notify import Notifier
-from common.process.pacing import Due, TickGrid
+from common.process.pacing import DueTick, TickGrid
 from deploy.ops.router import run as router
 
 
@@ -28,9 +28,9 @@ class Sessions:
 
 
 def test_a_zenoh_that_hangs_is_not_taken_for_alive(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def ticks(grid: TickGrid) -> AsyncIterator[Due]:
+    async def ticks(grid: TickGrid) -> AsyncIterator[DueTick]:
         for tick in range(10):
-            yield Due(tick, grid.origin_ns, 0)
+            yield DueTick(tick, grid.origin_ns, 0)
 
     messages: list[bytes] = []
 

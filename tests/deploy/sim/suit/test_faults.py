@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.can.frame import Frame
+from common.can.frame import CanFrame
 from common.clock import NS_PER_MS, to_ns
 from deploy.sim.suit.faults import Faults, FaultsConfig, NodeAnswer, Outgoing
 from master.suit.crc import frame_crc
@@ -22,7 +22,7 @@ def answers(frames_each: int = 1) -> list[NodeAnswer]:
         for k in range(frames_each):
             frame_id = 0x101 + i + 0x80 * k
             covered = bytes(range(7 * i, 7 * i + 7))
-            frames.append(Frame(frame_id, covered + bytes([frame_crc(frame_id, covered)]), fd=False))
+            frames.append(CanFrame(frame_id, covered + bytes([frame_crc(frame_id, covered)]), fd=False))
         out.append(NodeAnswer(node, "suit", frames))
     return out
 

@@ -15,7 +15,7 @@ from common.clock import NS_PER_S
 from common.clock_sync import MasterExchange
 from common.errors import RobotError
 from common.link.config import LinkConfig
-from common.process.pacing import Due, TickGrid
+from common.process.pacing import DueTick, TickGrid
 from common.wire.codec import decode, encode
 from common.wire.control import read_reply
 from common.wire.messages import Action, ClockReply, Command, CommandStamps, ControlReply, ControlRequest
@@ -149,10 +149,10 @@ def test_a_bus_that_hangs_holds_up_no_tick_of_the_slave(
     file = tmp_path / "robot-1.json"
     save(file, where(rig))
 
-    async def given(grid: TickGrid) -> AsyncIterator[Due]:
+    async def given(grid: TickGrid) -> AsyncIterator[DueTick]:
         for tick in range(200):
             await asyncio.sleep(0)
-            yield Due(tick, grid.origin_ns, 0)
+            yield DueTick(tick, grid.origin_ns, 0)
 
     monkeypatch.setattr(app, "ticks", given)
     link: Any = DeafLink()

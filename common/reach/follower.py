@@ -13,7 +13,7 @@ beside the pole of a ball joint (its middle angle at ±90°), and where two post
 near. So
 
 - of the two decompositions the one nearer to the last posture is kept, its angles unwrapped. Clamped, it
-  is preferred to a nearest posture that needs joints to turn far and gains little (`_KEPT_RAD`);
+  is preferred to a nearest posture that needs joints to turn far and gains little (`choice.py`);
 - no joint turns farther from one posture to the next than a share of what the operator's segment turned
   (`farthest_turn`), nor does the robot's segment. What is left is made up for as the operator goes on, or
   slowly while he stands still.
@@ -27,18 +27,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from common.quaternion import Array
-from common.reach.chart import Group, make_chart
-from common.reach.nearest import (
-    NOTHING,
-    Nearest,
-    Range,
-    Tensor,
-    Triple,
-    left_rad,
-    nearest_angles,
-    scalar_product,
-    tensor,
+from common.reach.chart import JointGroup, make_chart
+from common.reach.choice import (
+    BESIDE_POLE_RAD,
+    MOST_GAIN,
+    SAME_RAD,
+    TURN,
+    choose,
+    kept_decomposition,
+    worth_turning,
 )
+from common.reach.nearest import NOTHING, Nearest, nearest_angles, scalar_product, tensor
+from common.reach.step import Step, farthest_turn
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 
@@ -46,38 +46,12 @@ NOMINAL_S = 0.08
 """From one posture to the next, where nobody says."""
 FORGOTTEN_S = 0.5
 """Postures farther apart than this have nothing to do with each other."""
-MOST_GAIN = 3.0
-"""No joint turns faster than this times the operator's segment."""
-_GAIN, _CREEP_RAD_S = 1.5, math.radians(20.0)
-_MOST_CREEP_RAD = math.radians(1.8)
-_KEPT_RAD = math.radians(15.0)
-"""The kept decomposition, clamped, may be farther from the operator by this than the nearest posture,"""
-_KEPT_SHARE = 4.0
-"""and by this times the angle that the nearest one leaves: what can be reached, is."""
-_NEAR_RAD, _FAR_RAD = math.radians(15.0), math.radians(30.0)
-"""A nearest posture whose joints are within the first of the kept one's is taken, beyond the second never."""
-_BESIDE_POLE_RAD = math.acos(1.0 / MOST_GAIN)
-"""From this middle angle on (70.5°) joints may have to turn `MOST_GAIN` times as fast as the segment."""
-_IDLE_RAD, _WORTH_RAD = math.radians(1.0), math.radians(4.0)
-"""Beyond a limit beside the pole, turning that gains the first is not done, and the second at once."""
 _FLOOR = 1e-12
 _ROUNDING_RAD = 1e-9
 """At rest many joints stand at their limits: rounding puts none of them beyond."""
-_SAME_RAD = math.radians(0.1)
-_TURN = 2.0 * math.pi
 
 
-def farthest_turn(turned_rad: Array, elapsed_s: float) -> Array:
-    """How far (...) a joint may turn while the operator's segment turns by `turned_rad` (...).
-
-    min(max(3 t, creep), 1.5 t + creep): three times as far, and never more than half as far again and 1.8°.
-    """
-    creep = min(_CREEP_RAD_S * elapsed_s, _MOST_CREEP_RAD)
-    out: Array = np.minimum(np.maximum(MOST_GAIN * turned_rad, creep), _GAIN * turned_rad + creep)
-    return out
-
-
-class Reach:
+class PostureFollower:
     """A robot's limits, and the posture it was last given."""
 
     def __init__(self, skeleton: Skeleton, lower_rad: Array, upper_rad: Array) -> None:
@@ -135,12 +109,12 @@ class Reach:
         late = step > most_of_joint
         # a group's joints together turn its segment by no more than the sum of their steps; a step that is
         # not known counts as far, and must not spread
-        far = self._sums @ np.fmin(step, _TURN) > most.take(self._group_segments)
+        far = self._sums @ np.fmin(step, TURN) > most.take(self._group_segments)
         self.short_rad = np.zeros(len(q))
         if beyond.any() or late.any() or far.any():
             velocity[beyond] = 0.0
             self.short_rad[self._chart.segment_of_joint[:, 0]] = np.abs(free - position)
-            step_of = _Step(elapsed_s, most, most_of_joint, self._last, free, position, velocity)
+            step_of = Step(elapsed_s, most, most_of_joint, self._last, free, position, velocity)
             position, velocity = self._together(q, step_of, beyond, late, far)
         velocity = np.minimum(np.maximum(velocity, -fastest), fastest)
         self._last, self._last_q = position, q.copy()
@@ -169,7 +143,7 @@ class Reach:
         growth = over[:, 0] * over_rate[:, 0] + under[:, 0] * under_rate[:, 0]
         np.divide(2.0 * growth, length[:, 0] * length[:, 1], out=rates[2])
         driven = self._free_angles.reshape(2, -1).take(chart.driven, axis=1)
-        driven[0] -= _TURN * np.rint((driven[0] - self._reference()) / _TURN)
+        driven[0] -= TURN * np.rint((driven[0] - self._reference()) / TURN)
         free: Array = np.einsum("tjk,jk->tj", driven, chart.weights)
         return free[0], free[1]
 
@@ -182,7 +156,7 @@ class Reach:
         reference[known, 0] = self._last[known] / self._chart.weights[known, 0]
         return reference
 
-    def _together(self, q: Array, at: _Step, beyond: Mask, late: Mask, far: Mask) -> tuple[Array, Array]:
+    def _together(self, q: Array, at: Step, beyond: Mask, late: Mask, far: Mask) -> tuple[Array, Array]:
         """Positions and velocities (J,) where groups are beyond limits, or joints cannot keep up."""
         project = set(self._group_of_joint[beyond].tolist()) - {-1}
         behind = set(self._group_of_joint[late].tolist()) - {-1}
@@ -198,7 +172,7 @@ class Reach:
             at.limit_turn(self._chart.groups[g])
         return np.array(at.position), np.array(at.velocity)
 
-    def _project(self, g: int, q: list[float], at: _Step) -> None:
+    def _project(self, g: int, q: list[float], at: Step) -> None:
         """Put one group's nearest posture into `at`, and the velocities that go with it."""
         group = self._chart.groups[g]
         w, *vector = q
@@ -212,68 +186,25 @@ class Reach:
         towards = last if known else group.middle
         kept = NOTHING
         if known and group.ball:
-            angles = _kept(group.angles(at.free), group, last)
+            angles = kept_decomposition(group.angles(at.free), group, last)
             kept = Nearest(angles, abs(scalar_product(wanted, angles)))
         nearest = nearest_angles(wanted, group.box, towards, group.box.twofold, kept)
         if kept is not NOTHING:
-            nearest = _worth_turning(wanted, group, _chosen(wanted, nearest, kept), last)
+            nearest = worth_turning(wanted, group, choose(wanted, nearest, kept), last)
         self.short_rad[group.segment] = nearest.left_rad
         # beside the pole the decomposition's velocity of now tells nothing of what comes next
-        beside_pole = group.ball and abs(nearest.angles[1]) > _BESIDE_POLE_RAD
+        beside_pole = group.ball and abs(nearest.angles[1]) > BESIDE_POLE_RAD
         for k, joint in enumerate(group.joints):
             if joint is not None:
                 lower, upper = self._limits[joint]
                 at.position[joint] = now = min(max(nearest.angles[k] / group.scale[k], lower), upper)
-                if abs(now - at.free[joint]) < _SAME_RAD and not beside_pole:
+                if abs(now - at.free[joint]) < SAME_RAD and not beside_pole:
                     continue  # the velocity of the decomposition is its own
                 resting = now in (lower, upper) or not known
                 at.velocity[joint] = 0.0 if resting else (now - at.last[joint]) / at.elapsed_s
 
 
-class _Step:
-    """One step from the last posture to the next, as plain numbers: a dozen of them are quicker so."""
-
-    def __init__(
-        self,
-        elapsed_s: float,
-        most: Array,
-        most_of_joint: Array,
-        last: Array,
-        free: Array,
-        position: Array,
-        velocity: Array,
-    ) -> None:
-        self.elapsed_s = elapsed_s
-        self.last: list[float] = last.tolist()
-        self.free: list[float] = free.tolist()
-        self.position: list[float] = position.tolist()
-        self.velocity: list[float] = velocity.tolist()
-        self._most: list[float] = most.tolist()
-        self._most_of_joint: list[float] = most_of_joint.tolist()
-
-    def limit(self, joints: list[int]) -> None:
-        """None of these joints goes farther at once than it may."""
-        for j in joints:
-            now, last, most = self.position[j], self.last[j], self._most_of_joint[j]
-            if abs(now - last) > most:
-                self._put(j, last + math.copysign(most, now - last))
-
-    def limit_turn(self, group: Group) -> None:
-        """Nor does the segment that a group of joints turns."""
-        last, most = group.angles(self.last), self._most[group.segment]
-        for _ in range(3):
-            turn = left_rad(_product(last, group.angles(self.position)))
-            if not turn > most:
-                return
-            for j in group.turning:
-                self._put(j, self.last[j] + 0.98 * most / turn * (self.position[j] - self.last[j]))
-
-    def _put(self, joint: int, position_rad: float) -> None:
-        self.position[joint] = position_rad
-        self.velocity[joint] = (position_rad - self.last[joint]) / self.elapsed_s
-
-
-def _scales(groups: Sequence[Group], joints: int) -> Array:
+def _scales(groups: Sequence[JointGroup], joints: int) -> Array:
     """(J,): each joint's angle for 1 rad; 1 where it is of no group."""
     out = np.ones(joints)
     for group in groups:
@@ -281,68 +212,6 @@ def _scales(groups: Sequence[Group], joints: int) -> Array:
             if j is not None:
                 out[j] = scale
     return out
-
-
-def _kept(exact: Triple, group: Group, last: Triple) -> Triple:
-    """Of the two decompositions, of which `exact` is one, the one nearer to the last angles: clamped."""
-    kept, least = last, math.inf
-    x, y, z = last
-    one, two, three = group.box.ranges
-    for a, b, c in (exact, (exact[0] + math.pi, math.pi - exact[1], exact[2] + math.pi)):
-        # unwrapped: of whole turns the one nearest to the last posture
-        a -= _TURN * round((a - x) / _TURN)
-        b -= _TURN * round((b - y) / _TURN)
-        c -= _TURN * round((c - z) / _TURN)
-        way = max(abs(a - x), abs(b - y), abs(c - z))
-        if way < least:
-            kept, least = (_clamped(a, one), _clamped(b, two), _clamped(c, three)), way
-    return kept
-
-
-def _chosen(wanted: Tensor, nearest: Nearest, kept: Nearest) -> Nearest:
-    """The nearest posture, or the kept one where much turning would gain little."""
-    left = nearest.left_rad
-    if left < _SAME_RAD or kept.left_rad > left + min(_KEPT_SHARE * left, _KEPT_RAD):
-        return nearest
-    (a, b, c), (x, y, z) = kept.angles, nearest.angles
-    apart = max(abs(a - x), abs(b - y), abs(c - z))
-    if apart >= _FAR_RAD:
-        return kept
-    share = min((_FAR_RAD - apart) / (_FAR_RAD - _NEAR_RAD), 1.0)
-    angles = (a + share * (x - a), b + share * (y - b), c + share * (z - c))
-    return Nearest(angles, abs(scalar_product(wanted, angles)))
-
-
-def _worth_turning(wanted: Tensor, group: Group, aim: Nearest, last: Triple) -> Nearest:
-    """Towards `aim`, along the pole's valley only as far as that gains.
-
-    At a middle angle of ±90° the first and the third turn about one axis: while their sum (at -90° their
-    difference) is kept, turning them changes nothing, and close by next to nothing. What passes by the pole
-    beyond a limit would otherwise fling them about.
-    """
-    (a, b, c), x = aim.angles, last[0]
-    if aim.left_rad < _SAME_RAD or abs(b) < _BESIDE_POLE_RAD:
-        return aim
-    stay = (x, b, _clamped(a + c - x if b > 0.0 else c - a + x, group.box.ranges[2]))
-    gain = left_rad(scalar_product(wanted, stay)) - aim.left_rad
-    share = min(max((gain - _IDLE_RAD) / (_WORTH_RAD - _IDLE_RAD), 0.0), 1.0)
-    if share == 1.0:
-        return aim
-    z = stay[2]
-    angles = (x + share * (a - x), b, z + share * (c - z))
-    return Nearest(angles, abs(scalar_product(wanted, angles)))
-
-
-def _clamped(angle: float, allowed: Range) -> float:
-    return min(max(angle, allowed.lower.rad), allowed.upper.rad)
-
-
-def _product(p: Triple, q: Triple) -> float:
-    """Scalar product of the quaternions that two triples of angles make."""
-    # ⟨qx(a) qy(b) qz(c), qx(d) qy(e) qz(f)⟩ depends on a - d and c - f alone, and not on a and c
-    x, z = 0.5 * (p[0] - q[0]), 0.5 * (p[2] - q[2])
-    b, e = 0.5 * p[1], 0.5 * q[1]
-    return math.cos(x) * math.cos(b - e) * math.cos(z) - math.sin(x) * math.sin(b + e) * math.sin(z)
 
 
 def _signed_order(frame: Array) -> tuple[list[int], list[float]]:
