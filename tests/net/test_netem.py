@@ -32,7 +32,7 @@ def _netem() -> None:
     finally:
         remove(run)
     if not there:
-        pytest.skip("this kernel has no netem: tests/net/test_on_kernel.py runs these on one that has")
+        pytest.skip("this kernel has no netem: tests/contract/test_on_kernel.py runs these on one that has")
 
 
 def test_the_link_has_its_profile_and_is_cut_and_counted() -> None:

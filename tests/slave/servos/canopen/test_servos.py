@@ -37,6 +37,7 @@ from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.servos import CanopenServos
 from tests.slave.servos.contract import Subject, check
 
+pytestmark = pytest.mark.live
 NURSING = load_skeleton("nursing")
 DEADLINE_S = 60.0
 _number = itertools.count()

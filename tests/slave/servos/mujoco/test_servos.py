@@ -24,16 +24,20 @@ class StepClock:
     def __init__(self) -> None:
         self.now_ns = 1_000
         self.stands = False
+        self.read = 0
         self.turned = threading.Semaphore(0)
 
     def __call__(self) -> int:
         if not self.stands:
             self.now_ns += CYCLE_NS
+        self.read += 1
         self.turned.release()
         return self.now_ns
 
     def turns(self, count: int) -> None:
-        for _ in range(count):
+        """Wait until the thread has read it so often from now on."""
+        until = self.read + count
+        while self.read < until:
             assert self.turned.acquire(timeout=10.0)
 
 
