@@ -21,7 +21,7 @@ EARLY = 0.25
 """A command that comes this share of a period before the next is due makes that one not missing."""
 
 
-class Due:
+class DueCommands:
     """Follows the commands of one master after the other; another master's first begins anew."""
 
     def __init__(self) -> None:

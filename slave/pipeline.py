@@ -42,7 +42,7 @@ from slave.limit.limit import Setpoint, SetpointLimiter
 from slave.limit.nearest import NearestPosture
 from slave.limit.pace import Pace
 from slave.servos.servos import EncoderReading
-from slave.track import Target, Tracker
+from slave.track import Tracker, TrackTarget
 from slave.track.config import make_tracker
 from slave.traffic import CommandTraffic
 
@@ -218,7 +218,7 @@ class SlavePipeline:
         self.guard.written(now_ns, setpoint.position_rad, setpoint.velocity_rad_s)
         return setpoint
 
-    def _track(self, now_ns: int, permission: Permission) -> Target | None:
+    def _track(self, now_ns: int, permission: Permission) -> TrackTarget | None:
         """Where the operator is now; None: nowhere that the robot may go."""
         target = self.tracker.target(now_ns) if permission.moving else None
         if target is not None and not target.finite:
@@ -226,7 +226,7 @@ class SlavePipeline:
             return None
         return target
 
-    def _limit(self, now_ns: int, permission: Permission, target: Target) -> None:
+    def _limit(self, now_ns: int, permission: Permission, target: TrackTarget) -> None:
         """Move the setpoint towards the target, as far and as fast as each joint may in this step."""
         error_rad = self.limiter.limits.reachable(target.position_rad) - self.limiter.position_rad
         if permission.state is State.ALIGN:

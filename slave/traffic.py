@@ -7,7 +7,7 @@ from common.latency.arrivals import Arrivals
 from common.latency.durations import StreamedDurations
 from common.latency.one_way import one_way_ns
 from common.wire.messages import Command
-from slave.due import Due
+from slave.due import DueCommands
 from slave.journey import Journeys
 
 
@@ -19,7 +19,7 @@ class CommandTraffic:
         """By the commands' numbers."""
         self.one_way = StreamedDurations()
         """From put to received, while the offset was trusted."""
-        self.due = Due()
+        self.due = DueCommands()
         """The same with the commands that were due and did not come."""
         self.journeys = Journeys()
         """From the master's sample to the encoder that moved."""

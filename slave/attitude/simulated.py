@@ -32,7 +32,7 @@ def _identity() -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Errors:
+class ChipErrors:
     """What one sensor's readings are of the truth: matrix · truth + offset, then noise and rounding."""
 
     matrix: Array = field(default_factory=_identity)
@@ -45,21 +45,8 @@ class Errors:
 class Chips:
     """The two sensors of one instrument."""
 
-    acc: Errors = field(default_factory=Errors)
-    mag: Errors = field(default_factory=Errors)
-
-
-def as_soldered(rng: np.random.Generator) -> Chips:
-    """Two chips out of the box: ±5 % of scale, 1° askew, up to 0.1 g of offset; iron near by, up to 10 µT."""
-
-    def matrix() -> Array:
-        out: Array = np.eye(3) + np.diag(rng.uniform(-0.05, 0.05, 3)) + rng.uniform(-0.02, 0.02, (3, 3))
-        return out
-
-    return Chips(
-        Errors(matrix(), rng.uniform(-0.1, 0.1, 3) * GRAVITY_M_S2),
-        Errors(matrix(), rng.uniform(-10.0, 10.0, 3)),
-    )
+    acc: ChipErrors = field(default_factory=ChipErrors)
+    mag: ChipErrors = field(default_factory=ChipErrors)
 
 
 def readings(

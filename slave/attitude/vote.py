@@ -31,7 +31,7 @@ _RESOLUTION_RAD = math.radians(0.3)
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class TimedFrame:
     """One frame and when it came."""
 
     angles: FrameAngles
@@ -44,21 +44,21 @@ class Vote:
     def __init__(self, most_rad_s: float) -> None:
         """`most_rad_s`: the base cannot turn faster."""
         self._most_rad_s = most_rad_s
-        self._window: deque[Frame] = deque(maxlen=FRAMES)
-        self._told: Frame | None = None
+        self._window: deque[TimedFrame] = deque(maxlen=FRAMES)
+        self._told: TimedFrame | None = None
         self.outvoted = 0
         """Frames that contradict their neighbours."""
 
-    def hear(self, angles: FrameAngles, came_ns: int) -> Frame | None:
+    def hear(self, angles: FrameAngles, came_ns: int) -> TimedFrame | None:
         """What may be told after one more frame, None where nothing new may; `came_ns` never falls."""
         window = self._window
         if window and came_ns - window[-1].came_ns > _TOGETHER_NS:
             window.clear()
-        window.append(Frame(angles, came_ns))
+        window.append(TimedFrame(angles, came_ns))
         if len(window) < FRAMES:
             return None
         # as old as the frame in the middle of the three
-        chosen = Frame(median(*(frame.angles for frame in window)), window[-2].came_ns)
+        chosen = TimedFrame(median(*(frame.angles for frame in window)), window[-2].came_ns)
         if not self._plausible(window[-1], chosen):
             self.outvoted += 1
         settled = all(self._plausible(a, b) for a in window for b in window)
@@ -67,7 +67,7 @@ class Vote:
         self._told = chosen
         return chosen
 
-    def _plausible(self, a: Frame, b: Frame) -> bool:
+    def _plausible(self, a: TimedFrame, b: TimedFrame) -> bool:
         # a longer time than the window's excuses no further turn: half a second would excuse any
         longest_ns = self._window[-1].came_ns - self._window[0].came_ns
         past_s = to_s(min(abs(b.came_ns - a.came_ns), longest_ns))

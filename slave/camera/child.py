@@ -14,9 +14,9 @@ import numpy as np
 from common.errors import RobotError
 from slave.camera.config import CameraConfig
 from slave.camera.jpeg import Fitter, decode, size_of
-from slave.camera.pipe import REQUEST, Answer, Reply, Request, pack_reply, request_of
+from slave.camera.pipe import REQUEST, PictureReply, PictureRequest, ReplyKind, pack_reply, request_of
 
-Make = Callable[[Request], Reply]
+Make = Callable[[PictureRequest], PictureReply]
 
 
 def main(setting: str) -> None:
@@ -25,23 +25,23 @@ def main(setting: str) -> None:
     # whatever a driver prints must not get between the pictures
     answers = os.dup(1)
     os.dup2(2, 1)
-    requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
+    requests: queue.SimpleQueue[PictureRequest] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests,), name="requests", daemon=True).start()
     checked = CameraConfig.model_validate_json(config)
     try:
         make = open_camera(profile, checked)
     except RobotError as error:
         # a camera may be plugged in again; a machine that cannot draw will not learn to
-        answer = Answer.NEVER if checked.source == "robot" else Answer.TROUBLE
-        _write(answers, Reply(answer, body=str(error).encode()))
+        answer = ReplyKind.NEVER if checked.source == "robot" else ReplyKind.TROUBLE
+        _write(answers, PictureReply(answer, body=str(error).encode()))
         os._exit(0)  # a half-built OpenGL context makes trouble when it is taken down
-    _write(answers, Reply(Answer.READY))
+    _write(answers, PictureReply(ReplyKind.READY))
     while True:
         request = requests.get()
         try:
             reply = make(request)
         except (RobotError, ValueError) as error:
-            reply = Reply(Answer.TROUBLE, body=str(error).encode())
+            reply = PictureReply(ReplyKind.TROUBLE, body=str(error).encode())
         _write(answers, reply)
 
 
@@ -61,32 +61,32 @@ def open_camera(profile: str, config: CameraConfig) -> Make:
     drawn = DrawnCamera(profile, config.name, config.width, config.height)
     drawn.draw(np.zeros(drawn.joints))  # the first one takes the longest
 
-    def make(request: Request) -> Reply:
+    def make(request: PictureRequest) -> PictureReply:
         jpeg, width, height = fitter.fit(drawn.draw(request.position_rad), request.most_bytes)
-        return Reply(Answer.PICTURE, request.read_ns, width, height, jpeg)
+        return PictureReply(ReplyKind.PICTURE, request.read_ns, width, height, jpeg)
 
     return make
 
 
-def passed_on(taken_ns: int, jpeg: bytes, most_bytes: int, fitter: Fitter) -> Reply:
+def passed_on(taken_ns: int, jpeg: bytes, most_bytes: int, fitter: Fitter) -> PictureReply:
     """The camera's own JPEG where it is small enough, else one that is. Raises ValueError on garbage."""
     if len(jpeg) > most_bytes:
         smaller, width, height = fitter.fit(decode(jpeg), most_bytes)
-        return Reply(Answer.PICTURE, taken_ns, width, height, smaller)
-    return Reply(Answer.PICTURE, taken_ns, *size_of(jpeg), jpeg)
+        return PictureReply(ReplyKind.PICTURE, taken_ns, width, height, smaller)
+    return PictureReply(ReplyKind.PICTURE, taken_ns, *size_of(jpeg), jpeg)
 
 
-def _listen(requests: queue.SimpleQueue[Request]) -> None:
+def _listen(requests: queue.SimpleQueue[PictureRequest]) -> None:
     stdin = sys.stdin.buffer
     while True:
         head = stdin.read(REQUEST.size)
         if len(head) < REQUEST.size:
             os._exit(0)  # the slave has gone, whatever the driver is busy with
         read_ns, most_bytes, length = request_of(head)
-        requests.put(Request(read_ns, most_bytes, np.frombuffer(stdin.read(length), "<f8")))
+        requests.put(PictureRequest(read_ns, most_bytes, np.frombuffer(stdin.read(length), "<f8")))
 
 
-def _write(answers: int, reply: Reply) -> None:
+def _write(answers: int, reply: PictureReply) -> None:
     data = memoryview(pack_reply(reply))
     try:
         while data:

@@ -20,10 +20,10 @@ from common.quaternion import Array
 from common.wire.messages import Command
 from common.wire.video import VideoFrame, encode_frame
 from slave.camera.config import CameraConfig
-from slave.camera.pipe import Reply, Request
+from slave.camera.pipe import PictureReply, PictureRequest
 from slave.camera.process import CameraProcess, NeverError
 from slave.camera.rate import RateControl, RateLimits
-from slave.camera.sight import Seen, Sight
+from slave.camera.sight import SeenPicture, Sight
 
 _FIRST_BACK_OFF_S, _LONGEST_BACK_OFF_S = 0.5, 30.0
 _WELL_AFTER = 20
@@ -36,14 +36,14 @@ _BUSY_SHARE = 0.5
 log = logging.getLogger(__name__)
 
 
-class Camera(Protocol):
+class CameraSource(Protocol):
     """What the feed asks of a camera's process."""
 
     def wait_ready(self) -> None:
         """Wait until it can be asked."""
         ...
 
-    def ask(self, request: Request) -> Reply:
+    def ask(self, request: PictureRequest) -> PictureReply:
         """A picture. Raises RobotError."""
         ...
 
@@ -63,7 +63,7 @@ class CameraFeed:
         self,
         config: CameraConfig,
         put: Callable[[bytes], None],
-        open_camera: Callable[[], Camera],
+        open_camera: Callable[[], CameraSource],
         clock: Clock = monotonic_ns,
         make_rate: Callable[[RateLimits], RateControl] = RateControl,
     ) -> None:
@@ -83,10 +83,10 @@ class CameraFeed:
             )
         )
         self._angles: tuple[Array, int] | None = None
-        self._seen: deque[Seen] = deque(maxlen=64)
+        self._seen: deque[SeenPicture] = deque(maxlen=64)
         self._wake = threading.Event()
         self._stopping = False
-        self._camera: Camera | None = None
+        self._camera: CameraSource | None = None
         # above any number of an earlier run on this machine, which the master may still tell of
         self._number = clock() // NS_PER_MS
         self._count = _Count(clock())
@@ -162,7 +162,7 @@ class CameraFeed:
             self._pause(back_off_s)
             back_off_s = min(2 * back_off_s, _LONGEST_BACK_OFF_S)
 
-    def _serve(self, camera: Camera) -> None:
+    def _serve(self, camera: CameraSource) -> None:
         rest_until_ns = 0
         while not self._stopping:
             self._wake.clear()
@@ -178,14 +178,14 @@ class CameraFeed:
             if wait_ns > 0:
                 self._wake.wait(to_s(wait_ns))
                 continue
-            reply = camera.ask(Request(angles[1], self._rate.budget_bytes, angles[0]))
+            reply = camera.ask(PictureRequest(angles[1], self._rate.budget_bytes, angles[0]))
             made_ns = self._clock()
             rest_until_ns = now_ns + round((made_ns - now_ns) / _BUSY_SHARE)
             self._make.record(made_ns - now_ns)
             self._send(reply)
             self.fault = ""
 
-    def _send(self, reply: Reply) -> None:
+    def _send(self, reply: PictureReply) -> None:
         self._number += 1
         now_ns = self._clock()
         frame = VideoFrame(self._number, reply.captured_ns, now_ns, reply.width, reply.height, reply.body)

@@ -21,7 +21,7 @@ REPLY = struct.Struct("<BQHHI")
 MOST_JOINTS = 1024
 
 
-class Answer(IntEnum):
+class ReplyKind(IntEnum):
     """Kinds of reply."""
 
     READY = 1
@@ -34,7 +34,7 @@ class Answer(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class PictureRequest:
     """One picture, please."""
 
     read_ns: int
@@ -45,10 +45,10 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class PictureReply:
     """A picture, or words."""
 
-    answer: Answer
+    answer: ReplyKind
     captured_ns: int = 0
     width: int = 0
     height: int = 0
@@ -61,13 +61,13 @@ class Reply:
         return self.body.decode("utf-8", "replace")
 
 
-def pack_request(request: Request) -> bytes:
+def pack_request(request: PictureRequest) -> bytes:
     """The request's bytes."""
     angles = np.ascontiguousarray(request.position_rad, "<f8").tobytes()
     return REQUEST.pack(request.read_ns, request.most_bytes, len(request.position_rad)) + angles
 
 
-def pack_reply(reply: Reply) -> bytes:
+def pack_reply(reply: PictureReply) -> bytes:
     """The reply's bytes."""
     head = (reply.answer, reply.captured_ns, reply.width, reply.height, len(reply.body))
     return REPLY.pack(*head) + reply.body
@@ -81,12 +81,12 @@ def request_of(head: bytes) -> tuple[int, int, int]:
     return read_ns, most_bytes, 8 * joints
 
 
-def reply_of(head: bytes) -> tuple[Reply, int]:
+def reply_of(head: bytes) -> tuple[PictureReply, int]:
     """A reply without its body, and how many bytes of it follow. Raises CodecError."""
     answer, captured_ns, width, height, length = REPLY.unpack(head)
     if length > MAX_JPEG:
         raise CodecError(f"{length} bytes from the camera's process")
     try:
-        return Reply(Answer(answer), captured_ns, width, height), length
+        return PictureReply(ReplyKind(answer), captured_ns, width, height), length
     except ValueError:
         raise CodecError(f"an answer of kind {answer} from the camera's process") from None

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from common.clock import monotonic_ns, to_ns, to_s
 from common.errors import CodecError, RobotError
 from slave.camera.config import CameraConfig
-from slave.camera.pipe import REPLY, Answer, Reply, Request, pack_request, reply_of
+from slave.camera.pipe import REPLY, PictureReply, PictureRequest, ReplyKind, pack_request, reply_of
 
 START_S = 30.0
 ANSWER_S = 3.0
@@ -47,19 +47,19 @@ class CameraProcess:
     def wait_ready(self) -> None:
         """Wait until it can be asked. Raises NeverError or RobotError."""
         reply = self._receive(START_S)
-        if reply.answer is Answer.NEVER:
+        if reply.answer is ReplyKind.NEVER:
             raise NeverError(reply.words)
-        if reply.answer is not Answer.READY:
+        if reply.answer is not ReplyKind.READY:
             raise RobotError(reply.words or "the camera's process does not begin with READY")
 
-    def ask(self, request: Request) -> Reply:
+    def ask(self, request: PictureRequest) -> PictureReply:
         """A picture. Raises RobotError where the process fails, ends or does not answer."""
         try:
             os.write(self._stdin, pack_request(request))
         except OSError:
             raise RobotError(GONE) from None
         reply = self._receive(ANSWER_S)
-        if reply.answer is not Answer.PICTURE:
+        if reply.answer is not ReplyKind.PICTURE:
             raise RobotError(reply.words)
         return reply
 
@@ -75,13 +75,13 @@ class CameraProcess:
             if pipe is not None:
                 pipe.close()
 
-    def _receive(self, timeout_s: float) -> Reply:
+    def _receive(self, timeout_s: float) -> PictureReply:
         deadline_ns = monotonic_ns() + to_ns(timeout_s)
         try:
             reply, length = reply_of(self._read(REPLY.size, deadline_ns))
         except CodecError as error:
             raise RobotError(str(error)) from None
-        return Reply(
+        return PictureReply(
             reply.answer, reply.captured_ns, reply.width, reply.height, self._read(length, deadline_ns)
         )
 

@@ -15,7 +15,7 @@ _KEPT = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SeenPicture:
     """A command's word on the newest picture its master had."""
 
     number: int
@@ -42,7 +42,7 @@ class Sight:
         while len(self._pictures) > _KEPT:
             self._pictures.popitem(last=False)
 
-    def on_command(self, command: Command, now_ns: int, offset: Offset) -> Seen | None:
+    def on_command(self, command: Command, now_ns: int, offset: Offset) -> SeenPicture | None:
         """Take an accepted command; what it says of a picture that it is the first to tell of, else None."""
         known = self._pictures.get(command.seen_frame)
         if known is None:
@@ -60,4 +60,4 @@ class Sight:
             self.transit.record(transit_ns)
         # the bound is half the quickest round trip: what a packet takes that meets nothing on its way
         delay_ns = None if transit_ns is None else max(0, transit_ns - offset.bound_ns)
-        return Seen(command.seen_frame, now_ns, delay_ns)
+        return SeenPicture(command.seen_frame, now_ns, delay_ns)

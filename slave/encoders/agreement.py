@@ -22,7 +22,7 @@ READINGS = 2
 """One reading that disagrees is forgiven: a bit may flip on its way from the encoder to the drive."""
 
 
-class Agreement:
+class EncoderAgreement:
     """Of J joints. Give it each reading once."""
 
     def __init__(self, joint_names: Sequence[str], window_rad: float = WINDOW_RAD) -> None:

@@ -40,7 +40,7 @@ CREEP_RAD_S = math.radians(0.3)
 
 
 @dataclass(frozen=True, slots=True)
-class Patience:
+class MotionPatience:
     """How long a joint that is astray may go on outwards."""
 
     plain_ns: int
@@ -57,7 +57,7 @@ class UnbiddenMotion:
         still_rad: float = STILL_RAD,
         *,
         readings: int = 0,
-        patience: Patience | None = None,
+        patience: MotionPatience | None = None,
     ) -> None:
         """`still_rad`: how far a joint that has settled may be from where it settled.
 
@@ -144,7 +144,7 @@ class UnbiddenMotion:
             self._say(out, left, moved, beyond)
         return out
 
-    def _for_long(self, read_ns: int, patience: Patience, astray: Mask, width: Array) -> Mask:
+    def _for_long(self, read_ns: int, patience: MotionPatience, astray: Mask, width: Array) -> Mask:
         """Who of those that are astray (J,) has gone on for longer than it may."""
         np.copyto(self._fast_ns, read_ns, where=width > SHAKES_RAD)
         if not astray.any():

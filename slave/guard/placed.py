@@ -16,8 +16,8 @@ from common.clock import NS_PER_MS
 from common.quaternion import Array
 from common.wire.messages import Mask
 from slave.encoders.agreement import READINGS as AGREEMENT_READINGS
-from slave.encoders.agreement import Agreement
-from slave.encoders.unbidden import Patience, UnbiddenMotion
+from slave.encoders.agreement import EncoderAgreement
+from slave.encoders.unbidden import MotionPatience, UnbiddenMotion
 
 BEYOND_RAD = math.radians(8.0)
 """A joint further than this beyond its range is not where its encoder says."""
@@ -26,7 +26,7 @@ NEAR_RAD = math.radians(5.0)
 STILL_RAD = math.radians(1.0)
 """At the output, behind the gear's play, a joint that stands may be moved by so much."""
 READINGS = 2
-PATIENCE = Patience(plain_ns=20 * NS_PER_MS, shaken_ns=80 * NS_PER_MS)
+PATIENCE = MotionPatience(plain_ns=20 * NS_PER_MS, shaken_ns=80 * NS_PER_MS)
 """An arm that brakes at its limits throws a light wrist outwards for 56 ms; else nobody is astray at all."""
 
 
@@ -45,7 +45,7 @@ class Placement:
         self._lower_rad, self._upper_rad = lower_rad, upper_rad
         known = last_known_rad
         self._known_rad = None if known is None else np.array([known.get(n, np.nan) for n in joint_names])
-        self._agreement = Agreement(joint_names)
+        self._agreement = EncoderAgreement(joint_names)
         self._motion = UnbiddenMotion(joint_names, STILL_RAD, readings=READINGS, patience=PATIENCE)
         self._first_rad: Array = np.full(len(self._names), np.nan)
         self._read_ns: int | None = None

@@ -1,5 +1,5 @@
 """From commands at 12.5 Hz to setpoints at the servo rate."""
 
-from slave.track.tracker import Target, Tracker
+from slave.track.tracker import Tracker, TrackTarget
 
-__all__ = ["Target", "Tracker"]
+__all__ = ["TrackTarget", "Tracker"]

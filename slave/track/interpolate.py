@@ -10,7 +10,7 @@ from common.clock import to_ns, to_s
 from common.quaternion import Array
 from slave.track.blend import Blend, Course, coast
 from slave.track.lateness import Lateness
-from slave.track.tracker import Target
+from slave.track.tracker import TrackTarget
 
 _KEPT = 4
 """Segments remembered. The newest is played, or an older one where a slow link has suddenly become fast."""
@@ -75,12 +75,12 @@ class Interpolate:
         if before is not None:
             self._blend.begin(now_ns, old, self._course(sample, now_ns))
 
-    def target(self, now_ns: int) -> Target | None:
+    def target(self, now_ns: int) -> TrackTarget | None:
         """The course as it was `delay_s` ago."""
         if self._newest is None:
             return None
         course = self._blend.applied(now_ns, self._course(self._newest, now_ns))
-        return Target(course[0], course[1])
+        return TrackTarget(course[0], course[1])
 
     def _course(self, newest: Course, now_ns: int) -> Course:
         play_ns = now_ns - to_ns(self.delay_s)

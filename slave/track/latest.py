@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from common.quaternion import Array
-from slave.track.tracker import Target
+from slave.track.tracker import TrackTarget
 
 
 class Latest:
     """A `Tracker` that repeats the newest sample."""
 
     def __init__(self) -> None:
-        self._target: Target | None = None
+        self._target: TrackTarget | None = None
         self._sampled_ns = 0
 
     def reset(self) -> None:
@@ -24,8 +24,8 @@ class Latest:
         if self._target is not None and sampled_ns <= self._sampled_ns:
             return
         self._sampled_ns = sampled_ns
-        self._target = Target(position_rad.copy(), np.zeros_like(position_rad))
+        self._target = TrackTarget(position_rad.copy(), np.zeros_like(position_rad))
 
-    def target(self, now_ns: int) -> Target | None:
+    def target(self, now_ns: int) -> TrackTarget | None:
         """The newest sample, at rest."""
         return self._target

@@ -12,7 +12,7 @@ from slave.track.blend import Blend, Course, coast
 from slave.track.confidence import Confidence
 from slave.track.estimate import Estimate, corrected, farthest, first, relaxed
 from slave.track.lateness import Lateness
-from slave.track.tracker import Target
+from slave.track.tracker import TrackTarget
 
 _LEAST_FULL_S = 0.15
 """Followed at full rate up to this age at least, servo lag included; while nothing is measured up to this."""
@@ -75,12 +75,12 @@ class Predict:
         self._believe(after)
         self._blend.begin(now_ns, old, self._course(after, now_ns))
 
-    def target(self, now_ns: int) -> Target | None:
+    def target(self, now_ns: int) -> TrackTarget | None:
         """The course at `now_ns`."""
         if self._estimate is None:
             return None
         course = self._blend.applied(now_ns, self._course(self._estimate, now_ns))
-        return Target(course[0], course[1])
+        return TrackTarget(course[0], course[1])
 
     def _believe(self, estimate: Estimate) -> None:
         self._estimate = estimate

@@ -10,7 +10,7 @@ from common.quaternion import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class TrackTarget:
     """Where the joints should be told to go now."""
 
     position_rad: Array
@@ -42,6 +42,6 @@ class Tracker(Protocol):
         """
         ...
 
-    def target(self, now_ns: int) -> Target | None:
+    def target(self, now_ns: int) -> TrackTarget | None:
         """Where to be now, or None before the first sample. `now_ns` never goes back."""
         ...

@@ -14,7 +14,7 @@ from common.errors import TandemError
 from deploy.experiments.faults.fault import Reaction
 from deploy.experiments.faults.table import FAULTS
 from deploy.experiments.faults.trial import run_trial
-from slave.encoders.agreement import Agreement
+from slave.encoders.agreement import EncoderAgreement
 from slave.encoders.unbidden import UnbiddenMotion
 from slave.guard import GATES, states
 from slave.guard.states import GuardEvent
@@ -76,7 +76,7 @@ def test_a_drive_that_moves_by_itself_goes_on_without_the_watch(monkeypatch: pyt
 def test_drives_that_differ_from_encoders_go_on_without_the_comparison(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(Agreement, "judge", lambda *_: None)
+    monkeypatch.setattr(EncoderAgreement, "judge", lambda *_: None)
     assert run_trial(TABLE["drive and output encoder differ"]).wrong
 
 

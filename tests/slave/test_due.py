@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from common.clock import NS_PER_MS as MS
 from common.latency.durations import MOST_STEPS, Durations
-from slave.due import Due
+from slave.due import DueCommands
 
 PERIOD_NS = 80 * MS
 ONE_WAY_NS = MS // 2
 
 
-def followed(*put_ns: int, sequences: list[int] | None = None, clock: int = 1) -> Due:
-    due = Due()
+def followed(*put_ns: int, sequences: list[int] | None = None, clock: int = 1) -> DueCommands:
+    due = DueCommands()
     numbers = sequences or list(range(1, len(put_ns) + 1))
     for sequence, at_ns in zip(numbers, put_ns, strict=True):
         due.note(clock, sequence, at_ns, ONE_WAY_NS)

@@ -18,7 +18,7 @@ from slave.attitude.vote import Vote
 from slave.guard.body import Body
 from slave.guard.tilt import base_loss
 from slave.servos.canopen.config import CanopenConfig
-from slave.servos.canopen.network import DriveNetwork
+from slave.servos.canopen.drives import Drives
 from slave.servos.canopen.pdo import SYNC
 
 FRAMES_HZ = 10.0
@@ -28,9 +28,9 @@ FALLS_DEG_S = 100.0
 
 def second_master(scene: Scene) -> None:
     """Another program sends SYNC on a bus of the drives, which NMT then stops: they brake and hold."""
-    network = DriveNetwork(CanopenConfig(), scene.skeleton)
-    network.start(scene.run.slave_ns)
-    network.on_frame("left", SYNC, b"", scene.run.slave_ns)
+    drives = Drives(CanopenConfig(), scene.skeleton)
+    drives.start(scene.run.slave_ns)
+    drives.on_frame("left", SYNC, b"", scene.run.slave_ns)
     held: list[Array] = []
 
     def write(position_rad: Array) -> Array:
@@ -38,7 +38,7 @@ def second_master(scene: Scene) -> None:
         return held[0]
 
     scene.run.troubles.write = write
-    scene.run.troubles.body = lambda: Body(drives=network.faults)
+    scene.run.troubles.body = lambda: Body(drives=drives.faults)
 
 
 def frames_spoiled(scene: Scene) -> None:

@@ -20,7 +20,7 @@ from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
 from common.process.runtime import until_stopped
 from common.process.ticker import ticks
-from deploy.sim.drives.faults import Planned
+from deploy.sim.drives.faults import PlannedDriveFault
 from deploy.sim.drives.peer import DrivePeer
 from slave.config import SlaveConfig
 from slave.servos.canopen.config import CanopenConfig
@@ -34,7 +34,9 @@ def _open(config: BusConfig) -> can.BusABC:
     return open_without_function_code(config, TPDO1)
 
 
-async def run(config: SlaveConfig, stop: asyncio.Event, faults: Sequence[Planned] = ()) -> dict[str, object]:
+async def run(
+    config: SlaveConfig, stop: asyncio.Event, faults: Sequence[PlannedDriveFault] = ()
+) -> dict[str, object]:
     """Be the drives that a slave's file names, until `stop` is set; returns what was counted.
 
     Raises BusError where a bus cannot be opened.

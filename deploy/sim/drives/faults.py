@@ -12,7 +12,7 @@ DEMAND = 0x2010
 """The manufacturer's object: a fault's number written to it happens at once."""
 
 
-class Fault(IntEnum):
+class DriveFault(IntEnum):
     """By the number in DEMAND."""
 
     NONE = 0
@@ -58,22 +58,22 @@ class Fault(IntEnum):
         return self.name.lower().replace("_", "-")
 
 
-CODES = {Fault.OVER_CURRENT: (0x2310, 0x03), Fault.OVER_TEMPERATURE: (0x4310, 0x09)}
+CODES = {DriveFault.OVER_CURRENT: (0x2310, 0x03), DriveFault.OVER_TEMPERATURE: (0x4310, 0x09)}
 """Emergency code and error register of those that are the drive's own."""
-OPTIONS = {fault.option: fault for fault in Fault}
+OPTIONS = {fault.option: fault for fault in DriveFault}
 
 
 @dataclass(frozen=True, slots=True)
-class Planned:
+class PlannedDriveFault:
     """A fault that will happen."""
 
     joint: str
-    fault: Fault
+    fault: DriveFault
     after_s: float
     """Seconds after the first SYNC."""
 
 
-def planned(text: str, skeleton: Skeleton) -> Planned:
+def planned(text: str, skeleton: Skeleton) -> PlannedDriveFault:
     """Read `JOINT=FAULT@SECONDS`, such as `left_elbow_pitch=over-current@5`. Raises ConfigError."""
     joint, _, rest = text.partition("=")
     name, _, seconds = rest.partition("@")
@@ -88,5 +88,5 @@ def planned(text: str, skeleton: Skeleton) -> Planned:
     elif not 0.0 <= after_s <= 1e6:
         expected = "seconds after the @"
     else:
-        return Planned(joint, OPTIONS[name], after_s)
+        return PlannedDriveFault(joint, OPTIONS[name], after_s)
     raise ConfigError("tandem drives", [ConfigMistake("--fault", text, expected)])

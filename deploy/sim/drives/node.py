@@ -16,7 +16,7 @@ import canopen
 from canopen.sdo.exceptions import SdoAbortedError
 
 from common.clock import NS_PER_MS
-from deploy.sim.drives.faults import CODES, DEMAND, Fault
+from deploy.sim.drives.faults import CODES, DEMAND, DriveFault
 from deploy.sim.drives.machine import after, statusword
 from deploy.sim.drives.traits import Reformed, Traits
 from slave.servos.canopen import pdo
@@ -36,14 +36,14 @@ _BOOT, _PRE_OPERATIONAL, _OPERATIONAL = 0x00, 0x7F, 0x05
 _RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
 _PROFILE_POSITION = 1
 _BITS = {
-    Fault.NOT_FOLLOWING: (FOLLOWS, 0),
-    Fault.LIMIT_ACTIVE: (0, LIMITED),
-    Fault.LOCAL: (REMOTE, 0),
-    Fault.NO_VOLTAGE: (VOLTAGE, 0),
-    Fault.WARNS: (0, WARNING),
+    DriveFault.NOT_FOLLOWING: (FOLLOWS, 0),
+    DriveFault.LIMIT_ACTIVE: (0, LIMITED),
+    DriveFault.LOCAL: (REMOTE, 0),
+    DriveFault.NO_VOLTAGE: (VOLTAGE, 0),
+    DriveFault.WARNS: (0, WARNING),
 }
 """Bits of the statusword that a fault clears and sets."""
-_DEAF = (Fault.NOT_FOLLOWING, Fault.LOCAL, Fault.NO_VOLTAGE)
+_DEAF = (DriveFault.NOT_FOLLOWING, DriveFault.LOCAL, DriveFault.NO_VOLTAGE)
 
 
 @lru_cache(maxsize=1)
@@ -90,7 +90,7 @@ class SimulatedDrive:
         self.limited = False
         """Whether a limit of its own keeps it from its target."""
         self.state = Power.SWITCH_ON_DISABLED
-        self.fault = Fault.NONE
+        self.fault = DriveFault.NONE
         self.traits = Traits()
         self.rebooted = False
         """Set where the drive has lost what it was told; whoever reads it clears it."""
@@ -202,14 +202,14 @@ class SimulatedDrive:
             self._emergency(code, register)
             self.state = Power.FAULT_REACTION
 
-    def happen(self, fault: Fault) -> None:
+    def happen(self, fault: DriveFault) -> None:
         """A fault on demand; NONE ends what lasts."""
         self._stuck = self.count
         self.fault, self.limited = fault, False
         if fault in CODES:
             self.fail(*CODES[fault])
-        elif fault is Fault.RESTART:
-            self.fault = Fault.NONE
+        elif fault is DriveFault.RESTART:
+            self.fault = DriveFault.NONE
             self._lose_connection()
             self._boot()
 
@@ -230,12 +230,12 @@ class SimulatedDrive:
     @property
     def encoder(self) -> int:
         """The encoder's word (2000h)."""
-        if self.fault is Fault.ENCODER_ZERO:
+        if self.fault is DriveFault.ENCODER_ZERO:
             return 0
-        if self.fault is Fault.ENCODER_STUCK:
+        if self.fault is DriveFault.ENCODER_STUCK:
             return self._stuck
-        flag = {Fault.MAGNET_LOST: pdo.MAGNET_LOST, Fault.PARITY: pdo.PARITY_ERROR}.get(self.fault, 0)
-        return self.count | flag
+        flags = {DriveFault.MAGNET_LOST: pdo.MAGNET_LOST, DriveFault.PARITY: pdo.PARITY_ERROR}
+        return self.count | flags.get(self.fault, 0)
 
     def value(self, index: int, subindex: int = 0) -> int:
         """An entry of its dictionary."""
@@ -247,7 +247,7 @@ class SimulatedDrive:
 
     def _command(self, controlword: int) -> None:
         was = self.state
-        if self.fault is Fault.LOCAL:
+        if self.fault is DriveFault.LOCAL:
             self._controlword = controlword
             return
         state = after(self.state, controlword, self._controlword, self.traits.knows_16)
@@ -257,7 +257,7 @@ class SimulatedDrive:
         recovered = was is Power.FAULT or (was is Power.QUICK_STOP and state is Power.ENABLED)
         if recovered and state is not was and self.value(0x603F):
             if self.fault in CODES:
-                self.fault = Fault.NONE
+                self.fault = DriveFault.NONE
             self._emergency(0, 0)
 
     def _lose_connection(self) -> None:
@@ -282,7 +282,7 @@ class SimulatedDrive:
             self._send_now(pdo.SDO_ANSWER + self.id, data)
 
     def _send_now(self, frame_id: int, data: bytes) -> None:
-        if self.fault is not Fault.SILENT:
+        if self.fault is not DriveFault.SILENT:
             self._send_frame(frame_id, data)
 
     def _read(self, index: int, subindex: int, **_: object) -> int | None:
@@ -292,7 +292,7 @@ class SimulatedDrive:
             case 0x6064:
                 return self.position
             case 0x6061:
-                return _PROFILE_POSITION if self.fault is Fault.WRONG_MODE else self.value(0x6060)
+                return _PROFILE_POSITION if self.fault is DriveFault.WRONG_MODE else self.value(0x6060)
             case 0x1018 if subindex == 4:
                 return self._serial
             case pdo.ENCODER:
@@ -313,9 +313,9 @@ class SimulatedDrive:
         elif index == 0x6040:
             self._command(int.from_bytes(data, "little"))
         elif index == DEMAND:
-            if data[0] > max(Fault):
+            if data[0] > max(DriveFault):
                 raise SdoAbortedError(0x0609_0030)
-            self.happen(Fault(data[0]))
+            self.happen(DriveFault(data[0]))
 
     def _activate(self, index: int, cob_id: int) -> None:
         known = _TAKEN if index == _RPDO_COMMUNICATION else _GIVEN

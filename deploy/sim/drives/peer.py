@@ -11,7 +11,7 @@ import numpy as np
 from common.clock import NS_PER_MS, NS_PER_S
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from deploy.sim.drives.faults import Fault, Planned
+from deploy.sim.drives.faults import DriveFault, PlannedDriveFault
 from deploy.sim.drives.node import SimulatedDrive
 from deploy.sim.drives.plant import Plant
 from slave.encoders.counts import EncoderConfig
@@ -41,7 +41,7 @@ class DriveCounters:
 
 
 class DrivePeer:
-    """The other end of `DriveNetwork`: one drive a joint, and the robot that they turn."""
+    """The other end of `Drives`: one drive a joint, and the robot that they turn."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class DrivePeer:
         encoders: EncoderConfig,
         send: SendOn,
         origin_ns: int,
-        faults: Sequence[Planned] = (),
+        faults: Sequence[PlannedDriveFault] = (),
         *,
         position_rad: Array | None = None,
     ) -> None:
@@ -132,14 +132,14 @@ class DrivePeer:
                 drive.at_rest()
         self._follow_states()
 
-    def happen(self, joint: str, fault: Fault) -> None:
+    def happen(self, joint: str, fault: DriveFault) -> None:
         """Make a drive fail, or well again."""
         log.info("%s: %s", joint, fault.option)
         self.counters.faults += 1
         self._drive(self._names.index(joint), fault)
         self._follow_states()
 
-    def _drive(self, i: int, fault: Fault) -> None:
+    def _drive(self, i: int, fault: DriveFault) -> None:
         """A fault of the mechanics, which the drive itself does not know of; or of the drive."""
         drive, scale = self.drives[i], self._scale[i]
         true = self._zero[i] + scale * self.plant.position_rad[i]
@@ -147,17 +147,17 @@ class DrivePeer:
         self._twins.pop(i, None)
         self._stuck.pop(i, None)
         match fault:
-            case Fault.LOST_TURNS:
+            case DriveFault.LOST_TURNS:
                 self._shift[i] = -true
-            case Fault.WRONG_ZERO:
+            case DriveFault.WRONG_ZERO:
                 self._shift[i] = _WRONG_ZERO_RAD * scale
-            case Fault.WRONG_GEAR:
+            case DriveFault.WRONG_GEAR:
                 self._gear[i] = 2.0
-            case Fault.REVERSED:
+            case DriveFault.REVERSED:
                 self._gear[i] = -1.0
-            case Fault.POSITION_STUCK:
+            case DriveFault.POSITION_STUCK:
                 self._stuck[i] = drive.position
-            case Fault.DOUBLE_ID:
+            case DriveFault.DOUBLE_ID:
                 twin = SimulatedDrive(drive.id, self._senders[i], serial=1000 + i)
                 twin.position = round(true + _TWIN_RAD * scale)
                 self._twins[i] = twin
@@ -182,7 +182,7 @@ class DrivePeer:
                 self._follow(i, drive, now_ns)
 
     def _follow(self, i: int, drive: SimulatedDrive, now_ns: int) -> None:
-        if drive.fault is Fault.RUNS_AWAY:
+        if drive.fault is DriveFault.RUNS_AWAY:
             step = _RUNS_AWAY_RAD_S * self._period_ns / NS_PER_S
             self.plant.follow(i, float(self.plant.position_rad[i]) + 2.0 * step, 2 * self._period_ns, now_ns)
             return

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pydantic import Field
 
 from common.can.config import BusConfig, names_used_twice
+from common.clock import NS_PER_S
 from common.config.section import Section
 from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
@@ -57,7 +58,7 @@ def _two_groups() -> list[BusConfig]:
 
 
 class CanopenConfig(BackendConfig):
-    """The drives as one network, which one SYNC moves."""
+    """`[servos.canopen]`: all drives of the robot, moved by one SYNC."""
 
     buses: list[BusConfig] = Field(default_factory=_two_groups, min_length=1)
     """`[[servos.canopen.buses]]`; without any: two multicast groups of this host, for `tandem drives`."""
@@ -85,6 +86,11 @@ class CanopenConfig(BackendConfig):
     """A drive that has just been enabled goes from where it stands to its setpoint at most so fast."""
     start_timeout_s: float = Field(10.0, gt=0.0, le=120.0)
     """All drives configured and enabled within, or the slave does not start."""
+
+    @property
+    def period_ns(self) -> int:
+        """Between two SYNCs."""
+        return NS_PER_S // self.sync_hz
 
     @property
     def bus_lag_s(self) -> float:

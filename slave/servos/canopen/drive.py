@@ -46,7 +46,7 @@ class Phase(Enum):
 
 
 @dataclass(slots=True)
-class Drive:
+class DriveState:
     """One drive. Its frames come in by `on_sdo`, what it shall do goes out by `controlword`."""
 
     setup: list[Transfer]

@@ -89,7 +89,7 @@ Transfer = Write | Read
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class SdoAnswer:
     """What a drive answered: done, or why not."""
 
     done: bool
@@ -114,10 +114,10 @@ def request(transfer: Transfer) -> bytes:
     return _HEAD.pack(command, transfer.index, transfer.subindex) + value
 
 
-def answer(transfer: Transfer, data: bytes) -> Answer | None:
+def answer(transfer: Transfer, data: bytes) -> SdoAnswer | None:
     """What `data` says to this transfer; None where it answers something else, or goes on in segments."""
     said = Exchange(transfer).on_answer(data)
-    return said if isinstance(said, Answer) else None
+    return said if isinstance(said, SdoAnswer) else None
 
 
 class Exchange:
@@ -137,7 +137,7 @@ class Exchange:
         self._segments = None
         return request(self._transfer)
 
-    def on_answer(self, data: bytes) -> Answer | More | None:
+    def on_answer(self, data: bytes) -> SdoAnswer | More | None:
         """What these bytes say; None where they answer something else, or are no answer."""
         if len(data) != 8:
             return None
@@ -149,16 +149,16 @@ class Exchange:
             return None
         value = int.from_bytes(data[4:], "little")
         if command == _ABORT:
-            return Answer(False, f"{self._name}: {ABORTS.get(value, f'aborted with {value:#010x}')}")
+            return SdoAnswer(False, f"{self._name}: {ABORTS.get(value, f'aborted with {value:#010x}')}")
         if isinstance(transfer, Write):
             if command == _DOWNLOADED:
-                return Answer(True)
+                return SdoAnswer(True)
         elif command & _UPLOAD_BITS == _UPLOADED:
             return self._on_upload(command, data[4:])
         self.strange = f"{self._name} is answered with command {command:02X}h, which is no answer to it"
         return None
 
-    def _on_upload(self, command: int, told: bytes) -> Answer | More:
+    def _on_upload(self, command: int, told: bytes) -> SdoAnswer | More:
         if command & _EXPEDITED:
             # without its size an expedited answer has four bytes, the value's own among them
             size = 4 - (command >> 2 & 3) if command & _SIZED else 4
@@ -167,30 +167,30 @@ class Exchange:
         self._length = int.from_bytes(told, "little") if command & _SIZED else None
         return More(bytes([_ASK_SEGMENT]) + bytes(7))
 
-    def _on_segment(self, data: bytes) -> Answer | More:
+    def _on_segment(self, data: bytes) -> SdoAnswer | More:
         assert self._segments is not None
         if data[0] & _TOGGLE != self._toggle:
             self._segments = None
-            return Answer(False, f"{self._name}: {ABORTS[TOGGLE_ERROR]}")
+            return SdoAnswer(False, f"{self._name}: {ABORTS[TOGGLE_ERROR]}")
         self._segments += data[1 : 8 - (data[0] >> 1 & 7)]
         if len(self._segments) > _MOST_BYTES:
             self._segments = None
-            return Answer(False, f"{self._name}: longer than {_MOST_BYTES} bytes")
+            return SdoAnswer(False, f"{self._name}: longer than {_MOST_BYTES} bytes")
         if not data[0] & _LAST:
             self._toggle ^= _TOGGLE
             return More(bytes([_ASK_SEGMENT | self._toggle]) + bytes(7))
         held, self._segments = bytes(self._segments), None
         if self._length is not None and len(held) != self._length:
-            return Answer(False, f"{self._name}: {len(held)} bytes came, {self._length} were told")
+            return SdoAnswer(False, f"{self._name}: {len(held)} bytes came, {self._length} were told")
         return self._judge(held)
 
-    def _judge(self, held: bytes) -> Answer:
+    def _judge(self, held: bytes) -> SdoAnswer:
         transfer = self._transfer
         assert isinstance(transfer, Read)
         value = int.from_bytes(held, "little")
         if value & transfer.mask == transfer.expected:
-            return Answer(True, data=bytes(held))
-        return Answer(False, f"{self._name} is {value:#x}: {transfer.meaning} expected", bytes(held))
+            return SdoAnswer(True, data=bytes(held))
+        return SdoAnswer(False, f"{self._name} is {value:#x}: {transfer.meaning} expected", bytes(held))
 
     @property
     def _name(self) -> str:

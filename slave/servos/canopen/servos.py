@@ -1,4 +1,4 @@
-"""CiA 402 drives on CAN as the slave's servos: the pure network, real buses and the clock.
+"""CiA 402 drives on CAN as the slave's servos: the pure `Drives`, real buses and the clock.
 
 It has no thread and no timer of its own: the slave's ticks drive SYNC and heartbeat. A slave that hangs
 therefore falls silent, and the drives stop by themselves.
@@ -27,9 +27,10 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.drives import Drives
 from slave.servos.canopen.load import WELL, too_much
-from slave.servos.canopen.network import DriveNetwork, Outgoing, period_ns
 from slave.servos.canopen.pdo import RPDO1
+from slave.servos.canopen.wiring import Outgoing
 from slave.servos.servos import EncoderReading
 
 log = logging.getLogger(__name__)
@@ -73,9 +74,9 @@ class CanopenServos:
         self._config = config
         self._skeleton = skeleton
         self._clock = clock
-        self._period_ns = period_ns(config)
+        self._period_ns = config.period_ns
         self._opener = opener
-        self._network = DriveNetwork(config, skeleton, encoders, last_known_rad=last_known_rad or {})
+        self._drives = Drives(config, skeleton, encoders, last_known_rad=last_known_rad or {})
         self._buses: dict[str, CanBus] = {}
         self._setpoint: Array | None = None
         self._due_ns = 0
@@ -84,7 +85,7 @@ class CanopenServos:
         self._answered = Durations()
         self._period = Durations()
         self._synced_ns = 0
-        self._warned = self._network.warnings
+        self._warned = self._drives.warnings
         self._fd = {bus.name: bus.fd for bus in config.buses}
 
     def start(self) -> None:
@@ -124,25 +125,25 @@ class CanopenServos:
             bus.read()
         if self._clock() >= self._due_ns + self._period_ns // 2:
             self._cycle()
-        return self._network.reading
+        return self._drives.reading
 
     def faults(self) -> Mapping[str, str]:
         """What drives, encoders and buses say is wrong, by joint."""
-        return self._network.faults
+        return self._drives.faults
 
     def quick_stop(self, stop: bool) -> None:
         """Brake and stay, at once; or enable all drives again, those with a fault too (`fault_reset`)."""
         if stop:
-            self._network.stop()
+            self._drives.stop()
         else:
-            self._network.release(self._clock())
+            self._drives.release(self._clock())
         self._flush()
         self._cycle()
 
     def stop(self) -> None:
         """Tell the drives to stop and stay, and close the buses."""
         if self._buses and self._spoken:
-            self._network.stop()
+            self._drives.stop()
             self._cycle()
         self._spoken = False
         for bus in self._buses.values():
@@ -153,10 +154,10 @@ class CanopenServos:
         """Counters and times: SYNC to the last drive's answer, and from SYNC to SYNC."""
         return ServoMetrics(
             counters={
-                "unanswered_syncs": self._network.unanswered,
-                "unknown_frames": self._network.unknown,
-                "second_master_frames": self._network.second_master.frames,
-                "warnings": len(self._network.warnings),
+                "unanswered_syncs": self._drives.unanswered,
+                "unknown_frames": self._drives.unknown,
+                "second_master_frames": self._drives.second_master.frames,
+                "warnings": len(self._drives.warnings),
             },
             times_ms={
                 "sync_to_positions": self._answered.summary(),
@@ -183,27 +184,27 @@ class CanopenServos:
             for bus in self._buses.values():
                 bus.read()
             time.sleep(_POLL_S)
-        if other := self._network.second_master.words:
+        if other := self._drives.second_master.words:
             raise RobotError(f"{other}; nothing has been sent to the drives")
 
     def _come_up(self) -> None:
         now_ns = self._clock()
         deadline_ns = now_ns + to_ns(self._config.start_timeout_s)
         self._due_ns = now_ns
-        self._network.start(now_ns)
+        self._drives.start(now_ns)
         self._flush()
-        while not self._network.running:
+        while not self._drives.running:
             now_ns = self._clock()
             for bus in self._buses.values():
                 bus.read()
             if now_ns >= self._due_ns:
                 self._cycle()
-            if self._network.failed or now_ns > deadline_ns:
+            if self._drives.failed or now_ns > deadline_ns:
                 raise RobotError(self._not_up())
             time.sleep(_POLL_S)
 
     def _not_up(self) -> str:
-        said = self._network.not_running
+        said = self._drives.not_running
         told = [f"{joint}: {words}" for joint, words in said.items()]
         listed = "; ".join(told[:_TOLD]) + (f"; and {len(told) - _TOLD} more" if len(told) > _TOLD else "")
         states = [
@@ -219,15 +220,15 @@ class CanopenServos:
 
     def _cycle(self) -> None:
         now_ns = self._clock()
-        network = self._network
-        for outgoing in network.cycle(now_ns, self._setpoint):
+        drives = self._drives
+        for outgoing in drives.cycle(now_ns, self._setpoint):
             self._send(outgoing)
         self._flush()
         synced_ns = self._clock()
-        for outgoing in network.sync(synced_ns):
+        for outgoing in drives.sync(synced_ns):
             self._send(outgoing)
-        if network.warnings is not self._warned:
-            self._warned = network.warnings
+        if drives.warnings is not self._warned:
+            self._warned = drives.warnings
             for joint, words in self._warned.items():
                 log.warning("%s: %s", joint, words)
         if self._synced_ns:
@@ -239,7 +240,7 @@ class CanopenServos:
             self._due_ns = now_ns + self._period_ns
 
     def _flush(self) -> None:
-        outbox, self._network.outbox = self._network.outbox, []
+        outbox, self._drives.outbox = self._drives.outbox, []
         for outgoing in outbox:
             self._send(outgoing)
 
@@ -250,15 +251,15 @@ class CanopenServos:
             bus.send(CanFrame(frame_id, data, False))
 
     def _on_frame(self, name: str, frame_id: int, data: bytes, now_ns: int) -> None:
-        network = self._network
-        waiting = network.answered_after_ns is None
-        network.on_frame(name, frame_id, data, now_ns)
-        if network.outbox:
+        drives = self._drives
+        waiting = drives.answered_after_ns is None
+        drives.on_frame(name, frame_id, data, now_ns)
+        if drives.outbox:
             self._flush()
-        if waiting and network.answered_after_ns is not None and self._synced_ns:
-            self._answered.record(network.answered_after_ns)
+        if waiting and drives.answered_after_ns is not None and self._synced_ns:
+            self._answered.record(drives.answered_after_ns)
 
     def _on_change(self, name: str, up: bool) -> None:
         bus = self._buses.get(name)
         if bus is not None:
-            self._network.on_bus(name, "" if up else bus.last_error)
+            self._drives.on_bus(name, "" if up else bus.last_error)

@@ -22,7 +22,7 @@ LAST_KNOWN_RAD = math.radians(5.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class JointPlace:
     """Where one joint stands, by everybody who can say; rad."""
 
     drive_rad: float
@@ -37,7 +37,7 @@ class Place:
     zero_increments: int
 
 
-def refusal(place: Place, statusword: int) -> str:
+def refusal(place: JointPlace, statusword: int) -> str:
     """Why a drive may not be enabled, in words; empty where it may."""
     return _bits(statusword) or _reference(place) or _range(place)
 
@@ -47,7 +47,7 @@ def _bits(statusword: int) -> str:
     return f"is not ready: {said}" if said else ""
 
 
-def _range(place: Place) -> str:
+def _range(place: JointPlace) -> str:
     lower, upper = place.limits_rad
     beyond = max(lower - place.drive_rad, place.drive_rad - upper)
     if beyond <= SLACK_RAD:
@@ -58,7 +58,7 @@ def _range(place: Place) -> str:
     )
 
 
-def _reference(place: Place) -> str:
+def _reference(place: JointPlace) -> str:
     if place.encoder_rad is not None:
         return _by_encoder(place, place.encoder_rad)
     if place.last_known_rad is None:
@@ -74,7 +74,7 @@ def _reference(place: Place) -> str:
     )
 
 
-def _by_encoder(place: Place, encoder_rad: float) -> str:
+def _by_encoder(place: JointPlace, encoder_rad: float) -> str:
     off = place.drive_rad - encoder_rad
     if abs(off) <= WINDOW_RAD:
         return ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +11,17 @@ from numpy.typing import NDArray
 from common.clock import NS_PER_MS
 from common.quaternion import Array
 from common.wire.messages import Mask
-from slave.encoders.agreement import Agreement
+from slave.encoders.agreement import EncoderAgreement
 from slave.encoders.counts import Encoders
-from slave.encoders.unbidden import STILL_RAD, Patience, UnbiddenMotion
-from slave.servos.canopen.start_check import CHECKED_SYNCS, Place, refusal
+from slave.encoders.unbidden import STILL_RAD, MotionPatience, UnbiddenMotion
+from slave.servos.canopen.answers import DriveAnswers
+from slave.servos.canopen.start_check import CHECKED_SYNCS, JointPlace, refusal
 from slave.servos.canopen.status_bits import BAD_SYNCS, GOOD, WARNING, WATCHED, amiss
+from slave.servos.canopen.units import DriveUnits
 
 _SPAN_NS = 120 * NS_PER_MS
 """How late a drive may follow."""
-_PATIENCE = Patience(plain_ns=0, shaken_ns=80 * NS_PER_MS)
+_PATIENCE = MotionPatience(plain_ns=0, shaken_ns=80 * NS_PER_MS)
 """SYNCs are 20 ms apart, and answers are judged before the next one: there is no time to wait for another."""
 _REFUSED_SYNCS = 10
 """A drive that may not be enabled for so many SYNCs has failed."""
@@ -30,39 +31,13 @@ _TWICE = 2
 """A drive that has answered so much oftener than it was asked is two."""
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """The answers to one SYNC, (J,) each."""
-
-    synced_ns: int
-    fresh: Mask
-    """Who has answered."""
-    statusword: NDArray[np.uint16]
-    encoder_valid: Mask
-    encoder_counts: NDArray[np.int64]
-    position: NDArray[np.int32]
-    """Increments."""
-
-
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """How each drive's increments are its joint's angle: angle = (position - zero) / scale."""
-
-    scale: Array
-    """(J,) increments a radian, signed."""
-    zero: Array
-    """(J,) increments at angle 0."""
-    limits_rad: tuple[tuple[float, float], ...]
-    """Software limits by drive."""
-
-
 class DriveWatch:
     """All drives of one robot."""
 
     def __init__(
         self,
         joint_names: Sequence[str],
-        frame: Frame,
+        units: DriveUnits,
         encoders: Encoders,
         *,
         period_ns: int,
@@ -72,7 +47,7 @@ class DriveWatch:
         """Answers to the SYNCs of the last `pending_ns` may still be on their way."""
         joints = len(joint_names)
         self._names = tuple(joint_names)
-        self._frame = frame
+        self._units = units
         self._encoders = encoders
         self._last_known = [last_known_rad.get(name) for name in joint_names]
         self._unanswered = [0] * joints
@@ -83,7 +58,7 @@ class DriveWatch:
         self._anchor_rad: Array = np.full(joints, np.nan)
         self._bad_bits: NDArray[np.int64] = np.zeros(joints, np.int64)
         self._motion = UnbiddenMotion(joint_names, patience=_PATIENCE)
-        self._agreement = Agreement(joint_names)
+        self._agreement = EncoderAgreement(joint_names)
         self._targets_rad: Array = np.zeros((max(2, _SPAN_NS // period_ns), joints))
         self._row = 0
         self._on: Mask = np.zeros(joints, np.bool_)
@@ -115,12 +90,12 @@ class DriveWatch:
         self._bad_bits[drive] = 0
         self._on[drive] = False
 
-    def take(self, seen: Seen) -> None:
+    def take(self, seen: DriveAnswers) -> None:
         """The newest answers: angles."""
-        self.drive_rad = (seen.position - self._frame.zero) / self._frame.scale
+        self.drive_rad = self._units.angle_rad(seen.position)
         self.encoder_rad = self._encoders.position_rad(seen.encoder_counts)
 
-    def check(self, drive: int, seen: Seen) -> tuple[bool, str]:
+    def check(self, drive: int, seen: DriveAnswers) -> tuple[bool, str]:
         """Of one that waits to be enabled and has answered: whether it may be, or why it never will be."""
         here = float(self.drive_rad[drive])
         if not abs(here - self._anchor_rad[drive]) <= STILL_RAD:
@@ -136,7 +111,7 @@ class DriveWatch:
             return False, "moves although it has not been enabled"
         return self._passed[drive] >= CHECKED_SYNCS, ""
 
-    def judge(self, seen: Seen, on: Mask, running: Mask) -> dict[int, str]:
+    def judge(self, seen: DriveAnswers, on: Mask, running: Mask) -> dict[int, str]:
         """Which of the drives (J,) that are switched on must be stopped now, and why.
 
         `on`: on the way to running, or running.
@@ -161,7 +136,7 @@ class DriveWatch:
         self._targets_rad[self._row] = np.where(running, target_rad, self._anchor_rad)
         self._row = (self._row + 1) % len(self._targets_rad)
 
-    def warnings(self, seen: Seen) -> dict[str, str]:
+    def warnings(self, seen: DriveAnswers) -> dict[str, str]:
         """Drives whose statusword warns (bit 7), by joint: no reason to stop yet."""
         warned = np.flatnonzero((seen.statusword & WARNING) != 0).tolist()
         return {self._names[j]: "its drive warns: something is about to fail (bit 7)" for j in warned}
@@ -172,13 +147,13 @@ class DriveWatch:
         said += [words[name] for words in (self._agreement.words, self._motion.words) if name in words]
         return "; ".join(said)
 
-    def _place(self, drive: int, seen: Seen) -> Place:
-        frame = self._frame
-        return Place(
+    def _place(self, drive: int, seen: DriveAnswers) -> JointPlace:
+        units = self._units
+        return JointPlace(
             drive_rad=float(self.drive_rad[drive]),
             encoder_rad=float(self.encoder_rad[drive]) if seen.encoder_valid[drive] else None,
             last_known_rad=self._last_known[drive],
-            limits_rad=frame.limits_rad[drive],
-            increments_per_rad=float(frame.scale[drive]),
-            zero_increments=int(frame.zero[drive]),
+            limits_rad=units.limits_rad[drive],
+            increments_per_rad=float(units.scale[drive]),
+            zero_increments=int(units.zero[drive]),
         )

@@ -39,7 +39,7 @@ class ServoError(RobotError):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ServoAnswer:
     """Of one servo to a read that all were asked."""
 
     value: int
@@ -124,13 +124,13 @@ class Bus:
             flat += [servo, *register.encode(value)]
         self._packets.syncWriteTxOnly(self._port, register.address, register.size, flat, len(flat))
 
-    def read_all(self, register: Register, servos: Sequence[int]) -> dict[int, Answer]:
+    def read_all(self, register: Register, servos: Sequence[int]) -> dict[int, ServoAnswer]:
         """One register of many servos at once: of all that answer in time.
 
         The library's own group read gives up at the first servo that is silent, and eats the answers
         of those behind it; so the answers are told apart here.
         """
-        out: dict[int, Answer] = {}
+        out: dict[int, ServoAnswer] = {}
         if not servos:
             return out
         port, asked = self._port, set(servos)
@@ -148,7 +148,7 @@ class Bus:
                 length = packet[_LENGTH] | packet[_LENGTH + 1] << 8
                 # an answer to something else, that came too late for it, has another length
                 if servo in asked and length == _STATUS_LENGTH + register.size:
-                    out[servo] = Answer(register.decode(data), bool(packet[_PARAMETERS - 1] & _ALERT))
+                    out[servo] = ServoAnswer(register.decode(data), bool(packet[_PARAMETERS - 1] & _ALERT))
                 continue
             self.broken += bool(packet)
             if port.isPacketTimeout():

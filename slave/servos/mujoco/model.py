@@ -40,7 +40,7 @@ _HEADROOM = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class ServoGains:
     """A joint's servo: torque = stiffness (setpoint - angle) - damping · rate, within the limit."""
 
     armature_kg_m2: float
@@ -54,7 +54,7 @@ def build_model(skeleton: Skeleton, step_s: float = STEP_S) -> mujoco.MjModel:
 
     Ranges of hinges are the mechanical stops, ranges of actuators the table's limits.
     """
-    bare = _compile(skeleton, [Drive(0.0, 0.0, 0.0, 1.0)] * len(skeleton.joints), step_s)
+    bare = _compile(skeleton, [ServoGains(0.0, 0.0, 0.0, 1.0)] * len(skeleton.joints), step_s)
     return _compile(skeleton, _drives(skeleton, bare), step_s)
 
 
@@ -63,7 +63,7 @@ def leader(joint: Joint) -> tuple[str, float]:
     return next(iter(joint.drives.items()))
 
 
-def _compile(skeleton: Skeleton, drives: Sequence[Drive], step_s: float) -> mujoco.MjModel:
+def _compile(skeleton: Skeleton, drives: Sequence[ServoGains], step_s: float) -> mujoco.MjModel:
     root = ET.Element("mujoco", model=skeleton.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     option = ET.SubElement(root, "option", timestep=f"{step_s!r}", integrator="implicitfast")
@@ -89,7 +89,7 @@ def _surroundings(world: ET.Element, skeleton: Skeleton) -> None:
         ET.SubElement(world, "geom", type="cylinder", fromto=fromto, size=f"{post.radius_m!r}")
 
 
-def _hinges(skeleton: Skeleton, drives: Sequence[Drive]) -> dict[str, dict[str, str]]:
+def _hinges(skeleton: Skeleton, drives: Sequence[ServoGains]) -> dict[str, dict[str, str]]:
     """MJCF attributes of every driven angle's hinge."""
     hinges = {}
     for joint, drive in zip(skeleton.joints, drives, strict=True):
@@ -165,7 +165,7 @@ def _couplings(equality: ET.Element, joint: Joint) -> None:
             )
 
 
-def _servo(actuator: ET.Element, joint: Joint, drive: Drive) -> None:
+def _servo(actuator: ET.Element, joint: Joint, drive: ServoGains) -> None:
     angle, ratio = leader(joint)
     ET.SubElement(
         actuator,
@@ -180,7 +180,7 @@ def _servo(actuator: ET.Element, joint: Joint, drive: Drive) -> None:
     )
 
 
-def _drives(skeleton: Skeleton, model: mujoco.MjModel) -> list[Drive]:
+def _drives(skeleton: Skeleton, model: mujoco.MjModel) -> list[ServoGains]:
     """Servos tuned to the heaviest load of each joint: on a lighter one they are damped the more.
 
     Their lag behind a ramp is damping / stiffness = 2 ζ / ω, whatever the load.
@@ -191,7 +191,7 @@ def _drives(skeleton: Skeleton, model: mujoco.MjModel) -> list[Drive]:
     omega = 2.0 * math.pi * BANDWIDTH_HZ
     torque = _HEADROOM * (gravity + total * skeleton.max_acceleration_rad_s2)
     return [
-        Drive(float(a), float(i * omega**2), float(2.0 * DAMPING_RATIO * omega * i), float(t))
+        ServoGains(float(a), float(i * omega**2), float(2.0 * DAMPING_RATIO * omega * i), float(t))
         for a, i, t in zip(armature, total, torque, strict=True)
     ]
 

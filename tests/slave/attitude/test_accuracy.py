@@ -21,9 +21,9 @@ from slave.attitude.angles import (
 )
 from slave.attitude.attitude import NEAR_VERTICAL_RAD, attitude
 from slave.attitude.instrument import Instrument, affine
-from slave.attitude.simulated import FIELD_UT, GRAVITY_M_S2, Chips, as_soldered, readings
+from slave.attitude.simulated import FIELD_UT, GRAVITY_M_S2, ChipErrors, Chips, readings
 from slave.attitude.smooth import Smoother
-from slave.attitude.turntable import fit_affine
+from tests.slave.attitude.turntable import fit_affine
 
 RATE_HZ = 50
 TIME_CONSTANT_S = 3.0
@@ -53,6 +53,19 @@ def settled(q: Array, chips: Chips, acc_map: Array, mag_map: Array, seed: int) -
         up = up + now * (affine(acc_map, acc) - up)
         field = field + now * (affine(mag_map, mag) - field)
     return up, field
+
+
+def as_soldered(rng: np.random.Generator) -> Chips:
+    """Two chips out of the box: ±5 % of scale, 1° askew, up to 0.1 g of offset; iron near by, up to 10 µT."""
+
+    def matrix() -> Array:
+        out: Array = np.eye(3) + np.diag(rng.uniform(-0.05, 0.05, 3)) + rng.uniform(-0.02, 0.02, (3, 3))
+        return out
+
+    return Chips(
+        ChipErrors(matrix(), rng.uniform(-0.1, 0.1, 3) * GRAVITY_M_S2),
+        ChipErrors(matrix(), rng.uniform(-10.0, 10.0, 3)),
+    )
 
 
 @dataclass(frozen=True)

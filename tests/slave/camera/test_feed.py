@@ -19,7 +19,7 @@ from common.wire.video import VideoFrame, decode_frame
 from slave.camera import feed as feed_module
 from slave.camera.config import CameraConfig
 from slave.camera.feed import CameraFeed
-from slave.camera.pipe import Answer, Reply, Request
+from slave.camera.pipe import PictureReply, PictureRequest, ReplyKind
 from slave.camera.process import CameraProcess, NeverError
 
 CONFIG = CameraConfig(source="robot", most_rate_hz=60.0)
@@ -30,11 +30,11 @@ from slave.camera.pipe import *
 out = sys.stdout.buffer
 def say(reply):
     out.write(pack_reply(reply)); out.flush()
-say(Reply(Answer.READY))
+say(PictureReply(ReplyKind.READY))
 while head := sys.stdin.buffer.read(REQUEST.size):
     read_ns, most, length = request_of(head)
     sys.stdin.buffer.read(length)
-    say(Reply(Answer.PICTURE, read_ns, 320, 240, b"\\xff\\xd8 picture \\xff\\xd9"))
+    say(PictureReply(ReplyKind.PICTURE, read_ns, 320, 240, b"\\xff\\xd8 picture \\xff\\xd9"))
 """
 
 
@@ -105,7 +105,7 @@ def test_a_camera_killed_is_told_and_started_anew(monkeypatch: pytest.MonkeyPatc
 
 def test_a_machine_that_cannot_says_so_once_and_is_not_asked_again() -> None:
     code = "import sys\nfrom slave.camera.pipe import *\n" \
-        "sys.stdout.buffer.write(pack_reply(Reply(Answer.NEVER, body=b'no OpenGL')))"  # fmt: skip
+        "sys.stdout.buffer.write(pack_reply(PictureReply(ReplyKind.NEVER, body=b'no OpenGL')))"  # fmt: skip
     opened = 0
 
     def open_camera() -> CameraProcess:
@@ -139,12 +139,15 @@ def test_a_process_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPa
     camera = process(SERVE.split("while")[0] + "sys.stdin.buffer.read()")
     camera.wait_ready()
     with pytest.raises(RobotError, match="does not answer"):
-        camera.ask(Request(0, 1000, np.zeros(JOINTS)))
+        camera.ask(PictureRequest(0, 1000, np.zeros(JOINTS)))
     camera.close()
 
 
 def test_the_feed_ends_at_once_whatever_its_camera_does() -> None:
-    with running(lambda: process(SERVE.split("say(Reply")[0] + "sys.stdin.buffer.read()")) as (feed, _):
+    with running(lambda: process(SERVE.split("say(PictureReply")[0] + "sys.stdin.buffer.read()")) as (
+        feed,
+        _,
+    ):
         until(lambda: feed._camera is not None)
     assert not feed._thread.is_alive()
 
@@ -164,8 +167,8 @@ def test_the_robot_sees_its_room_and_keeps_within_the_bytes() -> None:
     try:
         sizes = {}
         for most_bytes in (1500, 1500, 1500, 40_000):
-            reply = camera.ask(Request(99, most_bytes, np.zeros(JOINTS)))
-            assert reply.answer is Answer.PICTURE
+            reply = camera.ask(PictureRequest(99, most_bytes, np.zeros(JOINTS)))
+            assert reply.answer is ReplyKind.PICTURE
             assert reply.captured_ns == 99
             assert len(reply.body) <= most_bytes
             sizes[most_bytes] = (reply.width, reply.height)
@@ -198,4 +201,4 @@ def test_a_camera_s_process_ends_when_the_slave_does() -> None:
     camera._process.stdin.close()
     assert camera._process.wait(10) == 0
     camera.close()
-    assert Reply(Answer.TROUBLE, body=b"x").words == "x"
+    assert PictureReply(ReplyKind.TROUBLE, body=b"x").words == "x"

@@ -34,7 +34,7 @@ from deploy.harness.endpoints import free_port
 from master.picture import VideoWatch
 from slave.camera.config import CameraConfig
 from slave.camera.feed import CameraFeed
-from slave.camera.pipe import Answer, Reply, Request
+from slave.camera.pipe import PictureReply, PictureRequest, ReplyKind
 from slave.camera.rate import RateControl
 from tests.slave.camera.slow_link import SlowLink, SlowLinkOptions
 
@@ -61,10 +61,10 @@ class FullCamera:
     def wait_ready(self) -> None:
         """At once."""
 
-    def ask(self, request: Request) -> Reply:
+    def ask(self, request: PictureRequest) -> PictureReply:
         """A JPEG's two ends with nothing between them."""
         body = b"\xff\xd8" + bytes(request.most_bytes - 60) + b"\xff\xd9"
-        return Reply(Answer.PICTURE, monotonic_ns(), 320, 240, body)
+        return PictureReply(ReplyKind.PICTURE, monotonic_ns(), 320, 240, body)
 
     def kill(self) -> None:
         """Nothing to end."""

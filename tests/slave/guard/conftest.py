@@ -20,7 +20,7 @@ from slave.guard import Admission, Guard, GuardConfig, State
 from slave.guard.body import WELL
 from slave.limit.limit import Setpoint
 from slave.pipeline import SlavePipeline
-from slave.track import Target
+from slave.track import TrackTarget
 
 ROBOT = "robot-1"
 KEY = "a key kept at the robot"
@@ -39,8 +39,8 @@ class NewestTracker:
     def __init__(self) -> None:
         self.resets = 0
         self.accepted: list[tuple[int, int, Array, Array]] = []
-        self.newest: Target | None = None
-        self.override: Target | None = None
+        self.newest: TrackTarget | None = None
+        self.override: TrackTarget | None = None
 
     def reset(self) -> None:
         self.resets += 1
@@ -48,9 +48,9 @@ class NewestTracker:
 
     def accept(self, sampled_ns: int, now_ns: int, position_rad: Array, velocity_rad_s: Array) -> None:
         self.accepted.append((sampled_ns, now_ns, position_rad, velocity_rad_s))
-        self.newest = Target(position_rad, velocity_rad_s)
+        self.newest = TrackTarget(position_rad, velocity_rad_s)
 
-    def target(self, now_ns: int) -> Target | None:
+    def target(self, now_ns: int) -> TrackTarget | None:
         return self.override if self.newest is not None and self.override is not None else self.newest
 
 

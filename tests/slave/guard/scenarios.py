@@ -278,7 +278,7 @@ def late_step(make_rig: MakeRig) -> None:
     assert (moved <= rig.skeleton.max_velocity_rad_s * rig.config.max_step_s + 1e-9).all()
 
 
-@about("Target.finite")
+@about("TrackTarget.finite")
 def broken_tracker(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
     rig.tracker.newest = type(rig.tracker.newest)(np.full(rig.joints, np.nan), np.zeros(rig.joints))
@@ -366,7 +366,7 @@ def mended(make_rig: MakeRig) -> None:
 # joints that are not where they are said to be, or do not stay there
 
 
-@about("Agreement.judge")
+@about("EncoderAgreement.judge")
 def drive_and_encoder_differ(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.drive_off_rad = np.zeros(rig.joints)

@@ -9,7 +9,7 @@ import pytest
 from common.wire.messages import Action
 from slave.guard import GuardConfig, State
 from slave.guard.events import Change, Clamp, Rule
-from slave.track import Target
+from slave.track import TrackTarget
 
 MakeRig = Callable[..., Any]
 
@@ -128,7 +128,7 @@ def test_a_tracker_that_fails_holds(rig: Any, bad: float, field: str) -> None:
     rig.to_track()
     values = {"position_rad": rig.target.copy(), "velocity_rad_s": np.zeros(rig.joints)}
     values[field][9] = bad
-    rig.tracker.override = Target(**values)
+    rig.tracker.override = TrackTarget(**values)
     setpoint = rig.step()
     assert rig.guard.state is State.HOLD
     assert np.isfinite(setpoint.position_rad).all()

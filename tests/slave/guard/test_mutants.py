@@ -126,14 +126,14 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (plausible.EncoderPlausibility, "unsettled", nothing),
     (plausible.EncoderPlausibility, "trust", nothing),
     (plausible.Past, "span", lambda self, _: (self._low.min(0) - 9.0, self._high.max(0) + 9.0)),
-    (agreement.Agreement, "judge", nothing),
+    (agreement.EncoderAgreement, "judge", nothing),
     (placed.Placement, "unplaced", nothing),
     (unbidden.UnbiddenMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_)),
     (unbidden.UnbiddenMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_)),
     (joints.JointReadings, "strayed", nothing),
     (guard.Guard, "_elapsed_s", unbounded_s),
     (guard.Guard, "_believed", lambda self: np.ones_like(self._commands.valid)),
-    (tracker.Target, "finite", True),
+    (tracker.TrackTarget, "finite", True),
 )
 """What stands in no list: owner, its attribute, and what it does once it is taken away."""
 

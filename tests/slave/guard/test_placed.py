@@ -11,7 +11,7 @@ import pytest
 
 from common.clock import NS_PER_MS
 from common.wire.messages import Action
-from slave.encoders.agreement import WINDOW_RAD, Agreement
+from slave.encoders.agreement import WINDOW_RAD, EncoderAgreement
 from slave.encoders.unbidden import ASTRAY_RAD, SHAKEN_NS, SHAKES_RAD, STILL_RAD, UnbiddenMotion
 from slave.guard import State
 from slave.guard.placed import BEYOND_RAD, NEAR_RAD, PATIENCE, READINGS
@@ -194,7 +194,7 @@ def test_a_robot_whose_drive_and_encoder_differ_is_held_nowhere(make_rig: MakeRi
 @pytest.mark.parametrize("sign", [1, -1])
 def test_at_the_window_they_agree_and_just_beyond_they_do_not(sign: int) -> None:
     for off, apart in ((WINDOW_RAD - 1e-9, False), (WINDOW_RAD + 1e-9, True)):
-        part = Agreement(["a"])
+        part = EncoderAgreement(["a"])
         for _ in range(3):
             said = part.judge(np.array([sign * off]), np.zeros(1), ONE)
         assert said[0] == apart
@@ -204,7 +204,7 @@ def test_at_the_window_they_agree_and_just_beyond_they_do_not(sign: int) -> None
 
 
 def test_an_angle_that_is_no_number_does_not_agree() -> None:
-    part = Agreement(["a"])
+    part = EncoderAgreement(["a"])
     for _ in range(2):
         said = part.judge(np.array([math.nan]), np.zeros(1), ONE)
     assert said[0]

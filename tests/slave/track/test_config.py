@@ -10,7 +10,7 @@ import pytest
 from common.config.load import check_config
 from common.errors import ConfigError
 from common.quaternion import Array
-from slave.track import Target
+from slave.track import TrackTarget
 from slave.track.config import STRATEGIES, TrackConfig, make_tracker
 from slave.track.latest import Latest
 from tests.slave.track.contract import check
@@ -49,9 +49,9 @@ class Believing(Latest):
 
 
 class Still(Latest):
-    def target(self, now_ns: int) -> Target | None:
+    def target(self, now_ns: int) -> TrackTarget | None:
         target = super().target(now_ns)
-        return target and Target(np.zeros_like(target.position_rad), target.velocity_rad_s)
+        return target and TrackTarget(np.zeros_like(target.position_rad), target.velocity_rad_s)
 
 
 @pytest.mark.parametrize("kind", [Forgetful, Believing, Still])

@@ -18,9 +18,9 @@ from deploy.ops.doctor.read.servos import PINGS, Pinged, ping_servos
 from deploy.ops.doctor.read.tree import Tree
 from slave.servos.canopen.load import bits_per_s
 from slave.servos.dynamixel.config import DynamixelConfig
-from slave.servos.dynamixel.simulated.bus import SimulatedBus
-from slave.servos.dynamixel.simulated.pty import SimulatedPort
-from slave.servos.dynamixel.simulated.servo import SimulatedServo
+from tests.slave.servos.dynamixel.simulated.bus import SimulatedBus
+from tests.slave.servos.dynamixel.simulated.pty import SimulatedPort
+from tests.slave.servos.dynamixel.simulated.servo import SimulatedServo
 
 
 @pytest.fixture

@@ -10,17 +10,17 @@ import pytest
 from common.clock import NS_PER_MS
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from deploy.sim.drives.faults import Fault
+from deploy.sim.drives.faults import DriveFault
 from deploy.sim.drives.peer import DrivePeer
 from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.canopen.config import CanopenConfig
-from slave.servos.canopen.network import DriveNetwork, period_ns
+from slave.servos.canopen.drives import Drives
 
 STEP_NS = 4 * NS_PER_MS
 
 
 class Wired:
-    """A network and its drives; time passes in `run`."""
+    """A drives and its drives; time passes in `run`."""
 
     def __init__(self, config: CanopenConfig | None = None, encoders: EncoderConfig | None = None) -> None:
         self.skeleton = load_skeleton("nursing")
@@ -31,7 +31,7 @@ class Wired:
         """False: the slave is dead, its drives are on their own."""
         self.cut: set[str] = set()
         """Buses that carry nothing."""
-        self.network = DriveNetwork(self.config, self.skeleton, encoders)
+        self.drives = Drives(self.config, self.skeleton, encoders)
         self.peer = DrivePeer(
             self.config, self.skeleton, encoders or EncoderConfig(), self._to_slave, self.now_ns
         )
@@ -42,7 +42,7 @@ class Wired:
 
     def _to_slave(self, bus: str, frame_id: int, data: bytes) -> None:
         if self.alive and bus not in self.cut:
-            self.network.on_frame(bus, frame_id, data, self.now_ns)
+            self.drives.on_frame(bus, frame_id, data, self.now_ns)
 
     def _to_drives(self, frames: list[tuple[str, int, bytes]]) -> None:
         for bus, frame_id, data in frames:
@@ -50,18 +50,18 @@ class Wired:
                 self.peer.on_frame(bus, frame_id, data, self.now_ns)
 
     def _flush(self) -> None:
-        while self.network.outbox:
-            frames, self.network.outbox = self.network.outbox, []
+        while self.drives.outbox:
+            frames, self.drives.outbox = self.drives.outbox, []
             self._to_drives(frames)
 
     def start(self) -> None:
-        self.network.start(self.now_ns)
+        self.drives.start(self.now_ns)
         self._flush()
 
     def up(self) -> None:
         """Started, and all running."""
         self.start()
-        self.until(lambda: self.network.running, 1.0)
+        self.until(lambda: self.drives.running, 1.0)
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds * 1e9 / STEP_NS)):
@@ -69,23 +69,28 @@ class Wired:
             self.peer.advance(self.now_ns)
             self.positions.append(self.peer.plant.position_rad)
             if self.alive and self.now_ns >= self._due_ns:
-                self._due_ns = self.now_ns + period_ns(self.config)
-                self._to_drives(self.network.cycle(self.now_ns, self.setpoint))
+                self._due_ns = self.now_ns + self.config.period_ns
+                self._to_drives(self.drives.cycle(self.now_ns, self.setpoint))
                 self._flush()
-                self._to_drives(self.network.sync(self.now_ns))
+                self._to_drives(self.drives.sync(self.now_ns))
 
     def until(self, condition: Callable[[], bool], seconds: float) -> None:
         for _ in range(round(seconds * 1e9 / STEP_NS)):
             if condition():
                 return
             self.run(STEP_NS / 1e9)
-        raise AssertionError(f"not within {seconds} s: {dict(self.network.faults)}")
+        raise AssertionError(f"not within {seconds} s: {dict(self.drives.faults)}")
 
-    def happen(self, joint: str, fault: Fault) -> None:
+    def happen(self, joint: str, fault: DriveFault) -> None:
         self.peer.happen(joint, fault)
 
     def read_rad(self) -> Array:
-        return self.encoders.position_rad(self.network.reading.counts)
+        return self.encoders.position_rad(self.drives.reading.counts)
+
+    def where(self, joint: str) -> tuple[str, int]:
+        """Bus and node id of a joint's drive."""
+        drive = self.config.drives_of(self.skeleton)[joint]
+        return drive.bus, drive.id
 
     def index(self, joint: str) -> int:
         return self.skeleton.joint_names.index(joint)

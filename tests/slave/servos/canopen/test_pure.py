@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from deploy.sim.drives.machine import after, statusword
 from deploy.sim.drives.node import EDS, _Wire
 from slave.servos.canopen import pdo
+from slave.servos.canopen.answers import SyncAnswers
 from slave.servos.canopen.cia402 import _PATTERNS, FAULT_RESET, Power, power, towards_enabled
 from slave.servos.canopen.emergency import emergency
 from slave.servos.canopen.sdo import Read, Write, answer, request
@@ -77,20 +78,23 @@ def test_targets_are_packed_as_struct_packs_them(rows: list[tuple[int, int]]) ->
     st.randoms(use_true_random=False),
 )
 def test_answers_in_any_order_are_read_as_struct_reads_them(rows, random) -> None:  # type: ignore[no-untyped-def]
-    answers = pdo.Answers(len(rows))
+    answers = SyncAnswers(len(rows))
     order = list(range(len(rows)))
     random.shuffle(order)
     for done, i in enumerate(order):
         assert not answers.complete
-        assert answers.fresh.sum() == done
+        assert answers.of(0).fresh.sum() == done
         assert answers.take(i, struct.pack("<HHi", *rows[i]))
         assert answers.take(i, struct.pack("<HHi", *rows[i]))
     assert answers.complete
-    columns = (answers.statusword.tolist(), answers.encoder.tolist(), answers.position.tolist())
-    assert list(zip(*columns, strict=True)) == rows
+    read = answers.of(7)
+    columns = (read.statusword.tolist(), read.encoder_counts.tolist(), read.position.tolist())
+    assert list(zip(*columns, strict=True)) == [(s, word & 0x0FFF, p) for s, word, p in rows]
+    assert read.encoder_valid.tolist() == [word & 0xC000 == 0 for _, word, _ in rows]
+    assert read.synced_ns == 7
     answers.begin()
     assert not answers.complete
-    assert not answers.fresh.any()
+    assert not answers.of(0).fresh.any()
 
 
 @QUICK

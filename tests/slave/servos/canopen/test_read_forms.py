@@ -6,7 +6,7 @@ import pytest
 
 from common.clock import NS_PER_MS
 from deploy.sim.drives.traits import ReadForm
-from slave.servos.canopen.sdo import ABORTS, Answer, Exchange, More, Read, Write, answer
+from slave.servos.canopen.sdo import ABORTS, Exchange, More, Read, SdoAnswer, Write, answer
 from tests.slave.servos.canopen.conftest import Wired
 
 TYPE = Read(0x1000, 0, 0xFFFF, 402, "a CiA 402 drive")
@@ -22,7 +22,7 @@ def test_expedited_answers_of_every_size(command: int, size: int) -> None:
     told = value.to_bytes(size, "little").ljust(4, b"\xa5")
     read = Read(0x1000, 0, 0xFFFF_FFFF, value, "the value")
     said = answer(read, bytes([command]) + HEAD + told)
-    assert said == Answer(True, data=told[:size])
+    assert said == SdoAnswer(True, data=told[:size])
 
 
 @pytest.mark.parametrize("told", [True, False])
@@ -38,17 +38,17 @@ def test_segmented_answers_of_any_length(told: bool, length: int) -> None:
         head = toggle | (7 - len(part)) << 1 | (not held)
         said = exchange.on_answer(bytes([head]) + part.ljust(7, b"\xa5"))
         toggle ^= 0x10
-    assert said == Answer(True, data=bytes(range(1, length + 1)))
+    assert said == SdoAnswer(True, data=bytes(range(1, length + 1)))
 
 
 def test_a_segment_out_of_turn_and_a_wrong_length_are_told() -> None:
     exchange = Exchange(TYPE)
     assert isinstance(exchange.on_answer(b"\x41" + HEAD + b"\x02\0\0\0"), More)
     said = exchange.on_answer(b"\x1b\x92\x01" + bytes(5))
-    assert said == Answer(False, "object 1000:0: toggle bit not alternated")
+    assert said == SdoAnswer(False, "object 1000:0: toggle bit not alternated")
     exchange.on_answer(b"\x41" + HEAD + b"\x04\0\0\0")
     said = exchange.on_answer(b"\x0b\x92\x01" + bytes(5))
-    assert said == Answer(False, "object 1000:0: 2 bytes came, 4 were told")
+    assert said == SdoAnswer(False, "object 1000:0: 2 bytes came, 4 were told")
 
 
 def test_an_endless_answer_ends() -> None:
@@ -59,7 +59,7 @@ def test_an_endless_answer_ends() -> None:
             break
         said = exchange.on_answer(bytes([toggle]) + bytes(7))
         toggle ^= 0x10
-    assert said == Answer(False, "object 1000:0: longer than 4096 bytes")
+    assert said == SdoAnswer(False, "object 1000:0: longer than 4096 bytes")
 
 
 @pytest.mark.parametrize("code", [*ABORTS, 0x1234_5678])
@@ -69,7 +69,7 @@ def test_aborts_in_words_in_the_midst_of_segments_too(code: int, transfer: Read 
     if isinstance(transfer, Read):
         exchange.on_answer(b"\x40" + HEAD + bytes(4))
     said = exchange.on_answer(b"\x80" + HEAD + code.to_bytes(4, "little"))
-    assert said == Answer(False, f"object 1000:0: {ABORTS.get(code, 'aborted with 0x12345678')}")
+    assert said == SdoAnswer(False, f"object 1000:0: {ABORTS.get(code, 'aborted with 0x12345678')}")
 
 
 @pytest.mark.parametrize("form", list(ReadForm))
@@ -77,22 +77,22 @@ def test_drives_that_answer_in_any_form_start(wired: Wired, form: ReadForm) -> N
     for drive in wired.peer.drives:
         drive.traits.read_form = form
     wired.up()
-    assert dict(wired.network.faults) == {}
+    assert dict(wired.drives.faults) == {}
 
 
 @pytest.mark.parametrize("late_ms", [100, 280, 400])
 def test_drives_that_answer_late_start(wired: Wired, late_ms: int) -> None:
     wired.peer.drives[3].traits.answers_after_ns = late_ms * NS_PER_MS
     wired.start()
-    wired.until(lambda: wired.network.running, 20.0)
-    assert dict(wired.network.faults) == {}
+    wired.until(lambda: wired.drives.running, 20.0)
+    assert dict(wired.drives.faults) == {}
 
 
 def test_an_answer_that_is_none_is_not_called_silence(wired: Wired) -> None:
-    bus, node = wired.network.where("neck_yaw")
+    bus, node = wired.where("neck_yaw")
     wired.cut.add(bus)
-    wired.network.start(wired.now_ns)
-    wired.network.on_frame(bus, 0x580 + node, b"\x60" + HEAD + bytes(4), wired.now_ns)
-    wired.network.pending(wired.now_ns + 301 * NS_PER_MS)
-    said = wired.network.not_running["neck_yaw"]
+    wired.drives.start(wired.now_ns)
+    wired.drives.on_frame(bus, 0x580 + node, b"\x60" + HEAD + bytes(4), wired.now_ns)
+    wired.drives.pending(wired.now_ns + 301 * NS_PER_MS)
+    said = wired.drives.not_running["neck_yaw"]
     assert said.endswith("object 1000:0 is answered with command 60h, which is no answer to it")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from slave.servos.canopen.cia402 import Power
-from slave.servos.canopen.network import DriveNetwork
+from slave.servos.canopen.drives import Drives
 from tests.slave.servos.canopen.conftest import Wired
 
 FRAMES = [
@@ -25,24 +25,24 @@ def test_a_frame_that_only_a_master_sends_stops_the_robot(
     wired: Wired, frame_id: int, data: bytes, said: str
 ) -> None:
     wired.up()
-    wired.network.on_frame("left", frame_id, data, wired.now_ns)
+    wired.drives.on_frame("left", frame_id, data, wired.now_ns)
     wired._flush()
-    faults = dict(wired.network.faults)
+    faults = dict(wired.drives.faults)
     assert set(faults) == set(wired.skeleton.joint_names)
     assert all("a second master is on bus left" in words and said in words for words in faults.values())
     wired.run(0.1)
     assert all(drive.state is Power.QUICK_STOP for drive in wired.peer.drives)
     wired.run(0.5)
     # not while it speaks, and by a reset once it has gone
-    wired.network.on_frame("left", frame_id, data, wired.now_ns)
-    wired.network.release(wired.now_ns)
+    wired.drives.on_frame("left", frame_id, data, wired.now_ns)
+    wired.drives.release(wired.now_ns)
     wired.run(0.3)
-    assert not wired.network.running
+    assert not wired.drives.running
     wired.run(1.0)
-    wired.network.release(wired.now_ns)
+    wired.drives.release(wired.now_ns)
     wired._flush()
-    wired.until(lambda: wired.network.running, 1.5)
-    assert dict(wired.network.faults) == {}
+    wired.until(lambda: wired.drives.running, 1.5)
+    assert dict(wired.drives.faults) == {}
 
 
 @pytest.mark.parametrize(
@@ -51,15 +51,15 @@ def test_a_frame_that_only_a_master_sends_stops_the_robot(
 )
 def test_frames_of_others_are_no_second_master(wired: Wired, frame_id: int, data: bytes) -> None:
     wired.up()
-    wired.network.on_frame("left", frame_id, data, wired.now_ns)
+    wired.drives.on_frame("left", frame_id, data, wired.now_ns)
     wired.run(0.1)
-    assert dict(wired.network.faults) == {}
+    assert dict(wired.drives.faults) == {}
 
 
 class TwoMasters(Wired):
-    """A second network on the same buses, which hears and is heard."""
+    """A second drives on the same buses, which hears and is heard."""
 
-    other: DriveNetwork | None = None
+    other: Drives | None = None
 
     def _to_slave(self, bus: str, frame_id: int, data: bytes) -> None:
         super()._to_slave(bus, frame_id, data)
@@ -75,7 +75,7 @@ class TwoMasters(Wired):
     def of_other(self, frames: list[tuple[str, int, bytes]]) -> None:
         for frame in frames:
             self.peer.on_frame(*frame, self.now_ns)
-            self.network.on_frame(*frame, self.now_ns)
+            self.drives.on_frame(*frame, self.now_ns)
 
 
 def test_two_slaves_stop_the_robot_once_and_it_stands() -> None:
@@ -83,7 +83,7 @@ def test_two_slaves_stop_the_robot_once_and_it_stands() -> None:
     wired.up()
     wired.setpoint = np.clip(np.full(25, 0.2), wired.skeleton.lower_rad, wired.skeleton.upper_rad)
     wired.run(0.5)
-    other = wired.other = DriveNetwork(wired.config, wired.skeleton)
+    other = wired.other = Drives(wired.config, wired.skeleton)
     other.start(wired.now_ns)
     changes, states = 0, [drive.state for drive in wired.peer.drives]
     for _ in range(100):
@@ -98,27 +98,27 @@ def test_two_slaves_stop_the_robot_once_and_it_stands() -> None:
     assert changes == 25  # each drive stopped once
     assert set(states) == {Power.QUICK_STOP}
     assert np.abs(wired.speed_rad_s(1.5)).max() < 0.02
-    for network in (wired.network, other):
-        assert all("a second master" in words for words in network.faults.values())
-        assert len(network.faults) == 25
+    for drives in (wired.drives, other):
+        assert all("a second master" in words for words in drives.faults.values())
+        assert len(drives.faults) == 25
 
 
 def test_a_master_that_starts_the_drives_again_does_not_get_them(wired: Wired) -> None:
     wired.up()
     for _ in range(50):
         for frame_id, data in ((0x000, b"\x01\x00"), (0x201, b"\x0f\x00" + bytes(4))):
-            wired.network.on_frame("left", frame_id, data, wired.now_ns)
+            wired.drives.on_frame("left", frame_id, data, wired.now_ns)
             wired.peer.on_frame("left", frame_id, data, wired.now_ns)
         wired._flush()
         wired.run(0.1)
-    assert "a second master" in wired.network.faults["neck_yaw"]
+    assert "a second master" in wired.drives.faults["neck_yaw"]
     # what NMT lets through before the next heartbeat is stopped within it
     wired.run(0.3)
     assert all(drive.state is Power.QUICK_STOP for drive in wired.peer.drives)
 
 
 def test_one_that_has_not_begun_says_nothing_to_another_s_drives(wired: Wired) -> None:
-    late = DriveNetwork(wired.config, wired.skeleton)
+    late = Drives(wired.config, wired.skeleton)
     for frame_id, data in ((0x080, b""), (0x701, b"\x05"), (0x201, b"\x0f\x00" + bytes(4))):
         late.on_frame("left", frame_id, data, wired.now_ns)
     assert late.outbox == []

@@ -28,7 +28,7 @@ from common.link.config import LinkConfig
 from common.skeleton import load_skeleton
 from deploy.harness.host import HostWatch
 from deploy.sim.drives.app import run as run_drives
-from deploy.sim.drives.faults import DEMAND, Fault
+from deploy.sim.drives.faults import DEMAND, DriveFault
 from deploy.sim.drives.node import EDS
 from slave.backends import ServosConfig
 from slave.config import SlaveConfig
@@ -214,7 +214,7 @@ def test_start_follow_quick_stop_fault_and_back(config: CanopenConfig, tmp_path:
 
             # a fault on demand, by a third party on the bus: SDO write of one byte to 2010h of node 1
             with can_bus(config) as bus:
-                data = bytes([0x2F, DEMAND & 0xFF, DEMAND >> 8, 0, Fault.OVER_CURRENT, 0, 0, 0])
+                data = bytes([0x2F, DEMAND & 0xFF, DEMAND >> 8, 0, DriveFault.OVER_CURRENT, 0, 0, 0])
                 bus.send(can.Message(arbitration_id=0x601, is_extended_id=False, data=data))
                 await ticking.until(lambda: "neck_yaw" in servos.faults())
                 await ticking.until(lambda: "over-current" in servos.faults()["neck_yaw"])
@@ -284,7 +284,7 @@ def test_a_second_slave_is_refused_and_the_first_does_not_notice(
         assert "nothing has been sent to the drives" in await refused
         assert "SYNC" in await refused
         assert dict(servos.faults()) == {}
-        assert servos._network.second_master.frames == 0
+        assert servos._drives.second_master.frames == 0
         servos.stop()
 
     with drives_on(config, tmp_path):
@@ -318,10 +318,10 @@ def test_a_setpoint_that_is_none_is_refused(setpoint: np.ndarray) -> None:
 def test_the_library_s_master_finds_a_cia_402_drive(config: CanopenConfig, tmp_path: Path) -> None:
     """The `canopen` library, which knows nothing of this code, drives node 2 through its states by SDO."""
     with drives_on(config, tmp_path), can_bus(config) as bus:
-        network = canopen.Network(bus)
-        network.connect()
+        drives = canopen.Network(bus)
+        drives.connect()
         try:
-            node = network.add_node(2, str(EDS))
+            node = drives.add_node(2, str(EDS))
             node.sdo.RESPONSE_TIMEOUT = 10.0
             assert node.sdo[0x1000].raw & 0xFFFF == 402
             assert node.sdo[0x1008].raw == "tandem simulated CiA 402 drive"  # segmented
@@ -339,14 +339,14 @@ def test_the_library_s_master_finds_a_cia_402_drive(config: CanopenConfig, tmp_p
             assert seen == [0x21, 0x23, 0x27, 0x07, 0x27]
             heard = threading.Event()
             node.emcy.add_callback(lambda _: heard.set())
-            node.sdo[DEMAND].raw = Fault.OVER_TEMPERATURE
+            node.sdo[DEMAND].raw = DriveFault.OVER_TEMPERATURE
             assert heard.wait(10.0)
             assert [emergency.code for emergency in node.emcy.log] == [0x4310]
             assert node.sdo[0x1001].raw == 0x09
         finally:
-            network.bus = None
-            assert network.notifier is not None
-            network.notifier.stop()
+            drives.bus = None
+            assert drives.notifier is not None
+            drives.notifier.stop()
 
 
 SLAVE = """

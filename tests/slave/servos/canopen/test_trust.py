@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from deploy.sim.drives.faults import Fault
+from deploy.sim.drives.faults import DriveFault
 from deploy.sim.drives.peer import DrivePeer
 from slave.encoders.counts import EncoderConfig
 from slave.encoders.unbidden import ASTRAY_RAD
@@ -13,8 +13,8 @@ from slave.guard import GuardConfig
 from slave.limit.limit import SetpointLimiter
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
-from slave.servos.canopen.drive import Drive
-from slave.servos.canopen.start_check import LAST_KNOWN_RAD, SLACK_RAD, Place, refusal
+from slave.servos.canopen.drive import DriveState
+from slave.servos.canopen.start_check import LAST_KNOWN_RAD, SLACK_RAD, JointPlace, refusal
 from slave.servos.canopen.status_bits import FOLLOWS, GOOD, LIMITED, REMOTE, VOLTAGE, amiss
 from slave.servos.canopen.watch import DriveWatch
 from tests.slave.servos.canopen.conftest import Wired
@@ -47,7 +47,7 @@ def moved_deg(wired: Wired, joint: str = ELBOW) -> float:
     return float(np.degrees(np.abs(course - course[0]).max()))
 
 
-def wrong_from_the_start(fault: Fault, elbow_deg: float = 40.0) -> Wired:
+def wrong_from_the_start(fault: DriveFault, elbow_deg: float = 40.0) -> Wired:
     wired = standing(elbow_deg)
     wired.happen(ELBOW, fault)
     wired.start()
@@ -58,28 +58,28 @@ def wrong_from_the_start(fault: Fault, elbow_deg: float = 40.0) -> Wired:
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        (Fault.LOST_TURNS, "0.0°, its output encoder 40"),
-        (Fault.WRONG_ZERO, "says 70.0°, its output encoder 40"),
-        (Fault.WRONG_GEAR, "says 79.9°, its output encoder 40"),
-        (Fault.REVERSED, "says -40.0°, its output encoder 40"),
-        (Fault.ENCODER_ZERO, "says 40.0°, its output encoder 0.0°"),
-        (Fault.DOUBLE_ID, "two drives have its id"),
+        (DriveFault.LOST_TURNS, "0.0°, its output encoder 40"),
+        (DriveFault.WRONG_ZERO, "says 70.0°, its output encoder 40"),
+        (DriveFault.WRONG_GEAR, "says 79.9°, its output encoder 40"),
+        (DriveFault.REVERSED, "says -40.0°, its output encoder 40"),
+        (DriveFault.ENCODER_ZERO, "says 40.0°, its output encoder 0.0°"),
+        (DriveFault.DOUBLE_ID, "two drives have its id"),
         (
-            Fault.WRONG_MODE,
+            DriveFault.WRONG_MODE,
             "object 6061:0 is 0x1: the mode asked for, cyclic synchronous position (8)",
         ),
-        (Fault.LIMIT_ACTIVE, "is not ready: a limit of its own is active"),
-        (Fault.LOCAL, "is not ready: it is under local control"),
-        (Fault.NOT_FOLLOWING, "is enabled, but it does not follow its target (bit 12)"),
-        (Fault.NO_VOLTAGE, "is enabled, but its motor stage has no voltage (statusword bit 4)"),
+        (DriveFault.LIMIT_ACTIVE, "is not ready: a limit of its own is active"),
+        (DriveFault.LOCAL, "is not ready: it is under local control"),
+        (DriveFault.NOT_FOLLOWING, "is enabled, but it does not follow its target (bit 12)"),
+        (DriveFault.NO_VOLTAGE, "is enabled, but its motor stage has no voltage (statusword bit 4)"),
     ],
 )
-def test_a_drive_that_is_wrong_at_the_start_is_named_and_moves_nothing(fault: Fault, said: str) -> None:
+def test_a_drive_that_is_wrong_at_the_start_is_named_and_moves_nothing(fault: DriveFault, said: str) -> None:
     wired = wrong_from_the_start(fault)
     wired.run(2.0)
-    assert said in wired.network.faults[ELBOW]
-    assert not wired.network.running
-    assert wired.network.failed
+    assert said in wired.drives.faults[ELBOW]
+    assert not wired.drives.running
+    assert wired.drives.failed
     # a setpoint of the guard's, who sits at the encoder, changes nothing
     wired.setpoint = wired.read_rad()
     wired.run(1.0)
@@ -88,9 +88,9 @@ def test_a_drive_that_is_wrong_at_the_start_is_named_and_moves_nothing(fault: Fa
 
 
 def test_which_zero_would_agree_is_told() -> None:
-    wired = wrong_from_the_start(Fault.LOST_TURNS)
+    wired = wrong_from_the_start(DriveFault.LOST_TURNS)
     increments = round(-65536 * 40.0 / 360.0)
-    told = int(wired.network.faults[ELBOW].rpartition("= ")[2])
+    told = int(wired.drives.faults[ELBOW].rpartition("= ")[2])
     assert told == pytest.approx(increments, abs=65536 / 4096)
 
 
@@ -102,10 +102,10 @@ def test_a_drive_beyond_its_software_limit_is_not_enabled(beyond_deg: float) -> 
     wired = standing(40.0, plain.model_copy(update={"drives": drives}))
     wired.start()
     wired.run(1.0)
-    assert wired.network.running == (beyond_deg == 0.0)
+    assert wired.drives.running == (beyond_deg == 0.0)
     assert moved_deg(wired) < 0.3
     if beyond_deg:
-        assert f"stands at 40.0°, {beyond_deg:.1f}° beyond its software limits" in wired.network.faults[ELBOW]
+        assert f"stands at 40.0°, {beyond_deg:.1f}° beyond its software limits" in wired.drives.faults[ELBOW]
 
 
 @pytest.mark.parametrize("rest_s", [0.0, 0.1, 0.5, 2.0])
@@ -115,13 +115,13 @@ def test_a_drive_that_moves_by_itself_in_hold_is_stopped_within_50_ms(rest_s: fl
     wired.setpoint = wired.read_rad() if rest_s else None
     wired.run(rest_s)
     before, at_s = len(wired.positions), wired.now_ns / 1e9
-    wired.happen(ELBOW, Fault.RUNS_AWAY)
-    wired.until(lambda: ELBOW in wired.network.faults, 0.5)
+    wired.happen(ELBOW, DriveFault.RUNS_AWAY)
+    wired.until(lambda: ELBOW in wired.drives.faults, 0.5)
     course = np.array(wired.positions)[before - 1 :, wired.index(ELBOW)]
     began = int(np.flatnonzero(np.abs(course - course[0]) > np.radians(0.5))[0])
     assert (wired.now_ns / 1e9 - at_s) - began * 0.004 <= 0.05
     wired.run(1.0)
-    assert "by itself" in wired.network.faults[ELBOW]
+    assert "by itself" in wired.drives.faults[ELBOW]
     assert wired.peer.drives[wired.index(ELBOW)].state is Power.QUICK_STOP
     # and braked on its ramp
     assert moved_deg(wired) < 8.0
@@ -139,16 +139,16 @@ def stopped_after_s(wired: Wired, elbow_rad_s: float, others_rad_s: float) -> fl
     evident_ns = 0
     for i in range(150):
         if i == 50:
-            wired.happen(ELBOW, Fault.RUNS_AWAY)
+            wired.happen(ELBOW, DriveFault.RUNS_AWAY)
         wired.setpoint = wired.setpoint + rate * 0.004
         sent.append(wired.setpoint[wired.index(ELBOW)])
         wired.run(0.004)
         stands, lately = wired.positions[-1][wired.index(ELBOW)], sent[-31:]
         if not evident_ns and max(min(lately) - stands, stands - max(lately)) > ASTRAY_RAD:
             evident_ns = wired.now_ns
-        if ELBOW in wired.network.faults:
-            assert "against its setpoint" in wired.network.faults[ELBOW]
-            assert list(wired.network.faults) == [ELBOW]
+        if ELBOW in wired.drives.faults:
+            assert "against its setpoint" in wired.drives.faults[ELBOW]
+            assert list(wired.drives.faults) == [ELBOW]
             # the drive may be found out before, at the margin
             return max(wired.now_ns - evident_ns, 0) / 1e9 if evident_ns else 0.0
     return np.inf
@@ -172,45 +172,45 @@ def test_without_the_astray_window_a_drive_moves_on(
 
 
 @pytest.mark.parametrize(
-    "fault", [Fault.REVERSED, Fault.WRONG_GEAR, Fault.ENCODER_ZERO, Fault.POSITION_STUCK]
+    "fault", [DriveFault.REVERSED, DriveFault.WRONG_GEAR, DriveFault.ENCODER_ZERO, DriveFault.POSITION_STUCK]
 )
-def test_what_cannot_be_seen_at_zero_is_seen_at_the_first_degrees(fault: Fault) -> None:
+def test_what_cannot_be_seen_at_zero_is_seen_at_the_first_degrees(fault: DriveFault) -> None:
     wired = wrong_from_the_start(fault, elbow_deg=0.0)
-    assert wired.network.running
+    assert wired.drives.running
     wired.setpoint = np.zeros(25)
     wired.setpoint[wired.index(ELBOW)] = 0.6
     wired.run(2.0)
-    assert wired.network.faults[ELBOW]
+    assert wired.drives.faults[ELBOW]
     assert moved_deg(wired) < 5.0
 
 
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        (Fault.NOT_FOLLOWING, "it does not follow its target (bit 12)"),
-        (Fault.LIMIT_ACTIVE, "a limit of its own is active"),
-        (Fault.LOCAL, "under local control"),
-        (Fault.NO_VOLTAGE, "has no voltage"),
+        (DriveFault.NOT_FOLLOWING, "it does not follow its target (bit 12)"),
+        (DriveFault.LIMIT_ACTIVE, "a limit of its own is active"),
+        (DriveFault.LOCAL, "under local control"),
+        (DriveFault.NO_VOLTAGE, "has no voltage"),
         # the other one says that it has started
-        (Fault.DOUBLE_ID, "has restarted"),
+        (DriveFault.DOUBLE_ID, "has restarted"),
     ],
 )
-def test_an_enabled_drive_that_does_not_obey_stops_within_50_ms(fault: Fault, said: str) -> None:
+def test_an_enabled_drive_that_does_not_obey_stops_within_50_ms(fault: DriveFault, said: str) -> None:
     wired = standing(20.0)
     wired.up()
     wired.run(0.5)
     wired.happen(ELBOW, fault)
     wired.run(0.068)
-    assert said in wired.network.faults[ELBOW]
+    assert said in wired.drives.faults[ELBOW]
 
 
 def test_a_warning_is_told_and_stops_nothing() -> None:
     wired = standing(20.0)
     wired.up()
-    wired.happen(ELBOW, Fault.WARNS)
+    wired.happen(ELBOW, DriveFault.WARNS)
     wired.run(0.1)
-    assert dict(wired.network.warnings) == {ELBOW: "its drive warns: something is about to fail (bit 7)"}
-    assert wired.network.running
+    assert dict(wired.drives.warnings) == {ELBOW: "its drive warns: something is about to fail (bit 7)"}
+    assert wired.drives.running
 
 
 def test_two_joints_with_one_id_in_the_drives_are_two_drives() -> None:
@@ -224,40 +224,40 @@ def test_two_joints_with_one_id_in_the_drives_are_two_drives() -> None:
     wired.peer = DrivePeer(wrongly, wired.skeleton, EncoderConfig(), wired._to_slave, wired.now_ns)
     wired.start()
     wired.run(1.0)
-    assert "two drives have its id" in wired.network.faults[one]
-    assert "does not answer" in wired.network.faults[other]
+    assert "two drives have its id" in wired.drives.faults[one]
+    assert "does not answer" in wired.drives.faults[other]
     assert moved_deg(wired, one) < 0.3
 
 
 def test_two_boot_ups_of_one_id_are_two_drives() -> None:
     wired = Wired()
-    wired.network.start(wired.now_ns)
+    wired.drives.start(wired.now_ns)
     for _ in range(2):
-        wired.network.on_frame("left", 0x701, b"\x00", wired.now_ns)
-    assert "two drives have its id" in wired.network.faults["neck_yaw"]
+        wired.drives.on_frame("left", 0x701, b"\x00", wired.now_ns)
+    assert "two drives have its id" in wired.drives.faults["neck_yaw"]
 
 
 def test_a_drive_that_took_a_while_to_change_its_mode_is_taken() -> None:
     wired = standing(20.0)
-    wired.happen(ELBOW, Fault.WRONG_MODE)
+    wired.happen(ELBOW, DriveFault.WRONG_MODE)
     wired.start()
     wired.run(0.2)
-    wired.happen(ELBOW, Fault.NONE)
-    wired.until(lambda: wired.network.running, 1.0)
+    wired.happen(ELBOW, DriveFault.NONE)
+    wired.until(lambda: wired.drives.running, 1.0)
 
 
 def test_a_release_checks_again() -> None:
     """A drive whose count was lost while it was switched off for the e-stop."""
     wired = standing(20.0)
     wired.up()
-    wired.network.stop()
+    wired.drives.stop()
     wired.run(0.5)
-    wired.happen(ELBOW, Fault.LOST_TURNS)
+    wired.happen(ELBOW, DriveFault.LOST_TURNS)
     wired.setpoint = wired.read_rad()
-    wired.network.release(wired.now_ns)
+    wired.drives.release(wired.now_ns)
     wired._flush()
     wired.run(1.0)
-    assert "its output encoder" in wired.network.faults[ELBOW]
+    assert "its output encoder" in wired.drives.faults[ELBOW]
     assert moved_deg(wired) < 0.5
 
 
@@ -283,14 +283,14 @@ def flung() -> Wired:
 
 
 def test_drives_that_are_sent_to_and_fro_at_their_limits_are_believed() -> None:
-    assert dict(flung().network.faults) == {}
+    assert dict(flung().drives.faults) == {}
 
 
 def test_without_the_patience_a_thrown_wrist_would_be_stopped(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("slave.servos.canopen.watch._PATIENCE", None)
-    assert "against its setpoint" in flung().network.faults["right_wrist_yaw"]
+    assert "against its setpoint" in flung().drives.faults["right_wrist_yaw"]
 
 
 # without what holds it off, each comes true
@@ -299,7 +299,7 @@ def test_without_the_patience_a_thrown_wrist_would_be_stopped(
 def test_without_the_start_check_a_lost_count_moves_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("slave.servos.canopen.watch.refusal", lambda *_: "")
     monkeypatch.setattr(DriveWatch, "judge", lambda *_: {})
-    wired = wrong_from_the_start(Fault.LOST_TURNS)
+    wired = wrong_from_the_start(DriveFault.LOST_TURNS)
     wired.setpoint = wired.read_rad()
     wired.run(4.0)
     assert moved_deg(wired) > 30.0
@@ -309,7 +309,7 @@ def test_without_the_watch_a_runaway_runs_on(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(DriveWatch, "judge", lambda *_: {})
     wired = standing(20.0)
     wired.up()
-    wired.happen(ELBOW, Fault.RUNS_AWAY)
+    wired.happen(ELBOW, DriveFault.RUNS_AWAY)
     wired.run(0.5)
     assert moved_deg(wired) > 12.0
 
@@ -318,8 +318,8 @@ def test_without_counting_answers_two_drives_of_one_id_look_alike(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(DriveWatch, "answered", lambda *_: "")
-    monkeypatch.setattr(Drive, "_notice_second", lambda *_: None)
-    assert "two drives" not in wrong_from_the_start(Fault.DOUBLE_ID).network.faults.get(ELBOW, "")
+    monkeypatch.setattr(DriveState, "_notice_second", lambda *_: None)
+    assert "two drives" not in wrong_from_the_start(DriveFault.DOUBLE_ID).drives.faults.get(ELBOW, "")
 
 
 @pytest.mark.parametrize("kept", ["answered", "_notice_second"])
@@ -327,19 +327,19 @@ def test_either_way_alone_finds_two_drives_of_one_id(monkeypatch: pytest.MonkeyP
     if kept != "answered":
         monkeypatch.setattr(DriveWatch, "answered", lambda *_: "")
     else:
-        monkeypatch.setattr(Drive, "_notice_second", lambda *_: None)
-    assert "two drives" in wrong_from_the_start(Fault.DOUBLE_ID).network.faults[ELBOW]
+        monkeypatch.setattr(DriveState, "_notice_second", lambda *_: None)
+    assert "two drives" in wrong_from_the_start(DriveFault.DOUBLE_ID).drives.faults[ELBOW]
 
 
 # boundaries
 
 
-def place(**changes: object) -> Place:
+def place(**changes: object) -> JointPlace:
     good: dict[str, object] = {
         "drive_rad": 0.5, "encoder_rad": 0.5, "last_known_rad": None, "limits_rad": (-1.0, 1.0),
         "increments_per_rad": 1e4, "zero_increments": 0,
     }  # fmt: skip
-    return Place(**(good | changes))  # type: ignore[arg-type]
+    return JointPlace(**(good | changes))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("sign", [1, -1])

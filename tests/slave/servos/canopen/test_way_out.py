@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from common.clock import NS_PER_MS
-from deploy.sim.drives.faults import Fault
+from deploy.sim.drives.faults import DriveFault
 from deploy.sim.drives.machine import after, statusword
 from slave.servos.canopen.cia402 import DISABLE_VOLTAGE, ENABLE, FAULT_RESET, Power, power, towards_enabled
 from tests.slave.servos.canopen.conftest import Wired
@@ -47,53 +47,53 @@ def test_a_drive_without_transition_16_returns_by_reset_and_restart(wired: Wired
         drive.traits.knows_16 = False
     wired.up()
     for again in ("release", "start"):
-        wired.network.stop()
+        wired.drives.stop()
         wired.run(0.5)
         assert all(drive.state is Power.QUICK_STOP for drive in wired.peer.drives)
-        getattr(wired.network, again)(wired.now_ns)
+        getattr(wired.drives, again)(wired.now_ns)
         wired._flush()
-        wired.until(lambda: wired.network.running, 2.0)
-        assert dict(wired.network.faults) == {}
+        wired.until(lambda: wired.drives.running, 2.0)
+        assert dict(wired.drives.faults) == {}
         assert all(drive.state is Power.ENABLED for drive in wired.peer.drives)
 
 
 def test_a_drive_that_knows_transition_16_is_never_let_go(wired: Wired) -> None:
     wired.up()
-    wired.network.stop()
+    wired.drives.stop()
     wired.run(0.3)
-    wired.network.release(wired.now_ns)
+    wired.drives.release(wired.now_ns)
     states = set()
     for _ in range(50):
         wired.run(0.02)
         states |= {drive.state for drive in wired.peer.drives}
     assert states <= {Power.QUICK_STOP, Power.ENABLED}
-    assert wired.network.running
+    assert wired.drives.running
 
 
 @pytest.mark.parametrize("state", list(Power))
 def test_a_reset_brings_a_drive_back_from_any_state(wired: Wired, state: Power) -> None:
     wired.up()
     drive = wired.peer.drives[wired.index(ELBOW)]
-    wired.network.stop()
+    wired.drives.stop()
     wired.run(0.1)
     drive.state = state
     wired.run(0.1)
     if state is Power.NOT_READY:
         drive.state = Power.SWITCH_ON_DISABLED  # its self-test is over
-    wired.network.release(wired.now_ns)
+    wired.drives.release(wired.now_ns)
     wired._flush()
-    wired.until(lambda: wired.network.running, 2.0)
-    assert dict(wired.network.faults) == {}
+    wired.until(lambda: wired.drives.running, 2.0)
+    assert dict(wired.drives.faults) == {}
 
 
 def test_a_fault_reaction_that_lasts_is_waited_for(wired: Wired) -> None:
     wired.up()
-    wired.happen(ELBOW, Fault.OVER_CURRENT)
+    wired.happen(ELBOW, DriveFault.OVER_CURRENT)
     drive = wired.peer.drives[wired.index(ELBOW)]
     drive.state = Power.FAULT_REACTION
-    wired.network.release(wired.now_ns)
+    wired.drives.release(wired.now_ns)
     wired._flush()
-    wired.until(lambda: wired.network.running, 2.0)
+    wired.until(lambda: wired.drives.running, 2.0)
 
 
 def test_while_it_brakes_nothing_lets_a_drive_go(wired: Wired) -> None:
@@ -105,13 +105,13 @@ def test_while_it_brakes_nothing_lets_a_drive_go(wired: Wired) -> None:
     for _ in range(20):
         wired.setpoint = np.clip(wired.setpoint + 0.02, wired.skeleton.lower_rad, wired.skeleton.upper_rad)
         wired.run(0.02)
-    wired.network.stop()
+    wired.drives.stop()
     wired.run(0.04)
-    wired.network.release(wired.now_ns)
+    wired.drives.release(wired.now_ns)
     wired._flush()
     stopped_ns = wired.now_ns
     while wired.now_ns - stopped_ns < 450 * NS_PER_MS:
         wired.run(0.02)
         assert all(drive.state is Power.QUICK_STOP for drive in wired.peer.drives)
     assert np.abs(wired.speed_rad_s(0.1)).max() < 0.02
-    wired.until(lambda: wired.network.running, 1.0)
+    wired.until(lambda: wired.drives.running, 1.0)

@@ -14,9 +14,9 @@ from common.skeleton import load_skeleton
 from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.dynamixel.config import DynamixelConfig
 from slave.servos.dynamixel.driver import Driver
-from slave.servos.dynamixel.simulated.bus import SimulatedBus
-from slave.servos.dynamixel.simulated.pty import SimulatedPort
-from slave.servos.dynamixel.simulated.servo import SimulatedServo
+from tests.slave.servos.dynamixel.simulated.bus import SimulatedBus
+from tests.slave.servos.dynamixel.simulated.pty import SimulatedPort
+from tests.slave.servos.dynamixel.simulated.servo import SimulatedServo
 
 PERIOD_NS = 10_000_000
 

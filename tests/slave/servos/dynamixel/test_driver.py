@@ -11,8 +11,8 @@ import pytest
 from common.errors import RobotError
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.driver import Driver
-from slave.servos.dynamixel.simulated.packets import STATUS, frame
-from slave.servos.dynamixel.simulated.pty import SimulatedPort
+from tests.slave.servos.dynamixel.simulated.packets import STATUS, frame
+from tests.slave.servos.dynamixel.simulated.pty import SimulatedPort
 
 if TYPE_CHECKING:
     from tests.slave.servos.dynamixel.conftest import Rig

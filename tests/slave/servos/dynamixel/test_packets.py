@@ -9,8 +9,8 @@ from dynamixel_sdk import PacketHandler
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slave.servos.dynamixel.simulated.bus import SimulatedBus
-from slave.servos.dynamixel.simulated.packets import (
+from tests.slave.servos.dynamixel.simulated.bus import SimulatedBus
+from tests.slave.servos.dynamixel.simulated.packets import (
     PING,
     READ,
     STATUS,
@@ -21,7 +21,7 @@ from slave.servos.dynamixel.simulated.packets import (
     stuff,
     unstuff,
 )
-from slave.servos.dynamixel.simulated.servo import SimulatedServo
+from tests.slave.servos.dynamixel.simulated.servo import SimulatedServo
 
 few = settings(max_examples=150, derandomize=True, deadline=None)
 # bytes that make headers likely

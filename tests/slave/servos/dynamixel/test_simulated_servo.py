@@ -6,8 +6,8 @@ import pytest
 
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.registers import Register
-from slave.servos.dynamixel.simulated.bus import SimulatedBus
-from slave.servos.dynamixel.simulated.packets import (
+from tests.slave.servos.dynamixel.simulated.bus import SimulatedBus
+from tests.slave.servos.dynamixel.simulated.packets import (
     BROADCAST,
     PING,
     READ,
@@ -17,7 +17,7 @@ from slave.servos.dynamixel.simulated.packets import (
     Parser,
     frame,
 )
-from slave.servos.dynamixel.simulated.servo import ACCESS, LIMIT, OK, SimulatedServo
+from tests.slave.servos.dynamixel.simulated.servo import ACCESS, LIMIT, OK, SimulatedServo
 
 MS = 1_000_000
 

@@ -1,4 +1,4 @@
-"""The pure network against the simulated drives, on a virtual clock."""
+"""The pure drives against the simulated drives, on a virtual clock."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from deploy.sim.drives.faults import Fault
+from deploy.sim.drives.faults import DriveFault
 from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import Power
@@ -26,13 +26,13 @@ def small_posture(wired: Wired, rad: float = 0.2) -> Array:
 
 def test_all_drives_come_up_and_nothing_moves(wired: Wired) -> None:
     wired.up()
-    assert dict(wired.network.faults) == {}
+    assert dict(wired.drives.faults) == {}
     assert all(drive.state is Power.ENABLED for drive in wired.peer.drives)
     wired.run(0.5)
-    assert wired.network.reading.valid.all()
+    assert wired.drives.reading.valid.all()
     assert np.abs(wired.speed_rad_s(0.5)).max() < 0.02
-    assert wired.network.unanswered == 0
-    assert wired.network.unknown == 0
+    assert wired.drives.unanswered == 0
+    assert wired.drives.unknown == 0
 
 
 @pytest.mark.parametrize("sync_hz", [50, 100])
@@ -70,34 +70,34 @@ def test_a_drive_joins_a_far_setpoint_slowly_then_follows_exactly(wired: Wired) 
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        (Fault.OVER_CURRENT, "drive fault; over-current at the output (code 2310, current)"),
-        (Fault.OVER_TEMPERATURE, "drive fault; over-temperature of the motor (code 4310, temperature)"),
-        (Fault.SILENT, "silent: neither heartbeat nor position"),
-        (Fault.RESTART, "has restarted"),
+        (DriveFault.OVER_CURRENT, "drive fault; over-current at the output (code 2310, current)"),
+        (DriveFault.OVER_TEMPERATURE, "drive fault; over-temperature of the motor (code 4310, temperature)"),
+        (DriveFault.SILENT, "silent: neither heartbeat nor position"),
+        (DriveFault.RESTART, "has restarted"),
     ],
 )
 def test_a_failed_drive_is_named_and_only_release_brings_it_back(
-    wired: Wired, fault: Fault, said: str
+    wired: Wired, fault: DriveFault, said: str
 ) -> None:
     wired.up()
     joint = wired.index(ELBOW)
     wired.happen(ELBOW, fault)
-    wired.until(lambda: ELBOW in wired.network.faults, 0.5)
+    wired.until(lambda: ELBOW in wired.drives.faults, 0.5)
     wired.run(0.1)
-    assert dict(wired.network.faults) == {ELBOW: said}
-    wired.happen(ELBOW, Fault.NONE)
+    assert dict(wired.drives.faults) == {ELBOW: said}
+    wired.happen(ELBOW, DriveFault.NONE)
     stood = wired.peer.plant.position_rad[joint]
     wired.setpoint = small_posture(wired)
     wired.run(1.0)
-    assert ELBOW in wired.network.faults
+    assert ELBOW in wired.drives.faults
     assert wired.peer.drives[joint].state is not Power.ENABLED
     assert abs(wired.peer.plant.position_rad[joint] - stood) < 0.01
 
-    wired.network.release(wired.now_ns)
+    wired.drives.release(wired.now_ns)
     wired._flush()
-    assert "is being enabled" in wired.network.faults[ELBOW]
-    wired.until(lambda: wired.network.running, 1.0)
-    assert dict(wired.network.faults) == {}
+    assert "is being enabled" in wired.drives.faults[ELBOW]
+    wired.until(lambda: wired.drives.running, 1.0)
+    assert dict(wired.drives.faults) == {}
     wired.run(1.5)
     assert np.abs(wired.read_rad() - wired.setpoint).max() < 0.006
 
@@ -105,43 +105,43 @@ def test_a_failed_drive_is_named_and_only_release_brings_it_back(
 def test_a_fault_is_not_reset_where_that_is_forbidden() -> None:
     wired = Wired(CanopenConfig(fault_reset=False))
     wired.up()
-    wired.happen(ELBOW, Fault.OVER_CURRENT)
+    wired.happen(ELBOW, DriveFault.OVER_CURRENT)
     wired.run(0.2)
-    wired.network.release(wired.now_ns)
+    wired.drives.release(wired.now_ns)
     wired.run(0.3)
-    assert "cannot be enabled: it is in fault" in wired.network.faults[ELBOW]
+    assert "cannot be enabled: it is in fault" in wired.drives.faults[ELBOW]
     assert wired.peer.drives[wired.index(ELBOW)].state is Power.FAULT
 
 
 @pytest.mark.parametrize(
     ("fault", "said"),
-    [(Fault.MAGNET_LOST, "encoder: magnet lost"), (Fault.PARITY, "encoder: parity error")],
+    [(DriveFault.MAGNET_LOST, "encoder: magnet lost"), (DriveFault.PARITY, "encoder: parity error")],
 )
 def test_an_encoder_that_warns_is_not_valid_until_it_is_well_again(
-    wired: Wired, fault: Fault, said: str
+    wired: Wired, fault: DriveFault, said: str
 ) -> None:
     wired.up()
     joint = wired.index(ELBOW)
     wired.happen(ELBOW, fault)
     wired.run(0.05)
-    assert dict(wired.network.faults) == {ELBOW: said}
-    assert np.flatnonzero(~wired.network.reading.valid).tolist() == [joint]
-    wired.happen(ELBOW, Fault.NONE)
+    assert dict(wired.drives.faults) == {ELBOW: said}
+    assert np.flatnonzero(~wired.drives.reading.valid).tolist() == [joint]
+    wired.happen(ELBOW, DriveFault.NONE)
     wired.run(0.05)
-    assert dict(wired.network.faults) == {}
-    assert wired.network.reading.valid.all()
+    assert dict(wired.drives.faults) == {}
+    assert wired.drives.reading.valid.all()
 
 
 def test_a_stuck_encoder_is_found_within_two_degrees(wired: Wired) -> None:
     wired.up()
-    wired.happen(ELBOW, Fault.ENCODER_STUCK)
+    wired.happen(ELBOW, DriveFault.ENCODER_STUCK)
     before = wired.read_rad()
     wired.setpoint = small_posture(wired)
     wired.run(1.5)
     joint = wired.index(ELBOW)
     assert wired.read_rad()[joint] == before[joint]
     assert np.degrees(wired.peer.plant.position_rad[joint]) < 4.0
-    assert "its output encoder 0.0°" in wired.network.faults[ELBOW]
+    assert "its output encoder 0.0°" in wired.drives.faults[ELBOW]
 
 
 def test_quick_stop_brakes_all_and_holds_whatever_is_written(wired: Wired) -> None:
@@ -149,16 +149,16 @@ def test_quick_stop_brakes_all_and_holds_whatever_is_written(wired: Wired) -> No
     wired.setpoint = small_posture(wired)
     wired.run(2.0)
     wired.setpoint = small_posture(wired, 0.35)
-    wired.network.stop()
+    wired.drives.stop()
     wired.run(0.5)
     assert all(drive.state is Power.QUICK_STOP for drive in wired.peer.drives)
-    assert dict(wired.network.faults) == {}
+    assert dict(wired.drives.faults) == {}
     assert np.abs(wired.read_rad() - small_posture(wired)).max() < 0.03
     wired.run(0.3)
     assert np.abs(wired.speed_rad_s(0.2)).max() < 0.02
 
-    wired.network.release(wired.now_ns)
-    wired.until(lambda: wired.network.running, 0.5)
+    wired.drives.release(wired.now_ns)
+    wired.until(lambda: wired.drives.running, 0.5)
     wired.run(1.5)
     assert np.abs(wired.read_rad() - wired.setpoint).max() < 0.006
     assert np.abs(wired.speed_rad_s(1.5)).max() < 1.5 * np.radians(wired.config.join_deg_s)
@@ -183,8 +183,8 @@ def test_a_dead_slave_leaves_drives_that_stop_by_themselves_and_hold(wired: Wire
     # a slave that lives again finds them holding, and says why
     wired.alive = True
     wired.run(0.2)
-    assert len(wired.network.faults) == 25
-    assert "has left operation by itself: quick stop active" in wired.network.faults[ELBOW]
+    assert len(wired.drives.faults) == 25
+    assert "has left operation by itself: quick stop active" in wired.drives.faults[ELBOW]
 
 
 def test_a_pause_that_the_drives_did_not_survive_is_no_jump(wired: Wired) -> None:
@@ -201,11 +201,11 @@ def test_a_pause_that_the_drives_did_not_survive_is_no_jump(wired: Wired) -> Non
         stopped = [drive.state is Power.QUICK_STOP for drive in wired.peer.drives]
         if any(stopped):
             assert all(stopped)
-            assert len(wired.network.faults) == 25
+            assert len(wired.drives.faults) == 25
             assert np.abs(wired.peer.plant.position_rad - stood).max() < 0.01
         wired.setpoint = wired.read_rad()
-        wired.network.release(wired.now_ns)
-        wired.until(lambda: wired.network.running, 0.5)
+        wired.drives.release(wired.now_ns)
+        wired.until(lambda: wired.drives.running, 0.5)
 
 
 def test_a_bus_cut_for_longer_than_the_drives_wait_is_no_jump(wired: Wired) -> None:
@@ -219,7 +219,7 @@ def test_a_bus_cut_for_longer_than_the_drives_wait_is_no_jump(wired: Wired) -> N
     wired.run(0.3)
     assert all(drive.state is Power.QUICK_STOP for drive in wired.peer.drives)
     assert np.abs(wired.peer.plant.position_rad - stood).max() < 0.01
-    assert len(wired.network.faults) == 25
+    assert len(wired.drives.faults) == 25
 
 
 def test_a_following_error_is_a_fault_of_the_drive_itself() -> None:
@@ -230,36 +230,36 @@ def test_a_following_error_is_a_fault_of_the_drive_itself() -> None:
     for _ in range(25):
         wired.setpoint = np.clip(wired.setpoint + 0.04, wired.skeleton.lower_rad, wired.skeleton.upper_rad)
         wired.run(0.02)
-    assert "following error (code 8611" in wired.network.faults["left_shoulder_pitch"]
+    assert "following error (code 8611" in wired.drives.faults["left_shoulder_pitch"]
 
 
 def test_a_bus_that_carries_nothing_fails_its_drives_only(wired: Wired) -> None:
     wired.up()
     wired.cut.add("right")
-    wired.network.on_bus("right", "receiving failed: network is down")
-    said = dict(wired.network.faults)
+    wired.drives.on_bus("right", "receiving failed: drives is down")
+    said = dict(wired.drives.faults)
     assert set(said) == {name for name in wired.skeleton.joint_names if name.startswith("right_")}
-    assert said["right_thumb"] == "bus right is down: receiving failed: network is down"
+    assert said["right_thumb"] == "bus right is down: receiving failed: drives is down"
     wired.run(1.0)
-    reading = wired.network.reading
+    reading = wired.drives.reading
     assert (reading.valid == [not n.startswith("right_") for n in wired.skeleton.joint_names]).all()
     wired.cut.clear()
-    wired.network.on_bus("right", "")
+    wired.drives.on_bus("right", "")
     wired.run(0.3)
     # heard again, but nobody has asked for it to move again
-    assert wired.network.reading.valid[wired.index("right_thumb")]
-    assert "silent" in wired.network.faults["right_thumb"]
-    wired.network.release(wired.now_ns)
+    assert wired.drives.reading.valid[wired.index("right_thumb")]
+    assert "silent" in wired.drives.faults["right_thumb"]
+    wired.drives.release(wired.now_ns)
     wired._flush()
-    wired.until(lambda: wired.network.running, 1.0)
+    wired.until(lambda: wired.drives.running, 1.0)
 
 
 def test_a_drive_that_is_not_there_is_named_with_its_place(wired: Wired) -> None:
-    wired.peer.drives[wired.index(ELBOW)].happen(Fault.SILENT)
+    wired.peer.drives[wired.index(ELBOW)].happen(DriveFault.SILENT)
     wired.start()
     wired.run(1.5)
-    bus, node = wired.network.where(ELBOW)
-    assert wired.network.not_running == {ELBOW: f"node {node} on bus {bus} does not answer"}
+    bus, node = wired.where(ELBOW)
+    assert wired.drives.not_running == {ELBOW: f"node {node} on bus {bus} does not answer"}
 
 
 def test_a_setting_that_is_refused_is_told_with_its_object(wired: Wired) -> None:
@@ -267,7 +267,7 @@ def test_a_setting_that_is_refused_is_told_with_its_object(wired: Wired) -> None
     node.add_write_callback(_refuse_limits)
     wired.start()
     wired.run(0.2)
-    said = wired.network.not_running["neck_yaw"]
+    said = wired.drives.not_running["neck_yaw"]
     assert "refuses its configuration: object 607D:1: value out of range" in said
 
 
@@ -281,42 +281,40 @@ def _refuse_limits(index: int, **_: object) -> None:
 def test_frames_of_wrong_length_and_of_strangers_change_nothing(wired: Wired) -> None:
     wired.up()
     wired.run(0.1)
-    reading = wired.network.reading
+    reading = wired.drives.reading
     for frame in ((0x181, b"short"), (0x181, bytes(9)), (0x1FF, bytes(8)), (0x5FF, bytes(8)), (0x700, b"")):
-        wired.network.on_frame("left", *frame, wired.now_ns)
-    wired.network.on_frame("nowhere", 0x181, bytes(8), wired.now_ns)
-    wired.network.on_frame("left", 0x581, bytes(8), wired.now_ns)
-    wired.network.on_frame("left", 0x081, b"", wired.now_ns)
-    assert wired.network.reading is reading
-    assert dict(wired.network.faults) == {}
-    assert wired.network.unknown == 6
+        wired.drives.on_frame("left", *frame, wired.now_ns)
+    wired.drives.on_frame("nowhere", 0x181, bytes(8), wired.now_ns)
+    wired.drives.on_frame("left", 0x581, bytes(8), wired.now_ns)
+    wired.drives.on_frame("left", 0x081, b"", wired.now_ns)
+    assert wired.drives.reading is reading
+    assert dict(wired.drives.faults) == {}
+    assert wired.drives.unknown == 6
 
 
 def test_an_emergency_without_a_fault_is_told_until_it_is_over(wired: Wired) -> None:
     wired.up()
-    wired.network.on_frame("left", 0x081, bytes.fromhex("1042090000000000"), wired.now_ns)
-    assert dict(wired.network.faults) == {
-        "neck_yaw": "over-temperature of the drive (code 4210, temperature)"
-    }
+    wired.drives.on_frame("left", 0x081, bytes.fromhex("1042090000000000"), wired.now_ns)
+    assert dict(wired.drives.faults) == {"neck_yaw": "over-temperature of the drive (code 4210, temperature)"}
     wired.run(0.1)
-    assert wired.network.running
-    wired.network.on_frame("left", 0x081, bytes(8), wired.now_ns)
-    assert dict(wired.network.faults) == {}
+    assert wired.drives.running
+    wired.drives.on_frame("left", 0x081, bytes(8), wired.now_ns)
+    assert dict(wired.drives.faults) == {}
 
 
 def test_a_drive_that_restarts_while_configured_is_configured_anew(wired: Wired) -> None:
     """The heartbeat that it shall watch for among it: or it would not stop when the slave dies."""
-    network, now_ns = wired.network, wired.now_ns
-    network.start(now_ns)
-    bus, node = network.where(ELBOW)
+    drives, now_ns = wired.drives, wired.now_ns
+    drives.start(now_ns)
+    bus, node = wired.where(ELBOW)
     request = pdo.SDO_REQUEST + node
 
     def asked() -> list[bytes]:
-        frames, network.outbox = network.outbox, []
+        frames, drives.outbox = drives.outbox, []
         return [data for where, frame_id, data in frames if (where, frame_id) == (bus, request)]
 
     first = asked()[0]
-    network.on_frame(bus, pdo.SDO_ANSWER + node, b"\x60" + first[1:4] + bytes(4), now_ns)
+    drives.on_frame(bus, pdo.SDO_ANSWER + node, b"\x60" + first[1:4] + bytes(4), now_ns)
     assert asked() != [first]
-    network.on_frame(bus, pdo.HEARTBEAT + node, b"\x00", now_ns)
+    drives.on_frame(bus, pdo.HEARTBEAT + node, b"\x00", now_ns)
     assert asked() == [first]

@@ -10,7 +10,7 @@ import tty
 from collections.abc import Callable
 
 from common.clock import Clock, monotonic_ns
-from slave.servos.dynamixel.simulated.bus import SimulatedBus
+from tests.slave.servos.dynamixel.simulated.bus import SimulatedBus
 
 _LOOK_S = 0.02
 """Between looks at whether to end, and at what moves by itself."""

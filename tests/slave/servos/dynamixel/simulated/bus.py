@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from slave.servos.dynamixel import registers as x
-from slave.servos.dynamixel.simulated import packets
-from slave.servos.dynamixel.simulated.packets import Packet, Parser, frame
-from slave.servos.dynamixel.simulated.servo import OK, SimulatedServo
+from tests.slave.servos.dynamixel.simulated import packets
+from tests.slave.servos.dynamixel.simulated.packets import Packet, Parser, frame
+from tests.slave.servos.dynamixel.simulated.servo import OK, SimulatedServo
 
 _UNKNOWN_INSTRUCTION = 2
 

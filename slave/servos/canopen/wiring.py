@@ -1,0 +1,66 @@
+"""Which node on which bus turns which joint. Drives are numbered in the order of the joints. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from common.skeleton import Skeleton
+from slave.servos.canopen import pdo
+from slave.servos.canopen.config import CanopenConfig
+
+Outgoing = tuple[str, int, bytes]
+"""Bus name, identifier, data."""
+START, STOP, PRE_OPERATIONAL = 0x01, 0x02, 0x80
+"""NMT commands."""
+BOOTED, OPERATIONAL = 0x00, 0x05
+"""NMT states in a heartbeat."""
+
+
+class DriveWiring:
+    """The identifiers that each drive sends and hears, and the frames to it."""
+
+    def __init__(self, config: CanopenConfig, skeleton: Skeleton) -> None:
+        self.joints = skeleton.joint_names
+        self.where = [(drive.bus, drive.id) for drive in config.drives_of(skeleton).values()]
+        """Bus and node id of each drive."""
+        self._buses = [bus.name for bus in config.buses]
+        self._beat = pdo.HEARTBEAT + config.node_id
+        self._targets = [(bus, pdo.RPDO1 + node) for bus, node in self.where]
+        self._by_answer = {(bus, pdo.TPDO1 + node): i for i, (bus, node) in enumerate(self.where)}
+        self._by_node = {where: i for i, where in enumerate(self.where)}
+
+    def answering(self, bus: str, frame_id: int) -> int | None:
+        """The drive whose answer to SYNC has this identifier, or None."""
+        return self._by_answer.get((bus, frame_id))
+
+    def sending(self, bus: str, frame_id: int) -> int | None:
+        """The drive that sends this identifier, whatever for, or None."""
+        return self._by_node.get((bus, frame_id & 0x7F))
+
+    def on_bus(self, bus: str) -> dict[int, str]:
+        """The joints on a bus by node id."""
+        rows = zip(self.where, self.joints, strict=True)
+        return {node: joint for (name, node), joint in rows if name == bus}
+
+    def nmt(self, drive: int, command: int) -> Outgoing:
+        """An NMT command to one drive."""
+        bus, node = self.where[drive]
+        return bus, pdo.NMT, bytes([command, node])
+
+    def sdo(self, drive: int, data: bytes) -> Outgoing:
+        """An SDO request to one drive."""
+        bus, node = self.where[drive]
+        return bus, pdo.SDO_REQUEST + node, data
+
+    def heartbeats(self) -> list[Outgoing]:
+        """The slave's own, one a bus."""
+        return [(bus, self._beat, bytes([OPERATIONAL])) for bus in self._buses]
+
+    def syncs(self) -> list[Outgoing]:
+        """SYNC, one a bus."""
+        return [(bus, pdo.SYNC, b"") for bus in self._buses]
+
+    def targets(self, data: Sequence[bytes], seen: Sequence[bool]) -> list[Outgoing]:
+        """Each drive's target, of those drives that are `seen`."""
+        rows = zip(self._targets, data, seen, strict=True)
+        return [(bus, frame_id, part) for (bus, frame_id), part, send in rows if send]

@@ -1,1 +1,0 @@
-"""A bus of X series servos that are not there, behind a pseudo-terminal."""
