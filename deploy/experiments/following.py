@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from common.wire.messages import Action
-from deploy.measure import Motion, MovedSeries, motion
+from deploy.measure import FollowedMotion, MovedSeries, motion
 from deploy.sim.network.profile import Profile, Way, load_profile
 from deploy.sim.world.whole_way import VirtualRun, World
 
@@ -32,7 +32,7 @@ PATIENCE_S = 6
 class Followed:
     """One run: how the robot followed, and what the guard had to do."""
 
-    motion: Motion | None
+    motion: FollowedMotion | None
     run: VirtualRun
 
 

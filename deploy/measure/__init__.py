@@ -1,12 +1,12 @@
 """Judge a finished run: what was solved and what the robot did, against the operator's true joint angles."""
 
 from deploy.measure.accuracy import Accuracy, accuracy
-from deploy.measure.motion import Motion, motion
+from deploy.measure.motion import FollowedMotion, motion
 from deploy.measure.trace import MovedSeries, SolvedSeries, Trace, TruthSeries
 
 __all__ = [
     "Accuracy",
-    "Motion",
+    "FollowedMotion",
     "MovedSeries",
     "SolvedSeries",
     "Trace",

@@ -17,7 +17,7 @@ import numpy as np
 from common.clock import NS_PER_S, to_ns
 from common.quaternion import Array
 from common.wire.messages import Command, Mask, RobotState
-from deploy.measure import Motion, MovedSeries, TruthSeries, motion
+from deploy.measure import FollowedMotion, MovedSeries, TruthSeries, motion
 from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
 from slave.limit.limit import SetpointLimiter
@@ -53,8 +53,8 @@ def arrivals(commands: Iterable[Command], states: Iterable[RobotState]) -> list[
 class Comparison:
     """The run and its replays, judged over the same instants."""
 
-    as_run: Motion
-    replayed: dict[str, Motion]
+    as_run: FollowedMotion
+    replayed: dict[str, FollowedMotion]
     """On the virtual robot; its row of the run's own strategy tells how true the replay is."""
 
     @property
@@ -72,7 +72,7 @@ def compare(
     moved = _end_of(moved)
     names = config.skeleton.joint_names
     as_run = motion(truth, moved, names)
-    replayed: dict[str, Motion] = {}
+    replayed: dict[str, FollowedMotion] = {}
     for strategy in STRATEGIES:
         judged = motion(truth, replay(accepted, moved, strategy, config), names) if as_run else None
         if judged is None:
@@ -92,7 +92,7 @@ def replay(
     period_ns = round(NS_PER_S / config.loop.rate_hz)
     moved = _rows(moved, slice(int(np.argmax(moved.tracking)), None))
     now_ns, taken = int(moved.encoder_ns[0]), 0
-    way = _Way(strategy, config, now_ns, moved.position_rad[0])
+    way = _ReplayedRobot(strategy, config, now_ns, moved.position_rad[0])
     stamps_ns, positions = [], []
     for wanted_ns in moved.encoder_ns.tolist():
         while now_ns <= wanted_ns:
@@ -125,7 +125,7 @@ def _rows(moved: MovedSeries, rows: slice) -> MovedSeries:
     )
 
 
-class _Way:
+class _ReplayedRobot:
     """From an accepted command to the encoders: tracker ▸ limiter ▸ robot."""
 
     def __init__(self, strategy: Strategy, config: SlaveConfig, now_ns: int, position_rad: Array) -> None:

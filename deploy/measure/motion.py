@@ -41,7 +41,7 @@ _Read = tuple[Mapping[str, float], Mask]
 
 
 @dataclass(frozen=True, slots=True)
-class JointMotion:
+class FollowedJoint:
     """One moving joint. The aligned figure uses the lag of the whole robot."""
 
     rmse_deg: float
@@ -50,10 +50,10 @@ class JointMotion:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class FollowedMotion:
     """How the robot followed, over all moving joints."""
 
-    joints: Mapping[str, JointMotion]
+    joints: Mapping[str, FollowedJoint]
     """The moving joints alone."""
     samples: int
     """Encoder readings judged."""
@@ -68,7 +68,7 @@ class Motion:
     """By moving joint, the share of its readings that were valid."""
 
 
-def motion(truth: TruthSeries, moved: MovedSeries, joint_names: Sequence[str]) -> Motion | None:
+def motion(truth: TruthSeries, moved: MovedSeries, joint_names: Sequence[str]) -> FollowedMotion | None:
     """Judge the encoders against the truth while the guard was in `track`; None where there is too little.
 
     `joint_names` (J,) are in the order of the columns; both series must carry stamps of one clock.
@@ -121,7 +121,7 @@ def _figures(
     robot_rad: Array,
     lag_ns: int | None,
     read: _Read,
-) -> Motion:
+) -> FollowedMotion:
     shares, asked = read
     now_rad = at_shift(truth, at_ns, 0)
     error = charged_with_largest(np.degrees(robot_rad - now_rad), asked)
@@ -130,14 +130,14 @@ def _figures(
         aligned = charged_with_largest(np.degrees(robot_rad - at_shift(truth, at_ns, lag_ns)), asked)
     robot, operator = accelerations(at_ns, robot_rad, np.where(np.isnan(robot_rad), np.nan, now_rad), GAP_S)
     joints = {
-        name: JointMotion(
+        name: FollowedJoint(
             rmse_deg=_rms(error[:, j]),
             aligned_rmse_deg=None if aligned is None else _rms(aligned[:, j]),
             roughness=_ratio(robot[:, j], operator[:, j]),
         )
         for j, name in enumerate(shares)
     }
-    return Motion(
+    return FollowedMotion(
         joints=joints,
         samples=len(at_ns),
         rmse_deg=_rms(error),

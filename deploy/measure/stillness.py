@@ -26,7 +26,7 @@ REST_S = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class StoppingMotion:
     """What was asked of the joints and what the encoders showed, at the same instants."""
 
     at_s: Array
@@ -55,7 +55,9 @@ class Stillness:
     """From the fault until every joint stood for good; None where one still moved at the end."""
 
 
-def stillness(course: Course, skeleton: Skeleton, concerned: Mask, still_rad: float = STILL_RAD) -> Stillness:
+def stillness(
+    course: StoppingMotion, skeleton: Skeleton, concerned: Mask, still_rad: float = STILL_RAD
+) -> Stillness:
     """Judge the joints (J,) `concerned`, at least one. The course begins at or before the fault."""
     joints = np.flatnonzero(concerned)
     after = course.at_s >= 0.0

@@ -10,7 +10,7 @@ from deploy.measure.verdict import Verdict, at_most
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class ReportTarget:
     """One value of a report and its limit."""
 
     name: str
@@ -20,7 +20,7 @@ class Target:
     unit: str = ""
 
 
-def judge_targets(report: Mapping[str, object], targets: Iterable[Target]) -> list[Verdict]:
+def judge_targets(report: Mapping[str, object], targets: Iterable[ReportTarget]) -> list[Verdict]:
     """A verdict for each target; not judged where the report does not hold the value."""
     return [at_most(t.name, _worse_side(report, t.path), t.limit, t.unit) for t in targets]
 

@@ -8,7 +8,7 @@ import pytest
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.experiments.faults.limits import Asked, asked_beyond, moved_beyond
-from deploy.measure.stillness import SPEED_ERROR_RAD_S, STILL_RAD, Course, stillness
+from deploy.measure.stillness import SPEED_ERROR_RAD_S, STILL_RAD, StoppingMotion, stillness
 from slave.encoders.counts import RAD_PER_COUNT
 
 SKELETON = load_skeleton("nursing")
@@ -17,12 +17,12 @@ AT_S = np.arange(-0.2, 2.0, 0.005)
 ALL = np.ones(JOINTS, np.bool_)
 
 
-def course(joint: int, position_rad: Array, asked_rad: float) -> Course:
+def course(joint: int, position_rad: Array, asked_rad: float) -> StoppingMotion:
     encoder = np.zeros((len(AT_S), JOINTS))
     encoder[:, joint] = np.rint(position_rad / RAD_PER_COUNT) * RAD_PER_COUNT
     setpoint = np.zeros_like(encoder)
     setpoint[:, joint] = asked_rad
-    return Course(AT_S, setpoint, encoder)
+    return StoppingMotion(AT_S, setpoint, encoder)
 
 
 def test_a_joint_that_runs_on_for_a_while() -> None:

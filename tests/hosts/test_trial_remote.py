@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from deploy.experiments.trial.cell.plan import CellKey, Plan, Setup
-from deploy.experiments.trial.cell.result import Status
+from deploy.experiments.trial.cell.plan import CellKey, Setup, TrialPlan
+from deploy.experiments.trial.cell.result import CellStatus
 from deploy.experiments.trial.remote.operator import run_remote_cell
 from deploy.harness.endpoints import free_port
 from deploy.harness.host import HostWatch
@@ -28,7 +28,7 @@ def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(
 ) -> None:
     setup = Setup("udp", "loopback", "predict")
     endpoint = f"tcp/127.0.0.1:{free_port('tcp')}"
-    plan = Plan(
+    plan = TrialPlan(
         transports=("udp",), profiles=("loopback",), strategies=("predict",), repeat=1, seconds=5.0,
         outage_s=0.0, robot="nursing", motion="sweep", seed=1, router=False, max_age_s=0.3, hosts=endpoint,
     )  # fmt: skip
@@ -42,7 +42,7 @@ def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(
         try:
             words: list[str] = []
             cell = await run_remote_cell(plan, CellKey(setup, 1), asyncio.Event(), words.append)
-            assert cell.status is Status.DONE, cell.why
+            assert cell.status is CellStatus.DONE, cell.why
             values = cell.values
             assert values["true_one_way_p50_ms"] is None, "two hosts have no shared clock"
             one_way, bound = values["one_way_p50_ms"], values["one_way_bound_ms"]

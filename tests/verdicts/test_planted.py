@@ -30,12 +30,12 @@ from deploy.experiments.soak.judge.growth import (
 )
 from deploy.experiments.trial.cell.plan import CellKey, Setup
 from deploy.experiments.trial.cell.result import Cell
-from deploy.experiments.trial.cell.result import Status as CellStatus
-from deploy.experiments.trial.report.spread import Row
+from deploy.experiments.trial.cell.result import CellStatus as CellStatus
+from deploy.experiments.trial.report.spread import SetupResults
 from deploy.experiments.trial.report.targets import LIMITS, SetupLimit, judge
 from deploy.measure.accuracy import SIDES
 from deploy.measure.stillness import stillness
-from deploy.measure.target import Target, judge_targets
+from deploy.measure.target import ReportTarget, judge_targets
 from deploy.measure.verdict import Outcome
 from deploy.ops.record.record import RecordOptions, Taken, _check
 from slave.guard import State
@@ -45,7 +45,7 @@ LONG = 3600
 TARGETS = {f"{name}: {t.name}": (ts, t) for name, ts in {**BY_PROFILE, "bench": BENCH}.items() for t in ts}
 
 
-def tree(targets: tuple[Target, ...], values: dict[str, float]) -> dict[str, Any]:
+def tree(targets: tuple[ReportTarget, ...], values: dict[str, float]) -> dict[str, Any]:
     """A report that holds each target's figure at its limit, or at the value given."""
     made: dict[str, Any] = {}
     for target in targets:
@@ -73,7 +73,7 @@ def test_each_limit_of_a_trial_is_missed_just_above_it(limit: SetupLimit) -> Non
     def met(value: float) -> bool:
         values = {"moved_alone": 0.0, limit.figure: value}
         cells = [Cell(CellKey(setup, n), CellStatus.DONE, values=values) for n in range(3)]
-        [found] = judge([Row(setup, cells, {})], [limit])
+        [found] = judge([SetupResults(setup, cells, {})], [limit])
         return found.passed is True
 
     assert met(limit.at_most)

@@ -11,7 +11,7 @@ import pytest
 from common.clock import NS_PER_MS
 from common.wire.messages import Action
 from deploy.experiments.following import SETTLE_S, SLOW, engaged, follow, moved
-from deploy.measure import Motion, motion
+from deploy.measure import FollowedMotion, motion
 from deploy.sim.network.profile import Profile, Way, load_profile
 from deploy.sim.world.whole_way import VirtualRun, World
 
@@ -21,8 +21,8 @@ ROUND_S = 16.0
 
 @dataclass(frozen=True)
 class Pair:
-    latest: Motion
-    predict: Motion
+    latest: FollowedMotion
+    predict: FollowedMotion
 
     @property
     def share(self) -> float:

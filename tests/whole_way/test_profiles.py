@@ -9,7 +9,7 @@ import pytest
 
 from common.skeleton.synergy import synergy_positions
 from common.wire.messages import Action
-from deploy.measure import Accuracy, Motion, accuracy, motion
+from deploy.measure import Accuracy, FollowedMotion, accuracy, motion
 from deploy.sim.world.whole_way import VirtualRun, World
 from slave.guard.limits import MotionLimits
 
@@ -22,7 +22,7 @@ class Run:
 
     run: VirtualRun
     solved: Accuracy
-    moved: Motion
+    moved: FollowedMotion
 
 
 def followed(profile: str, seconds: float) -> Run:

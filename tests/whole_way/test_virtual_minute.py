@@ -8,12 +8,12 @@ import pytest
 from common.wire.codec import encode
 from common.wire.messages import Action
 from deploy.experiments.following import engaged, follow
-from deploy.measure import Motion, accuracy
+from deploy.measure import FollowedMotion, accuracy
 from deploy.measure.paper import ETA_PERCENT, TABLE_1
 from deploy.sim.world.whole_way import VirtualRun, World
 
 
-def judged_motion(strategy: str, seconds: float) -> Motion:
+def judged_motion(strategy: str, seconds: float) -> FollowedMotion:
     done = follow(World(), strategy, seconds)
     assert not done.run.slave.guard.counters.doubts
     assert done.motion is not None

@@ -19,7 +19,7 @@ LEAST_ESTIMATED = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Errors:
+class OrientationErrors:
     """Errors of T samples, rad, not below 0; NaN where there is no truth or no estimate."""
 
     total: Array
@@ -44,11 +44,11 @@ class Score:
     error, which would make a filter that gives up look better."""
 
 
-def errors(q_world_from_sensor: Array, truth: Array) -> Errors:
+def errors(q_world_from_sensor: Array, truth: Array) -> OrientationErrors:
     """Errors of estimates (T, 4) against truth (T, 4)."""
     e = multiply(q_world_from_sensor, conjugate(truth))
     # the paper's 2 acos |w|, 2 atan |z / w| and 2 acos √(w² + z²), by atan2: well-conditioned near 0 too
-    return Errors(
+    return OrientationErrors(
         total=2.0 * np.arctan2(np.linalg.norm(e[:, 1:], axis=1), np.abs(e[:, 0])),
         heading=2.0 * np.arctan2(np.abs(e[:, 3]), np.abs(e[:, 0])),
         inclination=2.0 * np.arctan2(np.hypot(e[:, 1], e[:, 2]), np.hypot(e[:, 0], e[:, 3])),
@@ -56,7 +56,7 @@ def errors(q_world_from_sensor: Array, truth: Array) -> Errors:
     )
 
 
-def score(found: Errors, movement: Mask) -> Score:
+def score(found: OrientationErrors, movement: Mask) -> Score:
     """RMSE over the samples of `movement` (T,) that have truth; withheld below LEAST_ESTIMATED of them."""
     asked = movement & found.known
     counts = asked & np.isfinite(found.total)

@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from common.quaternion import Array
-from deploy.experiments.accuracy.broad import Errors, errors, score, with_heading_of
+from deploy.experiments.accuracy.broad import OrientationErrors, errors, score, with_heading_of
 from deploy.experiments.accuracy.frames import fit, hint
-from deploy.experiments.accuracy.online import Run, run_online
+from deploy.experiments.accuracy.online import FilterRun, run_online
 from deploy.experiments.accuracy.picture import Panel
 from deploy.experiments.accuracy.recording import Trial, load_trial
 from deploy.harness.workers import OnProgress, jobs_here, run_each
@@ -29,7 +29,7 @@ _TIMED = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class JudgedRecording:
     """What came of it."""
 
     tree: dict[str, Any]
@@ -45,7 +45,7 @@ def judge(
     jobs: int | None = None,
     *,
     align: bool = False,
-) -> Judged:
+) -> JudgedRecording:
     """Read all recordings, then run each filter online over each, in `jobs` processes at once.
 
     `align`: one constant rotation each side is taken out of the truth (`frames.fit`). `jobs` None: one a
@@ -69,13 +69,13 @@ def judge(
             for name in filters:
                 # others at work on this machine would count: timed again, alone
                 us = run_online(trial.beginning(_TIMED), _filter(trial, name), _unheard).us_per_sample
-                runs[name] = Run(found[path, name], us)
+                runs[name] = FilterRun(found[path, name], us)
                 progress.advance(timing)
             figures, panel = of_trial(trial, runs, align=align)
             tree["files"][str(path)] = figures
             panels.append(panel)
     tree["mean"] = mean_over(tree["files"].values())
-    return Judged(tree, panels)
+    return JudgedRecording(tree, panels)
 
 
 def _run(work: tuple[Path, str], tell: OnProgress) -> Array:
@@ -93,7 +93,9 @@ def _unheard(_: int) -> None:
     """Nobody waits for so little."""
 
 
-def of_trial(trial: Trial, runs: dict[str, Run], *, align: bool = False) -> tuple[dict[str, Any], Panel]:
+def of_trial(
+    trial: Trial, runs: dict[str, FilterRun], *, align: bool = False
+) -> tuple[dict[str, Any], Panel]:
     """One recording's figures and curves: against its truth, or against the first filter without one."""
     truth = trial.q_world_from_sensor
     of_filters: dict[str, dict[str, Any]] = {
@@ -130,7 +132,7 @@ def of_trial(trial: Trial, runs: dict[str, Run], *, align: bool = False) -> tupl
     )
 
 
-def _errors(trial: Trial, q: Array, truth: Array | None, reference: Array) -> Errors:
+def _errors(trial: Trial, q: Array, truth: Array | None, reference: Array) -> OrientationErrors:
     against = reference if truth is None else truth
     return errors(_same_heading(trial, q, against), against)
 

@@ -18,7 +18,7 @@ _REPORT_EVERY = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class FilterRun:
     """What one filter made of one recording."""
 
     q_world_from_sensor: Array
@@ -26,7 +26,7 @@ class Run:
     us_per_sample: Figures
 
 
-def run_online(trial: Trial, filter_: OrientationFilter, advance: Callable[[int], object]) -> Run:
+def run_online(trial: Trial, filter_: OrientationFilter, advance: Callable[[int], object]) -> FilterRun:
     """Filter a trial by a filter of one node. `advance` hears now and then how many samples went by."""
     gyr, acc, mag = (part[:, None] for part in (trial.gyr_rad_s, trial.acc_m_s2, trial.mag_ut))
     out = np.full((len(gyr), 4), np.nan)
@@ -46,4 +46,4 @@ def run_online(trial: Trial, filter_: OrientationFilter, advance: Callable[[int]
     advance(len(gyr) - len(kept) + len(kept) % _REPORT_EVERY)
     newest = np.maximum.accumulate(np.where(trial.dropped, -1, np.arange(len(gyr))))
     out[newest >= 0] = out[newest[newest >= 0]]
-    return Run(out, spread_us(durations_ns))
+    return FilterRun(out, spread_us(durations_ns))

@@ -22,7 +22,7 @@ from deploy.experiments.demo.plain import tree_or_none, trees
 from deploy.experiments.demo.robots import robot_problems, robot_row
 from deploy.harness.observer import Observer
 from deploy.harness.rig import ROBOT, Rig
-from deploy.measure import Accuracy, Motion, SolvedSeries, TruthSeries, accuracy, motion
+from deploy.measure import Accuracy, FollowedMotion, SolvedSeries, TruthSeries, accuracy, motion
 from deploy.measure.baseline import MOST_S, Comparison, arrivals, compare
 from deploy.measure.estimated import LEAST_ESTIMATED
 from slave.config import SlaveConfig
@@ -54,7 +54,7 @@ class DemoReport:
     """The judged figures of the first robot, and the JSON tree of all."""
 
     accuracy: Accuracy
-    motion: Motion | None
+    motion: FollowedMotion | None
     comparison: Comparison | None
     """With the other strategies, on the same commands; None where there is nothing to judge."""
     curves: Curves | None
@@ -173,7 +173,7 @@ def _one_way(slave: SlaveMetrics | None) -> dict[str, Any]:
     }
 
 
-def _answers_within(slave: SlaveMetrics | None, judged: Motion | None) -> float | None:
+def _answers_within(slave: SlaveMetrics | None, judged: FollowedMotion | None) -> float | None:
     """How late the robot answers, in ms: the slowest of 100 commands, and how far the motion lags.
 
     `end_to_end_ms` ends at the first change of any encoder, which a robot that moves already shows at once.
@@ -184,7 +184,7 @@ def _answers_within(slave: SlaveMetrics | None, judged: Motion | None) -> float 
     return None if p99 is None or lag_ms is None else p99 + max(0.0, lag_ms)
 
 
-def _motion_tree(judged: Motion | None, compared: Comparison | None) -> dict[str, Any]:
+def _motion_tree(judged: FollowedMotion | None, compared: Comparison | None) -> dict[str, Any]:
     replayed = compared.replayed if compared else {}
     return {
         "motion": _motion(judged),
@@ -197,7 +197,7 @@ def _motion_tree(judged: Motion | None, compared: Comparison | None) -> dict[str
     }
 
 
-def _motion(judged: Motion | None) -> dict[str, float | None]:
+def _motion(judged: FollowedMotion | None) -> dict[str, float | None]:
     return {
         "rmse_deg": judged.rmse_deg if judged else None,
         "aligned_rmse_deg": judged.aligned_rmse_deg if judged else None,

@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from deploy.measure.accuracy import SIDES, Accuracy, JointAccuracy
-from deploy.measure.motion import Motion
+from deploy.measure.motion import FollowedMotion
 from deploy.measure.paper import ETA_PERCENT, TABLE_1
 from deploy.report.tables import UNKNOWN, number, plain_table, within_limit
 
@@ -96,7 +96,7 @@ def accuracy_table(judged: Accuracy) -> RenderableType:
     return Group(table, eta, _joints_table(judged))
 
 
-def motion_table(judged: Motion | None) -> RenderableType:
+def motion_table(judged: FollowedMotion | None) -> RenderableType:
     """Moved against truth: each joint that moved, the worst first, then over all."""
     if judged is None:
         return Text(
@@ -120,7 +120,7 @@ def motion_table(judged: Motion | None) -> RenderableType:
     return Group(table, Text(f"motion lag {judged.lag_ms:.0f} ms", "bold"))
 
 
-def strategies_table(as_run: Motion, replayed: Mapping[str, Motion]) -> RenderableType:
+def strategies_table(as_run: FollowedMotion, replayed: Mapping[str, FollowedMotion]) -> RenderableType:
     """The run beside what each strategy makes of the same commands on the virtual robot."""
     table = plain_table(
         "", "RMSE °", "lag ms", "aligned °", "roughness", title="same commands, each strategy"

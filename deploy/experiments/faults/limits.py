@@ -9,7 +9,7 @@ import numpy as np
 
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from deploy.measure.stillness import SPEED_ERROR_RAD_S, Course, speeds
+from deploy.measure.stillness import SPEED_ERROR_RAD_S, StoppingMotion, speeds
 
 SERVO_SHARE = 0.05
 """By how much a servo may pass a setpoint that goes at the limit: 4.3 % for a second order at damping √½."""
@@ -44,7 +44,7 @@ def asked_beyond(asked: Asked, skeleton: Skeleton) -> list[str]:
     ]
 
 
-def moved_beyond(course: Course, skeleton: Skeleton) -> list[str]:
+def moved_beyond(course: StoppingMotion, skeleton: Skeleton) -> list[str]:
     """Limits that the joints themselves broke, the worst of each, servos and encoders allowed for."""
     fastest = skeleton.max_velocity_rad_s * (1.0 + SERVO_SHARE) + SPEED_ERROR_RAD_S
     lower, upper = skeleton.lower_rad - STOP_RAD, skeleton.upper_rad + STOP_RAD

@@ -30,7 +30,7 @@ from deploy.harness.excuse import Lost
 from deploy.harness.host import HostWatch, watch_host
 from deploy.harness.rig import DRIVES, Rig, drive_buses, open_rig
 from deploy.harness.start import start_tracking
-from deploy.measure.stillness import Course, stillness
+from deploy.measure.stillness import StoppingMotion, stillness
 from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
 from slave.servos.canopen.config import CanopenConfig
@@ -172,7 +172,7 @@ def _fast(rig: Rig) -> bool:
 
 
 def _judge(
-    fault: ProcessFault, course: Course, skeleton: Skeleton, state: str, reason: str, lost: Lost
+    fault: ProcessFault, course: StoppingMotion, skeleton: Skeleton, state: str, reason: str, lost: Lost
 ) -> Outcome:
     """`lost`: what the host lost from the fault to the row's bound."""
     measured = stillness(course, skeleton, np.ones(len(skeleton.joints), np.bool_))
@@ -235,12 +235,12 @@ class EncoderWatch:
         late = monotonic_ns() - self._heard_ns > to_ns(5.0 * SYNC_S)
         return [name for name, silent in zip(self._skeleton.joint_names, late, strict=True) if silent]
 
-    def course(self, fault_ns: int) -> Course:
+    def course(self, fault_ns: int) -> StoppingMotion:
         """What the encoders showed; where they came to rest stands for the last setpoint."""
         rows = [row for row in list(self._seen) if row[0] >= fault_ns - to_ns(0.2)]
         encoder = np.array([position for _, position in rows])
         at_s = np.array([to_s(at_ns - fault_ns) for at_ns, _ in rows])
-        return Course(at_s, np.broadcast_to(encoder[-1], encoder.shape), encoder)
+        return StoppingMotion(at_s, np.broadcast_to(encoder[-1], encoder.shape), encoder)
 
     def _listen(self) -> None:
         due_ns = 0

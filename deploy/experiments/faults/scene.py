@@ -18,7 +18,7 @@ from common.wire.messages import Action, Command
 from deploy.examples.profiles import NURSING
 from deploy.experiments.faults.limits import Asked
 from deploy.experiments.faults.setting import Later, Setting, files
-from deploy.measure.stillness import Course
+from deploy.measure.stillness import StoppingMotion
 from deploy.sim.suit.motion import Motion, parse_motion
 from deploy.sim.world.whole_way import VirtualRun, World
 from slave.encoders.counts import Encoders
@@ -167,10 +167,10 @@ class Scene:
                 since = None if row.state is not state else row.now_ns if since is None else since
         return None if since is None else to_s(since - self.fault_ns)
 
-    def course(self) -> Course:
+    def course(self) -> StoppingMotion:
         """From shortly before the fault to now."""
         rows = self._recent()
-        return Course(
+        return StoppingMotion(
             at_s=np.array([to_s(row.now_ns - self.fault_ns) for row in rows]),
             setpoint_rad=np.array([row.setpoint.position_rad for row in rows]),
             encoder_rad=np.array([self.encoders.position_rad(row.reading.counts) for row in rows]),

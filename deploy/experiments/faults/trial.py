@@ -13,7 +13,7 @@ from common.wire.messages import Mask
 from deploy.experiments.faults.fault import Fault, Reaction
 from deploy.experiments.faults.limits import asked_beyond, moved_beyond
 from deploy.experiments.faults.scene import TRIAL_S, Scene
-from deploy.measure.stillness import STILL_RAD, Course, Stillness, stillness
+from deploy.measure.stillness import STILL_RAD, Stillness, StoppingMotion, stillness
 from slave.guard import State
 
 
@@ -101,7 +101,7 @@ def _stillness_amiss(fault: Fault, figures: Stillness) -> list[str]:
     return []
 
 
-def _strayed_rad(fault: Fault, course: Course, concerned: Mask) -> float | None:
+def _strayed_rad(fault: Fault, course: StoppingMotion, concerned: Mask) -> float | None:
     others = np.ones_like(concerned) if fault.reaction is Reaction.GOES_ON else ~concerned
     if fault.strays_deg is None or not others.any():
         return None
@@ -110,7 +110,7 @@ def _strayed_rad(fault: Fault, course: Course, concerned: Mask) -> float | None:
 
 
 @cache
-def undisturbed() -> Course:
+def undisturbed() -> StoppingMotion:
     """The course without any fault, from `track`."""
     scene = Scene()
     scene.to(State.TRACK)

@@ -46,7 +46,7 @@ async def _needs_nothing(_: Stage) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class SoakFault:
     """One kind. After `begin` it lasts for a while, then `end` undoes it."""
 
     name: str
@@ -159,46 +159,46 @@ LINK_S = 1.5
 """An outage's own target (issue 5): commands flow again so soon after the link is back."""
 
 
-def _killed(name: str, lives: bool, flow_s: float | None, notices_s: float = 0.0) -> Fault:
-    return Fault(
+def _killed(name: str, lives: bool, flow_s: float | None, notices_s: float = 0.0) -> SoakFault:
+    return SoakFault(
         f"{name}-kill", f"the {name} is killed (kill -9) and started again",
         partial(_kill, name), partial(_start, name),
         ends_process=True, holds=True, lives=lives, notices_s=notices_s, flow_s=flow_s,
     )  # fmt: skip
 
 
-def _stepped(name: str, lives: bool) -> Fault:
-    return Fault(
+def _stepped(name: str, lives: bool) -> SoakFault:
+    return SoakFault(
         f"{name}-clock", f"the {name} is killed and comes back with its clock stepped, as after a reboot",
         partial(_kill, name), partial(_start_stepped, name),
         ends_process=True, holds=True, lives=lives, flow_s=RESTART_S, needs=_can_step,
     )  # fmt: skip
 
 
-FAULTS: Mapping[str, Fault] = {
+FAULTS: Mapping[str, SoakFault] = {
     fault.name: fault
     for fault in (
         _killed("master", lives=True, flow_s=RESTART_S),
         _killed("slave", lives=False, flow_s=RESTART_S),
         # commands go on, but with no valid joint they are nobody's
         _killed("suit", lives=True, flow_s=None, notices_s=SUIT_LOST_S),
-        Fault(
+        SoakFault(
             "recorder-kill", "the recorder is killed (kill -9) and started again",
             partial(_kill, recording.NAME), _restart_recorder, ends_process=True,
         ),
         _stepped("master", lives=True),
         _stepped("slave", lives=False),
-        Fault(
+        SoakFault(
             "outage", "nothing passes between the two hosts for some seconds", _cut, _restore, (3.0, 7.0),
             holds=True, flow_s=LINK_S, needs=_has_network,
         ),
-        Fault(
+        SoakFault(
             "router-restart", "the router is killed (kill -9) and started again",
             partial(_kill, ROUTER), partial(_start, ROUTER),
             ends_process=True, holds=True, lives=False, flow_s=RESTART_S, needs=_has_router,
         ),
-        Fault("node-loss", "one of the suit's nodes falls silent", _lose_node, _find_node, (2.0, 6.0)),
-        Fault(
+        SoakFault("node-loss", "one of the suit's nodes falls silent", _lose_node, _find_node, (2.0, 6.0)),
+        SoakFault(
             "disk-full", "the recorder's disk fills up", _fill_disk, _free_disk,
             (FILLS_S, FILLS_S), ends_process=True,
         ),

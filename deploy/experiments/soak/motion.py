@@ -10,7 +10,7 @@ from common.clock import NS_PER_S, to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask, RobotState
-from deploy.measure.stillness import STILL_RAD, Course, stillness
+from deploy.measure.stillness import STILL_RAD, StoppingMotion, stillness
 
 KEPT = 400
 """States: 8 s."""
@@ -72,6 +72,6 @@ class MotionWatch:
         if not rows or rows[-1][0] - fault_ns < NS_PER_S // 2 or rows[0][0] > fault_ns:
             return None
         at_s = np.array([to_s(at_ns - fault_ns) for at_ns, _, _ in rows])
-        course = Course(at_s, np.array([s for _, s, _ in rows]), np.array([p for _, _, p in rows]))
+        course = StoppingMotion(at_s, np.array([s for _, s, _ in rows]), np.array([p for _, _, p in rows]))
         everyone = np.ones(len(self._skeleton.joints), np.bool_)
         return stillness(course, self._skeleton, everyone if concerned is None else concerned).standstill_s

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from deploy.experiments.soak.schedule import Planned
+from deploy.experiments.soak.schedule import PlannedFault
 
 
 @dataclass(slots=True)
@@ -14,7 +14,7 @@ class SoakProgress:
     duration_s: float
     began_s: float | None = None
     """When the robot first followed, seconds of the soak."""
-    planned: list[Planned] = field(default_factory=list)
+    planned: list[PlannedFault] = field(default_factory=list)
     next: int = 0
     busy: str = "starting"
     """What is being done; empty while nothing is."""

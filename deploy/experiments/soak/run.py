@@ -19,7 +19,7 @@ from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from common.wire.messages import Action
 from deploy.experiments.soak import recorder as recording
-from deploy.experiments.soak.faults import FAULTS, Case, Fault, possible
+from deploy.experiments.soak.faults import FAULTS, Case, SoakFault, possible
 from deploy.experiments.soak.files.happenings import (
     FaultBegun,
     FaultRecovered,
@@ -139,7 +139,7 @@ class Soak:
         self._log.add(FaultRecovered(**asdict(recovery)))
         self.progress.busy = ""
 
-    async def _bring(self, fault: Fault, number: int) -> None:
+    async def _bring(self, fault: SoakFault, number: int) -> None:
         """One fault from its begin until the robot follows again."""
         watch, log = self._stage.watch, self._log
         self.progress.busy = fault.words

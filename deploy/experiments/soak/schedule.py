@@ -21,7 +21,7 @@ SHORTEST_S, LONGEST_S, TIMES_EACH = 20.0, 120.0, 2
 
 
 @dataclass(frozen=True, slots=True)
-class Planned:
+class PlannedFault:
     """One fault to come."""
 
     at_s: float
@@ -41,14 +41,14 @@ def calm_from_s(duration_s: float) -> float:
 
 def schedule(
     duration_s: float, kinds: Sequence[str], enders: Sequence[str], every_s: float, seed: int
-) -> list[Planned]:
+) -> list[PlannedFault]:
     """Faults in the order of time: rounds of all kinds, shuffled each time anew.
 
     `enders`: the kinds that end a process; they do not come in the calm part. Same arguments, same plan.
     """
     draw = random.Random(seed)
     calm_s = calm_from_s(duration_s)
-    planned: list[Planned] = []
+    planned: list[PlannedFault] = []
     waiting: list[str] = []
     at_s = SETTLE_S
     while True:
@@ -58,5 +58,5 @@ def schedule(
             waiting = draw.sample(allowed, len(allowed))
         if not waiting or at_s > duration_s - TAIL_S:
             return planned
-        planned.append(Planned(round(at_s, 3), waiting.pop()))
+        planned.append(PlannedFault(round(at_s, 3), waiting.pop()))
         at_s += every_s * draw.uniform(1.0 - SPREAD, 1.0 + SPREAD)

@@ -13,7 +13,7 @@ from common.errors import NetworkError, TandemError
 from common.process.runtime import run as run_until_stopped
 
 if TYPE_CHECKING:
-    from deploy.experiments.trial.cell.plan import Plan
+    from deploy.experiments.trial.cell.plan import TrialPlan
     from deploy.experiments.trial.progress import Progress
     from deploy.experiments.trial.run import RunCell
 
@@ -105,12 +105,12 @@ def trial(
     if context.invoked_subcommand is not None:
         return
     from deploy.experiments.trial.cell.choice import choose
-    from deploy.experiments.trial.cell.plan import Plan
+    from deploy.experiments.trial.cell.plan import TrialPlan
 
     if 0.0 < outage < SHORTEST_OUTAGE_S:
         raise TandemError(f"--outage {outage:g}: expected 0, or {SHORTEST_OUTAGE_S:g} s or longer")
     networks = (profiles,) if remote else choose("--profiles", profiles)
-    plan = Plan(
+    plan = TrialPlan(
         transports=choose("--transports", transports), profiles=networks,
         strategies=choose("--strategies", strategies), repeat=repeat, seconds=seconds,
         outage_s=0.0 if remote else outage, robot="nursing", motion=motion, seed=seed, router=router,
@@ -169,7 +169,7 @@ def report(
     _finish(folder, tasks, Console())
 
 
-def _run_here(plan: Plan, path: Path, tasks: Path | None) -> None:
+def _run_here(plan: TrialPlan, path: Path, tasks: Path | None) -> None:
     from deploy.experiments.trial.cell.stage import run_cell
     from deploy.sim.network.namespaces import why_not
 
@@ -179,7 +179,7 @@ def _run_here(plan: Plan, path: Path, tasks: Path | None) -> None:
     _run(plan, path, tasks, run_cell)
 
 
-def _run_remote(plan: Plan, path: Path, tasks: Path | None, link: Path | None) -> None:
+def _run_remote(plan: TrialPlan, path: Path, tasks: Path | None, link: Path | None) -> None:
     from dataclasses import replace
     from functools import partial
 
@@ -193,7 +193,7 @@ def _run_remote(plan: Plan, path: Path, tasks: Path | None, link: Path | None) -
     _run(plan, path, tasks, partial(run_remote_cell, tls=tls))
 
 
-def _run(plan: Plan, path: Path, tasks: Path | None, run_cell: RunCell) -> None:
+def _run(plan: TrialPlan, path: Path, tasks: Path | None, run_cell: RunCell) -> None:
     from deploy.experiments.trial.cell.folder import Folder
     from deploy.experiments.trial.report.tasks import TASKS, load_tasks
     from deploy.experiments.trial.run import run_trial

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common.clock import to_s
-from deploy.experiments.trial.cell.plan import CellKey, Plan
+from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 
 AROUND_S = 22.0
 """What a cell takes beside its judged time and its outage, before any has shown it: start, align, stop."""
@@ -22,7 +22,7 @@ AGAIN_S = 8.0
 class Progress:
     """Counts cells and takes their times."""
 
-    plan: Plan
+    plan: TrialPlan
     total: int
     """Cells to run now."""
     skipped: int = 0

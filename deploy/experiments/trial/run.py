@@ -12,22 +12,22 @@ from common.clock import monotonic_ns
 from common.errors import TandemError
 from deploy.experiments.trial.cell.figures import BY_NAME, printed
 from deploy.experiments.trial.cell.folder import Folder
-from deploy.experiments.trial.cell.plan import CellKey, Plan
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.progress import Progress, clock, draw
 
 Tell = Callable[[str], None]
-RunCell = Callable[[Plan, CellKey, asyncio.Event, Tell], Awaitable[Cell]]
+RunCell = Callable[[TrialPlan, CellKey, asyncio.Event, Tell], Awaitable[Cell]]
 
 
-def missing(plan: Plan, folder: Folder) -> list[CellKey]:
+def missing(plan: TrialPlan, folder: Folder) -> list[CellKey]:
     """The plan's cells that are not there, or failed, in the order they are to run."""
     there = folder.cells()
     return [key for key in plan.cells() if key not in there or not there[key].settled]
 
 
 async def run_trial(
-    plan: Plan, folder: Folder, run_cell: RunCell, stop: asyncio.Event, console: Console
+    plan: TrialPlan, folder: Folder, run_cell: RunCell, stop: asyncio.Event, console: Console
 ) -> Progress:
     """Run until all is there or `stop` is set. Raises TandemError where the folder does not fit the plan."""
     folder.begin(plan)
@@ -52,7 +52,9 @@ async def run_trial(
                 raise
             folder.keep(cell)
             progress.end(
-                ran=cell.status is Status.DONE, failed=cell.status is Status.FAILED, now_ns=monotonic_ns()
+                ran=cell.status is CellStatus.DONE,
+                failed=cell.status is CellStatus.FAILED,
+                now_ns=monotonic_ns(),
             )
             console.print(_line(cell), highlight=False)
     return progress
@@ -62,8 +64,8 @@ def _line(cell: Cell) -> str:
     """What a person wants to see of a cell at once."""
     key = cell.key
     head = f"[dim]{key.setup.profile}, {key.setup.name}, repeat {key.repetition}:[/]"
-    if cell.status is not Status.DONE:
-        colour = "yellow" if cell.status is Status.IMPOSSIBLE else "red"
+    if cell.status is not CellStatus.DONE:
+        colour = "yellow" if cell.status is CellStatus.IMPOSSIBLE else "red"
         return f"{head} [{colour}]{cell.status}[/]: {cell.why}"
     shown = ("one_way_p50_ms", "rmse_deg", "rmse_over_latest", "roughness", "flow_s")
     figures = (f"{BY_NAME[name].title} {printed(name, cell.values.get(name), unit=True)}" for name in shown)

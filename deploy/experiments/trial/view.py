@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from deploy.experiments.trial.cell.figures import BY_NAME, printed
-from deploy.experiments.trial.report.spread import Row
+from deploy.experiments.trial.report.spread import SetupResults
 from deploy.experiments.trial.report.write import Findings
 from deploy.measure.verdict import verdict_table
 from deploy.report.tables import plain_table
@@ -37,7 +37,7 @@ def print_findings(findings: Findings, console: Console) -> None:
         console.print(Text.assemble((f"{ranking.task.title}: ", "cyan"), ranking.verdict, "."))
 
 
-def _table(rows: Iterable[Row]) -> Table:
+def _table(rows: Iterable[SetupResults]) -> Table:
     """A section a network; at home in 80 columns."""
     heads = [f"{BY_NAME[n].title}{', ' + BY_NAME[n].unit if BY_NAME[n].unit else ''}" for n in SHOWN]
     table = plain_table("", *heads)

@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from deploy.measure.target import Target, judge_targets
+from deploy.measure.target import ReportTarget, judge_targets
 from deploy.measure.verdict import Outcome, Verdict, at_most, counts, unproven, verdict_table
 
 
@@ -38,7 +38,7 @@ def test_verdicts_are_passed_failed_and_not_judged() -> None:
 
 
 def test_a_side_without_a_figure_is_not_judged_by_the_other() -> None:
-    target = Target("elbow", ("table_1", "*_elbow", "error_deg"), 1.0)
+    target = ReportTarget("elbow", ("table_1", "*_elbow", "error_deg"), 1.0)
     left, right = {"error_deg": 0.2}, {"error_deg": 0.4}
 
     def value(table: dict[str, object]) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from deploy.experiments.accuracy.papers.figures import Figure
+from deploy.experiments.accuracy.papers.figures import PaperValue
 from deploy.measure import accuracy
 from deploy.sim.world.whole_way import VirtualRun, World
 
@@ -24,7 +24,9 @@ JOINTS = {
 """By profile: the joint, the segment whose field is turned, and the angles judged."""
 
 
-def experiment(seed: int, seconds: float = SECONDS, profiles: Sequence[str] = tuple(JOINTS)) -> list[Figure]:
+def experiment(
+    seed: int, seconds: float = SECONDS, profiles: Sequence[str] = tuple(JOINTS)
+) -> list[PaperValue]:
     """RMSE of each profile's angles with the joints' constraints and without, field disturbed and not."""
     figures = []
     for profile in profiles:
@@ -35,9 +37,9 @@ def experiment(seed: int, seconds: float = SECONDS, profiles: Sequence[str] = tu
             target = RATIO_TARGET if constraints == "online" else None
             ratio = () if quiet is None or turned is None else (turned / quiet,)
             figures += [
-                Figure(f"{of}: RMSE undisturbed", "°", () if quiet is None else (quiet,)),
-                Figure(f"{of}: RMSE disturbed", "°", () if turned is None else (turned,)),
-                Figure(f"{of}: disturbed / undisturbed", "", ratio, None, target),
+                PaperValue(f"{of}: RMSE undisturbed", "°", () if quiet is None else (quiet,)),
+                PaperValue(f"{of}: RMSE disturbed", "°", () if turned is None else (turned,)),
+                PaperValue(f"{of}: disturbed / undisturbed", "", ratio, None, target),
             ]
     return figures
 

@@ -32,7 +32,7 @@ def papers(
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from deploy.experiments.accuracy.papers.experiments import EXPERIMENTS
-    from deploy.experiments.accuracy.papers.figures import Figure, gather
+    from deploy.experiments.accuracy.papers.figures import PaperValue, gather
     from deploy.experiments.accuracy.papers.run import run_all
     from deploy.experiments.accuracy.papers.table import experiment_table, experiment_tree
     from deploy.measure.verdict import Outcome
@@ -43,7 +43,7 @@ def papers(
     if unknown:
         raise typer.BadParameter(f"there is no {', '.join(unknown)}; there are {', '.join(known)}")
     wanted = [e for e in EXPERIMENTS if not keys or e.key.lower() in (k.lower() for k in keys)]
-    found: dict[str, dict[int, list[Figure]]] = {experiment.key: {} for experiment in wanted}
+    found: dict[str, dict[int, list[PaperValue]]] = {experiment.key: {} for experiment in wanted}
     console = Console()
     columns = (
         TextColumn("{task.description}"),

@@ -10,7 +10,7 @@ from deploy.measure.verdict import Outcome, Verdict, at_most
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class PaperValue:
     """One figure of one seed. Of all of them less is better."""
 
     name: str
@@ -30,13 +30,13 @@ class Experiment:
     key: str
     """As `--only` names it."""
     title: str
-    run: Callable[[int], list[Figure]]
+    run: Callable[[int], list[PaperValue]]
     notes: tuple[str, ...] = ()
     """What a reader must know to judge the figures, a sentence each."""
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class PaperComparison:
     """A figure over all seeds."""
 
     name: str
@@ -83,15 +83,15 @@ class Row:
         return None if self.verdict is None else self.verdict.outcome
 
 
-def gather(by_seed: Mapping[int, Sequence[Figure]]) -> list[Row]:
+def gather(by_seed: Mapping[int, Sequence[PaperValue]]) -> list[PaperComparison]:
     """One row a figure, in the order of their first appearance, over the seeds' figures."""
-    found: dict[str, Figure] = {}
+    found: dict[str, PaperValue] = {}
     for figures in by_seed.values():
         for figure in figures:
             found.setdefault(figure.name, figure)
     of_seed = {seed: {figure.name: figure.values for figure in figures} for seed, figures in by_seed.items()}
     return [
-        Row(
+        PaperComparison(
             name,
             figure.unit,
             figure.paper,

@@ -24,7 +24,7 @@ DIFFERENCE_S = 5e-4
 
 
 @dataclass(frozen=True, slots=True)
-class Take:
+class SensorTake:
     """What N units read during one motion, beside what was so. One tick is one reading."""
 
     rate_hz: float
@@ -129,7 +129,7 @@ def record(
     units: Imperfections,
     on_segment: Sequence[int],
     q_segment_from_sensor: Array | None = None,
-) -> Take:
+) -> SensorTake:
     """What the units read while the motion is made; `on_segment` (N,) says where each of them sits.
 
     `q_segment_from_sensor` (S, 4): how they sit; None: aligned.
@@ -138,7 +138,7 @@ def record(
     ideal = ideal_readings(skeleton, motion, t_s, q_segment_from_sensor)
     samples = read_by(units, ideal[:, list(on_segment)])
     position_rad = motion.state(t_s)[0]
-    return Take(rate_hz, samples, position_rad, orientations(skeleton, position_rad))
+    return SensorTake(rate_hz, samples, position_rad, orientations(skeleton, position_rad))
 
 
 def read_by(units: Imperfections, ideal: Array) -> Array:
@@ -173,7 +173,7 @@ def ideal_readings(
     return out
 
 
-def ticks(take: Take) -> list[Tick]:
+def ticks(take: SensorTake) -> list[Tick]:
     """The take's readings one tick at a time; every unit answers."""
     count = take.samples.shape[2]
     fresh, lost = np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)

@@ -10,8 +10,16 @@ import numpy as np
 
 from common.quaternion import Array, conjugate, multiply, to_matrix
 from common.skeleton import Segment, Skeleton
-from deploy.experiments.accuracy.papers.figures import Figure
-from deploy.experiments.accuracy.papers.fixture import Take, Wave, Waves, free_joint, record, ticks, turntable
+from deploy.experiments.accuracy.papers.figures import PaperValue
+from deploy.experiments.accuracy.papers.fixture import (
+    SensorTake,
+    Wave,
+    Waves,
+    free_joint,
+    record,
+    ticks,
+    turntable,
+)
 from deploy.experiments.accuracy.papers.units import SESSION, calibrate
 from deploy.sim.suit.imperfections import Imperfections
 from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, Move
@@ -44,12 +52,12 @@ class _Node:
 
 def experiment(
     seed: int, hold_s: float = 10.0, moved_s: float = 60.0, session: TrayConfig = SESSION
-) -> list[Figure]:
+) -> list[PaperValue]:
     """The paper's section 4 with two units as delivered, calibrated by a session of their own."""
     units = Imperfections("raw", 2, seed)
     calibrated = calibrate(units, 2, [0, 1], seed, session)
     spread = tuple(100.0 * m.hold_out_spread_ut / m.fit.field_ut for m in calibrated.magnetic)
-    found = [Figure("ellipsoid, hold-out spread", "%", spread, None, SPREAD_TARGET_PERCENT)]
+    found = [PaperValue("ellipsoid, hold-out spread", "%", spread, None, SPREAD_TARGET_PERCENT)]
     still, rows = held(units, hold_s)
     moving = moved(units, seed, moved_s)
     for name in FILTERS:
@@ -73,7 +81,7 @@ def hinged_pair() -> Skeleton:
     return Skeleton("hinged pair", (*table.segments, second), (*table.joints, free_joint("hinge")))
 
 
-def orient(take: Take, filter_name: str, calibration: Calibration | None = None) -> tuple[Array, Array]:
+def orient(take: SensorTake, filter_name: str, calibration: Calibration | None = None) -> tuple[Array, Array]:
     """Orientations (T, N, 4) and rates (T, N, 3) that the master's estimator finds, tick by tick."""
     count = take.samples.shape[2]
     config = EstimationConfig.model_validate({"filter": filter_name, "zero_pose_s": ZERO_POSE_S})
@@ -86,7 +94,7 @@ def orient(take: Take, filter_name: str, calibration: Calibration | None = None)
     return q, rate
 
 
-def held(units: Imperfections, hold_s: float = 10.0) -> tuple[Take, list[slice]]:
+def held(units: Imperfections, hold_s: float = 10.0) -> tuple[SensorTake, list[slice]]:
     """The pair level, hinged to each angle in turn; and which rows belong to each hold."""
     skeleton, turn_s = hinged_pair(), 1.5
     moves, rows, now_s, at_deg = [], [], SETTLED_S, 0.0
@@ -101,7 +109,7 @@ def held(units: Imperfections, hold_s: float = 10.0) -> tuple[Take, list[slice]]
     return record(skeleton, motion, now_s, RATE_HZ, units, [0, 1]), rows
 
 
-def moved(units: Imperfections, seed: int, seconds: float = 60.0) -> Take:
+def moved(units: Imperfections, seed: int, seconds: float = 60.0) -> SensorTake:
     """Both units on one body, turned by hand about all three axes; the truth is the reference unit."""
     skeleton = turntable(lever_m=0.1)
     random = np.random.default_rng([seed, 7])
@@ -120,7 +128,7 @@ def moved(units: Imperfections, seed: int, seconds: float = 60.0) -> Take:
     return record(skeleton, motion, seconds, RATE_HZ, units, [0, 0])
 
 
-def still_figures(rows: Sequence[slice], q: Array, rate: Array) -> list[Figure]:
+def still_figures(rows: Sequence[slice], q: Array, rate: Array) -> list[PaperValue]:
     """Mean error and spread of the hinge's angle at each hold, as the master solves it."""
     solver = JointAngles(hinged_pair())
     errors, spreads = [], []
@@ -129,12 +137,14 @@ def still_figures(rows: Sequence[slice], q: Array, rate: Array) -> list[Figure]:
         errors.append(abs(math.degrees(float(np.mean(solved))) - angle_deg))
         spreads.append(math.degrees(float(np.std(solved))))
     return [
-        Figure("held at 0, 30, 60, 90°: mean error", "°", tuple(errors), STILL_PAPER_DEG, STILL_TARGET_DEG),
-        Figure("held: standard deviation", "°", tuple(spreads)),
+        PaperValue(
+            "held at 0, 30, 60, 90°: mean error", "°", tuple(errors), STILL_PAPER_DEG, STILL_TARGET_DEG
+        ),
+        PaperValue("held: standard deviation", "°", tuple(spreads)),
     ]
 
 
-def moving_figures(take: Take, q: Array) -> list[Figure]:
+def moving_figures(take: SensorTake, q: Array) -> list[PaperValue]:
     """Roll, pitch and yaw of both units against the truth, and by how much they are late."""
     after = round(SETTLED_S * RATE_HZ)
     truth = take.q_world_from_segment[after:, 0]
@@ -147,9 +157,9 @@ def moving_figures(take: Take, q: Array) -> list[Figure]:
         most.extend(np.abs(error_deg).max(axis=0).tolist())
     late_ms = tuple(1e3 * lateness_s(truth, q[after:, unit], RATE_HZ) for unit in range(q.shape[1]))
     return [
-        Figure("moved: RMSE of each axis", "°", tuple(rmse), RMSE_PAPER_DEG, RMSE_TARGET_DEG),
-        Figure("moved: largest error of each axis", "°", tuple(most), MOST_PAPER_DEG, MOST_TARGET_DEG),
-        Figure("moved: delay of the estimate", "ms", late_ms, 60.0, 60.0),
+        PaperValue("moved: RMSE of each axis", "°", tuple(rmse), RMSE_PAPER_DEG, RMSE_TARGET_DEG),
+        PaperValue("moved: largest error of each axis", "°", tuple(most), MOST_PAPER_DEG, MOST_TARGET_DEG),
+        PaperValue("moved: delay of the estimate", "ms", late_ms, 60.0, 60.0),
     ]
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from common.quaternion import IDENTITY, Array, conjugate, from_axis_angle, normalise, rotate
 from common.skeleton import load_skeleton
-from deploy.experiments.accuracy.papers.figures import Figure
-from deploy.experiments.accuracy.papers.fixture import Take, record
+from deploy.experiments.accuracy.papers.figures import PaperValue
+from deploy.experiments.accuracy.papers.fixture import SensorTake, record
 from deploy.sim.suit.imperfections import GradeName, Imperfections
 from deploy.sim.suit.motion import load_motion
 from master.calibrate.alignment import find_alignment
@@ -29,16 +29,16 @@ WORN = tuple(name for name in LEGS.segment_names if name.endswith(("thigh", "sha
 KNEES = ("left_shank", "right_shank")
 
 
-def experiment(seed: int, grade: GradeName = "calibrated") -> list[Figure]:
+def experiment(seed: int, grade: GradeName = "calibrated") -> list[PaperValue]:
     """Both knees of one walk, every sensor 40° askew about an axis of its own; no magnetometer is read."""
     q_segment_from_sensor = askew(seed)
     take = walk(seed, grade, q_segment_from_sensor)
     found = find_alignment(recordings(take), LEGS, zero_pose_s=(0.3, STILL_S - 0.3))
     missing = [name for name in WORN if name not in found.nodes]
     axes = axis_errors_deg(take, q_segment_from_sensor)
-    figures = [Figure("hinge axes in both sensors' frames", "°", axes, None, AXIS_TARGET_DEG)]
+    figures = [PaperValue("hinge axes in both sensors' frames", "°", axes, None, AXIS_TARGET_DEG)]
     if missing:
-        return [*figures, Figure("knee angle, RMSE", "°", (), None, KNEE_TARGET_DEG)]
+        return [*figures, PaperValue("knee angle, RMSE", "°", (), None, KNEE_TARGET_DEG)]
     alignment = np.array(
         [found.nodes[name].q_sensor_from_segment if name in WORN else IDENTITY for name in LEGS.segment_names]
     )
@@ -46,9 +46,9 @@ def experiment(seed: int, grade: GradeName = "calibrated") -> list[Figure]:
     own_zero_deg = error_deg - error_deg.mean(axis=1, keepdims=True)
     return [
         *figures,
-        Figure("knee angle, RMSE", "°", _rms(error_deg), None, KNEE_TARGET_DEG),
-        Figure("knee angle, largest error", "°", tuple(np.abs(error_deg).max(axis=1).tolist())),
-        Figure("knee angle, RMSE about its mean error", "°", _rms(own_zero_deg)),
+        PaperValue("knee angle, RMSE", "°", _rms(error_deg), None, KNEE_TARGET_DEG),
+        PaperValue("knee angle, largest error", "°", tuple(np.abs(error_deg).max(axis=1).tolist())),
+        PaperValue("knee angle, RMSE about its mean error", "°", _rms(own_zero_deg)),
     ]
 
 
@@ -58,7 +58,7 @@ def askew(seed: int) -> Array:
     return from_axis_angle(axes, np.full(len(axes), math.radians(ASKEW_DEG)))
 
 
-def walk(seed: int, grade: GradeName, q_segment_from_sensor: Array) -> Take:
+def walk(seed: int, grade: GradeName, q_segment_from_sensor: Array) -> SensorTake:
     """Standing still, then 20 s of walking, read by a unit on each of the 7 segments."""
     count = len(LEGS.segments)
     units = Imperfections(grade, count, seed)
@@ -66,7 +66,7 @@ def walk(seed: int, grade: GradeName, q_segment_from_sensor: Array) -> Take:
     return record(LEGS, motion, STILL_S + MOTION_S, RATE_HZ, units, range(count), q_segment_from_sensor)
 
 
-def recordings(take: Take) -> dict[str, NodeRecording]:
+def recordings(take: SensorTake) -> dict[str, NodeRecording]:
     """The take by segment, without magnetometers."""
     return {
         name: NodeRecording(name, take.rate_hz, take.samples[:, 0, i], take.samples[:, 1, i])
@@ -75,7 +75,7 @@ def recordings(take: Take) -> dict[str, NodeRecording]:
     }
 
 
-def axis_errors_deg(take: Take, q_segment_from_sensor: Array) -> tuple[float, ...]:
+def axis_errors_deg(take: SensorTake, q_segment_from_sensor: Array) -> tuple[float, ...]:
     """Angle between each knee's found and true axis in both sensors' frames, whatever the sign."""
     after = slice(round(STILL_S * RATE_HZ), None)
     gyr = take.samples[:, 1] - take.samples[: after.start, 1].mean(axis=0)
@@ -91,7 +91,7 @@ def axis_errors_deg(take: Take, q_segment_from_sensor: Array) -> tuple[float, ..
     return tuple(errors)
 
 
-def knee_errors_deg(take: Take, q_sensor_from_segment: Array) -> Array:
+def knee_errors_deg(take: SensorTake, q_sensor_from_segment: Array) -> Array:
     """Fused angle minus truth of both knees while walking, (2, T)."""
     rows = []
     for name in KNEES:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from deploy.experiments.accuracy.papers.figures import Experiment, Figure
+from deploy.experiments.accuracy.papers.figures import Experiment, PaperValue
 from deploy.harness.workers import OnProgress, jobs_here, run_each
 
-Done = tuple[Experiment, int, list[Figure]]
+Done = tuple[Experiment, int, list[PaperValue]]
 
 
 def run_all(
@@ -19,6 +19,6 @@ def run_all(
         yield experiment, seed, figures
 
 
-def _run(work: tuple[Experiment, int], _: OnProgress) -> list[Figure]:
+def _run(work: tuple[Experiment, int], _: OnProgress) -> list[PaperValue]:
     experiment, seed = work
     return experiment.run(seed)

@@ -8,12 +8,12 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from deploy.experiments.accuracy.papers.figures import Experiment, Row
+from deploy.experiments.accuracy.papers.figures import Experiment, PaperComparison
 from deploy.measure.verdict import STYLES
 from deploy.report.tables import UNKNOWN, plain_table
 
 
-def experiment_table(experiment: Experiment, rows: Sequence[Row]) -> RenderableType:
+def experiment_table(experiment: Experiment, rows: Sequence[PaperComparison]) -> RenderableType:
     """One experiment: the paper's figure beside ours, mean and worst over seeds, and the target."""
     heads = ("paper", "mean", "worst", "at most", "")
     table = plain_table("", *heads, title=f"{experiment.key}  {experiment.title}")
@@ -26,7 +26,7 @@ def experiment_table(experiment: Experiment, rows: Sequence[Row]) -> RenderableT
     return Group(table, *(Text(note, "dim") for note in experiment.notes))
 
 
-def experiment_tree(experiment: Experiment, rows: Sequence[Row]) -> dict[str, Any]:
+def experiment_tree(experiment: Experiment, rows: Sequence[PaperComparison]) -> dict[str, Any]:
     """The same for a report."""
     return {
         "title": experiment.title,

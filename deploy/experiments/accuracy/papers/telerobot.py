@@ -11,7 +11,7 @@ from pathlib import Path
 from common.config.sensor_calibration import Made
 from common.quaternion import IDENTITY
 from common.skeleton import load_skeleton
-from deploy.experiments.accuracy.papers.figures import Figure
+from deploy.experiments.accuracy.papers.figures import PaperValue
 from deploy.experiments.accuracy.papers.units import SESSION, calibrate
 from deploy.measure import Accuracy, accuracy
 from deploy.measure.accuracy import SIDES, FastAccuracy
@@ -32,14 +32,14 @@ SECONDS = 32.5
 
 def whole_way(
     seed: int, seconds: float = SECONDS, suit: Sequence[str] = (), master: Sequence[str] = ()
-) -> list[Figure]:
+) -> list[PaperValue]:
     """Table 1 and η for the suit of that seed; `suit` and `master` are overrides of the example files."""
     run = VirtualRun(World(overrides={"suit": [f"seed={seed}", *suit], "master": list(master)}))
     run.run(seconds)
     return judge(accuracy(run.trace.truth(), run.trace.solved(), run.trace.joint_names))
 
 
-def as_a_suit(seed: int, seconds: float = SECONDS) -> list[Figure]:
+def as_a_suit(seed: int, seconds: float = SECONDS) -> list[PaperValue]:
     """The same with what only a suit knows: how its units sit, a zero pose first, what elbows cannot do.
 
     The alignment is as `tandem calibrate align` leaves it, here of units that sit straight.
@@ -53,7 +53,7 @@ def as_a_suit(seed: int, seconds: float = SECONDS) -> list[Figure]:
         return whole_way(seed, seconds, (), master)
 
 
-def own_calibration(seed: int, seconds: float = SECONDS, session: TrayConfig = SESSION) -> list[Figure]:
+def own_calibration(seed: int, seconds: float = SECONDS, session: TrayConfig = SESSION) -> list[PaperValue]:
     """The same with units as delivered, calibrated by a session of their own and put on in the zero pose."""
     names = load_skeleton("nursing").segment_names
     chosen = [names.index(name) for name in ARMS]
@@ -69,13 +69,13 @@ def own_calibration(seed: int, seconds: float = SECONDS, session: TrayConfig = S
         return whole_way(seed, seconds, ['grade="raw"'], master)
 
 
-def judge(judged: Accuracy) -> list[Figure]:
+def judge(judged: Accuracy) -> list[PaperValue]:
     """A run's figures, one value a side where there are two: the paper measured one arm."""
     # one arm's figure must not stand for two where the other's is withheld
     rows = {joint: [] if judged.worse(joint) is None else _sides(judged, joint) for joint in TABLE_1}
     names = {joint: joint.replace("_", " ") for joint in TABLE_1}
     errors = [
-        Figure(
+        PaperValue(
             f"{names[joint]}, mean error",
             "°",
             tuple(row.error_deg for row in rows[joint]),
@@ -85,7 +85,9 @@ def judge(judged: Accuracy) -> list[Figure]:
         for joint, paper in TABLE_1.items()
     ]
     shares = [
-        Figure(f"{names[joint]}, share of the step", "", tuple(row.ratio for row in rows[joint]), paper.ratio)
+        PaperValue(
+            f"{names[joint]}, share of the step", "", tuple(row.ratio for row in rows[joint]), paper.ratio
+        )
         for joint, paper in TABLE_1.items()
     ]
     by_side = judged.eta_percent_by_side.values()
@@ -93,9 +95,9 @@ def judge(judged: Accuracy) -> list[Figure]:
     return [
         *errors,
         *shares,
-        Figure("η (Eq. 25)", "%", etas, ETA_PERCENT, ETA_TARGET_PERCENT),
-        Figure("beside η: mean absolute error", "°", _known(judged.fast_mae_deg)),
-        Figure("beside η: RMSE", "°", _known(judged.fast_rmse_deg)),
+        PaperValue("η (Eq. 25)", "%", etas, ETA_PERCENT, ETA_TARGET_PERCENT),
+        PaperValue("beside η: mean absolute error", "°", _known(judged.fast_mae_deg)),
+        PaperValue("beside η: RMSE", "°", _known(judged.fast_rmse_deg)),
     ]
 
 

@@ -10,7 +10,7 @@ Values = Mapping[str, float | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class CellMetric:
     """One figure."""
 
     name: str
@@ -26,78 +26,78 @@ class Figure:
 LATENCY, TRIP, MOTION, GUARD, OUTAGE, COST = "latency", "trip", "motion", "guard", "outage", "cost"
 
 FIGURES = (
-    Figure("one_way_p50_ms", "one-way p50", "ms", 1, LATENCY,
+    CellMetric("one_way_p50_ms", "one-way p50", "ms", 1, LATENCY,
            "put → received, of every command that arrived in the judged time, by the clock offset that was "
            "measured then"),
-    Figure("one_way_p99_ms", "one-way p99", "ms", 1, LATENCY, "the same, 99th percentile"),
-    Figure("one_way_corrected_p99_ms", "with the missing, p99", "ms", 1, LATENCY,
+    CellMetric("one_way_p99_ms", "one-way p99", "ms", 1, LATENCY, "the same, 99th percentile"),
+    CellMetric("one_way_corrected_p99_ms", "with the missing, p99", "ms", 1, LATENCY,
            "the same over every command that was due, also those that never came or were never sent: how "
            "long the robot went without what they had to say (correction for coordinated omission)"),
-    Figure("one_way_bound_ms", "bound ±", "ms", 1, LATENCY,
+    CellMetric("one_way_bound_ms", "bound ±", "ms", 1, LATENCY,
            "how wrong the clock offset can make a one-way figure at most: half the least round trip, "
            "plus drift"),
-    Figure("true_one_way_p50_ms", "true p50", "ms", 1, LATENCY,
+    CellMetric("true_one_way_p50_ms", "true p50", "ms", 1, LATENCY,
            "one-way of accepted commands by the one clock that both namespaces share: a check of the "
            "bound that two real hosts do not have"),
-    Figure("true_one_way_p99_ms", "true p99", "ms", 1, LATENCY, "the same, 99th percentile"),
-    Figure("round_trip_p50_ms", "round trip p50", "ms", 1, TRIP,
+    CellMetric("true_one_way_p99_ms", "true p99", "ms", 1, LATENCY, "the same, 99th percentile"),
+    CellMetric("round_trip_p50_ms", "round trip p50", "ms", 1, TRIP,
            "command put → its echo heard, in the judged time, on the master's clock, without the time the "
            "robot held it"),
-    Figure("round_trip_p99_ms", "round trip p99", "ms", 1, TRIP, "the same, 99th percentile"),
-    Figure("age_p50_ms", "age p50", "ms", 1, TRIP,
+    CellMetric("round_trip_p99_ms", "round trip p99", "ms", 1, TRIP, "the same, 99th percentile"),
+    CellMetric("age_p50_ms", "age p50", "ms", 1, TRIP,
            "age at the servo: the operator stood so → the setpoint that first uses it is written"),
-    Figure("age_p99_ms", "age p99", "ms", 1, TRIP, "the same, 99th percentile"),
-    Figure("delivered", "delivered", "%", 1, TRIP,
+    CellMetric("age_p99_ms", "age p99", "ms", 1, TRIP, "the same, 99th percentile"),
+    CellMetric("delivered", "delivered", "%", 1, TRIP,
            "commands that reached the robot, of those that were due by their numbers and by time"),
-    Figure("accepted", "accepted", "%", 1, TRIP,
+    CellMetric("accepted", "accepted", "%", 1, TRIP,
            "commands that the guard accepted, of those sent; the rest was lost, stale or overtaken"),
-    Figure("rmse_deg", "RMSE", "°", 2, MOTION,
+    CellMetric("rmse_deg", "RMSE", "°", 2, MOTION,
            "same-instant tracking error: encoders against the operator's true angles at the same moment, "
            "over the joints that move: what the patient sees"),
-    Figure("rmse_over_latest", "RMSE / latest", "", 3, MOTION,
+    CellMetric("rmse_over_latest", "RMSE / latest", "", 3, MOTION,
            "that error over the one plain hold makes of the very same commands, replayed with their "
            "arrival times"),
-    Figure("lag_ms", "motion lag", "ms", 0, MOTION,
+    CellMetric("lag_ms", "motion lag", "ms", 0, MOTION,
            "the shift in time that makes robot and operator fit best; negative: the robot is early"),
-    Figure("aligned_rmse_deg", "aligned RMSE", "°", 2, MOTION,
+    CellMetric("aligned_rmse_deg", "aligned RMSE", "°", 2, MOTION,
            "the error that is left when the lag is taken out"),
-    Figure("roughness", "roughness", "", 2, MOTION,
+    CellMetric("roughness", "roughness", "", 2, MOTION,
            "RMS acceleration of the robot over the operator's; 1 is as smooth as the operator"),
-    Figure("eta_percent", "η", "%", 2, MOTION,
+    CellMetric("eta_percent", "η", "%", 2, MOTION,
            "the paper's dynamic error (Eq. 25) of the solved angles, the worse arm; the network has no "
            "part in it; withheld below 95 % estimated"),
-    Figure("estimated", "estimated", "%", 1, MOTION,
+    CellMetric("estimated", "estimated", "%", 1, MOTION,
            "share of the joints' angles that were estimated, of the joint with the least"),
-    Figure("tracked", "tracked", "%", 1, GUARD, "share of the judged time in which the robot followed"),
-    Figure("holds", "holds", "", 0, GUARD,
+    CellMetric("tracked", "tracked", "%", 1, GUARD, "share of the judged time in which the robot followed"),
+    CellMetric("holds", "holds", "", 0, GUARD,
            "times that the guard left track during the judged time; the operator then engaged again"),
-    Figure("refused", "refused", "", 0, GUARD, "commands that arrived and were refused by a gate"),
-    Figure("clamps", "clamps", "", 0, GUARD,
+    CellMetric("refused", "refused", "", 0, GUARD, "commands that arrived and were refused by a gate"),
+    CellMetric("clamps", "clamps", "", 0, GUARD,
            "times that a joint was given less than was asked, by any limit"),
-    Figure("held_s", "cut → hold", "s", 2, OUTAGE,
+    CellMetric("held_s", "cut → hold", "s", 2, OUTAGE,
            "the link is cut → the robot holds, by itself; its time-out is 0.2 s without a command"),
-    Figure("flow_s", "flow after outage", "s", 2, OUTAGE,
+    CellMetric("flow_s", "flow after outage", "s", 2, OUTAGE,
            "the link returns → the guard accepts the first command"),
-    Figure("stale_accepted", "stale accepted", "", 0, OUTAGE,
+    CellMetric("stale_accepted", "stale accepted", "", 0, OUTAGE,
            "commands accepted after the return that were older than the guard may take, by the shared "
            "clock; none may be. Of several between two states (20 ms) only the last is seen: of the others "
            "as many count as the robot's own counter proves"),
-    Figure("stale_refused", "stale refused", "", 0, OUTAGE,
+    CellMetric("stale_refused", "stale refused", "", 0, OUTAGE,
            "commands that the guard refused for their age from the cut on"),
-    Figure("moved_alone", "moved alone", "", 0, OUTAGE,
+    CellMetric("moved_alone", "moved alone", "", 0, OUTAGE,
            "1 where the robot left hold before the operator's act; it must not"),
-    Figure("ready_s", "ready after outage", "s", 2, OUTAGE,
+    CellMetric("ready_s", "ready after outage", "s", 2, OUTAGE,
            "the link returns → the operator holds the lease and may engage"),
-    Figure("track_again_s", "act → track", "s", 2, OUTAGE,
+    CellMetric("track_again_s", "act → track", "s", 2, OUTAGE,
            "the operator engages → the robot follows again"),
-    Figure("cpu_master", "CPU master", "%", 1, COST, "of one core, while judged"),
-    Figure("cpu_slave", "CPU slave", "%", 1, COST,
+    CellMetric("cpu_master", "CPU master", "%", 1, COST, "of one core, while judged"),
+    CellMetric("cpu_slave", "CPU slave", "%", 1, COST,
            "of one core, while judged, the simulated robot included"),
-    Figure("cpu_router", "CPU router", "%", 1, COST, "of one core, where there is one"),
-    Figure("up_kb_s", "to robot", "kB/s", 2, COST,
+    CellMetric("cpu_router", "CPU router", "%", 1, COST, "of one core, where there is one"),
+    CellMetric("up_kb_s", "to robot", "kB/s", 2, COST,
            "bytes on the wire per second, operator → robot, headers and acknowledgements included"),
-    Figure("down_kb_s", "from robot", "kB/s", 2, COST, "the same, robot → operator"),
-    Figure("ticks_missed", "ticks missed", "%", 2, COST,
+    CellMetric("down_kb_s", "from robot", "kB/s", 2, COST, "the same, robot → operator"),
+    CellMetric("ticks_missed", "ticks missed", "%", 2, COST,
            "of the master's and slave's loops, the worse: of a machine that misses many, distrust every "
            "figure"),
 )  # fmt: skip

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import TandemError
-from deploy.experiments.trial.cell.plan import CellKey, Plan, check_continues, merged
+from deploy.experiments.trial.cell.plan import CellKey, TrialPlan, check_continues, merged
 from deploy.experiments.trial.cell.result import Cell
 from deploy.report.output import writing
 
@@ -23,7 +23,7 @@ class Folder:
         self.path = path
         self._cells = path / "cells"
 
-    def begin(self, plan: Plan) -> Plan:
+    def begin(self, plan: TrialPlan) -> TrialPlan:
         """Take up a plan, beside what is there already; the plan of all its cells.
 
         Raises TandemError where the folder holds cells of a plan that this one does not continue.
@@ -37,7 +37,7 @@ class Folder:
         _write(self.path / PLAN, plan.tree())
         return plan
 
-    def plan(self) -> Plan:
+    def plan(self) -> TrialPlan:
         """Of the trial that lies here. Raises TandemError where none does."""
         plan = self._plan()
         if plan is None:
@@ -59,9 +59,9 @@ class Folder:
         """Write it, whole or not at all."""
         _write(self._cells / f"{cell.key.slug}.json", cell.tree())
 
-    def _plan(self) -> Plan | None:
+    def _plan(self) -> TrialPlan | None:
         file = self.path / PLAN
-        return Plan.of_tree(_read(file)) if file.exists() else None
+        return TrialPlan.of_tree(_read(file)) if file.exists() else None
 
 
 def as_json(tree: Mapping[str, Any]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from deploy.experiments.trial.cell.measure import excerpt, measure, one_way_percentiles_ms
 from deploy.experiments.trial.cell.plan import CellKey
 from deploy.experiments.trial.cell.recording import CellCourse, counts, echoes
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from slave.config import SlaveConfig
 
 
@@ -20,10 +20,10 @@ def judged(
     """
     why = _nothing_to_judge(course)
     if why:
-        return Cell(key, Status.FAILED, why, remarks=(*course.remarks, *remarks), settings=settings)
+        return Cell(key, CellStatus.FAILED, why, remarks=(*course.remarks, *remarks), settings=settings)
     return Cell(
         key=key,
-        status=Status.DONE,
+        status=CellStatus.DONE,
         values=measure(course, config),
         remarks=(*course.remarks, *remarks),
         settings=settings,

@@ -45,7 +45,7 @@ class CellKey:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class TrialPlan:
     """A whole trial, as the command line chose it."""
 
     transports: tuple[str, ...]
@@ -107,7 +107,7 @@ class Plan:
         return cls(**values)
 
 
-def check_continues(old: Plan, new: Plan) -> None:
+def check_continues(old: TrialPlan, new: TrialPlan) -> None:
     """Whether cells of `old` may stand in a report of `new`. Raises TandemError with what differs."""
     before, after = old.tree(), new.tree()
     differs = [
@@ -124,7 +124,7 @@ def check_continues(old: Plan, new: Plan) -> None:
         )
 
 
-def merged(old: Plan, new: Plan) -> Plan:
+def merged(old: TrialPlan, new: TrialPlan) -> TrialPlan:
     """The plan of a report that shows the cells of both. They must continue each other."""
     check_continues(old, new)
     return replace(

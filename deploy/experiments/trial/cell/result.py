@@ -14,7 +14,7 @@ from deploy.experiments.trial.cell.plan import CellKey, Setup
 VERSION = 1
 
 
-class Status(StrEnum):
+class CellStatus(StrEnum):
     """How a cell ended."""
 
     DONE = "done"
@@ -42,7 +42,7 @@ class Cell:
     """One run of a setup, and what came of it."""
 
     key: CellKey
-    status: Status
+    status: CellStatus
     why: str = ""
     """Where it is not done."""
     values: Values = field(default_factory=dict)
@@ -59,7 +59,7 @@ class Cell:
     @property
     def settled(self) -> bool:
         """Whether another try would tell nothing new."""
-        return self.status is not Status.FAILED
+        return self.status is not CellStatus.FAILED
 
     def tree(self) -> dict[str, Any]:
         """As JSON has it, rounded."""
@@ -96,7 +96,7 @@ class Cell:
             setup = Setup(tree["transport"], tree["profile"], tree["strategy"])
             return cls(
                 key=CellKey(setup, int(tree["repetition"])),
-                status=Status(tree["status"]),
+                status=CellStatus(tree["status"]),
                 why=tree["why"],
                 values={f.name: tree["figures"].get(f.name) for f in FIGURES},
                 remarks=tuple(tree["remarks"]),

@@ -11,11 +11,11 @@ from common.errors import TandemError
 from deploy.examples.profiles import example
 from deploy.experiments.trial.cell.choice import why_impossible
 from deploy.experiments.trial.cell.judge import judged
-from deploy.experiments.trial.cell.plan import CellKey, Plan
+from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 from deploy.experiments.trial.cell.recorder import MessageKeeper
 from deploy.experiments.trial.cell.recording import CellCourse, CellMessages, ScriptedOutage
 from deploy.experiments.trial.cell.remarks import hold_remarks
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.harness.engage import EngageDriver, RigRobot, keep_engaged, until_tracking
 from deploy.harness.link_settings import needed_age_s, open_timeout_s
 from deploy.harness.operator import Operator
@@ -36,11 +36,11 @@ WATCH_S = 0.6
 LOOK_S = 0.1
 
 
-async def run_cell(plan: Plan, key: CellKey, stop: asyncio.Event, tell: Callable[[str], None]) -> Cell:
+async def run_cell(plan: TrialPlan, key: CellKey, stop: asyncio.Event, tell: Callable[[str], None]) -> Cell:
     """Run it and judge it. What goes wrong in it is its result; only an interruption raises TandemError."""
     reason = why_impossible(key.setup)
     if reason is not None:
-        return Cell(key, Status.IMPOSSIBLE, reason)
+        return Cell(key, CellStatus.IMPOSSIBLE, reason)
     profile = load_profile(key.setup.profile)
     age_s = plan.max_age_s or needed_age_s(profile)
     opening = f"link.open_timeout_s={open_timeout_s(profile)}"
@@ -58,13 +58,13 @@ async def run_cell(plan: Plan, key: CellKey, stop: asyncio.Event, tell: Callable
     except TandemError as error:
         if stop.is_set():  # a Ctrl-C reaches the processes too: that they end is then no failure
             raise TandemError("interrupted") from None
-        return Cell(key, Status.FAILED, str(error), settings=settings)
+        return Cell(key, CellStatus.FAILED, str(error), settings=settings)
     ended = tuple(f"the {name} ended with status {status}" for name, status in statuses.items() if status)
     tell("judging")
     return await asyncio.to_thread(judged, key, course, config, settings, ended)
 
 
-def _overrides(plan: Plan, key: CellKey, age_s: float, opening: str) -> dict[str, list[str]]:
+def _overrides(plan: TrialPlan, key: CellKey, age_s: float, opening: str) -> dict[str, list[str]]:
     return {
         "suit": [f"seed={plan.seed_of(key)}", f'motion="{plan.motion}"'],
         # the simulated operator begins in the zero pose: zeroed there, as the paper's reference was
@@ -77,7 +77,7 @@ class _Story:
     """What is done with a rig over a network, one step after the other."""
 
     def __init__(
-        self, plan: Plan, rig: Rig, network: Network, stop: asyncio.Event, tell: Callable[[str], None]
+        self, plan: TrialPlan, rig: Rig, network: Network, stop: asyncio.Event, tell: Callable[[str], None]
     ) -> None:
         self._plan = plan
         self._rig = rig

@@ -22,11 +22,11 @@ from common.wire.messages import RobotState, Statistics
 from deploy.examples.profiles import example
 from deploy.experiments.trial.cell.choice import why_impossible
 from deploy.experiments.trial.cell.judge import judged
-from deploy.experiments.trial.cell.plan import CellKey, Plan
+from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 from deploy.experiments.trial.cell.recorder import MessageKeeper
 from deploy.experiments.trial.cell.recording import CellCourse, on_masters_clock
 from deploy.experiments.trial.cell.remarks import hold_remarks
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.remote import talk
 from deploy.harness.endpoints import Endpoints, free_port
 from deploy.harness.engage import EngageDriver, keep_engaged, until_all_track
@@ -125,7 +125,7 @@ class PartnerRobot:
 
 
 async def run_remote_cell(
-    plan: Plan,
+    plan: TrialPlan,
     key: CellKey,
     stop: asyncio.Event,
     tell: Callable[[str], None],
@@ -139,7 +139,7 @@ async def run_remote_cell(
     if reason is None and key.setup.transport in SECURE and tls is None:
         reason = "no keys: name a file with [link.tls] by --link, and one over there (see `tandem keys`)"
     if reason is not None:
-        return Cell(key, Status.IMPOSSIBLE, reason)
+        return Cell(key, CellStatus.IMPOSSIBLE, reason)
     slave = [f'track.strategy="{key.setup.strategy}"', f"guard.max_age_s={plan.max_age_s}"]
     config = load_config(example("slave", plan.robot), SlaveConfig, slave)
     settings = {"guard.max_age_s": f"{plan.max_age_s:g}"}
@@ -154,7 +154,7 @@ async def run_remote_cell(
     except TandemError as error:
         if stop.is_set():
             raise TandemError("interrupted") from None
-        return Cell(key, Status.FAILED, str(error), settings=settings)
+        return Cell(key, CellStatus.FAILED, str(error), settings=settings)
     tell("judging")
     return await asyncio.to_thread(judged, key, course, config, settings, ())
 
@@ -168,7 +168,7 @@ async def _farewell(link: Link) -> None:
 
 
 async def _play(
-    plan: Plan, key: CellKey, partner: Partner, tell: Callable[[str], None], tls: TlsConfig | None
+    plan: TrialPlan, key: CellKey, partner: Partner, tell: Callable[[str], None], tls: TlsConfig | None
 ) -> CellCourse:
     skeleton = load_skeleton(plan.robot)
     tell("starting the robot over there")
@@ -228,7 +228,9 @@ def _keys(tls: TlsConfig | None) -> list[str]:
 
 
 @asynccontextmanager
-async def _operators_rig(plan: Plan, key: CellKey, robot: str, tls: TlsConfig | None) -> AsyncIterator[Rig]:
+async def _operators_rig(
+    plan: TrialPlan, key: CellKey, robot: str, tls: TlsConfig | None
+) -> AsyncIterator[Rig]:
     """Suit and master here, watched on loopback; the master connects to the robot over there."""
     ends = Endpoints(
         (robot,), f"tcp/127.0.0.1:{free_port('tcp')}", f"tcp/127.0.0.1:{free_port('tcp')}", free_port("udp")

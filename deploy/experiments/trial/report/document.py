@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, Figure, printed
-from deploy.experiments.trial.cell.plan import Plan
+from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, CellMetric, printed
+from deploy.experiments.trial.cell.plan import TrialPlan
 from deploy.experiments.trial.report.plots import Plot
 from deploy.experiments.trial.report.ranking import Ranking
-from deploy.experiments.trial.report.spread import Row, Spread
+from deploy.experiments.trial.report.spread import SetupResults, Spread
 from deploy.measure.verdict import Verdict
 from deploy.report.page import render
 
@@ -24,15 +24,17 @@ GROUPS = {
 
 
 @dataclass(frozen=True, slots=True)
-class _Table:
+class MetricTable:
+    """The metrics of one group."""
+
     title: str
-    figures: Sequence[Figure]
+    figures: Sequence[CellMetric]
     """Its columns: those that some setup has."""
 
 
 def as_html(
-    plan: Plan,
-    rows: Sequence[Row],
+    plan: TrialPlan,
+    rows: Sequence[SetupResults],
     ranks: Sequence[Ranking],
     judged: Sequence[Verdict],
     plots: Sequence[Plot],
@@ -62,13 +64,13 @@ def as_html(
     )
 
 
-def _tables(rows: Sequence[Row]) -> list[_Table]:
+def _tables(rows: Sequence[SetupResults]) -> list[MetricTable]:
     measured = {name for row in rows for name in row.spreads}
     tables = []
     for group, title in GROUPS.items():
         figures = [f for f in FIGURES if f.group == group and f.name in measured]
         if figures:
-            tables.append(_Table(title, figures))
+            tables.append(MetricTable(title, figures))
     return tables
 
 
@@ -78,7 +80,7 @@ def _by_task(ranks: Sequence[Ranking]) -> list[list[Ranking]]:
     return [[r for r in ranks if r.task.name == name] for name in names]
 
 
-def _settings(rows: Sequence[Row]) -> dict[str, dict[str, str]]:
+def _settings(rows: Sequence[SetupResults]) -> dict[str, dict[str, str]]:
     """By network, what was set over the example files."""
     found: dict[str, dict[str, str]] = {}
     for row in rows:
@@ -87,7 +89,7 @@ def _settings(rows: Sequence[Row]) -> dict[str, dict[str, str]]:
     return {profile: settings for profile, settings in found.items() if settings}
 
 
-def _busy(rows: Sequence[Row]) -> float | None:
+def _busy(rows: Sequence[SetupResults]) -> float | None:
     """The worst share of missed ticks, where it is large enough to distrust the figures."""
     worst = max(
         (row.spreads["ticks_missed"].high for row in rows if "ticks_missed" in row.spreads), default=0.0
@@ -95,11 +97,11 @@ def _busy(rows: Sequence[Row]) -> float | None:
     return worst if worst > 2.0 else None
 
 
-def _cell(row: Row, name: str) -> str:
+def _cell(row: SetupResults, name: str) -> str:
     return printed(name, row.median(name))
 
 
-def _range(row: Row, name: str) -> str:
+def _range(row: SetupResults, name: str) -> str:
     """The repeats' range, empty where it says no more than the median does."""
     spread: Spread | None = row.spreads.get(name)
     if spread is None or spread.count < 2:

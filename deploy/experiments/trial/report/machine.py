@@ -9,18 +9,18 @@ from dataclasses import asdict
 from typing import Any
 
 from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, rounded
-from deploy.experiments.trial.cell.plan import Plan
+from deploy.experiments.trial.cell.plan import TrialPlan
 from deploy.experiments.trial.cell.result import Cell
 from deploy.experiments.trial.report.ranking import Ranking
-from deploy.experiments.trial.report.spread import Row, Spread
+from deploy.experiments.trial.report.spread import SetupResults, Spread
 from deploy.measure.verdict import Verdict
 
 _KEYS = ("profile", "transport", "strategy", "repetition", "status")
 
 
 def tree(
-    plan: Plan,
-    rows: Sequence[Row],
+    plan: TrialPlan,
+    rows: Sequence[SetupResults],
     ranks: Sequence[Ranking],
     judged: Sequence[Verdict],
     about: dict[str, str],
@@ -53,11 +53,11 @@ def as_csv(cells: Iterable[Cell]) -> str:
     return out.getvalue()
 
 
-def _path(row: Row) -> str:
+def _path(row: SetupResults) -> str:
     return f"{row.setup.profile}/{row.setup.transport}/{row.setup.strategy}"
 
 
-def _setup(row: Row) -> dict[str, Any]:
+def _setup(row: SetupResults) -> dict[str, Any]:
     return {
         "repeats_done": len(row.done),
         "repeats_failed": len(row.failed),

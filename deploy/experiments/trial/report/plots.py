@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from deploy.experiments.trial.cell.figures import BY_NAME
-from deploy.experiments.trial.cell.result import Status
-from deploy.experiments.trial.report.spread import Row
+from deploy.experiments.trial.cell.result import CellStatus
+from deploy.experiments.trial.report.spread import SetupResults
 from deploy.report.plots import BAR_COLOUR, INK, LIMIT_COLOUR, colour, svg
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class Plot:
     image: str
 
 
-def plots(rows: Sequence[Row]) -> list[Plot]:
+def plots(rows: Sequence[SetupResults]) -> list[Plot]:
     """Those that there is data for."""
     rows = [row for row in rows if row.done]
     made = [
@@ -49,7 +49,7 @@ def plots(rows: Sequence[Row]) -> list[Plot]:
 
 
 def _per_setup(
-    rows: Sequence[Row], name: str, title: str, caption: str, line: float | None = None
+    rows: Sequence[SetupResults], name: str, title: str, caption: str, line: float | None = None
 ) -> Plot | None:
     """Setups along x by network, one figure up; every repeat shown."""
     shown = [row for row in rows if name in row.spreads]
@@ -75,7 +75,7 @@ def _per_setup(
     return Plot(title, caption, _svg(draw, width=max(6.5, 1.5 + 0.32 * len(shown))))
 
 
-def _trade(rows: Sequence[Row]) -> Plot | None:
+def _trade(rows: Sequence[SetupResults]) -> Plot | None:
     """Error against roughness: a good setup is at the lower left."""
     shown = [row for row in rows if {"rmse_deg", "roughness"} <= row.spreads.keys()]
     if not shown:
@@ -109,7 +109,7 @@ def _trade(rows: Sequence[Row]) -> Plot | None:
     )
 
 
-def _latency(rows: Sequence[Row]) -> Plot | None:
+def _latency(rows: Sequence[SetupResults]) -> Plot | None:
     """One-way as measured with its bound, beside the true one; each network on its own scale."""
     shown = [row for row in rows if row.median("one_way_p50_ms") is not None]
     if not shown:
@@ -139,7 +139,7 @@ def _latency(rows: Sequence[Row]) -> Plot | None:
     )
 
 
-def _one_way(axes: Axes, row: Row, x: float) -> None:
+def _one_way(axes: Axes, row: SetupResults, x: float) -> None:
     p50, bound = row.spreads["one_way_p50_ms"].median, row.median("one_way_bound_ms") or 0.0
     # a way is never shorter than nothing, whatever the bound
     below_above = [[min(bound, p50)], [bound]]
@@ -151,11 +151,11 @@ def _one_way(axes: Axes, row: Row, x: float) -> None:
         axes.plot(x, true, "o", color=INK, markersize=4)
 
 
-def _motion(rows: Sequence[Row]) -> Plot | None:
+def _motion(rows: Sequence[SetupResults]) -> Plot | None:
     """One joint for a few seconds: each strategy over each network, with the first transport."""
     first: dict[tuple[str, str], Any] = {}
     for row in rows:
-        found = [c.excerpt for c in row.cells if c.status is Status.DONE and c.excerpt is not None]
+        found = [c.excerpt for c in row.cells if c.status is CellStatus.DONE and c.excerpt is not None]
         if found:
             first.setdefault((row.setup.profile, row.setup.strategy), (row.setup, found[0]))
     if not first:
@@ -189,7 +189,7 @@ def _motion(rows: Sequence[Row]) -> Plot | None:
     )
 
 
-def _places(axes: Axes, rows: Sequence[Row]) -> list[float]:
+def _places(axes: Axes, rows: Sequence[SetupResults]) -> list[float]:
     """Where each row stands along x: networks set apart, the transport named under it, the network above."""
     places, labels, x, before = [], [], 0.0, None
     for row in rows:

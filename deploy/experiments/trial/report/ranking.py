@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from deploy.experiments.trial.cell.figures import BY_NAME, printed
 from deploy.experiments.trial.cell.plan import Setup
 from deploy.experiments.trial.cell.result import Cell
-from deploy.experiments.trial.report.spread import Row, Spread, spread
+from deploy.experiments.trial.report.spread import SetupResults, Spread, spread
 from deploy.experiments.trial.report.tasks import Criterion, Task
 
 MOST_NAMED = 3
@@ -72,7 +72,7 @@ class Ranking:
         return words
 
 
-def rank(task: Task, profile: str, rows: Sequence[Row]) -> Ranking:
+def rank(task: Task, profile: str, rows: Sequence[SetupResults]) -> Ranking:
     """Rank the setups over that network. A figure that no setup has (no outage was made) counts for none."""
     ours = [row for row in rows if row.setup.profile == profile]
     used = [c for c in task.criteria if any(c.figure in row.spreads for row in ours)]
@@ -80,13 +80,13 @@ def rank(task: Task, profile: str, rows: Sequence[Row]) -> Ranking:
     return Ranking(task, profile, places)
 
 
-def rankings(tasks: Sequence[Task], rows: Sequence[Row]) -> list[Ranking]:
+def rankings(tasks: Sequence[Task], rows: Sequence[SetupResults]) -> list[Ranking]:
     """By task, then network, in their own order."""
     profiles = list(dict.fromkeys(row.setup.profile for row in rows))
     return [rank(task, profile, rows) for task in tasks for profile in profiles]
 
 
-def _place(task: Task, used: Sequence[Criterion], row: Row) -> Ranked:
+def _place(task: Task, used: Sequence[Criterion], row: SetupResults) -> Ranked:
     scores = spread(_score(used, cell) for cell in row.done)
     barred = [] if row.done else (row.why_not or ["not run yet"])
     for name, most in task.must.items():
@@ -111,7 +111,7 @@ def _points(criterion: Criterion, value: float | None) -> float:
     return 0.0 if value is None else criterion.score(value)
 
 
-def _costs(used: Sequence[Criterion], row: Row) -> str:
+def _costs(used: Sequence[Criterion], row: SetupResults) -> str:
     lost = [(c.weight * (100.0 - _points(c, row.median(c.figure))), c.figure) for c in used]
     most, name = max(lost, default=(0.0, ""))
     return BY_NAME[name].title if most > 1.0 else ""

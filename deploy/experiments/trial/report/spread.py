@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from deploy.experiments.trial.cell.figures import FIGURES
-from deploy.experiments.trial.cell.plan import Plan, Setup
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.plan import Setup, TrialPlan
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Spread:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class SetupResults:
     """A setup over its repeats."""
 
     setup: Setup
@@ -38,17 +38,17 @@ class Row:
     @property
     def done(self) -> Sequence[Cell]:
         """Those that measured."""
-        return [cell for cell in self.cells if cell.status is Status.DONE]
+        return [cell for cell in self.cells if cell.status is CellStatus.DONE]
 
     @property
     def failed(self) -> Sequence[Cell]:
         """Those that were run and came to nothing."""
-        return [cell for cell in self.cells if cell.status is Status.FAILED]
+        return [cell for cell in self.cells if cell.status is CellStatus.FAILED]
 
     @property
     def why_not(self) -> list[str]:
         """Why repeats are missing, each reason once."""
-        return list(dict.fromkeys(cell.why for cell in self.cells if cell.status is not Status.DONE))
+        return list(dict.fromkeys(cell.why for cell in self.cells if cell.status is not CellStatus.DONE))
 
     def median(self, name: str) -> float | None:
         """Of one figure."""
@@ -62,7 +62,7 @@ def spread(values: Iterable[float | None]) -> Spread | None:
     return Spread(statistics.median(known), min(known), max(known), len(known)) if known else None
 
 
-def rows(plan: Plan, cells: Iterable[Cell]) -> list[Row]:
+def rows(plan: TrialPlan, cells: Iterable[Cell]) -> list[SetupResults]:
     """A row a setup of the plan, in its order."""
     by_setup: dict[Setup, list[Cell]] = {setup: [] for setup in plan.setups()}
     for cell in sorted(cells, key=lambda c: c.key.repetition):
@@ -71,7 +71,7 @@ def rows(plan: Plan, cells: Iterable[Cell]) -> list[Row]:
     return [_row(setup, group) for setup, group in by_setup.items()]
 
 
-def _row(setup: Setup, cells: Sequence[Cell]) -> Row:
-    done = [cell for cell in cells if cell.status is Status.DONE]
+def _row(setup: Setup, cells: Sequence[Cell]) -> SetupResults:
+    done = [cell for cell in cells if cell.status is CellStatus.DONE]
     found = {f.name: spread(cell.values.get(f.name) for cell in done) for f in FIGURES}
-    return Row(setup, cells, {name: s for name, s in found.items() if s is not None})
+    return SetupResults(setup, cells, {name: s for name, s in found.items() if s is not None})

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, OUTAGE
 from deploy.experiments.trial.cell.result import Cell
-from deploy.experiments.trial.report.spread import Row
+from deploy.experiments.trial.report.spread import SetupResults
 from deploy.measure.verdict import Outcome, Verdict
 
 MOST_NAMED = 4
@@ -52,13 +52,15 @@ LIMITS = (
 )
 
 
-def judge(rows: Sequence[Row], limits: Sequence[SetupLimit] = LIMITS, outage: bool = True) -> list[Verdict]:
+def judge(
+    rows: Sequence[SetupResults], limits: Sequence[SetupLimit] = LIMITS, outage: bool = True
+) -> list[Verdict]:
     """A verdict for each limit that this trial has setups for; `outage`: whether its cells have an outage."""
     asked = [limit for limit in limits if outage or not limit.of_outage]
     return [verdict for limit in asked if (verdict := _judge(limit, rows)) is not None]
 
 
-def _judge(limit: SetupLimit, rows: Sequence[Row]) -> Verdict | None:
+def _judge(limit: SetupLimit, rows: Sequence[SetupResults]) -> Verdict | None:
     """Passed where every setup keeps the limit and no repeat failed; None where it is asked of no setup."""
     asked = [
         row

@@ -9,12 +9,12 @@ from importlib.metadata import version
 from pathlib import Path
 
 from deploy.experiments.trial.cell.folder import Folder, as_json
-from deploy.experiments.trial.cell.plan import Plan
+from deploy.experiments.trial.cell.plan import TrialPlan
 from deploy.experiments.trial.report.document import as_html
 from deploy.experiments.trial.report.machine import as_csv, tree
 from deploy.experiments.trial.report.plots import plots
 from deploy.experiments.trial.report.ranking import Ranking, rankings
-from deploy.experiments.trial.report.spread import Row, rows
+from deploy.experiments.trial.report.spread import SetupResults, rows
 from deploy.experiments.trial.report.targets import judge
 from deploy.experiments.trial.report.tasks import TASKS, load_tasks
 from deploy.measure.verdict import Verdict
@@ -28,8 +28,8 @@ HTML, JSON, CSV = "report.html", "report.json", "cells.csv"
 class Findings:
     """What a folder's cells say."""
 
-    plan: Plan
-    rows: list[Row]
+    plan: TrialPlan
+    rows: list[SetupResults]
     rankings: list[Ranking]
     judged: list[Verdict]
 

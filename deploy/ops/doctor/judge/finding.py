@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Verdict(StrEnum):
+class Grade(StrEnum):
     """How a check ended."""
 
     OK = "ok"
@@ -22,7 +22,7 @@ class Finding:
     """One row of the report."""
 
     check: str
-    verdict: Verdict
+    verdict: Grade
     found: str
     advice: str = ""
     """What to do; empty where there is nothing to do."""
@@ -30,20 +30,20 @@ class Finding:
 
 def ok(check: str, found: str, advice: str = "") -> Finding:
     """All is well; the advice is for those who want it better."""
-    return Finding(check, Verdict.OK, found, advice)
+    return Finding(check, Grade.OK, found, advice)
 
 
 def warn(check: str, found: str, advice: str) -> Finding:
     """Not as it should be."""
-    return Finding(check, Verdict.WARN, found, advice)
+    return Finding(check, Grade.WARN, found, advice)
 
 
 def fail(check: str, found: str, advice: str) -> Finding:
     """It must be mended first."""
-    return Finding(check, Verdict.FAIL, found, advice)
+    return Finding(check, Grade.FAIL, found, advice)
 
 
-def worst(findings: Sequence[Finding]) -> Verdict:
+def worst(findings: Sequence[Finding]) -> Grade:
     """Of all findings; ok where there is none."""
-    order = list(Verdict)
-    return max((finding.verdict for finding in findings), key=order.index, default=Verdict.OK)
+    order = list(Grade)
+    return max((finding.verdict for finding in findings), key=order.index, default=Grade.OK)

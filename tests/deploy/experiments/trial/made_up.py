@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import random
 
-from deploy.experiments.trial.cell.plan import CellKey, Plan, Setup
-from deploy.experiments.trial.cell.result import Cell, Excerpt, Status
+from deploy.experiments.trial.cell.plan import CellKey, Setup, TrialPlan
+from deploy.experiments.trial.cell.result import Cell, CellStatus, Excerpt
 
-PLAN = Plan(
+PLAN = TrialPlan(
     transports=("tcp", "udp"),
     profiles=("lan", "4g"),
     strategies=("latest", "predict"),
@@ -76,7 +76,7 @@ def cell(key: CellKey) -> Cell:
     late_s = 0.001 * (DELAY_MS[key.setup.profile] + 40.0)
     return Cell(
         key=key,
-        status=Status.DONE,
+        status=CellStatus.DONE,
         values=values(key.setup, key.repetition),
         remarks=("held after 7.2 s: no command for 0.2 s; engaged again",) if key.repetition == 2 else (),
         settings={"guard.max_age_s": "0.45"},
@@ -91,5 +91,5 @@ def cell(key: CellKey) -> Cell:
     )
 
 
-def cells(plan: Plan = PLAN) -> list[Cell]:
+def cells(plan: TrialPlan = PLAN) -> list[Cell]:
     return [cell(key) for key in plan.cells()]

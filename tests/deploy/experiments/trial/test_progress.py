@@ -10,8 +10,8 @@ from rich.console import Console
 
 from common.errors import TandemError
 from deploy.experiments.trial.cell.folder import Folder
-from deploy.experiments.trial.cell.plan import CellKey, Plan
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.progress import Progress, clock
 from deploy.experiments.trial.run import Tell, run_trial
 from tests.deploy.experiments.trial.made_up import PLAN, cell
@@ -46,21 +46,21 @@ def test_a_clock_is_read_as_one() -> None:
     assert [clock(s) for s in (0.4, 59.6, 61, 3723)] == ["0:00", "1:00", "1:01", "1:02:03"]
 
 
-def run(plan: Plan, folder: Folder, act: dict[int, object]) -> tuple[Progress, list[CellKey], str]:
+def run(plan: TrialPlan, folder: Folder, act: dict[int, object]) -> tuple[Progress, list[CellKey], str]:
     """Run with made-up cells; `act` says what the n-th does: a status, "stop", or an error to raise."""
     out, ran = io.StringIO(), []
 
     async def story() -> Progress:
         stop = asyncio.Event()
 
-        async def run_cell(_: Plan, key: CellKey, stop: asyncio.Event, tell: Tell) -> Cell:
+        async def run_cell(_: TrialPlan, key: CellKey, stop: asyncio.Event, tell: Tell) -> Cell:
             ran.append(key)
             what = act.get(len(ran))
             tell("following")
             if what == "stop":
                 stop.set()
                 raise TandemError("interrupted")
-            if isinstance(what, Status):
+            if isinstance(what, CellStatus):
                 return Cell(key, what, "so it was")
             if isinstance(what, TandemError):
                 raise what
@@ -85,7 +85,7 @@ def test_each_cell_is_on_disk_before_the_next_begins(tmp_path: Path) -> None:
 
 def test_a_cell_that_fails_stops_nothing_and_is_tried_again_next_time(tmp_path: Path) -> None:
     folder, plan = Folder(tmp_path), replace(PLAN, repeat=1)
-    progress, ran, said = run(plan, folder, {2: Status.FAILED, 3: Status.IMPOSSIBLE})
+    progress, ran, said = run(plan, folder, {2: CellStatus.FAILED, 3: CellStatus.IMPOSSIBLE})
     assert progress.done == len(ran) == 8
     assert progress.failed == 1
     assert "so it was" in said

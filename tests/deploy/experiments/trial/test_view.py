@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from deploy.experiments.trial.cell.folder import Folder
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.report.write import find
 from deploy.experiments.trial.view import print_findings
 from tests.deploy.experiments.trial.made_up import PLAN, cells
@@ -36,7 +36,7 @@ def test_setups_stand_whole_in_80_columns_under_their_network(tmp_path: Path) ->
 def test_cells_that_failed_are_told_with_the_targets(tmp_path: Path) -> None:
     folder, (first, *others) = Folder(tmp_path), cells()
     folder.begin(PLAN)
-    for one in (Cell(first.key, Status.FAILED, "the robot is not heard"), *others):
+    for one in (Cell(first.key, CellStatus.FAILED, "the robot is not heard"), *others):
         folder.keep(one)
     out = io.StringIO()
     print_findings(find(folder), Console(file=out, width=120))

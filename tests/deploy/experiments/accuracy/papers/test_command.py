@@ -8,13 +8,13 @@ from typer.testing import CliRunner
 
 from deploy.cli import app
 from deploy.experiments.accuracy.papers import experiments
-from deploy.experiments.accuracy.papers.figures import Experiment, Figure
+from deploy.experiments.accuracy.papers.figures import Experiment, PaperValue
 
 
 @pytest.fixture(autouse=True)
 def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    good = Experiment("A", "good", lambda seed: [Figure("error", "°", (0.1 * seed,), 1.0, 0.5)])
-    bad = Experiment("B", "bad", lambda seed: [Figure("lateness", "ms", (10.0 * seed,), 60.0, 15.0)])
+    good = Experiment("A", "good", lambda seed: [PaperValue("error", "°", (0.1 * seed,), 1.0, 0.5)])
+    bad = Experiment("B", "bad", lambda seed: [PaperValue("lateness", "ms", (10.0 * seed,), 60.0, 15.0)])
     monkeypatch.setattr(experiments, "EXPERIMENTS", (good, bad))
 
 

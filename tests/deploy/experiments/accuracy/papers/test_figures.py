@@ -6,15 +6,15 @@ import json
 import pytest
 from rich.console import Console
 
-from deploy.experiments.accuracy.papers.figures import Experiment, Figure, gather
+from deploy.experiments.accuracy.papers.figures import Experiment, PaperValue, gather
 from deploy.experiments.accuracy.papers.run import run_all
 from deploy.experiments.accuracy.papers.table import experiment_table, experiment_tree
 
 
-def made_up(seed: int) -> list[Figure]:
+def made_up(seed: int) -> list[PaperValue]:
     return [
-        Figure("error", "°", (0.1 * seed, 0.2), paper=1.5, target=0.35),
-        Figure("spread", "°", (float(seed),)),
+        PaperValue("error", "°", (0.1 * seed, 0.2), paper=1.5, target=0.35),
+        PaperValue("spread", "°", (float(seed),)),
     ]
 
 
@@ -35,7 +35,7 @@ def test_one_bad_seed_misses_the_target() -> None:
 
 @pytest.mark.parametrize("values", [(), (float("nan"),)])
 def test_a_seed_that_tells_nothing_has_missed(values: tuple[float, ...]) -> None:
-    rows = gather({1: made_up(1), 2: [Figure("error", "°", values, 1.5, 0.35)]})
+    rows = gather({1: made_up(1), 2: [PaperValue("error", "°", values, 1.5, 0.35)]})
     assert rows[0].outcome == "failed"
 
 

@@ -6,7 +6,7 @@ import pytest
 from common.quaternion import conjugate
 from deploy.experiments.accuracy.papers import lower_limb
 from deploy.experiments.accuracy.papers.figures import gather
-from deploy.experiments.accuracy.papers.fixture import Take
+from deploy.experiments.accuracy.papers.fixture import SensorTake
 
 
 def test_axes_and_knees_meet_their_targets_with_sensors_askew() -> None:
@@ -21,7 +21,7 @@ def test_an_alignment_that_is_off_shows_in_the_knees_angle() -> None:
     q_segment_from_sensor = lower_limb.askew(1)
     whole = lower_limb.walk(1, "ideal", q_segment_from_sensor)
     some = slice(0, 1600)
-    take = Take(
+    take = SensorTake(
         whole.rate_hz, whole.samples[some], whole.position_rad[some], whole.q_world_from_segment[some]
     )
     right = lower_limb.knee_errors_deg(take, conjugate(q_segment_from_sensor))

@@ -11,7 +11,7 @@ import pytest
 from common.errors import TandemError
 from deploy.experiments.trial.cell.figures import FIGURES, printed, rounded
 from deploy.experiments.trial.cell.folder import Folder
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.run import missing
 from tests.deploy.experiments.trial.made_up import PLAN, cell, cells
 
@@ -61,8 +61,8 @@ def test_a_second_run_skips_what_is_there_and_tries_again_what_failed(tmp_path: 
     assert missing(PLAN, folder) == PLAN.cells()
     first, second, third, *rest = PLAN.cells()
     folder.keep(cell(first))
-    folder.keep(Cell(second, Status.FAILED, "the robot is not heard"))
-    folder.keep(Cell(third, Status.IMPOSSIBLE, "does not cross hosts"))
+    folder.keep(Cell(second, CellStatus.FAILED, "the robot is not heard"))
+    folder.keep(Cell(third, CellStatus.IMPOSSIBLE, "does not cross hosts"))
     assert missing(PLAN, folder) == [second, *rest]
 
 

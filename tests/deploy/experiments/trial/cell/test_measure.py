@@ -25,7 +25,7 @@ from deploy.experiments.trial.cell.recording import (
     counts,
     on_masters_clock,
 )
-from deploy.experiments.trial.cell.result import Status
+from deploy.experiments.trial.cell.result import CellStatus
 from slave.config import SlaveConfig
 from tests.published import commanded, guard_metrics, master_metrics, slave_metrics
 
@@ -172,10 +172,10 @@ def test_a_cell_without_a_single_command_failed(without: str) -> None:
     )
     key = CellKey(Setup("tcp", "lan", "predict"), 0)
     cell = judged(key, CellCourse(heard, 0.3, shared_clock=True), CONFIG, {}, ())
-    assert cell.status is Status.FAILED
+    assert cell.status is CellStatus.FAILED
     assert "no command was" in cell.why
     whole = judged(key, CellCourse(recording(), 0.3, shared_clock=True), CONFIG, {}, ())
-    assert whole.status is Status.DONE
+    assert whole.status is CellStatus.DONE
 
 
 def test_a_robot_unheard_after_the_outage_is_not_called_safe() -> None:
@@ -186,7 +186,7 @@ def test_a_robot_unheard_after_the_outage_is_not_called_safe() -> None:
         recording(), 0.3, shared_clock=True, after=replace(after(0.6), states=[]), outage=outage
     )
     cell = judged(CellKey(Setup("tcp", "lan", "predict"), 0), course, CONFIG, {}, ())
-    assert cell.status is Status.FAILED
+    assert cell.status is CellStatus.FAILED
 
 
 def test_ages_that_nobody_knows_are_not_fresh() -> None:

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import TandemError
-from deploy.experiments.trial.cell.plan import CellKey, Plan, Setup, check_continues, merged
+from deploy.experiments.trial.cell.plan import CellKey, Setup, TrialPlan, check_continues, merged
 
-PLAN = Plan(
+PLAN = TrialPlan(
     transports=("tcp", "udp", "quic"),
     profiles=("lan", "4g"),
     strategies=("latest", "predict"),
@@ -60,9 +60,9 @@ def test_setups_of_a_repeat_share_their_seed_and_repeats_do_not() -> None:
 
 
 def test_a_plan_survives_json() -> None:
-    assert Plan.of_tree(PLAN.tree()) == PLAN
+    assert TrialPlan.of_tree(PLAN.tree()) == PLAN
     with pytest.raises(TandemError, match="another version"):
-        Plan.of_tree({"transports": ["tcp"]})
+        TrialPlan.of_tree({"transports": ["tcp"]})
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from common.errors import ConfigError
 from deploy.experiments.trial.cell.plan import CellKey, Setup
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.report.ranking import rank, rankings
 from deploy.experiments.trial.report.spread import Spread, rows, spread
 from deploy.experiments.trial.report.targets import SetupLimit, judge
@@ -22,7 +22,7 @@ finite = st.floats(-1e3, 1e3)
 
 
 def with_values(setup: Setup, *repeats: dict[str, float | None]) -> list[Cell]:
-    return [Cell(CellKey(setup, i + 1), Status.DONE, values=v) for i, v in enumerate(repeats)]
+    return [Cell(CellKey(setup, i + 1), CellStatus.DONE, values=v) for i, v in enumerate(repeats)]
 
 
 def test_a_spread_is_the_median_and_the_range_of_what_is_known() -> None:
@@ -93,7 +93,7 @@ def test_one_stale_command_in_one_repeat_bars_a_setup() -> None:
 def test_a_setup_that_was_not_run_says_why() -> None:
     setup = Setup("unixsock-stream", "lan", "predict")
     plan = replace(PLAN, transports=(setup.transport,), profiles=("lan",), strategies=("predict",), repeat=1)
-    found = rows(plan, [Cell(CellKey(setup, 1), Status.IMPOSSIBLE, "does not cross hosts")])
+    found = rows(plan, [Cell(CellKey(setup, 1), CellStatus.IMPOSSIBLE, "does not cross hosts")])
     assert rank(TASK["reach"], "lan", found).places[0].barred == ["does not cross hosts"]
     assert rank(TASK["reach"], "lan", rows(plan, [])).places[0].barred == ["not run yet"]
 
@@ -141,7 +141,7 @@ def test_commands_that_never_flow_again_miss_the_limit() -> None:
 def test_a_repeat_that_failed_meets_no_target_it_was_asked_of() -> None:
     setup = Setup("tcp", "4g", "predict")
     good: dict[str, float | None] = {"roughness": 1.0, "flow_s": 0.5}
-    failed = [Cell(CellKey(setup, n), Status.FAILED, "the robot is not heard") for n in (2, 3)]
+    failed = [Cell(CellKey(setup, n), CellStatus.FAILED, "the robot is not heard") for n in (2, 3)]
     limits = [
         SetupLimit("roughness", 3.0, "predict"),
         SetupLimit("flow_s", 1.5),
@@ -156,7 +156,7 @@ def test_a_repeat_that_failed_meets_no_target_it_was_asked_of() -> None:
     assert [j.name for j in without_outage] == [limits[0].words], (
         "an outage's target is not asked of a trial without"
     )
-    impossible = [Cell(CellKey(setup, 1), Status.IMPOSSIBLE, "does not cross hosts")]
+    impossible = [Cell(CellKey(setup, 1), CellStatus.IMPOSSIBLE, "does not cross hosts")]
     assert judge(rows(PLAN, impossible), limits) == []
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from deploy.experiments.trial.cell.folder import Folder
-from deploy.experiments.trial.cell.result import Cell, Status
+from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.report.write import CSV, HTML, JSON, write
 from tests.deploy.experiments.trial.made_up import PLAN, cell, cells
 
@@ -109,7 +109,9 @@ def test_json_holds_medians_with_their_spread(whole: Path) -> None:
 
 def test_csv_has_a_line_a_cell_and_no_figure_where_none_was_measured(tmp_path: Path) -> None:
     first, second, *_ = PLAN.cells()
-    folder = reported(tmp_path, [cell(first), Cell(second, Status.FAILED, "the robot, alas, is not heard")])
+    folder = reported(
+        tmp_path, [cell(first), Cell(second, CellStatus.FAILED, "the robot, alas, is not heard")]
+    )
     lines = list(csv.DictReader(io.StringIO((folder.path / CSV).read_text("utf-8"))))
     assert len(lines) == 2
     by_status = {line["status"]: line for line in lines}
@@ -126,7 +128,7 @@ def test_what_is_not_there_yet_is_said(tmp_path: Path) -> None:
 
 
 def test_words_from_a_robot_are_text_and_never_markup(tmp_path: Path) -> None:
-    foul = Cell(PLAN.cells()[0], Status.FAILED, "<script>alert('x')</script>")
+    foul = Cell(PLAN.cells()[0], CellStatus.FAILED, "<script>alert('x')</script>")
     page = (reported(tmp_path, [foul]).path / HTML).read_text("utf-8")
     assert "<script>" not in page
     assert "&lt;script&gt;" in page
@@ -143,7 +145,7 @@ def test_what_never_came_is_told_in_the_verdict(tmp_path: Path) -> None:
 
 def test_cells_that_failed_are_told_in_the_verdict(tmp_path: Path) -> None:
     first, *others = cells()
-    folder = reported(tmp_path, [Cell(first.key, Status.FAILED, "the robot is not heard"), *others]).path
+    folder = reported(tmp_path, [Cell(first.key, CellStatus.FAILED, "the robot is not heard"), *others]).path
     verdict = (folder / HTML).read_text("utf-8").partition("What suits which care task")[0]
     assert "1 failed" in verdict
     compared = json.loads((folder / JSON).read_text("utf-8"))["compared"]
