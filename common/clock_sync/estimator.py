@@ -133,7 +133,6 @@ class OffsetEstimator:
         self._upper: _Point | None = None
         self._proved: deque[tuple[int, _Rates]] = deque(maxlen=60)
         self._rates = _Rates(-self._max_drift(0), self._max_drift(0))
-        self._drift = 0.0
         self._exchanges = 0
         self._newest_ns = 0
 
@@ -170,11 +169,6 @@ class OffsetEstimator:
             round((upper_ns - lower_ns) / 2) + _ROUNDING_NS,
             trusted=fresh and self._exchanges >= self._trusted_from,
         )
-
-    @property
-    def drift_ppm(self) -> float:
-        """How much faster the remote clock runs than ours; 0 while nothing about that is proved."""
-        return self._drift * 1e6
 
     @property
     def round_trip_ns(self) -> int | None:
@@ -252,15 +246,13 @@ class OffsetEstimator:
         if self._proved and self._proved[-1][0] == window:
             between &= self._proved.pop()[1]
         self._proved.append((window, between))
-        mean = rates = _Rates(-most, most)
+        rates = _Rates(-most, most)
         for _, proved in self._proved:
-            mean &= proved
             rates &= _Rates(proved.lowest - wander, proved.highest + wander)
         if rates.lowest > rates.highest:  # it wandered by more than the law: what was proved is void
             self._proved.clear()
-            mean = rates = _Rates(-most, most)
+            rates = _Rates(-most, most)
         self._rates = rates
-        self._drift = (mean.lowest + mean.highest) / 2
 
 
 def _mean_rates(before: Iterable[_Point], point: _Point) -> _Rates:

@@ -11,7 +11,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from common.clock import monotonic_ns
-from common.link.inbox import Inbox, wake
+from common.link.inbox import Inbox
 from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
 from common.link.waiting import count_peers, wait_for_peer
@@ -147,32 +147,6 @@ class Link:
         Those already alive are reported at once, this session's own among them.
         """
         watch_presence(self._session, self._loop, self.robot, on_change, self._held)
-
-    def watch_alive(self, on_change: Callable[[str, bool], None]) -> None:
-        """Call `on_change(role, alive)` on the loop as other sessions' roles come and go.
-
-        Those already alive are reported at once. It informs people; it protects nobody: a dead link is
-        noticed only after its lease.
-        """
-
-        def deliver(role: str, alive: bool) -> None:
-            if self._closed or role in self._roles:
-                return
-            try:
-                on_change(role, alive)
-            except Exception:
-                self._count(ALIVE).handler_errors += 1
-                log.exception("%s: the handler failed", ALIVE.name)
-
-        def on_sample(sample: zenoh.Sample) -> None:
-            role = str(sample.key_expr).rpartition("/")[2]
-            wake(self._loop, deliver, role, sample.kind == zenoh.SampleKind.PUT)
-
-        self._held.append(
-            self._session.liveliness().declare_subscriber(
-                self._alive_key("*"), Callback(on_sample, indirect=False), history=True
-            )
-        )
 
     def counters(self) -> dict[str, TopicCounters]:
         """A copy of the counters, by topic name."""

@@ -24,7 +24,7 @@ from common.link.opening import open_zenoh
 from common.link.presence import watch_presence
 from common.link.waiting import count_peers
 from common.wire.presence import ProcessPresence
-from common.wire.topics import ALIVE, Topic
+from common.wire.topics import Topic
 
 CLOSE_TIMEOUT_S = 1.0
 _ROBOT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -102,23 +102,6 @@ class LinkSession:
         if robot not in self._links:
             self._links[robot] = Link(self._session, robot, self._loop, self._quality)
         return self._links[robot]
-
-    def watch_robots(self, on_change: Callable[[str, bool], None]) -> None:
-        """Call `on_change(robot, alive)` on the loop as slaves come and go; those there already at once."""
-
-        def deliver(robot: str, alive: bool) -> None:
-            if not self._closed:
-                on_change(robot, alive)
-
-        def on_sample(sample: zenoh.Sample) -> None:
-            robot = str(sample.key_expr).split("/")[1]
-            wake(self._loop, deliver, robot, sample.kind == zenoh.SampleKind.PUT)
-
-        self._held.append(
-            self._session.liveliness().declare_subscriber(
-                f"{ALIVE.key_for('*')}/slave", Callback(on_sample, indirect=False), history=True
-            )
-        )
 
     def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None], robot: str = "*") -> None:
         """Call `on_change(presence, alive)` on the loop as processes come and go, of every robot's name."""

@@ -88,8 +88,10 @@ class CameraMetrics(Metrics):
     width: int
     sent_kb: float
     budget_bytes: int
-    gave_way: int
-    unseen: int
+    bitrate_reduced: int
+    """Times that the picture's budget was made smaller."""
+    not_acknowledged: int
+    """Pictures that the master did not acknowledge."""
     make_ms: Summary
     transit_ms: Summary
     action_to_observation_ms: Summary

@@ -54,7 +54,7 @@ class RateControl:
         self._rest_until_ns = 0
         self._lowered_ns = -1
         self.lowered = 0
-        """Times that it gave way."""
+        """Times that the bitrate was reduced."""
         self.lost = 0
         """Pictures that nobody said he had seen."""
 

@@ -145,8 +145,10 @@ def video_table(video: Mapping[str, Any]) -> RenderableType:
     for name, key in ages.items():
         table.add_row(name, *stage_cells(video[key]))
     size = f"{video['fps']:.1f} Hz, {video['kb_s']:.0f} kB/s, {video['mean_kb']:.1f} kB each"
-    seen = f"{video['width']} pixels wide; gave way {video['gave_way']} times, {video['unseen']} unseen"
-    return Group(table, Text(f"{size}, {seen}", "dim"))
+    reduced = (
+        f"bitrate reduced {video['bitrate_reduced']}×; {video['not_acknowledged']} frames not acknowledged"
+    )
+    return Group(table, Text(f"{size}, {video['width']} pixels wide; {reduced}", "dim"))
 
 
 def synergy_table(judged: Mapping[str, Mapping[str, float] | None]) -> RenderableType:

@@ -147,19 +147,11 @@ def test_the_drift_is_fitted_and_makes_a_stale_offset_last() -> None:
     remote = RemoteClock(0, 80.0, 0)
     estimator = OffsetEstimator(RAW_CLOCKS)
     now_ns = steady(estimator, remote, 60, out_us=30, back_us=60, jitter_us=100)
-    assert abs(estimator.drift_ppm - 80) < 5
     later_ns = now_ns + 20 * NS_PER_S
     offset = estimator.estimate(later_ns)
     assert abs(offset.offset_ns - remote.offset_at(later_ns)) < 150_000  # without the fit: 1.6 ms
     assert holds(offset, remote, later_ns)
     assert offset.bound_ns < 20 * 200_000  # better than the limit of any clock
-
-
-def test_a_long_round_trip_says_nothing_of_the_drift() -> None:
-    remote = RemoteClock(0, 80.0, 0)
-    estimator = OffsetEstimator(RAW_CLOCKS)
-    steady(estimator, remote, 60, out_us=60_000, back_us=60_000)
-    assert estimator.drift_ppm == 0.0
 
 
 def test_it_is_trusted_from_the_third_exchange_and_until_it_is_stale() -> None:

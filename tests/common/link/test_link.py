@@ -325,22 +325,6 @@ def test_a_question_that_is_not_answered_times_out() -> None:
     run(test)
 
 
-def test_liveliness_tells_who_comes_and_goes_but_not_oneself() -> None:
-    async def test() -> None:
-        endpoint = free_endpoint()
-        changes: list[tuple[str, bool]] = []
-        async with open_link(LinkConfig(connect=[endpoint]), ROBOT) as master:
-            master.declare_alive("master")
-            master.watch_alive(lambda role, alive: changes.append((role, alive)))
-            async with open_link(LinkConfig(listen=[endpoint]), ROBOT) as slave:
-                slave.declare_alive("slave")
-                await until(lambda: changes)
-            await until(lambda: len(changes) > 1)
-        assert changes == [("slave", True), ("slave", False)]
-
-    run(test)
-
-
 def test_either_side_may_start_first_and_come_back() -> None:
     async def test() -> None:
         endpoint = free_endpoint()
@@ -444,7 +428,7 @@ def test_one_session_serves_many_robots_and_keeps_them_apart() -> None:
             open_link(LinkConfig(listen=[ends["robot-1"]]), "robot-1") as first,
             open_session(LinkConfig(connect=list(ends.values()))) as session,
         ):
-            session.watch_robots(lambda robot, alive: seen.append((robot, alive)))
+            session.watch_presence(lambda process, alive: seen.append((process.robot, alive)))
             links = {robot: session.link(robot) for robot in ends}
             assert session.link("robot-1") is links["robot-1"]
             heard = {robot: Heard() for robot in ends}
@@ -522,7 +506,7 @@ def test_two_clients_meet_through_a_router(protocol: str, tmp_path: Path) -> Non
             slave.subscribe(COMMAND, heard)
             slave.answer(CLOCK, lambda payload, _: payload)
             slave.declare_alive("slave")
-            master.watch_alive(lambda role, here: alive.update({role: here}))
+            master.watch_presence(lambda process, here: alive.update({process.role: here}))
             await heard_through(master.publish(COMMAND), heard, b"command")
             await master.connected(CLOCK)
             assert await master.ask(CLOCK, b"hello") == b"hello"
