@@ -22,7 +22,7 @@ from master.joint_angles.solver import JointSolver
 from master.orientation.estimator import Estimator
 from master.suit.doubt import Doubts, NodeDoubt, Weight, refusal, together
 from master.suit.nodes import NodeConfig
-from master.suit.plausibility import Plausibility
+from master.suit.plausibility import PlausibilityWatch
 from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol
 
@@ -62,7 +62,7 @@ class MasterPipeline:
         self.to_tell: list[str] = []
         """What the operator is to be told of the last joint angles."""
         self._angles_ns: int | None = None
-        self.plausibility = Plausibility(
+        self.plausibility = PlausibilityWatch(
             config.capture.plausibility, len(nodes), config.capture.rate_hz, protocol.fd.scale,
             self.estimator.affine,
         )  # fmt: skip

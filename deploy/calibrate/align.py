@@ -16,10 +16,14 @@ from deploy.calibrate.options import OutFolder, RecordingFile
 from deploy.report.options import AsJson, ReportFile
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rich.table import Table
 
+    from common.skeleton import Skeleton
     from master.calibrate.alignment import SuitAlignment
-    from master.calibrate.joint_motion import JointMotion
+    from master.calibrate.joint_motion import JointFinding
+    from master.calibrate.recording import NodeRecording
 
 
 _TIMES = re.compile(r"([0-9]+(?:\.[0-9]*)?):([0-9]+(?:\.[0-9]*)?)")
@@ -56,28 +60,17 @@ def align(
 
     Example: `tandem calibrate align session.mcap --profile nursing --out calibration`
     """
-    from rich.progress import Progress
-
     from common.skeleton import load_skeleton
-    from deploy.calibrate.align_picture import draw_angles
     from deploy.calibrate.session import make_folder, tell_machines
-    from master.calibrate.alignment import find_alignment
-    from master.calibrate.alignment_files import calibrated, of_profile, write_alignment
+    from master.calibrate.alignment_files import of_profile
     from master.calibrate.recording import load_recordings
 
     skeleton = load_skeleton(profile)
     make_folder(out)
     recorded = load_recordings(recording)
-    nodes = calibrated(of_profile(recorded, skeleton), out)
     between = None if zero_pose is None else (float(zero_pose.split(":")[0]), float(zero_pose.split(":")[1]))
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("joints", total=None)
-        found = find_alignment(
-            nodes, skeleton, between, lambda done, of: bar.update(task, completed=done, total=of)
-        )
-    write_alignment(found, recording, out, date.today())
-    if found.nodes:
-        draw_angles(nodes, skeleton, found, out / "alignment.png")
+    nodes = of_profile(recorded, skeleton)
+    found = align_to_files(nodes, skeleton, between, recording, out, Console(stderr=True))
     figures = as_report(found, recording)
     tell_machines(figures, report, to_stdout=as_json)
     if not as_json:
@@ -92,6 +85,37 @@ def align(
             )
     if found.refused:
         raise TandemError("\n".join(f"{recording}: {line}" for line in refusals(found)))
+
+
+def align_to_files(
+    recorded: Mapping[str, NodeRecording],
+    skeleton: Skeleton,
+    zero_pose_s: tuple[float, float] | None,
+    recording: Path,
+    folder: Path,
+    console: Console,
+    *,
+    picture: bool = True,
+) -> SuitAlignment:
+    """Find how the nodes sit, their `imu` calibrations applied; write it to their files, and the picture."""
+    from rich.progress import Progress
+
+    from deploy.calibrate.align_picture import draw_angles
+    from master.calibrate.alignment import find_alignment
+    from master.calibrate.alignment_files import calibrated, write_alignment
+
+    nodes = calibrated(recorded, folder)
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("joints", total=None)
+
+        def progress(done: int, of: int) -> None:
+            bar.update(task, completed=done, total=of)
+
+        found = find_alignment(nodes, skeleton, zero_pose_s, progress)
+    write_alignment(found, recording, folder, date.today())
+    if picture and found.nodes:
+        draw_angles(nodes, skeleton, found, folder / "alignment.png")
+    return found
 
 
 def refusals(found: SuitAlignment) -> list[str]:
@@ -125,7 +149,7 @@ def as_report(found: SuitAlignment, recording: Path) -> dict[str, Any]:
     }
 
 
-def _joint(joint: JointMotion) -> dict[str, Any]:
+def _joint(joint: JointFinding) -> dict[str, Any]:
     fit = joint.fit
     axes = fit is not None and joint.axes_known
     return {

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from deploy.calibrate.options import Nodes, OutFolder, RecordingFile
 from deploy.report.options import AsJson, ReportFile
 
 if TYPE_CHECKING:
-    from deploy.calibrate.session import Session
+    from deploy.calibrate.session import NodeMethod
     from master.calibrate.inertial import InertialCalibration
     from master.calibrate.recording import NodeRecording
+    from master.calibrate.six_position_session import SixPositionCalibration
 
 _STANDARD_GRAVITY_M_S2 = 9.80665
 
@@ -63,53 +62,55 @@ def imu(
 
     Example: `tandem calibrate imu session.npz --out calibration --report imu.json`
     """
-    from deploy.calibrate import session as sessions
-    from deploy.calibrate.pictures import draw_inertial
-    from master.calibrate.inertial import InertialOptions, calibrate_inertial
+    from deploy.calibrate.session import run_command
 
     if method == "six-position":
-        choice = (gravity, still_s, turn_deg)
-        _six_position(recording, (out, node or [], report), choice, as_json=as_json)
-        return
-    options = InertialOptions(gravity, still_s)
-
-    def calibrate(raw: NodeRecording, tell: Callable[[float], None]) -> InertialCalibration:
-        return calibrate_inertial(raw, options, tell)
-
-    sessions.make_folder(out)
-    day = date.today()
-    session = sessions.calibrate_nodes(recording, node or [], calibrate, Console(stderr=True))
-    written = sessions.write_nodes(session, recording, out, day)
-    for name, found in session.found.items():
-        draw_inertial(found, out / f"{name}_imu.png")
-    sessions.tell_machines(sessions.report(session, recording, day, _gist), report, to_stdout=as_json)
-    if not as_json:
-        _print(session, written, Console())
-    sessions.refuse(session, recording)
+        six = six_position_method(gravity, still_s, math.radians(turn_deg))
+        run_command(six, recording, node, out, report, as_json=as_json)
+    else:
+        attitudes = attitudes_method(gravity, still_s)
+        run_command(attitudes, recording, node, out, report, as_json=as_json)
 
 
-def _six_position(
-    recording: Path,
-    where: tuple[Path, list[str], Path | None],
-    choice: tuple[float, float, float],
-    *,
-    as_json: bool,
-) -> None:
-    from deploy.calibrate import session as sessions
-    from deploy.calibrate.views import notes, six_position_table
-    from master.calibrate.six_position_session import (
-        SixPositionCalibration,
-        SixPositionOptions,
-        calibrate_six_position,
-    )
+def attitudes_method(gravity_m_s2: float, still_s: float) -> NodeMethod[InertialCalibration]:
+    """Calibration from many attitudes."""
+    from deploy.calibrate.pictures import draw_inertial
+    from deploy.calibrate.session import NodeMethod
+    from deploy.calibrate.views import inertial_table
+    from master.calibrate.inertial import InertialOptions, calibrate_inertial
 
-    out, nodes, report = where
-    options = SixPositionOptions(choice[0], math.radians(choice[2]), choice[1])
+    options = InertialOptions(gravity_m_s2, still_s)
+
+    def calibrate(raw: NodeRecording, progress: Callable[[float], None]) -> InertialCalibration:
+        return calibrate_inertial(raw, options, progress)
+
+    def summary(found: InertialCalibration) -> dict[str, Any]:
+        return {
+            "still_intervals": len(found.still),
+            "attitudes": found.attitudes,
+            "evidence": [one.as_report() for one in found.evidence],
+            "moves": len(found.gyroscope.errors_rad),
+            "accelerometer_cost_m4_s8": found.accelerometer.cost,
+            "gyroscope_cost": found.gyroscope.cost,
+        }
+
+    return NodeMethod(calibrate, inertial_table, summary, draw_inertial, "imu")
+
+
+def six_position_method(
+    gravity_m_s2: float, still_s: float, turn_rad: float
+) -> NodeMethod[SixPositionCalibration]:
+    """Calibration from six faces and three turns."""
+    from deploy.calibrate.session import NodeMethod
+    from deploy.calibrate.views import six_position_table
+    from master.calibrate.six_position_session import SixPositionOptions, calibrate_six_position
+
+    options = SixPositionOptions(gravity_m_s2, turn_rad, still_s)
 
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> SixPositionCalibration:
         return calibrate_six_position(raw, options)
 
-    def gist(found: SixPositionCalibration) -> dict[str, Any]:
+    def summary(found: SixPositionCalibration) -> dict[str, Any]:
         return {
             "method": "six-position",
             "still_intervals": len(found.still),
@@ -118,32 +119,4 @@ def _six_position(
             "evidence": [one.as_report() for one in found.evidence],
         }
 
-    sessions.make_folder(out)
-    day = date.today()
-    session = sessions.calibrate_nodes(recording, nodes, calibrate, Console(stderr=True))
-    written = sessions.write_nodes(session, recording, out, day)
-    sessions.tell_machines(sessions.report(session, recording, day, gist), report, to_stdout=as_json)
-    if not as_json and session.found:
-        console = Console()
-        console.print(six_position_table(session.found))
-        notes(session.found, written, console)
-    sessions.refuse(session, recording)
-
-
-def _gist(found: InertialCalibration) -> dict[str, Any]:
-    return {
-        "still_intervals": len(found.still),
-        "attitudes": found.attitudes,
-        "evidence": [one.as_report() for one in found.evidence],
-        "moves": len(found.gyroscope.errors_rad),
-        "accelerometer_cost_m4_s8": found.accelerometer.cost,
-        "gyroscope_cost": found.gyroscope.cost,
-    }
-
-
-def _print(session: Session[InertialCalibration], written: dict[str, Path], console: Console) -> None:
-    from deploy.calibrate.views import inertial_table, notes
-
-    if session.found:
-        console.print(inertial_table(session.found))
-        notes(session.found, written, console)
+    return NodeMethod(calibrate, six_position_table, summary)

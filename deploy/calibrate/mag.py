@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from deploy.calibrate.options import HemisphereOption, Nodes, OutFolder, RecordingFile
 from deploy.report.options import AsJson, ReportFile
 
 if TYPE_CHECKING:
-    from deploy.calibrate.session import Session
+    from common.quaternion import Array
+    from deploy.calibrate.session import NodeMethod
     from master.calibrate.magnetic import MagneticCalibration
+    from master.calibrate.magnetometer_axes import Hemisphere
     from master.calibrate.recording import NodeRecording
 
 
@@ -60,44 +60,36 @@ def mag(
 
     Example: `tandem calibrate mag rotation.npz --out calibration --node left_hand`
     """
-    from deploy.calibrate import session as sessions
-    from deploy.calibrate.pictures import draw_magnetic
-    from master.calibrate.magnetic import MagneticOptions, calibrate_magnetic
+    from deploy.calibrate.session import run_command
     from master.calibrate.magnetometer_axes import axes_matrix, hemisphere_named
+
+    matrix = None if axes is None else axes_matrix(axes)
+    method = rotation_method(out, hemisphere_named(hemisphere), matrix, tuple(overflow or ()))
+    run_command(method, recording, node, out, report, as_json=as_json)
+
+
+def rotation_method(
+    folder: Path, hemisphere: Hemisphere, axes: Array | None = None, overflow_ut: tuple[float, ...] = ()
+) -> NodeMethod[MagneticCalibration]:
+    """Calibration from free rotation; `folder` holds the accelerometers' calibrations, if there are any."""
+    from deploy.calibrate.pictures import draw_magnetic
+    from deploy.calibrate.session import NodeMethod
+    from deploy.calibrate.views import magnetic_table
+    from master.calibrate.magnetic import MagneticOptions, calibrate_magnetic
     from master.calibrate.node_file import accelerometer_map
 
-    options = MagneticOptions(
-        hemisphere_named(hemisphere), None if axes is None else axes_matrix(axes), tuple(overflow or ())
-    )
+    options = MagneticOptions(hemisphere, axes, overflow_ut)
 
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
-        return calibrate_magnetic(raw, accelerometer_map(out, raw.name), options)
+        return calibrate_magnetic(raw, accelerometer_map(folder, raw.name), options)
 
-    sessions.make_folder(out)
-    day = date.today()
-    session = sessions.calibrate_nodes(recording, node or [], calibrate, Console(stderr=True))
-    written = sessions.write_nodes(session, recording, out, day)
-    for name, found in session.found.items():
-        draw_magnetic(found, out / f"{name}_mag.png")
-    sessions.tell_machines(sessions.report(session, recording, day, _gist), report, to_stdout=as_json)
-    if not as_json:
-        _print(session, written, Console())
-    sessions.refuse(session, recording)
+    def summary(found: MagneticCalibration) -> dict[str, Any]:
+        return {
+            "field_ut": found.fit.field_ut,
+            "coverage": found.coverage,
+            "aligned_deg": None if found.rotation is None else math.degrees(found.rotation.angle_rad),
+            "evidence": [one.as_report() for one in found.evidence],
+            "hold_out_percent": 100.0 * found.hold_out_spread_ut / found.fit.field_ut,
+        }
 
-
-def _gist(found: MagneticCalibration) -> dict[str, Any]:
-    return {
-        "field_ut": found.fit.field_ut,
-        "coverage": found.coverage,
-        "aligned_deg": None if found.rotation is None else math.degrees(found.rotation.angle_rad),
-        "evidence": [one.as_report() for one in found.evidence],
-        "hold_out_percent": 100.0 * found.hold_out_spread_ut / found.fit.field_ut,
-    }
-
-
-def _print(session: Session[MagneticCalibration], written: dict[str, Path], console: Console) -> None:
-    from deploy.calibrate.views import magnetic_table, notes
-
-    if session.found:
-        console.print(magnetic_table(session.found))
-        notes(session.found, written, console)
+    return NodeMethod(calibrate, magnetic_table, summary, draw_magnetic, "mag")

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, track
+from rich.table import Table
+from rich.text import Text
 
 from common.config.sensor_calibration import Made
 from common.errors import TandemError
@@ -40,16 +42,79 @@ Calibrate = Callable[[NodeRecording, Callable[[float], None]], Result]
 
 
 @dataclass(frozen=True, slots=True)
-class Session(Generic[Result]):
+class NodeResults(Generic[Result]):
     """The nodes that could be calibrated, and why others could not."""
 
     found: Mapping[str, Result]
     refused: Mapping[str, str]
 
 
+@dataclass(frozen=True, slots=True)
+class NodeMethod(Generic[Result]):
+    """One way to calibrate single nodes, and how its results are shown."""
+
+    calibrate: Calibrate[Result]
+    table: Callable[[Mapping[str, Result]], Table]
+    summary: Callable[[Result], dict[str, Any]]
+    """Figures for the JSON report, beside the parts that the node's file holds."""
+    draw: Callable[[Result, Path], None] | None = None
+    picture: str = ""
+    """A node's picture is `{node}_{picture}.png`."""
+
+
+def calibrate_to_files(
+    method: NodeMethod[Result],
+    recording: Path,
+    names: list[str],
+    folder: Path,
+    console: Console,
+    *,
+    pictures: bool = True,
+) -> tuple[NodeResults[Result], dict[str, Any]]:
+    """Calibrate nodes of a recording and write their files and pictures; the results, and the report."""
+    day = date.today()
+    results = calibrate_nodes(recording, names, method.calibrate, console)
+    write_nodes(results, recording, folder, day)
+    if pictures and method.draw is not None:
+        for name, found in track(results.found.items(), "pictures", console=console, transient=True):
+            method.draw(found, folder / f"{name}_{method.picture}.png")
+    return results, report(results, recording, day, method.summary)
+
+
+def show(method: NodeMethod[Result], results: NodeResults[Result], folder: Path, console: Console) -> None:
+    """Print the table, the notes and where the files are; nothing where no node could be calibrated."""
+    if not results.found:
+        return
+    console.print(method.table(results.found))
+    said = by_words((name, note) for name, node in results.found.items() for note in node.notes)
+    for note, names in said.items():
+        console.print(Text(f"{', '.join(names)}: {note}", "yellow"))
+    for name in results.found:
+        console.print(Text(f"written: {folder / name}.toml", "dim"), soft_wrap=True)
+
+
+def run_command(
+    method: NodeMethod[Result],
+    recording: Path,
+    names: list[str] | None,
+    folder: Path,
+    report_file: Path | None,
+    *,
+    as_json: bool,
+) -> None:
+    """The whole of `tandem calibrate imu` and `mag`. Raises TandemError for nodes that are refused."""
+    make_folder(folder)
+    console = Console(stderr=True)
+    results, figures = calibrate_to_files(method, recording, names or [], folder, console)
+    tell_machines(figures, report_file, to_stdout=as_json)
+    if not as_json:
+        show(method, results, folder, Console())
+    refuse(results, recording)
+
+
 def calibrate_nodes(
     path: Path, names: list[str], calibrate: Calibrate[Result], console: Console
-) -> Session[Result]:
+) -> NodeResults[Result]:
     """Calibrate the named nodes of a recording, all without names, with a progress bar.
 
     Raises TandemError when the recording cannot be read or has no such node.
@@ -75,7 +140,7 @@ def calibrate_nodes(
             except TandemError as error:
                 refused[name] = str(error)
             tell(1.0)
-    return Session(found, refused)
+    return NodeResults(found, refused)
 
 
 def make_folder(folder: Path) -> None:
@@ -86,17 +151,14 @@ def make_folder(folder: Path) -> None:
         raise TandemError(f"--out {folder}: cannot be made ({error.strerror})") from None
 
 
-def write_nodes(session: Session[Result], recording: Path, folder: Path, day: date) -> dict[str, Path]:
-    """Write each node's TOML into the folder; a file that is there keeps its other parts. Their paths."""
-    written = {}
-    for name, found in session.found.items():
-        written[name] = folder / f"{name}.toml"
-        write_calibration(written[name], found.parts(day, recording.name))
-    return written
+def write_nodes(results: NodeResults[Result], recording: Path, folder: Path, day: date) -> None:
+    """Write each node's TOML into the folder; a file that is there keeps its other parts."""
+    for name, found in results.found.items():
+        write_calibration(folder / f"{name}.toml", found.parts(day, recording.name))
 
 
 def report(
-    session: Session[Result], recording: Path, day: date, gist: Callable[[Result], Any]
+    results: NodeResults[Result], recording: Path, day: date, gist: Callable[[Result], Any]
 ) -> dict[str, Any]:
     """The figures for machines: a node's parts as its file has them, and the command's own figures."""
     return {
@@ -111,9 +173,9 @@ def report(
                     for part, (values, made) in found.parts(day, recording.name).items()
                 },
             }
-            for name, found in session.found.items()
+            for name, found in results.found.items()
         },
-        "refused": dict(session.refused),
+        "refused": dict(results.refused),
     }
 
 
@@ -134,9 +196,9 @@ def by_words(said: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
     return nodes
 
 
-def refuse(session: Session[Result], recording: Path) -> None:
+def refuse(results: NodeResults[Result], recording: Path) -> None:
     """Raises TandemError, a line a reason with its nodes; after what was found has been written."""
-    nodes = by_words(session.refused.items())
+    nodes = by_words(results.refused.items())
     if nodes:
         raise TandemError(
             "\n".join(f"{recording}: {', '.join(names)}: {why}" for why, names in nodes.items())

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from rich import box
-from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from common.quaternion import Array
-from deploy.calibrate.session import Found, by_words
 from master.calibrate.inertial import InertialCalibration
 from master.calibrate.magnetic import MagneticCalibration
 from master.calibrate.six_position_session import SixPositionCalibration
@@ -24,21 +20,17 @@ def inertial_table(found: Mapping[str, InertialCalibration]) -> Table:
     for name, node in found.items():
         a, g = node.accelerometer, node.gyroscope
         scale = np.cbrt(np.linalg.det(a.gain)), np.cbrt(np.linalg.det(g.gain))
-        table.add_row(
-            name,
-            "acc",
-            f"{len(node.still)} rests",
-            *(f"{_mean(e):.4f}" for e in (node.acc_before_m_s2, a.residuals_m_s2, a.hold_out_m_s2)),
-            f"{100 * a.sigma[:6].max() / scale[0]:.3f} %",
-            f"{a.sigma[6:].max() * scale[0]:.4f} m/s²",
+        _acc_row(
+            table,
+            (name, f"{len(node.still)} rests"),
+            (node.acc_before_m_s2, a.residuals_m_s2, a.hold_out_m_s2),
+            (a.sigma[:6].max() / scale[0], a.sigma[6:].max() * scale[0]),
         )
-        table.add_row(
-            "",
-            "gyro",
+        _gyro_row(
+            table,
             f"{len(g.errors_rad)} moves",
-            *(f"{np.degrees(_mean(e)):.3f}" for e in (node.gyr_before_rad, g.errors_rad, g.hold_out_rad)),
-            f"{100 * g.sigma.max() / scale[1]:.3f} %",
-            f"{np.degrees(g.bias_sigma.max() * scale[1]):.4f} °/s",
+            (node.gyr_before_rad, g.errors_rad, g.hold_out_rad),
+            (g.sigma.max() / scale[1], g.bias_sigma.max() * scale[1]),
         )
     return table
 
@@ -49,27 +41,32 @@ def six_position_table(found: Mapping[str, SixPositionCalibration]) -> Table:
     for name, node in found.items():
         a, g = node.accelerometer, node.gyroscope
         scale = [np.cbrt(abs(np.linalg.det(sensor.affine[:, :3]))) for sensor in (a, g)]
-        table.add_row(
-            name,
-            "acc",
-            f"{len(node.still)} rests",
-            f"{_mean(a.before_m_s2):.4f}",
-            f"{_mean(a.after_m_s2):.4f}",
-            "-",
-            f"{100 * a.sigma[:, :3].max() / scale[0]:.3f} %",
-            f"{a.sigma[:, 3].max():.4f} m/s²",
+        _acc_row(
+            table,
+            (name, f"{len(node.still)} rests"),
+            (a.before_m_s2, a.after_m_s2, None),
+            (a.sigma[:, :3].max() / scale[0], a.sigma[:, 3].max()),
         )
-        table.add_row(
-            "",
-            "gyro",
+        _gyro_row(
+            table,
             f"{len(g.after_rad)} turns",
-            f"{np.degrees(_mean(g.before_rad)):.3f}",
-            f"{np.degrees(_mean(g.after_rad)):.3f}",
-            "-",
-            f"{100 * g.sigma[:, :3].max() / scale[1]:.3f} %",
-            f"{np.degrees(g.sigma[:, 3].max()):.4f} °/s",
+            (g.before_rad, g.after_rad, None),
+            (g.sigma[:, :3].max() / scale[1], g.sigma[:, 3].max()),
         )
     return table
+
+
+def _acc_row(
+    table: Table, head: tuple[str, str], errors: Sequence[Array | None], sigma: tuple[float, float]
+) -> None:
+    means = ["-" if e is None else f"{_mean(e):.4f}" for e in errors]
+    table.add_row(head[0], "acc", head[1], *means, f"{100 * sigma[0]:.3f} %", f"{sigma[1]:.4f} m/s²")
+
+
+def _gyro_row(table: Table, source: str, errors: Sequence[Array | None], sigma: tuple[float, float]) -> None:
+    means = ["-" if e is None else f"{np.degrees(_mean(e)):.3f}" for e in errors]
+    bias = f"{np.degrees(sigma[1]):.4f} °/s"
+    table.add_row("", "gyro", source, *means, f"{100 * sigma[0]:.3f} %", bias)
 
 
 def magnetic_table(found: Mapping[str, MagneticCalibration]) -> Table:
@@ -86,14 +83,6 @@ def magnetic_table(found: Mapping[str, MagneticCalibration]) -> Table:
             f"{node.sigma[:, 3].max():.3f} µT",
         )
     return table
-
-
-def notes(found: Mapping[str, Found], written: Mapping[str, Path], console: Console) -> None:
-    """What a person should know of the nodes, and where their files are."""
-    for note, names in by_words((name, note) for name, node in found.items() for note in node.notes).items():
-        console.print(Text(f"{', '.join(names)}: {note}", "yellow"))
-    for name in found:
-        console.print(Text(f"written: {written[name]}", "dim"), soft_wrap=True)
 
 
 def _table(title: str) -> Table:

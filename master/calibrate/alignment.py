@@ -22,10 +22,10 @@ import numpy as np
 from common.quaternion import Array, conjugate, heading_turn, multiply, rotate
 from common.skeleton import Skeleton
 from master.calibrate.clock_lag import check_lags, joint_lag
-from master.calibrate.evidence import Evidence, first_contradiction
+from master.calibrate.evidence import CrossCheck, first_contradiction
 from master.calibrate.facing import Axis, Island, axes_by_node, facing_of, islands_of, joint_angles
 from master.calibrate.hinge import PoorMotionError
-from master.calibrate.joint_motion import JointMotion, joint_motion
+from master.calibrate.joint_motion import JointFinding, joint_motion
 from master.calibrate.joint_residuals import Moving
 from master.calibrate.neighbours import check_order, fit_pairs
 from master.calibrate.oriented import Oriented, mean_rotation, moving, orient
@@ -63,9 +63,9 @@ class SuitAlignment:
     nodes: dict[str, NodeAlignment]
     refused: dict[str, str]
     """Nodes that the recording does not determine, or whose evidence contradicts it: why, and what to do."""
-    joints: list[JointMotion]
+    joints: list[JointFinding]
     zero_pose_s: tuple[float, float]
-    evidence: dict[str, list[Evidence]]
+    evidence: dict[str, list[CrossCheck]]
     """What was compared before the answer was believed, by node."""
 
 
@@ -117,7 +117,7 @@ def find_alignment(
 
 
 def _by_sides(
-    skeleton: Skeleton, suit: Oriented, found: SuitAlignment, evidence: dict[str, list[Evidence]]
+    skeleton: Skeleton, suit: Oriented, found: SuitAlignment, evidence: dict[str, list[CrossCheck]]
 ) -> SuitAlignment:
     """Nothing at all where left and right seem to be exchanged."""
     ends = {name: (node.heading_rad, node.q_sensor_from_segment) for name, node in found.nodes.items()}
@@ -139,7 +139,7 @@ def _misplaced(
     names: list[str],
     units: list[Moving],
     spacing_s: float,
-    evidence: dict[str, list[Evidence]],
+    evidence: dict[str, list[CrossCheck]],
 ) -> dict[str, str]:
     """Nodes whose neighbours contradict them, and why: one that is late, or, of two exchanged, everyone.
 
@@ -175,7 +175,7 @@ def posture(suit: Oriented, alignment: SuitAlignment) -> Array:
 
 
 def _assemble(
-    skeleton: Skeleton, suit: Oriented, zero_pose: slice, joints: list[JointMotion]
+    skeleton: Skeleton, suit: Oriented, zero_pose: slice, joints: list[JointFinding]
 ) -> SuitAlignment:
     q_zero_pose = {name: mean_rotation(q[zero_pose]) for name, q in zip(suit.names, suit.q, strict=True)}
     islands = islands_of(suit.names, joints)
@@ -222,7 +222,7 @@ def _node(
     island: Island,
     axes: dict[str, list[Axis]],
     facing: tuple[float, float],
-    joints: list[JointMotion],
+    joints: list[JointFinding],
 ) -> NodeAlignment:
     """Its own axes' facing, else that of the segment it hangs on, else everyone's."""
     facing_rad, facing_sigma = facing
@@ -258,7 +258,7 @@ def _node(
     )
 
 
-def _tilt(skeleton: Skeleton, joint: JointMotion, name: str, q_zero_pose: Array) -> float:
+def _tilt(skeleton: Skeleton, joint: JointFinding, name: str, q_zero_pose: Array) -> float:
     """How far the joint's axis is from level (or from where the skeleton has it) in the zero pose, rad."""
     assert joint.fit is not None
     assert joint.fit.axes is not None
@@ -267,20 +267,20 @@ def _tilt(skeleton: Skeleton, joint: JointMotion, name: str, q_zero_pose: Array)
 
 
 def _with_flexion(
-    skeleton: Skeleton, suit: Oriented, joint: JointMotion, nodes: Mapping[str, NodeAlignment]
-) -> JointMotion:
+    skeleton: Skeleton, suit: Oriented, joint: JointFinding, nodes: Mapping[str, NodeAlignment]
+) -> JointFinding:
     if not joint.axes_known or joint.segment not in nodes or joint.parent not in nodes:
         return joint
     i = skeleton.segment_names.index(joint.segment)
     ends = {n: (nodes[n].heading_rad, nodes[n].q_sensor_from_segment) for n in (joint.parent, joint.segment)}
     angle = np.degrees(joint_angles(skeleton, suit, i, ends)[skeleton.segments[i].human.index(True)])
     low, high = np.quantile(angle, [0.05, 0.95]).tolist()
-    return JointMotion(
+    return JointFinding(
         joint.segment, joint.parent, joint.kind, joint.fit, joint.refusal, joint.axes_known, (low, high)
     )
 
 
-def _why(name: str, joints: list[JointMotion]) -> str:
+def _why(name: str, joints: list[JointFinding]) -> str:
     """The refusals of the joints at a node, or what no joint of it can tell."""
     reasons = [
         f"joint {j.segment} on {j.parent}: {j.refusal}"

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from master.calibrate.evidence import Evidence, at_most, not_judged
+from master.calibrate.evidence import CrossCheck, at_most, not_judged
 from master.calibrate.joint_residuals import Moving
 from master.calibrate.neighbours import centre_misfit
 from master.calibrate.oriented import rows_moving
@@ -54,7 +54,7 @@ def joint_lag(parent: Moving, child: Moving, spacing_s: float) -> Lag | None:
 
 def check_lags(
     names: Sequence[str], links: Sequence[tuple[int, int]], lags: Sequence[Lag | None]
-) -> dict[str, tuple[Evidence, float]]:
+) -> dict[str, tuple[CrossCheck, float]]:
     """Of every node the evidence, and the logarithm of what taking its lag off gains in all its joints.
 
     A joint that lags blames the end that has fewer joints in order; of two alike the child.
@@ -85,7 +85,7 @@ def _alone(share: dict[int, float], told: dict[int, int], parent: int, child: in
     return share[child] == share[parent] and told[child] >= told[parent]
 
 
-def _evidence(seconds: float, told: int) -> Evidence:
+def _evidence(seconds: float, told: int) -> CrossCheck:
     if not told:
         return not_judged(_COMPARED, "no joint of it moved enough")
     later = "later" if seconds > 0.0 else "earlier"

@@ -1,6 +1,6 @@
 """What a calibration compares before anything is written: each check, its figure, and what follows from it.
 
-Checks return `Evidence`; `refuse_contradictions` turns the first that contradicts into a refusal, so the
+Checks return `CrossCheck`; `refuse_contradictions` turns the first that contradicts into a refusal, so the
 checks are to be given in the order of how likely each cause is. What cannot be judged is said, never counted
 as good.
 """
@@ -17,7 +17,7 @@ Verdict = Literal["agrees", "contradicts", "not judged"]
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class CrossCheck:
     """One comparison of two things that should agree."""
 
     compared: str
@@ -49,23 +49,23 @@ class Evidence:
         }
 
 
-def agrees(compared: str, figure: float, limit: float, unit: str = "") -> Evidence:
+def agrees(compared: str, figure: float, limit: float, unit: str = "") -> CrossCheck:
     """Both agree."""
-    return Evidence(compared, figure, limit, unit, "agrees")
+    return CrossCheck(compared, figure, limit, unit, "agrees")
 
 
-def not_judged(compared: str, why: str) -> Evidence:
+def not_judged(compared: str, why: str) -> CrossCheck:
     """The data do not tell."""
-    return Evidence(compared, None, None, "", "not judged", why)
+    return CrossCheck(compared, None, None, "", "not judged", why)
 
 
-def at_most(compared: str, figure: float, limit: float, unit: str = "", *, advice: str) -> Evidence:
+def at_most(compared: str, figure: float, limit: float, unit: str = "", *, advice: str) -> CrossCheck:
     """Contradicts where the figure is above the limit, or is no number."""
     verdict: Verdict = "agrees" if figure <= limit else "contradicts"
-    return Evidence(compared, figure, limit, unit, verdict, "" if verdict == "agrees" else advice)
+    return CrossCheck(compared, figure, limit, unit, verdict, "" if verdict == "agrees" else advice)
 
 
-def refuse_contradictions(evidence: Iterable[Evidence]) -> tuple[Evidence, ...]:
+def refuse_contradictions(evidence: Iterable[CrossCheck]) -> tuple[CrossCheck, ...]:
     """The evidence as it came. Raises RecordingError with the advice of the first that contradicts."""
     judged = tuple(evidence)
     for one in judged:
@@ -74,11 +74,11 @@ def refuse_contradictions(evidence: Iterable[Evidence]) -> tuple[Evidence, ...]:
     return judged
 
 
-def first_contradiction(evidence: Iterable[Evidence]) -> Evidence | None:
+def first_contradiction(evidence: Iterable[CrossCheck]) -> CrossCheck | None:
     """The likeliest cause, for whom a refusal concerns one node of many; None where all is well."""
     return next((one for one in evidence if one.contradicts), None)
 
 
-def unjudged(evidence: Iterable[Evidence]) -> tuple[str, ...]:
+def unjudged(evidence: Iterable[CrossCheck]) -> tuple[str, ...]:
     """A note for a person for each comparison that was not possible."""
     return tuple(f"not judged: {e.compared}: {e.advice}" for e in evidence if e.verdict == "not judged")

@@ -15,7 +15,7 @@ import numpy as np
 
 from common.quaternion import Array, conjugate, heading_turn, multiply, rotate, to_matrix
 from common.skeleton import Skeleton
-from master.calibrate.joint_motion import JointMotion, zero_axes
+from master.calibrate.joint_motion import JointFinding, zero_axes
 from master.calibrate.oriented import Oriented
 from master.joint_angles.angles import intrinsic_angles
 
@@ -46,7 +46,7 @@ Island = dict[str, tuple[float, float]]
 """Nodes whose headings are known against each other: offset into the island's frame, and its variance."""
 
 
-def islands_of(names: tuple[str, ...], joints: list[JointMotion]) -> list[Island]:
+def islands_of(names: tuple[str, ...], joints: list[JointFinding]) -> list[Island]:
     """Parents stand before children, so one pass is enough."""
     links = {j.segment: j for j in joints if j.refusal is None}
     islands: list[Island] = []
@@ -65,7 +65,7 @@ def axes_by_node(
     skeleton: Skeleton,
     suit: Oriented,
     q_zero_pose: dict[str, Array],
-    joints: list[JointMotion],
+    joints: list[JointFinding],
     island: Island,
 ) -> dict[str, list[Axis]]:
     """Every node's own level axes, by node, with their signs."""
@@ -108,7 +108,7 @@ def _excess(
     skeleton: Skeleton,
     suit: Oriented,
     i: int,
-    joint: JointMotion,
+    joint: JointFinding,
     q_zero_pose: dict[str, Array],
     island: Island,
     facing_rad: float,

@@ -16,7 +16,7 @@ import numpy as np
 
 from common.quaternion import Array, from_rotation_vector, multiply, rotate
 from master.calibrate.carried import confusion, signed_permutations
-from master.calibrate.evidence import Evidence, at_most, not_judged
+from master.calibrate.evidence import CrossCheck, at_most, not_judged
 
 WINDOW_S = 6.0
 _BLOCKS = 3
@@ -92,7 +92,7 @@ def gyro_gravity(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> GravityAg
     )
 
 
-def judge_agreement(found: GravityAgreement | None) -> list[Evidence]:
+def judge_agreement(found: GravityAgreement | None) -> list[CrossCheck]:
     """Units of the gyroscope first, then its axes, then whatever else makes both contradict each other."""
     of_unit, of_axes = "the gyroscope's unit, by gravity's turns", "the gyroscope's axes, by gravity's turns"
     if found is None:
@@ -135,7 +135,7 @@ def judge_agreement(found: GravityAgreement | None) -> list[Evidence]:
     ]
 
 
-def slipped(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> Evidence:
+def slipped(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float) -> CrossCheck:
     """Whether gravity jumps where the gyroscope did not turn: the unit slipped, or something knocked it.
 
     The mean force of the seconds before an instant and after it, turned back by the gyroscope, differ by what

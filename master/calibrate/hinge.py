@@ -20,7 +20,7 @@ import numpy as np
 
 from common.errors import TandemError
 from common.quaternion import Array
-from master.calibrate.evidence import Evidence, at_most, not_judged
+from master.calibrate.evidence import CrossCheck, at_most, not_judged
 from master.calibrate.gauss_newton import Minimum, along_sphere, gauss_newton, half_sphere, tangents
 from master.calibrate.joint_fit import JointFit
 from master.calibrate.joint_residuals import Moving
@@ -144,7 +144,9 @@ def again(joint: str) -> str:
     return f"record again: bend {joint} ten times through its range while the whole limb moves about"
 
 
-def check_rates(fit: JointFit, parent: Moving, child: Moving, spacing_s: float) -> tuple[JointFit, Evidence]:
+def check_rates(
+    fit: JointFit, parent: Moving, child: Moving, spacing_s: float
+) -> tuple[JointFit, CrossCheck]:
     """The answer with its uncertainty widened by what the rates alone say, and the comparison itself."""
     compared = "the hinge's axes against the rates alone"
     assert fit.axes is not None

@@ -16,7 +16,7 @@ import numpy as np
 
 from common.quaternion import heading_turn, to_matrix
 from master.calibrate.clock_lag import WORST_LAG_S, joint_lag
-from master.calibrate.evidence import Evidence, first_contradiction
+from master.calibrate.evidence import CrossCheck, first_contradiction
 from master.calibrate.gauss_newton import tangents
 from master.calibrate.hinge import HingeAxes, PoorMotionError, again, check_moved, check_rates, find_hinge
 from master.calibrate.joint_fit import JointFit, fit_joint
@@ -38,7 +38,7 @@ class HingePair:
     """Axes from the rates alone (paper C), signs as the answer's."""
     fit: JointFit
     """The answer: axes, heading offset and joint centre from all readings together."""
-    rates: Evidence
+    rates: CrossCheck
     """The answer's axes against the rates alone, low-passed as neighbours share them."""
     hinge: Hinge
     """What the fused angle needs of it. Angle 0 is the pose at the beginning."""

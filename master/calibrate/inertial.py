@@ -13,7 +13,7 @@ from common.quaternion import Array
 from master.calibrate import accelerometer as acc
 from master.calibrate import gyroscope as gyr
 from master.calibrate import inertial_evidence as compare
-from master.calibrate.evidence import Evidence, refuse_contradictions
+from master.calibrate.evidence import CrossCheck, refuse_contradictions
 from master.calibrate.inertial_readings import STANDARD_GRAVITY_M_S2, made, sound_readings
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
@@ -72,7 +72,7 @@ class InertialCalibration:
     counts: bool
     """The maps take raw counts."""
     notes: tuple[str, ...] = field(default=())
-    evidence: tuple[Evidence, ...] = ()
+    evidence: tuple[CrossCheck, ...] = ()
     """What was compared before this was believed."""
 
     def parts(self, day: date, recording: str) -> dict[Part, tuple[Array, Made]]:
@@ -205,7 +205,7 @@ def _moves(recording: NodeRecording, rates: Array, still: Intervals, force: Arra
     ), still_rates
 
 
-def _gyro_unit(moves: gyr.Moves, *, counts: bool) -> tuple[float, Evidence]:
+def _gyro_unit(moves: gyr.Moves, *, counts: bool) -> tuple[float, CrossCheck]:
     """rad/s of one unit of the readings, 1 where they are in rad/s, and what gravity says of the axes.
 
     Refused where neither another unit nor other axes explain it.

@@ -8,7 +8,7 @@ from common.quaternion import Array
 from master.calibrate import accelerometer as acc
 from master.calibrate import gyroscope as gyr
 from master.calibrate.carried import confusion, signed_permutations
-from master.calibrate.evidence import Evidence, agrees, at_most
+from master.calibrate.evidence import CrossCheck, agrees, at_most
 from master.calibrate.recording import NodeRecording
 from master.calibrate.unit_evidence import clipping
 
@@ -33,7 +33,7 @@ _SCALES = np.exp(np.arange(np.log(0.5), np.log(100.0), 0.15))
 """Fastest rate of a session made by hand, rad/s: where nothing is known of the unit."""
 
 
-def known_unit(norm: float, gravity_m_s2: float) -> Evidence:
+def known_unit(norm: float, gravity_m_s2: float) -> CrossCheck:
     """Whether the median norm of a recording, of which little is known yet, is gravity in another unit."""
     name = next((name for size, share, name in _ACC_UNITS if abs(norm / size - 1.0) < share), None)
     return at_most(
@@ -44,7 +44,7 @@ def known_unit(norm: float, gravity_m_s2: float) -> Evidence:
     )
 
 
-def acceleration_unit(norm: float, gravity_m_s2: float) -> Evidence:
+def acceleration_unit(norm: float, gravity_m_s2: float) -> CrossCheck:
     """The accelerometer's norm at rest against gravity."""
     known = known_unit(norm, gravity_m_s2)
     said = f"the accelerometer reads {norm:.3g} m/s² at rest, not {gravity_m_s2:.3g}; "
@@ -56,7 +56,7 @@ def acceleration_unit(norm: float, gravity_m_s2: float) -> Evidence:
     )
 
 
-def ranges(recording: NodeRecording, at_rest: Array) -> list[Evidence]:
+def ranges(recording: NodeRecording, at_rest: Array) -> list[CrossCheck]:
     """Whether the gyroscope stayed within its range; `at_rest` (T, 3) are its readings while nothing turned.
 
     A perfect sensor on a turntable reads the same all along: without noise nothing tells that it is clipped.
@@ -84,7 +84,7 @@ def axes_and_unit(moves: gyr.Moves, *, counts: bool) -> tuple[Array, float, floa
     return axes, scale, float(np.mean(gyr.gravity_errors(scale * axes, moves)))
 
 
-def gyroscope_axes(moves: gyr.Moves, scale: float, *, counts: bool) -> Evidence:
+def gyroscope_axes(moves: gyr.Moves, scale: float, *, counts: bool) -> CrossCheck:
     """The gyroscope's turns against gravity's, its axes as they are: another way that fits contradicts."""
     compared = "gyroscope's axes against gravity's turns"
     error = float(np.mean(gyr.gravity_errors(scale * np.eye(3), moves)))
@@ -119,7 +119,7 @@ def whose(axes: Array) -> str:
     return f"{of_gyro}; or {of_acc}{kind}"
 
 
-def found_accelerometer(fit: acc.AccelerometerFit, gravity_m_s2: float, *, counts: bool) -> list[Evidence]:
+def found_accelerometer(fit: acc.AccelerometerFit, gravity_m_s2: float, *, counts: bool) -> list[CrossCheck]:
     """The calibrated accelerometer against gravity, and its map against what such a sensor can be."""
     norm = float(np.sqrt(np.mean(fit.residuals_m_s2**2)))
     out = [
@@ -156,7 +156,7 @@ def found_accelerometer(fit: acc.AccelerometerFit, gravity_m_s2: float, *, count
     return out
 
 
-def found_gyroscope(fit: gyr.GyroscopeFit, scale: float) -> list[Evidence]:
+def found_gyroscope(fit: gyr.GyroscopeFit, scale: float) -> list[CrossCheck]:
     """The calibrated gyroscope against gravity's turns, and its axes against those delivered."""
     error = float(np.mean(fit.errors_rad))
     off = float(np.max(np.abs(fit.gain / np.cbrt(np.abs(np.linalg.det(fit.gain))) - np.eye(3))))

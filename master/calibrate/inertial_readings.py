@@ -10,7 +10,7 @@ import numpy as np
 from common.config.sensor_calibration import Made
 from common.quaternion import Array
 from master.calibrate import inertial_evidence as compare
-from master.calibrate.evidence import Evidence, refuse_contradictions
+from master.calibrate.evidence import CrossCheck, refuse_contradictions
 from master.calibrate.recording import NodeRecording
 from master.calibrate.soundness import check_inertial, check_samples, filled, without_zeros
 from master.calibrate.still import motion_level, stillest_level
@@ -32,7 +32,7 @@ class InertialReadings:
     """(T,) how fast the node turns, in the same unit; see `motion_level`."""
     rest: float
     """That level of a node at rest."""
-    evidence: tuple[Evidence, ...]
+    evidence: tuple[CrossCheck, ...]
 
     def force_bridged(self) -> Array:
         """(T, 3) of the accelerometer, short gaps bridged."""
@@ -44,7 +44,7 @@ def sound_readings(recording: NodeRecording, gravity_m_s2: float) -> InertialRea
     recording = without_zeros(recording)
     check_samples("accelerometer", recording.acc_m_s2)
     check_samples("gyroscope", recording.gyr_rad_s)
-    evidence: tuple[Evidence, ...] = ()
+    evidence: tuple[CrossCheck, ...] = ()
     if not recording.counts:
         norms = np.linalg.norm(recording.acc_m_s2, axis=1)
         evidence = (compare.known_unit(float(np.median(norms[np.isfinite(norms)])), gravity_m_s2),)

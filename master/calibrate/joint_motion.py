@@ -21,7 +21,7 @@ _LEAST_SAMPLES = 60
 
 
 @dataclass(frozen=True, slots=True)
-class JointMotion:
+class JointFinding:
     """What the motion told about one joint."""
 
     segment: str
@@ -48,7 +48,7 @@ def zero_axes(skeleton: Skeleton, segment: int) -> list[Array] | None:
     return moved if len(moved) in (1, 2) else None
 
 
-def joint_motion(skeleton: Skeleton, i: int, parent: Moving, child: Moving, spacing_s: float) -> JointMotion:
+def joint_motion(skeleton: Skeleton, i: int, parent: Moving, child: Moving, spacing_s: float) -> JointFinding:
     """Fit the joint of segment `i`, and judge whether its heading offset and its axes may be used."""
     entry = skeleton.segments[i]
     axes = zero_axes(skeleton, i)
@@ -56,7 +56,7 @@ def joint_motion(skeleton: Skeleton, i: int, parent: Moving, child: Moving, spac
     rows = rows_moving(parent, child)
     ask = _ask(kind, entry.name, entry.parent)
     if len(rows) < _LEAST_SAMPLES:
-        return JointMotion(entry.name, entry.parent, kind, None, f"it hardly moved; {ask}", False)
+        return JointFinding(entry.name, entry.parent, kind, None, f"it hardly moved; {ask}", False)
     fit = fit_joint(parent.some(rows), child.some(rows), axes, spacing_s)
     rates = None
     if kind == "hinge":
@@ -80,7 +80,7 @@ def joint_motion(skeleton: Skeleton, i: int, parent: Moving, child: Moving, spac
         and max(fit.axis_sigma_rad) < _WORST_AXIS_RAD
         and fit.axis_rival > _WORST_RIVAL
     )
-    return JointMotion(entry.name, entry.parent, kind, fit, refusal, known)
+    return JointFinding(entry.name, entry.parent, kind, fit, refusal, known)
 
 
 def _percent(share: float) -> str:

@@ -20,7 +20,7 @@ from master.calibrate.ellipsoid import (
     off_ut,
     spread_ut,
 )
-from master.calibrate.evidence import Evidence, refuse_contradictions, unjudged
+from master.calibrate.evidence import CrossCheck, refuse_contradictions, unjudged
 from master.calibrate.magnetometer_axes import Hemisphere, check_axes
 from master.calibrate.magnetometer_rotation import MagnetometerRotation, UndeterminedError, align_magnetometer
 from master.calibrate.node_file import Part
@@ -67,7 +67,7 @@ class MagneticCalibration:
     rotation: MagnetometerRotation | None = None
     """Into the accelerometer's axes; None where they are not known."""
     notes: tuple[str, ...] = ()
-    evidence: tuple[Evidence, ...] = ()
+    evidence: tuple[CrossCheck, ...] = ()
     """What was compared before this was believed."""
     axes: Array = field(default_factory=lambda: np.eye(3))
     """(3, 3), the signed permutation that took the readings as they came to the node's axes, before the

@@ -13,7 +13,7 @@ import numpy as np
 
 from common.quaternion import Array
 from master.calibrate.carried import AXES, Carried, axes_text, carried, confusion
-from master.calibrate.evidence import Evidence, agrees, at_most, not_judged
+from master.calibrate.evidence import CrossCheck, agrees, at_most, not_judged
 from master.calibrate.recording import NodeRecording
 
 Hemisphere = Literal["north", "south"]
@@ -51,7 +51,7 @@ def axes_matrix(text: str) -> Array:
     return matrix
 
 
-def check_axes(recording: NodeRecording, field: Array, hemisphere: Hemisphere) -> list[Evidence]:
+def check_axes(recording: NodeRecording, field: Array, hemisphere: Hemisphere) -> list[CrossCheck]:
     """Compare calibrated magnetometer readings (T, 3), NaN where none are, with the other sensors."""
     found = carried(field, recording.gyr_rad_s, recording.rate_hz)
     if found is None or not found.told:
@@ -60,7 +60,7 @@ def check_axes(recording: NodeRecording, field: Array, hemisphere: Hemisphere) -
     return [_handed(axes), _same_as_gravity(recording, found), *_signed(recording, field, found, hemisphere)]
 
 
-def _handed(axes: Array) -> Evidence:
+def _handed(axes: Array) -> CrossCheck:
     compared = "handedness of the gyroscope against the magnetometer's"
     if np.linalg.det(axes) > 0.0:
         return agrees(compared, 0.0, 0.0)
@@ -73,7 +73,7 @@ def _handed(axes: Array) -> Evidence:
     )
 
 
-def _same_as_gravity(recording: NodeRecording, found: Carried) -> Evidence:
+def _same_as_gravity(recording: NodeRecording, found: Carried) -> CrossCheck:
     compared = "gyroscope's axes against gravity's turns"
     gravity = carried(recording.acc_m_s2, recording.gyr_rad_s, recording.rate_hz)
     if gravity is None or not gravity.told:
@@ -88,7 +88,9 @@ def _same_as_gravity(recording: NodeRecording, found: Carried) -> Evidence:
     )
 
 
-def _signed(recording: NodeRecording, field: Array, found: Carried, hemisphere: Hemisphere) -> list[Evidence]:
+def _signed(
+    recording: NodeRecording, field: Array, found: Carried, hemisphere: Hemisphere
+) -> list[CrossCheck]:
     """By gravity, which of both possible maps it is: the axes found, or all of them negated."""
     rotation = found.axes if found.confused else np.eye(3)
     dip = _sine_of_dip(recording.acc_m_s2, field @ rotation)
@@ -105,7 +107,7 @@ def _signed(recording: NodeRecording, field: Array, found: Carried, hemisphere: 
     ]
 
 
-def _dip_sign(dip: float, hemisphere: Hemisphere, wrong: bool) -> Evidence:
+def _dip_sign(dip: float, hemisphere: Hemisphere, wrong: bool) -> CrossCheck:
     degrees = float(np.degrees(np.arcsin(dip)))
     other = "south" if hemisphere == "north" else "north"
     advice = (
@@ -114,10 +116,10 @@ def _dip_sign(dip: float, hemisphere: Hemisphere, wrong: bool) -> Evidence:
         f"{other} only: there, say --hemisphere {other}. Otherwise all three axes of the magnetometer are "
         "negated (a mirror image): correct the signs in its driver, and record again"
     )
-    return Evidence(_SIGN, degrees, 0.0, "°", "contradicts" if wrong else "agrees", advice if wrong else "")
+    return CrossCheck(_SIGN, degrees, 0.0, "°", "contradicts" if wrong else "agrees", advice if wrong else "")
 
 
-def _square(found: Carried, rotation: Array) -> Evidence:
+def _square(found: Carried, rotation: Array) -> CrossCheck:
     degrees = float(np.degrees(_turned_by(found, rotation)))
     return at_most(
         _WAYS,
@@ -142,7 +144,7 @@ def _offer(rotation: Array, hemisphere: Hemisphere, mirrored: bool) -> str:
     )
 
 
-def _refused(what: str) -> Evidence:
+def _refused(what: str) -> CrossCheck:
     return at_most(_WAYS, 1.0, 0.0, advice=f"the magnetometer's axes are not the gyroscope's: {what}")
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.quaternion import Array
-from master.calibrate.evidence import Evidence, at_most, not_judged
+from master.calibrate.evidence import CrossCheck, at_most, not_judged
 from master.calibrate.joint_residuals import ACCELERATION_M_S2, LEVER_M, Moving
 from master.calibrate.oriented import rows_moving
 
@@ -72,7 +72,7 @@ def centre_misfit(one: Moving, two: Moving) -> float:
     return math.sqrt(max(0.0, float(squared.min())))
 
 
-def check_order(fits: Fits, links: Sequence[tuple[int, int]]) -> Evidence:
+def check_order(fits: Fits, links: Sequence[tuple[int, int]]) -> CrossCheck:
     """Whether the suit fits better with two of its units exchanged; `links` are (parent, child) rows."""
     compared = "neighbours' accelerations against each other"
     rough = np.log(np.maximum(fits.misfit_m_s2, _FLOOR_M_S2))

@@ -13,9 +13,9 @@ import numpy as np
 
 from common.quaternion import IDENTITY, conjugate, rotate
 from common.skeleton import Skeleton
-from master.calibrate.evidence import Evidence, at_most, not_judged
+from master.calibrate.evidence import CrossCheck, at_most, not_judged
 from master.calibrate.facing import Ends, angles_at, beyond, limits_of, segment_orientation
-from master.calibrate.joint_motion import JointMotion
+from master.calibrate.joint_motion import JointFinding
 from master.calibrate.oriented import Oriented
 
 _WORST_RAD = math.radians(0.5)
@@ -24,7 +24,7 @@ _KNOWN_M = 0.05
 """Centres nearer than that to each other, sideways, tell nothing."""
 
 
-def check_sides(skeleton: Skeleton, suit: Oriented, joints: list[JointMotion], ends: Ends) -> Evidence:
+def check_sides(skeleton: Skeleton, suit: Oriented, joints: list[JointFinding], ends: Ends) -> CrossCheck:
     """All pairs of limbs together, by their joints with the trunk."""
     compared = "the limbs' angles against their limits, this side and the other"
     as_said = exchanged = 0.0
@@ -73,7 +73,7 @@ def _excess(skeleton: Skeleton, suit: Oriented, ends: Ends, rows: tuple[int, int
     return sum(float(np.mean(beyond(a, of))) for a, of in zip(angles, limits, strict=True) if of)
 
 
-def _wrong_way(joints: list[JointMotion], ends: Ends) -> bool | None:
+def _wrong_way(joints: list[JointFinding], ends: Ends) -> bool | None:
     """Whether the left joints' centres lie right of the right ones'; None where that is not known."""
     sideways: dict[str, float] = {}
     for joint in joints:
@@ -90,7 +90,7 @@ def _wrong_way(joints: list[JointMotion], ends: Ends) -> bool | None:
     return None if not told else sum(told) < 0.0
 
 
-def _same_parent(joints: list[JointMotion], one: str, other: str) -> bool:
+def _same_parent(joints: list[JointFinding], one: str, other: str) -> bool:
     parents = {j.segment: j.parent for j in joints}
     return parents[one] == parents[other]
 

@@ -17,7 +17,7 @@ import numpy as np
 from common.quaternion import Array
 from common.wire.messages import Mask
 from master.calibrate.carried import AXES
-from master.calibrate.evidence import Evidence, at_most
+from master.calibrate.evidence import CrossCheck, at_most
 from master.calibrate.recording import RecordingError
 from master.calibrate.still import Intervals, interval_means
 from master.calibrate.uncertainty import covariance
@@ -219,7 +219,7 @@ def _three(found: list[tuple[Array, float]], angle_rad: float) -> tuple[Array, A
     return np.array(turned), np.array(axes)
 
 
-def check_tilt(tilt_rad: float) -> Evidence:
+def check_tilt(tilt_rad: float) -> CrossCheck:
     """How square the node lay on its faces."""
     return at_most(
         "gravity against the normals of the six faces",

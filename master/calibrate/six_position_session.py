@@ -11,7 +11,7 @@ from common.config.sensor_calibration import Made
 from common.quaternion import Array
 from master.calibrate import inertial_evidence as compare
 from master.calibrate.carried import carried
-from master.calibrate.evidence import Evidence, agrees, at_most, not_judged, refuse_contradictions, unjudged
+from master.calibrate.evidence import CrossCheck, agrees, at_most, not_judged, refuse_contradictions, unjudged
 from master.calibrate.inertial_readings import STANDARD_GRAVITY_M_S2, InertialReadings, made, sound_readings
 from master.calibrate.node_file import Part
 from master.calibrate.recording import NodeRecording, RecordingError
@@ -49,7 +49,7 @@ class SixPositionCalibration:
     accelerometer: SixFaces
     gyroscope: ThreeTurns
     notes: tuple[str, ...]
-    evidence: tuple[Evidence, ...]
+    evidence: tuple[CrossCheck, ...]
 
     def parts(self, day: date, recording: str) -> dict[Part, tuple[Array, Made]]:
         """As `write_calibration` takes them."""
@@ -104,7 +104,7 @@ def _rests(sound: InertialReadings, options: SixPositionOptions) -> Intervals:
     return still
 
 
-def _axes(recording: NodeRecording, rates: Array, faces: SixFaces, turns: ThreeTurns) -> Evidence:
+def _axes(recording: NodeRecording, rates: Array, faces: SixFaces, turns: ThreeTurns) -> CrossCheck:
     """The gyroscope's signs, which the turns alone do not tell, by how gravity moved meanwhile."""
     force = recording.acc_m_s2 @ faces.affine[:, :3].T + faces.affine[:, 3]
     found = carried(force, rates @ turns.affine[:, :3].T + turns.affine[:, 3], recording.rate_hz)

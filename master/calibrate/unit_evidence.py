@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from common.quaternion import Array
-from master.calibrate.evidence import Evidence, at_most, not_judged
+from master.calibrate.evidence import CrossCheck, at_most, not_judged
 from master.calibrate.gyro_gravity import gyro_gravity, judge_agreement, slipped
 from master.calibrate.oriented import LONGEST_GAP_S, bridged, longest_gap
 from master.calibrate.recording import NodeRecording
@@ -41,7 +41,7 @@ def rest_gravity(acc_m_s2: Array, gyr: Array) -> float:
     return float(np.median(np.linalg.norm(acc_m_s2[rate <= np.quantile(rate, 0.1)], axis=1)))
 
 
-def unit_evidence(recording: NodeRecording) -> list[Evidence]:
+def unit_evidence(recording: NodeRecording) -> list[CrossCheck]:
     """All checks of one unit, the likeliest cause first; readings in SI units, short gaps are left out."""
     if recording.duration_s < _SHORTEST_S:
         return [not_judged("everything", f"it is {recording.duration_s:.1f} s long")]
@@ -58,7 +58,7 @@ def unit_evidence(recording: NodeRecording) -> list[Evidence]:
     return [*out, *clipping(recording), *turns[:-1], slipped(acc, gyr, recording.rate_hz), turns[-1]]
 
 
-def clipping(recording: NodeRecording) -> list[Evidence]:
+def clipping(recording: NodeRecording) -> list[CrossCheck]:
     """Time in which the gyroscope stood at an end of its range, and the accelerometer's share of samples."""
     read = recording.as_read or recording
     gyr, acc = read.gyr_rad_s, read.acc_m_s2
@@ -89,7 +89,7 @@ def clipping(recording: NodeRecording) -> list[Evidence]:
     ]
 
 
-def _complete(recording: NodeRecording) -> Evidence:
+def _complete(recording: NodeRecording) -> CrossCheck:
     gap = max(longest_gap(recording.acc_m_s2), longest_gap(recording.gyr_rad_s))
     return at_most(
         "samples without long gaps",
@@ -101,7 +101,7 @@ def _complete(recording: NodeRecording) -> Evidence:
     )
 
 
-def _gravity(norm: float) -> Evidence:
+def _gravity(norm: float) -> CrossCheck:
     """The unit of the accelerometer by its norm at rest."""
     said = f"its accelerometer reads {norm:.4g} m/s² at rest; expected about 9.81"
     unit = next((u for u, one in _OTHER_UNITS.items() if abs(norm / one - 1.0) < 0.1), None)
@@ -116,7 +116,7 @@ def _gravity(norm: float) -> Evidence:
     )
 
 
-def _alive(gyr: Array) -> Evidence:
+def _alive(gyr: Array) -> CrossCheck:
     constant = np.ptp(gyr, axis=0) == 0.0
     # a perfect sensor, as in a simulation, reads zero about an axis about which nothing turns
     noisy = constant.all() or bool(np.median(np.abs(np.diff(gyr[:, ~constant], axis=0)).min(axis=1)) > 0.0)

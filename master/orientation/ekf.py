@@ -32,7 +32,7 @@ from common.quaternion import (
     to_matrix,
 )
 from common.wire.messages import Mask
-from master.orientation.front import BehindFront, Front, FrontSection, Limits
+from master.orientation.front import BehindFront, Front, FrontLimits, FrontSection
 from master.orientation.mahony import begun_anew, initial_orientation
 from master.orientation.rest import Rest, RestState
 
@@ -81,7 +81,7 @@ class EkfConfig(FrontSection):
 
 
 @dataclass(slots=True)
-class _State:
+class _EkfState:
     """n nodes."""
 
     q: Array
@@ -106,10 +106,10 @@ class EkfFilter(BehindFront):
     def __init__(self, config: EkfConfig, rate_hz: float, count: int) -> None:
         self._config = config
         self._period_s = 1.0 / rate_hz
-        limits = Limits(config.rest_bias_limit_deg_s, _REACH_RAD_S, config.field_change)
+        limits = FrontLimits(config.rest_bias_limit_deg_s, _REACH_RAD_S, config.field_change)
         self._front = Front(limits, rate_hz, count, self.q_inertial_from_sensor)
         self._rest = Rest()
-        self._state = _State(
+        self._state = _EkfState(
             q=np.tile(IDENTITY, (count, 1)),
             bias=np.zeros((count, 3)),
             covariance=np.zeros((count, 6, 6)),

@@ -34,7 +34,7 @@ _LEAST_SUIT = 4
 
 
 @dataclass(slots=True)
-class _State:
+class _FieldState:
     """n nodes."""
 
     reference: Array
@@ -54,7 +54,7 @@ class FieldWatch:
     def __init__(self, share: float, count: int) -> None:
         """`share`: how much strength may change, 0 to watch nothing."""
         self.share = share
-        self._state = _State(
+        self._state = _FieldState(
             reference=np.full((count, 2), np.nan),
             now=np.full((count, 2), np.nan),
             off=np.zeros(count),
@@ -114,10 +114,10 @@ class FieldWatch:
         state.off[nodes] = state.age_s[nodes] = 0.0
         state.doubted[nodes] = False
 
-    def snapshot(self) -> _State:
+    def snapshot(self) -> _FieldState:
         """The state, to be given to `restore`."""
         return copy.deepcopy(self._state)
 
-    def restore(self, snapshot: _State) -> None:
+    def restore(self, snapshot: _FieldState) -> None:
         """Go on from a snapshot."""
         self._state = copy.deepcopy(snapshot)

@@ -42,7 +42,7 @@ class FrontSection(FilterSection):
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class FrontLimits:
     """What a front allows."""
 
     bias_deg_s: float
@@ -59,7 +59,7 @@ class Front:
     """Leaves out what is no reading, fields that have changed and gross biases found at rest, of n nodes."""
 
     def __init__(
-        self, limits: Limits, rate_hz: float, count: int, q_inertial_from_sensor: Callable[[], Array]
+        self, limits: FrontLimits, rate_hz: float, count: int, q_inertial_from_sensor: Callable[[], Array]
     ) -> None:
         """`q_inertial_from_sensor` gives the filter's newest orientations (n, 4)."""
         self._inertial = q_inertial_from_sensor

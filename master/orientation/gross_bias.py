@@ -37,7 +37,7 @@ _GYR, _ACC, _MAG = slice(0, 3), slice(3, 6), slice(6, 9)
 
 
 @dataclass(slots=True)
-class _State:
+class _BiasState:
     """n nodes."""
 
     offset: Array
@@ -58,7 +58,7 @@ class GrossBias:
     def __init__(self, limit_rad_s: float, reach_rad_s: float, count: int) -> None:
         """`limit_rad_s`: of what is learnt, 0 for nothing; `reach_rad_s`: what the filter itself learns."""
         self._limit, self._reach = limit_rad_s, reach_rad_s
-        self._state = _State(
+        self._state = _BiasState(
             offset=np.zeros((count, 3)),
             beyond_rad_s=np.zeros(count),
             ring=np.full((_LOOKS, count, 9), np.nan),
@@ -172,11 +172,11 @@ class GrossBias:
         state.ring[:, nodes] = np.nan
         state.steady[nodes] = 0
 
-    def snapshot(self) -> _State:
+    def snapshot(self) -> _BiasState:
         """The state, to be given to `restore`."""
         return copy.deepcopy(self._state)
 
-    def restore(self, snapshot: _State) -> None:
+    def restore(self, snapshot: _BiasState) -> None:
         """Go on from a snapshot."""
         self._state = copy.deepcopy(snapshot)
         self.some = bool(self._state.offset.any())

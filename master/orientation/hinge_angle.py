@@ -92,7 +92,7 @@ def force_at_joint(acc_m_s2: Array, gyr_rad_s: Array, gyr_change_rad_s2: Array, 
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class ForceAngle:
     """What two forces say of the angle."""
 
     angle_rad: Array
@@ -103,7 +103,7 @@ class Seen:
     """(...) by how much the two nodes differ on what does not depend on the angle."""
 
 
-def angle_of_forces(hinge: Hinge, force1_m_s2: Array, force2_m_s2: Array) -> Seen:
+def angle_of_forces(hinge: Hinge, force1_m_s2: Array, force2_m_s2: Array) -> ForceAngle:
     """The angle at which both nodes feel one and the same force, (..., 3) at the joint's centre, m/s²."""
     frame1, frame2 = _frames(hinge)
     return _compared(np.stack([_into(frame1, force1_m_s2), _into(frame2, force2_m_s2)]))
@@ -123,11 +123,11 @@ def _into(frame: Array, vector: Array) -> Array:
     return out
 
 
-def _compared(forces_m_s2: Array) -> Seen:
+def _compared(forces_m_s2: Array) -> ForceAngle:
     """The angle from both nodes' forces in their frames' axes, (2, ..., 3)."""
     along, x, y = np.moveaxis(forces_m_s2, -1, 0)
     across = np.hypot(x, y)
-    return Seen(
+    return ForceAngle(
         # the difference of the two polar angles, in one atan2
         angle_rad=np.arctan2(y[0] * x[1] - x[0] * y[1], x[0] * x[1] + y[0] * y[1]),
         across_m_s2=np.minimum(across[0], across[1]),
@@ -204,7 +204,7 @@ class HingeAngle:
         smooth = np.where(begun, self._smooth + self._share * (turned - self._smooth), turned)
         self._smooth = np.where(known, smooth, self._smooth)
 
-    def _seen(self) -> Seen:
+    def _seen(self) -> ForceAngle:
         """The angle by the forces, brought from the turned-back frames to the present ones."""
         seen = _compared(self._smooth)
         return replace(seen, angle_rad=seen.angle_rad + self._phase[1] - self._phase[0])
@@ -247,7 +247,7 @@ class _Fusion:
     def __init__(self, config: HingeAngleConfig, period_s: float) -> None:
         self._config, self._period_s = config, period_s
 
-    def start(self, seen: Seen) -> None:
+    def start(self, seen: ForceAngle) -> None:
         """Begin at what the accelerometers say."""
         known = np.isfinite(seen.angle_rad)
         self.angle = np.where(known, seen.angle_rad, 0.0)
@@ -256,7 +256,7 @@ class _Fusion:
         self.p_both = np.zeros_like(self.angle)
         self.p_drift = np.full_like(self.angle, self._config.first_drift_rad_s**2)
 
-    def correct(self, seen: Seen) -> None:
+    def correct(self, seen: ForceAngle) -> None:
         """Take in what the accelerometers say of the present angle."""
         config = self._config
         noise = config.acceleration_noise**2 + config.disagreement_s * seen.disagreement_m_s2**2

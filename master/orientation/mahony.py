@@ -14,7 +14,7 @@ from pydantic import Field
 
 from common.quaternion import Array, conjugate, cross, heading_rad, heading_turn, multiply, to_matrix
 from common.wire.messages import Mask
-from master.orientation.front import BehindFront, Front, FrontSection, Limits
+from master.orientation.front import BehindFront, Front, FrontLimits, FrontSection
 
 _REACH_RAD_S = np.radians(0.5)
 """Its integral learns slowly, and about the vertical not at all without a magnetometer."""
@@ -54,7 +54,7 @@ class MahonyFilter(BehindFront):
         self._config = config
         self._period_s = 1.0 / rate_hz
         limit_deg_s = config.rest_bias_limit_deg_s if config.ki > 0.0 else 0.0
-        limits = Limits(limit_deg_s, float(_REACH_RAD_S), config.field_change, any_field=False)
+        limits = FrontLimits(limit_deg_s, float(_REACH_RAD_S), config.field_change, any_field=False)
         self._front = Front(limits, rate_hz, count, self.q_inertial_from_sensor)
         self._q = np.zeros((count, 4))
         self._q[:, 0] = 1.0

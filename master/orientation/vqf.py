@@ -8,7 +8,7 @@ from vqf import VQF
 
 from common.quaternion import Array
 from common.wire.messages import Mask
-from master.orientation.front import BehindFront, Front, FrontSection, Limits
+from master.orientation.front import BehindFront, Front, FrontLimits, FrontSection
 
 _REACH_RAD_S = np.radians(1.9)
 """Just below the package's `biasClip` of 2 °/s, beyond which it takes no rest for one."""
@@ -45,7 +45,7 @@ class VqfFilter(BehindFront):
         self._period_s = 1.0 / rate_hz
         limit_deg_s = config.rest_bias_limit_deg_s if config.rest_bias else 0.0
         field_change = config.field_change if config.reject_disturbed_field else 0.0
-        limits = Limits(limit_deg_s, float(_REACH_RAD_S), field_change)
+        limits = FrontLimits(limit_deg_s, float(_REACH_RAD_S), field_change)
         self._front = Front(limits, rate_hz, count, self.q_inertial_from_sensor)
         self._filters = [
             VQF(

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from common.wire.messages import Mask
 from master.suit.health import Counts, NodeCounters
 from master.suit.layout import Raw
-from master.suit.protocol import READINGS, AnswerFormat, Status
+from master.suit.protocol import READINGS, AnswerFormat, NodeStatus
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class AnswerSlot:
     """Where a node stands: its index in node order, its number on the bus, and the bus's first key."""
 
     index: int
@@ -25,7 +25,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Answers:
+class NodeAnswers:
     """What the n nodes of one format answered in one window."""
 
     usable: Mask
@@ -48,7 +48,7 @@ class Intake:
     A key is a frame's identifier plus the first key of its bus, so that buses do not mix.
     """
 
-    def __init__(self, form: AnswerFormat, places: Sequence[Place]) -> None:
+    def __init__(self, form: AnswerFormat, places: Sequence[AnswerSlot]) -> None:
         self.length = form.length
         self.parts = len(form.parts)
         self.rows = np.array([place.index for place in places], dtype=np.intp)
@@ -94,7 +94,7 @@ class Intake:
         self._slots.append(slot)
         self._frames.append(data)
 
-    def take(self, tick: int, counters: NodeCounters) -> Answers:
+    def take(self, tick: int, counters: NodeCounters) -> NodeAnswers:
         """Check, count and empty what was added, for that tick."""
         slots = np.array(self._slots, dtype=np.intp)
         decoded = self._layout.decode(b"".join(self._frames))
@@ -131,14 +131,14 @@ class Intake:
         differs = (raw[chosen] != self._raw[slots[chosen]]).any(axis=1)
         return self._frames_a_node(slots[chosen][differs]) > 0
 
-    def _judge(self, got: Mask, status: NDArray[np.uint8], counters: NodeCounters) -> Answers:
+    def _judge(self, got: Mask, status: NDArray[np.uint8], counters: NodeCounters) -> NodeAnswers:
         answered: Mask = np.logical_and.reduce(self._by_node(got), axis=1)
         said = np.bitwise_or.reduce(self._by_node(status), axis=1)
-        fault = answered & (said & Status.FAULT > 0)
+        fault = answered & (said & NodeStatus.FAULT > 0)
         counters.faults[self.rows] += fault
-        saturated = answered & (said & Status.SATURATED > 0)
+        saturated = answered & (said & NodeStatus.SATURATED > 0)
         counters.saturated[self.rows] += saturated
-        return Answers(answered & ~fault, answered, self._by_node(self._raw), saturated, fault, fault)
+        return NodeAnswers(answered & ~fault, answered, self._by_node(self._raw), saturated, fault, fault)
 
     def _by_node(self, per_slot: NDArray[Any]) -> NDArray[Any]:
         return per_slot.reshape(len(self.rows), -1)

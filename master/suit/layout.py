@@ -41,7 +41,7 @@ class BitField:
 
 
 @dataclass(frozen=True, slots=True)
-class Decoded:
+class DecodedFrame:
     """A batch of F answers of one layout."""
 
     raw: Raw
@@ -115,12 +115,12 @@ class AnswerLayout:
         """True where frames of both can be decoded in one batch."""
         return self.dtype == other.dtype and (self.tick, self.status) == (other.tick, other.status)
 
-    def decode(self, frames: bytes) -> Decoded:
+    def decode(self, frames: bytes) -> DecodedFrame:
         """Read F frames that lie one after the other, F × length bytes. Checks nothing."""
         table = np.frombuffer(frames, dtype=self.dtype)
         as_bytes = np.frombuffer(frames, dtype=np.uint8).reshape(-1, self.length)
         tick, status = self.tick, self.status
-        return Decoded(
+        return DecodedFrame(
             raw=table["raw"],
             tick=(table["tick"] >> tick.shift) & tick.mask,
             status=(table["status"] >> status.shift) & status.mask,

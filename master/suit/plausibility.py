@@ -78,7 +78,7 @@ class PlausibilityConfig(Section):
     """A node is believed again when nothing has been wrong for so long. Its filter then starts anew."""
 
 
-class Plausibility:
+class PlausibilityWatch:
     """State of N nodes between ticks."""
 
     def __init__(

@@ -19,11 +19,11 @@ from common.quaternion import Array
 from common.wire.messages import Mask
 from master.suit.clash import Clashes
 from master.suit.health import BusHealth, NodeCounters, NodeHealth
-from master.suit.intake import Intake, Place
+from master.suit.intake import AnswerSlot, Intake
 from master.suit.layout import Raw
 from master.suit.nodes import NodeConfig
 from master.suit.number import number_of
-from master.suit.presence import Presence
+from master.suit.presence import NodePresence
 from master.suit.protocol import MAG_OVERFLOW, NO_VALUE, READINGS, SuitProtocol
 from master.suit.silence import BusSigns
 
@@ -69,7 +69,7 @@ class Poll:
         self._fd = dict(fd)
         self._protocol = protocol
         self._counters = NodeCounters(count)
-        self._presence = Presence(count, lost_after)
+        self._presence = NodePresence(count, lost_after)
         self._counters.times_lost = self._presence.times_lost
         self._bus_of_node = [node.bus for node in nodes]
         self.bus_health: dict[str, BusHealth] = {bus: BusHealth() for bus in fd}
@@ -84,7 +84,7 @@ class Poll:
         self._values[:, 6:] = np.nan
 
         self._first_key = {bus: place * _IDS for place, bus in enumerate(fd)}
-        places = [Place(i, node.id, self._first_key[node.bus]) for i, node in enumerate(nodes)]
+        places = [AnswerSlot(i, node.id, self._first_key[node.bus]) for i, node in enumerate(nodes)]
         self._intakes: list[Intake] = []
         self._intake_of_bus: dict[str, Intake] = {}
         for kind in sorted(set(fd.values())):

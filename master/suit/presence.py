@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from common.wire.messages import Mask
 
 
-class Presence:
+class NodePresence:
     """Misses in a row of N nodes, counted in windows.
 
     A node is *late* when it misses a window and *lost* when it has missed `lost_after` of them in a row, or

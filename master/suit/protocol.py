@@ -37,7 +37,7 @@ SHIPPED_DBC = Path(__file__).with_name("suit.dbc")
 """The description that comes with tandem."""
 
 
-class Status(IntFlag):
+class NodeStatus(IntFlag):
     """Status bits of an answer."""
 
     FAULT = 1

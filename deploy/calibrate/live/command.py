@@ -59,7 +59,7 @@ def live(
     from common.process.runtime import run as run_until_stopped
     from deploy.calibrate.live.compute import Choice, compute
     from deploy.calibrate.live.guide import GuideOptions
-    from deploy.calibrate.live.run import LiveSession, Session
+    from deploy.calibrate.live.run import LiveRecordings, LiveSession
     from deploy.calibrate.session import make_folder, tell_machines
     from master.calibrate.magnetometer_axes import hemisphere_named
     from master.config import MasterConfig
@@ -70,7 +70,7 @@ def live(
     console = Console(stderr=True)
     by_word = console.is_terminal
     options = GuideOptions(wanted, still_s, attitudes, coverage, tumble_s, limber_s=limber_s, by_word=by_word)
-    session = Session()
+    session = LiveRecordings()
 
     async def guide(stop: object) -> None:
         import asyncio

@@ -3,35 +3,24 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress, track
 
 from common.errors import TandemError
-from deploy.calibrate import session as sessions
-from deploy.calibrate.align import as_report, joints_table, nodes_table
+from deploy.calibrate.align import align_to_files, as_report, joints_table, nodes_table
 from deploy.calibrate.align import refusals as alignment_refusals
-from deploy.calibrate.align_picture import draw_angles
+from deploy.calibrate.imu import attitudes_method
 from deploy.calibrate.live.guide import What
-from deploy.calibrate.live.run import Session
-from deploy.calibrate.pictures import draw_inertial, draw_magnetic
-from deploy.calibrate.views import inertial_table, magnetic_table, notes
+from deploy.calibrate.live.run import LiveRecordings
+from deploy.calibrate.mag import rotation_method
+from deploy.calibrate.session import NodeMethod, Result, calibrate_to_files, show
 from deploy.report.output import writing
-from master.calibrate.alignment import find_alignment
-from master.calibrate.alignment_files import calibrated, write_alignment
-from master.calibrate.inertial import InertialCalibration, InertialOptions, calibrate_inertial
-from master.calibrate.magnetic import MagneticCalibration, MagneticOptions, calibrate_magnetic
 from master.calibrate.magnetometer_axes import Hemisphere
-from master.calibrate.node_file import accelerometer_map
-from master.calibrate.recording import NodeRecording, load_recordings
+from master.calibrate.recording import load_recordings
 from master.config import MasterConfig
-
-Node = TypeVar("Node")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,20 +36,24 @@ class Choice:
 
 
 def compute(
-    config: MasterConfig, session: Session, choice: Choice, folder: Path, console: Console
+    config: MasterConfig, session: LiveRecordings, choice: Choice, folder: Path, console: Console
 ) -> tuple[dict[str, Any], list[str]]:
     """Write every node that could be calibrated; the figures, and a line for each refusal."""
-    day = date.today()
     figures: dict[str, Any] = {**session.counters}
     refusals: list[str] = []
     inherit(config, folder)
-    if session.tray is not None:
-        if "imu" in choice.what:
-            figures["imu"] = _imu(session.tray, choice, folder, day, console, refusals)
-        if "mag" in choice.what:
-            figures["mag"] = _mag(config, session.tray, choice, folder, day, console, refusals)
+    if session.tray is not None and "imu" in choice.what:
+        # rests were asked for a little longer than this
+        imu = attitudes_method(choice.gravity_m_s2, min(2.0, 0.8 * choice.still_s))
+        figures["imu"] = _nodes(imu, session.tray, [], choice, folder, console, refusals)
+    if session.tray is not None and "mag" in choice.what:
+        mag = rotation_method(folder, choice.hemisphere)
+        magnetic = [name for name in load_recordings(session.tray) if config.nodes[name].magnetometer]
+        figures["mag"] = (
+            _nodes(mag, session.tray, magnetic, choice, folder, console, refusals) if magnetic else {}
+        )
     if session.worn is not None:
-        figures["align"] = _align(config, session, choice, folder, day, console, refusals)
+        figures["align"] = _align(config, session, choice, folder, console, refusals)
     written = sorted(path.stem for path in folder.glob("*.toml") if path.stem in config.nodes)
     if written:
         console.print("To use them, name each in the master's file, as in")
@@ -81,86 +74,44 @@ def inherit(config: MasterConfig, folder: Path) -> None:
                 shutil.copyfile(node.calibration, here)
 
 
-def _imu(
-    path: Path, choice: Choice, folder: Path, day: date, console: Console, refusals: list[str]
-) -> dict[str, Any]:
-    # rests were asked for a little longer than this
-    options = InertialOptions(choice.gravity_m_s2, min(2.0, 0.8 * choice.still_s))
-
-    def calibrate(raw: NodeRecording, tell: Callable[[float], None]) -> InertialCalibration:
-        return calibrate_inertial(raw, options, tell)
-
-    found = sessions.calibrate_nodes(path, [], calibrate, console)
-    written = sessions.write_nodes(found, path, folder, day)
-    if choice.pictures:
-        for name, node in _with_progress(found.found, console):
-            draw_inertial(node, folder / f"{name}_imu.png")
-    if found.found:
-        console.print(inertial_table(found.found))
-        notes(found.found, written, console)
-    refusals += [f"imu: {name}: {why}" for name, why in found.refused.items()]
-    return sessions.report(found, path, day, lambda node: {"attitudes": node.attitudes})
-
-
-def _mag(
-    config: MasterConfig,
-    path: Path,
+def _nodes(
+    method: NodeMethod[Result],
+    recording: Path,
+    names: list[str],
     choice: Choice,
     folder: Path,
-    day: date,
     console: Console,
     refusals: list[str],
 ) -> dict[str, Any]:
-    def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
-        return calibrate_magnetic(
-            raw, accelerometer_map(folder, raw.name), MagneticOptions(choice.hemisphere)
-        )
-
-    magnetic = [name for name in load_recordings(path) if config.nodes[name].magnetometer]
-    if not magnetic:
-        return {}
-    found = sessions.calibrate_nodes(path, magnetic, calibrate, console)
-    written = sessions.write_nodes(found, path, folder, day)
-    if choice.pictures:
-        for name, node in _with_progress(found.found, console):
-            draw_magnetic(node, folder / f"{name}_mag.png")
-    if found.found:
-        console.print(magnetic_table(found.found))
-        notes(found.found, written, console)
-    refusals += [f"mag: {name}: {why}" for name, why in found.refused.items()]
-    return sessions.report(found, path, day, lambda node: {"coverage": node.coverage})
-
-
-def _with_progress(found: Mapping[str, Node], console: Console) -> Iterator[tuple[str, Node]]:
-    yield from track(found.items(), "pictures", console=console, transient=True)
+    """Calibrate single nodes by one method; the report."""
+    results, figures = calibrate_to_files(method, recording, names, folder, console, pictures=choice.pictures)
+    show(method, results, folder, console)
+    refusals += [f"{method.picture}: {name}: {why}" for name, why in results.refused.items()]
+    return figures
 
 
 def _align(
     config: MasterConfig,
-    session: Session,
+    session: LiveRecordings,
     choice: Choice,
     folder: Path,
-    day: date,
     console: Console,
     refusals: list[str],
 ) -> dict[str, Any]:
     assert session.worn is not None
     try:
-        nodes = calibrated(load_recordings(session.worn), folder)
-        with Progress(console=console, transient=True) as progress:
-            task = progress.add_task("joints", total=None)
-            alignment = find_alignment(
-                nodes,
-                config.skeleton,
-                session.zero_pose_s,
-                lambda done, of: progress.update(task, completed=done, total=of),
-            )
+        found = align_to_files(
+            load_recordings(session.worn),
+            config.skeleton,
+            session.zero_pose_s,
+            session.worn,
+            folder,
+            console,
+            picture=choice.pictures,
+        )
     except TandemError as error:
         refusals.append(f"align: {error}")
         return {"refused": {"": str(error)}}
-    write_alignment(alignment, session.worn, folder, day)
-    if choice.pictures and alignment.nodes:
-        draw_angles(nodes, config.skeleton, alignment, folder / "alignment.png")
-    console.print(nodes_table(alignment), joints_table(alignment))
-    refusals += [f"align: {line}" for line in alignment_refusals(alignment)]
-    return as_report(alignment, session.worn)
+    console.print(nodes_table(found), joints_table(found))
+    refusals += [f"align: {line}" for line in alignment_refusals(found)]
+    return as_report(found, session.worn)

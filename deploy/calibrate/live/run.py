@@ -28,7 +28,7 @@ _FILE: dict[StepName, str] = {"attitudes": "tray", "tumble": "tray", "zero_pose"
 
 
 @dataclass(slots=True)
-class Session:
+class LiveRecordings:
     """What the guided part leaves."""
 
     tray: Path | None = None
@@ -60,7 +60,7 @@ class LiveSession:
         self._recorders: list[McapRecorder] = []
         self._ticks = 0
         self._said_s = -_LOG_S
-        self.session = Session()
+        self.session = LiveRecordings()
 
     async def run(self, stop: asyncio.Event) -> None:
         """Guide until all is recorded or `stop` is set. Raises TandemError where it cannot go on."""

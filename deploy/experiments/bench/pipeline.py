@@ -20,7 +20,7 @@ from master.joint_angles.solver import JointSolver
 from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
 from master.suit.nodes import NodeConfig
-from master.suit.plausibility import BLOCK, Plausibility, PlausibilityConfig
+from master.suit.plausibility import BLOCK, PlausibilityConfig, PlausibilityWatch
 from master.suit.poll import Poll, Sweep
 from master.suit.protocol import SuitProtocol
 
@@ -76,7 +76,7 @@ def ticks(seconds: float, count: int, fd: bool = True, filter_name: str = "vqf")
 def plausibility(seconds: float, count: int) -> dict[str, Any]:
     """µs a tick to judge whether that many nodes lie, at rest; over the two ways a judgement takes turns."""
     scale = SuitProtocol.load().fd.scale
-    watch = Plausibility(PlausibilityConfig(), count, RATE_HZ, scale)
+    watch = PlausibilityWatch(PlausibilityConfig(), count, RATE_HZ, scale)
     rest = np.array([0.0, 0.0, 9.81, 0.0, 0.0, 0.0, 0.0, 20.0, -43.0])
     noise = np.repeat([0.04, 0.02, 0.3], 3) * np.random.default_rng(0).normal(size=(64, count, 9))
     readings = np.rint((rest + noise) / scale) * scale

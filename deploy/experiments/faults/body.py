@@ -17,7 +17,7 @@ from deploy.experiments.faults.scene import Scene
 from deploy.experiments.faults.setting import Setting
 from deploy.sim.suit.faults import FaultsConfig, Loss, Twin
 from deploy.sim.suit.lies import Lie, LieKind
-from deploy.sim.suit.motion import Motion, parse_motion
+from deploy.sim.suit.motion import OperatorMotion, parse_motion
 from slave.guard import State
 from slave.guard.body import Body
 from slave.guard.tilt import base_loss
@@ -65,7 +65,7 @@ def nothing(_: Scene) -> None:
     """All that is amiss has been so from the beginning, by the row's setting."""
 
 
-def leaning() -> Motion:
+def leaning() -> OperatorMotion:
     """An operator who stands bowed by 25°."""
     moves = "".join(
         f"[[move]]\nstart_s = {start_s}\nduration_s = 1.0\nto_deg = {{ neck_yaw = {deg} }}\n"

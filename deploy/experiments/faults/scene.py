@@ -19,7 +19,7 @@ from deploy.examples.profiles import NURSING
 from deploy.experiments.faults.limits import Asked
 from deploy.experiments.faults.setting import Later, Setting, files
 from deploy.measure.stillness import StoppingMotion
-from deploy.sim.suit.motion import Motion, parse_motion
+from deploy.sim.suit.motion import OperatorMotion, parse_motion
 from deploy.sim.world.whole_way import VirtualRun, World
 from slave.encoders.counts import Encoders
 from slave.guard import Guard, State
@@ -41,7 +41,7 @@ BEFORE_S = 0.2
 
 
 @cache
-def reach() -> Motion:
+def reach() -> OperatorMotion:
     """Both arms and the head at once, joints of the right arm twice as fast as those of paper A's nurse."""
     text = resources.files(__package__).joinpath("reach.toml").read_text("utf-8")
     return parse_motion(text, load_skeleton(NURSING), source="reach.toml")
@@ -58,7 +58,7 @@ class Scene:
                 "slave": [f'guard.reset_key="{RESET_KEY}"'], "suit": list(setting.suit), "master": master,
             }  # fmt: skip
             usual = reach() if setting.motion is None else setting.motion()
-            motion: Motion = Later(usual, setting.lead_s) if setting.lead_s else usual
+            motion: OperatorMotion = Later(usual, setting.lead_s) if setting.lead_s else usual
             self.run = VirtualRun(World(start_ns=UP_NS, motion=motion, overrides=overrides))
         config = self.run.slave_config
         self.skeleton = config.skeleton

@@ -17,7 +17,7 @@ from common.config.sensor_calibration import Made
 from common.quaternion import IDENTITY, Array
 from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING
-from deploy.sim.suit.motion import Motion
+from deploy.sim.suit.motion import OperatorMotion
 from master.calibrate.node_file import write_calibration
 
 
@@ -33,14 +33,14 @@ class Setting:
     """Overrides of the master's."""
     aligned: bool = False
     """How each node sits is known, so that a lean from the zero pose can be told."""
-    motion: Callable[[], Motion] | None = None
+    motion: Callable[[], OperatorMotion] | None = None
     """Of the operator, None for the usual reach."""
 
 
 class Later:
     """A motion that begins later: until then its first posture."""
 
-    def __init__(self, motion: Motion, lead_s: float) -> None:
+    def __init__(self, motion: OperatorMotion, lead_s: float) -> None:
         self._motion, self._lead_s = motion, lead_s
         self.period_s = motion.period_s + lead_s
 

@@ -14,17 +14,17 @@ from common.clock import NS_PER_MS, to_s
 from common.config.section import Section
 from common.errors import ConfigMistake
 from deploy.sim.suit.lies import Lie
-from deploy.sim.suit.span import Span
+from deploy.sim.suit.span import TimeSpan
 
 
-class Loss(Span):
+class Loss(TimeSpan):
     """`[[faults.lose]]`: a node that does not answer."""
 
     node: str
     """Its segment."""
 
 
-class Delay(Span):
+class Delay(TimeSpan):
     """`[[faults.delay]]`: a node that answers late."""
 
     node: str | None = None
@@ -34,7 +34,7 @@ class Delay(Span):
     """Share of its answers that are late."""
 
 
-class Twin(Span):
+class Twin(TimeSpan):
     """`[[faults.twin]]`: a second node with the same id on the same bus, worn by somebody else."""
 
     node: str | None = None

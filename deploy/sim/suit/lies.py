@@ -28,8 +28,8 @@ from pydantic import Field
 
 from common.quaternion import Array
 from deploy.sim.suit.imperfections import Counts
-from deploy.sim.suit.span import Span
-from master.suit.protocol import MAG_OVERFLOW, Status
+from deploy.sim.suit.span import TimeSpan
+from master.suit.protocol import MAG_OVERFLOW, NodeStatus
 
 LieKind = Literal[
     "frozen", "zero", "ones", "stuck", "dead_gyro", "saturated", "flipped_gyro", "swapped_gyro", "rescaled",
@@ -39,7 +39,7 @@ _ACC, _GYR, _MAG = slice(0, 3), slice(3, 6), slice(6, 9)
 _SELF_TEST_M_S2, _SELF_TEST_RAD_S = 5.0, math.radians(30.0)
 
 
-class Lie(Span):
+class Lie(TimeSpan):
     """`[[faults.lie]]`: a node whose answers are sound frames with wrong content."""
 
     node: str
@@ -76,7 +76,7 @@ class Lies:
             held = self._began.setdefault(lie, counts[row].copy())
             counts[row] = self._told(lie, counts[row], held)
             if lie.kind == "saturated":
-                status[row] |= int(Status.SATURATED)
+                status[row] |= int(NodeStatus.SATURATED)
         return counts, status
 
     def _told(self, lie: Lie, now: Counts, held: Counts) -> Counts:

@@ -37,7 +37,7 @@ SWEEP_SHARE = 0.4
 """A sweep takes this share of each joint's velocity and acceleration limit at most."""
 
 
-class Motion(Protocol):
+class OperatorMotion(Protocol):
     """Joint angles as a smooth function of time; it loops after `period_s`."""
 
     @property
@@ -56,7 +56,7 @@ def motion_mistakes(name: str, profile: str) -> list[ConfigMistake]:
     return [ConfigMistake("motion", name, f"one of {', '.join(able)} for the profile {profile}")]
 
 
-def load_motion(name: str, skeleton: Skeleton) -> Motion:
+def load_motion(name: str, skeleton: Skeleton) -> OperatorMotion:
     """The named one of `MOTIONS` for a skeleton.
 
     Raises ConfigError for another name, for a motion of another profile, and for one whose joints the
@@ -75,7 +75,7 @@ def load_motion(name: str, skeleton: Skeleton) -> Motion:
     return parse_motion(text, skeleton, source=f"{name}.toml")
 
 
-def parse_motion(text: str, skeleton: Skeleton, source: str) -> Motion:
+def parse_motion(text: str, skeleton: Skeleton, source: str) -> OperatorMotion:
     """A motion from TOML text (its forms are described at the heads of bottle.toml and walk.toml)."""
     table = tomllib.loads(text)
     if "strides" in table:
@@ -96,7 +96,7 @@ def parse_motion(text: str, skeleton: Skeleton, source: str) -> Motion:
         raise ConfigError(source, [ConfigMistake("move", "", str(error))]) from None
 
 
-def _gait(table: dict[str, Any], skeleton: Skeleton, source: str) -> Motion:
+def _gait(table: dict[str, Any], skeleton: Skeleton, source: str) -> OperatorMotion:
     curves = {
         f"{side}_{joint}": (_curve(curve), ahead)
         for side, ahead in table["ahead"].items()
@@ -113,12 +113,12 @@ def _curve(table: dict[str, Any]) -> Curve:
     return Curve(math.radians(table["mean_deg"]), cosines, sines)
 
 
-def stand_still(skeleton: Skeleton) -> Motion:
+def stand_still(skeleton: Skeleton) -> OperatorMotion:
     """The zero pose, or as near to it as the limits let: what a calibration asks of the operator."""
     return MinimumJerkMotion(skeleton.joint_names, _nearest_to_zero(skeleton, 0.0), [], period_s=1.0)
 
 
-def sweep(skeleton: Skeleton) -> Motion:
+def sweep(skeleton: Skeleton) -> OperatorMotion:
     """Each joint after the other up, down and back, to one degree inside its limits."""
     rest_rad = _nearest_to_zero(skeleton, SWEEP_MARGIN_RAD)
     moves = []

@@ -9,7 +9,7 @@ from pydantic import Field
 from common.config.section import Section
 
 
-class Span(Section):
+class TimeSpan(Section):
     """In seconds since the first SYNC."""
 
     from_s: float = Field(default=0.0, ge=0.0)

@@ -20,13 +20,13 @@ from deploy.sim.suit.encode import BatchEncoder
 from deploy.sim.suit.faults import Faults, NodeAnswer, Outgoing
 from deploy.sim.suit.imperfections import Counts, Imperfections, quantise
 from deploy.sim.suit.lies import Lies
-from deploy.sim.suit.motion import Motion, load_motion
+from deploy.sim.suit.motion import OperatorMotion, load_motion
 from deploy.sim.suit.replay import Replay, load_replay
 from deploy.sim.suit.sensors import IdealSensors, earth_field_ut
 from deploy.sim.suit.tray import Tray
 from master.suit.nodes import NodeConfig
 from master.suit.number import tick_of
-from master.suit.protocol import NO_VALUE, Status, SuitProtocol
+from master.suit.protocol import NO_VALUE, NodeStatus, SuitProtocol
 
 Bits = NDArray[np.int64]
 _OTHER_AXES = [1, 2, 0, 4, 5, 3, 7, 8, 6]
@@ -71,7 +71,7 @@ class SimulatedOperator:
 
     magnetic = True
 
-    def __init__(self, motion: Motion, sensors: IdealSensors, imperfections: Imperfections) -> None:
+    def __init__(self, motion: OperatorMotion, sensors: IdealSensors, imperfections: Imperfections) -> None:
         self._motion = motion
         self._sensors = sensors
         self._imperfections = imperfections
@@ -174,7 +174,7 @@ class SimulatedSuit:
         readings[self._without_field, 6:] = 0.0
         counts, saturated = quantise(readings, self._scale, None if self._wearer.noisy else self._random)
         counts[self._without_field, 6:] = NO_VALUE
-        return counts, np.where(saturated, int(Status.SATURATED), 0)
+        return counts, np.where(saturated, int(NodeStatus.SATURATED), 0)
 
     def _answers(self, tick: int, counts: Counts, status: Bits) -> list[NodeAnswer]:
         return [
@@ -210,7 +210,9 @@ def _group(
     )
 
 
-def build_suit(config: SuitConfig, protocol: SuitProtocol, motion: Motion | None = None) -> SimulatedSuit:
+def build_suit(
+    config: SuitConfig, protocol: SuitProtocol, motion: OperatorMotion | None = None
+) -> SimulatedSuit:
     """The suit that a configuration describes, worn in another motion where one is given.
 
     Raises ConfigError; opens nothing but files.
@@ -222,7 +224,7 @@ def build_suit(config: SuitConfig, protocol: SuitProtocol, motion: Motion | None
     return SimulatedSuit(skeleton, config.nodes, config.buses, protocol, wearer, faults)
 
 
-def _wearer(config: SuitConfig, skeleton: Skeleton, motion: Motion | None = None) -> Wearer:
+def _wearer(config: SuitConfig, skeleton: Skeleton, motion: OperatorMotion | None = None) -> Wearer:
     if config.replay is not None:
         return RecordedOperator(load_replay(config.replay, skeleton, config.nodes))
     alignment = np.array([config.alignment.get(name, IDENTITY) for name in skeleton.segment_names])

@@ -24,7 +24,7 @@ from deploy.sim.network.profile import Profile
 from deploy.sim.network.profile import Way as Direction
 from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.faults import Outgoing
-from deploy.sim.suit.motion import Motion
+from deploy.sim.suit.motion import OperatorMotion
 from deploy.sim.suit.suit import build_suit
 from deploy.sim.world.link import VirtualLink
 from deploy.sim.world.troubles import Troubles, Way
@@ -59,7 +59,7 @@ class World:
     """How the link behaves, as over an emulated network. Its outages are not played."""
     network_seed: int = 1
     profile: str = NURSING
-    motion: Motion | None = None
+    motion: OperatorMotion | None = None
     """Of the operator, instead of the one that the suit's file names."""
     overrides: dict[str, list[str]] = field(default_factory=dict)
     """Of the example files, by role."""

@@ -9,7 +9,7 @@ import pytest
 from common.skeleton import load_skeleton
 from master.calibrate import joint_motion as module
 from master.calibrate.joint_fit import JointFit
-from master.calibrate.joint_motion import JointMotion, joint_motion
+from master.calibrate.joint_motion import JointFinding, joint_motion
 from master.calibrate.joint_residuals import Moving
 from master.calibrate.steadiness import Steadiness
 
@@ -18,7 +18,7 @@ Y = np.array([0.0, 1.0, 0.0])
 STEADY = Steadiness(0.0, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0)
 
 
-def judge(monkeypatch: pytest.MonkeyPatch, segment: str, moving: bool = True, **fit: Any) -> JointMotion:
+def judge(monkeypatch: pytest.MonkeyPatch, segment: str, moving: bool = True, **fit: Any) -> JointFinding:
     """What is made of a fit with those properties, and otherwise beyond doubt."""
     good: dict[str, Any] = {
         "axis_sigma_rad": (0.01, 0.01),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from master.suit.chance import NEVER, RepeatChance, longest_repeat
-from master.suit.plausibility import Plausibility, PlausibilityConfig
+from master.suit.plausibility import PlausibilityConfig, PlausibilityWatch
 from master.suit.poll import Sweep
 from master.suit.protocol import SuitProtocol
 
@@ -30,7 +30,7 @@ def rest(sigma: float, nodes: int, ticks: int, seed: int = 5) -> np.ndarray:
 def said(counts: np.ndarray) -> list[tuple[int, int, str]]:
     """(tick, node, words) of every doubt as it begins."""
     count = counts.shape[1]
-    watch = Plausibility(PlausibilityConfig(), count, 200.0, SCALE)
+    watch = PlausibilityWatch(PlausibilityConfig(), count, 200.0, SCALE)
     yes, no = np.ones(count, np.bool_), np.zeros(count, np.bool_)
     out: list[Any] = []
     before: set[Any] = set()

@@ -10,7 +10,7 @@ import pytest
 from common.quaternion import Array
 from deploy.sim.suit.lies import LieKind
 from master.suit.doubt import Weight
-from master.suit.plausibility import Plausibility, PlausibilityConfig
+from master.suit.plausibility import PlausibilityConfig, PlausibilityWatch
 from tests.master.test_pipeline import Bench
 
 NODE = "right_forearm"
@@ -156,7 +156,7 @@ def judged(counts: np.ndarray, **settings: object) -> list[str]:
     from master.suit.protocol import SuitProtocol
 
     scale = SuitProtocol.load().fd.scale
-    watch = Plausibility(PlausibilityConfig.model_validate(settings), 1, 200.0, scale)
+    watch = PlausibilityWatch(PlausibilityConfig.model_validate(settings), 1, 200.0, scale)
     said, yes, no = [], np.array([True]), np.array([False])
     for tick, row in enumerate(counts * scale):
         values = row[None]

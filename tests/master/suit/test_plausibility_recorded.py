@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from master.suit.plausibility import Plausibility, PlausibilityConfig
+from master.suit.plausibility import PlausibilityConfig, PlausibilityWatch
 from master.suit.poll import Sweep
 from master.suit.protocol import SuitProtocol
 
@@ -20,7 +20,7 @@ def alarms(readings: Array, rate_hz: float) -> dict[int, str]:
     """First words said of each node, of readings (T, N, 9) as the wire would carry them."""
     count = readings.shape[1]
     wire = np.clip(np.rint(readings / SCALE), -32767, 32767) * SCALE
-    watch = Plausibility(PlausibilityConfig(), count, rate_hz, SCALE)
+    watch = PlausibilityWatch(PlausibilityConfig(), count, rate_hz, SCALE)
     yes, no = np.ones(count, np.bool_), np.zeros(count, np.bool_)
     said: dict[int, str] = {}
     for tick, v in enumerate(wire):

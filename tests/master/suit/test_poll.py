@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll
-from master.suit.protocol import NO_VALUE, Status
+from master.suit.protocol import NO_VALUE, NodeStatus
 
 if TYPE_CHECKING:
     from tests.master.suit.conftest import Suit
@@ -107,7 +107,9 @@ def test_a_node_without_magnetometer_has_none_whatever_it_sends(new_suit: type[S
 
 def test_a_saturated_reading_is_used_and_counted(suit: Suit, fd: bool) -> None:
     suit.settle()
-    sweep = suit.window([*suit.answer(1, 2, seed=9, status=Status.SATURATED), *suit.answers(2, without=(1,))])
+    sweep = suit.window(
+        [*suit.answer(1, 2, seed=9, status=NodeStatus.SATURATED), *suit.answers(2, without=(1,))]
+    )
     assert sweep.fresh.all()
     assert suit.holds(sweep, 0, 9)
     assert suit.health(1).saturated == 1
@@ -118,7 +120,7 @@ def test_one_faulty_part_of_a_classic_answer_condemns_it(new_suit: type[Suit]) -
     suit = new_suit(fd=False)
     suit.settle()
     parts = suit.answer(1, 2, seed=9)
-    parts[1] = suit.answer(1, 2, seed=9, status=Status.FAULT)[1]
+    parts[1] = suit.answer(1, 2, seed=9, status=NodeStatus.FAULT)[1]
     sweep = suit.window([*parts, *suit.answers(2, without=(1,))])
     assert not sweep.fresh[0]
     assert new_suit.holds(sweep, 0, 0)

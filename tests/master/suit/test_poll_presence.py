@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from master.suit.nodes import NodeConfig
 from master.suit.poll import Poll
-from master.suit.protocol import Status
+from master.suit.protocol import NodeStatus
 
 if TYPE_CHECKING:
     from tests.master.suit.conftest import Suit
@@ -91,7 +91,7 @@ def test_a_faulty_sensor_changes_nothing_and_is_lost_in_time(suit: Suit) -> None
     suit.settle()
     for missed in range(1, suit.lost_after + 1):
         tick = suit.tick + 1
-        faulty = suit.answer(1, tick, seed=9, status=Status.FAULT)
+        faulty = suit.answer(1, tick, seed=9, status=NodeStatus.FAULT)
         sweep = suit.window([*faulty, *suit.answers(tick, seed=5, without=(1,))])
         assert suit.complete[-1]
         assert sweep.fresh.tolist() == [False, True, True]

@@ -5,21 +5,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from master.suit.presence import Presence
+from master.suit.presence import NodePresence
 
 YES, NO = np.array([True]), np.array([False])
 
 
-def present(lost_after: int) -> Presence:
+def present(lost_after: int) -> NodePresence:
     """One node that has just answered."""
-    presence = Presence(1, lost_after)
+    presence = NodePresence(1, lost_after)
     presence.close(YES, YES)
     assert not presence.lost[0]
     return presence
 
 
 def test_a_node_that_never_answered_is_lost_but_never_left_sight() -> None:
-    presence = Presence(2, 3)
+    presence = NodePresence(2, 3)
     assert presence.lost.all()
     assert presence.awaited.all()
     assert presence.times_lost.tolist() == [0, 0]
@@ -68,7 +68,7 @@ def test_a_lost_node_that_is_heard_is_awaited_once_and_then_left_alone() -> None
 
 
 def test_a_lost_bus_takes_its_nodes_at_once() -> None:
-    presence = Presence(2, 5)
+    presence = NodePresence(2, 5)
     presence.close(np.ones(2, bool), np.ones(2, bool))
     presence.lose(np.array([True, False]))
     assert presence.lost.tolist() == [True, False]
@@ -79,7 +79,7 @@ def test_a_lost_bus_takes_its_nodes_at_once() -> None:
 
 
 def test_a_bus_that_is_back_at_once_brings_its_nodes_back() -> None:
-    presence, all_there = Presence(2, 5), np.ones(2, bool)
+    presence, all_there = NodePresence(2, 5), np.ones(2, bool)
     presence.close(all_there, all_there)
     presence.lose(all_there)
     presence.close(all_there, all_there)
@@ -89,7 +89,7 @@ def test_a_bus_that_is_back_at_once_brings_its_nodes_back() -> None:
 
 def test_lost_after_must_be_a_count() -> None:
     with pytest.raises(ValueError, match="at least 1"):
-        Presence(1, 0)
+        NodePresence(1, 0)
 
 
 @given(
@@ -97,7 +97,7 @@ def test_lost_after_must_be_a_count() -> None:
     lost_after=st.integers(1, 5),
 )
 def test_lost_is_a_run_of_misses(answers: list[list[bool]], lost_after: int) -> None:
-    presence = Presence(3, lost_after)
+    presence = NodePresence(3, lost_after)
     for upto in range(1, len(answers) + 1):
         fresh = np.array(answers[upto - 1])
         presence.close(fresh, fresh)

@@ -14,7 +14,7 @@ from common.skeleton import Joint, Segment, Skeleton
 from common.skeleton.kinematics import orientations, origins
 from common.wire.messages import Mask
 from deploy.sim.suit.imperfections import Imperfections, quantise
-from deploy.sim.suit.motion import Motion
+from deploy.sim.suit.motion import OperatorMotion
 from deploy.sim.suit.sensors import CHANNELS, GRAVITY_M_S2, earth_field_ut
 from master.suit.protocol import SHIPPED_DBC, SuitProtocol
 
@@ -123,7 +123,7 @@ def turntable(lever_m: float = 0.0) -> Skeleton:
 
 def record(
     skeleton: Skeleton,
-    motion: Motion,
+    motion: OperatorMotion,
     seconds: float,
     rate_hz: float,
     units: Imperfections,
@@ -149,7 +149,7 @@ def read_by(units: Imperfections, ideal: Array) -> Array:
 
 
 def ideal_readings(
-    skeleton: Skeleton, motion: Motion, t_s: Array, q_segment_from_sensor: Array | None = None
+    skeleton: Skeleton, motion: OperatorMotion, t_s: Array, q_segment_from_sensor: Array | None = None
 ) -> Array:
     """(T, S, 9): as `IdealSensors` reads them, all times at once.
 

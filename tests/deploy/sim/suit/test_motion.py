@@ -6,12 +6,12 @@ import pytest
 from common.errors import ConfigError
 from common.quaternion import Array
 from common.skeleton import Skeleton, load_skeleton
-from deploy.sim.suit.motion import MOTIONS, STILL_S, Motion, load_motion, parse_motion
+from deploy.sim.suit.motion import MOTIONS, STILL_S, OperatorMotion, load_motion, parse_motion
 
 STEP_S = 0.002
 
 
-def sampled(motion: Motion) -> tuple[Array, Array, Array]:
+def sampled(motion: OperatorMotion) -> tuple[Array, Array, Array]:
     return motion.state(np.arange(0.0, motion.period_s, STEP_S))
 
 
@@ -23,17 +23,17 @@ PROFILES = ("nursing", "hand", "lower_limb")
     params=[(name, profile) for name, only in MOTIONS.items() for profile in ([only] if only else PROFILES)],
     ids=" ".join,
 )
-def moved(request: pytest.FixtureRequest) -> tuple[Motion, Skeleton]:
+def moved(request: pytest.FixtureRequest) -> tuple[OperatorMotion, Skeleton]:
     name, profile = request.param
     return load_motion(name, load_skeleton(profile)), load_skeleton(profile)
 
 
 @pytest.fixture(scope="module")
-def bottle(skeleton: Skeleton) -> Motion:
+def bottle(skeleton: Skeleton) -> OperatorMotion:
     return load_motion("bottle", skeleton)
 
 
-def test_every_motion_stays_within_all_limits(moved: tuple[Motion, Skeleton]) -> None:
+def test_every_motion_stays_within_all_limits(moved: tuple[OperatorMotion, Skeleton]) -> None:
     motion, skeleton = moved
     position, velocity, acceleration = sampled(motion)
     assert (position >= skeleton.lower_rad).all()
@@ -42,7 +42,7 @@ def test_every_motion_stays_within_all_limits(moved: tuple[Motion, Skeleton]) ->
     assert (np.abs(acceleration) <= 0.5 * skeleton.max_acceleration_rad_s2).all()
 
 
-def test_every_motion_is_smooth_at_its_seam(moved: tuple[Motion, Skeleton]) -> None:
+def test_every_motion_is_smooth_at_its_seam(moved: tuple[OperatorMotion, Skeleton]) -> None:
     motion, _ = moved
     end, begin = motion.state(motion.period_s - 1e-9), motion.state(motion.period_s + 1e-9)
     for left, right in zip(end, begin, strict=True):
@@ -64,13 +64,13 @@ def test_the_sweep_takes_each_joint_to_one_degree_inside_its_limits(skeleton: Sk
     np.testing.assert_array_equal(still, 0.0)
 
 
-def test_the_bottle_begins_with_three_seconds_of_standing_near_zero(bottle: Motion) -> None:
+def test_the_bottle_begins_with_three_seconds_of_standing_near_zero(bottle: OperatorMotion) -> None:
     position, velocity, _ = bottle.state(np.arange(0.0, 3.0, STEP_S))
     np.testing.assert_array_equal(velocity, 0.0)
     assert np.degrees(np.abs(position)).max() < 15.0
 
 
-def test_in_the_bottle_every_joint_takes_part(bottle: Motion, skeleton: Skeleton) -> None:
+def test_in_the_bottle_every_joint_takes_part(bottle: OperatorMotion, skeleton: Skeleton) -> None:
     position, _, _ = sampled(bottle)
     travel = dict(zip(skeleton.joint_names, np.degrees(np.ptp(position, axis=0)), strict=True))
     assert min(travel.values()) > 10.0, travel
@@ -80,7 +80,7 @@ def test_in_the_bottle_every_joint_takes_part(bottle: Motion, skeleton: Skeleton
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("joint", ["shoulder_pitch", "shoulder_roll", "shoulder_yaw"])
 def test_the_bottles_fast_phases_are_those_of_the_papers_table_1(
-    bottle: Motion, skeleton: Skeleton, side: str, joint: str
+    bottle: OperatorMotion, skeleton: Skeleton, side: str, joint: str
 ) -> None:
     """Paper A, Table 1: the shoulder's angles change 4.02 to 4.94 degrees an 80 ms step on average."""
     j = skeleton.joint_names.index(f"{side}_{joint}")
@@ -91,7 +91,7 @@ def test_the_bottles_fast_phases_are_those_of_the_papers_table_1(
     assert 4.0 <= np.degrees(change.mean()) <= 5.0
 
 
-def test_the_bottles_joints_do_not_start_in_step(bottle: Motion) -> None:
+def test_the_bottles_joints_do_not_start_in_step(bottle: OperatorMotion) -> None:
     _, velocity, _ = sampled(bottle)
     first = np.argmax(np.abs(velocity) > 0.0, axis=0)
     assert len(set(first.tolist())) >= 8

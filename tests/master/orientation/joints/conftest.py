@@ -15,7 +15,7 @@ from common.skeleton import Skeleton, load_skeleton
 from common.wire.messages import Mask
 from deploy.sim.suit.disturbance import Disturbance, DisturbanceConfig
 from deploy.sim.suit.imperfections import Imperfections
-from deploy.sim.suit.motion import Motion
+from deploy.sim.suit.motion import OperatorMotion
 from deploy.sim.suit.sensors import IdealSensors, earth_field_ut
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import identity
@@ -68,7 +68,7 @@ def arms() -> Skeleton:
 
 def wear(
     skeleton: Skeleton,
-    motion: Motion,
+    motion: OperatorMotion,
     seconds: float,
     *,
     seed: int = 1,
