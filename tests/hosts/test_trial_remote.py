@@ -56,7 +56,7 @@ def test_a_cell_over_a_real_network_is_judged_by_the_measured_offset(
             assert values["cpu_slave"] is not None
             assert values["cpu_slave"] > 0.0
             assert values["flow_s"] is None
-            assert "fetching what the robot said" in words
+            assert "fetching the robot's messages" in words
             server.send_signal(signal.SIGTERM)
             assert await asyncio.wait_for(server.wait(), 30) == 0, (tmp_path / "serve.log").read_text("utf-8")
         finally:

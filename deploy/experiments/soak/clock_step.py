@@ -1,4 +1,4 @@
-"""A clock that is really stepped: a process in a time namespace, where CLOCK_MONOTONIC is offset."""
+"""Steps a process's clock: the process runs in a time namespace, where CLOCK_MONOTONIC is offset."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ PROBE_S = 86_400
 
 
 def through(step_s: int) -> tuple[str, ...]:
-    """The command that runs another one with its monotonic clock that far ahead of the host's."""
+    """The command that runs another one with its monotonic clock so far ahead of the host's."""
     return ("unshare", "--time", "--monotonic", str(step_s), "--")
 
 
 async def why_not() -> str:
-    """Empty where this host can step a process's clock; else the reason, in words."""
+    """The reason why this host cannot step a process's clock; empty where it can."""
     look = "import time; print(time.monotonic_ns())"
     try:
         status, out, err = await finished([*through(PROBE_S), sys.executable, "-c", look])

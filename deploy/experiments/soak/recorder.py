@@ -1,4 +1,4 @@
-"""The recorder's process within a soak: a new file each time, looked at once it is closed."""
+"""The recorder's process within a soak: a new file each time, checked when it is closed."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ NAME = "recorder"
 FULL_BYTES = 40 * 1024
 """A disk of this size is full after about 4 s: commands, states and statistics are 10 kB/s, compressed."""
 ENDS_HERE = "the recording ends here"
-"""What the recorder logs, once, when its disk fails."""
+"""What the recorder logs once when its disk fails."""
 
 
 class RecorderProcess:
-    """Starts and ends `tandem record` of one robot. Files lie in `folder` and are deleted when looked at."""
+    """Starts and ends `tandem record` of one robot. Its files lie in `folder` until they are checked."""
 
     def __init__(self, child: Child, folder: Path, link: LinkConfig, robot: str) -> None:
-        """`link`: where the commands and the states are heard."""
+        """`link`: where commands and states are received."""
         self.child = child
         self._folder = folder
         self._link = folder / f"{NAME}.toml"
@@ -44,26 +44,26 @@ class RecorderProcess:
             "--may-miss",
         ]
         self._number = 0
-        self._said_before = 0
+        self._logged_before = 0
         self.file = folder / "none.mcap"
         self.disk = SmallDisk(folder / "full")
 
     async def start(self, through: Sequence[str] = (), folder: Path | None = None) -> None:
         """Record into a new file."""
         self._number += 1
-        self._said_before = len(self.child.log_text()) if self.child.log.exists() else 0
+        self._logged_before = len(self.child.log_text()) if self.child.log.exists() else 0
         self.file = (folder or self._folder) / f"recording-{self._number:04}.mcap"
         await self.child.run([*self._arguments, "--out", str(self.file)], through)
 
     async def start_on_small_disk(self) -> str:
-        """Record onto a disk that will be full soon; how it was made so."""
+        """Record onto a disk that will be full soon; returns how the disk was limited."""
         where, through, how = await self.disk.make()
         await self.start(through, where)
         return how
 
     def complaints(self) -> int:
-        """How often this process said that its disk failed."""
-        return self.child.log_text()[self._said_before :].count(ENDS_HERE)
+        """How often this process logged that its disk failed."""
+        return self.child.log_text()[self._logged_before :].count(ENDS_HERE)
 
     async def look(self, ended_ns: int | None = None) -> RecordingChecked:
         """What is in the last file of a process that has ended; all are deleted. `ended_ns`: when it died."""
@@ -87,7 +87,7 @@ class RecorderProcess:
         )
 
     async def kill(self) -> int:
-        """End it without a warning; when, by this host's clock."""
+        """Kill it; returns when, by this host's clock."""
         at_ns = monotonic_ns()
         await self.child.kill()
         return at_ns
@@ -108,7 +108,7 @@ class SmallDisk:
         self._mounted = False
 
     async def make(self) -> tuple[Path, tuple[str, ...], str]:
-        """Where to write, what to run the process through, and in words what it is. Raises TandemError."""
+        """Where to write, the command to run the process through, and a description. Raises TandemError."""
         self._folder.mkdir(exist_ok=True)
         size = f"size={FULL_BYTES // 1024}k"
         if await _succeeds("mount", "-t", "tmpfs", "-o", size, "tmpfs", str(self._folder)):
@@ -128,7 +128,7 @@ class SmallDisk:
 
 
 async def _contents(file: Path) -> Mapping[str, Any]:
-    """Looked at in a process of its own: a long recording must cost the soak neither memory nor time."""
+    """Read in another process: a long recording must cost the soak neither memory nor time."""
     nice = ("nice", "-n", "15") if shutil.which("nice") else ()
     _, out, err = await finished([*nice, sys.executable, "-m", "deploy", "recording", str(file), "--json"])
     try:

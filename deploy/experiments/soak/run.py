@@ -1,4 +1,4 @@
-"""The story of a soak: start, follow, one fault after the other, each time engage again, stop."""
+"""The story of a soak: start, follow, bring one fault after the other, engage again each time, stop."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ MOST_ENDS = 5
 
 
 class Soak:
-    """One soak on a stage. `run` returns when the time is over; it may be cancelled at any moment."""
+    """One soak. `run` returns when its time is over; it may be cancelled at any moment."""
 
     def __init__(self, options: SoakOptions, stage: Stage, log: SoakLog, host: HostWatch, live: Live) -> None:
         self._options = options
@@ -68,7 +68,7 @@ class Soak:
         self.progress = SoakProgress(options.duration_s)
 
     async def run(self) -> None:
-        """Raises TandemError where it cannot even begin, or a process ends again and again."""
+        """Raises TandemError where it cannot begin, or a process ends again and again."""
         sampling = asyncio.create_task(self._sample())
         telling = asyncio.create_task(self._story())
         try:
@@ -114,7 +114,7 @@ class Soak:
             raise TandemError(f"the robot never followed: {recovery.refused or waiting}")
 
     async def _tend(self, until_s: float) -> None:
-        """Let it run; a robot that leaves off by itself is noted, and engaged again."""
+        """Let it run; a robot that stops following by itself is noted, and engaged again."""
         steady_s = self._log.now_s + STEADY_S
         while self._log.now_s < max(until_s, min(steady_s, until_s + STEADY_S)):
             if not self._operator.follows and not await self._soon():
@@ -123,7 +123,7 @@ class Soak:
             await asyncio.sleep(LOOK_S)
 
     async def _soon(self) -> bool:
-        """Whether it follows again at once: a late command is not worth a word."""
+        """Whether it follows again at once: a single late command is not noted."""
         for _ in range(10):
             await asyncio.sleep(LOOK_S)
             if self._operator.follows:
@@ -134,7 +134,7 @@ class Soak:
         watch, state = self._stage.watch, self._stage.watch.state
         guard = watch.guard(monotonic_ns())
         self._log.add(RobotLeft(guard, state.reason if state else "", watch.known()))
-        self.progress.busy = "the robot left off by itself"
+        self.progress.busy = "the robot stopped following by itself"
         recovery = await self._operator.recover(monotonic_ns())
         self._log.add(FaultRecovered(**asdict(recovery)))
         self.progress.busy = ""
@@ -188,7 +188,7 @@ class Soak:
             self._live.update(draw(self.progress, self._stage, self._log, row))
 
     def _stalls(self) -> float:
-        """The longest stall since the last look that is shown to be the host's, ms; forgotten once told."""
+        """The longest stall since the last call that the host is shown to have caused, ms."""
         longest_s = 0.0
         for stall in self._host.stalls:
             still_s = to_s(stall.until_ns - stall.from_ns)

@@ -1,4 +1,4 @@
-"""The running whole way of a soak: suit, master, slave, recorder; what can be done to it."""
+"""The processes of a soak: suit, master, slave, recorder; start, kill and stop them, give the suit faults."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from deploy.harness.rig import ROBOT, Rig
 
 
 class Stage:
-    """The processes by name, and which of them are meant to run."""
+    """The processes by name, and which of them are to run."""
 
     def __init__(self, rig: Rig, watch: Watch, record: Record) -> None:
         self.rig = rig
@@ -28,7 +28,7 @@ class Stage:
         self.recorder = RecorderProcess(child, rig.folder, rig.endpoints.observing, ROBOT)
         self.children: dict[str, Child] = {**rig.children, recording.NAME: child}
         self.meant = {name for name, child in self.children.items() if child.running}
-        """Processes that nobody has ended; a router runs already."""
+        """Processes that are to run; a router runs already."""
 
     @property
     def names(self) -> list[str]:
@@ -46,14 +46,14 @@ class Stage:
         self.record(ProcessStarted(name, self.children[name].lifetime))
 
     async def kill(self, name: str) -> int:
-        """End it as a crash would; when, by this host's clock."""
+        """Kill it; returns when, by this host's clock."""
         self.meant.discard(name)
         at_ns = monotonic_ns()
         await self.children[name].kill()
         return at_ns
 
     async def stop(self, name: str) -> int | None:
-        """Ask it to end; its exit status."""
+        """Stop it; its exit status."""
         self.meant.discard(name)
         return await self.children[name].stop()
 
@@ -70,7 +70,7 @@ class Stage:
         raise TandemError(f"the suit does not take its faults: {refused}")
 
     def ended(self) -> list[str]:
-        """Processes that ended by themselves since the last look; they are not meant to run any more."""
+        """Processes that ended by themselves since the last call; they are no longer among those to run."""
         gone = [name for name in sorted(self.meant) if not self.children[name].running]
         self.meant.difference_update(gone)
         return gone
@@ -85,7 +85,7 @@ class Stage:
         return replace(await self.recorder.look(ended_ns), after=after)
 
     async def close(self) -> dict[str, int | None]:
-        """End all, the master first; exit statuses."""
+        """Stop all, the recorder and the master first; exit statuses."""
         statuses = {recording.NAME: await self.stop(recording.NAME)}
         self.meant.clear()
         statuses |= await self.rig.stop()

@@ -1,4 +1,4 @@
-"""What became of the robot in the scripted outage and after it. Pure."""
+"""What the robot did in the scripted outage and after it. Pure."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from deploy.experiments.trial.cell.recording import CellMessages, ScriptedOutage
 
 MOVING = ("align", "track")
 LEFT_S = 0.5
-"""After the cut for longer than this, a robot that still moves has not noticed: its time-out is 0.2 s."""
+"""A robot that still moves this long after the cut has not noticed it: its time-out is 0.2 s."""
 
-TELLS_NS = 20 * NS_PER_MS
-"""The slave counts for its statistics at most so long after the time they bear."""
+PUBLISHES_NS = 20 * NS_PER_MS
+"""The slave counts for its statistics at most so long after their time stamp."""
 
 
 def aftermath(after: CellMessages, outage: ScriptedOutage, max_age_s: float) -> dict[str, float | None]:
-    """The outage's figures; `after` is what was heard from the cut on. None: nobody can tell."""
+    """The outage's figures; `after` holds the messages from the cut on. None: not known."""
     states = after.states
     accepted = {n: e for n, e in echoes(states).items() if e.accepted_ns > outage.back_ns}
     until_ns = outage.act_ns if outage.act_ns is not None else max((s.sent_ns for s in states), default=0)
@@ -31,12 +31,12 @@ def aftermath(after: CellMessages, outage: ScriptedOutage, max_age_s: float) -> 
     moved = bool(states) and states[0].guard in MOVING
     held_ns = next((s.sent_ns for s in states if moved and s.guard == "hold"), None)
     flow_ns = min((e.accepted_ns for e in accepted.values()), default=None)
-    told = len(published(after.told, SlaveMetrics)) > 1
+    counted = len(published(after.statistics, SlaveMetrics)) > 1
     return {
         "held_s": None if held_ns is None else (held_ns - outage.cut_ns) / NS_PER_S,
         "flow_s": None if flow_ns is None else (flow_ns - outage.back_ns) / NS_PER_S,
-        "stale_accepted": _stale_accepted(after, outage, max_age_s, accepted) if told and states else None,
-        "stale_refused": float(counts(after).get("dropped", {}).get("age", 0)) if told else None,
+        "stale_accepted": _stale_accepted(after, outage, max_age_s, accepted) if counted and states else None,
+        "stale_refused": float(counts(after).get("dropped", {}).get("age", 0)) if counted else None,
         "moved_alone": float(alone) if states else None,
         "ready_s": None if outage.ready_ns is None else (outage.ready_ns - outage.back_ns) / NS_PER_S,
         "track_again_s": (again_ns[0] - act_ns) / NS_PER_S if again_ns and act_ns is not None else None,
@@ -55,10 +55,10 @@ def _stale_accepted(
 
 
 def _stale_unseen(after: CellMessages, outage: ScriptedOutage, max_age_s: float) -> int:
-    """How many that no state echoed were accepted stale, at the least.
+    """How many commands without an echo were accepted stale, at the least.
 
-    Of a burst between two states only the last is echoed. That there were others the slave's counter tells,
-    not which: they are taken to be the freshest that they can have been, accepted as early as they can.
+    Of a burst between two states only the last is echoed. The slave's counter shows that there were others,
+    but not which: they count as the freshest that are possible, accepted as early as possible.
     """
     unseen = _accepted_unseen(after)
     sampled_ns = {c.sequence: c.stamps.sampled_ns for c in after.commands}
@@ -75,11 +75,11 @@ def _stale_unseen(after: CellMessages, outage: ScriptedOutage, max_age_s: float)
 
 
 def _accepted_unseen(after: CellMessages) -> int:
-    """Accepted by the slave's counter and echoed by no state, between its first word and its last."""
-    told = [(s.sent_ns, s.metrics.guard.accepted) for s in published(after.told, SlaveMetrics)]
-    if len(told) < 2:
+    """Accepted by the slave's counter and echoed by no state, between its first and last statistics."""
+    counted = [(s.sent_ns, s.metrics.guard.accepted) for s in published(after.statistics, SlaveMetrics)]
+    if len(counted) < 2:
         return 0
-    (from_ns, before), (until_ns, accepted) = told[0], told[-1]
+    (from_ns, before), (until_ns, accepted) = counted[0], counted[-1]
     found = echoes(after.states).values()
-    seen = sum(from_ns < e.accepted_ns <= until_ns + TELLS_NS for e in found)
+    seen = sum(from_ns < e.accepted_ns <= until_ns + PUBLISHES_NS for e in found)
     return max(0, accepted - before - seen)

@@ -104,7 +104,7 @@ def _one_way_ms(judged: CellMessages, missing: bool = False) -> list[float]:
 
     With the `missing`, also what it took for each command that was due and did not come.
     """
-    all_ = [word.metrics for word in published(judged.told, SlaveMetrics)[1:]]
+    all_ = [word.metrics for word in published(judged.statistics, SlaveMetrics)[1:]]
     came = [us / 1000.0 for metrics in all_ for us in metrics.one_way_recent_us]
     if not missing:
         return came
@@ -113,7 +113,7 @@ def _one_way_ms(judged: CellMessages, missing: bool = False) -> list[float]:
 
 def _round_trip_ms(judged: CellMessages) -> list[float]:
     """Each round trip that the master published between its first message and its last."""
-    words = published(judged.told, MasterMetrics)[1:]
+    words = published(judged.statistics, MasterMetrics)[1:]
     robots = [robot for word in words for robot in word.metrics.robots.values()]
     return [us / 1000.0 for robot in robots for us in robot.round_trip_recent_us]
 
@@ -146,7 +146,7 @@ def _accepted_percent(judged: CellMessages) -> float | None:
 
 def _delivered_percent(judged: CellMessages) -> float | None:
     """Between the slave's first and last word: what came, of what was due by numbers and by time."""
-    told = published(judged.told, SlaveMetrics)
+    told = published(judged.statistics, SlaveMetrics)
     if len(told) < 2:
         return None
     first, last = (told[i].metrics.commands for i in (0, -1))
@@ -190,7 +190,7 @@ def _guard(judged: CellMessages) -> dict[str, float | None]:
         return {}
     left = sum(before.guard == "track" != after.guard for before, after in pairwise(states))
     # a kind that is not in it did not grow; without two words nobody can tell
-    told = len(published(judged.told, SlaveMetrics)) > 1
+    told = len(published(judged.statistics, SlaveMetrics)) > 1
     counted = counts(judged)
     return {
         "tracked": 100.0 * sum(s.guard == "track" for s in states) / len(states),
@@ -203,8 +203,8 @@ def _guard(judged: CellMessages) -> dict[str, float | None]:
 def _missed_percent(judged: CellMessages) -> float | None:
     shares = []
     ticks_of_processes = (
-        [word.metrics.ticks for word in published(judged.told, MasterMetrics)],
-        [word.metrics.ticks for word in published(judged.told, SlaveMetrics)],
+        [word.metrics.ticks for word in published(judged.statistics, MasterMetrics)],
+        [word.metrics.ticks for word in published(judged.statistics, SlaveMetrics)],
     )
     for ticks in ticks_of_processes:
         if len(ticks) < 2:

@@ -1,4 +1,4 @@
-"""Keeps what the observer hears, stretch by stretch."""
+"""Keeps the messages that the observer receives, stretch by stretch."""
 
 from __future__ import annotations
 
@@ -24,5 +24,5 @@ class MessageKeeper:
             commands=[m for m in heard if isinstance(m, Command)],
             states=[m for m in heard if isinstance(m, RobotState)],
             truth=[m for m in heard if isinstance(m, Truth)],
-            told=[m for m in heard if isinstance(m, Statistics)],
+            statistics=[m for m in heard if isinstance(m, Statistics)],
         )

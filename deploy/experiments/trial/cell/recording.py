@@ -1,4 +1,4 @@
-"""What was heard of one cell, and what happened when. Pure."""
+"""The messages that one cell received, and when its outage was. Pure."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _Metrics = TypeVar("_Metrics", MasterMetrics, SlaveMetrics)
 
 @dataclass(frozen=True, slots=True)
 class CellMessages:
-    """Messages of a stretch of time, all stamps of one clock: that of the master."""
+    """The messages of a stretch of time; all stamps are of the master's clock."""
 
     commands: Sequence[Command]
     states: Sequence[RobotState]
     truth: Sequence[Truth]
-    told: Sequence[Statistics]
+    statistics: Sequence[Statistics]
     """Once a second, from each process; each counts from its start."""
 
     def trace(self, skeleton: Skeleton) -> Trace:
@@ -44,14 +44,14 @@ class ScriptedOutage:
     back_ns: int
     """The link carries again."""
     ready_ns: int | None
-    """The operator may engage; None where that did not come."""
+    """The operator may engage; None where the robot never became ready."""
     act_ns: int | None
     """The operator engages."""
 
 
 @dataclass(frozen=True, slots=True)
 class CellCourse:
-    """A whole cell: judged time, then the outage where there was one."""
+    """A whole cell: the judged time, then the outage where the plan has one."""
 
     judged: CellMessages
     max_age_s: float
@@ -108,9 +108,9 @@ class Published(Generic[_Metrics]):
     metrics: _Metrics
 
 
-def published(told: Iterable[Statistics], kind: type[_Metrics]) -> list[Published[_Metrics]]:
+def published(statistics: Iterable[Statistics], kind: type[_Metrics]) -> list[Published[_Metrics]]:
     """Of one process, in the order of their sending."""
-    found = [Published(s.sent_ns, s.metrics) for s in told if isinstance(s.metrics, kind)]
+    found = [Published(s.sent_ns, s.metrics) for s in statistics if isinstance(s.metrics, kind)]
     return sorted(found, key=lambda one: one.sent_ns)
 
 
@@ -120,11 +120,11 @@ def echoes(states: Sequence[RobotState]) -> dict[int, CommandEcho]:
 
 
 def counts(heard: CellMessages) -> dict[str, dict[str, int]]:
-    """The guard's events between the slave's first and last word, by kind and name, if any."""
-    told = published(heard.told, SlaveMetrics)
-    if not told:
+    """The guard's events between the slave's first and last statistics, by kind and name."""
+    words = published(heard.statistics, SlaveMetrics)
+    if not words:
         return {}
-    first, last = (_counted(told[i].metrics.guard) for i in (0, -1))
+    first, last = (_counted(words[i].metrics.guard) for i in (0, -1))
     grown = {kind: Counter(last[kind]) - Counter(first[kind]) for kind in last}
     return {kind: dict(sorted(count.items())) for kind, count in grown.items() if count}
 

@@ -27,12 +27,12 @@ from slave.config import SlaveConfig
 START_S = 30.0
 """Processes up, filters settled, clock trusted, lease held."""
 ALIGN_S = 25.0
-TOLD_S = 1.6
-"""Statistics come once a second: after this each process has told them once more."""
+STATISTICS_S = 1.6
+"""Statistics come once a second: after this each process has published them once more."""
 RETURN_S = 15.0
-"""Of the operator's readiness after an outage."""
+"""How soon after an outage the robot may be engaged."""
 WATCH_S = 0.6
-"""Before the operator's act: does the robot move by itself?"""
+"""How long the robot is watched before it is engaged: it must not move by itself."""
 LOOK_S = 0.1
 
 
@@ -74,7 +74,7 @@ def _overrides(plan: TrialPlan, key: CellKey, age_s: float, opening: str) -> dic
 
 
 class _Story:
-    """What is done with a rig over a network, one step after the other."""
+    """The steps of one cell, on a rig over a network."""
 
     def __init__(
         self, plan: TrialPlan, rig: Rig, network: Network, stop: asyncio.Event, tell: Callable[[str], None]
@@ -149,7 +149,7 @@ class _Story:
         except TandemError as error:
             self._look()
             self._remarks.append(str(error))
-        await asyncio.sleep(TOLD_S)
+        await asyncio.sleep(STATISTICS_S)
         return self._recorder.take(), ScriptedOutage(cut_ns, back_ns, ready_ns, act_ns)
 
     def _look(self) -> None:

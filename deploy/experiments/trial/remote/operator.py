@@ -1,4 +1,4 @@
-"""The operator's host in a trial on separate hosts: suit and master here, the robot over there asked for."""
+"""The operator's host in a trial on separate hosts: suit and master here, the robot asked over the link."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ class Partner:
         self._stop = stop
 
     async def look(self) -> talk.TalkAnswer:
-        """How it stands there. Raises TandemError."""
+        """The situation over there. Raises TandemError."""
         return await self._ask(talk.Look())
 
     async def do(self, request: talk.Request) -> talk.TalkAnswer:
-        """Ask for something and wait until it is over. Raises TandemError where it did not come about."""
+        """Send a request and wait until it is done. Raises TandemError where it failed."""
         answer = await self._ask(request)
         while answer.busy:
             await asyncio.sleep(LOOK_S)
@@ -63,7 +63,7 @@ class Partner:
     async def until(
         self, reached: Callable[[talk.TalkAnswer], bool], timeout_s: float, what: str
     ) -> talk.TalkAnswer:
-        """Look until something is so. Raises TandemError when it does not come, or the slave is gone."""
+        """Look until a condition holds. Raises TandemError where it takes too long, or the slave ended."""
         deadline_ns = monotonic_ns() + to_ns(timeout_s)
         while True:
             answer = await self.look()
@@ -76,15 +76,15 @@ class Partner:
             await asyncio.sleep(LOOK_S)
 
     async def kept(self, skeleton: Skeleton) -> tuple[list[RobotState], list[Statistics]]:
-        """What the robot said while it was recorded, its own clock's stamps. Raises TandemError."""
+        """The robot's messages while it was recorded, with its own clock's stamps. Raises TandemError."""
         states: list[RobotState] = []
-        told: list[Statistics] = []
+        statistics: list[Statistics] = []
         while True:
             page = await self._ask(talk.Page(first=len(states)))
             states += [decode(payload, RobotState, len(skeleton.joints)) for payload in page.states]
-            told += [decode(payload, Statistics) for payload in page.told]
+            statistics += [decode(payload, Statistics) for payload in page.statistics]
             if len(states) >= page.total or not page.states:
-                return states, told
+                return states, statistics
 
     async def _ask(self, request: talk.Request) -> talk.TalkAnswer:
         if self._stop.is_set():
@@ -198,10 +198,10 @@ async def _play(
         for child in rig.children.values():
             child.measure()
         cpu = {"master": rig.children["master"].cpu_percent, "slave": answer.cpu_percent}
-        tell("fetching what the robot said")
-        states, told = await partner.kept(skeleton)
+        tell("fetching the robot's messages")
+        states, statistics = await partner.kept(skeleton)
     remarks = tuple(hold_remarks(operator.holds, began_ns))
-    judged_time = replace(heard, states=on_masters_clock(states), told=[*heard.told, *told])
+    judged_time = replace(heard, states=on_masters_clock(states), statistics=[*heard.statistics, *statistics])
     return CellCourse(judged_time, plan.max_age_s, shared_clock=False, cpu_percent=cpu, remarks=remarks)
 
 

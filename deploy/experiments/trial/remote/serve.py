@@ -1,4 +1,4 @@
-"""The robot's host in a trial on separate hosts: a fresh slave for each cell, and word of how it fared."""
+"""The robot's host in a trial on separate hosts: a fresh slave for each cell, and answers about it."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from slave.config import SlaveConfig
 log = logging.getLogger(__name__)
 
 UP_S = 20.0
-"""A slave that says nothing for this long after its start has failed."""
+"""A slave that publishes no state for this long after its start has failed."""
 IDLE_S = 60.0
-"""Without a question for this long the slave is stopped: whoever started it is gone."""
+"""Without a request for this long the slave is stopped: the operator's host is gone."""
 LOOK_S = 0.1
 
 
@@ -49,10 +49,10 @@ class ServeOptions:
     listen: str
     """Endpoint at which this host waits for `tandem trial --remote`."""
     address: str = "0.0.0.0"
-    """On which slaves listen."""
+    """Where slaves listen."""
     port: int = 7447
     max_age_s: float = 1.0
-    """The most that the guard's age limit may be set to from afar."""
+    """The largest age limit of the guard that the operator's host may set."""
 
 
 class RobotHost:
@@ -63,10 +63,10 @@ class RobotHost:
         self._folder = folder
         self._config = load_config(options.config, SlaveConfig)
         if self._config.link.access is not None:
-            # its rules know neither these questions nor transports on which nobody proves who he is
+            # its rules know neither these requests nor transports without certificates
             raise TandemError(
-                f"{options.config}: a trial cannot be served under [link.access]: give it a copy of the file "
-                "without, on a network that you trust"
+                f"{options.config}: a trial cannot be served under [link.access]: use a copy of the file "
+                "without it, on a network that you trust"
             )
         self._running: AsyncExitStack | None = None
         self._child: Child | None = None
@@ -86,19 +86,21 @@ class RobotHost:
         )
         try:
             async with open_link(link_config, self._config.robot) as link:
-                link.answer(talk.TALK, self.on_question)
-                log.info("%s: waits for an operator's trial at %s", self._config.robot, self._options.listen)
+                link.answer(talk.TALK, self.on_request)
+                log.info(
+                    "%s: waiting for an operator's trial at %s", self._config.robot, self._options.listen
+                )
                 while True:
                     await asyncio.sleep(1.0)
                     if self._child is not None and monotonic_ns() - self._asked_ns > to_ns(IDLE_S):
-                        log.warning("nobody asks any more: the slave is stopped")
+                        log.warning("no request for %g s: the slave is stopped", IDLE_S)
                         await self._stop()
         finally:
             if self._task is not None:
                 self._task.cancel()
             await self._stop()
 
-    def on_question(self, payload: bytes, _: int) -> bytes:
+    def on_request(self, payload: bytes, _: int) -> bytes:
         """The answer's bytes. It never waits."""
         self._asked_ns = monotonic_ns()
         try:
@@ -107,15 +109,15 @@ class RobotHost:
             return talk.pack(talk.TalkAnswer(taken=False, fault=f"not understood: {error}"))
         if isinstance(request, talk.Page):
             return talk.pack(self._page(request.first))
-        refusal = self._take_up(request)
+        refusal = self._begin_request(request)
         return talk.pack(self._situation(refusal))
 
-    def _take_up(self, request: talk.Request) -> str:
-        """Begin what is asked for; why not, where it is refused."""
+    def _begin_request(self, request: talk.Request) -> str:
+        """Begin what was requested; the reason where it is refused."""
         if isinstance(request, talk.Look):
             return ""
         if self._task is not None and not self._task.done():
-            return "still busy with what was asked before"
+            return "the last request is still being carried out"
         if isinstance(request, talk.Start):
             refusal = self._why_not(request)
             if not refusal:
@@ -156,8 +158,8 @@ class RobotHost:
                 await work
             except TandemError as error:
                 self._fault = str(error)
-            except Exception as error:  # the operator's host must not take it for done
-                log.exception("what was asked for did not come about")
+            except Exception as error:  # the operator's host must not believe that it is done
+                log.exception("a request failed")
                 self._fault = f"the robot's host failed: {str(error) or type(error).__name__}"
 
         self._fault = ""
@@ -186,7 +188,7 @@ class RobotHost:
         while self._observer.state is None:
             self._child.check()
             if monotonic_ns() > deadline_ns:
-                raise TandemError(f"the slave says nothing: {self._child.last_lines()}")
+                raise TandemError(f"the slave publishes no state: {self._child.last_lines()}")
             await asyncio.sleep(LOOK_S)
         log.info("slave %d: %s at %s", self._started, start.strategy, there)
 
@@ -223,7 +225,7 @@ class RobotHost:
         )
 
     def _take_fault(self) -> str:
-        """Why what was asked for last did not come about; said once, when it is over."""
+        """Why the last request failed; given once, when it is over."""
         if self._task is not None and not self._task.done():
             return ""
         fault, self._fault = self._fault, ""
@@ -239,11 +241,11 @@ class RobotHost:
 
     def _page(self, first: int) -> talk.TalkAnswer:
         page = self._kept.states[first : first + talk.PAGE]
-        told = [] if first else self._kept.told
+        statistics = [] if first else self._kept.statistics
         return talk.TalkAnswer(
             total=len(self._kept.states),
             states=[encode(state) for state in page],
-            told=[encode(word) for word in told],
+            statistics=[encode(one) for one in statistics],
         )
 
 

@@ -1,14 +1,15 @@
-"""What the two hosts of a trial say to each other: one question, one answer, checked on arrival. Pure.
+"""The messages between the two hosts of a trial: one request, one answer, checked on arrival. Pure.
 
-What takes time (start, engage, stop) is answered at once with `busy`; whoever asked looks until it is over.
+Requests that take time (start, engage, stop) are answered at once with `busy`; the operator's host then looks
+until they are done.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal, TypeVar
 
 import msgpack
-from pydantic import Field, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from common.config.section import Section
 from common.errors import CodecError
@@ -17,6 +18,7 @@ from common.wire.topics import Priority, Topic
 
 TALK = Topic("trial", "tandem/{robot}/trial", 0.0, 10.0, Priority.DATA, True, True, False)
 """The robot's host answers. Ten seconds, for a page of states over a slow link."""
+_Message = TypeVar("_Message")
 PAGE = 100
 """States in one answer: some 70 kB."""
 
@@ -31,32 +33,32 @@ class Start(Section):
 
 
 class Look(Section):
-    """Ask how it stands."""
+    """Ask for the situation."""
 
     do: Literal["look"] = "look"
 
 
 class Engage(Section):
-    """The operator's act, for the robot beside you."""
+    """Engage the robot beside you."""
 
     do: Literal["engage"] = "engage"
     operator: str
 
 
 class Record(Section):
-    """Keep what the robot says from now on."""
+    """Keep the robot's messages from now on."""
 
     do: Literal["record"] = "record"
 
 
 class EndRecording(Section):
-    """Keep nothing more."""
+    """End the recording."""
 
     do: Literal["take"] = "take"
 
 
 class Page(Section):
-    """Hand over what was kept, from this number on."""
+    """Hand over the kept states from this number on."""
 
     do: Literal["page"] = "page"
     first: int = Field(ge=0)
@@ -69,26 +71,18 @@ class Stop(Section):
 
 
 Request = Start | Look | Engage | Record | EndRecording | Page | Stop
-REQUESTS: dict[str, type[Request]] = {
-    "start": Start,
-    "look": Look,
-    "engage": Engage,
-    "record": Record,
-    "take": EndRecording,
-    "page": Page,
-    "stop": Stop,
-}
+_REQUEST: TypeAdapter[Request] = TypeAdapter(Annotated[Request, Field(discriminator="do")])
 
 
 class TalkAnswer(Section):
-    """How it stands. Fields that a question does not concern stay at their defaults."""
+    """The situation at the robot. Fields that a request does not concern stay at their defaults."""
 
     taken: bool = True
-    """Whether the question was; if not, `fault` says why."""
+    """Whether the request was accepted; if not, `fault` gives the reason."""
     busy: bool = False
-    """Something that was asked for is still under way."""
+    """The last request is still being carried out."""
     fault: str = ""
-    """Why what was asked for last did not come about, told once; or why the slave is gone."""
+    """Why the last request failed, sent once; or why the slave ended."""
     port: int = 0
     """Where the slave listens; 0 while there is none."""
     guard: str = ""
@@ -98,9 +92,12 @@ class TalkAnswer(Section):
     total: int = 0
     """States kept."""
     states: list[bytes] = Field(default_factory=list)
-    told: list[bytes] = Field(default_factory=list)
+    statistics: list[bytes] = Field(default_factory=list)
     """With the first page."""
     cpu_percent: float = 0.0
+
+
+_ANSWER = TypeAdapter(TalkAnswer)
 
 
 def pack(message: Request | TalkAnswer) -> bytes:
@@ -110,23 +107,22 @@ def pack(message: Request | TalkAnswer) -> bytes:
 
 
 def read_request(payload: bytes) -> Request:
-    """Raises CodecError for what is none."""
-    table = _table(payload)
-    kind = REQUESTS.get(str(table.get("do")))
-    if kind is None:
-        raise CodecError(f"no such request; expected one of {', '.join(REQUESTS)}")
-    try:
-        return kind.model_validate(table)
-    except ValidationError as error:
-        raise CodecError(_short(error)) from None
+    """Raises CodecError for what is not a request."""
+    return _valid(_REQUEST, payload)
 
 
 def read_answer(payload: bytes) -> TalkAnswer:
-    """Raises CodecError for what is none."""
+    """Raises CodecError for what is not an answer."""
+    return _valid(_ANSWER, payload)
+
+
+def _valid(kind: TypeAdapter[_Message], payload: bytes) -> _Message:
+    table = _table(payload)
     try:
-        return TalkAnswer.model_validate(_table(payload))
+        return kind.validate_python(table)
     except ValidationError as error:
-        raise CodecError(_short(error)) from None
+        first = error.errors()[0]
+        raise CodecError(f"{'.'.join(map(str, first['loc'])) or 'message'}: {first['msg']}") from None
 
 
 def _table(payload: bytes) -> dict[str, object]:
@@ -139,8 +135,3 @@ def _table(payload: bytes) -> dict[str, object]:
     if not isinstance(table, dict):
         raise CodecError("not a table")
     return table
-
-
-def _short(error: ValidationError) -> str:
-    first = error.errors()[0]
-    return f"{'.'.join(map(str, first['loc'])) or 'message'}: {first['msg']}"

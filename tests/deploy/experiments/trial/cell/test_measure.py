@@ -134,7 +134,7 @@ def test_one_way_and_round_trip_are_of_the_judged_time() -> None:
     for n, us in enumerate(of_seconds):
         at_ns = BEGIN_NS + n * S
         words += [Statistics(at_ns, slave_metrics(one_way_recent_us=tuple(us))), master_told(at_ns, us)]
-    figures = measure(CellCourse(replace(recording(), told=words), 0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(replace(recording(), statistics=words), 0.3, shared_clock=True), CONFIG)
     assert figures["one_way_p50_ms"] == figures["round_trip_p50_ms"] == pytest.approx(41.5)
     # one that the guard refuses for its age has taken its time all the same
     assert figures["one_way_p99_ms"] == figures["round_trip_p99_ms"] == pytest.approx(400.0, abs=11.0)
@@ -154,7 +154,7 @@ def test_commands_that_were_due_and_never_came_are_in_the_figures() -> None:
             ),
         ),
     ]
-    figures = measure(CellCourse(replace(recording(), told=told), 0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(replace(recording(), statistics=told), 0.3, shared_clock=True), CONFIG)
     assert figures["delivered"] == pytest.approx(100.0 * 63 / 125)
     assert figures["one_way_p99_ms"] == pytest.approx(40.0)
     corrected = figures["one_way_corrected_p99_ms"]
@@ -193,12 +193,12 @@ def test_ages_that_nobody_knows_are_not_fresh() -> None:
     outage = ScriptedOutage(CUT_NS, BACK_NS, BACK_NS + 700 * MS, ACT_NS)
     assert aftermath(after(0.6), outage, 0.3)["stale_accepted"] == 0.0
     assert aftermath(replace(after(0.6), commands=[]), outage, 0.3)["stale_accepted"] is None
-    untold = aftermath(replace(after(0.6), told=[]), outage, 0.3)
-    assert (untold["stale_accepted"], untold["stale_refused"]) == (None, None)
+    silent_slave = aftermath(replace(after(0.6), statistics=[]), outage, 0.3)
+    assert (silent_slave["stale_accepted"], silent_slave["stale_refused"]) == (None, None)
 
 
 def test_what_the_slave_did_not_tell_is_no_zero() -> None:
-    figures = measure(CellCourse(replace(recording(), told=[]), 0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(replace(recording(), statistics=[]), 0.3, shared_clock=True), CONFIG)
     assert (figures["refused"], figures["clamps"], figures["delivered"]) == (None, None, None)
 
 
@@ -332,7 +332,7 @@ def test_a_stale_burst_is_proven_by_the_slave_s_counter(unseen: int, stale: floa
         slave_told(ended_ns, 0, 0, accepted=100 + seen + unseen),
     ]
     # one came every 80 ms and the limit is 300 ms: four of those under way can have been fresh
-    assert outage_figures(replace(heard, told=words))["stale_accepted"] == stale
+    assert outage_figures(replace(heard, statistics=words))["stale_accepted"] == stale
 
 
 def test_a_robot_that_moves_before_the_operators_act_is_noticed() -> None:
