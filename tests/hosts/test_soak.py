@@ -52,7 +52,7 @@ def test_it_comes_back_from_each_fault_and_judges_itself(tmp_path: Path) -> None
     assert {path.name for path in report.iterdir()} >= {
         "report.json", "report.html", "soak.png", "events.jsonl", "samples.csv", "master.log", "recorder.log",
     }  # fmt: skip
-    assert ended.returncode == any(c["status"] == "fail" for c in judged.values()), said
+    assert ended.returncode == any(c["outcome"] == "failed" for c in judged.values()), said
 
 
 def test_interrupted_it_writes_its_report_and_ends_its_processes(tmp_path: Path) -> None:
