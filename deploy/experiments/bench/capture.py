@@ -1,4 +1,4 @@
-"""What it costs to hear the suit: SYNC out, every node's answer in, on a real bus between two processes."""
+"""What it costs to receive the suit: SYNC out, every node's answer in, on a bus between two processes."""
 
 from __future__ import annotations
 

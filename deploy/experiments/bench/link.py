@@ -13,7 +13,7 @@ from deploy.harness.endpoints import free_ports, local_endpoints
 from deploy.harness.keys import make_keys
 
 BARE = "bare zenoh"
-"""Over tcp, with nothing of ours on the way but the configuration."""
+"""Zenoh over tcp without tandem's link, with the same configuration."""
 
 
 def link(seconds: float) -> dict[str, Any]:

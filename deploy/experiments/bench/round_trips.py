@@ -1,7 +1,7 @@
 """Times several doors in turn, each at the rate of the commands, between two processes and on one clock.
 
-Each figure is half a round trip. At low rates most of it is the waking of an idle core, which is why only the
-ratios say something about the code.
+Each time is half a round trip. At low rates most of it is the waking of an idle core: only the ratios
+describe the code.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from deploy.experiments.bench.link import link, transports
 from deploy.experiments.bench.loop import RATE_HZ, loop
 from deploy.experiments.bench.pipeline import pipeline
 from deploy.experiments.bench.robot import robot
-from deploy.experiments.bench.table import bench_table
+from deploy.experiments.bench.table import bench_table, value_at
 from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.bench.worker import BenchError, in_worker
 from deploy.measure.target import judge_targets
@@ -95,35 +95,26 @@ def core_percent(report: dict[str, Any]) -> dict[str, float | None]:
 
     None where a bench did not give its part.
     """
-    a_command = total(
-        (_median(report, "pipeline", "joint_angles_us"), _median(report, "pipeline", "codec_us"))
-    )
+    a_command = total(_median(report, "pipeline", step) for step in ("joint_angles_us", "codec_us"))
 
-    def master(heard: str, nodes: str) -> float | None:
-        a_tick = total(
-            (
-                _median(report, "capture", heard, "cpu_us"),
-                _median(report, "pipeline", nodes, "orientation_us"),
-            )
-        )
+    def master(captured: str, nodes: str) -> float | None:
+        parts = (("capture", captured, "cpu_us"), ("pipeline", nodes, "orientation_us"))
+        a_tick = total(_median(report, *part) for part in parts)
         if a_tick is None or a_command is None:
             return None
         return round(1e-4 * (RATE_HZ * a_tick + COMMAND.rate_hz * a_command), 2)
 
-    of_36, robot = master("nodes_36", "nodes_36"), report["robot"].get("core_percent")
+    of_36, of_robot = master("nodes_36", "nodes_36"), report["robot"].get("core_percent")
     return {
         "master_36_nodes": of_36,
         "master_8_classic_nodes": master("nodes_8_classic", "nodes_8"),
-        "robot": robot,
-        "total": total((of_36, robot)),
+        "robot": of_robot,
+        "total": total((of_36, of_robot)),
     }
 
 
 def _median(report: dict[str, Any], *path: str) -> float | None:
-    figures: Any = report
-    for key in path:
-        figures = figures.get(key, {})
-    median: float | None = figures.get("median")
+    median: float | None = value_at(report, path).get("median")
     return median
 
 

@@ -43,10 +43,10 @@ def bench_table(report: Mapping[str, Any]) -> RenderableType:
     """The figures of `tandem bench`, then percent of a core."""
     table = plain_table("", "min", "median", "p99", "max", title="bench")
     for name, path in _BENCH_ROWS:
-        figures = _within(report, path)
+        figures = value_at(report, path)
         table.add_row(name, *(number(figures.get(key), 1) for key in ("min", "median", "p99", "max")))
     shares = (f"{name.replace('_', ' ')} {number(v, 1)}" for name, v in report["core_percent"].items())
-    alone = _within(report, ("loop", "idle"))
+    alone = value_at(report, ("loop", "idle"))
     missed = Text(
         f"ticks missed by a loop that does nothing else: {alone.get('missed', UNKNOWN)} "
         f"of {alone.get('late_us', {}).get('count', UNKNOWN)} run; "
@@ -55,7 +55,8 @@ def bench_table(report: Mapping[str, Any]) -> RenderableType:
     return Group(table, Text("percent of one core: " + ", ".join(shares), "bold"), missed)
 
 
-def _within(report: Mapping[str, Any], path: Iterable[str]) -> Any:
+def value_at(report: Mapping[str, Any], path: Iterable[str]) -> Any:
+    """The part of a report at these keys; {} where a bench did not give it."""
     found: Any = report
     for key in path:
         found = found.get(key, {})

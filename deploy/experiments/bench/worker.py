@@ -1,4 +1,4 @@
-"""Runs a function in a process of its own: a cold one, in which nothing else happens.
+"""Runs a function in a new process, in which nothing else happens.
 
 The parent pickles the function, by its module and name, and its arguments; the last line of output is the
 result as JSON. A worker ends when its parent does: it watches its standard input for the end.
@@ -79,7 +79,7 @@ def main() -> None:
     """The worker's side."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     sys.setswitchinterval(SWITCH_INTERVAL_S)  # as the services have it
-    # the parent's own words, handed over on the command line
+    # from the parent's command line, so it is trusted
     function, arguments = pickle.loads(bytes.fromhex(sys.argv[1]))
     print(json.dumps(function(**arguments)), flush=True)  # noqa: T201
     # a worker owns nothing that must be closed, and foreign threads could hold it up

@@ -14,17 +14,17 @@ class RecordedAlignment:
     """What the master needs to know of how a recording's sensors sit."""
 
     overrides: list[str]
-    """Of the master's file: the calibration of each node that the motion told of."""
+    """Of the master's file: the calibration of each node whose alignment the motion shows."""
     left: dict[str, str]
-    """The other nodes, and why; the zero pose alone must do for them."""
+    """The other nodes, and why: they are aligned by the zero pose alone."""
 
 
 def align(recording: Path, skeleton: Skeleton, folder: Path) -> RecordedAlignment:
     """Find how the sensors of a full-body recording sit, and write a file a node into `folder`.
 
-    A segment that was not recorded goes by the one it hangs on, as in the replay: a flat, stiff hand.
-    Where nothing can be said, as of a recording without a zero pose, every node is among the `left`.
-    Raises RecordingError for a file that is none.
+    A segment that was not recorded takes its parent's alignment, as in the replay: a flat, stiff hand.
+    Where nothing is known, as of a recording without a zero pose, every node is among the `left`.
+    Raises RecordingError for a file that is not a recording.
     """
     from master.calibrate.alignment import find_alignment
     from master.calibrate.alignment_files import of_profile, write_alignment
@@ -42,12 +42,12 @@ def align(recording: Path, skeleton: Skeleton, folder: Path) -> RecordedAlignmen
         if source in files:
             overrides.append(f'nodes.{name}.calibration="{files[source].resolve()}"')
         elif name not in left:
-            left[name] = left.get(source, "nobody recorded it")
+            left[name] = left.get(source, "it was not recorded")
     return RecordedAlignment(overrides, left)
 
 
 def _recorded(name: str, skeleton: Skeleton, known: set[str]) -> str:
-    """The segment itself, or the nearest that it hangs on of which something is known."""
+    """The segment itself, or the nearest parent that was recorded."""
     while name not in known:
         parent = skeleton.segments[skeleton.segment_names.index(name)].parent
         if parent not in skeleton.segment_names:

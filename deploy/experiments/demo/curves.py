@@ -21,7 +21,7 @@ SIDES = ("left_", "right_")
 
 @dataclass(frozen=True, slots=True)
 class JointCurves:
-    """Angles and angular velocities on the grid, (K, J) each; NaN where there is nothing to go by."""
+    """Angles and angular velocities on the grid, (K, J) each; NaN where nothing was measured."""
 
     angle_deg: Array
     rate_deg_s: Array
@@ -45,12 +45,12 @@ class Curves:
     robot: JointCurves
     """What the encoders showed."""
     operator: JointCurves | None
-    """The truth; None where nobody knows it."""
+    """The truth; None where it is not known."""
     groups: tuple[CurveGroup, ...]
 
 
 def curves(truth: TruthSeries, moved: MovedSeries, skeleton: Skeleton) -> Curves | None:
-    """From a run whose stamps are of one clock (one host); None where it hardly tracked."""
+    """The curves of a run on one host, whose stamps are of one clock; None where it hardly tracked."""
     tracked_ns = moved.encoder_ns[moved.tracking]
     if len(tracked_ns) == 0 or to_s(int(tracked_ns.max() - tracked_ns.min())) < LEAST_S:
         return None
@@ -83,7 +83,7 @@ def groups(skeleton: Skeleton) -> tuple[CurveGroup, ...]:
 
 
 def _label(member: str, title: str) -> str:
-    """What a joint's name says beyond its group's."""
+    """A joint's name without its group's."""
     rest = member.removeprefix(title).removesuffix(title).strip("_")
     return rest or member
 

@@ -90,4 +90,4 @@ def _master_words(tree: Mapping[str, Any]) -> str:
 def _missing_words(robots: Mapping[str, Mapping[str, Any]]) -> str:
     missing = {robot: row["due"]["missing"] for robot, row in robots.items() if row["due"] is not None}
     named = ", ".join(f"{robot} {count}" for robot, count in missing.items() if count)
-    return f"; commands not there when they were due: {named}" if named else ""
+    return f"; commands missing when due: {named}" if named else ""

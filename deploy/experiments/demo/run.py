@@ -59,11 +59,11 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
 
 
 async def _align(options: DemoOptions, replay: Path, folder: Path, console: Console) -> list[str]:
-    """What the master's file must say of sensors that sit askew."""
-    console.print(f"finding from {replay.name} how its sensors sit …")
+    """The overrides of the master's file for sensors that sit askew."""
+    console.print(f"finding the sensor-to-segment alignment from {replay.name} …")
     aligned = await asyncio.to_thread(align, replay, load_skeleton(options.profile), folder)
     for name, why in aligned.left.items():
-        console.print(f"[yellow]{name}: by the zero pose alone ({why})", highlight=False)
+        console.print(f"[yellow]{name}: aligned by the zero pose alone ({why})", highlight=False)
     return aligned.overrides
 
 

@@ -41,15 +41,15 @@ def latency_table(
         return Group(table, *notes)
     bound = one_way.get("bound")
     if not one_way.get("trusted", bound is not None):
-        known = Text("one-way figures are not trusted: the clocks' offset is stale", "yellow")
+        known = Text("one-way times are not trusted: the clock offset is stale", "yellow")
     else:
-        known = Text(f"one-way figures are known to ± {number(bound, 3)} ms", "dim")
+        known = Text(f"one-way times are uncertain by ± {number(bound, 3)} ms", "dim")
     return Group(table, *notes, known, *_due_notes(one_way))
 
 
 MOVED_IS = (
     "written→moved ends at the first change of any encoder: the loop is closed. A robot that moves already "
-    "shows one at once, so it does not tell how soon the robot answers; the motion lag does"
+    "shows one at once, so this stage does not show how soon the robot answers; the motion lag does"
 )
 
 
@@ -60,18 +60,18 @@ def _due_notes(one_way: Mapping[str, Any]) -> list[Text]:
         return []
     p99, most = (number(corrected.get(key), 2) for key in ("p99", "max"))
     raw = f"one way p99 {number(one_way.get('p99'), 2)} ms of the commands that came"
-    words = f"{raw}; {p99} ms, at most {most} ms, with the {missing} that were not there when they were due"
+    words = f"{raw}; {p99} ms, at most {most} ms, with the {missing} that were missing when due"
     return [Text(words, "yellow" if missing else "dim")]
 
 
 def accuracy_table(judged: Accuracy) -> RenderableType:
-    """Solved against truth: the paper's Table 1 beside ours, η beside what it hides, then every joint.
+    """Joint angles against truth: beside the paper's Table 1, η beside what it hides, then every joint.
 
     A robot that has none of Table 1's joints gets the last part alone.
     """
     if not judged.fast:
         return _joints_table(judged)
-    table = plain_table("joint", title="solved against truth, fast periods")
+    table = plain_table("joint", title="joint angles against truth, fast periods")
     for head in ("°/step", "left °", "right °", "paper °", "ratio", "paper"):
         table.add_column(head, justify="right", no_wrap=True)
     for joint, paper in TABLE_1.items():
@@ -97,14 +97,14 @@ def accuracy_table(judged: Accuracy) -> RenderableType:
 
 
 def motion_table(judged: FollowedMotion | None) -> RenderableType:
-    """Moved against truth: each joint that moved, the worst first, then over all."""
+    """Motion against truth: each joint that moved, the worst first, then all of them."""
     if judged is None:
         return Text(
-            "moved against truth: not enough data (was the robot in track, did it move, "
+            "motion against truth: not enough data (was the robot in track, did it move, "
             "were 95 % of each encoder's readings valid?)",
             "yellow",
         )
-    table = plain_table("joint", "RMSE °", "aligned °", "roughness", title="moved against truth")
+    table = plain_table("joint", "RMSE °", "aligned °", "roughness", title="motion against truth")
     for name, joint in sorted(judged.joints.items(), key=lambda item: -item[1].rmse_deg):
         table.add_row(
             name,
@@ -152,7 +152,7 @@ def video_table(video: Mapping[str, Any]) -> RenderableType:
 
 
 def synergy_table(judged: Mapping[str, Mapping[str, float] | None]) -> RenderableType:
-    """The joints of a coarser robot, solved against truth: from a report's `synergies`."""
+    """The joints of a coarser robot against truth, from a report's `synergies`."""
     table = plain_table(
         "joint", "mean abs °", "RMSE °", "largest °", title="as a robot's joints, by its synergies"
     )
@@ -162,9 +162,9 @@ def synergy_table(judged: Mapping[str, Mapping[str, float] | None]) -> Renderabl
     return table
 
 
-def ticks_text(ours: Mapping[str, Mapping[str, int] | None], host: Mapping[str, Any]) -> RenderableType:
-    """Ticks that our loops missed beside those of a loop that does nothing else, from a report's `host`."""
-    missed = ", ".join(f"{name} {_missed(ticks)}" for name, ticks in ours.items())
+def ticks_text(loops: Mapping[str, Mapping[str, int] | None], host: Mapping[str, Any]) -> RenderableType:
+    """Ticks that the loops missed, beside those of the reference loops in a report's `host`."""
+    missed = ", ".join(f"{name} {_missed(ticks)}" for name, ticks in loops.items())
     if not host:
         return Text(f"ticks missed: {missed}; the host itself was not measured", "dim")
     first = "" if host["priority"] else " (without real-time priority: only steal excuses)"
@@ -194,7 +194,7 @@ def _missed(ticks: Mapping[str, int] | None) -> str:
 
 def _joints_table(judged: Accuracy) -> RenderableType:
     heads = ("mean abs °", "RMSE °", "bias °", "largest °", "estimated %")
-    table = plain_table("joint", *heads, title="solved against truth, whole run")
+    table = plain_table("joint", *heads, title="joint angles against truth, whole run")
     for name, joint in judged.joints.items():
         cells = [UNKNOWN] * 4 if joint is None else _joint_cells(joint)
         share = judged.estimated.get(name)

@@ -1,4 +1,4 @@
-"""What a person sees of a demo: the live view while it runs, the tables when it is over."""
+"""What a demo shows: the live view while it runs, the tables when it is over."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _print_tables(report: DemoReport, console: Console) -> None:
     if tree["video"]:
         console.print(video_table(tree["video"]))
     if not any(report.accuracy.estimated.values()):
-        console.print(Text("no truth to judge by: a recording has none", "yellow"))
+        console.print(Text("no truth to judge by: a recording has no true angles", "yellow"))
     else:
         console.print(accuracy_table(report.accuracy), motion_table(report.motion))
     if report.comparison is not None:

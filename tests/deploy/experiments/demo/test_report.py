@@ -249,8 +249,8 @@ def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
     verdict = {v.name: v for v in judge_targets(report.tree, DEMO)}["commands due that never came"]
     assert verdict.passed is False
     assert verdict.measured == pytest.approx(62, abs=4)
-    assert "that were not there when they were due" in " ".join(text(report).split())
-    assert "it does not tell how soon the robot answers" in " ".join(text(report).split())
+    assert "that were missing when due" in " ".join(text(report).split())
+    assert "this stage does not show how soon the robot answers" in " ".join(text(report).split())
 
 
 def test_paper_b_s_60_ms_are_of_one_way_and_lag(report: DemoReport) -> None:
