@@ -7,9 +7,9 @@ from collections import Counter
 
 from common.link.access import named
 from common.link.config import LinkConfig
-from common.link.listening import hear_refusals
 from common.link.refusals import Refusals
 from common.link.session import LinkSession
+from common.link.zenoh_log import hear_refusals
 from common.metrics.link import AccessMetrics
 
 log = logging.getLogger(__name__)

@@ -14,7 +14,7 @@ import zenoh
 
 from common.errors import LinkError
 from common.link.config import LinkConfig
-from common.link.configuration import zenoh_configuration
+from common.link.zenoh_config import zenoh_configuration
 
 RETRY_S = 0.5
 MOST_RETRY_S = 5.0

@@ -17,8 +17,8 @@ import zenoh
 from zenoh.handlers import Callback
 
 from common.link.config import LinkConfig, TlsConfig
-from common.link.configuration import zenoh_configuration
 from common.link.roles import Role
+from common.link.zenoh_config import zenoh_configuration
 from common.wire.topics import COMMAND, STATE, VIDEO, Topic
 from deploy.certificates.folder import stem, write_pair
 from deploy.certificates.make import Pair, new_authority, new_identity

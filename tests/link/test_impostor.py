@@ -13,9 +13,9 @@ import zenoh
 
 from common.link import open_link
 from common.link.config import LinkConfig
-from common.link.configuration import zenoh_configuration
 from common.link.endpoint import SECURE
 from common.link.roles import Role
+from common.link.zenoh_config import zenoh_configuration
 from common.wire.topics import STATE
 from deploy.certificates.folder import read_authority, stem, write_pair
 from deploy.certificates.make import new_authority, new_identity

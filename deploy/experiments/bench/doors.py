@@ -16,8 +16,8 @@ from zenoh.handlers import Callback
 from common.clock import monotonic_ns
 from common.link import open_link
 from common.link.config import AccessConfig, LinkConfig
-from common.link.configuration import zenoh_configuration
 from common.link.roles import Role
+from common.link.zenoh_config import zenoh_configuration
 from common.wire.topics import COMMAND, STATE
 from deploy.harness.keys import MASTER, tls_of
 

@@ -15,7 +15,7 @@ import uvloop
 
 from common.clock import monotonic_ns, to_ns
 from common.errors import LinkError
-from common.link.listening import hear_refusals
+from common.link.zenoh_log import hear_refusals
 from common.process.heap import freeze_heap
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks

@@ -9,9 +9,9 @@ from typing import Any
 
 from common.clock import NS_PER_S, monotonic_ns
 from common.link.audit import Audit
-from common.link.configuration import zenoh_configuration
 from common.link.router import RouterConfig
 from common.link.session import LinkSession, open_session
+from common.link.zenoh_config import zenoh_configuration
 from common.metrics.tree import to_tree
 from common.process.launch import WriteFigures
 from common.process.notify import Notifier, open_notifier

@@ -1,7 +1,7 @@
 import pytest
 
 from common.link.config import LinkConfig
-from common.link.configuration import zenoh_configuration
+from common.link.zenoh_config import zenoh_configuration
 from deploy.harness.link_settings import needed_age_s, open_timeout_s
 from deploy.sim.network import Profile, Way, load_profile, profile_names
 
