@@ -11,9 +11,10 @@ import pytest
 
 import slave.limit.limit
 from common.errors import TandemError
-from deploy.experiments.faults.fault import Reaction
-from deploy.experiments.faults.table import FAULTS
-from deploy.experiments.faults.trial import run_trial
+from deploy.harness.faults.fault import Reaction
+from deploy.harness.faults.table import FAULTS as EVERY
+from deploy.harness.faults.table import VIRTUAL as FAULTS
+from deploy.harness.faults.virtual import try_on_virtual_clock
 from slave.encoders.agreement import EncoderAgreement
 from slave.encoders.unbidden import UnbiddenMotion
 from slave.guard import GATES, states
@@ -49,7 +50,7 @@ def rows() -> list[Any]:
 
 @pytest.mark.parametrize("name", rows())
 def test_the_robot_does_what_the_table_says(name: str) -> None:
-    outcome = run_trial(TABLE[name])
+    outcome = try_on_virtual_clock(TABLE[name])
     assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"
 
 
@@ -57,27 +58,27 @@ def test_the_robot_does_what_the_table_says(name: str) -> None:
 def test_the_row_fails_without_its_protection(name: str) -> None:
     fault = TABLE[name]
     assert fault.held_by
-    assert run_trial(fault, **without(fault.held_by)).wrong
+    assert try_on_virtual_clock(fault, **without(fault.held_by)).wrong
 
 
 def test_the_rules_of_the_limiter_are_what_bounds_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
     fault = TABLE["valid but impossible jump"]
-    assert not [word for word in run_trial(fault).wrong if "setpoint" in word]
+    assert not [word for word in try_on_virtual_clock(fault).wrong if "setpoint" in word]
     kept = tuple(pair for pair in slave.limit.limit.RULES if str(pair[0]) not in fault.held_by)
     monkeypatch.setattr(slave.limit.limit, "RULES", kept)
-    assert [word for word in run_trial(fault).wrong if "setpoint" in word]
+    assert [word for word in try_on_virtual_clock(fault).wrong if "setpoint" in word]
 
 
 def test_a_drive_that_moves_by_itself_goes_on_without_the_watch(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(UnbiddenMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_))
-    assert run_trial(TABLE["drive moves by itself"]).wrong
+    assert try_on_virtual_clock(TABLE["drive moves by itself"]).wrong
 
 
 def test_drives_that_differ_from_encoders_go_on_without_the_comparison(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(EncoderAgreement, "judge", lambda *_: None)
-    assert run_trial(TABLE["drive and output encoder differ"]).wrong
+    assert try_on_virtual_clock(TABLE["drive and output encoder differ"]).wrong
 
 
 @pytest.mark.parametrize(
@@ -90,10 +91,9 @@ def test_drives_that_differ_from_encoders_go_on_without_the_comparison(
 )
 def test_a_row_of_the_estimate_fails_without_its_setting(name: str, without: str) -> None:
     fault = TABLE[name]
-    assert fault.setting is not None
     bared = replace(fault, setting=replace(fault.setting, master=(*fault.setting.master, without)))
     try:
-        wrong = run_trial(bared).wrong
+        wrong = try_on_virtual_clock(bared).wrong
     except TandemError as error:
         wrong = (str(error),)
     assert wrong
@@ -106,7 +106,7 @@ def test_an_emergency_stop_fails_without_its_transition(monkeypatch: pytest.Monk
         pair: after for pair, after in states.TRANSITIONS.items() if pair != (fault.begins, GuardEvent.ESTOP)
     }
     monkeypatch.setattr(states, "TRANSITIONS", rest)
-    assert run_trial(fault).wrong
+    assert try_on_virtual_clock(fault).wrong
 
 
 def test_the_table_names_only_protections_there_are() -> None:
@@ -117,7 +117,7 @@ def test_the_table_names_only_protections_there_are() -> None:
 
 def test_every_row_that_stands_has_a_bound() -> None:
     assert len(TABLE) == len(FAULTS), "two rows of one name"
-    for fault in FAULTS:
+    for fault in EVERY.values():
         stands = fault.reaction not in (Reaction.GOES_ON, Reaction.LIMITED)
         assert (fault.stands_s is not None) == stands, fault.name
         assert stands or fault.strays_deg is not None or fault.reaction is Reaction.LIMITED, fault.name

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import common
 from deploy.experiments.faults.document import BEGIN, END, within_page, words
-from deploy.experiments.faults.processes import PROCESS_FAULTS
-from deploy.experiments.faults.table import FAULTS
+from deploy.harness.faults.fault import FaultRow
+from deploy.harness.faults.table import FAULTS
 
 ROOT = Path(common.__file__).parents[1]
 PAGE = ROOT / "docs" / "when-something-fails.md"
-ROWS = [*FAULTS, *(fault.row for fault in PROCESS_FAULTS)]
+ROWS = list(FAULTS.values())
 
 
 def lines() -> list[str]:
@@ -24,7 +23,7 @@ def lines() -> list[str]:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_each_row_is_on_the_page_with_its_bounds(row: Any) -> None:
+def test_each_row_is_on_the_page_with_its_bounds(row: FaultRow) -> None:
     assert "| " + " | ".join(words(row)) + " |" in lines()
 
 

@@ -6,12 +6,12 @@ import asyncio
 
 import pytest
 
-from deploy.experiments.faults.processes import PROCESS_FAULTS, ProcessFault, tried
+from deploy.harness.faults.processes import PROCESSES, ProcessFault, try_with_processes
 
 pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
 
 
-@pytest.mark.parametrize("fault", PROCESS_FAULTS, ids=lambda fault: fault.row.name)
+@pytest.mark.parametrize("fault", PROCESSES, ids=lambda fault: fault.name)
 def test_the_robot_stands_whatever_program_dies(fault: ProcessFault) -> None:
-    outcome = asyncio.run(tried(fault))
+    outcome = asyncio.run(try_with_processes(fault))
     assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"

@@ -7,7 +7,7 @@ import pytest
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from deploy.experiments.faults.limits import Asked, asked_beyond, moved_beyond
+from deploy.harness.faults.judge import Asked, asked_beyond, moved_beyond
 from deploy.measure.stillness import SPEED_ERROR_RAD_S, STILL_RAD, StoppingMotion, stillness
 from slave.encoders.counts import RAD_PER_COUNT
 

@@ -68,13 +68,13 @@ def _process(found: re.Match[str]) -> str:
 
 def fault_words() -> set[str]:
     """Of a row of the fault matrix: what should not have been."""
-    file = "deploy/experiments/faults/trial.py"
+    executor, judge = "deploy/harness/faults/virtual.py", "deploy/harness/faults/judge.py"
     return {
-        *texts(file, "_judge", lambda node: isinstance(node, ast.JoinedStr)),
-        *texts(file, "_state_amiss", _is_return),
-        *texts(file, "_stillness_amiss", _is_return),
-        *texts("deploy/experiments/faults/limits.py", "asked_beyond", _is_argument),
-        *texts("deploy/experiments/faults/limits.py", "moved_beyond", _is_argument),
+        *texts(executor, "_judge", lambda node: isinstance(node, ast.JoinedStr)),
+        *texts(executor, "_state_amiss", _is_return),
+        *texts(judge, "standing_amiss", _is_return),
+        *texts(judge, "asked_beyond", _is_argument),
+        *texts(judge, "moved_beyond", _is_argument),
     }
 
 

@@ -13,10 +13,6 @@ from common.errors import TandemError
 from common.recording import RecorderCounters
 from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.demo.targets import BY_PROFILE
-from deploy.experiments.faults.fault import Fault
-from deploy.experiments.faults.scene import Scene
-from deploy.experiments.faults.table import FAULTS
-from deploy.experiments.faults.trial import _judge, _stillness_amiss, run_trial
 from deploy.experiments.soak.judge.growth import (
     BLOCKS_H,
     DRIFT_MS_H,
@@ -33,6 +29,10 @@ from deploy.experiments.trial.cell.result import Cell
 from deploy.experiments.trial.cell.result import CellStatus as CellStatus
 from deploy.experiments.trial.report.spread import SetupResults
 from deploy.experiments.trial.report.targets import LIMITS, SetupLimit, judge
+from deploy.harness.faults.judge import standing_amiss
+from deploy.harness.faults.scene import Scene
+from deploy.harness.faults.table import VIRTUAL
+from deploy.harness.faults.virtual import VirtualFault, _judge, try_on_virtual_clock
 from deploy.measure.accuracy import SIDES
 from deploy.measure.stillness import stillness
 from deploy.measure.target import ReportTarget, judge_targets
@@ -115,9 +115,9 @@ def test_each_process_that_leaks_fails(make: Make, process: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def cut() -> tuple[Fault, Scene]:
+def cut() -> tuple[VirtualFault, Scene]:
     """The link is cut, and all is as it must be."""
-    fault = next(fault for fault in FAULTS if fault.name == "link cut")
+    fault = next(fault for fault in VIRTUAL if fault.name == "link cut")
     scene = Scene()
     scene.to(fault.begins)
     scene.begin()
@@ -137,7 +137,7 @@ def cut() -> tuple[Fault, Scene]:
     ],
 )
 def test_a_row_of_the_fault_matrix_fails_where_it_is_not_kept(
-    cut: tuple[Fault, Scene], stricter: dict[str, Any], words: str
+    cut: tuple[VirtualFault, Scene], stricter: dict[str, Any], words: str
 ) -> None:
     fault, scene = cut
     [wrong] = _judge(replace(fault, **stricter), scene).wrong
@@ -145,7 +145,7 @@ def test_a_row_of_the_fault_matrix_fails_where_it_is_not_kept(
 
 
 def test_what_was_granted_or_let_through_is_wrong(
-    cut: tuple[Fault, Scene], monkeypatch: pytest.MonkeyPatch
+    cut: tuple[VirtualFault, Scene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fault, scene = cut
     monkeypatch.setattr(scene, "granted", ["an engage"])
@@ -154,14 +154,14 @@ def test_what_was_granted_or_let_through_is_wrong(
 
 
 def test_joints_that_were_to_go_on_and_strayed_are_wrong() -> None:
-    fault = next(fault for fault in FAULTS if fault.strays_deg is not None and fault.begins is State.TRACK)
-    assert any("strayed by" in words for words in run_trial(replace(fault, strays_deg=-1.0)).wrong)
+    fault = next(fault for fault in VIRTUAL if fault.strays_deg is not None and fault.begins is State.TRACK)
+    assert any("strayed by" in words for words in try_on_virtual_clock(replace(fault, strays_deg=-1.0)).wrong)
 
 
-def test_a_robot_that_never_stands_is_wrong(cut: tuple[Fault, Scene]) -> None:
+def test_a_robot_that_never_stands_is_wrong(cut: tuple[VirtualFault, Scene]) -> None:
     fault, scene = cut
     figures = replace(stillness(scene.course(), scene.skeleton, np.ones(25, np.bool_)), standstill_s=None)
-    [words] = _stillness_amiss(fault, figures)
+    [words] = standing_amiss(fault, figures)
     assert "still moves at the end of the trial" in words
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -13,10 +12,6 @@ from rich.progress import track
 
 from common.errors import TandemError
 from deploy.report.options import ReportFile
-
-if TYPE_CHECKING:
-    from deploy.experiments.faults.fault import Fault
-    from deploy.experiments.faults.trial import Outcome
 
 
 def faults(
@@ -38,31 +33,18 @@ def faults(
     Example: `tandem faults "link" --report faults.json`
     """
     from deploy.experiments.faults.document import matrix, tree, within_page
-    from deploy.experiments.faults.processes import PROCESS_FAULTS
-    from deploy.experiments.faults.processes import tried as tried_in_processes
-    from deploy.experiments.faults.table import FAULTS
-    from deploy.experiments.faults.trial import run_trial
     from deploy.experiments.faults.view import print_matrix
+    from deploy.harness.faults.table import FAULTS, try_fault
 
-    def wanted(fault: Fault) -> bool:
-        return not only or any(word.casefold() in fault.name.casefold() for word in only)
-
-    processes = {fault.row.name: fault for fault in PROCESS_FAULTS}
-    table = [*FAULTS, *(fault.row for fault in PROCESS_FAULTS)]
-    chosen = [fault for fault in table if wanted(fault)]
+    words = [word.casefold() for word in only or [""]]
+    chosen = [row for name, row in FAULTS.items() if any(word in name.casefold() for word in words)]
     if not chosen:
-        raise TandemError(f"no row is named so; there are: {', '.join(fault.name for fault in table)}")
-    if page is not None and len(chosen) < len(table):
+        raise TandemError(f"no row's name contains that; the rows are: {', '.join(FAULTS)}")
+    if page is not None and len(chosen) < len(FAULTS):
         raise TandemError("a page holds the whole matrix: name no rows with --page")
 
-    def tried(fault: Fault) -> Outcome:
-        if fault.name in processes:
-            return asyncio.run(tried_in_processes(processes[fault.name]))
-        return run_trial(fault)
-
     console = Console()
-    bar = track(chosen, "trying", console=console, transient=True)
-    outcomes = [tried(fault) for fault in bar]
+    outcomes = [try_fault(row) for row in track(chosen, "trying", console=console, transient=True)]
     print_matrix(outcomes, console)
     try:
         if report is not None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from deploy.experiments.faults.fault import Fault, Reaction
-from deploy.experiments.faults.trial import Outcome
+from deploy.harness.faults.fault import FaultRow
+from deploy.harness.faults.judge import FaultOutcome
 
 BEGIN = "<!-- the matrix: written by `tandem faults --page` -->"
 END = "<!-- end of the matrix -->"
@@ -23,7 +23,7 @@ FIGURES_HEAD = (
 _NONE = "–"
 
 
-def matrix(outcomes: Sequence[Outcome]) -> str:
+def matrix(outcomes: Sequence[FaultOutcome]) -> str:
     """Both tables, between the marks."""
     missed = [f"- **{o.fault.name}**: {o.fault.missed}" for o in outcomes if o.fault.missed]
     parts = [
@@ -48,12 +48,12 @@ def within_page(page: str, part: str) -> str:
     return before + part + rest
 
 
-def words(fault: Fault) -> tuple[str, ...]:
+def words(fault: FaultRow) -> tuple[str, ...]:
     """What, reaction, bound, and what a person does."""
     return (f"**{fault.name}**: {fault.done}", fault.robot, bound(fault), fault.person)
 
 
-def bound(fault: Fault) -> str:
+def bound(fault: FaultRow) -> str:
     """By when, in words."""
     if fault.stands_s is None:
         return "all the time" if fault.strays_deg is None else f"never more than {fault.strays_deg:g}° off"
@@ -61,9 +61,9 @@ def bound(fault: Fault) -> str:
     return f"{decided}stands in {fault.stands_s:.2g} s"
 
 
-def figures(outcome: Outcome) -> tuple[str, ...]:
+def figures(outcome: FaultOutcome) -> tuple[str, ...]:
     """Of one trial, as cells."""
-    fault, measured = outcome.fault, outcome.figures
+    fault, measured = outcome.fault, outcome.stillness
     stands = fault.stands_s is not None
     moved = _degrees(measured.peak_speed_rad_s, 0)
     share = f"{moved} ({measured.peak_share:.0%} of {measured.peak_joint}'s limit)"
@@ -78,9 +78,9 @@ def figures(outcome: Outcome) -> tuple[str, ...]:
     )
 
 
-def tree(outcome: Outcome) -> dict[str, object]:
+def tree(outcome: FaultOutcome) -> dict[str, object]:
     """Of one trial, as plain values for a report."""
-    measured = outcome.figures
+    measured = outcome.stillness
     return {
         "fault": outcome.fault.name,
         "expected": str(outcome.fault.reaction),
@@ -98,11 +98,6 @@ def tree(outcome: Outcome) -> dict[str, object]:
         "strayed_deg": None if outcome.strayed_rad is None else math.degrees(outcome.strayed_rad),
         "refused": outcome.refused,
     }
-
-
-def goes_on(fault: Fault) -> bool:
-    """Whether the robot as a whole is to keep moving."""
-    return fault.reaction in (Reaction.GOES_ON, Reaction.LIMITED)
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

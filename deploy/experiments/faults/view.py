@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.table import Table
 
 from deploy.experiments.faults.document import figures
-from deploy.experiments.faults.trial import Outcome
+from deploy.harness.faults.judge import FaultOutcome
 
 
-def print_matrix(outcomes: Sequence[Outcome], console: Console) -> None:
+def print_matrix(outcomes: Sequence[FaultOutcome], console: Console) -> None:
     """One row a fault, and under the table whatever was not as it should be."""
     table = Table(
         box=box.SIMPLE_HEAD, pad_edge=False, caption="seconds, degrees, and shares of a speed limit"
@@ -22,7 +22,7 @@ def print_matrix(outcomes: Sequence[Outcome], console: Console) -> None:
         table.add_column(head, justify="right", no_wrap=True)
     for outcome in outcomes:
         name, reacted, stood, peak, way, over, strayed = figures(outcome)
-        speed, share = peak.split(" ")[0], f"{outcome.figures.peak_share:.0%}"
+        speed, share = peak.split(" ")[0], f"{outcome.stillness.peak_share:.0%}"
         colour = ("yellow" if outcome.fault.missed else "red") if outcome.wrong else None
         table.add_row(name, reacted, stood, speed, share, way, over, strayed, style=colour)
     console.print(table)

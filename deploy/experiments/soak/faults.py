@@ -1,4 +1,4 @@
-"""The faults a soak knows: what is done, how long it lasts, what the robot must then do."""
+"""The faults that a soak brings about: rows of the fault table with real processes, each undone again."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from deploy.experiments.soak import clock_step
 from deploy.experiments.soak import recorder as recording
 from deploy.experiments.soak.files.happenings import FaultCourse
 from deploy.experiments.soak.stage import Stage
+from deploy.harness.faults.fault import Reaction
+from deploy.harness.faults.table import FAULTS as ROWS
 from deploy.harness.rig import ROUTER
 
 STEPS_S = (60, 3_600, 86_400, 2_592_000)
@@ -21,8 +23,8 @@ FILLS_S = 8.0
 
 
 @dataclass(slots=True)
-class Case:
-    """One fault as it happens: where, with what luck, and what is to be said of it."""
+class FaultCase:
+    """One fault as it happens: where, with which random draws, and what is recorded of it."""
 
     stage: Stage
     draw: random.Random
@@ -38,7 +40,7 @@ class Case:
     """The recorder's life that met the full disk."""
 
 
-Act = Callable[[Case], Awaitable[None]]
+Act = Callable[[FaultCase], Awaitable[None]]
 
 
 async def _needs_nothing(_: Stage) -> str:
@@ -51,22 +53,27 @@ class SoakFault:
 
     name: str
     words: str
+    row: str
+    """The row of the fault table that says what the robot must do; empty where the robot is not concerned."""
     begin: Act
     end: Act
     lasts_s: tuple[float, float] = (1.2, 2.5)
     """Long enough to see the robot stand."""
     ends_process: bool = False
     """Some process dies of it; not in the calm part."""
-    holds: bool = False
-    """The robot must hold, and not move until it is engaged anew."""
     lives: bool = True
-    """The robot goes on to be heard, so that its reaction can be seen."""
+    """The robot is still heard, so that its reaction can be seen."""
     notices_s: float = 0.0
-    """How long the master needs to see it, and the robot to be told: its own times count from then."""
+    """How long the master needs to see it and to tell the robot, whose own times count from then."""
     flow_s: float | None = None
     """Once it is undone, commands must flow again within this; None: they never stop."""
     needs: Callable[[Stage], Awaitable[str]] = _needs_nothing
     """Empty where this host and this rig can do it; else why not."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the robot must hold, and not move until it is engaged anew."""
+        return bool(self.row) and ROWS[self.row].reaction is Reaction.HOLDS
 
     def course(self, number: int, begun_s: float) -> FaultCourse:
         """Its course so far, with what it asks of the robot: it is judged by what stands there."""
@@ -75,35 +82,35 @@ class SoakFault:
         )
 
 
-async def _kill(name: str, case: Case) -> None:
+async def _kill(name: str, case: FaultCase) -> None:
     case.ended_ns = await case.stage.kill(name)
 
 
-async def _start(name: str, case: Case) -> None:
+async def _start(name: str, case: FaultCase) -> None:
     await case.stage.start(name)
 
 
-async def _start_stepped(name: str, case: Case) -> None:
+async def _start_stepped(name: str, case: FaultCase) -> None:
     case.step_s = case.draw.choice(STEPS_S)
     await case.stage.start(name, clock_step.through(case.step_s))
 
 
-async def _restart_recorder(case: Case) -> None:
+async def _restart_recorder(case: FaultCase) -> None:
     case.stage.record(await case.stage.check_recording("kill", case.ended_ns))
     await case.stage.start(recording.NAME)
 
 
-async def _lose_node(case: Case) -> None:
+async def _lose_node(case: FaultCase) -> None:
     nodes = case.stage.rig.skeleton.segment_names
     case.node = case.draw.choice(nodes)
     await case.stage.tell_suit(f'lose = [{{ node = "{case.node}" }}]')
 
 
-async def _find_node(case: Case) -> None:
+async def _find_node(case: FaultCase) -> None:
     await case.stage.tell_suit("")
 
 
-async def _fill_disk(case: Case) -> None:
+async def _fill_disk(case: FaultCase) -> None:
     stage = case.stage
     await stage.stop(recording.NAME)
     stage.record(await stage.check_recording("stop"))
@@ -117,7 +124,7 @@ async def _fill_disk(case: Case) -> None:
     stage.meant.add(recording.NAME)
 
 
-async def _free_disk(case: Case) -> None:
+async def _free_disk(case: FaultCase) -> None:
     stage = case.stage
     child, said = stage.recorder.child, stage.recorder.complaints()
     # one that ended is started again by whoever looks after the processes: that one met no full disk
@@ -129,12 +136,12 @@ async def _free_disk(case: Case) -> None:
     await stage.start(recording.NAME)
 
 
-async def _cut(case: Case) -> None:
+async def _cut(case: FaultCase) -> None:
     if case.stage.rig.network is not None:
         case.stage.rig.network.cut()
 
 
-async def _restore(case: Case) -> None:
+async def _restore(case: FaultCase) -> None:
     if case.stage.rig.network is not None:
         case.stage.rig.network.restore()
 
@@ -159,48 +166,54 @@ LINK_S = 1.5
 """An outage's own target (issue 5): commands flow again so soon after the link is back."""
 
 
-def _killed(name: str, lives: bool, flow_s: float | None, notices_s: float = 0.0) -> SoakFault:
+def _killed(
+    name: str, row: str, *, lives: bool = True, flow_s: float | None = None, notices_s: float = 0.0
+) -> SoakFault:
     return SoakFault(
-        f"{name}-kill", f"the {name} is killed (kill -9) and started again",
+        f"{name}-kill", f"the {name} is killed (kill -9) and started again", row,
         partial(_kill, name), partial(_start, name),
-        ends_process=True, holds=True, lives=lives, notices_s=notices_s, flow_s=flow_s,
+        ends_process=True, lives=lives, flow_s=flow_s, notices_s=notices_s,
     )  # fmt: skip
 
 
-def _stepped(name: str, lives: bool) -> SoakFault:
+def _stepped(name: str, row: str, lives: bool) -> SoakFault:
     return SoakFault(
         f"{name}-clock", f"the {name} is killed and comes back with its clock stepped, as after a reboot",
+        row,
         partial(_kill, name), partial(_start_stepped, name),
-        ends_process=True, holds=True, lives=lives, flow_s=RESTART_S, needs=_can_step,
+        ends_process=True, lives=lives, flow_s=RESTART_S, needs=_can_step,
     )  # fmt: skip
 
 
 FAULTS: Mapping[str, SoakFault] = {
     fault.name: fault
     for fault in (
-        _killed("master", lives=True, flow_s=RESTART_S),
-        _killed("slave", lives=False, flow_s=RESTART_S),
-        # commands go on, but with no valid joint they are nobody's
-        _killed("suit", lives=True, flow_s=None, notices_s=SUIT_LOST_S),
+        _killed("master", "master killed", flow_s=RESTART_S),
+        _killed("slave", "robot's program killed", lives=False, flow_s=RESTART_S),
+        # commands go on, but no joint in them is valid
+        _killed("suit", "CAN bus of the suit off", notices_s=SUIT_LOST_S),
         SoakFault(
-            "recorder-kill", "the recorder is killed (kill -9) and started again",
+            "recorder-kill", "the recorder is killed (kill -9) and started again", "",
             partial(_kill, recording.NAME), _restart_recorder, ends_process=True,
         ),
-        _stepped("master", lives=True),
-        _stepped("slave", lives=False),
+        _stepped("master", "master killed", lives=True),
+        _stepped("slave", "robot's program killed", lives=False),
         SoakFault(
-            "outage", "nothing passes between the two hosts for some seconds", _cut, _restore, (3.0, 7.0),
-            holds=True, flow_s=LINK_S, needs=_has_network,
+            "outage", "nothing passes between the two hosts for some seconds", "link cut",
+            _cut, _restore, (3.0, 7.0), flow_s=LINK_S, needs=_has_network,
         ),
         SoakFault(
-            "router-restart", "the router is killed (kill -9) and started again",
+            "router-restart", "the router is killed (kill -9) and started again", "link cut",
             partial(_kill, ROUTER), partial(_start, ROUTER),
-            ends_process=True, holds=True, lives=False, flow_s=RESTART_S, needs=_has_router,
+            ends_process=True, lives=False, flow_s=RESTART_S, needs=_has_router,
         ),
-        SoakFault("node-loss", "one of the suit's nodes falls silent", _lose_node, _find_node, (2.0, 6.0)),
         SoakFault(
-            "disk-full", "the recorder's disk fills up", _fill_disk, _free_disk,
-            (FILLS_S, FILLS_S), ends_process=True,
+            "node-loss", "one of the suit's nodes falls silent", "sensor node lost",
+            _lose_node, _find_node, (2.0, 6.0),
+        ),
+        SoakFault(
+            "disk-full", "the recorder's disk fills up", "",
+            _fill_disk, _free_disk, (FILLS_S, FILLS_S), ends_process=True,
         ),
     )
 }  # fmt: skip

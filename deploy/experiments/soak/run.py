@@ -19,7 +19,7 @@ from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from common.wire.messages import Action
 from deploy.experiments.soak import recorder as recording
-from deploy.experiments.soak.faults import FAULTS, Case, SoakFault, possible
+from deploy.experiments.soak.faults import FAULTS, FaultCase, SoakFault, possible
 from deploy.experiments.soak.files.happenings import (
     FaultBegun,
     FaultRecovered,
@@ -143,7 +143,7 @@ class Soak:
         """One fault from its begin until the robot follows again."""
         watch, log = self._stage.watch, self._log
         self.progress.busy = fault.words
-        case = Case(self._stage, random.Random(f"{self._options.seed} {number}"))
+        case = FaultCase(self._stage, random.Random(f"{self._options.seed} {number}"))
         lasts_s = case.draw.uniform(*fault.lasts_s)
         course = fault.course(number, log.now_s)
         log.add(FaultBegun(**asdict(course), lasts_s=lasts_s))

@@ -9,7 +9,7 @@ from typing import cast
 import pytest
 
 from common.errors import TandemError
-from deploy.experiments.soak.faults import FAULTS, Case
+from deploy.experiments.soak.faults import FAULTS, FaultCase
 from deploy.experiments.soak.files.happenings import RecordingChecked
 from deploy.experiments.soak.stage import Stage
 
@@ -64,8 +64,8 @@ class FakeStage:
         self.checked[what.after] = what
 
 
-def case_on(stage: FakeStage) -> Case:
-    return Case(cast(Stage, stage), random.Random(1))
+def case_on(stage: FakeStage) -> FaultCase:
+    return FaultCase(cast(Stage, stage), random.Random(1))
 
 
 async def begun(stage: FakeStage) -> None:

@@ -1,13 +1,14 @@
-"""The stage of a trial: a robot follows a reaching operator on a virtual clock, and all of it is seen."""
+"""The scene of a trial: a robot follows a reaching operator on a virtual clock; every tick is recorded."""
 
 from __future__ import annotations
 
 import itertools
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +17,11 @@ from common.errors import TandemError
 from common.skeleton import load_skeleton
 from common.wire.messages import Action, Command
 from deploy.examples.profiles import NURSING
-from deploy.experiments.faults.limits import Asked
-from deploy.experiments.faults.setting import Later, Setting, files
+from deploy.harness.faults.judge import Asked
+from deploy.harness.faults.setting import USUAL, Later, Setting, files
 from deploy.measure.stillness import StoppingMotion
 from deploy.sim.suit.motion import OperatorMotion, parse_motion
+from deploy.sim.world.troubles import Troubles
 from deploy.sim.world.whole_way import VirtualRun, World
 from slave.encoders.counts import Encoders
 from slave.guard import Guard, State
@@ -35,9 +37,10 @@ ENGAGED_S = 1.1
 """Into the operator's motion: he stands still, every joint and the clocks' offset are known."""
 REACHING_S = 2.1
 """In the middle of the reach."""
-TRIAL_S = 2.0
 BEFORE_S = 0.2
 """How much of the course before the fault is kept."""
+JOINT_TURN_RAD = 0.5
+"""How far foul commands ask every joint to be from where it is."""
 
 
 @cache
@@ -47,11 +50,28 @@ def reach() -> OperatorMotion:
     return parse_motion(text, load_skeleton(NURSING), source="reach.toml")
 
 
+@dataclass(frozen=True, slots=True)
+class _RobotTick:
+    """What the robot did in one of its ticks."""
+
+    now_ns: int
+    """True time."""
+    slave_ns: int
+    """By the slave's own clock."""
+    state: State
+    reading: EncoderReading
+    setpoint: Setpoint
+
+
+def turned(command: Command, by_rad: float = JOINT_TURN_RAD) -> Command:
+    """A command as if it came next; were it accepted, it would be seen at the robot."""
+    return replace(command, sequence=command.sequence + 1, position_rad=command.position_rad + by_rad)
+
+
 class Scene:
     """One run up to the fault, and beyond. `guard_options` may take gates and watches out of the guard."""
 
-    def __init__(self, setting: Setting | None = None, **guard_options: Any) -> None:
-        setting = setting or Setting()
+    def __init__(self, setting: Setting = USUAL, **guard_options: Any) -> None:
         self._begins_s = setting.lead_s
         with files(setting) as master:
             overrides = {
@@ -76,16 +96,19 @@ class Scene:
         """Ends the fault."""
         self.each_period: Callable[[], None] = lambda: None
         """What somebody does to the robot at the rate of commands, 12.5 Hz, from the fault on."""
-        self._ticks = 0
         self.encoders = Encoders(self.skeleton, config.encoders)
-        self._seen: list[_Seen] = []
-        self.run.troubles.watch = self._watch
+        self._seen: list[_RobotTick] = []
+        self.inject.watch = self._watch
 
     def _watch(self, reading: EncoderReading, setpoint: Setpoint) -> None:
-        self._seen.append(_Seen(self.run.now_ns, self.run.slave_ns, self.guard.state, reading, setpoint))
-        self._ticks += 1
-        if self._ticks % self.run.master_config.capture.decimation == 0:
+        self._seen.append(_RobotTick(self.run.now_ns, self.run.slave_ns, self.guard.state, reading, setpoint))
+        if len(self._seen) % self.run.master_config.capture.decimation == 0:
             self.each_period()
+
+    @property
+    def inject(self) -> Troubles:
+        """Where faults enter the virtual world."""
+        return self.run.troubles
 
     @property
     def guard(self) -> Guard:
@@ -101,7 +124,7 @@ class Scene:
         """Bring the robot to a state. Raises TandemError where it does not get there."""
         if state is State.BOOT:
             blind = np.zeros(len(self.skeleton.joints), np.bool_)
-            self.run.troubles.read = lambda reading: EncoderReading(reading.read_ns, reading.counts, blind)
+            self.inject.read = lambda reading: EncoderReading(reading.read_ns, reading.counts, blind)
         self.run.run(self._begins_s + ENGAGED_S)
         if state in (State.ALIGN, State.TRACK):
             if state is State.ALIGN:  # once the operator has reached, so that there is some way to go
@@ -186,17 +209,5 @@ class Scene:
             velocity_rad_s=np.array([row.setpoint.velocity_rad_s for row in rows]),
         )
 
-    def _recent(self) -> list[_Seen]:
+    def _recent(self) -> list[_RobotTick]:
         return [row for row in self._seen if row.now_ns >= self.fault_ns - round(BEFORE_S * NS_PER_S)]
-
-
-class _Seen(NamedTuple):
-    """One tick of the robot."""
-
-    now_ns: int
-    """True time."""
-    slave_ns: int
-    """By its own clock."""
-    state: State
-    reading: EncoderReading
-    setpoint: Setpoint

@@ -37,6 +37,9 @@ class Setting:
     """Of the operator, None for the usual reach."""
 
 
+USUAL = Setting()
+
+
 class Later:
     """A motion that begins later: until then its first posture."""
 

@@ -1,15 +1,17 @@
-"""Whether a limit of the joints was broken: by what was asked of the drives, or by what the encoders show."""
+"""What came of a fault, and what of it was wrong: joints that did not stand, limits that were broken."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from deploy.measure.stillness import SPEED_ERROR_RAD_S, StoppingMotion, speeds
+from deploy.harness.faults.fault import FaultRow
+from deploy.measure.stillness import SPEED_ERROR_RAD_S, Stillness, StoppingMotion, speeds
 
 SERVO_SHARE = 0.05
 """By how much a servo may pass a setpoint that goes at the limit: 4.3 % for a second order at damping √½."""
@@ -17,6 +19,38 @@ STOP_RAD = math.radians(3.0)
 """The mechanical stops stand this far outside the position limits. A joint that stands at its limit is shaken
 beyond it when its neighbours brake (a finger by 1°); the stop it must not reach."""
 _ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class FaultOutcome:
+    """What came of a fault."""
+
+    fault: FaultRow
+    state: str
+    """The guard's."""
+    reason: str
+    """The guard's own words."""
+    stillness: Stillness
+    """Of the joints concerned."""
+    wrong: tuple[str, ...]
+    """What should not have been; empty where all is as it must be."""
+    reacted_s: float | None = None
+    """When the guard had reached the state in which it was to end; None where it did not, or nobody knows."""
+    strayed_rad: float | None = None
+    """How far joints that were to go on were from where they would have been; None where none was to."""
+    refused: Mapping[str, int] = field(default_factory=dict)
+    """Commands refused since the fault, by gate."""
+
+
+def standing_amiss(fault: FaultRow, seen: Stillness, excused_s: float = 0.0) -> list[str]:
+    """What is wrong with how the joints came to stand. `excused_s`: what the host itself lost meanwhile."""
+    if fault.stands_s is None:
+        return []
+    if seen.standstill_s is None:
+        return [f"still moves at the end of the trial, {seen.peak_joint} foremost"]
+    if seen.standstill_s > fault.stands_s + excused_s:
+        return [f"stands after {seen.standstill_s:.3f} s, at most {fault.stands_s:g} s"]
+    return []
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,9 @@
-"""One trial: a robot is brought to the state the fault begins in, the fault happens, the course is judged."""
+"""Faults that are tried on the virtual clock: bring the robot to a state, act, and judge the course."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -10,34 +11,40 @@ from typing import Any
 import numpy as np
 
 from common.wire.messages import Mask
-from deploy.experiments.faults.fault import Fault, Reaction
-from deploy.experiments.faults.limits import asked_beyond, moved_beyond
-from deploy.experiments.faults.scene import TRIAL_S, Scene
-from deploy.measure.stillness import STILL_RAD, Stillness, StoppingMotion, stillness
+from deploy.harness.faults.fault import FaultRow, Reaction
+from deploy.harness.faults.judge import FaultOutcome, asked_beyond, moved_beyond, standing_amiss
+from deploy.harness.faults.scene import Scene
+from deploy.harness.faults.setting import USUAL, Setting
+from deploy.measure.stillness import STILL_RAD, StoppingMotion, stillness
 from slave.guard import State
 
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What came of a fault."""
-
-    fault: Fault
-    state: str
-    reason: str
-    """The guard's own words."""
-    reacted_s: float | None
-    """When the guard had reached the state that it was to end in."""
-    figures: Stillness
-    """Of the joints concerned."""
-    strayed_rad: float | None
-    """How far joints that were to go on were from where they would have been; None where none was to."""
-    refused: dict[str, int]
-    """Commands refused since the fault, by gate."""
-    wrong: tuple[str, ...]
-    """What should not have been; empty where all is as it must be."""
+TRIAL_S = 2.0
 
 
-def run_trial(fault: Fault, **guard_options: Any) -> Outcome:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VirtualFault(FaultRow):
+    """A row that is tried on the virtual clock."""
+
+    act: Callable[[Scene], None]
+    """Brings the fault about, in a robot that follows a reaching operator unless `begins` says otherwise."""
+    begins: State = State.TRACK
+    ends: State = State.HOLD
+    """The guard's state afterwards."""
+    lasts_s: float | None = None
+    """After this long `act` is undone; None: not within the trial."""
+    setting: Setting = USUAL
+    """What differs from the usual scene from its beginning on."""
+    concerns: Callable[[Scene], Set[str]] | None = None
+    """The joints that are to stand; None: all."""
+    sway_deg: float | None = None
+    """How far a joint that stands may be shaken by those that go on; None: two counts of its encoder."""
+    refused_by: Set[str] = frozenset()
+    """The gates that must have refused commands; `codec` is the decoder before them."""
+    held_by: Set[str] = frozenset()
+    """The gates, watches and rules of the guard that hold the fault off: without them the row must fail."""
+
+
+def try_on_virtual_clock(fault: VirtualFault, **guard_options: Any) -> FaultOutcome:
     """Try it, on a guard with some gates or watches taken out where `guard_options` says so."""
     scene = Scene(fault.setting, **guard_options)
     scene.to(fault.begins)
@@ -50,17 +57,17 @@ def run_trial(fault: Fault, **guard_options: Any) -> Outcome:
     return _judge(fault, scene)
 
 
-def _judge(fault: Fault, scene: Scene) -> Outcome:
+def _judge(fault: VirtualFault, scene: Scene) -> FaultOutcome:
     course, skeleton = scene.course(), scene.skeleton
     concerned = _concerned(fault, scene)
     refused = scene.refused() - scene.dropped_before
     reacted_s = scene.state_reached_s(fault.ends)
     strayed = _strayed_rad(fault, course, concerned)
     still_rad = STILL_RAD if fault.sway_deg is None else math.radians(fault.sway_deg)
-    figures = stillness(course, skeleton, concerned, still_rad)
+    seen = stillness(course, skeleton, concerned, still_rad)
     wrong = [
         *_state_amiss(fault, scene, reacted_s),
-        *_stillness_amiss(fault, figures),
+        *standing_amiss(fault, seen),
         *asked_beyond(scene.asked(), skeleton),
         *moved_beyond(course, skeleton),
         *[f"{scene.foul} foul commands were accepted"] * bool(scene.foul),
@@ -69,13 +76,14 @@ def _judge(fault: Fault, scene: Scene) -> Outcome:
     ]
     if strayed is not None and fault.strays_deg is not None and np.degrees(strayed) > fault.strays_deg:
         wrong.append(f"strayed by {np.degrees(strayed):.2f}°, at most {fault.strays_deg:g}°")
-    return Outcome(
-        fault, str(scene.guard.state), scene.guard.reason, reacted_s, figures, strayed,
-        {gate: count for gate, count in refused.items() if count}, tuple(wrong),
+    return FaultOutcome(
+        fault, str(scene.guard.state), scene.guard.reason, seen, tuple(wrong),
+        reacted_s=reacted_s, strayed_rad=strayed,
+        refused={gate: count for gate, count in refused.items() if count},
     )  # fmt: skip
 
 
-def _concerned(fault: Fault, scene: Scene) -> Mask:
+def _concerned(fault: VirtualFault, scene: Scene) -> Mask:
     names = scene.skeleton.joint_names
     if fault.concerns is None:
         return np.ones(len(names), np.bool_)
@@ -83,7 +91,7 @@ def _concerned(fault: Fault, scene: Scene) -> Mask:
     return np.array([name in concerned for name in names])
 
 
-def _state_amiss(fault: Fault, scene: Scene, reacted_s: float | None) -> list[str]:
+def _state_amiss(fault: VirtualFault, scene: Scene, reacted_s: float | None) -> list[str]:
     if reacted_s is None:
         return [f"ended in {scene.guard.state} ({scene.guard.reason}), not in {fault.ends}"]
     if fault.reacts_s is not None and reacted_s > fault.reacts_s:
@@ -91,17 +99,7 @@ def _state_amiss(fault: Fault, scene: Scene, reacted_s: float | None) -> list[st
     return []
 
 
-def _stillness_amiss(fault: Fault, figures: Stillness) -> list[str]:
-    if fault.stands_s is None:
-        return []
-    if figures.standstill_s is None:
-        return [f"still moves at the end of the trial, {figures.peak_joint} foremost"]
-    if figures.standstill_s > fault.stands_s:
-        return [f"stands after {figures.standstill_s:.3f} s, at most {fault.stands_s:g} s"]
-    return []
-
-
-def _strayed_rad(fault: Fault, course: StoppingMotion, concerned: Mask) -> float | None:
+def _strayed_rad(fault: VirtualFault, course: StoppingMotion, concerned: Mask) -> float | None:
     others = np.ones_like(concerned) if fault.reaction is Reaction.GOES_ON else ~concerned
     if fault.strays_deg is None or not others.any():
         return None

@@ -1,0 +1,129 @@
+"""Faults by others: recordings played back, a second operator, commands or a robot of the wrong name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+from common.wire.codec import decode, encode
+from common.wire.messages import Action, ControlReply, ControlRequest
+from common.wire.presence import ProcessPresence
+from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, Reaction
+from deploy.harness.faults.scene import ENGAGED_S, REACHING_S, Scene, reach, turned
+from deploy.harness.faults.virtual import VirtualFault
+from deploy.sim.world.whole_way import VirtualRun, World
+from slave.guard import State
+
+
+def _replayed_yesterday(scene: Scene) -> None:
+    requests, commands = _yesterday()
+    for request in requests:
+        if decode(scene.run.slave.on_control(request, scene.run.slave_ns), ControlReply).done:
+            scene.granted.append("yesterday's request")
+    _play(scene, commands)
+
+
+@cache
+def _yesterday() -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
+    """Requests and commands of a run on another day: other clocks, other lease."""
+    run = VirtualRun(World(slave_ahead_ns=86_400 * 10**9, motion=reach()))
+    run.run(ENGAGED_S)
+    challenge = run.ask(Action.STATUS).challenge
+    operator, robot = run.master_config.operator.name, run.robot
+    requests = [
+        ControlRequest(robot, Action.CLAIM, operator),
+        ControlRequest(robot, Action.ENGAGE, operator, challenge=challenge),
+    ]
+    run.run(REACHING_S)
+    return tuple(map(encode, requests)), tuple(encode(c) for c in run.commands if c.lease)
+
+
+def _replayed_today(scene: Scene) -> None:
+    _play(scene, [encode(command) for command in scene.run.commands if command.lease])
+
+
+def _play(scene: Scene, payloads: Sequence[bytes]) -> None:
+    """In the order of the recording, a hundred a second, so that many fall into the trial."""
+    left = iter(payloads)
+
+    def command() -> None:
+        for _, payload in zip(range(8), left, strict=False):
+            scene.command(payload)
+
+    scene.each_period = command
+
+
+def _second_operator(scene: Scene) -> None:
+    for action in (Action.CLAIM, Action.ENGAGE, Action.DISENGAGE, Action.RELEASE):
+        scene.ask(action, "nurse-2")
+
+    def command() -> None:
+        for lease in (0, 1, scene.newest().lease + 1):
+            scene.command(encode(turned(replace(scene.newest(), lease=lease))))
+
+    scene.each_period = command
+
+
+def _wrong_robot(scene: Scene) -> None:
+    def command() -> None:
+        scene.command(encode(turned(replace(scene.newest(), robot="robot-2"))))
+
+    scene.each_period = command
+
+
+def _namesake(scene: Scene) -> None:
+    other = ProcessPresence(scene.run.robot, "slave", 2, 1, "1.0", "another room, tcp/192.168.7.9:7447")
+    scene.run.slave.namesakes.on_presence(other, here=True)
+
+
+STRANGERS = (
+    VirtualFault(
+        name="yesterday's recording replayed",
+        done="A session of another day, its requests to claim and to engage included, beside the operator's.",
+        reaction=Reaction.GOES_ON,
+        robot="Follows its operator. Nothing of the recording is accepted.",
+        person="Find out who sends it.",
+        act=_replayed_yesterday,
+        ends=State.TRACK, strays_deg=0.0,
+        refused_by={"lease"}, held_by={"lease", "sequence", "age", "future"},
+    ),
+    VirtualFault(
+        name="this session's recording replayed",
+        done="The operator's own commands of the last seconds once more.",
+        reaction=Reaction.GOES_ON,
+        robot="Follows its operator. Nothing of the recording is accepted.",
+        person="Find out who sends it.",
+        act=_replayed_today,
+        ends=State.TRACK, strays_deg=0.0, refused_by={"sequence"}, held_by={"sequence", "age"},
+    ),
+    VirtualFault(
+        name="second operator",
+        done="Another person claims, engages, disengages, releases, and sends commands 12.5 times a second.",
+        reaction=Reaction.GOES_ON,
+        robot="Follows its operator, and tells the other who that is. "
+        "Only an emergency stop is open to everybody.",
+        person="Nothing; or the operator releases the robot, and the other claims it.",
+        act=_second_operator,
+        ends=State.TRACK, strays_deg=0.0, refused_by={"lease"}, held_by={"lease"},
+    ),
+    VirtualFault(
+        name="wrong robot",
+        done="Commands for another robot arrive here, with this robot's own lease.",
+        reaction=Reaction.GOES_ON,
+        robot="Follows its operator. What is not for it is not accepted.",
+        person="Correct the robot's name in the file of the other side.",
+        act=_wrong_robot,
+        ends=State.TRACK, strays_deg=0.0, refused_by={"robot"}, held_by={"robot"},
+    ),
+    VirtualFault(
+        name="another robot of the same name",
+        done="A second robot starts under this one's name: nobody knows which of the two an order is for.",
+        reaction=Reaction.HOLDS,
+        robot="Brakes all joints and stands; names where the other is. "
+        "Nobody can engage while both are there.",
+        person="Give each robot a name of its own (`robot` in its file); then engage.",
+        act=_namesake,
+        reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by={"namesake"},
+    ),
+)  # fmt: skip

@@ -1,0 +1,28 @@
+"""The one fault table, in the order of docs/when-something-fails.md, and how a row of it is tried."""
+
+from __future__ import annotations
+
+import asyncio
+
+from deploy.harness.faults.clocks import CLOCKS, ESTOPS
+from deploy.harness.faults.fault import FaultRow
+from deploy.harness.faults.judge import FaultOutcome
+from deploy.harness.faults.link import LINK
+from deploy.harness.faults.processes import PROCESSES, ProcessFault, try_with_processes
+from deploy.harness.faults.robot import ROBOT
+from deploy.harness.faults.strangers import STRANGERS
+from deploy.harness.faults.suit import SUIT
+from deploy.harness.faults.values import VALUES
+from deploy.harness.faults.virtual import VirtualFault, try_on_virtual_clock
+
+VIRTUAL: tuple[VirtualFault, ...] = (*LINK, *STRANGERS, *VALUES, *SUIT, *ROBOT, *CLOCKS, *ESTOPS)
+FAULTS: dict[str, FaultRow] = {fault.name: fault for fault in (*VIRTUAL, *PROCESSES)}
+"""By name."""
+
+
+def try_fault(fault: FaultRow) -> FaultOutcome:
+    """Bring the fault about and judge the robot. Raises TandemError where the trial cannot begin."""
+    if isinstance(fault, ProcessFault):
+        return asyncio.run(try_with_processes(fault))
+    assert isinstance(fault, VirtualFault)
+    return try_on_virtual_clock(fault)
