@@ -95,7 +95,7 @@ class SlavePipeline:
         self.on_accepted: Callable[[Command, int, Offset], None] | None = None
         """Called with every command that the guard accepts, now_ns, and the clocks' offset."""
         self.camera_fault = ""
-        """StreamedDurations with the state; no reason to stop moving."""
+        """Published with the state; no reason to stop moving."""
         self._states_sent = 0
         self._reading: EncoderReading | None = None
         self._body = WELL

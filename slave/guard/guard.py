@@ -13,10 +13,9 @@ from common.errors import ConfigError
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Command, Mask
-from slave.guard.admit import DEADMAN, GATES, Admission, Gate
+from slave.guard.admit import DEADMAN, GATES, Admission, CommandGate, Gate
 from slave.guard.align import AlignProgress
 from slave.guard.body import WELL, Body
-from slave.guard.commands import CommandGate
 from slave.guard.config import GuardConfig
 from slave.guard.engage import Readiness, refusal
 from slave.guard.events import Change, Clamp, Doubt, GuardCounters, Journal
