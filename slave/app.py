@@ -56,7 +56,7 @@ class Slave:
         *,
         last_known: LastKnown | None = None,
     ) -> None:
-        """`last_known`: where it is kept where the joints stand; None: nowhere."""
+        """`last_known`: the file that keeps the joints' last angles; None: none does."""
         self._config = config
         self._link = link
         self._servos = servos
@@ -67,7 +67,7 @@ class Slave:
             config, place=place(endpoints), last_known_rad=last_known.before_rad if last_known else None
         )
         self._last_known = last_known
-        self._pipeline.tell = log.warning
+        self._pipeline.warn = log.warning
         self._stopped = False
         self._ticks_expected = 0
         self._ticks_missed = 0
@@ -85,18 +85,18 @@ class Slave:
         link.watch_presence(self._on_presence)
 
     async def run(self) -> None:
-        """Guard, drive and tell until cancelled."""
+        """Run the servo loop and publish statistics until cancelled."""
         endpoints = own_endpoints(self._config.link)
         self._link.declare_alive("slave", self._pipeline.instance, endpoints)
         with self._camera or nullcontext():
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._drive())
-                tasks.create_task(self._tell())
+                tasks.create_task(self._publish_statistics())
                 if self._last_known is not None:
                     tasks.create_task(self._remember(self._last_known))
 
     async def _remember(self, last_known: LastKnown) -> None:
-        """Keep where the joints stand, seldom, and only once it is known; in a thread, as disks stall."""
+        """Save the joints' angles now and then, once they are known. In a thread: disks stall."""
         while True:
             await asyncio.sleep(EVERY_S)
             position_rad = self._pipeline.position_rad
@@ -104,14 +104,14 @@ class Slave:
                 await asyncio.to_thread(last_known.keep, position_rad.copy())
 
     def remember_last(self) -> None:
-        """Keep it once more, at the end."""
+        """Save them once more, at the end."""
         if self._last_known is not None and self._pipeline.guard.placed:
             self._last_known.keep(self._pipeline.position_rad.copy())
 
     async def _drive(self) -> None:
         loop = self._config.loop
         period_ns = round(1e9 / loop.rate_hz)
-        said, told, namesake = "", -1, self._pipeline.namesake
+        logged, published, namesake = "", -1, self._pipeline.namesake
         async for due in ticks(TickGrid(monotonic_ns() + period_ns, period_ns)):
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
@@ -125,19 +125,19 @@ class Slave:
             if self._camera is not None:
                 self._camera.look(self._pipeline.position_rad, reading.read_ns)
                 self._pipeline.camera_fault = self._camera.fault
-            # where the very tick was missed the next one tells, or an overloaded robot would seem dead
-            if due.tick // loop.state_every != told:
-                told = due.tick // loop.state_every
+            # a missed tick's state is published by the next one, or an overloaded robot would seem dead
+            if due.tick // loop.state_every != published:
+                published = due.tick // loop.state_every
                 self._put_state(self._pipeline.state(monotonic_ns()))
             guard = self._pipeline.guard
             if namesake != self._pipeline.namesake:
                 namesake = self._pipeline.namesake
-                log.warning("%s: %s", self._config.robot, namesake or "no other robot bears its name now")
-            if guard.state != said:
-                said = guard.state
+                log.warning("%s: %s", self._config.robot, namesake or "no other robot has this name any more")
+            if guard.state != logged:
+                logged = guard.state
                 log.info("%s: %s: %s", self._config.robot, guard.state, guard.reason)
                 self._notifier.status(f"{guard.state}: {guard.reason}")
-            self._notifier.beat(monotonic_ns())  # last: a servo or sensor that hangs must be noticed too
+            self._notifier.beat(monotonic_ns())  # last, so that a servo or sensor that hangs is noticed too
 
     def _body(self) -> Body:
         if self._base is None:
@@ -147,7 +147,7 @@ class Slave:
         return Body(self._servos.faults(), base_loss(attitude, monotonic_ns(), self._config.guard))
 
     def _brake_drives(self, stop: bool) -> None:
-        """On an e-stop the drives brake by themselves too: whatever becomes of this process."""
+        """On an e-stop the drives also brake by themselves, whatever happens to this process."""
         if stop != self._stopped:
             self._stopped = stop
             self._servos.quick_stop(stop)
@@ -169,7 +169,7 @@ class Slave:
     def _on_clock(self, payload: bytes, received_ns: int) -> bytes:
         return self._pipeline.on_clock(payload, received_ns, monotonic_ns())
 
-    async def _tell(self) -> None:
+    async def _publish_statistics(self) -> None:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
             metrics = replace(
                 self.metrics(),
@@ -210,7 +210,7 @@ class Slave:
 async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
     """Run a slave until `stop` is set; the servos are left holding. Raises LinkError or RobotError."""
     await until_stopped(stop, _run(config, write_figures))
-    log.info("stopped; the servos hold")
+    log.info("slave stopped; the servos hold their position")
 
 
 async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
@@ -231,7 +231,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
             audit.attach(session)
             slave = Slave(config, session.link(config.robot), servos, base, notifier, last_known=last_known)
             where = ", ".join(config.link.listen or config.link.connect)
-            log.info("%s: waits for a master at %s", config.robot, where)
+            log.info("%s: waiting for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
             freeze_heap()
             reserve_heap()

@@ -1,7 +1,7 @@
-"""Where every joint stood last, kept on disk: a robot that is switched on again compares.
+"""The joints' last angles, kept on disk, so that a robot that is switched on again can compare.
 
-Written seldom, whole, and never by the control loop: to a file beside it, then renamed, so that a power cut
-leaves the old one or the new one.
+The file is written seldom and never by the control loop. It is replaced whole: a power cut leaves the old one
+or the new one.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def load(file: Path) -> dict[str, float]:
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
-        log.warning("%s: where the joints stood last cannot be read, so it is not known: %s", file, error)
+        log.warning("%s: cannot read the last known joint angles, so none are known: %s", file, error)
         return {}
     return {joint: angle for joint, angle in angles.items() if math.isfinite(angle)}
 
@@ -79,7 +79,7 @@ class LastKnown:
             save(self.file, dict(zip(self._names, position_rad.tolist(), strict=True)))
         except OSError as error:
             if not self._failed:
-                log.warning("%s: where the joints stand cannot be kept: %s", self.file, error)
+                log.warning("%s: cannot save the joint angles: %s", self.file, error)
             self._failed = True
             return
         self._kept, self._failed = position_rad.copy(), False

@@ -68,8 +68,8 @@ class SlavePipeline:
         self.robot = config.robot
         self.instance = instance or draw_instance()
         self.place = place
-        self.tell: Callable[[str], None] = lambda _: None
-        """What hears, at most once a second, of messages that cannot be read."""
+        self.warn: Callable[[str], None] = lambda _: None
+        """Called, at most once a second, with a warning about messages that cannot be read."""
         self._throttle = LogThrottle()
         self.namesakes = Namesakes(self.instance)
         self.skeleton = config.skeleton
@@ -88,7 +88,7 @@ class SlavePipeline:
         self.pace = Pace(limits, config.guard)
         self.limiter = SetpointLimiter(self.skeleton.joint_names, limits)
         self._episode = 0
-        """The guard's when the tracker was reset last."""
+        """The guard's episode when the tracker was reset last."""
         self.clock = SlaveExchange()
         self.traffic = CommandTraffic()
         self.undecodable: dict[str, int] = {}
@@ -100,7 +100,7 @@ class SlavePipeline:
         self._reading: EncoderReading | None = None
         self._body = WELL
         self.base: BaseAttitude | None = None
-        """How the base stands, where it carries a sensor; `Body.base` says whether that is well."""
+        """The base's attitude, if it carries a sensor; `Body.base` has what is wrong with it."""
         self._position_rad = np.zeros(len(self.skeleton.joints))
         self._setpoint = Setpoint(self._position_rad, np.zeros_like(self._position_rad), ready=False)
 
@@ -136,7 +136,7 @@ class SlavePipeline:
         return admission
 
     def on_stop(self, payload: bytes, now_ns: int) -> bytes:
-        """Answer whoever may only stop the robot, or ask how it is; never with silence."""
+        """Answer a client that may only stop the robot or ask for its status; every request is answered."""
         return self.on_control(payload, now_ns, OPEN)
 
     def _stopped(self, by: str, now_ns: int) -> bytes:
@@ -147,7 +147,7 @@ class SlavePipeline:
     def on_control(
         self, payload: bytes, now_ns: int, allowed: frozenset[Action] = frozenset(Action)
     ) -> bytes:
-        """Answer a request of a person or a master; never with silence.
+        """Answer a request of a person or a master. Every request is answered.
 
         A stop comes before all else: whatever its version, and whatever else is wrong with it.
         """
@@ -160,7 +160,7 @@ class SlavePipeline:
             self._count("control", error, now_ns)
             return self._reply(ControlReply(False, self.guard.state, f"not understood: {error}"))
         if request.action not in allowed:
-            text = f"{request.action} is for the robot's operators: ask it where they do"
+            text = f"{request.action} is for operators only: send it on the control topic"
             return self._reply(ControlReply(False, self.guard.state, text))
         reply = self.control.answer(self.guard, request, now_ns)
         if request.action is Action.NAMESAKE and reply.done:
@@ -297,4 +297,4 @@ class SlavePipeline:
     def _count(self, topic: str, error: CodecError, now_ns: int) -> None:
         count = self.undecodable[topic] = self.undecodable.get(topic, 0) + 1
         if self._throttle.passes(now_ns):
-            self.tell(f"{self.robot}: a {topic} message cannot be read: {error} ({count} so far)")
+            self.warn(f"{self.robot}: a {topic} message cannot be read: {error} ({count} so far)")

@@ -92,7 +92,7 @@ class FrameReader:
             try:
                 if port is None:
                     port = open_port(*self._where)
-                    log.info("%s: the attitude instrument's port is open again", self._where[0])
+                    log.info("%s: attitude port open again", self._where[0])
                 self._read(port)
             # TypeError: pyserial's own where the port is closed under a read
             except (OSError, TypeError, serial.SerialException, RobotError) as error:

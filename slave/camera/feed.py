@@ -147,13 +147,13 @@ class CameraFeed:
                     self._camera.wait_ready()
                     self._serve(self._camera)
             except NeverError as error:
-                self._say(str(error))
+                self._report(str(error))
                 return
             except RobotError as error:
-                self._say(str(error))
+                self._report(str(error))
             except Exception as error:  # a thread that dies would say nothing
-                log.exception("the camera's thread")
-                self._say(f"{type(error).__name__}: {error}")
+                log.exception("camera thread failed; restarting it")
+                self._report(f"{type(error).__name__}: {error}")
             finally:
                 if self._camera is not None:
                     self._camera.close()
@@ -199,7 +199,7 @@ class CameraFeed:
         self._put(payload)
         self._count.add(len(payload), reply.width, now_ns)
 
-    def _say(self, words: str) -> None:
+    def _report(self, words: str) -> None:
         if not self._stopping and words != self.fault:
             log.warning("no video: %s", words)
             self.fault = words

@@ -56,7 +56,7 @@ class RateControl:
         self.lowered = 0
         """Times that the bitrate was reduced."""
         self.lost = 0
-        """Pictures that nobody said he had seen."""
+        """Pictures that were not acknowledged."""
 
     @property
     def budget_bytes(self) -> int:

@@ -28,6 +28,12 @@ class EncoderReading:
     """(J,) the joints' angles by the drives' own encoders at that time; None where they have none."""
 
 
+def check_setpoint(position_rad: Array, joints: int) -> None:
+    """Raises ValueError where setpoints are not one finite angle a joint."""
+    if position_rad.shape != (joints,) or not np.isfinite(position_rad).all():
+        raise ValueError(f"setpoints must be {joints} finite angles, not {position_rad}")
+
+
 class Servos(Protocol):
     """The robot as the slave sees it. No method blocks for longer than `start` and `stop` must."""
 

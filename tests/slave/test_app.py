@@ -91,7 +91,7 @@ def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
         SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"])), link, servos
     )
     slave._pipeline.traffic.one_way.record(3_000_000)
-    asyncio.run(slave._tell())
+    asyncio.run(slave._publish_statistics())
     assert words == [(3000,), ()]
 
 

@@ -94,7 +94,7 @@ def test_where_anybody_may_ask_the_robot_is_stopped_but_not_engaged(
     for action in set(Action) - {Action.ESTOP, Action.STATUS}:
         reply = ask(action)
         assert (reply.done, reply.guard) == (False, "boot")
-        assert reply.text == f"{action} is for the robot's operators: ask it where they do"
+        assert reply.text == f"{action} is for operators only: send it on the control topic"
     assert not pipeline.guard.lease.held_by("ben")
     assert ask(Action.STATUS).done
     assert read_reply(pipeline.on_stop(pack_stop("robot-1", "ben"), NS_PER_S), Action.ESTOP).guard == "estop"
@@ -151,7 +151,7 @@ def test_who_may_only_stop_it_may_not_tell_it_of_a_namesake(pipeline: SlavePipel
 
 def test_other_versions_are_counted_and_reported_once_a_second(pipeline: SlavePipeline) -> None:
     said: list[str] = []
-    pipeline.tell = said.append
+    pipeline.warn = said.append
     later = msgpack.packb(["command", VERSION + 1, "robot-1", 0])
     for tick in range(30):
         pipeline.on_command(later, 1, NS_PER_S + tick * NS_PER_S // 10)

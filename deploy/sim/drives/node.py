@@ -7,9 +7,6 @@ thousands of times a minute, are done here.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import canopen
@@ -19,13 +16,11 @@ from common.clock import NS_PER_MS
 from deploy.sim.drives.faults import CODES, DEMAND, DriveFault
 from deploy.sim.drives.machine import after, statusword
 from deploy.sim.drives.traits import Reformed, Traits
+from deploy.sim.drives.wire import Send, Wire, dictionary
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION, Power
 from slave.servos.canopen.status_bits import FOLLOWS, LIMITED, REMOTE, VOLTAGE, WARNING
 
-EDS = Path(__file__).with_name("drive.eds")
-Send = Callable[[int, bytes], None]
-"""(identifier, data)."""
 _RPDO_COMMUNICATION, _RPDO_ENTRIES, _TPDO_COMMUNICATION, _TPDO_ENTRIES = 0x1400, 0x1600, 0x1800, 0x1A00
 _INVALID = 0x8000_0000
 _FORMATS = {8: "B", 16: "H", 32: "i"}
@@ -43,37 +38,7 @@ _BITS = {
     DriveFault.WARNS: (0, WARNING),
 }
 """Bits of the statusword that a fault clears and sets."""
-_DEAF = (DriveFault.NOT_FOLLOWING, DriveFault.LOCAL, DriveFault.NO_VOLTAGE)
-
-
-@lru_cache(maxsize=1)
-def _dictionary() -> canopen.ObjectDictionary:
-    """Shared by all drives: what a drive is told is kept in its node, not here."""
-    return canopen.import_od(str(EDS), node_id=1)
-
-
-class _Wire(canopen.Network):
-    """The library's network without its threads: what it sends goes to the bus, what beats is timed here."""
-
-    def __init__(self, send: Send) -> None:
-        super().__init__()
-        self._deliver = send
-
-    def send_message(self, can_id: int, data: Any, remote: bool = False) -> None:
-        self._deliver(can_id, bytes(data))
-
-    def send_periodic(self, can_id: int, data: Any, period: float, remote: bool = False) -> Any:
-        return _Beat()
-
-
-class _Beat:
-    """A heartbeat as the library sees it; `SimulatedDrive.beat` sends the real one."""
-
-    def update(self, data: object) -> None:
-        """The state is read when it is sent."""
-
-    def stop(self) -> None:
-        """The period is read when it is due."""
+_IGNORES_TARGETS = (DriveFault.NOT_FOLLOWING, DriveFault.LOCAL, DriveFault.NO_VOLTAGE)
 
 
 class SimulatedDrive:
@@ -108,8 +73,8 @@ class SimulatedDrive:
         self._boot()
 
     def _boot(self) -> None:
-        self._node = canopen.LocalNode(self.id, _dictionary())
-        self._network = _Wire(self._send)
+        self._node = canopen.LocalNode(self.id, dictionary())
+        self._network = Wire(self._send)
         self._node.associate_network(self._network)
         node: Any = self._node  # half of the library is untyped
         node.add_read_callback(self._read)
@@ -225,7 +190,7 @@ class SimulatedDrive:
     @property
     def follows(self) -> bool:
         """Whether it goes where its target is."""
-        return self.state is Power.ENABLED and self.fault not in _DEAF
+        return self.state is Power.ENABLED and self.fault not in _IGNORES_TARGETS
 
     @property
     def encoder(self) -> int:

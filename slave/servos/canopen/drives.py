@@ -111,7 +111,7 @@ class Drives:
         self._commands = self._commands or configure
         for i in range(len(self._drives)):
             self._start(i, now_ns, configure)
-        self._tell()
+        self._update_faults()
 
     def stop(self) -> None:
         """From the next cycle on every drive brakes and stays."""
@@ -124,7 +124,7 @@ class Drives:
             self._down[bus] = down
         else:
             self._down.pop(bus, None)
-        self._tell()
+        self._update_faults()
 
     def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
         """One frame that this side did not send: of a drive, or of a second master."""
@@ -135,7 +135,7 @@ class Drives:
             twice = self._watch.answered(drive)
             if twice and self._drives[drive].phase in LISTENED:
                 self._supervision.fail(drive, twice)
-                self._tell()
+                self._update_faults()
             if self._answers.complete:
                 if self.answered_after_ns is None:
                     self.answered_after_ns = now_ns - self._synced_ns
@@ -160,7 +160,7 @@ class Drives:
                 elif drive.phase is Phase.CHECKING:
                     self._operate(i, now_ns)
                 else:
-                    self._tell()
+                    self._update_faults()
             case pdo.HEARTBEAT if len(data) == 1:
                 self._silence.heartbeat(i, now_ns)
                 self._on_state(i, data[0] & 0x7F, now_ns)
@@ -171,7 +171,7 @@ class Drives:
                     if said.code == HEARTBEAT_MISSED and drive.phase is Phase.RUNNING:
                         # told "enable" right after, it would go on as if nothing had been
                         drive.fail("has stopped by itself")
-                    self._tell()
+                    self._update_faults()
             case _:
                 self.unknown += 1
 
@@ -181,7 +181,7 @@ class Drives:
             for i, drive in enumerate(self._drives):
                 drive.fail("stopped", reconfigure=True)
                 self.outbox.append(self._wiring.nmt(i, STOP))
-        self._tell()
+        self._update_faults()
 
     def _on_state(self, i: int, state: int, now_ns: int) -> None:
         drive = self._drives[i]
@@ -190,7 +190,7 @@ class Drives:
             return
         if drive.phase is Phase.CONFIGURING and state == BOOTED:
             if not drive.on_boot(now_ns):
-                self._tell()
+                self._update_faults()
                 return
             # what it was told before is forgotten, the slave's heartbeat that it shall watch for among it
             self._start(i, now_ns, configure=True)
@@ -199,7 +199,7 @@ class Drives:
         left = drive.phase is Phase.RUNNING and state != OPERATIONAL
         if left or (drive.phase in (Phase.CHECKING, Phase.ENABLING) and state == BOOTED):
             drive.fail("has restarted" if state == BOOTED else "is not operational", reconfigure=True)
-            self._tell()
+            self._update_faults()
 
     # out
 
@@ -222,7 +222,7 @@ class Drives:
         supervision.look(now_ns, seen)
         controlwords = supervision.controlwords(now_ns, seen)
         if not supervision.settled:
-            self._tell()
+            self._update_faults()
             supervision.settled = self.running and not self._fault_words
         targets = self._targets.step(setpoint_rad, seen.position, supervision.running)
         self._watch.aim(self._targets.target_rad, supervision.running)
@@ -292,9 +292,9 @@ class Drives:
             self._encoder_flags = seen.encoder_flags
             for drive, flag in zip(self._drives, seen.encoder_flags.tolist(), strict=True):
                 drive.encoder = pdo.encoder_words(flag)
-            self._tell()
+            self._update_faults()
 
-    def _tell(self) -> None:
+    def _update_faults(self) -> None:
         """Put together what is wrong with each drive: a second master, its bus, the drive itself."""
         words = {}
         other = self.second_master.words

@@ -31,7 +31,7 @@ from slave.servos.canopen.drives import Drives
 from slave.servos.canopen.load import WELL, too_much
 from slave.servos.canopen.pdo import RPDO1
 from slave.servos.canopen.wiring import Outgoing
-from slave.servos.servos import EncoderReading
+from slave.servos.servos import EncoderReading, check_setpoint
 
 log = logging.getLogger(__name__)
 
@@ -113,8 +113,7 @@ class CanopenServos:
 
     def write(self, position_rad: Array) -> None:
         """Setpoints (J,) for the next SYNC. Raises ValueError if not finite or not J."""
-        if position_rad.shape != (len(self._skeleton.joints),) or not np.isfinite(position_rad).all():
-            raise ValueError(f"setpoints must be {len(self._skeleton.joints)} finite angles")
+        check_setpoint(position_rad, len(self._skeleton.joints))
         self._setpoint = np.clip(position_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
         if self._clock() >= self._due_ns - _EARLY_NS:
             self._cycle()

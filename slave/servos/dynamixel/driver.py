@@ -11,14 +11,15 @@ from common.clock import Clock, to_ns, to_s
 from common.errors import RobotError
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT, Counts, EncoderConfig, Encoders
+from slave.encoders.counts import COUNTS_PER_TURN, Counts, EncoderConfig, Encoders
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
 from slave.servos.dynamixel.config import WATCHDOG_UNIT_S, DynamixelConfig
-from slave.servos.dynamixel.latency import BEST_MS, advice, timer_ms, too_late
+from slave.servos.dynamixel.goals import ServoGoals
+from slave.servos.dynamixel.latency import advice, timer_ms, too_late
 from slave.servos.dynamixel.port import Port, PortLostError
 from slave.servos.dynamixel.settings import Settings, settings_of
-from slave.servos.dynamixel.startup import arm, inspect, prepare
+from slave.servos.dynamixel.startup import arm, cannot_be_used, inspect, inspect_all, prepare
 from slave.servos.servos import EncoderReading
 
 log = logging.getLogger(__name__)
@@ -49,12 +50,11 @@ class Driver:
         self._config = config
         self._clock = clock
         self._open_port = open_port
-        self._skeleton = skeleton
         self._encoders = Encoders(skeleton, encoders)
         self._servos = settings_of(config, skeleton, self._encoders)
         self._joint_of = {servo.id: j for j, servo in enumerate(self._servos)}
         count = len(self._servos)
-        self._rejoin_counts = max(1, round(config.rejoin_velocity_rad_s / RAD_PER_COUNT / config.rate_hz))
+        self._goals = ServoGoals(config, skeleton, self._encoders, self._servos)
         self._watchdog_ns = to_ns(self._servos[0].watchdog * WATCHDOG_UNIT_S)
         self._bus: Bus | None = None
         self._broken_before = 0
@@ -63,11 +63,8 @@ class Driver:
         self._sent_ns = 0
         self._polled = 0
         self._late_before = 0
-        self._stopping = False
         self._misses = np.zeros(count, np.int64)
         self._stands: Counts = np.zeros(count, np.int64)  # as the servos tell it: below 0 past their end
-        self._goal: Counts = np.zeros(count, np.int64)
-        self._rejoining = np.zeros(count, np.bool_)
         self._faults: dict[str, str] = {}
         self.reading = EncoderReading(clock(), self._stands.copy(), np.zeros(count, np.bool_))
         """Of the newest cycle."""
@@ -91,38 +88,23 @@ class Driver:
         try:
             bus = self._open()
             with bus.patient(_START_PATIENCE_S):
-                wrong = self._inspect(bus)
+                wrong = inspect_all(bus, self._servos)
                 late = too_late(self._config.port, bus.quickest_s, self._config.reply_timeout_s)
             if wrong or late:
                 self._drop()
-                raise RobotError(self._cannot_be_used(wrong) if wrong else f"{self._config.port}: {late}")
+                raise RobotError(self._refusal(wrong) if wrong else f"{self._config.port}: {late}")
             wrong = self._prepare(self._servos, _START_PATIENCE_S)
         except PortLostError:
             self._drop()
             raise
         if wrong:
             self.close()
-            raise RobotError(self._cannot_be_used(wrong))
+            raise RobotError(self._refusal(wrong))
         self._faults.clear()
         self._publish()
 
-    def _cannot_be_used(self, wrong: list[tuple[Settings, str]]) -> str:
-        timer = timer_ms(self._config.port)
-        slow = f"; {advice(self._config.port, timer)}" if timer is not None and timer > BEST_MS else ""
-        lines = "\n".join(f"  {servo.joint} (id {servo.id}): {why}" for servo, why in wrong)
-        return (
-            f"{self._config.port}: {len(wrong)} of {len(self._servos)} servos cannot be used; "
-            f"check power, cable, ids and baud rate{slow}:\n{lines}"
-        )
-
-    def _inspect(self, bus: Bus) -> list[tuple[Settings, str]]:
-        wrong = []
-        for servo in self._servos:
-            try:
-                inspect(bus, servo)
-            except ServoError as error:
-                wrong.append((servo, str(error)))
-        return wrong
+    def _refusal(self, wrong: list[tuple[Settings, str]]) -> str:
+        return cannot_be_used(self._config.port, len(self._servos), wrong)
 
     def cycle(self, setpoint_rad: Array | None, stop: bool = False) -> None:
         """Write the setpoints (J,), read the positions, look after one servo's health.
@@ -141,7 +123,7 @@ class Driver:
 
     def recover(self) -> None:
         """Make the servos with faults ready again where they stand; all move slowly to their setpoints."""
-        self._rejoining[:] = True
+        self._goals.rejoin()
         if self._bus is None:
             return
         try:
@@ -169,7 +151,7 @@ class Driver:
         except ServoError:
             pass
         except PortLostError:
-            log.warning("%s: the port had gone; the servos stop by themselves", self._config.port)
+            log.warning("%s: servo port lost; the servos stop by themselves", self._config.port)
         self._drop()
 
     # the port
@@ -188,10 +170,10 @@ class Driver:
     def _lose(self, error: PortLostError) -> None:
         if self._bus is not None:
             self.lost += 1
-            log.error("the servos' port has gone: %s", error)
+            log.error("servo port lost: %s; retrying", error)
             for servo in self._servos:
                 self._faults[servo.joint] = f"the servos' port has gone ({error}); they stop by themselves"
-            self._rejoining[:] = True
+            self._goals.rejoin()
         self._drop()
         self._retry_ns = self._clock() + self._pause_ns
         self._pause_ns = min(2 * self._pause_ns, _LONGEST_PAUSE_NS)
@@ -202,7 +184,7 @@ class Driver:
         self._open()
         self._sent_ns = self._clock()
         self._misses[:] = 0
-        log.info("%s: open again", self._config.port)
+        log.info("%s: servo port open again", self._config.port)
         for servo in self._servos:
             self._faults[servo.joint] = f"the servos' port had gone; {_TAKE_IN}"
 
@@ -222,7 +204,7 @@ class Driver:
             try:
                 if not inspected:
                     inspect(bus, servo)
-                self._goal[j] = self._stands[j] = prepare(bus, servo)
+                self._goals.counts[j] = self._stands[j] = prepare(bus, servo)
             except ServoError as error:
                 wrong.append((servo, str(error)))
                 self._faults[servo.joint] = str(error)
@@ -245,9 +227,9 @@ class Driver:
         self._notice_gap()
         if not self._misses.any():
             self._late_before = bus.late_bytes
-        self._aim(setpoint_rad, stop)
+        self._goals.aim(setpoint_rad, stop, self._stands)
         well = [j for j, servo in enumerate(self._servos) if servo.joint not in self._faults]
-        bus.write_all(x.GOAL_POSITION, {self._servos[j].id: int(self._goal[j]) for j in well})
+        bus.write_all(x.GOAL_POSITION, {self._servos[j].id: int(self._goals.counts[j]) for j in well})
         present = [j for j in range(len(self._servos)) if self._misses[j] < self._config.silent_after]
         asked_ns = self._clock()
         answers = bus.read_all(x.PRESENT_POSITION, [self._servos[j].id for j in present])
@@ -269,27 +251,6 @@ class Driver:
         self._sent_ns = self._clock()
         if valid.any():
             self._pause_ns = _FIRST_PAUSE_NS
-
-    def _aim(self, setpoint_rad: Array | None, stop: bool) -> None:
-        if stop:
-            if not self._stopping:
-                # what a faulty servo's goal is does not matter: nobody writes it
-                self._goal[:] = np.clip(self._stands, *self._ends())
-            self._rejoining[:] = True
-        elif setpoint_rad is not None:
-            limited = np.clip(setpoint_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
-            way = self._encoders.counts(limited) - self._goal
-            near = np.abs(way) <= self._rejoin_counts
-            self._rejoining &= ~near
-            slow = np.clip(way, -self._rejoin_counts, self._rejoin_counts)
-            self._goal += np.where(self._rejoining, slow, way)
-        self._stopping = stop
-
-    def _ends(self) -> tuple[Counts, Counts]:
-        return (
-            np.array([servo.lowest for servo in self._servos]),
-            np.array([servo.highest for servo in self._servos]),
-        )
 
     def _notice_gap(self) -> None:
         gap_ns = self._clock() - self._sent_ns
@@ -327,7 +288,7 @@ class Driver:
         if instead or servo.joint not in self._faults:
             log.error("%s (id %d): %s", servo.joint, servo.id, words)
             self._faults[servo.joint] = words
-            self._rejoining[self._joint_of[servo.id]] = True
+            self._goals.rejoin(self._joint_of[servo.id])
 
     def _publish(self) -> None:
         if self._bus is None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
 from common.clock import Clock, monotonic_ns, to_s
 from common.errors import RobotError
 from common.metrics.slave import ServoMetrics
@@ -16,7 +14,7 @@ from slave.encoders.counts import EncoderConfig
 from slave.servos.dynamixel.config import DynamixelConfig
 from slave.servos.dynamixel.driver import Driver
 from slave.servos.dynamixel.port import Port
-from slave.servos.servos import EncoderReading
+from slave.servos.servos import EncoderReading, check_setpoint
 
 _JOIN_S = 3.0
 
@@ -60,8 +58,7 @@ class DynamixelServos:
 
     def write(self, position_rad: Array) -> None:
         """Hand over setpoints (J,); the newest wins. Raises ValueError if not finite or not J."""
-        if position_rad.shape != (self._count,) or not np.isfinite(position_rad).all():
-            raise ValueError(f"setpoints must be {self._count} finite angles, not {position_rad}")
+        check_setpoint(position_rad, self._count)
         self._setpoint = position_rad.copy()
 
     def read(self) -> EncoderReading:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
 from slave.servos.dynamixel.lasting import HOW, Difference, differences, in_words
+from slave.servos.dynamixel.latency import BEST_MS, advice, timer_ms
 from slave.servos.dynamixel.settings import Settings
 
 _DEG_PER_COUNT = RAD_PER_COUNT * 180.0 / 3.141592653589793
@@ -20,6 +23,28 @@ def inspect(bus: Bus, servo: Settings) -> None:
     if different:
         raise ServoError(f"{in_words(different)}; {HOW}")
     _check_place(servo, x.position_at_end(bus.read_bytes(servo.id, x.PLACE)))
+
+
+def inspect_all(bus: Bus, servos: Sequence[Settings]) -> list[tuple[Settings, str]]:
+    """Those that cannot be used, and why. Raises PortLostError."""
+    wrong = []
+    for servo in servos:
+        try:
+            inspect(bus, servo)
+        except ServoError as error:
+            wrong.append((servo, str(error)))
+    return wrong
+
+
+def cannot_be_used(port: str, count: int, wrong: Sequence[tuple[Settings, str]]) -> str:
+    """A refusal to start, with each of `count` servos that is `wrong`, and what to look at."""
+    timer = timer_ms(port)
+    slow = f"; {advice(port, timer)}" if timer is not None and timer > BEST_MS else ""
+    lines = "\n".join(f"  {servo.joint} (id {servo.id}): {why}" for servo, why in wrong)
+    return (
+        f"{port}: {len(wrong)} of {count} servos cannot be used; "
+        f"check power, cable, ids and baud rate{slow}:\n{lines}"
+    )
 
 
 def know(bus: Bus, servo: Settings) -> list[Difference]:

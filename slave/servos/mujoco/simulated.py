@@ -12,7 +12,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.mujoco.model import STEP_S, build_model, leader, unit_rates
-from slave.servos.servos import EncoderReading
+from slave.servos.servos import EncoderReading, check_setpoint
 
 STEPS_PER_CYCLE = 1
 CYCLE_NS = STEPS_PER_CYCLE * to_ns(STEP_S)
@@ -58,8 +58,7 @@ class SimulatedRobot:
 
     def write(self, position_rad: Array) -> None:
         """New setpoints (J,), kept within the drives' limits. Raises ValueError if not finite or not J."""
-        if position_rad.shape != self._setpoint.shape or not np.isfinite(position_rad).all():
-            raise ValueError(f"setpoints must be {len(self._setpoint)} finite angles, not {position_rad}")
+        check_setpoint(position_rad, len(self._setpoint))
         self._setpoint = np.clip(position_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
 
     def resume(self, now_ns: int) -> None:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from deploy.sim.drives.machine import after, statusword
-from deploy.sim.drives.node import EDS, _Wire
+from deploy.sim.drives.wire import EDS, Wire
 from slave.servos.canopen import pdo
 from slave.servos.canopen.answers import SyncAnswers
 from slave.servos.canopen.cia402 import _PATTERNS, FAULT_RESET, Power, power, towards_enabled
@@ -115,7 +115,7 @@ class Served:
     def __init__(self) -> None:
         self.said: list[bytes] = []
         self.node: Any = canopen.LocalNode(5, str(EDS))
-        self.node.associate_network(_Wire(lambda _, data: self.said.append(data)))
+        self.node.associate_network(Wire(lambda _, data: self.said.append(data)))
 
     def ask(self, transfer: Read | Write) -> bytes:
         self.said.clear()

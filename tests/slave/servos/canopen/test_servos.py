@@ -29,7 +29,7 @@ from common.skeleton import load_skeleton
 from deploy.harness.host import HostWatch
 from deploy.sim.drives.app import run as run_drives
 from deploy.sim.drives.faults import DEMAND, DriveFault
-from deploy.sim.drives.node import EDS
+from deploy.sim.drives.wire import EDS
 from slave.backends import ServosConfig
 from slave.config import SlaveConfig
 from slave.encoders.counts import EncoderConfig, Encoders

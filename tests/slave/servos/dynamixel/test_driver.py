@@ -237,7 +237,7 @@ def test_a_servo_past_the_end_of_its_turn_does_not_go_round(make_rig: Callable[.
     rig.cycles(1)
     assert rig.driver.reading.counts[0] == 4094
     rig.cycles(1, stop=True)
-    assert rig.driver._goal[0] == rig.driver._servos[0].lowest
+    assert rig.driver._goals.counts[0] == rig.driver._servos[0].lowest
 
 
 def test_a_pulled_cable_faults_all_and_a_new_one_works_after_a_reset(rig: Rig) -> None:
