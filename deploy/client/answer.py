@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class RobotAnswer:
     """What came of a request to one robot."""
 
     robot: str

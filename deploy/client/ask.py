@@ -9,8 +9,8 @@ from common.errors import CodecError, LinkError, LinkTimeoutError
 from common.link import Link, open_session
 from common.wire.control import ask_everybody, topic_for
 from common.wire.messages import Action, ControlRequest
-from deploy.client.answer import Answer
-from deploy.client.reach import ROUTER_S, Reach
+from deploy.client.answer import RobotAnswer
+from deploy.client.destination import ROUTER_S, Destination
 
 OTHERS_S = 0.5
 """How long a question waits for endpoints other than the robot's own."""
@@ -19,7 +19,7 @@ _OR_NOT_ALLOWED = " And may your certificate ask it? Its log says who was refuse
 _LATE = "is there, but gave no answer in {s:g} s: what it did is not known, `tandem status` tells"
 
 
-async def ask_robots(where: Reach, action: Action, key: str = "") -> list[Answer]:
+async def ask_robots(where: Destination, action: Action, key: str = "") -> list[RobotAnswer]:
     """The answers, in the robots' order. Raises LinkError where the link cannot be opened at all."""
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
         links = [session.link(robot) for robot in where.robots]
@@ -27,7 +27,7 @@ async def ask_robots(where: Reach, action: Action, key: str = "") -> list[Answer
     return [answer for answers in each for answer in answers]
 
 
-async def ask(link: Link, where: Reach, action: Action, key: str = "") -> list[Answer]:
+async def ask(link: Link, where: Destination, action: Action, key: str = "") -> list[RobotAnswer]:
     """What the robots of one name answer, or that none did: at least one. It never raises for their absence.
 
     Where several bear the name, nothing that could move one is asked of any.
@@ -37,7 +37,7 @@ async def ask(link: Link, where: Reach, action: Action, key: str = "") -> list[A
         await link.connected(topic)
     except LinkTimeoutError:
         text = _NOT_THERE.format(at=", ".join(where.link.connect))
-        return [Answer(link.robot, False, text + (_OR_NOT_ALLOWED if where.link.tls else ""))]
+        return [RobotAnswer(link.robot, False, text + (_OR_NOT_ALLOWED if where.link.tls else ""))]
     await _until_all_are_connected(link, where)
 
     async def ask_all(payload: bytes) -> list[bytes]:
@@ -47,17 +47,19 @@ async def ask(link: Link, where: Reach, action: Action, key: str = "") -> list[A
         request = ControlRequest(link.robot, action, where.operator, key)
         replies = await ask_everybody(ask_all, request)
     except LinkTimeoutError:
-        return [Answer(link.robot, False, _LATE.format(s=topic.timeout_s))]
+        return [RobotAnswer(link.robot, False, _LATE.format(s=topic.timeout_s))]
     except (LinkError, CodecError) as error:
-        return [Answer(link.robot, False, str(error))]
+        return [RobotAnswer(link.robot, False, str(error))]
     several = len(replies) > 1
     return [
-        Answer(link.robot, each.done, each.text, each.guard, each.instance, each.place if several else "")
+        RobotAnswer(
+            link.robot, each.done, each.text, each.guard, each.instance, each.place if several else ""
+        )
         for each in replies
     ]
 
 
-async def _until_all_are_connected(link: Link, where: Reach) -> None:
+async def _until_all_are_connected(link: Link, where: Destination) -> None:
     """A namesake may be behind an endpoint that is slower to answer than the robot that is asked for."""
     doors = 1 if where.link.mode == "client" else len(where.link.connect)
     with suppress(TimeoutError):

@@ -25,9 +25,9 @@ from common.skeleton.load import profile_names
 from common.wire.codec import decode
 from common.wire.messages import Action, RobotState, Statistics
 from common.wire.topics import STATE, STATISTICS
-from deploy.client.answer import Answer
+from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask
-from deploy.client.reach import ROUTER_S, Reach
+from deploy.client.destination import ROUTER_S, Destination
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 
 LISTEN_S = 1.5
@@ -61,7 +61,7 @@ class Heard:
             self.all.set()
 
 
-async def ask_status(where: Reach, listen_s: float = LISTEN_S) -> dict[str, dict[str, Any]]:
+async def ask_status(where: Destination, listen_s: float = LISTEN_S) -> dict[str, dict[str, Any]]:
     """Each robot's status as plain values. Raises LinkError where the link cannot be opened at all."""
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
         links = [session.link(robot) for robot in where.robots]
@@ -75,7 +75,7 @@ async def ask_status(where: Reach, listen_s: float = LISTEN_S) -> dict[str, dict
     return trees
 
 
-async def _status(link: Link, where: Reach, listen_s: float) -> tuple[list[Answer], HeardOfAll]:
+async def _status(link: Link, where: Destination, listen_s: float) -> tuple[list[RobotAnswer], HeardOfAll]:
     heard = HeardOfAll(link)
     answers = await ask(link, where, Action.STATUS)
     with suppress(TimeoutError):
@@ -130,7 +130,7 @@ def decode_state(payload: bytes) -> RobotState | None:
     return None
 
 
-def as_tree(answer: Answer, heard: Heard, namesakes: int = 0) -> dict[str, Any]:
+def as_tree(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> dict[str, Any]:
     """A robot's status as plain JSON values; None where the robot did not tell."""
     state, metrics = heard.state, heard.metrics
     figures: Mapping[str, Any] = to_tree(metrics) if metrics else {}

@@ -19,7 +19,7 @@ from common.process.runtime import run as run_until_stopped
 from common.wire.topics import video as video_topic
 from common.wire.video import VideoFrame
 from deploy.client.certificate import Certificate
-from deploy.client.reach import reach
+from deploy.client.destination import destination
 from master.picture import VideoWatch
 
 NOTHING_S = 5.0
@@ -47,8 +47,8 @@ def video(
         save.mkdir(parents=True, exist_ok=True)
 
     async def tell(stop: asyncio.Event) -> None:
-        seen = _Seen(save)
-        async with open_link(reach(connect, [robot], certificate=certificate).link, robot) as link:
+        seen = _ReceivedVideo(save)
+        async with open_link(destination(connect, [robot], certificate=certificate).link, robot) as link:
             try:
                 await link.connected()
             except LinkTimeoutError:
@@ -66,7 +66,7 @@ def video(
     run_until_stopped(tell)
 
 
-class _Seen:
+class _ReceivedVideo:
     def __init__(self, save: Path | None) -> None:
         self.watch = VideoWatch()
         self._save = save

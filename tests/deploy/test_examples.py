@@ -14,7 +14,7 @@ from common.config.load import load_config
 from common.link.router import RouterConfig
 from common.process.runtime import SHUTDOWN_S
 from deploy import cli
-from deploy.client.reach import reach
+from deploy.client.destination import destination
 from deploy.ops.router.run import zenohd_configuration
 from deploy.report.panels import PANELS
 from deploy.sim.suit.config import SuitConfig
@@ -70,12 +70,12 @@ def test_a_zenohd_gets_the_same_keys_and_rules() -> None:
 
 
 def test_a_person_at_the_operator_s_host_has_keys_but_no_door() -> None:
-    where = reach(None, None, master=SITE / "operator.toml")
+    where = destination(None, None, master=SITE / "operator.toml")
     assert where.link.tls is not None
     assert where.link.tls.certificate == SITE / "keys" / "operator-nurse-1.pem"
     assert where.link.listen == []
     assert (where.robots, where.operator) == (("robot-1",), "nurse-1")
-    elsewhere = reach(["tls/10.0.0.9:7447"], None, master=SITE / "operator.toml")
+    elsewhere = destination(["tls/10.0.0.9:7447"], None, master=SITE / "operator.toml")
     assert (elsewhere.link.connect, elsewhere.link.tls) == (["tls/10.0.0.9:7447"], where.link.tls)
 
 

@@ -35,7 +35,7 @@ class Reading:
 
 
 @dataclass(slots=True)
-class Span:
+class AngleRange:
     """From where to where an angle went, over the end of a turn too; rad."""
 
     first: float | None = None
@@ -58,16 +58,16 @@ class Span:
 
 
 @dataclass(slots=True)
-class Session:
+class AttitudeLog:
     """All that was read so far."""
 
     readings: int = 0
     newest: Reading | None = None
-    spans: dict[str, Span] = field(default_factory=dict)
+    spans: dict[str, AngleRange] = field(default_factory=dict)
 
     def add(self, reading: Reading) -> None:
         """Take the next reading."""
         self.readings += 1
         self.newest = reading
         for name, angle in reading.angles.items():
-            self.spans.setdefault(name, Span()).add(angle)
+            self.spans.setdefault(name, AngleRange()).add(angle)

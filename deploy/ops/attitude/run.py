@@ -16,7 +16,7 @@ from common.errors import TandemError
 from common.process.pacing import TickGrid
 from common.process.runtime import until_stopped
 from common.process.ticker import ticks
-from deploy.ops.attitude.reading import Reading, Session
+from deploy.ops.attitude.reading import AttitudeLog, Reading
 from deploy.ops.attitude.source import PortSource, SimulatedSource, Source, Take
 from deploy.ops.attitude.view import screen
 from slave.attitude.port import FrameWriter
@@ -44,9 +44,9 @@ class AttitudeOptions:
     seed: int = 1
 
 
-async def show_attitude(options: AttitudeOptions, stop: asyncio.Event, console: Console) -> Session:
+async def show_attitude(options: AttitudeOptions, stop: asyncio.Event, console: Console) -> AttitudeLog:
     """Show until stopped, or for as long as asked. Raises TandemError where nothing at all could be read."""
-    session = Session()
+    session = AttitudeLog()
     began_ns = monotonic_ns()
 
     def take(reading: Reading) -> None:
@@ -83,7 +83,7 @@ def _open(options: AttitudeOptions, began_ns: int, take: Take) -> Source:
 
 
 async def _follow(
-    options: AttitudeOptions, session: Session, source: Source, began_ns: int, console: Console
+    options: AttitudeOptions, session: AttitudeLog, source: Source, began_ns: int, console: Console
 ) -> None:
     with nullcontext() if options.as_json else Live(console=console, auto_refresh=False) as live:
         async for due in ticks(TickGrid(began_ns, NS_PER_S // RATE_HZ)):

@@ -10,13 +10,13 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from deploy.ops.attitude.reading import ANGLES, Session, Span
+from deploy.ops.attitude.reading import ANGLES, AngleRange, AttitudeLog
 
 _SILENT_S = 1.0
 _NONE = "–"
 
 
-def screen(session: Session, now_s: float, source: str, counters: Mapping[str, int]) -> RenderableType:
+def screen(session: AttitudeLog, now_s: float, source: str, counters: Mapping[str, int]) -> RenderableType:
     """Each angle now and the span it went through, as in the paper's Fig. 5; what came and was refused."""
     newest = session.newest
     if newest is None:
@@ -38,7 +38,7 @@ def screen(session: Session, now_s: float, source: str, counters: Mapping[str, i
     return Group(table, life, Text(counted, "dim"))
 
 
-def _ends(span: Span) -> tuple[str, str]:
+def _ends(span: AngleRange) -> tuple[str, str]:
     ends = span.ends
     if ends is None:
         return _NONE, _NONE

@@ -15,7 +15,7 @@ from common.errors import LinkError, TandemError
 from common.process.runtime import run as run_until_stopped
 from common.wire.messages import Action
 from deploy.client.certificate import Certificate
-from deploy.client.reach import Reach, reach
+from deploy.client.destination import Destination, destination
 from deploy.ops.control.teller import Say, telling
 from deploy.report.options import AsJson
 
@@ -77,7 +77,7 @@ def estop(
     """
     from deploy.ops.control.stop import stop_robots
 
-    where = reach(connect, robot, operator, master, certificate)
+    where = destination(connect, robot, operator, master, certificate)
     if not (all_ or where.robots):
         raise TandemError("which robot? Name it by --robot, or stop every one by --all")
 
@@ -110,7 +110,7 @@ def reset(
 
     Example: `tandem reset --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
     """
-    _act(Action.RESET, _named(reach(connect, robot, operator, master, certificate)), key)
+    _act(Action.RESET, _named(destination(connect, robot, operator, master, certificate)), key)
 
 
 def home(
@@ -135,7 +135,7 @@ def home(
 
     Example: `tandem home --connect tcp/192.168.7.2:7447 --robot robot-1 --key KEY`
     """
-    where = _named(reach(connect, robot, operator, master, certificate))
+    where = _named(destination(connect, robot, operator, master, certificate))
     if not yes:
         _act(Action.STATUS, where)
         if not typer.confirm("Does the robot stand so?"):
@@ -156,7 +156,7 @@ def status(
     """
     from deploy.client.status import ask_status, status_table
 
-    where = _named(reach(connect, robot, master=master, certificate=certificate))
+    where = _named(destination(connect, robot, master=master, certificate=certificate))
 
     async def tell() -> None:
         robots = await ask_status(where)
@@ -180,7 +180,7 @@ COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, home
 """In the order of the help."""
 
 
-def _act(action: Action, where: Reach, key: str = "") -> None:
+def _act(action: Action, where: Destination, key: str = "") -> None:
     from deploy.client.ask import ask_robots
 
     async def tell(say: Say) -> None:
@@ -196,7 +196,7 @@ def _act(action: Action, where: Reach, key: str = "") -> None:
     _carry_out(tell)
 
 
-def _named(where: Reach) -> Reach:
+def _named(where: Destination) -> Destination:
     if not where.robots:
         raise TandemError("which robot? Name it by --robot, or the master's file by --master")
     return where
@@ -208,8 +208,8 @@ def _holder(
     operator: str,
     master: Path | None,
     certificate: Path | None,
-) -> Reach:
-    where = _named(reach(connect, robot, operator, master, certificate))
+) -> Destination:
+    where = _named(destination(connect, robot, operator, master, certificate))
     if not where.operator:
         raise TandemError("who are you? Give your name by --operator, or the master's file by --master")
     return where

@@ -18,8 +18,8 @@ from common.link.queries import Answered
 from common.wire.presence import ProcessPresence
 from common.wire.stop import pack_stop, read_stop_answer
 from common.wire.topics import STOP
-from deploy.client.answer import Answer
-from deploy.client.reach import Reach
+from deploy.client.answer import RobotAnswer
+from deploy.client.destination import Destination
 from deploy.ops.control.stop_count import StopCount
 
 REPEAT_S = 0.2
@@ -29,7 +29,7 @@ SETTLE_S = 0.5
 
 OnAnswer = Callable[[Answered], None]
 AskAll = Callable[[bytes, OnAnswer], Awaitable[object]]
-Tell = Callable[[Answer], None]
+Tell = Callable[[RobotAnswer], None]
 
 log = logging.getLogger(__name__)
 
@@ -69,8 +69,8 @@ async def repeat_until_stopped(
 
 
 async def stop_robots(
-    where: Reach, everyone: bool, tell: Tell = lambda _: None, within_s: float = WITHIN_S
-) -> list[Answer]:
+    where: Destination, everyone: bool, tell: Tell = lambda _: None, within_s: float = WITHIN_S
+) -> list[RobotAnswer]:
     """Stop the named robots and, with `everyone`, all that show themselves at the endpoints.
 
     `tell` hears each answer as soon as it is known. An endpoint where no robot showed itself is an answer
@@ -92,10 +92,10 @@ async def stop_robots(
             many = f"{missing} of {doors} endpoints"
             text = f"NOT REACHED: {many} ({', '.join(endpoints)}); whoever is there is not stopped"
             # where robots were named, each of them has answered or is said not to have
-            answers.append(Answer("", not everyone, text))
+            answers.append(RobotAnswer("", not everyone, text))
             tell(answers[-1])
         elif everyone and not answers:
-            answers.append(Answer("", False, "NOBODY STOPPED: no robot showed itself at the endpoints"))
+            answers.append(RobotAnswer("", False, "NOBODY STOPPED: no robot showed itself at the endpoints"))
             tell(answers[-1])
     return answers
 
@@ -128,7 +128,7 @@ class _Stopping:
             self._counts[robot] = StopCount(robot, self._within_s)
             self._tasks[robot] = asyncio.create_task(self._stop(robot))
 
-    async def answers(self) -> list[Answer]:
+    async def answers(self) -> list[RobotAnswer]:
         """All of them, by name."""
         await asyncio.gather(*self._tasks.values())
         return [answer for robot in sorted(self._counts) for answer in self._counts[robot].answers()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from common.wire.presence import ProcessPresence, several_bear
 from common.wire.stop import StopAnswer
-from deploy.client.answer import Answer
+from deploy.client.answer import RobotAnswer
 
 
 class StopCount:
@@ -14,7 +14,7 @@ class StopCount:
         self._robot = robot
         self._within_s = within_s
         self._shown: dict[int, ProcessPresence] = {}
-        self._stopped: dict[int | str, Answer] = {}
+        self._stopped: dict[int | str, RobotAnswer] = {}
         """By instance; by session, where the robot is of schema 2 and has no instance number."""
 
     def expect(self, presence: ProcessPresence) -> None:
@@ -22,14 +22,14 @@ class StopCount:
         if presence.instance:
             self._shown[presence.instance] = presence
 
-    def on_answer(self, answer: StopAnswer, session: str) -> Answer | None:
+    def on_answer(self, answer: StopAnswer, session: str) -> RobotAnswer | None:
         """Take an answer; what to tell, where it is an acknowledgement that is new."""
         who = answer.instance or session
         if not answer.stopped or who in self._stopped:
             return None
         shown = self._shown.get(answer.instance)
         place = shown.words if shown is not None and self._several else ""
-        told = Answer(self._robot, True, answer.text, answer.guard, answer.instance, place)
+        told = RobotAnswer(self._robot, True, answer.text, answer.guard, answer.instance, place)
         self._stopped[who] = told
         return told
 
@@ -38,18 +38,18 @@ class StopCount:
         """Whether somebody has acknowledged, and everybody who showed himself has."""
         return bool(self._stopped) and not self._silent()
 
-    def answers(self) -> list[Answer]:
+    def answers(self) -> list[RobotAnswer]:
         """One a process: stopped, or not."""
         return [*self._stopped.values(), *self.failures()]
 
-    def failures(self) -> list[Answer]:
+    def failures(self) -> list[RobotAnswer]:
         """Those who were asked, or showed themselves, and did not acknowledge."""
         text = f"NOT STOPPED by this: no answer within {self._within_s:g} s. Stop it at the robot itself"
         silent = [
-            Answer(self._robot, False, text, instance=each.instance, place=each.words)
+            RobotAnswer(self._robot, False, text, instance=each.instance, place=each.words)
             for each in self._silent()
         ]
-        return silent if silent or self._stopped else [Answer(self._robot, False, text)]
+        return silent if silent or self._stopped else [RobotAnswer(self._robot, False, text)]
 
     def namesakes(self) -> str | None:
         """What to say where several robots bear the name."""

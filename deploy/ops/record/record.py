@@ -19,7 +19,7 @@ from common.metrics.tree import to_tree
 from common.process.launch import WriteFigures
 from common.process.runtime import until_stopped
 from common.wire.topics import COMMAND, STATE, STATISTICS, Topic, video
-from deploy.client.reach import reach
+from deploy.client.destination import destination
 from deploy.ops.record.missing import Missing, missing_in_words
 from deploy.ops.record.tape import Tape
 
@@ -38,7 +38,7 @@ def link_of(connect: Sequence[str], file: Path | None) -> LinkConfig:
     """Where to listen in: the endpoints, or the file's `[link]`. Raises ConfigError, TandemError."""
     if file is not None:
         return load_config(file, ObserverConfig).link
-    return reach(connect, None).link
+    return destination(connect, None).link
 
 
 @dataclass(frozen=True, slots=True)

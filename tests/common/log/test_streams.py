@@ -73,9 +73,9 @@ def test_every_command_s_table_comes_out_on_an_ascii_terminal() -> None:
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "80"}
     body = (
         "from rich.console import Console\n"
-        "from deploy.client.answer import Answer\n"
+        "from deploy.client.answer import RobotAnswer\n"
         "from deploy.client.status import Heard, as_tree, status_table\n"
-        "tree = as_tree(Answer('r', True, 'turns at 3°/s'), Heard())\n"
+        "tree = as_tree(RobotAnswer('r', True, 'turns at 3°/s'), Heard())\n"
         "Console().print(status_table({'r': tree}))\n"
     )
     done = run(body, env=environment)

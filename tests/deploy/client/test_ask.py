@@ -16,9 +16,9 @@ from common.link.config import LinkConfig
 from common.wire.codec import decode, encode
 from common.wire.messages import Action, ControlReply, ControlRequest
 from common.wire.topics import CONTROL, STOP, Topic
-from deploy.client.answer import Answer
+from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask, ask_robots
-from deploy.client.reach import Reach
+from deploy.client.destination import Destination
 
 
 def endpoint() -> str:
@@ -37,7 +37,7 @@ def test_each_robot_answers_for_itself() -> None:
     def unwilling(payload: bytes, _: int) -> bytes:
         return encode(ControlReply(False, "estop", "the e-stop is latched: reset it first"))
 
-    async def story() -> list[Answer]:
+    async def story() -> list[RobotAnswer]:
         at = [endpoint(), endpoint()]
         async with (
             open_link(LinkConfig(listen=[at[0]]), "a") as a,
@@ -45,11 +45,13 @@ def test_each_robot_answers_for_itself() -> None:
         ):
             a.answer(CONTROL, willing)
             b.answer(CONTROL, unwilling)
-            return await ask_robots(Reach(LinkConfig(connect=at), ("a", "b", "c"), "anna"), Action.ENGAGE)
+            return await ask_robots(
+                Destination(LinkConfig(connect=at), ("a", "b", "c"), "anna"), Action.ENGAGE
+            )
 
     a, b, c = asyncio.run(story())
-    assert a == Answer("a", True, "moves slowly", "align")
-    assert b == Answer("b", False, "the e-stop is latched: reset it first", "estop")
+    assert a == RobotAnswer("a", True, "moves slowly", "align")
+    assert b == RobotAnswer("b", False, "the e-stop is latched: reset it first", "estop")
     assert (c.done, c.guard) == (False, "")
     assert "is `tandem slave` running" in c.text
     assert [(r.robot, r.action, r.operator, r.challenge) for r in asked] == [
@@ -73,7 +75,7 @@ class Hanging:
 
 def test_a_robot_that_is_there_but_gives_no_answer_may_have_done_it() -> None:
     link: Any = Hanging()
-    (answer,) = asyncio.run(ask(link, Reach(LinkConfig(), ("a",), "anna"), Action.DISENGAGE))
+    (answer,) = asyncio.run(ask(link, Destination(LinkConfig(), ("a",), "anna"), Action.DISENGAGE))
     assert (answer.done, answer.guard) == (False, "")
     assert "what it did is not known" in answer.text
 
@@ -90,7 +92,7 @@ def test_while_two_bear_one_name_nothing_that_moves_is_asked_of_either(through_a
 
         return answer
 
-    async def story() -> list[list[Answer]]:
+    async def story() -> list[list[RobotAnswer]]:
         at = [endpoint(), endpoint()]
         async with AsyncExitStack() as stack:
             links = [LinkConfig(listen=[each]) for each in at]
@@ -104,7 +106,7 @@ def test_while_two_bear_one_name_nothing_that_moves_is_asked_of_either(through_a
                 one.answer(CONTROL, robot(instance))
                 one.answer(STOP, robot(instance))
             acts = (Action.STATUS, Action.ENGAGE, Action.RESET, Action.DISENGAGE)
-            return [await ask_robots(Reach(where, ("a",), "anna"), action) for action in acts]
+            return [await ask_robots(Destination(where, ("a",), "anna"), action) for action in acts]
 
     status, engage, reset, disengage = asyncio.run(story())
     assert sorted((answer.instance, answer.done) for answer in status) == [(1, True), (2, True)]

@@ -17,9 +17,9 @@ from common.wire.messages import Action, ControlReply, ControlRequest
 from common.wire.stop import StopAnswer, pack_stop_answer, read_stop
 from common.wire.topics import CONTROL, STOP
 from deploy.certificates.folder import stem
-from deploy.client.answer import Answer
+from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask_robots
-from deploy.client.reach import reach
+from deploy.client.destination import destination
 from deploy.harness.keys import make_keys, tls_of
 from deploy.ops.control.stop import stop_robots
 
@@ -37,8 +37,8 @@ def endpoint() -> str:
         return f"tls/127.0.0.1:{probe.getsockname()[1]}"
 
 
-def asked(at: str, keys: Path, who: str, *actions: Action) -> list[Answer]:
-    async def story() -> list[Answer]:
+def asked(at: str, keys: Path, who: str, *actions: Action) -> list[RobotAnswer]:
+    async def story() -> list[RobotAnswer]:
         config = LinkConfig(listen=[at], tls=tls_of(keys, Role.ROBOT, "robot-1"), access=ACCESS)
         async with open_link(config, "robot-1") as robot:
 
@@ -51,7 +51,7 @@ def asked(at: str, keys: Path, who: str, *actions: Action) -> list[Answer]:
 
             robot.answer(CONTROL, answer)
             robot.answer(STOP, answer)
-            where = reach([at], ["robot-1"], "nurse-1", certificate=keys / f"{who}.pem")
+            where = destination([at], ["robot-1"], "nurse-1", certificate=keys / f"{who}.pem")
             return [(await ask_robots(where, action))[0] for action in actions]
 
     return asyncio.run(story())
@@ -69,8 +69,8 @@ def test_an_operator_engages_and_whoever_is_not_named_does_not(keys: Path) -> No
 
 def test_a_secure_endpoint_asks_who_you_are() -> None:
     with pytest.raises(TandemError, match=r"who are you there\? Name your certificate by --certificate"):
-        reach(["tls/127.0.0.1:1"], ["robot-1"])
-    assert reach(["tcp/127.0.0.1:1"], ["robot-1"]).link.tls is None
+        destination(["tls/127.0.0.1:1"], ["robot-1"])
+    assert destination(["tcp/127.0.0.1:1"], ["robot-1"]).link.tls is None
 
 
 def test_the_master_s_file_lends_its_keys_but_no_doors_or_rules(keys: Path, tmp_path: Path) -> None:
@@ -84,12 +84,12 @@ def test_the_master_s_file_lends_its_keys_but_no_doors_or_rules(keys: Path, tmp_
         1,
     )
     (tmp_path / "master.toml").write_text(text)
-    link = reach(None, None, master=tmp_path / "master.toml").link
+    link = destination(None, None, master=tmp_path / "master.toml").link
     assert (link.connect, link.listen, link.mode) == (["tls/10.0.0.1:1"], [], "client")
     assert link.tls == own
     assert link.access is None
     other = tls_of(keys, Role.ROBOT, "robot-1").certificate
-    assert reach(None, None, master=tmp_path / "master.toml", certificate=other).link.tls == tls_of(
+    assert destination(None, None, master=tmp_path / "master.toml", certificate=other).link.tls == tls_of(
         keys, Role.ROBOT, "robot-1"
     )
 
@@ -99,7 +99,7 @@ def test_a_certificate_alone_is_no_key(keys: Path, tmp_path: Path) -> None:
     lonely.write_bytes((keys / lonely.name).read_bytes())
 
     async def story() -> None:
-        await ask_robots(reach(["tls/127.0.0.1:1"], ["r"], "a", certificate=lonely), Action.STATUS)
+        await ask_robots(destination(["tls/127.0.0.1:1"], ["r"], "a", certificate=lonely), Action.STATUS)
 
     with pytest.raises(LinkError, match=r"ca\.pem cannot be read \(No such file"):
         asyncio.run(story())
@@ -107,18 +107,18 @@ def test_a_certificate_alone_is_no_key(keys: Path, tmp_path: Path) -> None:
 
 def test_an_endpoint_that_is_none_is_still_told(keys: Path) -> None:
     with pytest.raises(ConfigError, match="expected a protocol out of"):
-        reach(["tsl/127.0.0.1:1"], ["r"], certificate=keys / "operator-nurse-1.pem")
+        destination(["tsl/127.0.0.1:1"], ["r"], certificate=keys / "operator-nurse-1.pem")
 
 
 def test_with_rules_a_robot_is_seen_and_stopped_by_those_named(keys: Path) -> None:
     at = endpoint()
 
-    async def story() -> list[Answer]:
+    async def story() -> list[RobotAnswer]:
         config = LinkConfig(listen=[at], tls=tls_of(keys, Role.ROBOT, "robot-1"), access=ACCESS)
         async with open_link(config, "robot-1") as robot:
             robot.answer(STOP, lambda *_: pack_stop_answer(StopAnswer(True, "estop", "stopped", 7)))
             robot.declare_alive("slave", 7, [at])
-            where = reach([at], [], "nurse-1", certificate=keys / "operator-nurse-1.pem")
+            where = destination([at], [], "nurse-1", certificate=keys / "operator-nurse-1.pem")
             return await stop_robots(where, everyone=True, within_s=5.0)
 
     (answer,) = asyncio.run(story())

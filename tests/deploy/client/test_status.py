@@ -21,7 +21,7 @@ from common.skeleton.load import profile_names
 from common.wire.codec import encode
 from common.wire.messages import BaseAttitude, RobotState
 from common.wire.topics import Topic
-from deploy.client.answer import Answer
+from deploy.client.answer import RobotAnswer
 from deploy.client.status import Heard, HeardOfAll, as_tree, decode_state, status_table
 from tests.published import master_metrics, slave_metrics
 
@@ -37,7 +37,7 @@ def state(joints: int = 25, bound_ns: int = 40_000) -> RobotState:
 
 
 def tree(heard: Heard) -> dict[str, object]:
-    return as_tree(Answer("robot-1", True, "follows anna", "track"), heard)
+    return as_tree(RobotAnswer("robot-1", True, "follows anna", "track"), heard)
 
 
 def heard() -> Heard:
@@ -99,7 +99,7 @@ def test_commands_that_were_due_are_counted_beside_both_figures() -> None:
 
 
 def test_a_robot_that_told_nothing_is_said_to_have_told_nothing() -> None:
-    said = as_tree(Answer("robot-1", False, "does not answer"), Heard())
+    said = as_tree(RobotAnswer("robot-1", False, "does not answer"), Heard())
     assert said["answers"] is False
     assert said["faults"] is None
     shown = rendered({"robot-1": said})
@@ -146,7 +146,7 @@ def rendered(robots: dict[str, dict[str, object]]) -> str:
 
 
 def test_one_of_two_of_a_name_is_shown_with_its_place() -> None:
-    answer = Answer("robot-1", True, "waits", "hold", 7, "room 1")
+    answer = RobotAnswer("robot-1", True, "waits", "hold", 7, "room 1")
     said = as_tree(answer, heard(), namesakes=1)
     assert (said["instance"], said["place"], said["namesakes"]) == (7, "room 1", 1)
     shown = rendered({"robot-1 00000007": said})

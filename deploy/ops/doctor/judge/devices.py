@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from deploy.ops.doctor.judge.finding import Finding, fail, ok, warn
-from deploy.ops.doctor.judge.needs import Camera
+from deploy.ops.doctor.judge.needs import CameraNeed
 from deploy.ops.doctor.read.devices import Device
 from deploy.ops.doctor.read.servos import Pinged
 from slave.servos.dynamixel.latency import BEST_MS, advice
@@ -44,15 +44,15 @@ def judge_latency(pinged: Pinged, reply_timeout_s: float) -> Finding:
     return ok(check, words)
 
 
-def judge_camera(source: Camera, device: Device, egl: bool, v4l2: bool) -> Finding:
+def judge_camera(source: CameraNeed, device: Device, egl: bool, v4l2: bool) -> Finding:
     """A robot runs without its camera, so none of this is fatal."""
     check = "camera"
     match source:
-        case Camera.OFF:
+        case CameraNeed.OFF:
             return ok(check, "off")
-        case Camera.DRAWN if not egl:
+        case CameraNeed.DRAWN if not egl:
             return warn(check, "no EGL to draw with", "apt install libegl1 libgl1-mesa-dri")
-        case Camera.DRAWN:
+        case CameraNeed.DRAWN:
             return ok(check, "drawn by EGL")
     if not v4l2:
         return warn(check, "the package that reads it is missing", "pip install 'tandem[v4l2]'")

@@ -27,7 +27,7 @@ GENERAL = "host"
 """The role where no file is given."""
 
 
-class Camera(StrEnum):
+class CameraNeed(StrEnum):
     """Where a slave's pictures come from."""
 
     OFF = "off"
@@ -59,7 +59,7 @@ class Needs:
     serial_ports: tuple[str, ...] = ()
     servos: DynamixelConfig | None = None
     """Those on a serial bus, which is one of the ports."""
-    camera: Camera = Camera.OFF
+    camera: CameraNeed = CameraNeed.OFF
     camera_device: str = ""
     link: LinkConfig = field(default_factory=LinkConfig)
     robots: tuple[str, ...] = ()
@@ -116,7 +116,7 @@ def _of_slave(config: SlaveConfig) -> Needs:
         servos=servos if isinstance(servos, DynamixelConfig) else None,
         realtime_priority=config.process.realtime_priority,
         serial_ports=tuple(ports),
-        camera=Camera(config.camera.source),
+        camera=CameraNeed(config.camera.source),
         camera_device=config.camera.device,
         link=config.link,
         certified_as=common_name(Role.ROBOT, config.robot),

@@ -14,7 +14,7 @@ TIMEOUT_S = 2.0
 _STREAMS = ("tcp", "tls", "ws")
 
 
-class Answer(StrEnum):
+class EndpointState(StrEnum):
     """What became of knocking at an endpoint, or of taking it."""
 
     ACCEPTS = "accepts"
@@ -37,7 +37,7 @@ class EndpointFacts:
     """One endpoint."""
 
     endpoint: str
-    answer: Answer
+    answer: EndpointState
 
 
 def _host_and_port(endpoint: str) -> tuple[str, int]:
@@ -50,25 +50,25 @@ async def knock(endpoint: str, timeout_s: float = TIMEOUT_S) -> EndpointFacts:
     """Open a connection and close it: no more than the endpoint's port is asked."""
     transport = transport_of(endpoint)
     if transport not in _STREAMS:
-        return EndpointFacts(endpoint, Answer.UNASKED)
+        return EndpointFacts(endpoint, EndpointState.UNASKED)
     try:
         async with asyncio.timeout(timeout_s):
             _, writer = await asyncio.open_connection(*_host_and_port(endpoint))
     except TimeoutError:
-        return EndpointFacts(endpoint, Answer.SILENT)
+        return EndpointFacts(endpoint, EndpointState.SILENT)
     except ConnectionRefusedError:
-        return EndpointFacts(endpoint, Answer.REFUSED)
+        return EndpointFacts(endpoint, EndpointState.REFUSED)
     except OSError:
-        return EndpointFacts(endpoint, Answer.UNKNOWN)
+        return EndpointFacts(endpoint, EndpointState.UNKNOWN)
     writer.close()
-    return EndpointFacts(endpoint, Answer.ACCEPTS)
+    return EndpointFacts(endpoint, EndpointState.ACCEPTS)
 
 
 def try_to_listen(endpoint: str) -> EndpointFacts:
     """Take the endpoint's port for a moment."""
     transport = transport_of(endpoint)
     if transport == "unixsock-stream":
-        return EndpointFacts(endpoint, Answer.FREE)  # Zenoh takes over what a dead process has left
+        return EndpointFacts(endpoint, EndpointState.FREE)  # Zenoh takes over what a dead process has left
     host, port = _host_and_port(endpoint)
     kind = socket.SOCK_STREAM if transport in _STREAMS else socket.SOCK_DGRAM
     try:
@@ -78,6 +78,6 @@ def try_to_listen(endpoint: str) -> EndpointFacts:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(address)
     except OSError as error:
-        answers = {errno.EADDRINUSE: Answer.TAKEN, errno.EACCES: Answer.FORBIDDEN}
-        return EndpointFacts(endpoint, answers.get(error.errno or 0, Answer.FOREIGN))
-    return EndpointFacts(endpoint, Answer.FREE)
+        answers = {errno.EADDRINUSE: EndpointState.TAKEN, errno.EACCES: EndpointState.FORBIDDEN}
+        return EndpointFacts(endpoint, answers.get(error.errno or 0, EndpointState.FOREIGN))
+    return EndpointFacts(endpoint, EndpointState.FREE)

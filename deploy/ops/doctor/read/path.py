@@ -10,7 +10,7 @@ from common.link import open_session
 from common.link.config import LinkConfig
 from common.wire.path_probe import probe
 from common.wire.topics import PATH
-from deploy.client.reach import ROUTER_S
+from deploy.client.destination import ROUTER_S
 
 SMALL_BYTES = 64
 SIZES = (1100, 1350, 4000, 16_000)

@@ -19,7 +19,7 @@ from common.wire.messages import Action, ClockReply
 from common.wire.presence import several_bear
 from common.wire.topics import CLOCK
 from deploy.client.ask import ask
-from deploy.client.reach import ROUTER_S, Reach
+from deploy.client.destination import ROUTER_S, Destination
 from deploy.client.status import HeardOfAll
 
 EXCHANGES = 20
@@ -53,12 +53,12 @@ async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) ->
 
     It only asks: it claims nothing, and listens at no endpoint, so a running master is not disturbed.
     """
-    where = Reach(link.model_copy(update={"listen": [], "access": None}), tuple(robots), operator)
+    where = Destination(link.model_copy(update={"listen": [], "access": None}), tuple(robots), operator)
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
         return await asyncio.gather(*(_read(session.link(robot), where) for robot in robots))
 
 
-async def _read(link: Link, where: Reach) -> RobotFacts:
+async def _read(link: Link, where: Destination) -> RobotFacts:
     all_heard = HeardOfAll(link)
     answers = await ask(link, where, Action.STATUS)
     if len(answers) > 1:

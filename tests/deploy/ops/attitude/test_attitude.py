@@ -18,7 +18,7 @@ from rich.console import Console
 
 from common.errors import TandemError
 from deploy import cli
-from deploy.ops.attitude.reading import Reading, Session, Span
+from deploy.ops.attitude.reading import AngleRange, AttitudeLog, Reading
 from deploy.ops.attitude.run import AttitudeOptions, show_attitude
 from deploy.ops.attitude.view import screen
 
@@ -36,11 +36,11 @@ def line() -> Iterator[tuple[int, str]]:
     os.close(held)
 
 
-def shown(options: AttitudeOptions) -> tuple[Session, str]:
+def shown(options: AttitudeOptions) -> tuple[AttitudeLog, str]:
     out = io.StringIO()
     console = Console(file=out, width=80)
 
-    async def show() -> Session:
+    async def show() -> AttitudeLog:
         return await show_attitude(options, asyncio.Event(), console)
 
     return asyncio.run(show()), out.getvalue()
@@ -76,7 +76,7 @@ def test_what_is_simulated_is_sent_as_frames(line: tuple[int, str]) -> None:
 def test_frames_are_shown_with_the_true_azimuth(line: tuple[int, str]) -> None:
     end, port = line
 
-    async def show() -> Session:
+    async def show() -> AttitudeLog:
         stop, out = asyncio.Event(), io.StringIO()
         options = AttitudeOptions(port=port, declination_deg=-2.5, as_json=True)
         showing = asyncio.create_task(show_attitude(options, stop, Console(file=out, width=80)))
@@ -102,15 +102,15 @@ def test_a_line_that_says_nothing_sensible_is_an_error_with_its_counts(line: tup
         shown(AttitudeOptions(port=line[1], seconds=0.1))
 
 
-def rendered(session: Session) -> str:
+def rendered(session: AttitudeLog) -> str:
     out = io.StringIO()
     Console(file=out, width=80).print(screen(session, 5.0, "here", {"refused": 3}))
     return out.getvalue()
 
 
 def test_the_screen_says_what_is_silent_and_what_was_refused() -> None:
-    assert "nothing yet" in rendered(Session())
-    session = Session()
+    assert "nothing yet" in rendered(AttitudeLog())
+    session = AttitudeLog()
     session.add(Reading(1.0, {"inclination": math.radians(10.04), "azimuth": math.radians(359.0)}))
     session.add(Reading(2.0, {"inclination": math.radians(9.86), "azimuth": math.radians(1.0)}))
     text = rendered(session)
@@ -119,7 +119,7 @@ def test_the_screen_says_what_is_silent_and_what_was_refused() -> None:
 
 
 def test_a_span_goes_over_the_end_of_a_turn() -> None:
-    span = Span()
+    span = AngleRange()
     assert span.ends is None
     for degrees in (1.0, None, 359.0, 2.0):
         span.add(None if degrees is None else math.radians(degrees))

@@ -18,8 +18,8 @@ from common.wire.messages import ControlReply
 from common.wire.presence import ProcessPresence
 from common.wire.stop import StopAnswer, pack_stop, pack_stop_answer, read_stop
 from common.wire.topics import STOP
-from deploy.client.answer import Answer
-from deploy.client.reach import Reach
+from deploy.client.answer import RobotAnswer
+from deploy.client.destination import Destination
 from deploy.ops.control.stop import OnAnswer, repeat_until_stopped, stop_robots
 from deploy.ops.control.stop_count import StopCount
 
@@ -55,8 +55,10 @@ def shown(instance: int) -> ProcessPresence:
     return ProcessPresence("robot-1", "slave", instance, 3, "1.0", f"room {instance}")
 
 
-async def stopped(road: Road, count: StopCount, within_s: float = 20.0, settled: bool = True) -> list[Answer]:
-    told: list[Answer] = []
+async def stopped(
+    road: Road, count: StopCount, within_s: float = 20.0, settled: bool = True
+) -> list[RobotAnswer]:
+    told: list[RobotAnswer] = []
     known = asyncio.Event()
     if settled:
         known.set()
@@ -166,11 +168,11 @@ async def robots(**at: str) -> AsyncIterator[dict[str, list[str]]]:
 
 def stop(
     at: dict[str, str], there: dict[str, str], named: tuple[str, ...], everyone: bool
-) -> tuple[list[Answer], dict[str, list[str]]]:
-    async def story() -> tuple[list[Answer], dict[str, list[str]]]:
+) -> tuple[list[RobotAnswer], dict[str, list[str]]]:
+    async def story() -> tuple[list[RobotAnswer], dict[str, list[str]]]:
         async with robots(**there) as asked:
-            where = Reach(LinkConfig(connect=list(at.values())), named, "anna")
-            told: list[Answer] = []
+            where = Destination(LinkConfig(connect=list(at.values())), named, "anna")
+            told: list[RobotAnswer] = []
             answers = await stop_robots(where, everyone, told.append, within_s=1.5)
             assert sorted(map(str, told)) == sorted(map(str, answers))
             return answers, asked
@@ -212,19 +214,19 @@ def test_all_that_reaches_no_robot_says_so() -> None:
 def test_through_routers_one_answer_is_enough_and_none_an_error() -> None:
     dead, router = endpoint(), endpoint()
 
-    async def story() -> list[Answer]:
+    async def story() -> list[RobotAnswer]:
         def through(*routers: str) -> LinkConfig:
             return LinkConfig(mode="client", connect=list(routers))
 
         with pytest.raises(LinkError, match=f"no router answered at {dead}"):
-            await stop_robots(Reach(through(dead), ("a",), "anna"), False, within_s=0.2)
+            await stop_robots(Destination(through(dead), ("a",), "anna"), False, within_s=0.2)
         async with (
             open_session(LinkConfig(listen=[router]), "router"),
             open_link(through(router), "a") as robot,
         ):
             robot.answer(STOP, lambda _payload, _ns: ACKNOWLEDGED)
             robot.declare_alive("slave")
-            return await stop_robots(Reach(through(dead, router), (), "anna"), True, within_s=5.0)
+            return await stop_robots(Destination(through(dead, router), (), "anna"), True, within_s=5.0)
 
     answers = asyncio.run(story())
     assert [(answer.robot, answer.done) for answer in answers] == [("a", True)]
@@ -235,7 +237,7 @@ def test_through_routers_one_answer_is_enough_and_none_an_error() -> None:
 def test_two_of_one_name_are_both_stopped_and_told_by_address(through_a_router: bool, everyone: bool) -> None:
     asked: list[int] = []
 
-    async def story() -> list[Answer]:
+    async def story() -> list[RobotAnswer]:
         at = [endpoint(), endpoint()]
         where = LinkConfig(connect=at)
         links = [LinkConfig(listen=[each]) for each in at]
@@ -254,7 +256,7 @@ def test_two_of_one_name_are_both_stopped_and_told_by_address(through_a_router: 
                 robot.answer(STOP, answer)
                 robot.declare_alive("slave", number, [f"room {number}"])
             named = () if everyone else ("a",)
-            return await stop_robots(Reach(where, named, "anna"), everyone, within_s=2.0)
+            return await stop_robots(Destination(where, named, "anna"), everyone, within_s=2.0)
 
     answers = asyncio.run(story())
     assert sorted((answer.instance, answer.done) for answer in answers) == [(1, True), (2, True)]
@@ -262,7 +264,7 @@ def test_two_of_one_name_are_both_stopped_and_told_by_address(through_a_router: 
 
 
 def test_one_of_two_that_shows_itself_and_hangs_is_not_called_stopped() -> None:
-    async def story() -> list[Answer]:
+    async def story() -> list[RobotAnswer]:
         at = [endpoint(), endpoint()]
         async with (
             open_link(LinkConfig(listen=[at[0]]), "a") as one,
@@ -271,7 +273,7 @@ def test_one_of_two_that_shows_itself_and_hangs_is_not_called_stopped() -> None:
             one.answer(STOP, lambda *_: pack_stop_answer(StopAnswer(True, "estop", "stopped", 1)))
             one.declare_alive("slave", 1, ["room 1"])
             other.declare_alive("slave", 2, ["room 2"])
-            return await stop_robots(Reach(LinkConfig(connect=at), ("a",), "anna"), False, within_s=1.0)
+            return await stop_robots(Destination(LinkConfig(connect=at), ("a",), "anna"), False, within_s=1.0)
 
     one, other = asyncio.run(story())
     assert (one.done, one.instance) == (True, 1)

@@ -13,7 +13,7 @@ from rich.console import Console
 from common.errors import ConfigError, TandemError
 from deploy import cli
 from deploy.ops.doctor.judge.finding import Grade, fail, ok, warn, worst
-from deploy.ops.doctor.judge.needs import Camera, needs_of
+from deploy.ops.doctor.judge.needs import CameraNeed, needs_of
 from deploy.ops.doctor.view import as_table, as_tree, in_words
 from master.suit.protocol import SHIPPED_DBC, SuitProtocol
 
@@ -44,7 +44,7 @@ def test_a_slave_s_file_tells_its_ports_and_camera() -> None:
     needs = needs_of(EXAMPLES / "slave.toml", instrument)
     assert (needs.role, needs.certified_as) == ("slave", "robot:robot-1")
     assert needs.serial_ports == ("/dev/ttyUSB3",)
-    assert needs.camera is Camera.DRAWN
+    assert needs.camera is CameraNeed.DRAWN
     assert needs.buses == ()
     drives = needs_of(EXAMPLES / "slave.toml", ['servos.backend="canopen"'])
     assert [need.bus.name for need in drives.buses] == ["left", "right"]

@@ -22,7 +22,7 @@ from deploy.ops.doctor.judge.machine import (
     judge_machine,
     judge_receive_buffer,
 )
-from deploy.ops.doctor.judge.needs import BusNeed, Camera
+from deploy.ops.doctor.judge.needs import BusNeed, CameraNeed
 from deploy.ops.doctor.judge.process import judge_memory_lock, judge_networks, judge_realtime
 from deploy.ops.doctor.read.can import ask_ip, read_can
 from deploy.ops.doctor.read.clock import clock_is_synchronised
@@ -325,12 +325,12 @@ def test_a_camera_is_never_fatal(host: Host) -> None:
     there, missing = Device("/dev/video0", True, True), Device("/dev/video0", False, False)
     forbidden = Device("/dev/video0", True, False)
 
-    def verdict(source: Camera, device: Device, egl: bool = True, v4l2: bool = True) -> Grade:
+    def verdict(source: CameraNeed, device: Device, egl: bool = True, v4l2: bool = True) -> Grade:
         return judge_camera(source, device, egl, v4l2).verdict
 
-    assert verdict(Camera.OFF, missing, egl=False, v4l2=False) is Grade.OK
-    assert verdict(Camera.DRAWN, missing) is Grade.OK
-    assert verdict(Camera.DRAWN, missing, egl=False) is Grade.WARN
-    assert verdict(Camera.V4L2, there) is Grade.OK
-    assert verdict(Camera.V4L2, there, v4l2=False) is Grade.WARN
-    assert verdict(Camera.V4L2, missing) is verdict(Camera.V4L2, forbidden) is Grade.WARN
+    assert verdict(CameraNeed.OFF, missing, egl=False, v4l2=False) is Grade.OK
+    assert verdict(CameraNeed.DRAWN, missing) is Grade.OK
+    assert verdict(CameraNeed.DRAWN, missing, egl=False) is Grade.WARN
+    assert verdict(CameraNeed.V4L2, there) is Grade.OK
+    assert verdict(CameraNeed.V4L2, there, v4l2=False) is Grade.WARN
+    assert verdict(CameraNeed.V4L2, missing) is verdict(CameraNeed.V4L2, forbidden) is Grade.WARN

@@ -28,7 +28,7 @@ from deploy.ops.doctor.judge.finding import Finding, Grade
 from deploy.ops.doctor.judge.keys import SOON_DAYS, judge_keys
 from deploy.ops.doctor.judge.needs import Needs
 from deploy.ops.doctor.judge.robots import OLDEST_MS, judge_robot
-from deploy.ops.doctor.read.endpoints import Answer, EndpointFacts, knock, try_to_listen
+from deploy.ops.doctor.read.endpoints import EndpointFacts, EndpointState, knock, try_to_listen
 from deploy.ops.doctor.read.keys import KeyFacts, read_keys
 from deploy.ops.doctor.read.robots import EXCHANGES, RobotFacts, read_robots
 from tests.published import slave_metrics
@@ -116,26 +116,29 @@ def test_knocking_at_a_door_that_is_open_and_at_one_that_is_not() -> None:
         door.bind(("127.0.0.1", 0))
         door.listen()
         endpoint = f"tcp/127.0.0.1:{door.getsockname()[1]}"
-        assert asyncio.run(knock(endpoint)).answer is Answer.ACCEPTS
-        assert try_to_listen(endpoint).answer is Answer.TAKEN
-    assert asyncio.run(knock(endpoint)).answer is Answer.REFUSED
-    assert try_to_listen(endpoint).answer is Answer.FREE
-    assert asyncio.run(knock("udp/127.0.0.1:9")).answer is Answer.UNASKED
-    assert try_to_listen("udp/127.0.0.1:0".replace(":0", ":47447")).answer in (Answer.FREE, Answer.TAKEN)
-    assert asyncio.run(knock("tcp/no-such-host.invalid:7447")).answer is Answer.UNKNOWN
-    assert try_to_listen("tcp/192.0.2.1:7447").answer is Answer.FOREIGN
+        assert asyncio.run(knock(endpoint)).answer is EndpointState.ACCEPTS
+        assert try_to_listen(endpoint).answer is EndpointState.TAKEN
+    assert asyncio.run(knock(endpoint)).answer is EndpointState.REFUSED
+    assert try_to_listen(endpoint).answer is EndpointState.FREE
+    assert asyncio.run(knock("udp/127.0.0.1:9")).answer is EndpointState.UNASKED
+    assert try_to_listen("udp/127.0.0.1:0".replace(":0", ":47447")).answer in (
+        EndpointState.FREE,
+        EndpointState.TAKEN,
+    )
+    assert asyncio.run(knock("tcp/no-such-host.invalid:7447")).answer is EndpointState.UNKNOWN
+    assert try_to_listen("tcp/192.0.2.1:7447").answer is EndpointState.FOREIGN
 
 
-@pytest.mark.parametrize("answer", Answer)
-def test_every_answer_is_judged_with_what_to_do(answer: Answer) -> None:
+@pytest.mark.parametrize("answer", EndpointState)
+def test_every_answer_is_judged_with_what_to_do(answer: EndpointState) -> None:
     finding = judge_endpoint(EndpointFacts("tcp/h:1", answer))
-    well = answer in (Answer.ACCEPTS, Answer.UNASKED, Answer.FREE)
+    well = answer in (EndpointState.ACCEPTS, EndpointState.UNASKED, EndpointState.FREE)
     assert (finding.verdict is Grade.OK) == well
     assert bool(finding.advice) != well
 
 
 def test_a_secure_knock_counts_as_a_refused_handshake() -> None:
-    counts = {e: "refused handshake" in judge_endpoint(EndpointFacts(e, Answer.ACCEPTS)).found for e in
+    counts = {e: "refused handshake" in judge_endpoint(EndpointFacts(e, EndpointState.ACCEPTS)).found for e in
               ("tls/h:1", "tcp/h:1", "ws/h:1")}  # fmt: skip
     assert counts == {"tls/h:1": True, "tcp/h:1": False, "ws/h:1": False}
 

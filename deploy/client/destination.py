@@ -1,4 +1,4 @@
-"""Which robots a person means, where they are, in whose name he asks: from options or the master's file."""
+"""Which robots a person means, where they are, and in whose name: from options or from the master's file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROUTER_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
+class Destination:
     """Endpoints to connect to, robots by name, and who asks."""
 
     link: LinkConfig
@@ -28,13 +28,13 @@ class Reach:
     operator: str = ""
 
 
-def reach(
+def destination(
     connect: Sequence[str] | None,
     robots: Sequence[str] | None,
     operator: str = "",
     master: Path | None = None,
     certificate: Path | None = None,
-) -> Reach:
+) -> Destination:
     """What the command line says; what it leaves out comes from the master's file, where one is named.
 
     Keys, access through a router and quality of service are the file's; a `certificate` is a person's own.
@@ -53,7 +53,7 @@ def reach(
         )
     link = _link_of(file, endpoints, certificate)
     named = dict.fromkeys(robots or (file.commanded if file else ()))
-    return Reach(link, tuple(named), operator or (file.operator.name if file else ""))
+    return Destination(link, tuple(named), operator or (file.operator.name if file else ""))
 
 
 def _link_of(file: MasterConfig | None, endpoints: list[str], certificate: Path | None) -> LinkConfig:
