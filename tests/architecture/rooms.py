@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from fnmatch import fnmatch
 
-from tests.architecture.imports import SourceTree, circles
+from tests.architecture.imports import SourceTree
 
 ORDER: Sequence[Sequence[str]] = [
     ["deploy"],
@@ -18,7 +18,10 @@ ORDER: Sequence[Sequence[str]] = [
     ["master/joint_angles"],
     ["master/orientation"],
     ["master/suit"],
-    ["slave/guard", "slave/track", "slave/limit", "slave/servos", "slave/attitude", "slave/camera"],
+    ["slave/camera"],
+    ["slave/servos", "slave/track"],
+    ["slave/limit"],
+    ["slave/guard", "slave/attitude"],
     ["slave/encoders"],
     ["common/link"],
     ["common/latency", "common/reach"],
@@ -28,12 +31,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["common"],
 ]  # fmt: skip
 """Rooms from the top down. A file imports its own room and the rooms below; `common` is its top files alone.
-Rooms on one line do not import each other, but for those of the slave, where only circles are wrong."""
-
-KNOWN_WRONG: set[tuple[str, str]] = set()
-"""Imports against the order that still stand. Delete an entry with its import; the end is an empty set."""
-KNOWN_CIRCLES: Sequence[set[str]] = []
-"""Circles of files and of folders that still stand, or a part of each. The end is an empty list."""
+Rooms on one line do not import each other."""
 
 IMPURE = [
     "common/clock.py", "common/can/*", "common/link/*", "common/log/handler.py", "common/log/streams.py",
@@ -58,14 +56,12 @@ def against_the_order(tree: SourceTree) -> list[str]:
     for each in tree.imports:
         path = tree.where(each.source)
         place = f"{path}:{each.line} imports {each.target}"
-        if (path, each.target) in KNOWN_WRONG:
-            continue
         if each.target.partition(".")[0] == "tests":
             wrong.append(place)
         elif each.target in tree.paths:
             source, target = room_of(path), room_of(tree.where(each.target))
             others = {source.partition("/")[0], target.partition("/")[0]} == {"master", "slave"}
-            sideways = level[source] == level[target] and not source.startswith("slave/")
+            sideways = level[source] == level[target]
             if source != target and (level[source] > level[target] or sideways or others):
                 wrong.append(place)
     return wrong
@@ -96,9 +92,3 @@ def impure(tree: SourceTree) -> list[str]:
         and each.target.partition(".")[0] in RIM
         and not any(fnmatch(path, pattern) for pattern in IMPURE)
     ]
-
-
-def new_circles(tree: SourceTree) -> list[tuple[str, ...]]:
-    """Circles of files and of folders that are not known."""
-    found = circles(tree.files) + circles(tree.folders)
-    return [ring for ring in found if not any(set(ring) <= known for known in KNOWN_CIRCLES)]

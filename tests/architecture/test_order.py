@@ -5,14 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.architecture.imports import PACKAGES, ROOT, SourceTree
+from tests.architecture.imports import PACKAGES, ROOT, SourceTree, circles
 from tests.architecture.rooms import (
     IMPURE,
     ORDER,
     against_the_order,
     between_siblings,
     impure,
-    new_circles,
 )
 
 
@@ -21,7 +20,8 @@ def test_imports_follow_the_order_of_the_rooms(tree: SourceTree) -> None:
 
 
 def test_no_circle_of_files_or_folders(tree: SourceTree) -> None:
-    assert new_circles(tree) == []
+    assert circles(tree.files) == []
+    assert circles(tree.folders) == []
 
 
 def test_experiments_and_ops_do_not_import_their_siblings(tree: SourceTree) -> None:
@@ -99,7 +99,7 @@ def test_a_planted_circle_of_files_is_found(plant: Plant) -> None:
         master__b="if TYPE_CHECKING:\n    import master.c",
         master__c="import master.a",
     )
-    assert new_circles(tree) == [("master.a", "master.b", "master.c")]
+    assert circles(tree.files) == [("master.a", "master.b", "master.c")]
 
 
 def test_a_planted_circle_of_folders_is_found(plant: Plant) -> None:
@@ -109,7 +109,7 @@ def test_a_planted_circle_of_folders_is_found(plant: Plant) -> None:
         slave__servos__c="from slave.camera import d",
         slave__camera__d="",
     )
-    assert new_circles(tree) == [("slave/camera", "slave/servos")]
+    assert circles(tree.folders) == [("slave/camera", "slave/servos")]
 
 
 @pytest.mark.parametrize("room", ["experiments", "ops"])
