@@ -15,7 +15,7 @@ from common.skeleton import Skeleton, load_skeleton
 from master.orientation.config import EstimationConfig
 from master.orientation.filters import filter_mistakes
 from master.suit.nodes import NodeConfig, wiring_mistakes
-from master.suit.plausibility import PlausibilityConfig
+from master.suit.plausibility_config import PlausibilityConfig
 
 RobotName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
 

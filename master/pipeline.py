@@ -23,8 +23,9 @@ from master.orientation.estimator import Estimator
 from master.suit.doubt import Doubts, NodeDoubt, Weight, refusal, together
 from master.suit.nodes import NodeConfig
 from master.suit.plausibility import PlausibilityWatch
-from master.suit.poll import Poll, Sweep
+from master.suit.poll import Poll
 from master.suit.protocol import SuitProtocol
+from master.suit.sweep import Sweep
 
 MOST_BRIDGED = 20
 """Ticks (0.1 s); what the operator did in a longer stall cannot be told from its ends."""

@@ -12,9 +12,9 @@ from common.quaternion import Array
 from common.recording import McapRecorder
 from master.config import MasterConfig
 from master.suit.capture import OnSweep, SuitCapture
-from master.suit.poll import Sweep
 from master.suit.protocol import SuitProtocol
 from master.suit.recorded import TOPIC, describe, encode_sweep
+from master.suit.sweep import Sweep
 
 
 def names(config: MasterConfig) -> tuple[str, ...]:

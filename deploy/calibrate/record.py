@@ -50,7 +50,7 @@ async def _record(
     from common.process.realtime import enter_real_time
     from common.process.runtime import until_stopped
     from deploy.calibrate import capture as shared
-    from master.suit.poll import Sweep
+    from master.suit.sweep import Sweep
 
     if out.suffix.lower() != ".mcap":
         raise TandemError(f"{out}: expected a name that ends in .mcap")

@@ -12,8 +12,9 @@ from common.metrics.tree import to_tree
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from master.suit.nodes import NodeConfig
-from master.suit.poll import Poll, Sweep
+from master.suit.poll import Poll
 from master.suit.protocol import SuitProtocol
+from master.suit.sweep import Sweep
 
 OnSweep = Callable[[Sweep], None]
 

@@ -9,7 +9,6 @@ counted. Frames are only put aside as they arrive, and decoded together when the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,32 +25,12 @@ from master.suit.number import number_of
 from master.suit.presence import NodePresence
 from master.suit.protocol import MAG_OVERFLOW, NO_VALUE, READINGS, SuitProtocol
 from master.suit.silence import BusSigns
+from master.suit.sweep import Sweep
 
 _IDS = 0x800
 """Identifiers of 11 bits."""
 _FRAMES_PER_PART = 16
 """Room in a window for each frame that is expected; a bus with more than that babbles."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sweep:
-    """One tick's answers, in node order. Where a node is not fresh its last good readings stand."""
-
-    tick: int
-    sampled_ns: int
-    """SYNC sent."""
-    frames_in_ns: int
-    """The last awaited node answered, or the window closed without it."""
-    acc_m_s2: Array
-    """(N, 3) specific force, sensor frame; zero before the first answer."""
-    gyr_rad_s: Array
-    """(N, 3) rotation rate, sensor frame; zero before the first answer."""
-    mag_ut: Array
-    """(N, 3) magnetic field, sensor frame; a row of NaN where there is no reading."""
-    fresh: Mask
-    """(N,) answered this tick soundly."""
-    lost: Mask
-    """(N,) missing for `lost_after` ticks or more, or never heard yet."""
 
 
 class Poll:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from common.errors import RecordingError
 from common.recording import read_recording
 from common.wire.messages import Mask
-from master.suit.poll import Sweep
+from master.suit.sweep import Sweep
 
 TOPIC = "suit/readings"
 VERSION = 1

@@ -12,7 +12,11 @@ from deploy.calibrate.options import HemisphereOption
 from deploy.report.options import AsJson, Overrides, ReportFile
 
 if TYPE_CHECKING:
-    from deploy.calibrate.live.guide import What
+    import asyncio
+
+    from deploy.calibrate.live.guide import GuideOptions, What
+    from deploy.calibrate.live.run import LiveRecordings
+    from master.config import MasterConfig
 
 
 def live(
@@ -56,10 +60,8 @@ def live(
     """
     from common.config.load import load_config
     from common.errors import TandemError
-    from common.process.runtime import run as run_until_stopped
     from deploy.calibrate.live.compute import Choice, compute
     from deploy.calibrate.live.guide import GuideOptions
-    from deploy.calibrate.live.run import LiveRecordings, LiveSession
     from deploy.calibrate.session import make_folder, tell_machines
     from master.calibrate.magnetometer_axes import hemisphere_named
     from master.config import MasterConfig
@@ -70,29 +72,36 @@ def live(
     console = Console(stderr=True)
     by_word = console.is_terminal
     options = GuideOptions(wanted, still_s, attitudes, coverage, tumble_s, limber_s=limber_s, by_word=by_word)
-    session = LiveRecordings()
-
-    async def guide(stop: object) -> None:
-        import asyncio
-
-        nonlocal session
-        assert isinstance(stop, asyncio.Event)
-        led = LiveSession(checked, options, out, console)
-        session = led.session
-        await led.run(stop)
-
-    run_until_stopped(guide)
-    if not session.finished:
-        kept = ", ".join(str(path) for path in (session.tray, session.worn) if path is not None)
-        raise TandemError(
-            f"stopped before the end; recorded so far: {kept or 'nothing'}. "
-            "`tandem calibrate imu`, `mag` and `align` can read it"
-        )
+    session = _guided(checked, options, out, console)
     choice = Choice(wanted, gravity, still_s, hemisphere_named(hemisphere), pictures)
     figures, refusals = compute(checked, session, choice, out, console)
     tell_machines(figures, report, to_stdout=as_json)
     if refusals:
         raise TandemError("\n".join(refusals))
+
+
+def _guided(config: MasterConfig, options: GuideOptions, out: Path, console: Console) -> LiveRecordings:
+    """Lead the person through the steps and record them. Raises TandemError where it was stopped early."""
+    from common.errors import TandemError
+    from common.process.runtime import run as run_until_stopped
+    from deploy.calibrate.live.run import LiveRecordings, LiveSession
+
+    recorded = LiveRecordings()
+
+    async def guide(stop: asyncio.Event) -> None:
+        nonlocal recorded
+        session = LiveSession(config, options, out, console)
+        recorded = session.session
+        await session.run(stop)
+
+    run_until_stopped(guide)
+    if not recorded.finished:
+        kept = ", ".join(str(path) for path in (recorded.tray, recorded.worn) if path is not None)
+        raise TandemError(
+            f"stopped before the end; recorded so far: {kept or 'nothing'}. "
+            "`tandem calibrate imu`, `mag` and `align` can read it"
+        )
+    return recorded
 
 
 def parts(text: str) -> tuple[What, ...]:

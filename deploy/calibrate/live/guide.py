@@ -14,18 +14,8 @@ from typing import Literal
 import numpy as np
 
 from common.quaternion import Array
-from deploy.calibrate.live.steps import (
-    WINDOW_S,
-    AttitudesStep,
-    MoveJointsStep,
-    NodeProgress,
-    ReadingsWindow,
-    Step,
-    TumbleStep,
-    WearStep,
-    ZeroPoseStep,
-    summed_up,
-)
+from deploy.calibrate.live.steps import AttitudesStep, MoveJointsStep, TumbleStep, WearStep, ZeroPoseStep
+from deploy.calibrate.live.window import WINDOW_S, NodeProgress, ReadingsWindow, Step, summed_up
 
 What = Literal["imu", "mag", "align"]
 WHATS: tuple[What, ...] = ("imu", "mag", "align")

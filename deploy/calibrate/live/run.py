@@ -19,7 +19,7 @@ from deploy.calibrate import capture as shared
 from deploy.calibrate.live.guide import Guide, GuideOptions, StepName, View
 from deploy.calibrate.live.screen import line, screen
 from master.config import MasterConfig
-from master.suit.poll import Sweep
+from master.suit.sweep import Sweep
 
 _SHOW_S = 0.2
 _LOG_S = 5.0

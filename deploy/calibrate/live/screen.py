@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from deploy.calibrate.live.guide import View
-from deploy.calibrate.live.steps import NodeProgress
+from deploy.calibrate.live.window import NodeProgress
 
 _FEW = 12
 """More nodes than this are shown in two columns."""

@@ -20,9 +20,11 @@ from master.joint_angles.solver import JointSolver
 from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
 from master.suit.nodes import NodeConfig
-from master.suit.plausibility import BLOCK, PlausibilityConfig, PlausibilityWatch
-from master.suit.poll import Poll, Sweep
+from master.suit.plausibility import BLOCK, PlausibilityWatch
+from master.suit.plausibility_config import PlausibilityConfig
+from master.suit.poll import Poll
 from master.suit.protocol import SuitProtocol
+from master.suit.sweep import Sweep
 
 BUS = "suit"
 RATE_HZ = 200

@@ -15,9 +15,8 @@ from common.quaternion import (
     to_matrix,
     to_rotation_vector,
 )
-from master.orientation.ekf import (
-    EkfConfig,
-    EkfFilter,
+from master.orientation.ekf import EkfConfig, EkfFilter
+from master.orientation.ekf_equations import (
     heading_update,
     predict,
     propagate,

@@ -9,8 +9,9 @@ from common.can.frame import CanFrame
 from master.suit.health import NodeHealth
 from master.suit.nodes import NodeConfig
 from master.suit.number import number_of
-from master.suit.poll import Poll, Sweep
+from master.suit.poll import Poll
 from master.suit.protocol import SuitProtocol
+from master.suit.sweep import Sweep
 
 PROTOCOL = SuitProtocol.load()
 LOST_AFTER = 3

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from master.suit.chance import NEVER, RepeatChance, longest_repeat
-from master.suit.plausibility import PlausibilityConfig, PlausibilityWatch
-from master.suit.poll import Sweep
+from master.suit.plausibility import PlausibilityWatch
+from master.suit.plausibility_config import PlausibilityConfig
 from master.suit.protocol import SuitProtocol
+from master.suit.sweep import Sweep
 
 SCALE = SuitProtocol.load().fd.scale
 YEAR = 6 * 36 * 200.0 * 365.25 * 86400

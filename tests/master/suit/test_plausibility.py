@@ -10,7 +10,8 @@ import pytest
 from common.quaternion import Array
 from deploy.sim.suit.lies import LieKind
 from master.suit.doubt import Weight
-from master.suit.plausibility import PlausibilityConfig, PlausibilityWatch
+from master.suit.plausibility import PlausibilityWatch
+from master.suit.plausibility_config import PlausibilityConfig
 from tests.master.test_pipeline import Bench
 
 NODE = "right_forearm"
@@ -152,8 +153,8 @@ def still_counts() -> np.ndarray:
 
 def judged(counts: np.ndarray, **settings: object) -> list[str]:
     """Words that were said of a single node."""
-    from master.suit.poll import Sweep
     from master.suit.protocol import SuitProtocol
+    from master.suit.sweep import Sweep
 
     scale = SuitProtocol.load().fd.scale
     watch = PlausibilityWatch(PlausibilityConfig.model_validate(settings), 1, 200.0, scale)

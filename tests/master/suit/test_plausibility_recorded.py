@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from master.suit.plausibility import PlausibilityConfig, PlausibilityWatch
-from master.suit.poll import Sweep
+from master.suit.plausibility import PlausibilityWatch
+from master.suit.plausibility_config import PlausibilityConfig
 from master.suit.protocol import SuitProtocol
+from master.suit.sweep import Sweep
 
 SCALE = SuitProtocol.load().fd.scale
 BROAD = ("02_undisturbed_slow_rotation_B", "06_undisturbed_fast_rotation_A", "25_disturbed_tapping_B")

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from common.errors import RecordingError
 from common.recording import McapRecorder
 from master.calibrate.recording import load_recordings
-from master.suit.poll import Sweep
 from master.suit.recorded import TOPIC, describe, encode_sweep, read_sweeps
+from master.suit.sweep import Sweep
 
 NODES = ("hand", "thumb", "index")
 

@@ -27,7 +27,7 @@ from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.imperfections import Imperfections
 from deploy.sim.suit.suit import Wearer, _wearer
 from master.config import MasterConfig
-from master.suit.poll import Sweep
+from master.suit.sweep import Sweep
 
 SEED = 7
 RATE_HZ = 50
