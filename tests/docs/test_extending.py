@@ -22,7 +22,7 @@ from common.config.load import check_config
 from common.skeleton import load_skeleton
 from common.wire.messages import Action
 from deploy.measure import motion
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 from master.orientation.config import EstimationConfig
 from master.orientation.filter import FilterSection
 from master.orientation.filters import FILTERS
@@ -131,15 +131,15 @@ def files_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
 
 @pytest.mark.usefixtures("files_of_the_page")
 def test_a_robot_of_the_profile_follows_the_operator() -> None:
-    run = VirtualRun(World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile="one_arm"))
+    run = VirtualWorld(
+        WorldSettings(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile="one_arm")
+    )
     run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
     run.run(1.0)
     reply = run.ask(Action.ENGAGE)
     assert reply.done, reply.text
     run.run(20.0)
     assert run.slave.guard.state == "track", run.slave.guard.reason
-    for state in run.states:
-        run.trace.add(state)
     moved = motion(run.trace.truth(), run.trace.moved(), run.trace.joint_names)
     assert moved is not None
     assert set(moved.joints) == {"raise", "bend"}

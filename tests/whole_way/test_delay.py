@@ -10,10 +10,11 @@ import pytest
 
 from common.clock import NS_PER_MS
 from common.wire.messages import Action
-from deploy.experiments.following import SETTLE_S, SLOW, engaged, follow, moved
-from deploy.measure import FollowedMotion, motion
+from deploy.experiments.following import SLOW
+from deploy.measure import FollowedMotion
 from deploy.sim.network.profile import Profile, Way, load_profile
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import ALIGN_S, VirtualWorld, WorldSettings
+from tests.whole_way.runs import engaged, follow, judged
 
 ROUND_S = 16.0
 """Of the operator's motion."""
@@ -31,31 +32,26 @@ class Pair:
 
 @cache
 def pair(profile: str, seed: int) -> Pair:
-    world = World(network=load_profile(profile), network_seed=seed)
-    latest, predict = (follow(world, strategy, ROUND_S).motion for strategy in ("latest", "predict"))
-    assert latest is not None
-    assert predict is not None
-    return Pair(latest, predict)
+    world = WorldSettings(network=load_profile(profile), network_seed=seed)
+    return Pair(*(judged(follow(world, strategy, ROUND_S)) for strategy in ("latest", "predict")))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("profile", "most"), [("4g", 0.4), ("intercontinental", 0.5)])
 def test_the_patient_sees_the_nurses_now(profile: str, most: float, seed: int) -> None:
-    judged = pair(profile, seed)
-    assert judged.share <= most
-    assert judged.predict.roughness is not None
-    assert judged.predict.roughness <= 3.0
-    assert judged.predict.lag_ms is not None
-    assert judged.latest.lag_ms is not None
-    assert abs(judged.predict.lag_ms) <= 0.5 * judged.latest.lag_ms
+    found = pair(profile, seed)
+    assert found.share <= most
+    assert found.predict.roughness is not None
+    assert found.predict.roughness <= 3.0
+    assert found.predict.lag_ms is not None
+    assert found.latest.lag_ms is not None
+    assert abs(found.predict.lag_ms) <= 0.5 * found.latest.lag_ms
 
 
 def test_100_ms_with_jitter_and_loss_still_halves_the_error() -> None:
     far = Profile(both=Way(delay_ms=100.0, jitter_ms=5.0, loss_percent=0.5))
-    world = World(network=far, network_seed=1)
-    latest, predict = (follow(world, strategy, ROUND_S).motion for strategy in ("latest", "predict"))
-    assert latest is not None
-    assert predict is not None
+    world = WorldSettings(network=far, network_seed=1)
+    latest, predict = (judged(follow(world, strategy, ROUND_S)) for strategy in ("latest", "predict"))
     assert predict.rmse_deg <= 0.5 * latest.rmse_deg
     assert predict.roughness is not None
     assert predict.roughness <= 3.0
@@ -66,10 +62,10 @@ def plain(delay_ms: float) -> Profile:
 
 
 @pytest.fixture(scope="module")
-def there_and_back() -> VirtualRun:
+def there_and_back() -> VirtualWorld:
     """30 ms one way, 150 ms for 8 s, then 30 ms. The jump itself is a silence of 200 ms."""
     slave = [*SLOW, "guard.command_timeout_s=0.4"]
-    run = engaged(World(network=plain(30.0), overrides={"slave": slave}))
+    run = engaged(WorldSettings(network=plain(30.0), overrides={"slave": slave}))
     for delay_ms, seconds in ((30.0, 8.0), (150.0, 8.0), (30.0, 8.0)):
         run.link.set(plain(delay_ms), run.now_ns)
         run.run(seconds)
@@ -77,19 +73,18 @@ def there_and_back() -> VirtualRun:
 
 
 def test_a_delay_that_jumps_and_returns_neither_stops_nor_shakes_the_robot(
-    there_and_back: VirtualRun,
+    there_and_back: VirtualWorld,
 ) -> None:
     run = there_and_back
     assert run.slave.guard.state == "track", run.slave.guard.reason
     assert not run.slave.guard.counters.losses
     assert not run.slave.guard.counters.doubts
-    judged = motion(run.trace.truth(), moved(run), run.trace.joint_names)
-    assert judged is not None
-    assert judged.roughness is not None
-    assert judged.roughness <= 3.0
+    found = judged(run)
+    assert found.roughness is not None
+    assert found.roughness <= 3.0
 
 
-def test_nor_does_it_take_a_setpoint_past_a_limit(there_and_back: VirtualRun) -> None:
+def test_nor_does_it_take_a_setpoint_past_a_limit(there_and_back: VirtualWorld) -> None:
     skeleton = there_and_back.slave_config.skeleton
     tracked = [s for s in there_and_back.states if s.guard == "track"]
     setpoints = np.array([s.setpoint_rad for s in tracked])
@@ -102,7 +97,7 @@ def test_nor_does_it_take_a_setpoint_past_a_limit(there_and_back: VirtualRun) ->
 @pytest.mark.timeout(300)
 def test_on_a_line_that_became_slow_the_robot_engages_and_tracks() -> None:
     """Seen: 20 ms one way became 190 ms; a minute later every command "may be 382 ms old", for good."""
-    run = engaged(World(one_way_ns=20 * NS_PER_MS))
+    run = engaged(WorldSettings(one_way_ns=20 * NS_PER_MS))
     run.run(5.0)
     assert run.slave.guard.state == "track"
     run.link.set(Profile.model_validate({"both": {"delay_ms": 190.0}}), run.now_ns)
@@ -113,6 +108,6 @@ def test_on_a_line_that_became_slow_the_robot_engages_and_tracks() -> None:
     if run.slave.guard.state == "hold":
         assert run.ask(Action.ENGAGE).done
     # the operator moves all the while: until a calm moment of the motion the robot only comes nearer
-    run.run(SETTLE_S, until=lambda: run.slave.guard.state == "track")
+    run.run(ALIGN_S, until=lambda: run.slave.guard.state == "track")
     run.run(2.0)
     assert run.slave.guard.state == "track"

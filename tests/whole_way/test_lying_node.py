@@ -5,16 +5,16 @@ from __future__ import annotations
 import pytest
 
 from common.wire.messages import Action
-from deploy.experiments.following import engaged
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
+from tests.whole_way.runs import engaged
 
 NODE = "right_forearm"
 HELD = {"right_elbow_pitch", "right_elbow_roll", "right_wrist_yaw"}
 
 
-def lying(kind: str, from_s: float, more: str = "") -> World:
+def lying(kind: str, from_s: float, more: str = "") -> WorldSettings:
     lie = f'faults.lie=[{{node="{NODE}",kind="{kind}",from_s={from_s}{more}}}]'
-    return World(overrides={"suit": [lie]})
+    return WorldSettings(overrides={"suit": [lie]})
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ def lying(kind: str, from_s: float, more: str = "") -> World:
     [("frozen", "", "frozen"), ("stuck", ",axis=1", "stuck"), ("zero", "", "reads zero")],
 )
 def test_engage_is_refused_with_words_that_name_the_node(kind: str, more: str, words: str) -> None:
-    run = VirtualRun(lying(kind, 3.0, more))
+    run = VirtualWorld(lying(kind, 3.0, more))
     run.run(6.0)
     assert run.slave.clock.estimator.estimate(run.slave_ns).trusted
     reply = run.ask(Action.ENGAGE)
@@ -38,7 +38,7 @@ def test_once_the_node_is_mended_the_robot_can_be_engaged() -> None:
 
 
 def test_who_is_engaged_goes_on_with_every_other_joint() -> None:
-    run = VirtualRun(lying("frozen", 40.0))
+    run = VirtualWorld(lying("frozen", 40.0))
     run.run(6.0)
     assert run.ask(Action.ENGAGE).done
     run.run(20.0, until=lambda: run.slave.guard.state == "track")

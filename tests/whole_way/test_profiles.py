@@ -10,7 +10,7 @@ import pytest
 from common.skeleton.synergy import synergy_positions
 from common.wire.messages import Action
 from deploy.measure import Accuracy, FollowedMotion, accuracy, motion
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.guard.limits import MotionLimits
 
 ZERO_POSE = {"master": ["estimation.zero_pose_s=1.0"]}
@@ -20,14 +20,16 @@ ZERO_POSE = {"master": ["estimation.zero_pose_s=1.0"]}
 class Run:
     """One host, so one clock: half a millisecond of link."""
 
-    run: VirtualRun
+    run: VirtualWorld
     solved: Accuracy
     moved: FollowedMotion
 
 
 def followed(profile: str, seconds: float) -> Run:
-    run = VirtualRun(
-        World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile, overrides=ZERO_POSE)
+    run = VirtualWorld(
+        WorldSettings(
+            slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile, overrides=ZERO_POSE
+        )
     )
     run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
     run.run(1.0)
@@ -36,8 +38,6 @@ def followed(profile: str, seconds: float) -> Run:
     run.run(15.0, until=lambda: run.slave.guard.state == "track")
     run.run(seconds)
     assert run.slave.guard.state == "track", run.slave.guard.reason
-    for state in run.states:
-        run.trace.add(state)
     moved = motion(run.trace.truth(), run.trace.moved(), run.trace.joint_names)
     assert moved is not None
     return Run(run, accuracy(run.trace.truth(), run.trace.solved(), run.trace.joint_names), moved)

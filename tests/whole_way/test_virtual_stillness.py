@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from deploy.experiments.following import engaged
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
+from tests.whole_way.runs import engaged
 
 STILL_S = 5.0
 
 
 @pytest.fixture(scope="module")
-def stood_still() -> VirtualRun:
-    run = engaged(World())
+def stood_still() -> VirtualWorld:
+    run = engaged(WorldSettings())
     run.run(20.0)
     assert run.slave.traffic.due.metrics().missing == 0
     run.stand_still(STILL_S)
@@ -20,13 +20,13 @@ def stood_still() -> VirtualRun:
     return run
 
 
-def test_no_number_tells_of_it_and_time_does(stood_still: VirtualRun) -> None:
+def test_no_number_tells_of_it_and_time_does(stood_still: VirtualWorld) -> None:
     slave = stood_still.slave
     assert slave.traffic.arrivals.metrics().lost == 0
     assert slave.traffic.due.metrics().missing == pytest.approx(12.5 * STILL_S, abs=4)
 
 
-def test_the_raw_one_way_hides_it_and_the_corrected_one_shows_it(stood_still: VirtualRun) -> None:
+def test_the_raw_one_way_hides_it_and_the_corrected_one_shows_it(stood_still: VirtualWorld) -> None:
     slave = stood_still.slave
     raw, corrected = slave.traffic.one_way.summary(), slave.traffic.due.corrected.summary()
     assert raw.max is not None

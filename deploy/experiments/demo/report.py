@@ -23,8 +23,8 @@ from deploy.experiments.demo.robots import robot_problems, robot_row
 from deploy.harness.observer import Observer
 from deploy.harness.rig import ROBOT, Rig
 from deploy.measure import Accuracy, FollowedMotion, SolvedSeries, TruthSeries, accuracy, motion
-from deploy.measure.baseline import MOST_S, Comparison, arrivals, compare
 from deploy.measure.estimated import LEAST_ESTIMATED
+from deploy.measure.replay import MOST_S, Comparison, arrivals, compare
 from slave.config import SlaveConfig
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from common.clock import NS_PER_MS, to_ns
 from deploy.harness.faults.fault import BRAKED_S, ENGAGE, NOTHING, NOTICED_S, Reaction
 from deploy.harness.faults.scene import Scene
 from deploy.harness.faults.virtual import VirtualFault
-from deploy.sim.world.troubles import Delivery, Troubles, Way
+from deploy.sim.world.injection import Delivery, FaultInjection, Traffic
 from slave.guard import State
 
 
 def _cut(scene: Scene) -> None:
     scene.inject.carry = lambda way, payload: ()
-    scene.undo = lambda: setattr(scene.inject, "carry", Troubles().carry)
+    scene.undo = lambda: setattr(scene.inject, "carry", FaultInjection().carry)
 
 
 def _held_back(scene: Scene) -> None:
@@ -25,10 +25,10 @@ def _held_back(scene: Scene) -> None:
 def _reordered(scene: Scene) -> None:
     odd = False
 
-    def carry(way: Way, payload: bytes) -> Sequence[Delivery]:
+    def carry(way: Traffic, payload: bytes) -> Sequence[Delivery]:
         nonlocal odd
-        odd ^= way is Way.COMMAND
-        return ((100 * NS_PER_MS if odd and way is Way.COMMAND else 0, payload),)
+        odd ^= way is Traffic.COMMAND
+        return ((100 * NS_PER_MS if odd and way is Traffic.COMMAND else 0, payload),)
 
     scene.inject.carry = carry
 

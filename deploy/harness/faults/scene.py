@@ -21,8 +21,8 @@ from deploy.harness.faults.judge import Asked
 from deploy.harness.faults.setting import USUAL, Later, Setting, files
 from deploy.measure.stillness import StoppingMotion
 from deploy.sim.suit.motion import OperatorMotion, parse_motion
-from deploy.sim.world.troubles import Troubles
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.injection import FaultInjection
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.encoders.counts import Encoders
 from slave.guard import Guard, State
 from slave.limit.limit import Setpoint
@@ -79,7 +79,7 @@ class Scene:
             }  # fmt: skip
             usual = reach() if setting.motion is None else setting.motion()
             motion: OperatorMotion = Later(usual, setting.lead_s) if setting.lead_s else usual
-            self.run = VirtualRun(World(start_ns=UP_NS, motion=motion, overrides=overrides))
+            self.run = VirtualWorld(WorldSettings(start_ns=UP_NS, motion=motion, overrides=overrides))
         config = self.run.slave_config
         self.skeleton = config.skeleton
         self.run.slave.guard = Guard(
@@ -106,9 +106,9 @@ class Scene:
             self.each_period()
 
     @property
-    def inject(self) -> Troubles:
+    def inject(self) -> FaultInjection:
         """Where faults enter the virtual world."""
-        return self.run.troubles
+        return self.run.inject
 
     @property
     def guard(self) -> Guard:

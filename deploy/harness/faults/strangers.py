@@ -12,7 +12,7 @@ from common.wire.presence import ProcessPresence
 from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, Reaction
 from deploy.harness.faults.scene import ENGAGED_S, REACHING_S, Scene, reach, turned
 from deploy.harness.faults.virtual import VirtualFault
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.guard import State
 
 
@@ -27,7 +27,7 @@ def _replayed_yesterday(scene: Scene) -> None:
 @cache
 def _yesterday() -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
     """Requests and commands of a run on another day: other clocks, other lease."""
-    run = VirtualRun(World(slave_ahead_ns=86_400 * 10**9, motion=reach()))
+    run = VirtualWorld(WorldSettings(slave_ahead_ns=86_400 * 10**9, motion=reach()))
     run.run(ENGAGED_S)
     challenge = run.ask(Action.STATUS).challenge
     operator, robot = run.master_config.operator.name, run.robot

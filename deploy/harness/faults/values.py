@@ -12,7 +12,7 @@ from common.wire.messages import Command
 from deploy.harness.faults.fault import NOTHING, Reaction
 from deploy.harness.faults.scene import Scene, turned
 from deploy.harness.faults.virtual import VirtualFault
-from deploy.sim.world.troubles import Delivery, Way
+from deploy.sim.world.injection import Delivery, Traffic
 from slave.guard import State
 
 LET_GO = "Let go of the deadman, or emergency stop."
@@ -22,8 +22,8 @@ def _change_commands(scene: Scene, change: Callable[[Command], Command]) -> None
     """The master itself sends something else than it should."""
     joints = len(scene.skeleton.joints)
 
-    def carry(way: Way, payload: bytes) -> Sequence[Delivery]:
-        if way is Way.COMMAND:
+    def carry(way: Traffic, payload: bytes) -> Sequence[Delivery]:
+        if way is Traffic.COMMAND:
             payload = encode(change(decode(payload, Command, joints)))
         return ((0, payload),)
 

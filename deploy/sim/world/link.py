@@ -1,4 +1,4 @@
-"""The link of the virtual world: the same packets' fates as over an emulated network, without the packets."""
+"""The link of the virtual world: messages are late or lost as over an emulated network, without packets."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Callable
 
 from deploy.sim.network.profile import Profile
 from deploy.sim.network.scheduler import PacketScheduler
-from deploy.sim.world.troubles import Way
+from deploy.sim.world.injection import Traffic
 
-TO_ROBOT = (Way.COMMAND, Way.QUERY)
+TO_ROBOT = (Traffic.COMMAND, Traffic.QUERY)
 At = Callable[[int, Callable[[], None]], None]
-"""Lets something happen at a time, ns."""
+"""Schedules an event at a time, ns."""
 
 
 class VirtualLink:
-    """Carries each message when the profile says so, if it does; each is one packet of its own size."""
+    """Delivers each message when the profile says so, or not at all; each is one packet of its own size."""
 
     def __init__(self, profile: Profile, seed: int, at: At) -> None:
-        """`at` is how the world is told of what happens later."""
+        """`at` is schedules what happens later."""
         ways = profile.ways
         self._to_robot: PacketScheduler[Callable[[], None]] = PacketScheduler(ways.to_robot, 2 * seed)
         self._to_operator: PacketScheduler[Callable[[], None]] = PacketScheduler(
@@ -31,9 +31,9 @@ class VirtualLink:
         self._to_robot.set(ways.to_robot, now_ns)
         self._to_operator.set(ways.to_operator, now_ns)
 
-    def send(self, way: Way, now_ns: int, size: int, arrive: Callable[[], None]) -> None:
+    def send(self, traffic: Traffic, now_ns: int, size: int, arrive: Callable[[], None]) -> None:
         """Take a message of `size` bytes; `arrive` is called when it does."""
-        direction = self._to_robot if way in TO_ROBOT else self._to_operator
+        direction = self._to_robot if traffic in TO_ROBOT else self._to_operator
         direction.push(now_ns, arrive, size)
         self._await(direction)
 

@@ -14,7 +14,7 @@ from common.clock import to_ns
 from common.quaternion import Array
 from slave.track import Tracker
 from slave.track.config import TrackConfig, make_tracker
-from slave.track.simulate import Operator, World
+from tests.slave.track.reaches import Operator, World
 
 TICK_S = 0.005
 SMOOTH = ("interpolate", "predict")

@@ -7,7 +7,7 @@ import pytest
 
 from slave.backends import ServosConfig
 from slave.track.config import TrackConfig, make_tracker
-from slave.track.simulate import TICK_S, Figures, Run, Strategy, World, figures, run, tracker_for
+from tests.slave.track.reaches import TICK_S, Figures, Run, Strategy, World, figures, run, tracker_for
 
 WORLD = World(seconds=14.0)
 UNLIMITED = replace(WORLD, max_velocity_deg_s=1e5, max_acceleration_deg_s2=1e8)

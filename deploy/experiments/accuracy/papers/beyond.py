@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from deploy.experiments.accuracy.papers.figures import PaperValue
 from deploy.measure import accuracy
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 
 RATIO_TARGET = 1.2
 SECONDS = 16.5
@@ -54,7 +54,7 @@ def rmse_deg(seed: int, profile: str, constraints: str, seconds: float, turn_deg
             f"disturbance.local=[{{ nodes = {nodes}, from_s = 5.0, ramp_s = 1.0, turn_deg = {turn_deg} }}]"
         )
     master = [f'estimation.constraints="{constraints}"']
-    run = VirtualRun(World(profile=profile, overrides={"suit": suit, "master": master}))
+    run = VirtualWorld(WorldSettings(profile=profile, overrides={"suit": suit, "master": master}))
     run.run(seconds)
     judged = accuracy(run.trace.truth(), run.trace.solved(), run.trace.joint_names).joints
     rows = [row for joint in joints if (row := judged[joint]) is not None]

@@ -18,7 +18,7 @@ from deploy.measure.accuracy import SIDES, FastAccuracy
 from deploy.measure.paper import ETA_PERCENT, TABLE_1
 from deploy.sim.suit.imperfections import Imperfections
 from deploy.sim.suit.tray import TrayConfig
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 from master.calibrate.node_file import write_calibration
 
 ETA_TARGET_PERCENT = 1.0
@@ -34,7 +34,7 @@ def whole_way(
     seed: int, seconds: float = SECONDS, suit: Sequence[str] = (), master: Sequence[str] = ()
 ) -> list[PaperValue]:
     """Table 1 and η for the suit of that seed; `suit` and `master` are overrides of the example files."""
-    run = VirtualRun(World(overrides={"suit": [f"seed={seed}", *suit], "master": list(master)}))
+    run = VirtualWorld(WorldSettings(overrides={"suit": [f"seed={seed}", *suit], "master": list(master)}))
     run.run(seconds)
     return judge(accuracy(run.trace.truth(), run.trace.solved(), run.trace.joint_names))
 

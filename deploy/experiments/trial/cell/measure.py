@@ -26,8 +26,8 @@ from deploy.experiments.trial.cell.recording import (
 )
 from deploy.experiments.trial.cell.result import Excerpt
 from deploy.measure import MovedSeries, TruthSeries, accuracy, motion
-from deploy.measure.baseline import arrivals, compare
 from deploy.measure.motion import at_shift
+from deploy.measure.replay import arrivals, compare
 from slave.config import SlaveConfig
 
 EXCERPT_S = 6.0

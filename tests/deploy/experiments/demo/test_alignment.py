@@ -10,7 +10,7 @@ import numpy as np
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.experiments.demo.alignment import align
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 
 LEGS = load_skeleton("lower_limb")
 
@@ -18,8 +18,8 @@ LEGS = load_skeleton("lower_limb")
 def knees_deg(recording: Path, overrides: list[str]) -> Array:
     """What the master commands of both knees over the first steps and sitting down, (T, 2)."""
     master = ["estimation.zero_pose_s=1.0", *overrides]
-    run = VirtualRun(
-        World(
+    run = VirtualWorld(
+        WorldSettings(
             slave_ahead_ns=0,
             slave_drift_ppm=0.0,
             one_way_ns=500_000,

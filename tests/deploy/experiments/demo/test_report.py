@@ -24,7 +24,7 @@ from deploy.harness.rig import Rig
 from deploy.measure import Trace
 from deploy.measure.target import judge_targets
 from deploy.measure.verdict import verdict_table
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.pipeline import SlavePipeline
 from tests.published import master_metrics, slave_metrics
 
@@ -62,7 +62,7 @@ def told_by(slave: SlavePipeline) -> SlaveMetrics:
     )
 
 
-def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
+def rig(run: VirtualWorld, guards_seen: list[str]) -> Rig:
     observer = SimpleNamespace(
         trace=run.trace, commands=run.commands, states=run.states, guards_seen=guards_seen, video=None
     )
@@ -73,25 +73,25 @@ def rig(run: VirtualRun, guards_seen: list[str]) -> Rig:
     )
 
 
-def followed(profile: str, seconds: float) -> VirtualRun:
+def followed(profile: str, seconds: float) -> VirtualWorld:
     """Some seconds on one host: one clock, half a millisecond of link."""
-    run = VirtualRun(World(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile))
+    run = VirtualWorld(
+        WorldSettings(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile)
+    )
     run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
     run.run(1.0)
     assert run.ask(Action.ENGAGE).done
     run.run(seconds)
-    for state in run.states:
-        run.trace.add(state)
     return run
 
 
 @pytest.fixture(scope="module")
-def tracked() -> VirtualRun:
+def tracked() -> VirtualWorld:
     return followed("nursing", 12.0)
 
 
 @pytest.fixture(scope="module")
-def report(tracked: VirtualRun) -> DemoReport:
+def report(tracked: VirtualWorld) -> DemoReport:
     return make_report(DemoOptions(), rig(tracked, ["hold", "align", "track"]), ENDED_WELL)
 
 
@@ -127,7 +127,7 @@ def test_predict_shows_a_third_of_the_error_of_latest_in_the_same_run(report: De
         assert words in text(report)
 
 
-def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualRun) -> None:
+def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualWorld) -> None:
     blind = rig(tracked, ["track"])
     blind.observer.trace = Trace(tracked.trace.joint_names)
     report = make_report(DemoOptions(), blind, ENDED_WELL)
@@ -138,7 +138,7 @@ def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualRun) -> None:
     assert "each strategy" not in shown
 
 
-def test_every_problem_is_named(tracked: VirtualRun) -> None:
+def test_every_problem_is_named(tracked: VirtualWorld) -> None:
     failed = rig(tracked, ["hold"])
     failed.observer.trace = Trace(tracked.trace.joint_names)
     failed.observer.states = []
@@ -153,7 +153,7 @@ def test_every_problem_is_named(tracked: VirtualRun) -> None:
     ]
 
 
-def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: VirtualRun) -> None:
+def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: VirtualWorld) -> None:
     host = {
         "ticks": {"expected": 90, "missed": 40},
         "longest_ms": 143.0,
@@ -224,7 +224,7 @@ def shown_verdicts(tree: dict[str, object]) -> str:
     return out.getvalue()
 
 
-def test_a_run_in_which_no_command_reached_the_robot_failed(tracked: VirtualRun) -> None:
+def test_a_run_in_which_no_command_reached_the_robot_failed(tracked: VirtualWorld) -> None:
     deaf = rig(tracked, ["track"])
     child = cast(FakeChild, deaf.children["slave"])
     child.slave = replace(child.slave, guard=replace(child.slave.guard, received=0))
@@ -233,7 +233,7 @@ def test_a_run_in_which_no_command_reached_the_robot_failed(tracked: VirtualRun)
     ]
 
 
-def test_a_run_in_which_no_command_was_observed_failed(tracked: VirtualRun) -> None:
+def test_a_run_in_which_no_command_was_observed_failed(tracked: VirtualWorld) -> None:
     deaf = rig(tracked, ["track"])
     deaf.observer.commands = []
     assert make_report(DemoOptions(), deaf, ENDED_WELL).problems == [

@@ -18,7 +18,7 @@ from common.wire.video import VideoFrame, encode_frame
 from deploy import cli
 from deploy.ops.record.contents import survey
 from deploy.ops.record.missing import STREAMS, Missing
-from deploy.sim.world.whole_way import VirtualRun, World
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 from tests.deploy.ops.record.numbered import command, state
 
 STATE_NS = NS_PER_S // 50
@@ -84,7 +84,7 @@ def test_streams_are_forgotten_and_their_gaps_are_not() -> None:
 
 
 def test_what_a_robot_really_says_is_numbered_without_a_gap() -> None:
-    run = VirtualRun(World())
+    run = VirtualWorld(WorldSettings())
     run.run(2.0)
     assert len(run.states) > 50
     assert missing([encode(s) for s in run.states]).count == 0

@@ -1,6 +1,6 @@
-"""How well does each strategy follow? Simulated reaches, samples late and noisy, guard, servo; no clock.
+"""Hard reaches for the tracker tests: samples late and noisy, the guard's limits, a servo; no clock.
 
-`python -m slave.track.simulate` prints the table of README.md.
+`python -m tests.slave.track.reaches` prints the table of slave/track/README.md.
 """
 
 from __future__ import annotations

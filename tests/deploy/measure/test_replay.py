@@ -12,9 +12,10 @@ from common.link.config import LinkConfig
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.messages import Command, CommandEcho, CommandStamps, RobotState
-from deploy.measure import MovedSeries, TruthSeries, baseline
-from deploy.measure.baseline import STRATEGIES, Arrival, Comparison, arrivals, compare, replay
+from deploy.measure import MovedSeries, TruthSeries
+from deploy.measure.replay import Arrival, Comparison, arrivals, compare, replay
 from slave.config import SlaveConfig
+from slave.track.config import STRATEGIES
 
 MS = 1_000_000
 SKELETON = load_skeleton("nursing")
@@ -111,7 +112,7 @@ def test_only_commands_the_slave_took_are_replayed_in_order() -> None:
 
 
 def test_a_perfect_robot_is_judged_beside_every_strategy(comparison: Comparison) -> None:
-    assert tuple(comparison.replayed) == STRATEGIES
+    assert list(comparison.replayed) == list(STRATEGIES)
     assert comparison.as_run.rmse_deg < 0.01
     assert comparison.rmse_over_latest == comparison.as_run.rmse_deg / comparison.replayed["latest"].rmse_deg
 
@@ -160,7 +161,7 @@ def test_a_joint_that_is_not_valid_is_held() -> None:
 
 
 def test_only_the_end_of_a_long_run_is_replayed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(baseline, "MOST_S", 4.0)
+    monkeypatch.setattr("deploy.measure.replay.MOST_S", 4.0)
     shortened = compared()
     for judged in (shortened.as_run, *shortened.replayed.values()):
         # 50 readings a second, less the second in which a stretch settles and the search for the lag

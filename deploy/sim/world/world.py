@@ -14,20 +14,20 @@ from functools import partial
 from common.clock import NS_PER_MS, NS_PER_S
 from common.clock_sync import MasterExchange
 from common.config.load import Model, load_config
+from common.errors import TandemError
 from common.metrics.master import Unreached
 from common.wire.codec import decode, encode
 from common.wire.control import CHALLENGED, read_reply, request_bytes
 from common.wire.messages import Action, ClockReply, Command, ControlReply, ControlRequest, RobotState
 from deploy.examples.profiles import NURSING, example
-from deploy.measure import Trace
-from deploy.sim.network.profile import Profile
-from deploy.sim.network.profile import Way as Direction
+from deploy.measure import MovedSeries, Trace
+from deploy.sim.network.profile import Profile, Way
 from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.faults import Outgoing
 from deploy.sim.suit.motion import OperatorMotion
 from deploy.sim.suit.suit import build_suit
+from deploy.sim.world.injection import FaultInjection, Traffic
 from deploy.sim.world.link import VirtualLink
-from deploy.sim.world.troubles import Troubles, Way
 from master.config import MasterConfig
 from master.lease import LeaseKeeper
 from master.pipeline import CommandWriter, JointAngleSample, MasterPipeline
@@ -42,10 +42,13 @@ NODE_NS = NS_PER_MS
 ANGLES_NS = NS_PER_MS // 2
 SLAVE_PHASE_NS = 2_300_000
 """The slave's ticks do not fall on the master's."""
+OFFSET_S = 6
+"""Over a slow link it takes some seconds until the clocks' offset is known."""
+ALIGN_S = 15.0
 
 
 @dataclass(frozen=True, slots=True)
-class World:
+class WorldSettings:
     """How the two hosts and the way between them are."""
 
     start_ns: int = NS_PER_S
@@ -65,13 +68,13 @@ class World:
     """Of the example files, by role."""
 
 
-class VirtualRun:
+class VirtualWorld:
     """One run; `now_ns` is true time, and the master's clock until that is stepped. Deterministic."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: WorldSettings) -> None:
         self._world = world
-        self.troubles = Troubles()
-        network = world.network or Profile(both=Direction(delay_ms=world.one_way_ns / NS_PER_MS))
+        self.inject = FaultInjection()
+        network = world.network or Profile(both=Way(delay_ms=world.one_way_ns / NS_PER_MS))
         self.link = VirtualLink(network, world.network_seed, self._at)
         self.master_config = _load(MasterConfig, "master", world)
         self.robot = self.master_config.commanded[0]
@@ -90,8 +93,6 @@ class VirtualRun:
         self.trace = Trace(self.slave_config.skeleton.joint_names)
         self.commands: list[Command] = []
         self.states: list[RobotState] = []
-        self.deliver: Callable[[bytes], bool] = lambda _: True
-        """Whether a command passes the link; a test may cut it."""
         self._under_way: list[tuple[int, int, Callable[[], None]]] = []
         self._order = itertools.count()
         self._tick = 0
@@ -99,12 +100,12 @@ class VirtualRun:
     @property
     def master_ns(self) -> int:
         """The master's clock now."""
-        return self.now_ns + self.troubles.master_stepped_ns
+        return self.now_ns + self.inject.master_stepped_ns
 
     @property
     def slave_ns(self) -> int:
         """The slave's clock now."""
-        return self._robot_ns + self.troubles.slave_stepped_ns
+        return self._robot_ns + self.inject.slave_stepped_ns
 
     @property
     def _robot_ns(self) -> int:
@@ -121,6 +122,28 @@ class VirtualRun:
         end_ns = self.now_ns + round(seconds * NS_PER_S)
         while self.now_ns < end_ns and not until():
             self._step()
+
+    def engage(self) -> None:
+        """Engage as soon as possible; go on until the robot tracks. Raises TandemError with the reason."""
+        self.run(10.0, until=self._suit_known)
+        for _ in range(OFFSET_S):
+            self.run(1.0)
+            reply = self.ask(Action.ENGAGE)
+            if reply.done:
+                break
+        else:
+            raise TandemError(reply.text)
+        self.run(ALIGN_S, until=lambda: self.slave.guard.state == "track")
+        if self.slave.guard.state != "track":
+            raise TandemError(self.slave.guard.reason)
+
+    def _suit_known(self) -> bool:
+        return bool(self.commands and self.commands[-1].valid.all() and self.commands[-1].lease)
+
+    def moved(self) -> MovedSeries:
+        """The encoders' series, its stamps on the suit's clock, which is the master's."""
+        series = self.trace.moved()
+        return replace(series, encoder_ns=series.encoder_ns - (self.slave_ns - self.now_ns))
 
     def stand_still(self, seconds: float) -> None:
         """Both processes are stopped for so long: nobody ticks, puts or takes anything; time goes by."""
@@ -155,7 +178,7 @@ class VirtualRun:
         sync, late = self._master.tick(self._tick - 1, self.master_ns)
         if late is not None:
             self._put(late)
-        if not self.troubles.suit_heard:
+        if not self.inject.suit_heard:
             for bus in self.master_config.capture.buses:
                 self._master.bus_down(bus.name)
             return
@@ -177,23 +200,23 @@ class VirtualRun:
         command = self._writer.write(angles, self._lease.token, True, put_ns, put_ns)
         self.commands.append(command)
         self.trace.add(command)
-        payload = encode(command)
-        if self.deliver(payload):
-            self._carry(Way.COMMAND, payload, self.on_command, ANGLES_NS)
+        self._carry(Traffic.COMMAND, encode(command), self.on_command, ANGLES_NS)
 
     def on_command(self, payload: bytes) -> None:
         """A command reaches the slave now."""
         self.slave.on_command(payload, self.slave_ns, self.slave_ns)
 
-    def _carry(self, way: Way, payload: bytes, arrive: Callable[[bytes], None], after_ns: int = 0) -> None:
-        for later_ns, carried in self.troubles.carry(way, payload):
+    def _carry(
+        self, traffic: Traffic, payload: bytes, arrive: Callable[[bytes], None], after_ns: int = 0
+    ) -> None:
+        for later_ns, carried in self.inject.carry(traffic, payload):
             arrived = partial(arrive, carried)
             if later_ns:
                 arrived = partial(self._after, later_ns, arrived)
-            self._at(self.now_ns + after_ns, partial(self._send, way, len(carried), arrived))
+            self._at(self.now_ns + after_ns, partial(self._send, traffic, len(carried), arrived))
 
-    def _send(self, way: Way, size: int, arrived: Callable[[], None]) -> None:
-        self.link.send(way, self.now_ns, size, arrived)
+    def _send(self, traffic: Traffic, size: int, arrived: Callable[[], None]) -> None:
+        self.link.send(traffic, self.now_ns, size, arrived)
 
     def _after(self, later_ns: int, event: Callable[[], None]) -> None:
         self._at(self.now_ns + later_ns, event)
@@ -202,18 +225,19 @@ class VirtualRun:
         now_ns = self.slave_ns
         self._robot.advance(self._robot_ns)
         true = self._robot.read()
-        reading = replace(true, read_ns=true.read_ns + self.troubles.slave_stepped_ns)
-        setpoint = self.slave.tick(now_ns, self.troubles.read(reading), self.troubles.body())
-        self.troubles.watch(true, setpoint)
+        reading = replace(true, read_ns=true.read_ns + self.inject.slave_stepped_ns)
+        setpoint = self.slave.tick(now_ns, self.inject.read(reading), self.inject.body())
+        self.inject.watch(true, setpoint)
         if setpoint.ready:
-            self._robot.write(self.troubles.write(setpoint.position_rad))
+            self._robot.write(self.inject.write(setpoint.position_rad))
             self.slave.written(now_ns)
         if self._tick % self.slave_config.loop.state_every == 0:
-            self._carry(Way.STATE, self.slave.state(now_ns), self._on_state)
+            self._carry(Traffic.STATE, self.slave.state(now_ns), self._on_state)
 
     def _on_state(self, payload: bytes) -> None:
         state = decode(payload, RobotState, len(self.slave_config.skeleton.joints))
         self.states.append(state)
+        self.trace.add(state)
         self._lease.on_state(state, self.master_ns)
         request = self._lease.request(self.master_ns)
         if request is not None:
@@ -221,15 +245,15 @@ class VirtualRun:
             self._lease.on_reply(decode(reply, ControlReply), self.master_ns)
 
     def _exchange_clocks(self) -> None:
-        self._carry(Way.QUERY, encode(self.clock.query(self.master_ns)), self._on_clock)
+        self._carry(Traffic.QUERY, encode(self.clock.query(self.master_ns)), self._on_clock)
 
     def _on_clock(self, query: bytes) -> None:
         reply = self.slave.on_clock(query, self.slave_ns, self.slave_ns)
-        self._carry(Way.REPLY, reply, self._on_clock_reply)
+        self._carry(Traffic.REPLY, reply, self._on_clock_reply)
 
     def _on_clock_reply(self, reply: bytes) -> None:
         self.clock.on_reply(decode(reply, ClockReply), self.master_ns)
 
 
-def _load(model: type[Model], role: str, world: World) -> Model:
+def _load(model: type[Model], role: str, world: WorldSettings) -> Model:
     return load_config(example(role, world.profile), model, world.overrides.get(role, ()))

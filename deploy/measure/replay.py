@@ -1,16 +1,14 @@
-"""What each strategy makes of one run's commands: replayed on the virtual robot, so that they compare.
+"""How well each tracking strategy follows the same commands: they are replayed on the simulated robot.
 
-Two runs with two strategies would differ in more than the strategy. So the very commands that the slave
-accepted, with their real arrival times, pass tracker, limits and simulated robot once more on a virtual
-clock. The demo runs on one host: the master's stamps, the slave's and the truth's are of one clock, and no
-offset is applied.
+Two runs with two strategies would differ in more than the strategy. So the commands that the slave accepted
+pass tracker, limits and simulated robot once more, at their real arrival times, on a virtual clock. All
+stamps must be of one clock: no offset is applied.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 
@@ -22,12 +20,10 @@ from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
 from slave.limit.limit import SetpointLimiter
 from slave.servos.mujoco.simulated import SimulatedRobot
-from slave.track.config import make_tracker
+from slave.track.config import STRATEGIES, make_tracker
 
-Strategy = Literal["latest", "interpolate", "predict"]
-STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
 MOST_S = 30.0
-"""Of a longer run only the end is replayed: that is 1.3 s of work a strategy, however long the run was."""
+"""Only the end of a longer run is replayed: 1.3 s of work a strategy, however long the run was."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +51,7 @@ class Comparison:
 
     as_run: FollowedMotion
     replayed: dict[str, FollowedMotion]
-    """On the virtual robot; its row of the run's own strategy tells how true the replay is."""
+    """By strategy, on the simulated robot; the run's own strategy shows how true the replay is."""
 
     @property
     def rmse_over_latest(self) -> float:
@@ -66,23 +62,25 @@ class Comparison:
 def compare(
     truth: TruthSeries, moved: MovedSeries, accepted: Sequence[Arrival], config: SlaveConfig
 ) -> Comparison | None:
-    """Replay the end of the run by each strategy; None where there is too little to judge."""
+    """Replay the end of the run with each strategy; None where there is too little to judge."""
     if not accepted or not moved.tracking.any():
         return None
     moved = _end_of(moved)
     names = config.skeleton.joint_names
     as_run = motion(truth, moved, names)
+    if as_run is None:
+        return None
     replayed: dict[str, FollowedMotion] = {}
     for strategy in STRATEGIES:
-        judged = motion(truth, replay(accepted, moved, strategy, config), names) if as_run else None
+        judged = motion(truth, replay(accepted, moved, strategy, config), names)
         if judged is None:
             return None
         replayed[strategy] = judged
-    return Comparison(as_run, replayed) if as_run else None
+    return Comparison(as_run, replayed)
 
 
 def replay(
-    accepted: Sequence[Arrival], moved: MovedSeries, strategy: Strategy, config: SlaveConfig
+    accepted: Sequence[Arrival], moved: MovedSeries, strategy: str, config: SlaveConfig
 ) -> MovedSeries:
     """The virtual robot's encoders, read when the real ones were; at least one row of `moved` must track.
 
@@ -92,16 +90,16 @@ def replay(
     period_ns = round(NS_PER_S / config.loop.rate_hz)
     moved = _rows(moved, slice(int(np.argmax(moved.tracking)), None))
     now_ns, taken = int(moved.encoder_ns[0]), 0
-    way = _ReplayedRobot(strategy, config, now_ns, moved.position_rad[0])
+    slave = _VirtualSlave(strategy, config, now_ns, moved.position_rad[0])
     stamps_ns, positions = [], []
     for wanted_ns in moved.encoder_ns.tolist():
         while now_ns <= wanted_ns:
             while taken < len(accepted) and accepted[taken].received_ns <= now_ns:
-                way.accept(accepted[taken])
+                slave.accept(accepted[taken])
                 taken += 1
-            way.tick(now_ns, period_ns)
+            slave.tick(now_ns, period_ns)
             now_ns += period_ns
-        stamp_ns, position_rad = way.read()
+        stamp_ns, position_rad = slave.read()
         stamps_ns.append(stamp_ns)
         positions.append(position_rad)
     return MovedSeries(
@@ -125,10 +123,10 @@ def _rows(moved: MovedSeries, rows: slice) -> MovedSeries:
     )
 
 
-class _ReplayedRobot:
+class _VirtualSlave:
     """From an accepted command to the encoders: tracker ▸ limiter ▸ robot."""
 
-    def __init__(self, strategy: Strategy, config: SlaveConfig, now_ns: int, position_rad: Array) -> None:
+    def __init__(self, strategy: str, config: SlaveConfig, now_ns: int, position_rad: Array) -> None:
         skeleton = config.skeleton
         self._tracker = make_tracker(
             config.track.model_copy(update={"strategy": strategy}), config.servos.chosen.bus_lag_s

@@ -12,7 +12,7 @@ from slave.limit.limit import Setpoint
 from slave.servos.servos import EncoderReading
 
 
-class Way(StrEnum):
+class Traffic(StrEnum):
     """What goes over the link."""
 
     COMMAND = "command"
@@ -26,10 +26,10 @@ Delivery = tuple[int, bytes]
 
 
 @dataclass(slots=True)
-class Troubles:
+class FaultInjection:
     """None unless told; each may be replaced at any moment of a run."""
 
-    carry: Callable[[Way, bytes], Sequence[Delivery]] = lambda _, payload: ((0, payload),)
+    carry: Callable[[Traffic, bytes], Sequence[Delivery]] = lambda _, payload: ((0, payload),)
     """What the link makes of a message: nothing, one, or more."""
     master_stepped_ns: int = 0
     """By how much the master's clock has been stepped; nothing else in the world notices."""
