@@ -25,6 +25,7 @@ from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.ops.control.teller import acted
 from deploy.ops.doctor.command import doctor
 from deploy.ops.keys.commands import app as keys_app
+from deploy.ops.network.command import app as network_app
 from deploy.ops.record.command import record, recording
 from deploy.ops.router.command import router
 from deploy.ops.servos import servos
@@ -32,7 +33,6 @@ from deploy.ops.sides import master, slave
 from deploy.ops.video import video
 from deploy.report.panels import arrange
 from deploy.sim.drives.process import drives
-from deploy.sim.network.command import app as network_app
 from deploy.sim.suit.command import suit
 
 app = typer.Typer(

@@ -20,7 +20,7 @@ from deploy.certificates.folder import stem, write_pair
 from deploy.certificates.make import new_authority, new_identity
 from deploy.harness.child import Child
 from deploy.harness.host import HostWatch
-from deploy.sim.network import Host
+from deploy.sim.network import EmulatedHost
 from deploy.sim.network.namespaces import why_not
 from deploy.sim.network.network import open_network
 from master.suit.protocol import SHIPPED_DBC
@@ -50,7 +50,7 @@ def a_site(folder: Path, robot_at: str) -> None:
         write_pair(keys, stem(role, name), new_identity(authority, role, name, hosts, now, valid))
 
 
-async def tandem(host: Host, *arguments: str) -> tuple[int | None, str]:
+async def tandem(host: EmulatedHost, *arguments: str) -> tuple[int | None, str]:
     """Type a command at a host; its status and what it printed."""
     process = await asyncio.create_subprocess_exec(
         *host.command([*TANDEM, *arguments]), stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
@@ -59,7 +59,7 @@ async def tandem(host: Host, *arguments: str) -> tuple[int | None, str]:
     return process.returncode, said.decode()
 
 
-async def until(reached: Callable[[Any], bool], host: Host, operator: Path) -> Any:
+async def until(reached: Callable[[Any], bool], host: EmulatedHost, operator: Path) -> Any:
     """Ask for the robot's status until it is as wanted."""
     for _ in range(30):
         _, said = await tandem(host, "status", "--master", str(operator), "--json")
@@ -69,7 +69,7 @@ async def until(reached: Callable[[Any], bool], host: Host, operator: Path) -> A
     raise AssertionError(f"not reached: {status}")
 
 
-async def follow(host: Host, operator: Path, robot: Child) -> None:
+async def follow(host: EmulatedHost, operator: Path, robot: Child) -> None:
     """Engage, and let it align undisturbed until it tracks: each command typed takes a core for a while."""
     said = ""
     for _ in range(3):

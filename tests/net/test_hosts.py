@@ -13,8 +13,9 @@ import psutil
 import pytest
 
 from common.errors import NetworkError
+from deploy.ops.network.verify import measure
 from deploy.sim.network import Profile, load_profile, open_network
-from deploy.sim.network.host import Host
+from deploy.sim.network.host import EmulatedHost
 from deploy.sim.network.namespaces import ip, parse_run, remove_dead
 
 ANSWER = """
@@ -47,7 +48,7 @@ def veths_of(run: str) -> list[str]:
     return [line for line in ip("link").splitlines() if run in line]
 
 
-async def answers(host: Host, address: str) -> bytes:
+async def answers(host: EmulatedHost, address: str) -> bytes:
     """What somebody in the caller's namespace hears from a program on the host."""
     process = await asyncio.create_subprocess_exec(
         *host.command([sys.executable, "-c", ANSWER, address]), stdout=asyncio.subprocess.PIPE
@@ -65,7 +66,7 @@ async def answers(host: Host, address: str) -> bytes:
         await process.wait()
 
 
-async def reached(host: Host, address: str) -> str:
+async def reached(host: EmulatedHost, address: str) -> str:
     """What went wrong when a program on the host called another address."""
     process = await asyncio.create_subprocess_exec(
         *host.command([sys.executable, "-c", REACH, address]), stderr=asyncio.subprocess.PIPE
@@ -81,7 +82,7 @@ def test_the_caller_reaches_both_hosts_and_they_each_other_by_the_link() -> None
                 assert await answers(host, host.management) == b"here"
             assert network.counters().to_robot.packets == 0  # none of that crossed the link
             assert "unreachable" in await reached(network.operator, network.robot.management)
-            measured = await network.measure(1.0)
+            measured = await measure(network, 1.0)
             assert measured.to_robot.received == measured.to_operator.received == 200
             assert measured.kept, measured.tree()
             counted = network.counters()
@@ -96,12 +97,12 @@ def test_the_link_is_cut_restored_and_changed_while_it_runs() -> None:
         async with open_network(QUIET, backend="forwarder") as network:
             network.cut()
             with pytest.raises(NetworkError, match="none of 40 packets came through"):
-                await network.measure(0.2)
+                await measure(network, 0.2)
             network.restore()
-            assert (await network.measure(0.5)).to_robot.received == 100
+            assert (await measure(network, 0.5)).to_robot.received == 100
             assert network.counters().to_robot.dropped == {"loss": 0, "queue": 0, "size": 0, "outage": 40}
             network.set(Profile.model_validate({"both": {"delay_ms": 40.0}}))
-            measured = await network.measure(0.5)
+            measured = await measure(network, 0.5)
             assert measured.to_operator.p50_ms == pytest.approx(40.0, abs=1.0)
 
     asyncio.run(story())
@@ -114,9 +115,9 @@ def test_scripted_outages_happen_and_end_with_the_profile() -> None:
         async with open_network(Profile.model_validate(always), backend="forwarder") as network:
             await asyncio.sleep(0)  # the script begins
             with pytest.raises(NetworkError, match="none of"):
-                await network.measure(0.2)
+                await measure(network, 0.2)
             network.set(QUIET)
-            assert (await network.measure(0.2)).to_robot.received == 40
+            assert (await measure(network, 0.2)).to_robot.received == 40
 
     asyncio.run(story())
 
@@ -125,7 +126,7 @@ def test_scripted_outages_happen_and_end_with_the_profile() -> None:
 def test_a_profile_is_kept(name: str) -> None:
     async def story() -> None:
         async with open_network(load_profile(name), backend="forwarder") as network:
-            measured = await network.measure(3.0)
+            measured = await measure(network, 3.0)
             assert measured.kept, measured.tree()
             assert measured.to_robot.reordered_percent == measured.to_operator.reordered_percent == 0.0
             assert network.counters().to_robot.dropped["queue"] > 0  # when more was sent than it takes
@@ -190,7 +191,7 @@ def test_two_networks_at_once_do_not_meet() -> None:
     async def story() -> None:
         async with open_network(QUIET) as one, open_network(QUIET) as other:
             assert len({one.operator.management, other.operator.management}) == 2
-            first, second = await asyncio.gather(one.measure(0.5), other.measure(0.5))
+            first, second = await asyncio.gather(measure(one, 0.5), measure(other, 0.5))
             assert first.to_robot.received == second.to_robot.received == 100
             assert one.counters().to_robot.packets == 100
 

@@ -8,8 +8,9 @@ import json
 import pytest
 
 from common.errors import NetworkError
+from deploy.ops.network.figures import Measured
+from deploy.ops.network.verify import measure
 from deploy.sim.network import Network, Profile, load_profile, open_network, profile_names
-from deploy.sim.network.figures import Measured
 from deploy.sim.network.namespaces import LINK, ip, make_host, new_run, remove
 from deploy.sim.network.netem import has_netem
 
@@ -39,7 +40,7 @@ def test_the_link_has_its_profile_and_is_cut_and_counted() -> None:
     async def story() -> None:
         async with open_network(MIXED) as network:
             assert network.backend == "netem"  # by itself: nothing in it that netem does otherwise
-            judge(await network.measure(3.0, rate_hz=100.0))
+            judge(await measure(network, 3.0, rate_hz=100.0))
             await cut(network)
             for name in profile_names():
                 network.set(load_profile(name).model_copy(update={"outages": []}))
@@ -66,7 +67,7 @@ async def cut(network: Network) -> None:
     before = network.counters().to_robot
     network.cut()
     with pytest.raises(NetworkError, match="none of 20 packets"):
-        await network.measure(0.2, rate_hz=100.0)
+        await measure(network, 0.2, rate_hz=100.0)
     network.restore()
     after = network.counters().to_robot
     assert after.dropped["outage"] >= 20

@@ -9,7 +9,7 @@ from contextlib import suppress
 import pytest
 
 from deploy.sim.network import Profile, open_network
-from deploy.sim.network.host import Host
+from deploy.sim.network.host import EmulatedHost
 from deploy.sim.network.namespaces import why_not
 
 pytestmark = [pytest.mark.net, pytest.mark.skipif(bool(why_not()), reason=str(why_not()))]
@@ -36,7 +36,7 @@ print(facts.there_bytes, facts.back_bytes, flush=True)
 """
 
 
-async def _start(host: Host, script: str, endpoint: str) -> asyncio.subprocess.Process:
+async def _start(host: EmulatedHost, script: str, endpoint: str) -> asyncio.subprocess.Process:
     command = host.command([sys.executable, "-c", script, endpoint])
     return await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
 

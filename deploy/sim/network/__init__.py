@@ -1,6 +1,6 @@
 """Hosts on one machine, and a link between them that behaves as a real network does."""
 
-from deploy.sim.network.host import Host as Host
+from deploy.sim.network.host import EmulatedHost as EmulatedHost
 from deploy.sim.network.network import Network as Network
 from deploy.sim.network.network import open_network as open_network
 from deploy.sim.network.profile import Profile as Profile

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Host:
+class EmulatedHost:
     """A network namespace of this machine."""
 
     name: str

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from common.errors import NetworkError
-from deploy.sim.network.namespaces import Run, parse_run, remove
+from deploy.sim.network.namespaces import NetworkRun, parse_run, remove
 
 REMOVE_S = 20.0
 
@@ -18,7 +18,7 @@ REMOVE_S = 20.0
 class Janitor:
     """The process, from its parent's side."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: NetworkRun) -> None:
         self._process = subprocess.Popen(
             [sys.executable, "-m", "deploy.sim.network.janitor", run.name],
             stdin=subprocess.PIPE,

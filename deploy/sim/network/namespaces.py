@@ -30,7 +30,7 @@ _RUN = re.compile(r"tandem-(\d+)-(\d+)-([0-9a-f]{6})")
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class NetworkRun:
     """One network's name: which process made it, when that began, and a random part."""
 
     pid: int
@@ -57,16 +57,16 @@ class Run:
         return _started(self.pid) == self.started
 
 
-def new_run() -> Run:
+def new_run() -> NetworkRun:
     """Of this process."""
     pid = os.getpid()
-    return Run(pid, _started(pid) or 0, secrets.token_hex(3))
+    return NetworkRun(pid, _started(pid) or 0, secrets.token_hex(3))
 
 
-def parse_run(name: str) -> Run | None:
+def parse_run(name: str) -> NetworkRun | None:
     """The run of a namespace or interface, by its name or alias; None for what is not ours."""
     match = _RUN.match(name)
-    return Run(int(match[1]), int(match[2]), match[3]) if match else None
+    return NetworkRun(int(match[1]), int(match[2]), match[3]) if match else None
 
 
 def why_not() -> str | None:
@@ -101,7 +101,7 @@ def ip(*arguments: str, tool: str = "ip") -> str:
     return done.stdout
 
 
-def link_addresses(run: Run) -> Iterator[tuple[str, str, str]]:
+def link_addresses(run: NetworkRun) -> Iterator[tuple[str, str, str]]:
     """Each host's namespace, its own address on the emulated link, and the other's."""
     ours, theirs = f"{LINK_NETWORK}.1", f"{LINK_NETWORK}.2"
     yield run.namespace(OPERATOR), ours, theirs
@@ -124,7 +124,7 @@ def congestion_control() -> str:
     return chosen
 
 
-def make_host(run: Run, host: str, management: str, caller: str) -> None:
+def make_host(run: NetworkRun, host: str, management: str, caller: str) -> None:
     """A namespace with loopback, multicast on it, and a veth to the caller. Raises NetworkError."""
     name, veth = run.namespace(host), f"{run.short}{host[0]}"
     ip("netns", "add", name)
@@ -153,7 +153,7 @@ def free_slot() -> list[str]:
             return slot
 
 
-def remove(run: Run) -> None:
+def remove(run: NetworkRun) -> None:
     """All of a run: what still runs in its namespaces, its veths, and the namespaces."""
     for namespace in _namespaces():
         if parse_run(namespace) == run:

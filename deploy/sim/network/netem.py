@@ -15,7 +15,7 @@ from common.errors import NetworkError
 from common.metrics.parts import Summary
 from deploy.sim.network.emulation import LinkCounters
 from deploy.sim.network.loss import gilbert_elliott
-from deploy.sim.network.namespaces import LINK, Run, ip, link_addresses
+from deploy.sim.network.namespaces import LINK, NetworkRun, ip, link_addresses
 from deploy.sim.network.profile import PACKET_BITS, Profile, Way
 from deploy.sim.network.scheduler import OUTAGE, Counters
 
@@ -34,7 +34,7 @@ def faithful(profile: Profile) -> bool:
     return not any(way.jitter_ms or way.reorder_percent or way.largest_bytes for way in ways)
 
 
-def has_netem(run: Run) -> bool:
+def has_netem(run: NetworkRun) -> bool:
     """Whether this kernel has it; tried on a host's loopback."""
     host = next(link_addresses(run))[0]
     try:
@@ -81,7 +81,7 @@ class Netem:
 
     name = "netem"
 
-    def __init__(self, run: Run, profile: Profile) -> None:
+    def __init__(self, run: NetworkRun, profile: Profile) -> None:
         """Raises NetworkError where this kernel has no netem."""
         self._run = run
         self._profile = profile

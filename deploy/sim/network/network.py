@@ -10,13 +10,11 @@ from typing import Literal, ParamSpec, TypeVar
 
 from common.errors import NetworkError
 from deploy.sim.network.emulation import Emulation, LinkCounters
-from deploy.sim.network.figures import Measured
-from deploy.sim.network.host import Host
+from deploy.sim.network.host import EmulatedHost
 from deploy.sim.network.janitor import Janitor
-from deploy.sim.network.measure import RATE_HZ, measure
 from deploy.sim.network.namespaces import (
     HOSTS,
-    Run,
+    NetworkRun,
     free_slot,
     link_addresses,
     make_host,
@@ -25,7 +23,7 @@ from deploy.sim.network.namespaces import (
     why_not,
 )
 from deploy.sim.network.netem import Netem, faithful, has_netem
-from deploy.sim.network.profile import Outage, Profile, load_profile
+from deploy.sim.network.profile import Profile, ScriptedOutage, load_profile
 from deploy.sim.network.tun import Forwarder
 
 Args = ParamSpec("Args")
@@ -36,10 +34,11 @@ Backend = Literal["auto", "forwarder", "netem"]
 class Network:
     """The two hosts, and the link as it is now. `set`, `cut` and `counters` block for some 0.2 ms."""
 
-    def __init__(self, hosts: Sequence[Host], emulation: Emulation, profile: Profile) -> None:
+    def __init__(self, hosts: Sequence[EmulatedHost], emulation: Emulation, profile: Profile) -> None:
         self.operator, self.robot = hosts
         self.profile = profile
-        self._emulation = emulation
+        self.emulation = emulation
+        """What makes packets late."""
         self._cut = False
         self._outages = 0
         self._script: asyncio.Task[None] | None = None
@@ -48,12 +47,12 @@ class Network:
     @property
     def backend(self) -> str:
         """What emulates the link: `forwarder`, `netem`."""
-        return self._emulation.name
+        return self.emulation.name
 
     def set(self, profile: Profile | str | Path) -> None:
         """Change the link to another profile; its scripted outages count from now."""
         profile = profile if isinstance(profile, Profile) else load_profile(profile)
-        self._emulation.set(profile)
+        self.emulation.set(profile)
         self.profile = profile
         self._follow(profile)
 
@@ -79,21 +78,17 @@ class Network:
 
     def counters(self) -> LinkCounters:
         """Packets and bytes each way since the network was opened, and what was dropped by cause."""
-        return self._emulation.counters()
-
-    async def measure(self, seconds: float = 10.0, rate_hz: float = RATE_HZ) -> Measured:
-        """Send packets both ways, and judge what arrives beside the profile. Raises NetworkError."""
-        return await measure((self.operator, self.robot), self.profile, self._emulation, seconds, rate_hz)
+        return self.emulation.counters()
 
     def _apply(self) -> None:
-        self._emulation.cut(self._cut or self._outages > 0)
+        self.emulation.cut(self._cut or self._outages > 0)
 
     def _follow(self, profile: Profile) -> None:
         if self._script is not None:
             self._script.cancel()
         self._script = asyncio.create_task(self._play(profile.outages)) if profile.outages else None
 
-    async def _play(self, outages: Sequence[Outage]) -> None:
+    async def _play(self, outages: Sequence[ScriptedOutage]) -> None:
         clock = asyncio.get_running_loop().time
         begun = clock()
         for outage in outages:
@@ -144,13 +139,13 @@ async def _whole(function: Callable[Args, Result], *args: Args.args, **named: Ar
         raise
 
 
-def _emulate(run: Run, profile: Profile, seed: int, backend: Backend) -> Emulation:
+def _emulate(run: NetworkRun, profile: Profile, seed: int, backend: Backend) -> Emulation:
     if backend == "netem" or (backend == "auto" and faithful(profile) and has_netem(run)):
         return Netem(run, profile)
     return Forwarder(run, profile, seed)
 
 
-def _make_hosts(run: Run) -> list[Host]:
+def _make_hosts(run: NetworkRun) -> list[EmulatedHost]:
     remove_dead()
     slot = free_slot()
     hosts = []
@@ -158,5 +153,5 @@ def _make_hosts(run: Run) -> list[Host]:
         HOSTS, link_addresses(run), slot[::2], slot[1::2], strict=True
     ):
         make_host(run, name, management, caller)
-        hosts.append(Host(name, namespace, address, management, caller))
+        hosts.append(EmulatedHost(name, namespace, address, management, caller))
     return hosts

@@ -16,7 +16,7 @@ from common.errors import NetworkError
 from common.metrics.parts import Summary
 from common.metrics.tree import from_tree
 from deploy.sim.network.emulation import TO_OPERATOR, TO_ROBOT, LinkCounters
-from deploy.sim.network.namespaces import LINK, Run, ip, link_addresses
+from deploy.sim.network.namespaces import LINK, NetworkRun, ip, link_addresses
 from deploy.sim.network.profile import Profile
 from deploy.sim.network.scheduler import Counters
 
@@ -30,7 +30,7 @@ class Forwarder:
 
     name = "forwarder"
 
-    def __init__(self, run: Run, profile: Profile, seed: int) -> None:
+    def __init__(self, run: NetworkRun, profile: Profile, seed: int) -> None:
         """Raises NetworkError."""
         devices: list[int] = []
         try:

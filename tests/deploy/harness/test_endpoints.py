@@ -11,7 +11,7 @@ from common.link.certificates import check_tls
 from common.link.config import LinkConfig, TlsConfig
 from common.link.endpoint import SECURE, TRANSPORTS
 from deploy.harness.endpoints import Endpoints, local_endpoints, network_endpoints
-from deploy.sim.network import Host, Network
+from deploy.sim.network import EmulatedHost, Network
 
 
 def fields(endpoints: Endpoints) -> list[str]:
@@ -81,8 +81,8 @@ def test_through_a_router_the_observer_asks_only_there(tmp_path: Path) -> None:
 HOSTS = cast(
     Network,
     SimpleNamespace(
-        operator=Host("operator", "o", "198.18.0.1", "198.19.1.2", "198.19.1.1"),
-        robot=Host("robot", "r", "198.18.0.2", "198.19.1.6", "198.19.1.5"),
+        operator=EmulatedHost("operator", "o", "198.18.0.1", "198.19.1.2", "198.19.1.1"),
+        robot=EmulatedHost("robot", "r", "198.18.0.2", "198.19.1.6", "198.19.1.5"),
     ),
 )
 

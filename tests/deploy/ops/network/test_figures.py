@@ -10,10 +10,10 @@ import pytest
 from rich.console import Console
 
 from common.errors import NetworkError
-from deploy.sim.network.figures import DELAY_MS, LOSS_POINTS, RATE_SHARE, Measured, judge, rate_mbit
+from deploy.ops.network.figures import DELAY_MS, LOSS_POINTS, RATE_SHARE, Measured, judge, rate_mbit
+from deploy.ops.network.view import measured_table
 from deploy.sim.network.profile import Way
 from deploy.sim.network.scheduler import PacketScheduler
-from deploy.sim.network.view import measured_table
 
 MS = 1_000_000
 STEADY = Way(delay_ms=20.0)

@@ -1,4 +1,4 @@
-"""Measures an emulated link from both ends: first at a steady rate, then with more than it takes."""
+"""Measure an emulated link from both ends: first at a steady rate, then with more than its rate."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from typing import Any
 from common.clock import to_ns, wall_ns
 from common.errors import NetworkError
 from common.metrics.parts import Summary
-from deploy.sim.network.emulation import DIRECTIONS, Emulation
-from deploy.sim.network.figures import Measured, WayMeasured, judge, rate_mbit
-from deploy.sim.network.host import Host
-from deploy.sim.network.probe import Plan
-from deploy.sim.network.profile import Profile, Way
+from deploy.ops.network.figures import Measured, WayMeasured, judge, rate_mbit
+from deploy.ops.network.probe import ProbePlan
+from deploy.sim.network.emulation import DIRECTIONS
+from deploy.sim.network.host import EmulatedHost
+from deploy.sim.network.network import Network
+from deploy.sim.network.profile import Way
 from deploy.sim.network.scheduler import LOSS, Counters
 
 RATE_HZ = 200.0
@@ -32,11 +33,10 @@ MOST_MBIT = 35.0
 """A faster link is not filled: the probe in Python would be what is measured."""
 
 
-async def measure(
-    hosts: Sequence[Host], profile: Profile, emulation: Emulation, seconds: float, rate_hz: float
-) -> Measured:
-    """Of both directions, for some seconds. Raises NetworkError where nothing arrives."""
-    ways = (profile.ways.to_robot, profile.ways.to_operator)
+async def measure(network: Network, seconds: float = 10.0, rate_hz: float = RATE_HZ) -> Measured:
+    """Send packets both ways, and judge what arrives. Raises NetworkError where nothing does."""
+    hosts, emulation = (network.operator, network.robot), network.emulation
+    ways = (network.profile.ways.to_robot, network.profile.ways.to_operator)
     before, counted = emulation.planned(), emulation.counters()
     count = round(seconds * rate_hz)
     ends = await _run(hosts, ways, (rate_hz, rate_hz), (count, count), SMALL)
@@ -47,11 +47,11 @@ async def measure(
         drawn = (_mean_ms(before, after, name), _loss_percent(getattr(counted, name), getattr(now, name)))
         judged.append(judge(way, sent, arrivals, SMALL, seconds, *drawn))
     to_robot, to_operator = await _fill(hosts, ways, judged)
-    return Measured(profile.name, emulation.name, to_robot, to_operator)
+    return Measured(network.profile.name, emulation.name, to_robot, to_operator)
 
 
 async def _fill(
-    hosts: Sequence[Host], ways: Sequence[Way], judged: Sequence[WayMeasured]
+    hosts: Sequence[EmulatedHost], ways: Sequence[Way], judged: Sequence[WayMeasured]
 ) -> list[WayMeasured]:
     """With the rate that came through when more was sent, where the link is slow enough to be filled."""
     limits = [way.rate_mbit if way.rate_mbit and way.rate_mbit <= MOST_MBIT else 0.0 for way in ways]
@@ -73,12 +73,16 @@ async def _fill(
 
 
 async def _run(
-    hosts: Sequence[Host], ways: Sequence[Way], rates_hz: Sequence[float], counts: Sequence[int], size: int
+    hosts: Sequence[EmulatedHost],
+    ways: Sequence[Way],
+    rates_hz: Sequence[float],
+    counts: Sequence[int],
+    size: int,
 ) -> list[dict[str, Any]]:
     last_s = max(count / rate for count, rate in zip(counts, rates_hz, strict=True))
     travel_ms = max(way.delay_ms + 6.0 * way.jitter_ms + way.reorder_ms + way.queue_ms for way in ways)
     plans = [
-        Plan(here.address, there.address, rate, count, size, last_s + travel_ms / 1e3 + LINGER_S)
+        ProbePlan(here.address, there.address, rate, count, size, last_s + travel_ms / 1e3 + LINGER_S)
         for here, there, rate, count in zip(hosts, hosts[::-1], rates_hz, counts, strict=True)
     ]
     probes: list[asyncio.subprocess.Process] = []
@@ -97,16 +101,16 @@ async def _run(
                 await probe.wait()
 
 
-async def _start(host: Host, plan: Plan) -> asyncio.subprocess.Process:
+async def _start(host: EmulatedHost, plan: ProbePlan) -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
-        *host.command([sys.executable, "-m", "deploy.sim.network.probe", *plan.arguments()]),
+        *host.command([sys.executable, "-m", "deploy.ops.network.probe", *plan.arguments()]),
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
     )
 
 
-async def _noted(host: Host, process: asyncio.subprocess.Process, word: bytes) -> dict[str, Any]:
+async def _noted(host: EmulatedHost, process: asyncio.subprocess.Process, word: bytes) -> dict[str, Any]:
     said, failed = await process.communicate(word)
     if process.returncode:
         words = failed.decode(errors="replace").strip().splitlines()[-1:]

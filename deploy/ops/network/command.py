@@ -11,11 +11,12 @@ from rich.progress import Progress
 
 from common.errors import TandemError
 from common.process.runtime import run, until_stopped
+from deploy.ops.network.figures import DELAY_MS, LOSS_POINTS, RATE_SHARE, Measured
+from deploy.ops.network.verify import measure
+from deploy.ops.network.view import measured_table, profiles_table
 from deploy.report.output import in_a_folder, write_json
-from deploy.sim.network.figures import DELAY_MS, LOSS_POINTS, RATE_SHARE, Measured
 from deploy.sim.network.network import open_network
 from deploy.sim.network.profile import Profile, load_profile, profile_names
-from deploy.sim.network.view import measured_table, profiles_table
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -97,7 +98,7 @@ def verify(
 async def _measure(profile: Profile, seconds: float, backend: Any) -> Measured:
     # an outage is no property of the packets that pass
     async with open_network(profile.model_copy(update={"outages": []}), backend=backend) as network:
-        return await network.measure(seconds)
+        return await measure(network, seconds)
 
 
 def _tell(measured: list[Measured], seconds: float, console: Console) -> None:

@@ -1,4 +1,4 @@
-"""`python -m deploy.sim.network.probe`: one end of a measurement, run within a host.
+"""`python -m deploy.ops.network.probe`: one end of a measurement, run within a host.
 
 Sends numbered, stamped packets at a steady rate and notes those of the other end. The hosts are on one
 machine, so one clock stamps both ends: the one-way times are exact, whatever the two sides may know.
@@ -30,7 +30,7 @@ _BUFFER = 8_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ProbePlan:
     """What one end does."""
 
     here: str
@@ -49,7 +49,7 @@ class Plan:
         return [json.dumps(asdict(self))]
 
 
-def open_end(plan: Plan) -> socket.socket:
+def open_end(plan: ProbePlan) -> socket.socket:
     """The socket: it hears from now on, and the kernel stamps what it hears."""
     end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     with suppress(OSError):  # beyond the host's limit for everybody, where permitted
@@ -60,7 +60,7 @@ def open_end(plan: Plan) -> socket.socket:
     return end
 
 
-def run(plan: Plan, end: socket.socket, start_ns: int) -> dict[str, Any]:
+def run(plan: ProbePlan, end: socket.socket, start_ns: int) -> dict[str, Any]:
     """`sent`: how many were, and `arrivals`: number, time of sending and of arrival, ns."""
     padding = bytes(plan.size - IP_UDP_BYTES - STAMP.size)
     period_ns = NS_PER_S / plan.rate_hz
@@ -94,7 +94,7 @@ def _arrived(end: socket.socket) -> list[tuple[int, int, int]]:
 
 def main() -> None:
     """Argument: the plan as JSON. Says `ready`, reads when to start (ns), prints what was seen as JSON."""
-    plan = Plan(**json.loads(sys.argv[1]))
+    plan = ProbePlan(**json.loads(sys.argv[1]))
     enter_real_time(PRIORITY)
     end = open_end(plan)
     sys.stdout.write("ready\n")

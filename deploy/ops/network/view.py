@@ -8,8 +8,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from deploy.ops.network.figures import Measured, WayMeasured
 from deploy.report.tables import UNKNOWN, plain_table
-from deploy.sim.network.figures import Measured, WayMeasured
 from deploy.sim.network.profile import Profile, Way
 
 
