@@ -23,7 +23,7 @@ from deploy.sim.network.namespaces import (
     why_not,
 )
 from deploy.sim.network.netem import Netem, faithful, has_netem
-from deploy.sim.network.profile import Profile, ScriptedOutage, load_profile
+from deploy.sim.network.profile import Outage, Profile, load_profile
 from deploy.sim.network.tun import Forwarder
 
 Args = ParamSpec("Args")
@@ -88,7 +88,7 @@ class Network:
             self._script.cancel()
         self._script = asyncio.create_task(self._play(profile.outages)) if profile.outages else None
 
-    async def _play(self, outages: Sequence[ScriptedOutage]) -> None:
+    async def _play(self, outages: Sequence[Outage]) -> None:
         clock = asyncio.get_running_loop().time
         begun = clock()
         for outage in outages:

@@ -73,7 +73,7 @@ class Way(Section):
         return [ConfigMistake(f"{section}.{key}", value, expected) for key, value, expected in found]
 
 
-class ScriptedOutage(Section):
+class Outage(Section):
     """A time in which nothing passes, either way."""
 
     at_s: float = Field(ge=0)
@@ -101,7 +101,7 @@ class Profile(Section):
     to_robot: Way = Way()
     """Only what differs from `both`, as the next: `ways` holds them whole."""
     to_operator: Way = Way()
-    outages: list[ScriptedOutage] = Field(default_factory=list)
+    outages: list[Outage] = Field(default_factory=list)
 
     @property
     def ways(self) -> Ways:
