@@ -36,7 +36,7 @@ def pair(profile: str, seed: int) -> Pair:
     return Pair(*(judged(follow(world, strategy, ROUND_S)) for strategy in ("latest", "predict")))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize(("profile", "most"), [("4g", 0.4), ("intercontinental", 0.5)])
 def test_the_patient_sees_the_nurses_now(profile: str, most: float, seed: int) -> None:
     found = pair(profile, seed)

@@ -10,31 +10,19 @@ To hold a filter to it, subclass `FilterContract` and give the fixture `section`
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from common.quaternion import Array, angle_between, conjugate, from_rotation_vector, multiply, rotate
 from master.orientation.filter import FilterSection, OrientationFilter
 from master.orientation.mahony import MahonyConfig
 
-RATE_HZ = 200.0
-GRAVITY = np.array([0.0, 0.0, 9.81])
-FIELD_UT = np.array([0.0, 28.0, -39.0])
-NO_FIELD = np.full(3, np.nan)
+from .perfect import FIELD_UT, GRAVITY, NO_FIELD, RATE_HZ, attitudes, seen
+
 UP = np.array([0.0, 0.0, 1.0])
 NODES = 3
 
 
 def make(section: FilterSection) -> OrientationFilter:
     return section.make(RATE_HZ, NODES)
-
-
-def attitudes(seed: int = 0) -> Array:
-    return Rotation.random(NODES, rng=seed).as_quat(scalar_first=True)
-
-
-def seen(q: Array, v_world: Array) -> Array:
-    """A world vector in each sensor's coordinates."""
-    return np.ascontiguousarray(rotate(conjugate(q), np.broadcast_to(v_world, (len(q), 3))))
 
 
 def inclination_deg(q: Array, truth: Array) -> float:
@@ -81,7 +69,7 @@ class FilterContract:
     """Tests of one filter, made from the fixture `section`, over simulated nodes with exact sensors."""
 
     def test_starts_from_a_still_pose_at_once_and_stays(self, section: FilterSection) -> None:
-        filter_, truth = make(section), attitudes()
+        filter_, truth = make(section), attitudes(NODES)
         rest(filter_, truth, 1)
         assert off_deg(filter_.q_world_from_sensor(), truth) < 0.1
         rest(filter_, truth, 600)
@@ -94,26 +82,26 @@ class FilterContract:
             make(section),
             np.full(100, 1.0 / RATE_HZ),
         )
-        move(told, attitudes(), dts_s)
-        move(untold, attitudes(), dts_s, tell_dt=False)
+        move(told, attitudes(NODES), dts_s)
+        move(untold, attitudes(NODES), dts_s, tell_dt=False)
         assert np.array_equal(told.q_world_from_sensor(), untold.q_world_from_sensor())
 
     @pytest.mark.parametrize("seed", [0, 17, 444, 1000])
     def test_follows_a_motion_read_at_uneven_times(self, section: FilterSection, seed: int) -> None:
-        filter_, truth = make(section), attitudes(seed)
+        filter_, truth = make(section), attitudes(NODES, seed)
         rest(filter_, truth, 100)
         dts_s = np.random.default_rng(seed).uniform(0.002, 0.012, 400)
         truth = move(filter_, truth, dts_s)
         assert off_deg(filter_.q_world_from_sensor(), truth) < 0.5
 
     def test_uneven_times_left_untold_do_harm(self, section: FilterSection) -> None:
-        filter_, truth = make(section), attitudes(1)
+        filter_, truth = make(section), attitudes(NODES, 1)
         rest(filter_, truth, 100)
         truth = move(filter_, truth, np.full(200, 0.012), tell_dt=False)
         assert off_deg(filter_.q_world_from_sensor(), truth) > 3.0
 
     def test_a_gap_is_bridged_by_the_turn_told_and_costs_little(self, section: FilterSection) -> None:
-        filter_, truth = make(section), attitudes(2)
+        filter_, truth = make(section), attitudes(NODES, 2)
         rest(filter_, truth, 100)
         gaps_s = np.full(300, 1.0 / RATE_HZ)
         gaps_s[100::50] = 20.0 / RATE_HZ
@@ -122,7 +110,7 @@ class FilterContract:
 
     def test_a_gap_turns_by_the_rate_less_its_bias(self, section: FilterSection) -> None:
         """Rest teaches the bias; a long gap must not integrate it."""
-        filter_, truth, bias = make(section), attitudes(3), np.full((NODES, 3), 0.01)
+        filter_, truth, bias = make(section), attitudes(NODES, 3), np.full((NODES, 3), 0.01)
         acc, no_field = seen(truth, GRAVITY), np.tile(NO_FIELD, (NODES, 1))
         for _ in range(1000):
             filter_.update(bias, acc, no_field)
@@ -135,7 +123,7 @@ class FilterContract:
 
     def test_a_disturbed_field_never_touches_the_inclination(self, section: FilterSection) -> None:
         clean, disturbed = make(section), make(section)
-        truth = attitudes(4)
+        truth = attitudes(NODES, 4)
         for filter_ in (clean, disturbed):
             rest(filter_, truth, 200)
         dts_s = np.full(600, 1.0 / RATE_HZ)
@@ -150,13 +138,13 @@ class FilterContract:
     def test_a_field_of_another_strength_is_left_out(self, section: FilterSection) -> None:
         filter_ = make(section)
         # vqf takes a field for the usual one after 5 s of motion
-        truth = move(filter_, attitudes(5), np.full(1800, 1.0 / RATE_HZ))
+        truth = move(filter_, attitudes(NODES, 5), np.full(1800, 1.0 / RATE_HZ))
         # by direction the field is then 55° off
         end = move(filter_, truth, np.full(600, 1.0 / RATE_HZ), FIELD_UT + [40.0, 0.0, 0.0])
         assert off_deg(filter_.q_world_from_sensor(), end) <= 3.0
 
     def test_without_the_magnetometer_only_the_heading_differs(self, section: FilterSection) -> None:
-        filter_, truth = make(section), attitudes(6)
+        filter_, truth = make(section), attitudes(NODES, 6)
         rest(filter_, truth, 100)
         move(filter_, truth, np.full(300, 1.0 / RATE_HZ), FIELD_UT + [10.0, 0.0, 0.0])
         between = multiply(filter_.q_inertial_from_sensor(), conjugate(filter_.q_world_from_sensor()))
@@ -166,7 +154,7 @@ class FilterContract:
         dts_s = np.full(600, 1.0 / RATE_HZ)
         headings = []
         for field in (FIELD_UT, FIELD_UT + [25.0, -20.0, 30.0]):
-            filter_, truth = make(section), attitudes(7)
+            filter_, truth = make(section), attitudes(NODES, 7)
             rest(filter_, truth, 200)
             before = filter_.q_inertial_from_sensor()
             end = move(filter_, truth, dts_s, field)
@@ -178,7 +166,7 @@ class FilterContract:
         assert max(headings) < (1.0 if isinstance(section, MahonyConfig) else 0.3)
 
     def test_six_axis_keeps_its_inclination_and_its_heading(self, section: FilterSection) -> None:
-        filter_, truth = make(section), attitudes(8)
+        filter_, truth = make(section), attitudes(NODES, 8)
         rest(filter_, truth, 1, NO_FIELD)
         start = filter_.q_world_from_sensor()
         assert inclination_deg(start, truth) < 0.1
@@ -192,7 +180,7 @@ class FilterContract:
 
     def test_a_magnetometer_that_falls_silent_leaves_the_others_alone(self, section: FilterSection) -> None:
         some, all_ = make(section), make(section)
-        truth = attitudes(9)
+        truth = attitudes(NODES, 9)
         rest(some, truth, 50)
         rest(all_, truth, 50)
         mag = seen(truth, FIELD_UT + [5.0, 0.0, 0.0])
@@ -208,8 +196,8 @@ class FilterContract:
     def test_restart_forgets_all_of_a_node_and_nothing_of_the_others(self, section: FilterSection) -> None:
         filter_, alone, fresh = (make(section) for _ in range(3))
         dts_s = np.full(200, 1.0 / RATE_HZ)
-        truth = move(filter_, attitudes(10), dts_s)
-        move(alone, attitudes(10), dts_s)
+        truth = move(filter_, attitudes(NODES, 10), dts_s)
+        move(alone, attitudes(NODES, 10), dts_s)
         filter_.restart(np.array([True, False, False]))
         for each in (filter_, alone, fresh):
             move(each, truth, dts_s, start_s=1.0)
@@ -220,7 +208,7 @@ class FilterContract:
 
     def test_goes_on_from_a_snapshot_again_and_again(self, section: FilterSection) -> None:
         filter_, dts_s = make(section), np.full(100, 1.0 / RATE_HZ)
-        truth = move(filter_, attitudes(11), dts_s)
+        truth = move(filter_, attitudes(NODES, 11), dts_s)
         snapshot = filter_.snapshot()
         ends = []
         for _ in range(3):
@@ -237,7 +225,7 @@ class FilterContract:
 
     def test_what_it_hands_out_is_the_caller_s_own(self, section: FilterSection) -> None:
         filter_ = make(section)
-        rest(filter_, attitudes(), 2)
+        rest(filter_, attitudes(NODES), 2)
         for of in (filter_.q_world_from_sensor, filter_.q_inertial_from_sensor, filter_.bias_rad_s):
             before = of()
             of()[:] = 7.0

@@ -25,19 +25,10 @@ from master.orientation.ekf_equations import (
     turn_by,
 )
 
-RATE_HZ = 200.0
-GRAVITY = np.array([0.0, 0.0, 9.81])
-FIELD_UT = np.array([0.0, 28.0, -39.0])
+from .perfect import FIELD_UT, GRAVITY, RATE_HZ, attitudes, seen
+
 few = settings(max_examples=25, derandomize=True, deadline=None)
 seeds = st.integers(0, 10_000)
-
-
-def attitudes(count: int, seed: int = 0) -> Array:
-    return Rotation.random(count, rng=seed).as_quat(scalar_first=True)
-
-
-def seen(q: Array, v_world: Array) -> Array:
-    return rotate(conjugate(q), np.broadcast_to(v_world, (*q.shape[:-1], 3)))
 
 
 def covariances(count: int, seed: int) -> Array:

@@ -1,10 +1,9 @@
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from common.errors import ConfigError
 from common.quaternion import (
@@ -19,48 +18,15 @@ from common.quaternion import (
 )
 from common.skeleton import load_skeleton
 from common.skeleton.kinematics import orientations, origins
-from common.wire.messages import Mask
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import Calibration, identity
 from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
 
-RATE_HZ = 200.0
-GRAVITY, FIELD_UT = np.array([0.0, 0.0, 9.81]), np.array([0.0, 28.0, -39.0])
+from .perfect import FIELD_UT, GRAVITY, RATE_HZ, Node, Readings, attitudes, seen_by
+
 QUICK = EstimationConfig(settle_s=0.1)
 SETTLE_TICKS = 20
-
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    filter: str | None = None
-    calibration: Path | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Readings:
-    acc_m_s2: Array
-    gyr_rad_s: Array
-    mag_ut: Array
-    fresh: Mask
-    lost: Mask
-
-
-def seen_by(q_world_from_sensor: Array, rate_rad_s: Array, acc_world: Array = GRAVITY) -> Readings:
-    """What perfect, fresh sensors read."""
-    inverse = conjugate(q_world_from_sensor)
-    count = len(q_world_from_sensor)
-    return Readings(
-        acc_m_s2=rotate(inverse, np.broadcast_to(acc_world, (count, 3))),
-        gyr_rad_s=rate_rad_s,
-        mag_ut=rotate(inverse, np.broadcast_to(FIELD_UT, (count, 3))),
-        fresh=np.ones(count, dtype=np.bool_),
-        lost=np.zeros(count, dtype=np.bool_),
-    )
-
-
-def attitudes(count: int, seed: int = 0) -> Array:
-    return Rotation.random(count, rng=seed).as_quat(scalar_first=True)
 
 
 def estimator(

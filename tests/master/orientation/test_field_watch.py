@@ -9,7 +9,7 @@ from master.orientation.filter import OrientationFilter
 from master.orientation.filters import FILTERS
 from master.suit.doubt import Weight
 
-from .test_estimator import FIELD_UT, GRAVITY, attitudes
+from .perfect import FIELD_UT, GRAVITY, attitudes
 from .test_recordings import TRIALS, LoadRecording
 
 RATE_HZ = 100.0

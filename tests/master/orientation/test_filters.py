@@ -14,7 +14,8 @@ from master.orientation.filters import FILTERS
 from master.orientation.mahony import MahonyConfig, MahonyFilter
 from master.suit.nodes import NodeConfig
 
-from .filter_contract import GRAVITY, RATE_HZ, FilterContract
+from .filter_contract import FilterContract
+from .perfect import GRAVITY, RATE_HZ
 
 
 class TestEveryFilter(FilterContract):

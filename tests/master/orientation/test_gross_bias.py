@@ -14,7 +14,7 @@ from master.orientation.filters import FILTERS
 from master.orientation.vqf import VqfConfig
 from master.suit.doubt import Weight
 
-from .test_estimator import FIELD_UT, GRAVITY, Node, attitudes, seen_by
+from .perfect import FIELD_UT, GRAVITY, Node, attitudes, seen_by
 
 RATE_HZ = 200.0
 NAMES = ("vqf", "mahony", "ekf")

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from common.quaternion import (
     Array,
@@ -20,21 +19,10 @@ from master.orientation.mahony import (
     integrate,
 )
 
-RATE_HZ = 200.0
-GRAVITY = np.array([0.0, 0.0, 9.81])
-FIELD_UT = np.array([0.0, 28.0, -39.0])
+from .perfect import FIELD_UT, GRAVITY, NO_FIELD, RATE_HZ, attitudes, seen
+
 GAIN_S = 0.02
 """K_p times the period: a few hundred steps of it settle the loop."""
-NO_FIELD = np.full(3, np.nan)
-
-
-def attitudes(count: int, seed: int = 0) -> Array:
-    return Rotation.random(count, rng=seed).as_quat(scalar_first=True)
-
-
-def seen(q: Array, v_world: Array) -> Array:
-    """A world vector in each sensor's coordinates."""
-    return rotate(conjugate(q), np.broadcast_to(v_world, (*q.shape[:-1], 3)))
 
 
 def inclination_rad(q: Array, truth: Array) -> Array:

@@ -16,7 +16,8 @@ from master.orientation.filters import FILTERS
 from master.orientation.soundness import Soundness
 from master.suit.doubt import Weight
 
-from .test_estimator import QUICK, Node, attitudes, seen_by
+from .perfect import Node, attitudes, seen_by
+from .test_estimator import QUICK
 
 RATE_HZ = 200.0
 NAMES = ("vqf", "mahony", "ekf")

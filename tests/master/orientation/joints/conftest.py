@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 
 from common.quaternion import Array, conjugate
 from common.skeleton import Skeleton, load_skeleton
-from common.wire.messages import Mask
 from deploy.sim.suit.disturbance import Disturbance, DisturbanceConfig
 from deploy.sim.suit.imperfections import Imperfections
 from deploy.sim.suit.motion import OperatorMotion
@@ -21,24 +19,10 @@ from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import identity
 from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
+from tests.master.orientation.perfect import Node, Readings
 
 EARTH_UT = earth_field_ut(50.0, 60.0)
 DECIDE_TICKS = 16
-
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    filter: str | None = None
-    calibration: Path | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Readings:
-    acc_m_s2: Array
-    gyr_rad_s: Array
-    mag_ut: Array
-    fresh: Mask
-    lost: Mask
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,33 +12,18 @@ import pytest
 from common.quaternion import Array
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.full_body import RECORDED_AS
-from common.wire.messages import Mask
 from master.calibrate.alignment import find_alignment
 from master.calibrate.recording import load_recordings
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.affine import Calibration, identity
 from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
+from tests.master.orientation.perfect import Node, Readings
 
 CONFIG = EstimationConfig.model_validate(
     {"constraints": "online", "zero_pose_s": 1.0}
     | {f"{sensor}_cutoff_hz": 0.0 for sensor in ("accelerometer", "gyroscope", "magnetometer")}
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    filter: None = None
-    calibration: None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Readings:
-    acc_m_s2: Array
-    gyr_rad_s: Array
-    mag_ut: Array
-    fresh: Mask
-    lost: Mask
 
 
 @dataclass(frozen=True, slots=True)
