@@ -122,11 +122,6 @@ class Accuracy:
         rows = self._fast_rows([f"{side}_{joint}" for side in SIDES])
         return max(rows, key=lambda row: row.error_deg, default=None)
 
-    def mean_error_deg(self, joint: str) -> float | None:
-        """Mean error of one of Table 1's joints over both sides, by samples."""
-        rows = self._fast_rows([f"{side}_{joint}" for side in SIDES])
-        return _mean([row.error_deg for row in rows], [row.samples for row in rows])
-
 
 def accuracy(truth: TruthSeries, solved: SolvedSeries, joint_names: Sequence[str]) -> Accuracy:
     """Judge the solved angles, row by row of equal tick.

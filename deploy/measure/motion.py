@@ -33,7 +33,6 @@ SEARCH_MS = (-100, 500)
 """Where the lag is looked for."""
 _COARSE_MS = 10
 _FINE_NS = NS_PER_MS / 10
-_GOLDEN = (5**0.5 - 1) / 2
 
 
 _Read = tuple[Mapping[str, float], Mask]
@@ -149,7 +148,8 @@ def _figures(
 
 
 def _lag_ns(truth: TruthSeries, at_ns: Nanoseconds, robot_rad: Array, shifts_ns: Nanoseconds) -> int | None:
-    """The shift of least RMSE: a coarse scan for the valley, then golden section within it."""
+    """The shift of least RMSE: a coarse scan for the valley, then the least within it."""
+    from scipy.optimize import minimize_scalar
 
     def rmse(shift_ns: float) -> float:
         return _rms(robot_rad - at_shift(truth, at_ns, round(shift_ns)))
@@ -157,19 +157,8 @@ def _lag_ns(truth: TruthSeries, at_ns: Nanoseconds, robot_rad: Array, shifts_ns:
     best = int(np.argmin([rmse(s) for s in shifts_ns]))
     if best in (0, len(shifts_ns) - 1):
         return None
-    low, high = float(shifts_ns[best - 1]), float(shifts_ns[best + 1])
-    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_left, at_right = rmse(left), rmse(right)
-    while high - low > _FINE_NS:
-        if at_left < at_right:
-            high, right, at_right = right, left, at_left
-            left = high - _GOLDEN * (high - low)
-            at_left = rmse(left)
-        else:
-            low, left, at_left = left, right, at_right
-            right = low + _GOLDEN * (high - low)
-            at_right = rmse(right)
-    return round(0.5 * (low + high))
+    valley = (float(shifts_ns[best - 1]), float(shifts_ns[best + 1]))
+    return round(minimize_scalar(rmse, bounds=valley, method="bounded", options={"xatol": _FINE_NS}).x)
 
 
 def _settled(encoder_ns: Nanoseconds, tracking: Mask) -> Mask:

@@ -55,13 +55,9 @@ def acceleration(time_s: Array, position_rad: Array) -> Array:
 
 def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
     """A second-order Butterworth run forward and backward: gain 1 / (1 + (f / cutoff)⁴), no delay. (T, J)."""
+    # imported here: it takes longer than the rest of tandem together
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(2, cutoff_hz, fs=rate_hz, output="sos")
     pad = min(round(_PAD_S * rate_hz), len(values) - 1)
-    # odd reflection keeps value and slope across the ends
-    head = 2.0 * values[0] - values[pad:0:-1]
-    tail = 2.0 * values[-1] - values[-2 : -pad - 2 : -1]
-    padded = np.concatenate([head, values, tail])
-    # the spectrum is of a periodic signal: take out the ramp from end to end, which no low-pass changes
-    ramp = np.linspace(padded[0], padded[-1], len(padded))
-    gain = 1.0 / (1.0 + (np.fft.rfftfreq(len(padded), 1.0 / rate_hz) / cutoff_hz) ** 4)
-    smooth = np.fft.irfft(np.fft.rfft(padded - ramp, axis=0) * gain[:, None], n=len(padded), axis=0) + ramp
-    return np.asarray(smooth[pad : pad + len(values)])
+    return np.asarray(sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=pad))

@@ -5,7 +5,8 @@ over all pairs of points within a stretch (Sen 1968; for several stretches Hirsc
 "seasonal Kendall slope"). Its interval follows from the variance of Kendall's S, summed over the stretches
 and corrected for ties. Neighbouring points resemble each other (memory does not shrink and grow at random),
 which makes an interval look too narrow: the variance is widened by (1 + r) / (1 - r), r being the
-correlation of neighbours about the line.
+correlation of neighbours about the line. By hand, because `scipy.stats.theilslopes` takes neither stretches
+nor that correlation.
 """
 
 from __future__ import annotations
@@ -32,11 +33,6 @@ class Slope:
     low: float
     high: float
     points: int
-
-    @property
-    def half_width(self) -> float:
-        """How far the truth may be away, at most."""
-        return max(self.high - self.value, self.value - self.low)
 
 
 def slope(stretches: Sequence[tuple[Array, Array]], confidence: float = 0.95) -> Slope | None:

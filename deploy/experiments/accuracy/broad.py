@@ -13,9 +13,7 @@ import numpy as np
 
 from common.quaternion import Array, conjugate, heading_rad, heading_turn, multiply
 from common.wire.messages import Mask
-
-LEAST_ESTIMATED = 0.95
-"""Of the samples with truth; a figure of fewer would say nothing of those that are missing."""
+from deploy.measure.estimated import LEAST_ESTIMATED
 
 
 @dataclass(frozen=True, slots=True)

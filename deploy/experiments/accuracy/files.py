@@ -63,9 +63,9 @@ def files(
         raise typer.BadParameter(f"{filter_!r}: expected {', '.join(FILTERS)} or all", param_hint="--filter")
     console = Console()
     judged = judge(recordings, list(FILTERS) if filter_ == "all" else [filter_], console, jobs, align=align)
-    console.print(accuracy_of_files(judged.tree))
+    console.print(accuracy_of_files(judged))
     if report is not None:
-        write_json(report, judged.tree)
+        write_json(report, judged.tree())
     picture = plot or (report.with_suffix(".png") if report is not None else None)
     if picture is not None and any(panel.curves for panel in judged.panels):
         draw(judged.panels, picture)

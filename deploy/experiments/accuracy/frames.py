@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.quaternion import IDENTITY, Array, angle_between, conjugate, multiply, normalise
 from common.wire.messages import Mask
@@ -28,7 +29,7 @@ _WORTH_RAD = math.radians(5.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Turned:
+class FrameRotations:
     """estimate = world · truth · sensor, quaternions (4,) wxyz."""
 
     world: Array
@@ -38,28 +39,30 @@ class Turned:
         """The truth (T, 4) in the estimate's frames."""
         return multiply(multiply(self.world, truth), self.sensor)
 
+    def tree(self) -> dict[str, list[float]]:
+        """As JSON."""
+        return {"world": self.world.tolist(), "sensor": self.sensor.tolist()}
+
     def words(self) -> str:
         """Both rotations for a person."""
         return f"world side {_turn(self.world)}, sensor side {_turn(self.sensor)}"
 
 
-def fit(q_world_from_sensor: Array, truth: Array, counts: Mask) -> Turned:
+def fit(q_world_from_sensor: Array, truth: Array, counts: Mask) -> FrameRotations:
     """The two constant rotations that bring truth (T, 4) nearest to the estimates (T, 4) where `counts` (T,).
 
     Samples without estimate or truth are left out; identities where none is left.
     """
-    known = counts & np.isfinite(q_world_from_sensor).all(axis=1) & np.isfinite(truth).all(axis=1)
-    rows = np.flatnonzero(known)
+    rows = _some(q_world_from_sensor, truth, counts)
     if not len(rows):
-        return Turned(IDENTITY, IDENTITY)
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, _FEW).astype(np.intp))]
+        return FrameRotations(IDENTITY, IDENTITY)
     q, t = q_world_from_sensor[rows], normalise(truth[rows])
-    best, left = Turned(IDENTITY, IDENTITY), math.inf
+    best, left = FrameRotations(IDENTITY, IDENTITY), math.inf
     for sensor in _starts():
         for _ in range(_ROUNDS):
             world = _mean(multiply(q, conjugate(multiply(t, sensor))))
             sensor = _mean(multiply(conjugate(multiply(world, t)), q))
-        found = Turned(world, sensor)
+        found = FrameRotations(world, sensor)
         off = _rms(q, found.applied(t))
         if off < left - 1e-9:
             best, left = found, off
@@ -68,11 +71,9 @@ def fit(q_world_from_sensor: Array, truth: Array, counts: Mask) -> Turned:
 
 def hint(q_world_from_sensor: Array, truth: Array, counts: Mask) -> str | None:
     """What would explain most of the error, in words; None where nothing does, or little is to explain."""
-    known = counts & np.isfinite(q_world_from_sensor).all(axis=1) & np.isfinite(truth).all(axis=1)
-    if not known.any():
+    rows = _some(q_world_from_sensor, truth, counts)
+    if not len(rows):
         return None
-    rows = np.flatnonzero(known)
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, _FEW).astype(np.intp))]
     q, t, all_ = q_world_from_sensor[rows], truth[rows], np.ones(len(rows), dtype=np.bool_)
     now = _rms(q, t)
     if now < _WORTH_RAD:
@@ -87,6 +88,13 @@ def hint(q_world_from_sensor: Array, truth: Array, counts: Mask) -> str | None:
             what = " and ".join([*([said] if said else []), *(["with --align"] if aligned else [])])
             return f"{_deg(now)}° in all would be {_deg(left)}° {what}"
     return None
+
+
+def _some(q_world_from_sensor: Array, truth: Array, counts: Mask) -> NDArray[np.intp]:
+    """At most _FEW rows, evenly spread, that count and have both estimate and truth."""
+    known = counts & np.isfinite(q_world_from_sensor).all(axis=1) & np.isfinite(truth).all(axis=1)
+    rows = np.flatnonzero(known)
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(_FEW, len(rows))).astype(np.intp))]
 
 
 def _as_it_is(truth: Array) -> Array:

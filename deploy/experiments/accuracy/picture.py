@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,7 +35,7 @@ class Panel:
     """Total, heading or inclination ▸ filter ▸ (T,) °."""
 
 
-def draw(panels: list[Panel], path: Path) -> None:
+def draw(panels: Sequence[Panel], path: Path) -> None:
     """Write the PNG; at least one of the panels has curves."""
     panels = [panel for panel in panels if panel.curves]
     columns = list(dict.fromkeys(part for panel in panels for part in panel.curves))

@@ -10,14 +10,12 @@ from common.clock import NS_PER_S, to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask, RobotState
-from deploy.measure.stillness import STILL_RAD, StoppingMotion, stillness
+from deploy.measure.stillness import StoppingMotion, stillness
 
 KEPT = 400
 """States: 8 s."""
 BRAKES_S = 0.7
 """A robot that holds has come to rest by then; what moves later moves by itself."""
-MOVED_RAD = 4.0 * STILL_RAD
-"""0.9°: far above what encoders, servos and shaking neighbours show of a robot that stands."""
 
 
 class MotionWatch:

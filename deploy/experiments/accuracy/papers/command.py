@@ -32,9 +32,9 @@ def papers(
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from deploy.experiments.accuracy.papers.experiments import EXPERIMENTS
-    from deploy.experiments.accuracy.papers.figures import PaperValue, gather
-    from deploy.experiments.accuracy.papers.run import run_all
+    from deploy.experiments.accuracy.papers.figures import PaperValue, gather, run_experiment
     from deploy.experiments.accuracy.papers.table import experiment_table, experiment_tree
+    from deploy.harness.workers import jobs_here, run_each
     from deploy.measure.verdict import Outcome
 
     keys = [key.strip() for key in (only or "").split(",") if key.strip()]
@@ -45,15 +45,11 @@ def papers(
     wanted = [e for e in EXPERIMENTS if not keys or e.key.lower() in (k.lower() for k in keys)]
     found: dict[str, dict[int, list[PaperValue]]] = {experiment.key: {} for experiment in wanted}
     console = Console()
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    work = [(experiment, seed) for experiment in wanted for seed in range(1, seeds + 1)]
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("experiments × seeds", total=len(wanted) * seeds)
-        for experiment, seed, figures in run_all(wanted, range(1, seeds + 1), jobs):
+        task = progress.add_task("experiments × seeds", total=len(work))
+        for (experiment, seed), figures in run_each(run_experiment, work, jobs or jobs_here()):
             found[experiment.key][seed] = figures
             progress.advance(task)
     trees: dict[str, Any] = {}

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from deploy.harness.workers import OnProgress
 from deploy.measure.verdict import Outcome, Verdict, at_most
 
 
@@ -81,6 +82,12 @@ class PaperComparison:
     def outcome(self) -> Outcome | None:
         """Of the verdict, where there is one."""
         return None if self.verdict is None else self.verdict.outcome
+
+
+def run_experiment(work: tuple[Experiment, int], _: OnProgress) -> list[PaperValue]:
+    """One experiment with one seed, in any process."""
+    experiment, seed = work
+    return experiment.run(seed)
 
 
 def gather(by_seed: Mapping[int, Sequence[PaperValue]]) -> list[PaperComparison]:

@@ -20,8 +20,6 @@ from master.orientation.affine import Calibration
 
 RATE_HZ = 50.0
 """Enough for turns by hand."""
-SHORT_SESSION = TrayConfig(attitudes=20, still_s=2.5, tumble_s=60.0)
-"""For whoever cannot wait."""
 SESSION = TrayConfig(attitudes=26, still_s=10.0, tumble_s=180.0)
 
 

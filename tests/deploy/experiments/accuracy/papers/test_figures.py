@@ -6,9 +6,9 @@ import json
 import pytest
 from rich.console import Console
 
-from deploy.experiments.accuracy.papers.figures import Experiment, PaperValue, gather
-from deploy.experiments.accuracy.papers.run import run_all
+from deploy.experiments.accuracy.papers.figures import Experiment, PaperValue, gather, run_experiment
 from deploy.experiments.accuracy.papers.table import experiment_table, experiment_tree
+from deploy.harness.workers import run_each
 
 
 def made_up(seed: int) -> list[PaperValue]:
@@ -39,14 +39,9 @@ def test_a_seed_that_tells_nothing_has_missed(values: tuple[float, ...]) -> None
     assert rows[0].outcome == "failed"
 
 
-def test_every_experiment_runs_with_every_seed() -> None:
-    done = list(run_all([MADE_UP], [1, 2, 3], jobs=1))
-    assert [(experiment.key, seed) for experiment, seed, _ in done] == [("X", 1), ("X", 2), ("X", 3)]
-
-
 def test_other_processes_find_the_same() -> None:
-    other = {seed: figures for _, seed, figures in run_all([MADE_UP], [1, 2], jobs=2)}
-    assert other == {seed: made_up(seed) for seed in (1, 2)}
+    work = [(MADE_UP, seed) for seed in (1, 2)]
+    assert dict(run_each(run_experiment, work, jobs=2)) == dict(run_each(run_experiment, work, jobs=1))
 
 
 def test_table_and_report_name_the_paper_s_figure_and_ours() -> None:

@@ -7,8 +7,10 @@ from scipy.spatial.transform import Rotation
 from common.quaternion import Array, from_axis_angle, multiply
 from deploy.experiments.accuracy.papers import glove
 from deploy.experiments.accuracy.papers.figures import gather
-from deploy.experiments.accuracy.papers.units import SHORT_SESSION
 from deploy.sim.suit.imperfections import Imperfections
+from deploy.sim.suit.tray import TrayConfig
+
+SHORT_SESSION = TrayConfig(attitudes=20, still_s=2.5, tumble_s=60.0)
 
 
 def test_units_as_delivered_meet_every_target_once_calibrated() -> None:

@@ -2,8 +2,10 @@ from __future__ import annotations
 
 from deploy.experiments.accuracy.papers import telerobot
 from deploy.experiments.accuracy.papers.figures import gather
-from deploy.experiments.accuracy.papers.units import SHORT_SESSION
 from deploy.measure.paper import ETA_PERCENT, TABLE_1
+from deploy.sim.suit.tray import TrayConfig
+
+SHORT_SESSION = TrayConfig(attitudes=20, still_s=2.5, tumble_s=60.0)
 
 
 def test_units_as_delivered_reach_table_1_and_eta_once_calibrated() -> None:
