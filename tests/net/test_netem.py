@@ -39,7 +39,7 @@ def _netem() -> None:
 def test_the_link_has_its_profile_and_is_cut_and_counted() -> None:
     async def story() -> None:
         async with open_network(MIXED) as network:
-            assert network.backend == "netem"  # by itself: nothing in it that netem does otherwise
+            assert network.emulation.name == "netem"  # by itself: nothing in it that netem does otherwise
             judge(await measure(network, 3.0, rate_hz=100.0))
             await cut(network)
             for name in profile_names():

@@ -60,7 +60,7 @@ class SoakFault:
     lasts_s: tuple[float, float] = (1.2, 2.5)
     """Long enough to see the robot stand."""
     ends_process: bool = False
-    """Some process dies of it; not in the calm part."""
+    """A process ends; such a fault does not come in the calm part."""
     lives: bool = True
     """The robot is still heard, so that its reaction can be seen."""
     notices_s: float = 0.0
@@ -68,7 +68,7 @@ class SoakFault:
     flow_s: float | None = None
     """Once it is undone, commands must flow again within this; None: they never stop."""
     needs: Callable[[Stage], Awaitable[str]] = _needs_nothing
-    """Empty where this host and this rig can do it; else why not."""
+    """Returns why this host or this rig cannot do it; empty where it can."""
 
     @property
     def holds(self) -> bool:
@@ -159,11 +159,11 @@ async def _can_step(_: Stage) -> str:
 
 
 RESTART_S = 15.0
-"""A process that was killed is back by then: it starts, its clock and lease are settled, filters too."""
+"""By then a killed process is back: it has started, its clock offset, lease and filters have settled."""
 SUIT_LOST_S = 0.1
 """`capture.lost_after` at `capture.rate_hz`: until then the master takes a node for one that is late."""
 LINK_S = 1.5
-"""An outage's own target (issue 5): commands flow again so soon after the link is back."""
+"""The target of an outage: commands flow again within this after the link is back."""
 
 
 def _killed(
@@ -236,6 +236,6 @@ def chosen(text: str) -> list[str]:
 
 
 async def possible(names: Iterable[str], stage: Stage) -> tuple[list[str], dict[str, str]]:
-    """Which of them can be done here, and why the others cannot."""
+    """The faults that can be done here, and why the others cannot."""
     why = {name: await FAULTS[name].needs(stage) for name in names}
     return [name for name in why if not why[name]], {name: words for name, words in why.items() if words}

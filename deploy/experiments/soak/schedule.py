@@ -1,4 +1,4 @@
-"""When which fault comes: every kind in turn in a random order, at random distances. Pure; seeded."""
+"""The plan of a soak's faults: each kind in turn, in random order, at random distances. Pure; seeded."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 SETTLE_S = 10.0
-"""No fault before: what is undisturbed is worth seeing first."""
+"""No fault comes before this, so that undisturbed operation is seen first."""
 TAIL_S = 12.0
-"""None in the end, so that the last one's recovery is seen."""
+"""No fault comes in the last seconds, so that the last recovery is seen."""
 SPREAD = 0.25
 """Distances vary by this share."""
 CALM_FROM_S = 20.0 * 60.0
 """A soak at least this long ends with a calm part."""
 CALM_SHARE = 0.4
-"""The last part of a long soak, in which no process is ended: slow growth is seen in long lives only."""
+"""Share of a long soak, at its end, in which no process is ended: only long lives show slow growth."""
 SHORTEST_S, LONGEST_S, TIMES_EACH = 20.0, 120.0, 2
-"""Distance between faults, where nobody chose it: each kind twice, but no closer and no farther apart."""
+"""Without `--every`: each kind comes twice, but faults are no closer and no farther apart than this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +30,12 @@ class PlannedFault:
 
 
 def distance_s(duration_s: float, kinds: int) -> float:
-    """Mean time between faults, where nobody chose it."""
+    """Mean time between faults, without `--every`."""
     return min(LONGEST_S, max(SHORTEST_S, duration_s / max(1, TIMES_EACH * kinds)))
 
 
 def calm_from_s(duration_s: float) -> float:
-    """From when no process is ended any more; the end where the soak is too short for that."""
+    """When the calm part begins, in which no process is ended; the end where the soak is too short for it."""
     return duration_s * (1.0 - CALM_SHARE) if duration_s >= CALM_FROM_S else duration_s
 
 

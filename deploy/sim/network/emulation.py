@@ -1,4 +1,4 @@
-"""Both directions of an emulated link, and what may be asked of it. Pure; `forwarder.py` gives it packets."""
+"""Both directions of an emulated link, and what may be asked of it. Pure; `forwarder.py` feeds it packets."""
 
 from __future__ import annotations
 
@@ -22,18 +22,14 @@ class LinkCounters:
     to_robot: Counters
     to_operator: Counters
 
-    def tree(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
-
 
 class Emulation(Protocol):
-    """Whatever makes packets late: our forwarder, or the kernel."""
+    """What emulates the link: the forwarder process, or the kernel (netem)."""
 
     name: str
 
     def set(self, profile: Profile) -> None:
-        """Behave so from now on. Raises NetworkError."""
+        """Change the link to this profile. Raises NetworkError."""
 
     def cut(self, cut: bool) -> None:
         """Let nothing pass, or let it pass again. Raises NetworkError."""
@@ -42,7 +38,7 @@ class Emulation(Protocol):
         """Raises NetworkError."""
 
     def planned(self) -> Mapping[str, Summary]:
-        """How long packets take by what was drawn, each way since the start; empty where it is not told."""
+        """The delays that were drawn, each way since the start; empty where they are not reported."""
 
     def close(self) -> None:
         """End it; nothing passes any more."""
@@ -86,7 +82,6 @@ class EmulatedLink:
         return {
             way: {
                 "counters": asdict(scheduler.counters),
-                "late_ms": to_tree(scheduler.late.summary()),
                 "planned_ms": to_tree(scheduler.planned.summary()),
             }
             for way, scheduler in self._ways.items()

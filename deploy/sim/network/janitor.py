@@ -1,4 +1,4 @@
-"""`python -m deploy.sim.network.janitor RUN`: removes a run's hosts when its parent is done, or dead.
+"""`python -m deploy.sim.network.janitor RUN`: removes a run's hosts when its parent has ended.
 
 Its standard input is a pipe that only the parent holds: whatever ends the parent closes it.
 """
@@ -16,7 +16,7 @@ REMOVE_S = 20.0
 
 
 class Janitor:
-    """The process, from its parent's side."""
+    """The janitor process, from its parent's side."""
 
     def __init__(self, run: NetworkRun) -> None:
         self._process = subprocess.Popen(
@@ -28,7 +28,7 @@ class Janitor:
         )
 
     def remove(self) -> None:
-        """Have all removed, and wait for it. Raises NetworkError with what it could not remove."""
+        """Remove the hosts and wait for it. Raises NetworkError with what it could not remove."""
         try:
             _, said = self._process.communicate(timeout=REMOVE_S)
         except subprocess.TimeoutExpired:

@@ -1,4 +1,4 @@
-"""Hosts as network namespaces: made, named so that a dead run's are known, and removed."""
+"""Hosts as network namespaces: made, named so that those of a dead run are recognised, and removed."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def free_slot() -> list[str]:
 
 
 def remove(run: NetworkRun) -> None:
-    """All of a run: what still runs in its namespaces, its veths, and the namespaces."""
+    """Remove all of a run: the processes in its namespaces, its veths, its namespaces."""
     for namespace in _namespaces():
         if parse_run(namespace) == run:
             with suppress(NetworkError):
@@ -172,7 +172,7 @@ def remove(run: NetworkRun) -> None:
 
 
 def remove_dead() -> list[str]:
-    """What runs that died left behind; their names."""
+    """Remove what dead runs left behind; returns their names."""
     names = [*_namespaces(), *(i.get("ifalias", "") for i in json.loads(ip("-j", "link")))]
     dead = {run for name in names if (run := parse_run(name)) is not None and not run.alive}
     for run in dead:

@@ -1,4 +1,4 @@
-"""The same profiles by the kernel's own emulation: `tc netem` at each end of a veth.
+"""The kernel's own emulation of the same profiles: `tc netem` at each end of a veth.
 
 It draws every packet's delay by itself. A rate makes it keep their order, so that with jitter those behind
 wait for the slowest ahead, and the mean grows with the packet rate; what is reordered is not held back but
@@ -29,7 +29,7 @@ NETEM = "netem"
 
 
 def faithful(profile: Profile) -> bool:
-    """Whether netem does all of the profile as the profile means it."""
+    """Whether netem emulates every key of the profile as the profile defines it."""
     ways = (profile.ways.to_robot, profile.ways.to_operator)
     return not any(way.jitter_ms or way.reorder_percent or way.largest_bytes for way in ways)
 
@@ -46,7 +46,7 @@ def has_netem(run: NetworkRun) -> bool:
 
 
 def netem_arguments(way: Way) -> list[str]:
-    """What `tc qdisc … netem` is told for one direction: all but the rate."""
+    """The arguments of `tc qdisc … netem` for one direction, without the rate."""
     # its limit is in packets, whatever their size: no bound for a queue, so none of this link's
     arguments = ["limit", str(MOST_PACKETS), "delay", f"{way.delay_ms:g}ms"]
     if way.jitter_ms:
@@ -100,12 +100,12 @@ class Netem:
         self._apply()
 
     def set(self, profile: Profile) -> None:
-        """Behave so from now on; what is under way arrives as it would have."""
+        """Change the link to this profile; packets under way arrive as planned."""
         self._profile = profile
         self._apply()
 
     def cut(self, cut: bool) -> None:
-        """Let nothing pass, or let it pass again; what is under way is lost."""
+        """Let nothing pass, or let it pass again; packets under way are lost."""
         if cut == self._cut:
             return
         self._count()
@@ -122,13 +122,13 @@ class Netem:
             self._apply()
 
     def counters(self) -> LinkCounters:
-        """What the kernel counted so far."""
+        """Packets and bytes each way so far, as the kernel counts them."""
         self._count()
         to_robot, to_operator = (replace(one, dropped=dict(one.dropped)) for one in self._totals.values())
         return LinkCounters(to_robot, to_operator)
 
     def planned(self) -> dict[str, Summary]:
-        """The kernel does not tell what it draws."""
+        """Empty: the kernel does not report the delays that it draws."""
         return {}
 
     def close(self) -> None:

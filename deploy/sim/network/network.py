@@ -38,16 +38,11 @@ class Network:
         self.operator, self.robot = hosts
         self.profile = profile
         self.emulation = emulation
-        """What makes packets late."""
+        """What emulates the link: the forwarder, or netem."""
         self._cut = False
         self._outages = 0
         self._script: asyncio.Task[None] | None = None
         self._follow(profile)
-
-    @property
-    def backend(self) -> str:
-        """What emulates the link: `forwarder`, `netem`."""
-        return self.emulation.name
 
     def set(self, profile: Profile | str | Path) -> None:
         """Change the link to another profile; its scripted outages count from now."""
@@ -62,12 +57,12 @@ class Network:
         self._apply()
 
     def restore(self) -> None:
-        """End of `cut`; outages that are under way go on."""
+        """End a `cut`; an outage that is under way goes on."""
         self._cut = False
         self._apply()
 
     async def outage(self, seconds: float) -> None:
-        """Let nothing pass for some time; returns when the link is back."""
+        """Let nothing pass for some time; return when the link is back."""
         self._outages += 1
         try:
             self._apply()
@@ -96,7 +91,7 @@ class Network:
             await self.outage(begun + outage.at_s + outage.for_s - clock())
 
     async def end_script(self) -> None:
-        """No scripted outage happens any more."""
+        """Cancel the scripted outages that are still to come."""
         if self._script is not None:
             self._script.cancel()
             with suppress(asyncio.CancelledError, NetworkError):
@@ -130,7 +125,7 @@ async def open_network(
 
 
 async def _whole(function: Callable[Args, Result], *args: Args.args, **named: Args.kwargs) -> Result:
-    """Run it in a thread. Cancelled, it is still waited for: the janitor comes after it, not before."""
+    """Run it in a thread. If cancelled, wait for its end all the same: the janitor must run after it."""
     task = asyncio.ensure_future(asyncio.to_thread(function, *args, **named))
     try:
         return await asyncio.shield(task)

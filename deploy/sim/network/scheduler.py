@@ -1,4 +1,4 @@
-"""When each packet arrives, if it does: one direction of an emulated link, on any clock. Pure."""
+"""One direction of an emulated link: when each packet arrives, or why it does not. Pure."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from deploy.sim.network.profile import Way
 
 P = TypeVar("P")
 LOSS, QUEUE, SIZE, OUTAGE = "loss", "queue", "size", "outage"
-"""Why a packet is dropped: by chance, by a full queue, while nothing passes."""
+"""Why a packet is dropped: by chance, by a full queue, because it is too large, while nothing passes."""
 
 
 @dataclass(slots=True)
@@ -34,20 +34,18 @@ class Counters:
 
 
 class PacketScheduler(Generic[P]):
-    """Takes packets, and gives each back when it is due.
+    """Takes packets, and returns each when it is due.
 
-    A packet first waits for those before it (rate, queue), then travels (delay, jitter). All of them keep
-    their order but those that are held back for reordering, and their copies.
+    A packet first waits for those before it (rate, queue), then travels (delay, jitter). Packets keep their
+    order, except those held back for reordering, and their copies.
     """
 
     def __init__(self, way: Way, seed: int = 0, now_ns: int = 0) -> None:
         self.counters = Counters()
-        self.late = Durations()
-        """How long after they were due packets were asked for."""
         self.planned = Durations()
         """How long packets in their order take: what was drawn by the profile's chances, and queueing."""
         self.cut = False
-        """While set nothing passes: what comes, or would arrive, is dropped."""
+        """While true, nothing passes: packets that enter or would arrive are dropped."""
         self._rng = random.Random(seed)
         self._under_way: list[tuple[int, int, int, P]] = []
         self._number = 0
@@ -59,7 +57,7 @@ class PacketScheduler(Generic[P]):
         self.set(way, now_ns)
 
     def set(self, way: Way, now_ns: int) -> None:
-        """From now on behave so; what is under way arrives as it would have."""
+        """Change the behaviour from now on; packets under way arrive as planned."""
         self._way = way
         self._set_ns = now_ns
         self._delay = DelayProcess(way.delay_ms, way.jitter_ms, self._seed)
@@ -111,11 +109,10 @@ class PacketScheduler(Generic[P]):
         """The packets that arrive by now, in their order."""
         arrived: list[P] = []
         while self._under_way and self._under_way[0][0] <= now_ns:
-            due_ns, _, size, packet = heapq.heappop(self._under_way)
+            _, _, size, packet = heapq.heappop(self._under_way)
             if self.cut:
                 self.counters.dropped[OUTAGE] += 1
                 continue
-            self.late.record(now_ns - due_ns)
             self.counters.delivered += 1
             self.counters.delivered_bytes += size
             arrived.append(packet)
@@ -125,8 +122,3 @@ class PacketScheduler(Generic[P]):
     def next_ns(self) -> int | None:
         """When the next packet arrives; None while none is under way."""
         return self._under_way[0][0] if self._under_way else None
-
-    @property
-    def under_way(self) -> int:
-        """How many packets are."""
-        return len(self._under_way)

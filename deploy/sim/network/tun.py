@@ -59,7 +59,7 @@ class Forwarder:
         self.set(profile)
 
     def set(self, profile: Profile) -> None:
-        """Behave so from now on."""
+        """Change the link to this profile."""
         self._ask({"set": profile.model_dump(mode="json", exclude_unset=True)})
 
     def cut(self, cut: bool) -> None:
@@ -67,19 +67,15 @@ class Forwarder:
         self._ask({"cut": cut})
 
     def counters(self) -> LinkCounters:
-        """What it has done so far."""
+        """Packets and bytes each way so far."""
         answer = self._ask({})
         return LinkCounters(
             Counters(**answer[TO_ROBOT]["counters"]), Counters(**answer[TO_OPERATOR]["counters"])
         )
 
     def planned(self) -> dict[str, Summary]:
-        """How long packets take by what was drawn, each way."""
+        """The delays that were drawn, each way."""
         return {way: from_tree(Summary, answer["planned_ms"]) for way, answer in self._ask({}).items()}
-
-    def late_ms(self) -> dict[str, Summary]:
-        """How late packets were released, each way: what this machine adds to the profile."""
-        return {way: from_tree(Summary, answer["late_ms"]) for way, answer in self._ask({}).items()}
 
     def close(self) -> None:
         """End the process."""

@@ -1,4 +1,4 @@
-"""Where troubles enter the virtual world: on the link, in the clocks, between the slave and its robot."""
+"""Where faults enter the virtual world: the link, the clocks, the suit's bus, between slave and robot."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from slave.servos.servos import EncoderReading
 
 
 class Traffic(StrEnum):
-    """What goes over the link."""
+    """The kinds of message on the link."""
 
     COMMAND = "command"
     STATE = "state"
@@ -22,25 +22,25 @@ class Traffic(StrEnum):
 
 
 Delivery = tuple[int, bytes]
-"""How much later than usual a message arrives, ns, and its bytes."""
+"""By how much a message is delayed beyond the link's own delay, ns, and its bytes."""
 
 
 @dataclass(slots=True)
 class FaultInjection:
-    """None unless told; each may be replaced at any moment of a run."""
+    """No fault by default; each member may be replaced at any moment of a run."""
 
     carry: Callable[[Traffic, bytes], Sequence[Delivery]] = lambda _, payload: ((0, payload),)
-    """What the link makes of a message: nothing, one, or more."""
+    """The messages that arrive for one that was sent: none, one, or more."""
     master_stepped_ns: int = 0
-    """By how much the master's clock has been stepped; nothing else in the world notices."""
+    """By how much the master's clock has been stepped; no other clock is."""
     slave_stepped_ns: int = 0
     suit_heard: bool = True
     """Whether the bus between suit and master works."""
     read: Callable[[EncoderReading], EncoderReading] = lambda reading: reading
-    """What becomes of a reading between the encoders and the slave."""
+    """Changes a reading between the encoders and the slave."""
     write: Callable[[Array], Array] = lambda position_rad: position_rad
-    """What becomes of setpoints (J,) between the slave and the drives."""
+    """Changes setpoints (J,) between the slave and the drives."""
     body: Callable[[], Body] = lambda: WELL
-    """What drives and base say of themselves."""
+    """What drives and base report of themselves."""
     watch: Callable[[EncoderReading, Setpoint], None] = lambda reading, setpoint: None
-    """Sees what the encoders truly show, and what the slave asked for, in each of its ticks."""
+    """Called in each tick of the slave with the true encoder reading and the slave's setpoint."""

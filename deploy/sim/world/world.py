@@ -1,6 +1,7 @@
-"""The whole way on a virtual clock: suit, master, slave and robot step together, far faster than real time.
+"""The whole system on a virtual clock: suit, master, slave and robot, far faster than real time.
 
-The same pure parts as in the processes, with the hosts' clocks apart and messages under way between them.
+It runs the same pipelines as the processes. The two hosts have different clocks, and messages take time
+between them. Faults are injected through `VirtualWorld.inject`.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ ALIGN_S = 15.0
 
 @dataclass(frozen=True, slots=True)
 class WorldSettings:
-    """How the two hosts and the way between them are."""
+    """The two hosts, the link between them, and the files that they are configured by."""
 
     start_ns: int = NS_PER_S
     """What the master's clock shows when the run begins."""
@@ -57,19 +58,19 @@ class WorldSettings:
     """The slave's clock minus the master's at the start."""
     slave_drift_ppm: float = 20.0
     one_way_ns: int = 2 * NS_PER_MS
-    """Of a link that neither loses nor delays anything more; used where there is no `network`."""
+    """Delay of a perfect link; used without a `network`."""
     network: Profile | None = None
-    """How the link behaves, as over an emulated network. Its outages are not played."""
+    """A profile of an emulated network. Its outages are not played."""
     network_seed: int = 1
     profile: str = NURSING
     motion: OperatorMotion | None = None
-    """Of the operator, instead of the one that the suit's file names."""
+    """The operator's; None: the one that the suit's file names."""
     overrides: dict[str, list[str]] = field(default_factory=dict)
-    """Of the example files, by role."""
+    """Changes to the example files, by role."""
 
 
 class VirtualWorld:
-    """One run; `now_ns` is true time, and the master's clock until that is stepped. Deterministic."""
+    """One run, deterministic. `now_ns` is true time, and the master's clock until that is stepped."""
 
     def __init__(self, world: WorldSettings) -> None:
         self._world = world

@@ -76,7 +76,8 @@ def test_every_packet_arrives_or_is_counted(way: Way, packets: list[tuple[int, i
     assert counted.delivered == len(carried.arrivals)
     assert counted.delivered_bytes == sum(carried.sizes[number] for _, number in carried.arrivals)
     assert counted.packets + counted.duplicated == counted.delivered + sum(counted.dropped.values())
-    assert counted.dropped[OUTAGE] == carried.scheduler.under_way == 0
+    assert counted.dropped[OUTAGE] == 0
+    assert carried.scheduler.next_ns is None
 
 
 @given(WAYS, PACKETS, st.integers(0, 100))
