@@ -13,12 +13,26 @@ from typing import Any
 import psutil
 
 from common.clock import monotonic_ns, to_s
+from common.metrics.parts import Ticks
 from deploy.harness.excuse import Lost, Stall, lost, lost_before
 from deploy.harness.reference_loop import PERIOD_NS
 
 START_S = 10.0
 """A host on which a reference loop does not start within this long is not measured."""
 STOP_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class HostMetrics:
+    """A report's `host`: what the host itself missed during a run."""
+
+    ticks: Ticks
+    """Of the reference loop of the worst core."""
+    longest_ms: float
+    """The longest stall of any core."""
+    priority: bool
+    """Whether the loops had real-time priority."""
+    steal_percent: float
 
 
 @dataclass(slots=True)
@@ -94,16 +108,16 @@ class HostWatch:
             counts[stall.core] = counts.get(stall.core, 0) + stall.missed
         return max(counts.values(), default=0)
 
-    def figures(self, now_ns: int) -> dict[str, Any]:
-        """For a report; {} where nothing was measured."""
+    def metrics(self, now_ns: int) -> HostMetrics | None:
+        """For a report; None where nothing was measured."""
         if not self.began_ns:
-            return {}
-        return {
-            "ticks": {"expected": max(0, now_ns - self.began_ns) // PERIOD_NS, "missed": self.missed},
-            "longest_ms": round(1e3 * self.stood_still_s(self.began_ns, now_ns), 1),
-            "priority": self.priority,
-            "steal_percent": round(self._steal_percent(), 1),
-        }
+            return None
+        return HostMetrics(
+            ticks=Ticks(max(0, now_ns - self.began_ns) // PERIOD_NS, self.missed),
+            longest_ms=round(1e3 * self.stood_still_s(self.began_ns, now_ns), 1),
+            priority=self.priority,
+            steal_percent=round(self._steal_percent(), 1),
+        )
 
     def _steal_percent(self) -> float:
         steal_s, all_s = (now - before for now, before in zip(_cpu_s(), self.cpu_s, strict=True))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 from common.clock import to_s
 from deploy.harness.excuse import Lost, StallEvidence
@@ -56,6 +55,25 @@ class UnaskedHold:
     """What the robot last answered when it refused to engage."""
     tracked_ns: int | None = None
     """When it tracked again; None while it does not."""
+
+
+@dataclass(frozen=True, slots=True)
+class HoldRecord:
+    """One of a report's `holds`."""
+
+    robot: str
+    at_s: float
+    """Since the robot first moved."""
+    was: str
+    reason: str
+    lasted_s: float | None
+    """Until it tracked again; None where it did not."""
+    host_still_ms: int
+    """The excused part of the host's stalls just before."""
+    host: str
+    """The same for a person, with the evidence."""
+    counts: bool
+    """Whether it counts against the robot."""
 
 
 @dataclass(slots=True)
@@ -153,24 +171,24 @@ class Operator:
 
     def words(self, hold: UnaskedHold) -> str:
         """The line that a person reads when the hold begins, and when it is over."""
-        row = self.row(hold)
-        if hold.tracked_ns is None:
-            return f"{self.robot} holds after {row['at_s']:.1f} s: {hold.reason}; the operator engages again"
-        counts = "counts" if row["counts"] else "does not count"
-        lasted = f"out of track for {row['lasted_s']:.1f} s"
-        return f"{self.robot} tracks again: {lasted}; {counts}: just before, {row['host']}"
+        record = self.record(hold)
+        if record.lasted_s is None:
+            return f"{self.robot} holds after {record.at_s:.1f} s: {hold.reason}; the operator engages again"
+        counts = "counts" if record.counts else "does not count"
+        lasted = f"out of track for {record.lasted_s:.1f} s"
+        return f"{self.robot} tracks again: {lasted}; {counts}: just before, {record.host}"
 
-    def row(self, hold: UnaskedHold) -> dict[str, Any]:
-        """One of a report's `holds`."""
+    def record(self, hold: UnaskedHold) -> HoldRecord:
+        """A hold as a report has it."""
         lost = self.host_lost(hold.began_ns)
         lasted_s = None if hold.tracked_ns is None else to_s(hold.tracked_ns - hold.began_ns)
-        return {
-            "robot": hold.robot,
-            "at_s": round(to_s(hold.began_ns - self.moved_ns), 2),
-            "was": hold.was,
-            "reason": hold.reason,
-            "lasted_s": None if lasted_s is None else round(lasted_s, 2),
-            "host_still_ms": round(1e3 * lost.excused_s),
-            "host": str(lost),
-            "counts": self._counts(hold),
-        }
+        return HoldRecord(
+            robot=hold.robot,
+            at_s=round(to_s(hold.began_ns - self.moved_ns), 2),
+            was=hold.was,
+            reason=hold.reason,
+            lasted_s=None if lasted_s is None else round(lasted_s, 2),
+            host_still_ms=round(1e3 * lost.excused_s),
+            host=str(lost),
+            counts=self._counts(hold),
+        )

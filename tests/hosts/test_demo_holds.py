@@ -34,16 +34,16 @@ def test_a_robot_that_held_is_engaged_again_and_the_hold_is_reported(on_this_hos
         async with open_rig() as rig:
             # however often this host stands still
             operators = await started(rig, lines, replace(PATIENCE, holds=None))
-            before = len(operators.rows())
+            before = len(operators.holds())
             rig.children["master"].send(signal.SIGSTOP)
             await rig.until(lambda: rig.observer.guard == "hold", 10.0, "hold")
             rig.children["master"].send(signal.SIGCONT)
             await operators.follow(0.5)
             assert not operators.problem
             assert rig.observer.guard == "track"
-            rows = operators.rows()[before:]
-            assert any("no command" in row["reason"] or "lease" in row["reason"] for row in rows), rows
-            assert all(row["lasted_s"] > 0.0 for row in rows)
+            holds = operators.holds()[before:]
+            assert any("no command" in hold.reason or "lease" in hold.reason for hold in holds), holds
+            assert all(hold.lasted_s and hold.lasted_s > 0.0 for hold in holds)
             assert any("engages again" in line for line in lines)
             assert any("tracks again" in line for line in lines)
             await operators.let_go()
@@ -62,6 +62,6 @@ def test_a_robot_whose_master_is_gone_is_given_up(on_this_host: OnThisHost) -> N
             await rig.until(lambda: rig.observer.guard == "hold", 10.0, "hold")
             await operators.follow(0.5)
             assert "did not track for 10 s: hold (" in operators.problem
-            assert operators.rows()[-1]["lasted_s"] is None
+            assert operators.holds()[-1].lasted_s is None
 
     on_this_host(story)

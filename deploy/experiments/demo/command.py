@@ -74,6 +74,7 @@ def demo(
     from deploy.experiments.demo.draw_curves import as_png
     from deploy.experiments.demo.options import DemoOptions
     from deploy.experiments.demo.run import run_demo
+    from deploy.experiments.demo.tree import report_tree
     from deploy.experiments.demo.view import print_report
 
     console = Console()
@@ -85,7 +86,7 @@ def demo(
     async def tell(stop: asyncio.Event) -> None:
         result = await run_demo(options, stop, console)
         if report is not None:
-            write_json(report, result.tree)
+            write_json(report, report_tree(result))
         print_report(result, console)
         if plots is not None and result.curves is not None:
             as_png(result.curves, plots)

@@ -9,7 +9,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from deploy.experiments.demo.tables import Stage, stage_cells
+from common.metrics.parts import Summary
+from deploy.experiments.demo.tables import stage_cells
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 
 
@@ -22,7 +23,7 @@ class Live:
     reason: str
     rates_hz: Mapping[str, float] = field(default_factory=dict)
     """Such as capture, commands, states."""
-    stages: Mapping[str, Stage] = field(default_factory=dict)
+    stages: Mapping[str, Summary] = field(default_factory=dict)
     joint_error_deg: Mapping[str, float] = field(default_factory=dict)
     """Encoder minus truth now, by joint; the worst few are shown."""
     drops: Mapping[str, int] = field(default_factory=dict)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from common.clock import monotonic_ns
 from deploy.harness.engage import (
@@ -15,7 +14,7 @@ from deploy.harness.engage import (
     until_all_track,
 )
 from deploy.harness.host import HostWatch
-from deploy.harness.operator import Operator, OperatorPatience
+from deploy.harness.operator import HoldRecord, Operator, OperatorPatience
 from deploy.harness.rig import Rig
 
 PATIENCE = OperatorPatience(back_s=20.0, holds=3, holds_within_s=20.0)
@@ -67,8 +66,8 @@ class DemoOperators:
         for robot in self._rig.observers:
             await disengage(self._rig, robot, self._check)
 
-    def rows(self) -> list[dict[str, Any]]:
+    def holds(self) -> list[HoldRecord]:
         """A report's `holds`, in the order in which they happened."""
         operators = [driver.operator for driver in self._drivers]
-        rows = [operator.row(hold) for operator in operators for hold in operator.holds]
-        return sorted(rows, key=lambda row: float(row["at_s"]))
+        found = [operator.record(hold) for operator in operators for hold in operator.holds]
+        return sorted(found, key=lambda hold: hold.at_s)

@@ -54,7 +54,7 @@ async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) ->
             await operators.follow(options.seconds, show.begin)
             if not operators.problem:
                 await operators.let_go()
-        notes = RunNotes(operators.rows(), host.figures(monotonic_ns()), operators.problem)
+        notes = RunNotes(operators.holds(), host.metrics(monotonic_ns()), operators.problem)
         return make_report(options, rig, await rig.stop(), notes)
 
 

@@ -2,49 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from common.metrics.parts import Summary, Ticks
+from common.metrics.slave import CameraMetrics, SlaveMetrics
+from deploy.harness.host import HostMetrics
+from deploy.harness.operator import HoldRecord
 from deploy.measure.accuracy import SIDES, Accuracy, JointAccuracy
 from deploy.measure.motion import FollowedMotion
 from deploy.measure.paper import ETA_PERCENT, TABLE_1
 from deploy.report.tables import UNKNOWN, number, plain_table, within_limit
 
-Stage = Mapping[str, Any]
-"""A `Summary` as plain values: `count`, and `mean`, `p50`, `p99`, `max` in ms, None where count is 0."""
 
-
-def latency_table(
-    stages: Mapping[str, Stage],
-    total: Stage | None = None,
-    one_way: Mapping[str, Any] | None = None,
-) -> RenderableType:
+def latency_table(slave: SlaveMetrics | None) -> RenderableType:
     """The latency budget: one row a stage in the order they happen, means that add up, and a total row.
 
-    `total` is the measured whole, for its percentiles (those of stages do not add up). `one_way` may hold
-    `bound` (ms) and `trusted`: how far the offset between the two clocks is known; and `p99`, `missing`,
-    `corrected`: one way of all commands that were due, beside that of those that came.
+    The total's percentiles are of the measured whole: those of stages do not add up.
     """
     table = plain_table("stage", "mean", "p50", "p99", "max", "count", title="latency budget, ms")
-    for name, stage in stages.items():
+    if slave is None:
+        return table
+    for name, stage in slave.stages_ms.items():
         table.add_row(name, *stage_cells(stage))
     table.add_section()
-    mean = sum(stage.get("mean") or 0.0 for stage in stages.values())
-    count = min((stage.get("count", 0) for stage in stages.values()), default=0)
-    sums = {"mean": mean, "count": count} if count else {}
-    table.add_row("total", *stage_cells({**(total or {}), **sums}), style="bold")
-    notes = [Text(MOVED_IS, "dim")] if "written→moved" in stages else []
-    if one_way is None:
-        return Group(table, *notes)
-    bound = one_way.get("bound")
-    if not one_way.get("trusted", bound is not None):
-        known = Text("one-way times are not trusted: the clock offset is stale", "yellow")
+    stages, total = slave.stages_ms.values(), slave.end_to_end_ms
+    if count := min((stage.count for stage in stages), default=0):
+        total = replace(total, mean=sum(stage.mean or 0.0 for stage in stages), count=count)
+    table.add_row("total", *stage_cells(total), style="bold")
+    notes = [Text(MOVED_IS, "dim")] if "written→moved" in slave.stages_ms else []
+    if slave.offset.trusted:
+        known = Text(f"one-way times are uncertain by ± {slave.offset.bound_ms:.3f} ms", "dim")
     else:
-        known = Text(f"one-way times are uncertain by ± {number(bound, 3)} ms", "dim")
-    return Group(table, *notes, known, *_due_notes(one_way))
+        known = Text("one-way times are not trusted: the clock offset is stale", "yellow")
+    return Group(table, *notes, known, _due_note(slave))
 
 
 MOVED_IS = (
@@ -53,15 +47,14 @@ MOVED_IS = (
 )
 
 
-def _due_notes(one_way: Mapping[str, Any]) -> list[Text]:
-    """The corrected figures beside the raw ones; nothing where they were not measured."""
-    corrected, missing = one_way.get("corrected"), one_way.get("missing")
-    if corrected is None or missing is None:
-        return []
-    p99, most = (number(corrected.get(key), 2) for key in ("p99", "max"))
-    raw = f"one way p99 {number(one_way.get('p99'), 2)} ms of the commands that came"
-    words = f"{raw}; {p99} ms, at most {most} ms, with the {missing} that were missing when due"
-    return [Text(words, "yellow" if missing else "dim")]
+def _due_note(slave: SlaveMetrics) -> Text:
+    """The corrected one-way times beside the raw ones."""
+    raw, corrected, missing = slave.one_way_ms, slave.one_way_corrected_ms, slave.due.missing
+    words = (
+        f"one way p99 {number(raw.p99, 2)} ms of the commands that came; {number(corrected.p99, 2)} ms, "
+        f"at most {number(corrected.max, 2)} ms, with the {missing} that were missing when due"
+    )
+    return Text(words, "yellow" if missing else "dim")
 
 
 def accuracy_table(judged: Accuracy) -> RenderableType:
@@ -136,60 +129,55 @@ def strategies_table(as_run: FollowedMotion, replayed: Mapping[str, FollowedMoti
     return table
 
 
-def video_table(video: Mapping[str, Any]) -> RenderableType:
-    """What the operator saw: rate and size, and how old it was when he acted; from a report's `video`."""
-    if video["fault"]:
-        return Text(f"no video: {video['fault']}", "yellow")
-    ages = {"picture sent→received": "transit_ms", "picture taken→operator's act": "action_to_observation_ms"}
+def video_table(video: CameraMetrics) -> RenderableType:
+    """What the operator saw: rate and size, and how old it was when he acted."""
+    if video.fault:
+        return Text(f"no video: {video.fault}", "yellow")
     table = plain_table("", "mean", "p50", "p99", "max", "count", title="video, ms")
-    for name, key in ages.items():
-        table.add_row(name, *stage_cells(video[key]))
-    size = f"{video['fps']:.1f} Hz, {video['kb_s']:.0f} kB/s, {video['mean_kb']:.1f} kB each"
-    reduced = (
-        f"bitrate reduced {video['bitrate_reduced']}×; {video['not_acknowledged']} frames not acknowledged"
+    table.add_row("picture sent→received", *stage_cells(video.transit_ms))
+    table.add_row("picture taken→operator's act", *stage_cells(video.action_to_observation_ms))
+    size = (
+        f"{video.fps:.1f} Hz, {video.kb_s:.0f} kB/s, {video.mean_kb:.1f} kB each, {video.width} pixels wide"
     )
-    return Group(table, Text(f"{size}, {video['width']} pixels wide; {reduced}", "dim"))
+    reduced = f"bitrate reduced {video.bitrate_reduced}×; {video.not_acknowledged} frames not acknowledged"
+    return Group(table, Text(f"{size}; {reduced}", "dim"))
 
 
-def synergy_table(judged: Mapping[str, Mapping[str, float] | None]) -> RenderableType:
-    """The joints of a coarser robot against truth, from a report's `synergies`."""
-    table = plain_table(
-        "joint", "mean abs °", "RMSE °", "largest °", title="as a robot's joints, by its synergies"
-    )
+def synergy_table(judged: Mapping[str, JointAccuracy | None]) -> RenderableType:
+    """The joints of a coarser robot against truth."""
+    title = "as a robot's joints, by its synergies"
+    table = plain_table("joint", "mean abs °", "RMSE °", "largest °", title=title)
     for name, row in judged.items():
-        figures = [None if row is None else row[key] for key in ("mae_deg", "rmse_deg", "max_deg")]
-        table.add_row(name, *(number(figure, 3) for figure in figures))
+        errors = (None, None, None) if row is None else (row.mae_deg, row.rmse_deg, row.max_deg)
+        table.add_row(name, *(number(error, 3) for error in errors))
     return table
 
 
-def ticks_text(loops: Mapping[str, Mapping[str, int] | None], host: Mapping[str, Any]) -> RenderableType:
-    """Ticks that the loops missed, beside those of the reference loops in a report's `host`."""
+def ticks_text(loops: Mapping[str, Ticks | None], host: HostMetrics | None) -> RenderableType:
+    """Ticks that the loops missed, beside those of the reference loops."""
     missed = ", ".join(f"{name} {_missed(ticks)}" for name, ticks in loops.items())
-    if not host:
+    if host is None:
         return Text(f"ticks missed: {missed}; the host itself was not measured", "dim")
-    first = "" if host["priority"] else " (without real-time priority: only steal excuses)"
+    first = "" if host.priority else " (without real-time priority: only steal excuses)"
     return Text(
-        f"ticks missed: {missed}; by the host itself, of a reference loop{first}: {_missed(host['ticks'])}, "
-        f"still for {host['longest_ms']:.0f} ms at most, {host['steal_percent']:.1f} % of its time stolen",
+        f"ticks missed: {missed}; by the host itself, of a reference loop{first}: {_missed(host.ticks)}, "
+        f"still for {host.longest_ms:.0f} ms at most, {host.steal_percent:.1f} % of its time stolen",
         "dim",
     )
 
 
-def holds_text(holds: Iterable[Mapping[str, Any]]) -> RenderableType:
-    """Each time a robot held by itself and was engaged again, from a report's `holds`."""
+def holds_text(holds: Sequence[HoldRecord]) -> RenderableType:
+    """Each time a robot held by itself and was engaged again."""
     lines = [
-        f"{row['robot']} held at {row['at_s']:.1f} s for "
-        f"{number(row['lasted_s'], 1)} s: {row['reason']} ({row['host']})"
-        for row in holds
+        f"{hold.robot} held at {hold.at_s:.1f} s for {number(hold.lasted_s, 1)} s: "
+        f"{hold.reason} ({hold.host})"
+        for hold in holds
     ]
-    if not lines:
-        return Text("the robot never held by itself", "dim")
-    return Text("\n".join(lines), "yellow")
+    return Text("\n".join(lines), "yellow") if lines else Text("the robot never held by itself", "dim")
 
 
-def _missed(ticks: Mapping[str, int] | None) -> str:
-    ticks = ticks or {}
-    return f"{ticks.get('missed', UNKNOWN)} of {ticks.get('expected', UNKNOWN)}"
+def _missed(ticks: Ticks | None) -> str:
+    return f"{UNKNOWN} of {UNKNOWN}" if ticks is None else f"{ticks.missed} of {ticks.expected}"
 
 
 def _joints_table(judged: Accuracy) -> RenderableType:
@@ -214,8 +202,6 @@ def _joint_cells(joint: JointAccuracy) -> list[str]:
     return [number(x, 3) for x in (joint.mae_deg, joint.rmse_deg, joint.bias_deg, joint.max_deg)]
 
 
-def stage_cells(stage: Stage) -> list[str]:
+def stage_cells(stage: Summary) -> list[str]:
     """Mean, percentiles, maximum and count of one stage."""
-    count = stage.get("count")
-    cells = [number(stage.get(key), 2) for key in ("mean", "p50", "p99", "max")]
-    return [*cells, UNKNOWN if count is None else f"{count:.0f}"]
+    return [*(number(value, 2) for value in (stage.mean, stage.p50, stage.p99, stage.max)), str(stage.count)]

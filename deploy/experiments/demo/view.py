@@ -7,7 +7,6 @@ from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from deploy.experiments.demo.live_view import Live, live_view
-from deploy.experiments.demo.plain import trees
 from deploy.experiments.demo.report import DemoReport
 from deploy.experiments.demo.robots import robots_table
 from deploy.experiments.demo.tables import (
@@ -21,9 +20,11 @@ from deploy.experiments.demo.tables import (
     video_table,
 )
 from deploy.experiments.demo.targets import of_demo
+from deploy.experiments.demo.tree import report_tree
 from deploy.harness.rig import Rig
 from deploy.measure.target import judge_targets
 from deploy.measure.verdict import verdict_table
+from deploy.report.tables import number
 
 
 def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
@@ -42,7 +43,7 @@ def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
             guard=observer.guard,
             reason=reason,
             rates_hz=observer.rates_hz,
-            stages=trees(slave.stages_ms if slave else {}),
+            stages=slave.stages_ms if slave else {},
             joint_error_deg=_errors_deg(rig),
             drops={
                 **({"ticks missed": master.ticks.missed} if master else {}),
@@ -61,31 +62,48 @@ def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
 
 def print_report(report: DemoReport, console: Console) -> None:
     """Of one robot all tables, and the targets met or missed; of several a row each."""
-    if len(report.tree["robots"]) > 1:
-        console.print(robots_table(report.tree))
+    if len(report.robots) > 1:
+        master = Text(_master_words(report), "dim")
+        console.print(Group(robots_table(report.robots), master, _loops(report)))
+        console.print(holds_text(report.notes.holds))
     else:
         _print_tables(report, console)
 
 
 def _print_tables(report: DemoReport, console: Console) -> None:
     """Latency budget, accuracy beside the paper's, motion, and the targets met or missed."""
-    tree = report.tree
-    console.print(latency_table(tree["stages_ms"], tree["end_to_end_ms"], tree["one_way_ms"]))
-    if tree["video"]:
-        console.print(video_table(tree["video"]))
+    console.print(latency_table(report.slave))
+    if report.video is not None:
+        console.print(video_table(report.video))
     if not any(report.accuracy.estimated.values()):
         console.print(Text("no truth to judge by: a recording has no true angles", "yellow"))
     else:
         console.print(accuracy_table(report.accuracy), motion_table(report.motion))
     if report.comparison is not None:
         console.print(strategies_table(report.comparison.as_run, report.comparison.replayed))
-    if tree["synergies"]:
-        console.print(synergy_table(tree["synergies"]))
-    console.print(ticks_text({"master": tree["ticks"], "robot": tree["slave_ticks"]}, tree["host"]))
-    console.print(holds_text(tree["holds"]))
-    options = tree["options"]
-    targets = of_demo(options["profile"], options["servos"])
-    console.print(verdict_table("targets", judge_targets(tree, targets)))
+    if report.synergies:
+        console.print(synergy_table(report.synergies))
+    console.print(Group(_loops(report), holds_text(report.notes.holds)))
+    targets = of_demo(report.options.profile, report.options.servos)
+    console.print(verdict_table("targets", judge_targets(report_tree(report), targets)))
+
+
+def _loops(report: DemoReport) -> RenderableType:
+    """The master's missed ticks, those of the robot that missed most, and the host's."""
+    rows = report.robots
+    worst = max(rows, key=lambda robot: ticks.missed if (ticks := rows[robot].ticks) else -1)
+    name = worst if len(rows) > 1 else "robot"
+    loops = {"master": report.master.ticks if report.master else None, name: rows[worst].ticks}
+    return ticks_text(loops, report.notes.host)
+
+
+def _master_words(report: DemoReport) -> str:
+    put_ms = number(report.master.frames_in_to_put_ms.p99 if report.master else None, 2)
+    cpu = f"master: {report.cpu_percent['master']:.0f} % of a core"
+    missing = {robot: row.due.missing for robot, row in report.robots.items() if row.due is not None}
+    named = ", ".join(f"{robot} {count}" for robot, count in missing.items() if count)
+    due = f"; commands missing when due: {named}" if named else ""
+    return f"{cpu}, last frame in → put p99 {put_ms} ms; times in ms, p99{due}"
 
 
 def _errors_deg(rig: Rig) -> dict[str, float]:

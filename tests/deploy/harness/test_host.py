@@ -9,6 +9,7 @@ import os
 import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S, monotonic_ns
+from common.metrics.parts import Ticks
 from deploy.harness.host import HostWatch, watch_host
 from deploy.harness.reference_loop import PERIOD_NS, stolen_ns
 
@@ -42,9 +43,10 @@ def test_the_longest_of_any_core_counts_as_far_as_it_lies_within(
 
 
 def test_figures_are_of_the_worst_core() -> None:
-    figures = told((0, 1100, 1140), (1, 2000, 2300), (0, 1200, 1230)).figures(3 * NS_PER_S)
-    assert figures["ticks"] == {"expected": 2 * NS_PER_S // PERIOD_NS, "missed": 60}
-    assert (figures["longest_ms"], figures["priority"]) == (300.0, True)
+    figures = told((0, 1100, 1140), (1, 2000, 2300), (0, 1200, 1230)).metrics(3 * NS_PER_S)
+    assert figures is not None
+    assert figures.ticks == Ticks(2 * NS_PER_S // PERIOD_NS, 60)
+    assert (figures.longest_ms, figures.priority) == (300.0, True)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +98,7 @@ def test_without_priority_only_what_was_stolen_excuses() -> None:
 
 
 def test_a_host_that_was_not_measured_excuses_nothing() -> None:
-    assert HostWatch().figures(NS_PER_S) == {}
+    assert HostWatch().metrics(NS_PER_S) is None
     assert HostWatch().stood_still_s(0, NS_PER_S) == 0.0
     assert not HostWatch().lost_before(NS_PER_S).explains_hold
 
@@ -116,7 +118,9 @@ def test_real_loops_tick_on_every_core_and_end_with_the_block() -> None:
         async with watch_host() as host:
             assert host.began_ns
             await host.known(host.began_ns + 2 * PERIOD_NS)
-            assert host.figures(monotonic_ns())["ticks"]["expected"] > 0
+            found = host.metrics(monotonic_ns())
+            assert found is not None
+            assert found.ticks.expected > 0
         return host
 
     host = asyncio.run(story())

@@ -9,6 +9,7 @@ from deploy.harness.excuse import STILL_S, Lost, StallEvidence
 from deploy.harness.operator import (
     JUDGED_AFTER_S,
     GuardSight,
+    HoldRecord,
     HostLost,
     Operator,
     OperatorPatience,
@@ -58,10 +59,10 @@ def test_a_hold_is_printed_engaged_again_and_kept() -> None:
     assert one.engages(to_ns(6.02))
     assert see(one, state(6.5, "align"), state(8.0, "track")) == [hold]
     assert "tracks again: out of track for 2.0 s" in one.words(hold)
-    assert one.row(hold) == {
-        "robot": "robot-1", "at_s": 5.0, "was": "track", "reason": "no encoder",
-        "lasted_s": 2.0, "host_still_ms": 0, "host": "the host kept its time", "counts": True,
-    }  # fmt: skip
+    assert one.record(hold) == HoldRecord(
+        robot="robot-1", at_s=5.0, was="track", reason="no encoder", lasted_s=2.0,
+        host_still_ms=0, host="the host kept its time", counts=True,
+    )  # fmt: skip
 
 
 def test_it_engages_only_a_ready_robot_and_waits_between_requests() -> None:
@@ -136,7 +137,7 @@ def test_a_hold_counts_unless_the_host_stalled_before_it(found: Lost, counts: bo
     holds(one, 3.0, 4.0, 5.0, 6.0)
     assert (one.gives_up(to_ns(6.0 + LATE_S)) is not None) is counts
     assert asked[0] == to_ns(3.0)
-    assert [one.row(hold)["counts"] for hold in one.holds] == [counts] * 4
+    assert [one.record(hold).counts for hold in one.holds] == [counts] * 4
 
 
 def test_what_the_host_says_a_second_late_is_waited_for() -> None:

@@ -6,11 +6,12 @@ import io
 import json
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import pytest
 from rich.console import Console
 
+from common.metrics.bus import BusMetrics
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Summary, Ticks
 from common.metrics.slave import SlaveMetrics
@@ -19,7 +20,10 @@ from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.demo.options import DemoOptions
 from deploy.experiments.demo.report import DemoReport, RunNotes, make_report
 from deploy.experiments.demo.targets import BY_PROFILE, DEMO, of_demo
+from deploy.experiments.demo.tree import report_tree
 from deploy.experiments.demo.view import print_report
+from deploy.harness.host import HostMetrics
+from deploy.harness.operator import HoldRecord
 from deploy.harness.rig import Rig
 from deploy.measure import Trace
 from deploy.measure.target import judge_targets
@@ -44,7 +48,11 @@ class FakeChild:
             return None
         if kind is SlaveMetrics:
             return self.slave
-        return master_metrics(ticks=Ticks(5, 0), frames_in_to_put_ms=Summary(9, 1.0, 1.0, 1.5, 2.0))
+        return master_metrics(
+            ticks=Ticks(5, 0),
+            frames_in_to_put_ms=Summary(9, 1.0, 1.0, 1.5, 2.0),
+            buses={"suit": BusMetrics(up=True)},
+        )
 
 
 def told_by(slave: SlavePipeline) -> SlaveMetrics:
@@ -95,6 +103,11 @@ def report(tracked: VirtualWorld) -> DemoReport:
     return make_report(DemoOptions(), rig(tracked, ["hold", "align", "track"]), ENDED_WELL)
 
 
+def tree_of(report: DemoReport) -> dict[str, Any]:
+    tree: dict[str, Any] = report_tree(report)
+    return tree
+
+
 def text(report: DemoReport) -> str:
     out = io.StringIO()
     print_report(report, Console(file=out, width=80, color_system=None))
@@ -105,23 +118,23 @@ def test_a_good_run_has_no_problem_and_is_plain_json(report: DemoReport) -> None
     assert report.problems == []
     assert "the robot never held by itself" in text(report)
     assert "the host itself was not measured" in " ".join(text(report).split())
-    assert json.loads(json.dumps(report.tree, allow_nan=False)) == report.tree
-    predict = report.tree["motion_by_strategy"]["predict"]
-    assert report.tree["motion_lag_ms"] == pytest.approx(predict["lag_ms"], abs=3.0)
+    assert json.loads(json.dumps(tree_of(report), allow_nan=False)) == tree_of(report)
+    predict = tree_of(report)["motion_by_strategy"]["predict"]
+    assert tree_of(report)["motion_lag_ms"] == pytest.approx(predict["lag_ms"], abs=3.0)
 
 
 def test_the_replay_of_the_run_s_own_strategy_moves_as_the_run_did(report: DemoReport) -> None:
-    motion, replayed = report.tree["motion"], report.tree["motion_by_strategy"]["predict"]
+    motion, replayed = tree_of(report)["motion"], tree_of(report)["motion_by_strategy"]["predict"]
     for figure in ("rmse_deg", "aligned_rmse_deg", "roughness"):
         assert replayed[figure] == pytest.approx(motion[figure], rel=0.1), figure
 
 
 def test_predict_shows_a_third_of_the_error_of_latest_in_the_same_run(report: DemoReport) -> None:
-    latest = report.tree["motion_by_strategy"]["latest"]
-    over_latest = report.tree["rmse_over_latest"]
-    assert over_latest == pytest.approx(report.tree["motion"]["rmse_deg"] / latest["rmse_deg"])
+    latest = tree_of(report)["motion_by_strategy"]["latest"]
+    over_latest = tree_of(report)["rmse_over_latest"]
+    assert over_latest == pytest.approx(tree_of(report)["motion"]["rmse_deg"] / latest["rmse_deg"])
     assert over_latest <= 1 / 3
-    found = {v.name: v for v in judge_targets(report.tree, DEMO)}["same-instant RMSE / latest"]
+    found = {v.name: v for v in judge_targets(tree_of(report), DEMO)}["same-instant RMSE / latest"]
     assert (found.measured, found.passed) == (over_latest, True)
     for words in ("same commands, each strategy", "this run", "latest, replayed", "RMSE / latest"):
         assert words in text(report)
@@ -132,7 +145,7 @@ def test_a_run_without_truth_is_judged_by_the_rest(tracked: VirtualWorld) -> Non
     blind.observer.trace = Trace(tracked.trace.joint_names)
     report = make_report(DemoOptions(), blind, ENDED_WELL)
     assert (report.problems, report.comparison, report.motion) == ([], None, None)
-    assert (report.tree["motion_by_strategy"], report.tree["rmse_over_latest"]) == ({}, None)
+    assert (tree_of(report)["motion_by_strategy"], tree_of(report)["rmse_over_latest"]) == ({}, None)
     shown = text(report)
     assert "no truth to judge by" in shown
     assert "each strategy" not in shown
@@ -154,21 +167,11 @@ def test_every_problem_is_named(tracked: VirtualWorld) -> None:
 
 
 def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: VirtualWorld) -> None:
-    host = {
-        "ticks": {"expected": 90, "missed": 40},
-        "longest_ms": 143.0,
-        "priority": True,
-        "steal_percent": 4.2,
-    }
-    row = {
-        "robot": "robot-1",
-        "at_s": 6.3,
-        "reason": "no encoder",
-        "lasted_s": 1.7,
-        "host": "the host kept its time",
-    }
-    report = make_report(DemoOptions(), rig(tracked, ["track"]), ENDED_WELL, RunNotes([row], host))
-    assert (report.tree["holds"], report.tree["host"], report.problems) == ([row], host, [])
+    host = HostMetrics(Ticks(90, 40), longest_ms=143.0, priority=True, steal_percent=4.2)
+    held = HoldRecord("robot-1", 6.3, "track", "no encoder", 1.7, 0, "the host kept its time", counts=True)
+    report = make_report(DemoOptions(), rig(tracked, ["track"]), ENDED_WELL, RunNotes([held], host))
+    assert tree_of(report)["holds"][0]["reason"] == "no encoder"
+    assert tree_of(report)["host"]["ticks"] == {"expected": 90, "missed": 40}
     shown = " ".join(text(report).split())
     assert (
         "ticks missed: master 0 of 5, robot 0 of 5; by the host itself, of a reference loop: 40 of 90"
@@ -181,7 +184,7 @@ def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: Virt
 def test_a_hand_s_report_has_five_joints_curves_and_paper_b_s_targets() -> None:
     run = followed("hand", 5.0)
     report = make_report(DemoOptions(profile="hand"), rig(run, ["hold", "align", "track"]), ENDED_WELL)
-    tree = json.loads(json.dumps(report.tree, allow_nan=False))
+    tree = json.loads(json.dumps(tree_of(report), allow_nan=False))
     assert tree["options"]["profile"] == "hand"
     assert tree["options"]["motion"] == "grasp"
     assert list(tree["synergies"]) == [f"right_{f}" for f in ("thumb", "index", "middle", "ring", "little")]
@@ -206,7 +209,7 @@ def test_every_profile_has_its_targets() -> None:
 def test_every_target_s_path_leads_to_a_figure_in_a_real_report(profile: str) -> None:
     """A renamed figure would not be missed otherwise: its target would only not be judged."""
     report = make_report(DemoOptions(profile=profile), rig(followed(profile, 8.0), ["track"]), ENDED_WELL)
-    tree = json.loads(json.dumps(report.tree, allow_nan=False))
+    tree = json.loads(json.dumps(tree_of(report), allow_nan=False))
     nowhere = [v.name for v in judge_targets(tree, BY_PROFILE[profile]) if v.measured is None]
     assert nowhere == []
 
@@ -246,7 +249,7 @@ def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
     run.stand_still(5.0)
     run.run(5.0)
     report = make_report(DemoOptions(), rig(run, ["track"]), ENDED_WELL)
-    verdict = {v.name: v for v in judge_targets(report.tree, DEMO)}["commands due that never came"]
+    verdict = {v.name: v for v in judge_targets(tree_of(report), DEMO)}["commands due that never came"]
     assert verdict.passed is False
     assert verdict.measured == pytest.approx(62, abs=4)
     assert "that were missing when due" in " ".join(text(report).split())
@@ -254,7 +257,7 @@ def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
 
 
 def test_paper_b_s_60_ms_are_of_one_way_and_lag(report: DemoReport) -> None:
-    tree = report.tree
+    tree = tree_of(report)
     lag_ms = max(0.0, tree["motion_lag_ms"])
     assert tree["one_way_plus_lag_ms"] == pytest.approx(tree["one_way_ms"]["corrected"]["p99"] + lag_ms)
     slow = {**tree, "one_way_plus_lag_ms": 61.0}

@@ -18,20 +18,15 @@ from common.metrics.slave import SlaveMetrics
 from common.wire.messages import Command, CommandStamps, RobotState
 from deploy.experiments.demo.options import DemoOptions
 from deploy.experiments.demo.report import DemoReport, RunNotes, make_report
-from deploy.experiments.demo.robots import robots_table
+from deploy.experiments.demo.view import print_report
+from deploy.harness.operator import HoldRecord
 from deploy.harness.rig import Rig, robot_name, slave_name
 from deploy.measure import Trace
 from tests.published import guard_metrics, master_metrics, slave_metrics
 
 JOINTS = ("left_elbow_pitch",)
 ROBOTS = 8
-HELD = {
-    "robot": "robot-3",
-    "at_s": 2.0,
-    "reason": "no encoder",
-    "lasted_s": 1.0,
-    "host": "the host kept its time",
-}
+HELD = HoldRecord("robot-3", 2.0, "track", "no encoder", 1.0, 0, "the host kept its time", counts=True)
 COUNTED = slave_metrics(
     ticks=Ticks(4000, 3),
     guard=guard_metrics(received=150, accepted=140, dropped={"lease": 10}),
@@ -81,28 +76,27 @@ def report(
         slaves=slaves, observers=observers, observer=observers["robot-1"], children=children
     )
     statuses: dict[str, int | None] = {**dict.fromkeys(children, 0), **(ended or {})}
-    return make_report(DemoOptions(robots=ROBOTS), cast(Rig, rig), statuses, RunNotes([HELD], {}, problem))
+    return make_report(DemoOptions(robots=ROBOTS), cast(Rig, rig), statuses, RunNotes([HELD], None, problem))
 
 
 def test_each_robot_has_its_own_figures() -> None:
     made = report()
     assert made.problems == []
-    assert list(made.tree["robots"]) == [f"robot-{i}" for i in range(1, 9)]
-    assert made.tree["robots"]["robot-8"]["accepted"] == 140
-    assert made.tree["robots"]["robot-8"]["in_track"] == 1.0
-    assert made.tree["cpu_percent"]["slave-8"] == 12.3
+    assert list(made.robots) == [f"robot-{i}" for i in range(1, 9)]
+    assert made.robots["robot-8"].accepted == 140
+    assert made.robots["robot-8"].in_track == 1.0
+    assert made.cpu_percent["slave-8"] == 12.3
 
 
 def test_failed_processes_and_robots_that_never_tracked_are_named() -> None:
     made = report(lost_by=3, ended={"slave-5": 1}, problem="robot-3 held 3 times within 20 s")
     assert made.problems == ["slave-5 ended with status 1", "robot-3 held 3 times within 20 s"]
-    assert made.tree["robots"]["robot-3"]["in_track"] == 0.5
-    assert made.tree["holds"] == [HELD]
+    assert made.robots["robot-3"].in_track == 0.5
+    assert made.notes.holds == [HELD]
 
 
 def test_only_what_follows_the_first_tracking_counts_as_left() -> None:
-    robots = report().tree["robots"]
-    assert robots["robot-1"]["in_track"] == 1.0
+    assert report().robots["robot-1"].in_track == 1.0
 
 
 def test_a_robot_that_never_tracked_is_a_problem() -> None:
@@ -118,7 +112,7 @@ def test_missing_metrics_and_missing_commands_are_problems() -> None:
 
 def test_the_table_has_a_row_each_and_fits() -> None:
     out = io.StringIO()
-    Console(file=out, width=80).print(robots_table(report(lost_by=3).tree))
+    print_report(report(lost_by=3), Console(file=out, width=80))
     lines = out.getvalue().splitlines()
     assert max(map(len, lines)) <= 80
     rows = {line.split()[0]: line.split()[1:] for line in lines if "robot-" in line and "%" in line}

@@ -1,10 +1,14 @@
 import io
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from common.metrics.parts import Summary
+from common.metrics.slave import OffsetMetrics, SlaveMetrics
 from deploy.experiments.demo.live_view import Live, live_view
 from deploy.experiments.demo.tables import (
     accuracy_table,
@@ -14,6 +18,7 @@ from deploy.experiments.demo.tables import (
 )
 from deploy.measure import MovedSeries, SolvedSeries, TruthSeries, accuracy, motion
 from deploy.measure.verdict import at_most, verdict_table
+from tests.published import slave_metrics
 
 NAMES = [
     *("neck_yaw", "neck_pitch", "waist_pitch"),
@@ -22,11 +27,16 @@ NAMES = [
 ]
 
 
-def stage(mean: float, count: int = 100) -> dict[str, float]:
-    return {"mean": mean, "p50": mean, "p99": 2 * mean, "max": 1234.56, "count": count}
+def stage(mean: float, count: int = 100) -> Summary:
+    return Summary(count, mean, mean, 2 * mean, 1234.56)
 
 
 STAGES = {"sampled→frames in": stage(2.25), "put→received": stage(0.5), "servo written→moved": stage(13.0)}
+
+
+def slave(trusted: bool = True, stages: Mapping[str, Summary] = STAGES) -> SlaveMetrics:
+    offset = OffsetMetrics(0.0, 0.071, trusted)
+    return slave_metrics(stages_ms=dict(stages), end_to_end_ms=stage(15.0), offset=offset)
 
 
 def text(renderable: Any, width: int = 80) -> str:
@@ -46,7 +56,7 @@ def series() -> tuple[TruthSeries, SolvedSeries, MovedSeries]:
 
 
 def test_the_latency_budgets_means_add_up_to_its_total() -> None:
-    shown = text(latency_table(STAGES, total=stage(15.0), one_way={"bound": 0.071, "trusted": True}))
+    shown = text(latency_table(slave()))
     rows = [line.split() for line in shown.splitlines()]
     total = next(row for row in rows if row and row[0] == "total")
     assert total[1:] == ["15.75", "15.00", "30.00", "1234.56", "100"]
@@ -54,13 +64,13 @@ def test_the_latency_budgets_means_add_up_to_its_total() -> None:
 
 
 def test_an_untrusted_offset_is_said() -> None:
-    assert "not trusted" in text(latency_table(STAGES, one_way={"bound": 0.071, "trusted": False}))
-    assert "not trusted" in text(latency_table(STAGES, one_way={"bound": None}))
+    assert "not trusted" in text(latency_table(slave(trusted=False)))
 
 
 def test_an_empty_budget_shows_no_figures() -> None:
-    shown = text(latency_table({"a": {}, "b": {"count": 0}}))
-    assert "0.00" not in shown
+    empty = replace(slave(stages={"a": Summary(0)}), end_to_end_ms=Summary(0))
+    assert "0.00" not in text(latency_table(empty))
+    assert "latency budget" in text(latency_table(None))
 
 
 def test_the_accuracy_table_stands_beside_the_paper() -> None:
@@ -129,7 +139,7 @@ def test_nothing_is_wider_than_the_terminal_or_cut(width: int) -> None:
         text(accuracy_table(accuracy(truth, solved, NAMES)), width),
         text(motion_table(judged), width),
         text(strategies_table(judged, {"interpolate": judged}), width),
-        text(latency_table(STAGES, stage(15.0)), width),
+        text(latency_table(slave()), width),
         text(verdict_table("bench", [at_most("ticks missed", None, 1.0)]), width),
         text(live_view(live), width),
     ]
