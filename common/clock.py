@@ -17,7 +17,7 @@ monotonic_ns: Clock = time.perf_counter_ns if _RAW is None else partial(time.clo
 """The oscillator as it runs. CLOCK_MONOTONIC is steered towards the time of day, by chrony at up to 8 %:
 no bound on the offset between two hosts' would be true. Windows' performance counter is not steered."""
 wall_ns: Clock = time.time_ns
-"""ns since 1970. It jumps when somebody sets it: for recordings and logs only, never to measure by."""
+"""ns since 1970. It jumps when it is set: for recordings and logs only, never to measure by."""
 
 
 def to_ns(seconds: float) -> int:

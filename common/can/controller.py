@@ -47,23 +47,23 @@ def of_error_frame(error_id: int, data: bytes) -> Controller | None:
 
 def error_words(error_id: int, data: bytes) -> str:
     """A SocketCAN error frame in words."""
-    said = []
+    words = []
     state = of_error_frame(error_id, data)
     if error_id & RESTARTED:
-        said.append("the controller was restarted")
+        words.append("the controller was restarted")
     elif state is not None:
-        said.append(f"the controller is {state}")
+        words.append(f"the controller is {state}")
     if error_id & _CONTROLLER and len(data) > 1:
-        said += [words for bit, words in _OVERFLOW.items() if data[1] & bit]
+        words += [text for bit, text in _OVERFLOW.items() if data[1] & bit]
     if error_id & _NO_ACK:
-        said.append("nobody acknowledges: no other node on the bus, or the wire is cut")
+        words.append("nobody acknowledges: no other node on the bus, or the wire is cut")
     if error_id & (_PROTOCOL | _BUS_ERROR):
-        said.append("frames are destroyed: look at the bit rate, the wiring, 120 Ω at both ends")
+        words.append("frames are destroyed: look at the bit rate, the wiring, 120 Ω at both ends")
     if error_id & _TRANSCEIVER:
-        said.append("the transceiver reports a fault of the wires")
+        words.append("the transceiver reports a fault of the wires")
     if error_id & _COUNTERS and len(data) > 7:
-        said.append(f"{data[6]} errors of sending and {data[7]} of receiving counted")
-    return "; ".join(said) or f"error frame {error_id:#x}"
+        words.append(f"{data[6]} errors of sending and {data[7]} of receiving counted")
+    return "; ".join(words) or f"error frame {error_id:#x}"
 
 
 def bus_off_words(channel: str, restart_ms: int) -> str:

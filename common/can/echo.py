@@ -1,7 +1,7 @@
-"""Whether a frame with an identifier of this side's is its own echo, or comes from a second sender. Pure.
+"""Whether a frame with an identifier that this side sends is its echo, or comes from a second sender. Pure.
 
-A bus such as udp_multicast gives a sender each of its frames back, once. What comes back more often than it
-was sent, or was never sent, is somebody else's.
+A bus such as udp_multicast gives a sender each of its frames back, once. A frame that comes back more often
+than it was sent, or was never sent, comes from a second sender.
 """
 
 from __future__ import annotations

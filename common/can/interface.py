@@ -56,7 +56,7 @@ def open_bus(config: BusConfig) -> can.BusABC:
 
 
 def carries_classic_only(config: BusConfig, bus: can.BusABC, sysfs: Path = _SYSFS) -> str:
-    """Why a bus that is to carry CAN FD cannot, and what to do; empty where it can, or does not tell."""
+    """Why a bus that is to carry CAN FD cannot, and what to do; empty if it can, or if that is not known."""
     otherwise = "or say fd = false, if the nodes speak classic CAN"
     if config.interface == "socketcan":
         try:
@@ -70,8 +70,8 @@ def carries_classic_only(config: BusConfig, bus: can.BusABC, sysfs: Path = _SYSF
             f"{config.channel} carries classic CAN only (MTU {room}) and the file says fd = true: every "
             f"answer would be lost; set it up with `ip link set {config.channel} {setting}`, {otherwise}"
         )
-    told = getattr(bus, "protocol", None)
-    if config.interface in _CLASSIC_ADAPTERS and told is can.CanProtocol.CAN_20:
+    protocol = getattr(bus, "protocol", None)
+    if config.interface in _CLASSIC_ADAPTERS and protocol is can.CanProtocol.CAN_20:
         return (
             f"python-can's {config.interface} carries classic CAN only and the file says fd = true: every "
             f"answer would be lost; use another adapter, {otherwise}"

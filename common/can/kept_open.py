@@ -31,7 +31,7 @@ OnChange = Callable[[str, bool], object]
 """(bus name, whether it is up)."""
 Opener = Callable[[BusConfig], can.BusABC]
 StateOf = Callable[[BusConfig, can.BusABC], Controller | None]
-"""The controller's state of an open bus, None where nothing tells it."""
+"""The controller's state of an open bus; None if it is not known."""
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ class KeptOpenBus(ABC):
         self.last_error = ""
         """Why the bus last failed or did not open; empty before."""
         self.state: Controller | None = None
-        """The controller's, by its last error frame; None where it has not told."""
+        """The controller's, by its last error frame; None before the first."""
         self._config = config
         self._on_change = on_change
         self._opener = opener
@@ -134,7 +134,7 @@ class KeptOpenBus(ABC):
                 self._on_change(self.name, True)
 
     def _on_state(self, state: Controller | None) -> None:
-        """An error frame told the controller's state, or None where it told nothing of it."""
+        """An error frame came, with the controller's state, or None if it holds no state."""
         self.state = state or self.state
         if state is Controller.BUS_OFF:
             self._doubtful = True
@@ -165,8 +165,8 @@ class KeptOpenBus(ABC):
         channel = self._config.channel
         if state is not Controller.BUS_OFF:
             return f"the controller of {channel} is {state}"
-        told = ask_kernel(channel) if self._config.interface == "socketcan" else None
-        return bus_off_words(channel, told.restart_ms if told is not None else 0)
+        report = ask_kernel(channel) if self._config.interface == "socketcan" else None
+        return bus_off_words(channel, report.restart_ms if report is not None else 0)
 
     def _attach(self, bus: can.BusABC) -> None:
         loop = asyncio.get_running_loop()
@@ -200,7 +200,7 @@ class KeptOpenBus(ABC):
                 self.last_error = str(error)
                 self._warn("open", str(error))
                 continue
-            # a socket opens whatever the controller does: only the controller tells whether the bus works
+            # a socket opens whatever the controller does: only the controller's state shows if the bus works
             state = await asyncio.to_thread(self._state_of, self._config, bus)
             self.state = state or self.state
             if state in CANNOT_SPEAK and not self._closing.is_set():

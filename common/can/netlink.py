@@ -37,7 +37,7 @@ class KernelReport:
 
 
 def state_of(config: BusConfig, bus: can.BusABC) -> Controller | None:
-    """The state of an open bus's controller; None where nothing tells it, as on a bus without one."""
+    """The state of an open bus's controller; None if it is not known, as on a bus without one."""
     if config.interface == "socketcan":
         link = ask_kernel(config.channel)
         return None if link is None else link.state
@@ -48,7 +48,7 @@ def state_of(config: BusConfig, bus: can.BusABC) -> Controller | None:
 
 
 def ask_kernel(channel: str) -> KernelReport | None:
-    """State and bit rate of a CAN interface; None where the kernel tells nothing of that name."""
+    """State and bit rate of a CAN interface; None if the kernel reports none of that name."""
     family = getattr(socket, "AF_NETLINK", None)
     try:
         index = socket.if_nametoindex(channel)
@@ -73,14 +73,14 @@ def read_report(reply: bytes) -> KernelReport | None:
             return None
         attributes = dict(_attributes(reply[_HEADER.size + _INFO.size : length]))
         info = dict(_attributes(attributes.get(_LINKINFO, b"")))
-        told = dict(_attributes(info.get(_INFO_DATA, b"")))
-        if _STATE not in told:
+        data = dict(_attributes(info.get(_INFO_DATA, b"")))
+        if _STATE not in data:
             return None
-        number = _number(told[_STATE])
+        number = _number(data[_STATE])
         return KernelReport(
             _STATES[number] if number < len(_STATES) else None,
-            _number(told.get(_BITTIMING, b"")[:4]),
-            _number(told.get(_RESTART_MS, b"")[:4]),
+            _number(data.get(_BITTIMING, b"")[:4]),
+            _number(data.get(_RESTART_MS, b"")[:4]),
         )
     except struct.error:
         return None

@@ -22,7 +22,7 @@ _THREAD_WAIT_S = 0.05
 
 OnMessage = Callable[[can.Message], None]
 OnError = Callable[[Exception], bool]
-"""Told of an error on the loop. True: it was one bad frame, read on. False: the bus has failed."""
+"""Called with an error, on the loop. True: it was one bad frame, read on. False: the bus has failed."""
 
 
 class Reader(Protocol):
@@ -42,10 +42,15 @@ class DescriptorReader:
     """Reads when the loop says that the bus can be read."""
 
     def __init__(
-        self, bus: can.BusABC, number: int, loop: asyncio.AbstractEventLoop, told: OnMessage, failed: OnError
+        self,
+        bus: can.BusABC,
+        number: int,
+        loop: asyncio.AbstractEventLoop,
+        on_message: OnMessage,
+        on_error: OnError,
     ) -> None:
         self._bus, self._number, self._loop = bus, number, loop
-        self._told, self._failed = told, failed
+        self._on_message, self._on_failure = on_message, on_error
         self._stopped = False
         loop.add_reader(number, self.read)
 
@@ -57,12 +62,12 @@ class DescriptorReader:
             try:
                 message = self._bus.recv(0)
             except Exception as error:  # whatever a driver raises, the session goes on
-                if self._failed(error):
+                if self._on_failure(error):
                     continue
                 return
             if message is None:
                 return
-            self._told(message)
+            self._on_message(message)
             if self._stopped:
                 return
 
@@ -80,10 +85,10 @@ class ThreadReader:
     """Reads in a thread, where an interface has no descriptor (`virtual`, and adapters on other systems)."""
 
     def __init__(
-        self, bus: can.BusABC, loop: asyncio.AbstractEventLoop, told: OnMessage, failed: OnError
+        self, bus: can.BusABC, loop: asyncio.AbstractEventLoop, on_message: OnMessage, on_error: OnError
     ) -> None:
         self._bus, self._loop = bus, loop
-        self._told, self._failed = told, failed
+        self._on_message, self._on_failure = on_message, on_error
         self._stopped = threading.Event()
         self._waiting: deque[can.Message] = deque()
         self._thread = threading.Thread(target=self._read, name=f"can {bus.channel_info}", daemon=True)
@@ -103,17 +108,17 @@ class ThreadReader:
                 self._hand_over(self.read)
 
     def _hand_over(self, callback: Callable[..., None], *values: object) -> None:
-        with contextlib.suppress(RuntimeError):  # the loop has closed: nobody is left to tell
+        with contextlib.suppress(RuntimeError):  # the loop has closed
             self._loop.call_soon_threadsafe(callback, *values)
 
     def _on_error(self, error: Exception) -> None:
         if not self._stopped.is_set():
-            self._failed(error)
+            self._on_failure(error)
 
     def read(self) -> None:
         """Call back for each message that the thread has read."""
         while self._waiting and not self._stopped.is_set():
-            self._told(self._waiting.popleft())
+            self._on_message(self._waiting.popleft())
 
     def stop(self) -> None:
         """Ask the thread to end."""

@@ -41,7 +41,7 @@ class RateLaw:
 
 
 RAW_CLOCKS = RateLaw(max_ppm=500.0, wander_ppm=20.0)
-"""Two oscillators that nobody steers: each within 250 ppm, and room temperature changes them by some ppm."""
+"""Two oscillators, not steered: each within 250 ppm, and room temperature changes them by some ppm."""
 ANY_CLOCKS = RateLaw(max_ppm=2 * STEERED_PPM, wander_ppm=4 * STEERED_PPM)
 """Two clocks that may both be steered, at any moment."""
 

@@ -41,7 +41,7 @@ class MasterExchange:
         return ClockQuery(now_ns, asked_ns, heard_ns, self.asker)
 
     def on_reply(self, reply: ClockReply, arrived_ns: int) -> bool:
-        """Take a reply; False if it was none of ours, or its stamps cannot be."""
+        """Take a reply; False if it answers no question of this side, or its stamps are impossible."""
         if reply.asked_ns not in self._asked:
             self.foreign += 1
             return False

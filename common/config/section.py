@@ -17,7 +17,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     def mistakes(self) -> list[ConfigMistake]:
-        """What no single key can tell: contradictions between keys. Asked once all keys are well formed."""
+        """Contradictions between keys. Called once all keys are well formed."""
         return []
 
 

@@ -9,9 +9,9 @@ REMEMBERED = 256
 
 
 class Arrivals:
-    """Counts since start. It looks before the gates do, so that what the guard refuses is not called lost.
+    """Counts since start, taken before the guard's gates, so that a refused message does not count as lost.
 
-    A number that is missing when a newer one comes is lost, whoever lost it: the network, or this process,
+    A number that is missing when a newer one comes is lost, be it in the network or in this process,
     which keeps only the newest that waits (`link.command.overwritten` counts those). Where it comes after all
     it was late, and not lost.
     """

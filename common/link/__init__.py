@@ -1,6 +1,6 @@
 """The link between the two sides: one Zenoh session a process, live data first, nothing kept.
 
-Read configuration (what Zenoh is told), inbox (foreign thread → loop), queries, waiting, link, then session.
+Read zenoh_config, inbox (foreign thread → loop), queries, waiting, link, then session.
 """
 
 from common.link.link import Link

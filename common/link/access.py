@@ -1,7 +1,8 @@
-"""`[link.access]` as Zenoh's access control: every message is refused but those that somebody may send. Pure.
+"""`[link.access]` as Zenoh's access control: a message that no rule allows is refused. Pure.
 
-A rule's flow is seen from here: `ingress` comes from the subject, `egress` goes to it. Whoever may publish a
-key is also told who listens to it, or it would send nothing. Subjects are certificates' common names.
+Flows are named from this host's side: `ingress` comes from the subject, `egress` goes to it. A publisher of a
+key must also receive its subscribers' declarations, or it would send nothing. Subjects are common names of
+certificates.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from common.wire.topics import (
 )
 
 HEARD = (COMMAND, STATE, STATISTICS, TRUTH)
-"""What an observer of a robot hears; `viewers` and operators see the video too."""
+"""Topics that an observer of a robot receives; viewers and operators receive the video too."""
 _WAYS = {
     "publish": ((("put", "delete"), "ingress"), (("declare_subscriber",), "egress")),
     "hear": ((("declare_subscriber",), "ingress"), (("put", "delete"), "egress")),
@@ -39,26 +40,26 @@ _WAYS = {
     ),
     "watched": ((("declare_liveliness_subscriber", "liveliness_query"), "egress"),),
 }
-"""What somebody may do with a key, as Zenoh's messages and their direction."""
+"""Each permission for a key, as Zenoh's messages and their direction."""
 _ALL = ("publish", "hear", "ask", "answer", "live", "watch", "watched")
 
 
 def access_control(access: AccessConfig) -> dict[str, Any]:
-    """Zenoh's `access_control`: rules, subjects and policies of everybody who is named."""
+    """Zenoh's `access_control`: rules, subjects and policies for every name in [link.access]."""
     table = _AccessRules()
     for router in access.routers:
         table.allow([common_name(Role.ROUTER, router)], _ALL, ["tandem/**"])
     for robot in access.robots:
         _robot(table, access, robot)
     everyone = sorted(named(access))
-    # presence is no secret among those who are named, and any of them may stop a robot
+    # every named host may see who is present, and may stop a robot
     table.allow(everyone, ("watch", "watched"), [_alive("*", "**")])
     table.allow(everyone, ("ask",), [STOP.key_for("*")])
     return table.zenoh()
 
 
 def named(access: AccessConfig) -> set[str]:
-    """The common names of everybody who may do anything."""
+    """The common name of every host in [link.access]."""
     people = [(Role.OPERATOR, access.operators), (Role.OBSERVER, access.observers | access.viewers)]
     of_people = {common_name(role, name) for role, table in people for name in table}
     robots = {common_name(Role.ROBOT, robot) for robot in access.robots}
@@ -98,7 +99,7 @@ def _alive(robot: str, role: str) -> str:
 
 
 class _AccessRules:
-    """Rules as they are allowed, each with those to whom it applies."""
+    """The rules so far, each with the subjects to which it applies."""
 
     def __init__(self) -> None:
         self.subjects: set[str] = set()

@@ -1,4 +1,4 @@
-"""Who is connected, by certificate, and who was refused: logged, and counted for reports."""
+"""Logs and counts connections, by certificate, and refusals."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ log = logging.getLogger(__name__)
 
 
 class Audit:
-    """Make it before the session opens, and `attach` it after. Without [link.tls] it hears nothing."""
+    """Make it before the session opens, and `attach` it after. Without [link.tls] it counts nothing."""
 
     def __init__(self, link: LinkConfig) -> None:
-        # who only connects lets nobody in: it need not pay for hearing of each message
+        # a host that only connects admits nobody, so it does not pay for a log line of each message
         guards = bool(link.listen)
         self._refusals: Refusals | None = hear_refusals(messages=guards) if link.tls else None
         self._known = named(link.access) if link.access else None
@@ -31,26 +31,26 @@ class Audit:
             )
 
     def attach(self, session: LinkSession) -> None:
-        """Hear of everybody who is connected, and who comes and goes."""
+        """Follow which hosts are connected from now on."""
         if self._refusals is not None:
             session.watch_peers(self._on_change)
 
-    def _on_change(self, session_id: str, who: str, here: bool) -> None:
-        if self._refusals is not None and who:
-            self._refusals.learn(session_id, who)
+    def _on_change(self, session_id: str, name: str, here: bool) -> None:
+        if self._refusals is not None and name:
+            self._refusals.learn(session_id, name)
             if not here:
                 self._refusals.went(session_id)
-        who = who or f"session {session_id}"
-        self._here[who] += 1 if here else -1
-        self._connections[who] += here
-        if self._here[who] <= 0:
-            del self._here[who]
+        name = name or f"session {session_id}"
+        self._here[name] += 1 if here else -1
+        self._connections[name] += here
+        if self._here[name] <= 0:
+            del self._here[name]
         if not here:
-            log.info("%s disconnected", who)
-        elif self._known is not None and who not in self._known:
-            log.warning("%s connected: [link.access] does not name it, so it may do nothing", who)
+            log.info("%s disconnected", name)
+        elif self._known is not None and name not in self._known:
+            log.warning("%s connected: [link.access] does not name it, so it may do nothing", name)
         else:
-            log.info("%s connected", who)
+            log.info("%s connected", name)
 
     def metrics(self) -> AccessMetrics:
         """For reports."""

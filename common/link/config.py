@@ -21,7 +21,7 @@ class TlsConfig(Section):
     """`[link.tls]`: this host's certificate and key, and the authority that it trusts."""
 
     ca: RelativePath
-    """The authority's certificate: whoever has none from it is refused."""
+    """The authority's certificate. A host without a certificate from it is refused."""
     certificate: RelativePath
     key: RelativePath
 
@@ -30,17 +30,17 @@ class AccessConfig(Section):
     """`[link.access]`: who may do what, by the names in the certificates. The same lines fit every host."""
 
     operators: dict[Name, list[Name]] = Field(default_factory=dict)
-    """Each operator's robots: who may command them, and see what they see."""
+    """The robots that each operator may command, and whose video the operator receives."""
     observers: dict[Name, list[Name]] = Field(default_factory=dict)
-    """Each observer's robots: who hears commands, states and statistics, but sees no video."""
+    """The robots whose commands, states and statistics each observer receives, but not their video."""
     viewers: dict[Name, list[Name]] = Field(default_factory=dict)
-    """Each viewer's robots: an observer who sees their video too."""
+    """The robots of which each viewer receives what an observer does, and their video."""
     routers: list[Name] = Field(default_factory=list)
-    """Through whom all of this may pass. A router enforces these rules towards everybody else."""
+    """Routers that may forward all of this. A router enforces these rules towards all other hosts."""
 
     @property
     def robots(self) -> list[str]:
-        """Every robot that anybody has something to do with, in the order of the file."""
+        """Every robot that the tables name, in the order of the file."""
         tables = (self.operators, self.observers, self.viewers)
         return list(dict.fromkeys(robot for table in tables for robots in table.values() for robot in robots))
 

@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 class Link:
     """The topics of one robot over one Zenoh session. All methods are for the loop's own thread.
 
-    A link never hears its own session: what it publishes reaches other sessions only. Nothing is kept for
+    A link never receives what its own session publishes. Nothing is kept for
     a late subscriber.
     """
 
@@ -92,7 +92,7 @@ class Link:
     def answer(self, topic: Topic, handler: Callable[[bytes, int], bytes]) -> None:
         """Answer other sessions' questions with `handler(payload, arrived_ns)`, run on the loop.
 
-        An exception in the handler is counted, logged, and sent as an error's text to who asked.
+        An exception in the handler is counted, logged, and sent to the asker as an error's text.
         """
         key = topic.key_for(self.robot)
         answerer = Answerer(key, handler, self._loop, self._count(topic), self._quality(topic).express)
@@ -110,7 +110,7 @@ class Link:
         await wait_for_peer(self._session, key, timeout_s)
 
     async def ask(self, topic: Topic, payload: bytes) -> bytes:
-        """The answer. LinkTimeoutError after the topic's time-out; LinkError where nobody can answer."""
+        """The answer. LinkTimeoutError after the topic's time-out; LinkError if no session answers it."""
         return (await self.ask_stamped(topic, payload))[0]
 
     async def ask_stamped(self, topic: Topic, payload: bytes) -> tuple[bytes, int]:
@@ -122,9 +122,9 @@ class Link:
     async def ask_all(
         self, topic: Topic, payload: bytes, on_answer: Callable[[Answered], None] = lambda _: None
     ) -> list[Answered]:
-        """The answers of everybody who answers the topic; `on_answer` hears each as it comes.
+        """The answers of every session that answers the topic; `on_answer` takes each as it comes.
 
-        It lasts until each has answered, or for the topic's time-out. Raises as `ask` where nobody answered.
+        It lasts until each has answered, or for the topic's time-out. Raises as `ask` if none answered.
         """
         topic = self._quality(topic)
         asking = Asking(self._session, topic, topic.key_for(self.robot), self._count(topic))

@@ -15,10 +15,10 @@ class Mailbox(Generic[Value]):
         self._lock = threading.Lock()
         self._slot: tuple[Value] | None = None
         self.overwritten = 0
-        """Values that nobody took."""
+        """Values that were replaced before they were taken."""
 
     def put(self, value: Value) -> bool:
-        """Leave a value. True if the box was empty, so that whoever reads it must be woken."""
+        """Leave a value. True if the box was empty, so that its reader must be woken."""
         with self._lock:
             was_empty = self._slot is None
             self._slot = (value,)

@@ -1,4 +1,4 @@
-"""Other processes that bear this robot's name, as far as they are known now. Pure: time is given."""
+"""Other processes with this robot's name, as far as they are known now. Pure: time is given."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from common.clock import to_ns
 from common.wire.presence import ProcessPresence
 
 NOTICE_S = 2.0
-"""How long a master's word that two answer to the name counts; it repeats it every NOTICE_S / 4."""
+"""How long a master's report of two robots with one name counts; it repeats it every NOTICE_S / 4."""
 
 
 class Namesakes:
-    """What a robot knows of its namesakes: those that show themselves to it, and those it is told of."""
+    """The robot's namesakes: those whose presence it sees, and those that a master reports to it."""
 
     def __init__(self, own: int) -> None:
         """`own`: this process's instance number."""
@@ -29,7 +29,7 @@ class Namesakes:
             self._shown.pop(presence.instance, None)
 
     def on_notice(self, words: str, now_ns: int) -> None:
-        """Somebody who sees both says so; between peers the two do not see each other."""
+        """A master sees both and reports it; between peers the two do not see each other."""
         self._notice, self._noticed_ns = words, now_ns
 
     def words(self, now_ns: int) -> str | None:

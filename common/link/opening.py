@@ -37,9 +37,9 @@ async def open_zenoh(
     within_s: float = math.inf,
     waits: Callable[[str], None] = lambda _: None,
 ) -> zenoh.Session:
-    """The session. It waits `within_s` for what a host may not have yet, and says so. Raises LinkError.
+    """The session. It waits `within_s` for what the host does not have yet, and logs it. Raises LinkError.
 
-    As a client it waits for its router; whoever listens, for the address or the name where it is to.
+    A client waits for its router; a session that listens waits for its address or host name.
     """
     turn, until_s = 0, asyncio.get_running_loop().time() + within_s
     pause_s = RETRY_S
@@ -99,5 +99,5 @@ def _close_unwanted(opening: asyncio.Future[zenoh.Session]) -> None:
 def _close(session: zenoh.Session) -> None:
     try:
         session.close()
-    except Exception as error:  # nobody wants it any more
+    except Exception as error:  # it was given up already
         log.debug("error while closing the session: %s", error)

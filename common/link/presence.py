@@ -22,7 +22,7 @@ def watch_presence(
 ) -> None:
     """Call `on_change(presence, alive)` on the loop; those already there at once. `robot` may be `*`.
 
-    A key that is no token of tandem's is passed over. What hears of them is added to `held`.
+    A key that is no token of tandem is ignored. The subscriber is added to `held`, which keeps it alive.
     """
 
     def on_sample(sample: zenoh.Sample) -> None:

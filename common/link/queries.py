@@ -77,7 +77,7 @@ class Answerer:
             with query:
                 if not self._closed:
                     self._reply(query, payload, arrived_ns)
-        except Exception as error:  # the asker has gone, or the session closes: nothing to be done for it
+        except Exception as error:  # the asker has gone, or the session closes
             log.debug("no answer on %s: %s", self._key, error)
 
     def _reply(self, query: zenoh.Query, payload: bytes, arrived_ns: int) -> None:
@@ -101,17 +101,17 @@ class Answerer:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """One answer of somebody."""
+    """One answer to a question."""
 
     payload: bytes
     arrived_ns: int
     """This host's clock."""
     replier: str = ""
-    """The session that answered; empty where Zenoh does not tell."""
+    """The session that answered; empty where Zenoh does not name it."""
 
 
 class Asking:
-    """Asks a key's answerers: `first` takes the nearest one's answer, `all` everybody's."""
+    """Asks the sessions that answer a key: `first` takes the nearest one's answer, `all` every answer."""
 
     def __init__(self, session: zenoh.Session, topic: Topic, key: str, counters: TopicCounters) -> None:
         self._session = session
@@ -122,16 +122,16 @@ class Asking:
     async def first(self, payload: bytes) -> tuple[bytes, int]:
         """The first answer and when it arrived, ns of this host's clock.
 
-        Raises LinkTimeoutError after the topic's time-out, LinkError at once where nobody can answer.
+        Raises LinkTimeoutError after the topic's time-out, LinkError at once if no session answers the key.
         """
         question = Question(asyncio.get_running_loop(), enough=1)
         answers = await self._ask(question, zenoh.QueryTarget.BEST_MATCHING, payload)
         return answers[0].payload, answers[0].arrived_ns
 
     async def all(self, payload: bytes, on_answer: Callable[[Answered], None]) -> list[Answered]:
-        """What everybody answered, through peers and routers, until each has or the time-out is over.
+        """Every answer, through peers and routers, until each session has answered or the time-out is over.
 
-        Raises as `first` where nobody answered.
+        Raises as `first` if none answered.
         """
         question = Question(asyncio.get_running_loop(), on_answer=on_answer)
         return await self._ask(question, zenoh.QueryTarget.ALL, payload)
@@ -206,7 +206,7 @@ class Question:
         wake(self._loop, self._end)
 
     def fail(self, error: LinkError) -> None:
-        """Note that somebody did not answer."""
+        """Note that a session did not answer."""
         self.failure = self.failure or error
         if self._enough:
             self._end()

@@ -1,8 +1,8 @@
-"""Who was refused, and why, from what Zenoh logs: it tells it nowhere else. Pure.
+"""Refused connections and messages, read from Zenoh's log, since Zenoh reports them nowhere else. Pure.
 
-A handshake is refused with a reason, before anybody's name is known. A message is refused by the access
-control, which names the certificate the first time and the session's id from then on; that it was dropped
-is said by the thread's next line.
+A handshake is refused with a reason, before the name of the other side is known. The access control refuses a
+message: its log line names the certificate the first time and the session's id from then on, and the same
+thread's next line says that the message was dropped.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from common.log.throttle import LogThrottle
 from common.metrics.link import RefusalMetrics
 
 REPEAT_S = 10.0
-"""What keeps being refused is said once in so long."""
+"""A refusal that repeats itself is logged once in this time."""
 MAX_KINDS = 256
-"""Different refusals that are told apart; what comes beyond is counted together."""
+"""Different refusals that are counted one by one; further ones are counted together."""
 HANDSHAKES = "error,zenoh_link_tls=warn,zenoh_link_commons=warn"
-"""What Zenoh must log to tell refused handshakes."""
+"""Zenoh's log filter that shows refused handshakes."""
 MESSAGES = f"{HANDSHAKES},zenoh::net::routing::interceptor=trace"
-"""And to tell refused messages too: a line for each that passes, some 20 µs on its way."""
+"""The filter that shows refused messages too: Zenoh then logs every message, some 20 µs each."""
 
 _HANDSHAKE = (
     re.compile(r"zenoh_link_tls::unicast: (?P<why>.+?)\.? Hint: "),
@@ -42,28 +42,28 @@ _DROPPED = "Msg intercepted!"
 class Refusal:
     """One attempt."""
 
-    who: str
-    """A common name, or a session's id; empty where the handshake failed, and nobody has proved anything."""
+    name: str
+    """A common name, or a session's id; empty where the handshake failed, so that no name is proved."""
     what: str
     key: str
 
     def __str__(self) -> str:
-        if not self.who:
+        if not self.name:
             return f"a connection was refused: {self.what}"
-        return f"{self.who} was refused: {self.what} {self.key}"
+        return f"{self.name} was refused: {self.what} {self.key}"
 
 
 class Refusals:
-    """Counts refusals; `feed` takes Zenoh's log and returns what is worth telling a person."""
+    """Counts refusals; `feed` takes a line of Zenoh's log and returns what to log about it."""
 
     def __init__(self) -> None:
         self.counts: Counter[Refusal] = Counter()
         self.more = 0
         """Refusals beyond MAX_KINDS different ones."""
         self.names: dict[str, str] = {}
-        """Common name by session, of who is connected or was; Zenoh's log does not name a stranger."""
+        """Common name by session, of those connected now or before; Zenoh's log does not name a stranger."""
         self._gone: dict[str, None] = {}
-        """Of those, who is not connected any more, in the order in which they went."""
+        """Those of them that are not connected any more, in the order in which they went."""
         self._pending: dict[str, Refusal] = {}
         self._throttle = LogThrottle(to_ns(REPEAT_S))
 
@@ -92,8 +92,8 @@ class Refusals:
             self.learn(named["zid"], named["name"])
         self._pending.pop(thread[0], None)
         if found := _UNAUTHORIZED.search(line):
-            who = self.names.get(found["zid"], found["zid"])
-            self._pending[thread[0]] = Refusal(who, found["what"], found["key"])
+            name = self.names.get(found["zid"], found["zid"])
+            self._pending[thread[0]] = Refusal(name, found["what"], found["key"])
         return None
 
     def learn(self, session: str, name: str) -> None:
@@ -106,17 +106,17 @@ class Refusals:
         self.names[session] = name
 
     def went(self, session: str) -> None:
-        """It is not connected any more; what it did may still be told under its name."""
+        """The session disconnected; its refusals keep its name."""
         if session in self.names:
             self._gone[session] = None
 
     def metrics(self) -> RefusalMetrics:
         """For reports: handshakes by reason, messages by certificate, kind and key, and how many in all."""
-        handshakes = {r.what: n for r, n in list(self.counts.items()) if not r.who}
+        handshakes = {r.what: n for r, n in list(self.counts.items()) if not r.name}
         messages: dict[str, dict[str, int]] = {}
         for refusal, count in list(self.counts.items()):
-            if refusal.who:
-                kinds = messages.setdefault(self.names.get(refusal.who, refusal.who), {})
+            if refusal.name:
+                kinds = messages.setdefault(self.names.get(refusal.name, refusal.name), {})
                 kind = f"{refusal.what} {refusal.key}"
                 kinds[kind] = kinds.get(kind, 0) + count
         total = self.counts.total() + self.more

@@ -13,9 +13,9 @@ class Role(StrEnum):
     ROBOT = "robot"
     """Publishes its own state and video, and answers."""
     OBSERVER = "observer"
-    """Hears; named under `observers` or, with video, `viewers`."""
+    """Receives only; named under `observers` or, with video, `viewers`."""
     ROUTER = "router"
-    """Passes on what others may say."""
+    """Forwards what others may send."""
 
 
 def common_name(role: Role, name: str) -> str:

@@ -1,4 +1,4 @@
-"""The router's TOML file: the same [link] as everybody's."""
+"""The router's TOML file: its [link] has the form of every other host's."""
 
 from __future__ import annotations
 

@@ -42,8 +42,8 @@ async def open_session(
     """A session for any robots' links. Raises LinkError where it cannot be opened; a peer may come later.
 
     `mode`: `router`, in place of the configuration's own. `router_within_s`: how long it waits for a router,
-    or for an address to listen at; a robot waits for ever, a person who asks does not. `waits` is told now
-    and then that it does.
+    or for an address to listen at; a robot waits for ever, a command does not. `waits` takes, now and then,
+    the reason for which it waits.
     """
     if not (config.listen or config.connect):
         raise LinkError("the link has no endpoint: set `listen` or `connect` under [link]")
@@ -113,7 +113,7 @@ class LinkSession:
         `name` is the common name of the certificate; empty where the transport has none.
         """
         names: dict[str, list[str]] = {}
-        """Of each session that is connected, once a link: as it goes it is not told any more."""
+        """Of each connected session, once a link: the event of its end does not name it."""
 
         def on_event(event: zenoh.LinkEvent) -> None:
             session_id, here = str(event.link.zid), event.kind == zenoh.SampleKind.PUT

@@ -19,8 +19,8 @@ def count_peers(session: zenoh.Session) -> int:
 async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: float) -> None:
     """Until another session is connected and, where a key is given, one that answers it.
 
-    A session is connected a millisecond before it has told what it answers, so a question put in between
-    would find nobody. Raises LinkTimeoutError.
+    A session is connected a millisecond before it has declared what it answers: a question put in between
+    would find no answerer. Raises LinkTimeoutError.
     """
     loop = asyncio.get_running_loop()
     there = asyncio.Event()

@@ -10,7 +10,7 @@ from common.link.endpoint import for_zenoh
 
 
 def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, Any]:
-    """The configuration of a session that listens and connects only where it is told to.
+    """The configuration of a session that listens and connects only where [link] says.
 
     `mode` in place of the configuration's own: `router`, which no master or slave is.
     """
@@ -18,14 +18,14 @@ def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, Any]:
     if config.tls is not None:
         settings["transport"]["link"]["tls"] = _tls(config.tls)
     if config.access is not None:
-        # elsewhere nobody proves who he is
+        # other transports prove no identity
         settings["transport"]["link"]["protocols"] = ["tls", "quic"]
         settings["access_control"] = access_control(config.access)
     return settings
 
 
 def _tls(tls: TlsConfig) -> dict[str, Any]:
-    # the same block serves quic; both sides show a certificate, whoever connects
+    # the same block serves quic; both sides show a certificate
     # absolute: a zenohd that reads them from a file of its own runs elsewhere
     ca, certificate, key = (str(path.absolute()) for path in (tls.ca, tls.certificate, tls.key))
     return {
@@ -46,7 +46,7 @@ def _endpoints_and_timing(config: LinkConfig, mode: str) -> dict[str, Any]:
         "mode": mode,
         # nothing is found by chance: endpoints are explicit
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        # told explicitly even where empty: by default a peer listens on every interface
+        # set even where empty: by default a peer listens on every interface
         "listen": {"endpoints": [for_zenoh(end) for end in config.listen]},
         "connect": {
             "endpoints": [for_zenoh(end) for end in config.connect],

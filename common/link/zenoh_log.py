@@ -1,4 +1,4 @@
-"""Hears Zenoh's log, which it writes to standard output, and hands it to `Refusals`. Once a process.
+"""Reads Zenoh's log, which Zenoh writes to standard output, and hands it to `Refusals`. Once a process.
 
 What the process itself prints goes where it went before. The pipe never blocks Zenoh: a line that does
 not fit is lost, and so is its count.

@@ -1,4 +1,4 @@
-"""Standard streams that end no act: closed, full, cut off or unable to show a letter, they only lose text.
+"""Standard streams that never raise: closed, full, cut off or unable to show a letter, they only lose text.
 
 A robot's stop must not depend on what becomes of the terminal that asked for it. `secure` is called once, at
 the start of each process of tandem.
@@ -43,7 +43,7 @@ class LossyRaw(io.FileIO):
             try:
                 rest = rest[os.write(fd, rest) :]
             except BlockingIOError:
-                # somebody else has made the terminal non-blocking: it is still there
+                # another process made the terminal non-blocking: it is still there
                 select.select([], [fd], [])
             except OSError as error:
                 self.trouble = error
@@ -66,7 +66,7 @@ def secure() -> None:
     """Make this process's standard streams such. Descriptors 0 to 2 that are closed lead to /dev/null.
 
     Else what is opened next takes their numbers: a socket then reads as standard input, and uvloop aborts the
-    process as it ends. Streams that somebody has replaced already, such as a test, are let be.
+    process as it ends. Streams that were replaced before, such as by a test, stay.
     """
     for fd in (0, 1, 2):
         try:

@@ -34,5 +34,5 @@ class BusMetrics(BusCounters):
 
     up: bool = False
     state: str = ""
-    """The controller's, by its last error frame; empty where it has not told."""
+    """The controller's, by its last error frame; empty before the first."""
     last_error: str = ""

@@ -29,7 +29,7 @@ class TopicCounters(Metrics):
     timeouts: int = 0
     """Questions that got no answer in time."""
     unanswered: int = 0
-    """Questions that nobody was there to answer, or whose answerer reported an error."""
+    """Questions that no session answered, or that were answered with an error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class RefusalMetrics(Metrics):
 
 @dataclass(frozen=True, slots=True)
 class AccessMetrics(Metrics):
-    """Who is connected, and who was refused."""
+    """Connected hosts, and refused ones, by certificate."""
 
     connected: dict[str, int]
     connections: dict[str, int]

@@ -65,7 +65,7 @@ class CommandedMetrics(Metrics):
 
 @dataclass(frozen=True, slots=True)
 class MasterMetrics(Metrics):
-    """The master's process. A message to a robot tells of that robot alone."""
+    """The master's process. A message to a robot holds that robot alone."""
 
     software: Software
     heap: HeapMetrics

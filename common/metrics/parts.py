@@ -49,7 +49,7 @@ class HeapMetrics(Metrics):
     """Memory that a process holds on to, beside which resident memory may hide a leak."""
 
     bytes_in_use: int | None
-    """Allocated by C and not freed; None where the C library does not tell."""
+    """Allocated by C and not freed; None where the C library does not report it."""
     python_blocks: int
     """Objects of Python's own allocator."""
     python_threads: int

@@ -51,7 +51,7 @@ class ArrivalCounts(Metrics):
 
 @dataclass(frozen=True, slots=True)
 class DueMetrics(Metrics):
-    """Commands of the lease's holder, by time: also those that nobody sent."""
+    """Commands of the lease's holder, by time: also those that were never sent."""
 
     expected: int
     """Came, or should have come between two that did."""

@@ -18,7 +18,7 @@ from common.errors import CodecError
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-# a field that nobody knows is a renamed one: it is refused, as a missing one is
+# an unknown field is a renamed one: it is refused, as a missing one is
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 

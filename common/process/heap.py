@@ -72,9 +72,9 @@ def heap_in_use() -> HeapMetrics:
     except AttributeError:  # not glibc, or one before 2.33
         return HeapMetrics(None, sys.getallocatedblocks(), threading.active_count())
     mallinfo2.restype = _MallInfo2
-    told = mallinfo2()
+    info = mallinfo2()
     # small Python objects live in maps of their own, which C does not count: blocks stand for them
-    return HeapMetrics(told.uordblks + told.hblkhd, sys.getallocatedblocks(), threading.active_count())
+    return HeapMetrics(info.uordblks + info.hblkhd, sys.getallocatedblocks(), threading.active_count())
 
 
 def _mallopt(parameter: int, value: int) -> bool:

@@ -1,4 +1,4 @@
-"""What systemd is told of this process: ready, alive, what it does, stopping (sd_notify(3)).
+"""Reports this process to systemd: ready, alive, its status, stopping (sd_notify(3)).
 
 The protocol is one datagram a message. Written here, because the packages that offer it either block when
 the manager does not read (`sdnotify`) or need a compiler and libsystemd's headers (`systemd-python`).
@@ -28,46 +28,46 @@ log = logging.getLogger(__name__)
 
 
 class Notifier:
-    """Tells the service manager; without one it does nothing. No call blocks or raises."""
+    """Reports to the service manager; without one it does nothing. No call blocks or raises."""
 
     def __init__(self, send: Callable[[bytes], bool] | None = None, watchdog_ns: int = 0) -> None:
-        """`send` delivers one message, False where it could not; `watchdog_ns`: 0 where nobody watches."""
+        """`send` delivers one message, False where it could not; `watchdog_ns`: 0 without a watchdog."""
         self._send = send
         self._every_ns = watchdog_ns // PINGS_A_PERIOD if watchdog_ns else _NEVER_NS
         self._next_ns = _NEVER_NS if send is None else 0
         self._ready = False
-        self._said = ""
+        self._last_status = ""
         self.unsent = 0
         """Messages that could not be delivered."""
 
     def beat(self, now_ns: int) -> None:
         """Called by the loop that is guarded, at the end of each of its ticks, and by nothing else.
 
-        The first says that the process is ready, those after it that the loop is alive. It costs one
+        The first reports that the process is ready, those after it that the loop is alive. It costs one
         comparison but for a few times a second.
         """
         if now_ns < self._next_ns:
             return
-        sent = self._tell("WATCHDOG=1" if self._ready else "READY=1\nWATCHDOG=1")
+        sent = self._send_message("WATCHDOG=1" if self._ready else "READY=1\nWATCHDOG=1")
         self._ready = self._ready or sent
         self._next_ns = now_ns + (self._every_ns if sent else min(_RETRY_NS, self._every_ns))
 
     def status(self, text: str) -> None:
-        """What the process does, in words: what `systemctl status` shows."""
+        """What the process does, in words: `systemctl status` shows it."""
         line = _one_line(text)
-        if line != self._said and self._tell(f"STATUS={line}"):
-            self._said = line
+        if line != self._last_status and self._send_message(f"STATUS={line}"):
+            self._last_status = line
 
     def waits(self, text: str) -> None:
-        """Not ready yet, through no fault of its own: why, and the manager's start time-out begins anew."""
-        self._tell(f"STATUS={_one_line(text)}\nEXTEND_TIMEOUT_USEC={STARTS_WITHIN_S * 1_000_000}")
+        """Not ready yet, for a reason outside this process; the manager's start time-out begins anew."""
+        self._send_message(f"STATUS={_one_line(text)}\nEXTEND_TIMEOUT_USEC={STARTS_WITHIN_S * 1_000_000}")
 
     def stopping(self) -> None:
         """The process has begun to end; the loop need not beat any more."""
         self._next_ns = _NEVER_NS
-        self._tell("STOPPING=1")
+        self._send_message("STOPPING=1")
 
-    def _tell(self, message: str) -> bool:
+    def _send_message(self, message: str) -> bool:
         if self._send is None:
             return False
         sent = self._send(message.encode("utf-8", "replace"))
@@ -76,7 +76,7 @@ class Notifier:
 
 
 def _one_line(text: str) -> str:
-    """A name that somebody chose must not be taken for a message of ours."""
+    """Printable characters on one line: a chosen name must not pass for a message to systemd."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:_MOST_TEXT]
 
 

@@ -1,4 +1,4 @@
-"""A process's life: run until told to stop, then end within one deadline, whatever hangs."""
+"""A process's life: run until a signal comes, then end within one deadline, whatever hangs."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ async def until_stopped(stop: asyncio.Event, work: Coroutine[Any, Any, None]) ->
 
 
 async def _main(main: Callable[[asyncio.Event], Awaitable[None]], shutdown: _Shutdown) -> None:
-    if shutdown.told:  # before there was a loop to tell
+    if shutdown.signalled:  # before there was a loop
         shutdown.stop.set()
     try:
         await main(shutdown.stop)
@@ -92,7 +92,7 @@ class _Shutdown:
         self._begun = False
 
     @property
-    def told(self) -> bool:
+    def signalled(self) -> bool:
         """Whether a signal has come."""
         return self._signals > 0 or self._hung_up
 
@@ -128,7 +128,7 @@ class _Shutdown:
         text = "\n  ".join([f"ended by force ({why}); still running:", *self._hanging()])
         if in_journal():
             text = with_priority(text, logging.CRITICAL)
-        with suppress(OSError):  # nobody may read it any more: the process ends all the same
+        with suppress(OSError):  # standard error may be closed: the process ends all the same
             os.write(2, f"{text}\n".encode("utf-8", "replace"))
         os._exit(status)
 

@@ -127,7 +127,7 @@ def _live(skeleton: Skeleton, index: int) -> tuple[int, ...]:
 
 
 def _free_heading(skeleton: Skeleton, index: int) -> bool:
-    """Of the world only the vertical is known: which way a root faces is nobody's angle."""
+    """Of the world only the vertical is known: no joint sets which way a root faces."""
     segment = skeleton.segments[index]
     return skeleton.parents[index] < 0 and segment.angles[0] is None and abs(segment.axes[0][2]) == 1
 

@@ -43,7 +43,7 @@ from common.skeleton import Skeleton
 from common.wire.messages import Mask
 
 NOMINAL_S = 0.08
-"""From one posture to the next, where nobody says."""
+"""The default time from one posture to the next."""
 FORGOTTEN_S = 0.5
 """Postures farther apart than this have nothing to do with each other."""
 _FLOOR = 1e-12

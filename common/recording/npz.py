@@ -1,4 +1,4 @@
-"""The arrays of an npz file, or a clear word on why there are none: whoever reads one begins here."""
+"""Reads the arrays of an npz file, or raises a clear error."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class RecordingStream:
     """The entries of a file one after the other, in constant memory, as far as the file is whole.
 
     `metadata` and `cut` are known once it has been gone through. Going through it raises RecordingError
-    where it cannot be opened or is no recording of ours.
+    where it cannot be opened or is no recording of tandem.
     """
 
     def __init__(self, path: Path) -> None:
@@ -86,7 +86,7 @@ class RecordingStream:
 def read_recording(path: Path) -> McapRecording:
     """Read a whole file, or one that was cut off, up to its last whole chunk.
 
-    Raises RecordingError where it cannot be opened or is no recording of ours.
+    Raises RecordingError where it cannot be opened or is no recording of tandem.
     """
     stream = RecordingStream(path)
     entries = list(stream)

@@ -1,4 +1,4 @@
-"""How to ask a robot: what could move it quotes a number that the robot gave a moment ago."""
+"""Requests to a robot. One that could move it quotes a number that the robot gave a moment ago."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ from common.wire.topics import CONTROL, STOP, Topic
 
 CHALLENGED = frozenset({Action.ENGAGE, Action.RESET, Action.HOME})
 """Requests that must not take effect late. To stop, claim, release or ask is harmless at any time."""
-
-
 OPEN = frozenset({Action.ESTOP, Action.STATUS})
-"""Requests that anybody may make who has a certificate; all others are for the robot's operators."""
+"""Requests allowed to every host with a certificate; all others are for the robot's operators."""
 
 
 def topic_for(action: Action) -> Topic:
-    """Where a request goes: what everybody may ask has a key of its own, as access control goes by keys."""
+    """The topic of a request: access control goes by keys, so requests open to all have their own key."""
     return STOP if action in OPEN else CONTROL
 
 
@@ -58,7 +56,7 @@ AskAll = Callable[[bytes], Awaitable[list[bytes]]]
 
 
 async def ask_everybody(ask_all: AskAll, request: ControlRequest) -> list[ControlReply]:
-    """What every robot of that name answers. Where several do, nothing that could move one is asked of any.
+    """What every robot of that name answers. If several answer, a request that could move one is not sent.
 
     Raises CodecError where any answer is not understood, and whatever `ask_all` raises.
     """
@@ -73,7 +71,7 @@ async def ask_everybody(ask_all: AskAll, request: ControlRequest) -> list[Contro
 
 
 async def _replies(ask_all: AskAll, request: ControlRequest) -> list[ControlReply]:
-    """One an instance: whoever is reached in two ways is one robot all the same."""
+    """One reply an instance: a robot that is reached in two ways is one robot."""
     answers = await ask_all(request_bytes(request))
     replies = [read_reply(payload, request.action) for payload in answers]
     return list({reply.instance: reply for reply in replies}.values())

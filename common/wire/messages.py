@@ -79,7 +79,7 @@ class BaseAttitude:
     azimuth_rad: float | None
     """True azimuth of the axis's horizontal projection, 0 to 2π; None where it has no direction."""
     tool_face_rad: float | None
-    """Rotation about the axis itself, 0 to 2π; None where neither gravity nor field tells it."""
+    """Rotation about the axis itself, 0 to 2π; None where neither gravity nor field determines it."""
     tilt_rad: float
     """Of the base from level, 0 to π: whatever its axis is, this is what it falls over by."""
 
@@ -98,7 +98,7 @@ class RobotState:
     reason: str
     """Why the guard is there, in words."""
     operator: str
-    """Who holds the lease, empty where nobody does."""
+    """Name of the operator who holds the lease; empty if none."""
     encoder_valid: Mask
     position_rad: Array
     """(J,) measured by the encoders."""
@@ -116,7 +116,7 @@ class RobotState:
     lease_id: int = 0
     """Which lease it is (`wire.lease.lease_id`): two masters may bear one name. 0 where there is none."""
     instance: int = 0
-    """Which process says so (`common.wire.instance`): two robots may bear one name by mistake."""
+    """Which process sent it (`common.wire.instance`): two robots may have one name by mistake."""
 
 
 class Action(StrEnum):
@@ -146,7 +146,7 @@ class ControlRequest:
     key: str = ""
     """The reset key, for `reset` and `home`; where the other is, for `namesake`."""
     clock: int = 0
-    """For `claim`: the asker whose clock queries tell of the clock that stamps this master's commands."""
+    """For `claim`: the asker of the clock queries that measure the clock of this master's stamps."""
     challenge: int = 0
     """For `engage`, `reset` and `home`: the one of the robot's last `status`. Else a late one would count."""
 

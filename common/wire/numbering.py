@@ -1,6 +1,6 @@
-"""The number that a message bears, and who counts it, without decoding the rest. Pure.
+"""A message's sequence number and its stream, without decoding the rest. Pure.
 
-Who records does not know how many joints a robot has, and need not: a gap shows in the numbers alone.
+The recorder does not know how many joints a robot has, and need not: a gap shows in the numbers alone.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Number:
     """One message among those of its stream."""
 
     stream: int
-    """Who counts: the lease of a command, the process of a state; 0 where there is only one count."""
+    """Within which it counts: the lease of a command, the process of a state; 0 if there is one count."""
     value: int
 
 
@@ -29,7 +29,7 @@ _PLACES = {"command": (3, 4), "state": (17, 3)}
 
 
 def number_of(payload: bytes) -> Number | None:
-    """The number of a command, a state or a picture. None where the payload bears none, or cannot be read."""
+    """The number of a command, a state or a picture; None if the payload has none or cannot be read."""
     if payload[:4] == b"TVID":
         try:
             return Number(0, decode_frame(payload).number)

@@ -1,6 +1,6 @@
-"""A question of one size that asks for an answer of another: which sizes does the way to a robot carry? Pure.
+"""Questions and answers of chosen sizes, to find the largest message that the path to a robot carries. Pure.
 
-Some ways, such as tunnels whose ICMP is filtered, swallow large packets without a word. Then small messages
+Some paths, such as tunnels whose ICMP is filtered, drop large packets silently. Then small messages
 pass, and a stream of large ones, such as video over tcp, stalls everything on the same connection.
 """
 

@@ -1,8 +1,8 @@
-"""Who is there, as a liveliness token's key tells it: role, process, version and place. Pure.
+"""Which processes are alive, from the keys of their liveliness tokens: role, instance, version, place. Pure.
 
 Each process shows two tokens. `alive/{role}` alone is the form of schema 2, which every version reads;
-`alive/{role}/{instance}/{version}/{place}` tells the rest, so that two processes of one name, or of two
-versions, are told apart before any message is read. Neither form ever changes.
+`alive/{role}/{instance}/{version}/{place}` holds the rest, so that two processes of one name, or of two
+versions, are distinguished before any message is read. Neither form ever changes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _MOST_PLACE = 160
 
 @dataclass(frozen=True, slots=True)
 class ProcessPresence:
-    """One process that shows itself."""
+    """One process that is alive."""
 
     robot: str
     role: str
@@ -29,7 +29,7 @@ class ProcessPresence:
     instance: int = 0
     """0 where only the short form came: a process of schema 2, or the other token of one that is known."""
     schema: int = 0
-    """Of its messages; 0 where it did not tell."""
+    """Of its messages; 0 where it is not known."""
     software: str = ""
     """Its tandem's version."""
     place: str = ""
@@ -46,7 +46,7 @@ class ProcessPresence:
 
     @property
     def other_version(self) -> str:
-        """What to say where its messages are of another version than this process's; empty where not."""
+        """Why this process cannot read its messages, and what to do; empty if it can."""
         if not self.instance or self.schema == SCHEMA:
             return ""
         return (
@@ -63,7 +63,7 @@ class ProcessPresence:
 
 
 def read_presence(key: str) -> ProcessPresence | None:
-    """What a token's key tells; None where it is no token of tandem's. It raises on no key."""
+    """The process that a token's key describes; None for a key that is no token of tandem. Never raises."""
     parts = key.split("/")
     if len(parts) < 4 or parts[0] != "tandem" or parts[2] != "alive":
         return None
@@ -73,7 +73,7 @@ def read_presence(key: str) -> ProcessPresence | None:
     try:
         instance = int(more[0], 16)
         schema, _, software = more[1].partition("-")
-        # what a later version appends to the key is let be
+        # a later version may append to the key
         return ProcessPresence(robot, role, instance, int(schema), unquote(software), unquote(more[2]))
     except (ValueError, IndexError):
         return None
@@ -86,11 +86,11 @@ def place(endpoints: Sequence[str]) -> str:
 
 
 def present(robot: str, role: str, instance: int, endpoints: Sequence[str]) -> ProcessPresence:
-    """How a process shows itself."""
+    """The presence of this process, for its token."""
     return ProcessPresence(robot, role, instance, SCHEMA, installed("tandem"), place(endpoints))
 
 
 def several_bear(robot: str, places: Sequence[str]) -> str:
-    """What to say where several processes bear one robot's name."""
+    """The message that several robots have one name, and what to do."""
     where = " and ".join(sorted(places))
     return f"{len(places)} robots bear the name {robot}: {where}. Give each its own (`robot` in its file)"

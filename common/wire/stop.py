@@ -25,7 +25,7 @@ STOPPED = "estop"
 
 @dataclass(frozen=True, slots=True)
 class StopAnswer:
-    """What a robot says to a stop."""
+    """A robot's answer to a stop."""
 
     done: bool
     guard: str
@@ -35,7 +35,7 @@ class StopAnswer:
 
     @property
     def stopped(self) -> bool:
-        """Whether it says that it is stopped."""
+        """Whether the robot reports that it is stopped."""
         return self.done and self.guard == STOPPED
 
 

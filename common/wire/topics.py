@@ -53,8 +53,8 @@ COMMAND = Topic("command", "tandem/{robot}/command", 12.5, 0.2, Priority.REAL_TI
 STATE = Topic("state", "tandem/{robot}/state", 50.0, 0.2, Priority.INTERACTIVE_HIGH, False, True, True)
 CONTROL = Topic("control", "tandem/{robot}/control", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
 STOP = Topic("stop", "tandem/{robot}/stop", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
-"""As CONTROL, but for whoever may only stop the robot or ask how it is: a key of its own, so that access
-control, which does not look into messages, can leave it to everybody."""
+"""As CONTROL, for stops and status requests alone: access control does not look into messages, so a key of
+their own is needed to allow them to every named host."""
 CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 1.0, Priority.REAL_TIME, True, True, True)
 PATH = Topic("path", "tandem/{robot}/path", 0.0, 1.0, Priority.DATA_LOW, True, True, True)
 """Questions of any size, answered by any size (`common.wire.path_probe`): which does the way carry?"""

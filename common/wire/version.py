@@ -1,4 +1,4 @@
-"""Which software this is, so that two hosts can tell whether they run the same."""
+"""Versions of this software, so that two hosts can check that they run the same."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from common.errors import CodecError
 
 MAX_JPEG = 1 << 20
-"""Bytes; a larger one is not sent, nor believed."""
+"""Bytes; a larger picture is neither sent nor accepted."""
 _HEADER = struct.Struct("<4sB3xQQQHHI")
 _MAGIC, _VERSION = b"TVID", 1
 _BEGIN, _END = b"\xff\xd8", b"\xff\xd9"
@@ -46,7 +46,7 @@ def encode_frame(frame: VideoFrame) -> bytes:
 
 
 def decode_frame(payload: bytes) -> VideoFrame:
-    """The frame. CodecError says what is wrong with it; the JPEG is not looked into but at both ends."""
+    """The frame. CodecError says what is wrong with it; of the JPEG only both ends are checked."""
     if len(payload) < _HEADER.size:
         raise CodecError(f"{len(payload)} bytes, expected at least a header of {_HEADER.size}")
     magic, version, number, captured_ns, sent_ns, width, height, length = _HEADER.unpack_from(payload)

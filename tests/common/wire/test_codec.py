@@ -42,6 +42,8 @@ counts = st.integers(0, 2**63 - 1)
 signed = st.integers(-(2**63) + 1, 2**63 - 1)
 names = st.text(st.characters(exclude_categories=["Cs"]), max_size=MAX_NAME)
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=MAX_TEXT)
+brief = st.text(st.characters(exclude_categories=["Cs"]), max_size=16)
+"""Texts of a state, so short that all of them fit and none is cut."""
 flags = st.booleans()
 
 
@@ -87,20 +89,20 @@ bases = st.builds(
 def states(draw: st.DrawFn, joints: int = 25) -> RobotState:
     echo = draw(st.none() | st.tuples(*[counts] * 5))
     return RobotState(
-        robot=draw(names),
+        robot=draw(brief),
         sequence=draw(counts),
         sent_ns=draw(counts),
         encoder_ns=draw(counts),
-        guard=draw(names),
-        reason=draw(texts),
-        operator=draw(names),
+        guard=draw(brief),
+        reason=draw(brief),
+        operator=draw(brief),
         encoder_valid=draw(masks(joints)),
         position_rad=draw(values(joints, ANGLE_LIMIT_RAD)),
         setpoint_rad=draw(values(joints, ANGLE_LIMIT_RAD)),
         echo=None if echo is None else CommandEcho(*echo),
         master_offset_ns=draw(signed),
         offset_bound_ns=draw(signed),
-        faults=draw(st.dictionaries(names, texts, max_size=5)),
+        faults=draw(st.dictionaries(brief, brief, max_size=2)),
         base=draw(st.none() | bases),
     )
 
