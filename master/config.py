@@ -69,11 +69,6 @@ class MasterConfig(Section):
         """The robot's table."""
         return load_skeleton(self.profile)
 
-    @property
-    def command_rate_hz(self) -> float:
-        """Commands a second."""
-        return self.capture.rate_hz / self.capture.decimation
-
     def mistakes(self) -> list[ConfigMistake]:
         """Nodes and buses must agree with the profile and with each other."""
         try:

@@ -16,7 +16,6 @@ nodes at once. Three things differ from the paper:
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass
 
@@ -236,14 +235,3 @@ class EkfFilter(BehindFront):
         state.accelerated[nodes] = 0.0
         state.pulled_rad[nodes] = 0.0
         state.rest.forget(nodes)
-
-    def snapshot(self) -> object:
-        """Orientation, bias, covariance, the usual field and what tells rest."""
-        return copy.deepcopy(self._state), self._front.snapshot()
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple) or snapshot[0].q.shape != self._state.q.shape:
-            raise TypeError("not a snapshot of this filter")
-        self._state = copy.deepcopy(snapshot[0])
-        self._front.restore(snapshot[1])

@@ -63,13 +63,7 @@ class Readings(Protocol):
         """(N,)."""
 
 
-class _Stateful(Protocol):
-    def snapshot(self) -> object: ...
-
-    def restore(self, snapshot: object) -> None: ...
-
-
-class _Headings(_Stateful, Protocol):
+class _Headings(Protocol):
     """What turns the filters' orientations about the vertical; see `OnlineHeadings`."""
 
     turn: Array
@@ -140,13 +134,6 @@ class Estimator:
             ),
         )
         self._aligned = calibration.aligned
-        self._parts: tuple[_Stateful, ...] = (
-            self._lowpass,
-            self._bank,
-            self._liveness,
-            self._heading,
-            self._zero_pose,
-        )
         self._gyr_rad_s = np.zeros((count, 3))
         # the filters hold each reading for the period before it, which leads by half of it on average
         self._advance_s = self._lowpass.delays_s[GYR] - 0.5 / rate_hz
@@ -232,16 +219,3 @@ class Estimator:
         """The filters' orientations brought forward over the delay of the gyro's low-pass, (N, 4)."""
         q = multiply(self._heading.turn, self._q_of_filters())
         return multiply(q, from_rotation_vector(self._advance_s * rate_rad_s))
-
-    def snapshot(self) -> object:
-        """The whole state, to be given to `restore`; later updates do not change it."""
-        return (*(part.snapshot() for part in self._parts), self._gyr_rad_s.copy())
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot that an estimator of the same configuration took."""
-        if not isinstance(snapshot, tuple) or len(snapshot) != len(self._parts) + 1:
-            raise TypeError("not a snapshot of this estimator")
-        *states, gyr_rad_s = snapshot
-        for part, state in zip(self._parts, states, strict=True):
-            part.restore(state)
-        self._gyr_rad_s = gyr_rad_s.copy()

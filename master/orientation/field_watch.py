@@ -9,7 +9,6 @@ noticed so.
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,11 +112,3 @@ class FieldWatch:
         state.reference[nodes] = np.nan
         state.off[nodes] = state.age_s[nodes] = 0.0
         state.doubted[nodes] = False
-
-    def snapshot(self) -> _FieldState:
-        """The state, to be given to `restore`."""
-        return copy.deepcopy(self._state)
-
-    def restore(self, snapshot: _FieldState) -> None:
-        """Go on from a snapshot."""
-        self._state = copy.deepcopy(snapshot)

@@ -53,12 +53,6 @@ class OrientationFilter(Protocol):
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
 
-    def snapshot(self) -> object:
-        """The whole state, to be given to `restore`; later updates do not change it."""
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot that a filter of the same kind and size took."""
-
 
 class FilterSection(Section):
     """`[estimation.<name>]`: the parameters of one filter, each with a default, and its maker."""

@@ -5,8 +5,8 @@ To add a filter, add its section to `FILTERS`; nothing else changes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from master.orientation.filter import FilterSection, OrientationFilter
 from master.orientation.mahony import MahonyConfig
 from master.orientation.vqf import VqfConfig
 from master.suit.doubt import NodeDoubt
+
+Number = TypeVar("Number", bound=np.generic)
 
 FILTERS: dict[str, type[FilterSection]] = {"vqf": VqfConfig, "mahony": MahonyConfig, "ekf": EkfConfig}
 """By name: `filter = "vqf"` selects a filter, `[estimation.vqf]` holds its parameters."""
@@ -56,33 +58,29 @@ class FilterBank:
         for rows, part in self._parts:
             part.update(gyr_rad_s[rows], acc_m_s2[rows], mag_ut[rows], dt_s)
 
+    def _gathered(self, read: Callable[[OrientationFilter], NDArray[Number]]) -> NDArray[Number]:
+        """What every filter says of its nodes, (N, ...)."""
+        parts = [(rows, read(part)) for rows, part in self._parts]
+        out = np.empty((self._count, *parts[0][1].shape[1:]), parts[0][1].dtype)
+        for rows, values in parts:
+            out[rows] = values
+        return out
+
     def q_world_from_sensor(self) -> Array:
         """Orientations (N, 4)."""
-        out = np.empty((self._count, 4))
-        for rows, part in self._parts:
-            out[rows] = part.q_world_from_sensor()
-        return out
+        return self._gathered(lambda part: part.q_world_from_sensor())
 
     def q_inertial_from_sensor(self) -> Array:
         """Orientations (N, 4) without the magnetometers."""
-        out = np.empty((self._count, 4))
-        for rows, part in self._parts:
-            out[rows] = part.q_inertial_from_sensor()
-        return out
+        return self._gathered(lambda part: part.q_inertial_from_sensor())
 
     def bias_rad_s(self) -> Array:
         """Gyro biases (N, 3)."""
-        out = np.empty((self._count, 3))
-        for rows, part in self._parts:
-            out[rows] = part.bias_rad_s()
-        return out
+        return self._gathered(lambda part: part.bias_rad_s())
 
     def undecided(self) -> Mask:
-        """(N,) whose rate may be a bias that is not learnt."""
-        out = np.zeros(self._count, dtype=np.bool_)
-        for rows, part in self._parts:
-            out[rows] = part.undecided()
-        return out
+        """(N,) nodes whose rate may be a bias that is not learnt yet."""
+        return self._gathered(lambda part: part.undecided())
 
     def doubts(self) -> dict[int, NodeDoubt]:
         """Doubted nodes by their number among all N."""
@@ -105,24 +103,10 @@ class FilterBank:
 
     @property
     def skipped(self) -> NDArray[np.int64]:
-        """(N,)."""
-        out = np.zeros(self._count, dtype=np.int64)
-        for rows, part in self._parts:
-            out[rows] = part.skipped
-        return out
+        """(N,) ticks with an unusable reading."""
+        return self._gathered(lambda part: part.skipped)
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (N,)."""
         for rows, part in self._parts:
             part.restart(nodes[rows])
-
-    def snapshot(self) -> object:
-        """The state of every part."""
-        return [part.snapshot() for _, part in self._parts]
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot of this bank."""
-        if not isinstance(snapshot, list) or len(snapshot) != len(self._parts):
-            raise TypeError("not a snapshot of this bank")
-        for (_, part), state in zip(self._parts, snapshot, strict=True):
-            part.restore(state)

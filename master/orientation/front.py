@@ -181,28 +181,6 @@ class Front:
             # their first orientation needs their field
             self._hidden = self._hidden & ~nodes
 
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return (
-            self._sound.snapshot(),
-            self._gross.snapshot(),
-            self._field.snapshot(),
-            self._withheld_s.copy(),
-            self._hidden,
-            self._looks,
-        )
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple):
-            raise TypeError("not a snapshot of this front")
-        sound, gross, field, withheld_s, self._hidden, self._looks = snapshot
-        self._field.restore(field)
-        self._withheld_s = withheld_s.copy()
-        self._sound.restore(sound)
-        self._gross.restore(gross)
-        self._ticks, self._seen = 0, self._sound.skipped.copy()
-
 
 class BehindFront:
     """What each filter reports of its front."""

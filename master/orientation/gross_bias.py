@@ -8,7 +8,6 @@ steadiness alone.
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass
 
@@ -171,12 +170,3 @@ class GrossBias:
         state = self._state
         state.ring[:, nodes] = np.nan
         state.steady[nodes] = 0
-
-    def snapshot(self) -> _BiasState:
-        """The state, to be given to `restore`."""
-        return copy.deepcopy(self._state)
-
-    def restore(self, snapshot: _BiasState) -> None:
-        """Go on from a snapshot."""
-        self._state = copy.deepcopy(snapshot)
-        self.some = bool(self._state.offset.any())

@@ -42,13 +42,3 @@ class HeadingMemory:
 
     def correct(self, q_world_from_sensor: Array, mag_ut: Array, alignment: Array, usable: Mask) -> None:
         """Nothing."""
-
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return self.turn.copy(), self._held.copy()
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple):
-            raise TypeError("not a snapshot of this memory")
-        self.turn, self._held = snapshot[0].copy(), snapshot[1].copy()

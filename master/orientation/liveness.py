@@ -42,14 +42,3 @@ class Liveness:
             went=was_alive & ~self.alive,
             settled=self.settled & ~was_settled,
         )
-
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return self.alive.copy(), self._age.copy()
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple):
-            raise TypeError("not a snapshot of this liveness")
-        self.alive, self._age = snapshot[0].copy(), snapshot[1].copy()
-        self.settled = self._age > self._settle_ticks

@@ -111,13 +111,3 @@ class LowPass:
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (nodes,)."""
         self._state[:, 1:, np.repeat(nodes, 3)] = np.nan
-
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return self._state.copy()
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, np.ndarray) or snapshot.shape != self._state.shape:
-            raise TypeError("not a snapshot of this low-pass")
-        self._state[...] = snapshot

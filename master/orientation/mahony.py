@@ -7,8 +7,6 @@ Eq. 9 is m̂ × û, not m̂ × v̂.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from pydantic import Field
 
@@ -34,17 +32,6 @@ class MahonyConfig(FrontSection):
     def make(self, rate_hz: float, count: int) -> MahonyFilter:
         """The filter for `count` nodes."""
         return MahonyFilter(self, rate_hz, count)
-
-
-@dataclass(frozen=True, slots=True)
-class _Snapshot:
-    q: Array
-    error: Array
-    turn: Array
-    integral: Array
-    pulled_rad: Array
-    started: Mask
-    front: object
 
 
 class MahonyFilter(BehindFront):
@@ -118,30 +105,6 @@ class MahonyFilter(BehindFront):
         self._error[nodes] = 0.0
         self._turn[nodes] = 0.0
         self._pulled_rad[nodes] = 0.0
-
-    def snapshot(self) -> object:
-        """Orientation, its error and the bias."""
-        return _Snapshot(
-            self._q.copy(),
-            self._error.copy(),
-            self._turn.copy(),
-            self._integral.copy(),
-            self._pulled_rad.copy(),
-            self._started.copy(),
-            self._front.snapshot(),
-        )
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, _Snapshot) or snapshot.q.shape != self._q.shape:
-            raise TypeError("not a snapshot of this filter")
-        self._q = snapshot.q.copy()
-        self._error = snapshot.error.copy()
-        self._turn = snapshot.turn.copy()
-        self._integral = snapshot.integral.copy()
-        self._pulled_rad = snapshot.pulled_rad.copy()
-        self._started = snapshot.started.copy()
-        self._front.restore(snapshot.front)
 
 
 def attitude_error(q_world_from_sensor: Array, acc: Array, mag: Array) -> tuple[Array, Array]:

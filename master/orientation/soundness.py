@@ -75,14 +75,6 @@ class Soundness:
         """Forget the last rates of some nodes, mask (n,)."""
         self._gyr[nodes] = 0.0
 
-    def snapshot(self) -> tuple[Array, NDArray[np.int64]]:
-        """The state, to be given to `restore`."""
-        return self._gyr.copy(), self.skipped.copy()
-
-    def restore(self, snapshot: tuple[Array, NDArray[np.int64]]) -> None:
-        """Go on from a snapshot."""
-        self._gyr, self.skipped = snapshot[0].copy(), snapshot[1].copy()
-
 
 def _beyond(part: Array, limit: float) -> Mask:
     out: Mask = np.logical_not((np.abs(part) <= limit).all(axis=1))

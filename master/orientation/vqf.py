@@ -113,16 +113,3 @@ class VqfFilter(BehindFront):
         self._front.restart(nodes)
         for i in np.flatnonzero(nodes):
             self._filters[i].resetState()
-
-    def snapshot(self) -> object:
-        """Each object's state."""
-        return self._front.snapshot(), [vqf.state for vqf in self._filters]
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple) or len(snapshot[1]) != len(self._filters):
-            raise TypeError("not a snapshot of this filter")
-        front, states = snapshot
-        self._front.restore(front)
-        for vqf, state in zip(self._filters, states, strict=True):
-            vqf.state = state

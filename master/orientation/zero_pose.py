@@ -13,7 +13,6 @@ cannot be noticed: how a segment stands whose alignment is not known, and what i
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass
 
@@ -175,23 +174,6 @@ class ZeroPose:
         }
         rest = NodeDoubt("waits for the zero pose: stand upright, arms hanging, and still", Weight.REFUSED)
         return out | {node: rest for node in np.flatnonzero(waiting).tolist() if node not in out}
-
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return copy.deepcopy({name: getattr(self, name) for name in _STATE})
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, dict) or snapshot.keys() != set(_STATE):
-            raise TypeError("not a snapshot of this zero pose")
-        for name, part in copy.deepcopy(snapshot).items():
-            setattr(self, name, part)
-
-
-_STATE = (
-    "_sum", "_first", "_taken", "known", "refused", "reasons", "q_sensor_from_segment", "correction_rad",
-    "lean_rad",
-)  # fmt: skip
 
 
 def _largest_first(values: Array, limit: float) -> list[int]:

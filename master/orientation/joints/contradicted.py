@@ -37,13 +37,3 @@ class ContradictedJoints:
     def degrees(self, pair: int) -> float:
         """The mean turn of one pair."""
         return math.degrees(math.asin(min(1.0, float(self.mean[pair]))))
-
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return self.mean.copy(), self.now.copy()
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple):
-            raise TypeError("not a snapshot of contradicted joints")
-        self.mean, self.now = (part.copy() for part in snapshot)

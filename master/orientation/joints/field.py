@@ -82,16 +82,6 @@ class MagneticHeadings:
             self._usual_ut = median_ut
         self._usual_ut = self._usual_ut + min(dt_s / _REFERENCE_S, 1.0) * (median_ut - self._usual_ut)
 
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return self._usual_ut.copy(), self._disturbance_ut2.copy(), self.north_rad.copy()
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple):
-            raise TypeError("not a snapshot of these magnetic headings")
-        self._usual_ut, self._disturbance_ut2, self.north_rad = (part.copy() for part in snapshot)
-
 
 def wrap(angle_rad: Array) -> Array:
     """Angles to [-π, π)."""

@@ -80,13 +80,3 @@ class Headings:
         step = self.covariance[:, :n] @ gain
         self.theta_rad = self.theta_rad + step[:n]
         self.drift_rad_s = self.drift_rad_s + step[n:]
-
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return self.theta_rad.copy(), self.drift_rad_s.copy(), self.covariance.copy()
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple):
-            raise TypeError("not a snapshot of these headings")
-        self.theta_rad, self.drift_rad_s, self.covariance = (part.copy() for part in snapshot)

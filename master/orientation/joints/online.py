@@ -171,24 +171,3 @@ class OnlineHeadings:
 
     def _turn(self) -> None:
         self.turn = heading_turn(self._headings.theta_rad)
-
-    def snapshot(self) -> object:
-        """The state, to be given to `restore`."""
-        return (
-            self._field.snapshot(),
-            self._headings.snapshot(),
-            self._held.copy(),
-            self._ticks,
-            (self._contradicted.snapshot()),
-        )
-
-    def restore(self, snapshot: object) -> None:
-        """Go on from a snapshot."""
-        if not isinstance(snapshot, tuple):
-            raise TypeError("not a snapshot of these headings")
-        field, headings, held, self._ticks, contradicted = snapshot
-        self._contradicted.restore(contradicted)
-        self._field.restore(field)
-        self._headings.restore(headings)
-        self._held = held.copy()
-        self._turn()

@@ -206,23 +206,6 @@ class FilterContract:
             assert np.allclose(restarted[0], new[0], atol=1e-12)
             assert np.allclose(restarted[1:], other[1:], atol=1e-12)
 
-    def test_goes_on_from_a_snapshot_again_and_again(self, section: FilterSection) -> None:
-        filter_, dts_s = make(section), np.full(100, 1.0 / RATE_HZ)
-        truth = move(filter_, attitudes(NODES, 11), dts_s)
-        snapshot = filter_.snapshot()
-        ends = []
-        for _ in range(3):
-            filter_.restore(snapshot)
-            move(filter_, truth, dts_s, FIELD_UT + [10.0, 0.0, 0.0])
-            parts = (filter_.q_world_from_sensor(), filter_.q_inertial_from_sensor(), filter_.bias_rad_s())
-            ends.append(np.concatenate(parts, axis=1))
-        assert np.array_equal(ends[0], ends[1])
-        assert np.array_equal(ends[0], ends[2])
-        with pytest.raises(TypeError, match="not a snapshot"):
-            filter_.restore(None)
-        with pytest.raises(TypeError, match="not a snapshot"):
-            section.make(RATE_HZ, NODES + 1).restore(snapshot)
-
     def test_what_it_hands_out_is_the_caller_s_own(self, section: FilterSection) -> None:
         filter_ = make(section)
         rest(filter_, attitudes(NODES), 2)

@@ -151,7 +151,7 @@ def test_the_covariance_stays_symmetric_and_positive_over_many_steps() -> None:
         rate = rng.normal(size=(4, 3))
         truth = propagate(truth, rate, 1.0 / RATE_HZ)
         filter_.update(rate, seen(truth, GRAVITY) + rng.normal(size=(4, 3)), seen(truth, FIELD_UT))
-    p = filter_.snapshot()[0].covariance  # type: ignore[index]
+    p = filter_._state.covariance
     scale = np.sqrt(np.einsum("nii->ni", p))
     unit = p / scale[:, :, None] / scale[:, None, :]
     assert np.allclose(unit, unit.transpose(0, 2, 1), atol=1e-6)

@@ -315,25 +315,6 @@ def test_each_node_may_have_its_own_filter() -> None:
     assert np.allclose(q[1:], pure["vqf"].posture().q_world_from_segment[1:], atol=1e-12)
 
 
-def test_goes_on_from_a_snapshot() -> None:
-    subject, turning = estimator(3), Turning(3)
-    ticks = [turning.readings() for _ in range(80)]
-    for readings in ticks[:15]:
-        subject.update(readings)
-    snapshot = subject.snapshot()
-    ends = []
-    for _ in range(2):
-        for readings in ticks[15:]:
-            subject.update(readings)
-        ends.append(subject.posture())
-        subject.restore(snapshot)
-    assert np.array_equal(ends[0].q_world_from_segment, ends[1].q_world_from_segment)
-    assert np.array_equal(ends[0].rate_rad_s, ends[1].rate_rad_s)
-    assert not subject.posture().valid.any()
-    with pytest.raises(TypeError, match="not a snapshot"):
-        subject.restore(())
-
-
 def test_a_cutoff_must_lie_below_half_the_rate() -> None:
     config = EstimationConfig(gyroscope_cutoff_hz=99.9, accelerometer_cutoff_hz=100.0)
     (mistake,) = config.mistakes_at(RATE_HZ)
@@ -342,23 +323,6 @@ def test_a_cutoff_must_lie_below_half_the_rate() -> None:
     assert mistake.expected == "less than half the rate of 200 Hz, or 0"
     with pytest.raises(ConfigError, match=r"estimation\.accelerometer_cutoff_hz = 100\.0"):
         Estimator(config, [Node()], RATE_HZ, identity(1))
-
-
-@pytest.mark.parametrize("name", ["vqf", "mahony", "ekf"])
-def test_with_constraints_it_finds_the_same_headings_after_a_snapshot(name: str) -> None:
-    config = EstimationConfig.model_validate({"filter": name, "settle_s": 0.1, "constraints": "online"})
-    skeleton = load_skeleton("lower_limb")
-    subject = Estimator(config, [Node()] * 7, RATE_HZ, identity(7), skeleton)
-    rng = np.random.default_rng(0)
-    truth = orientations(skeleton, rng.uniform(skeleton.lower_rad, skeleton.upper_rad)[None], 0.4)[0]
-    rest(subject, truth, 100)
-    assert np.max(angle_between(subject.posture().q_world_from_segment, truth)) < np.radians(0.5)
-    snapshot, ends = subject.snapshot(), []
-    for _ in range(2):
-        rest(subject, truth, 40, mag_ut=np.tile([9.0, 30.0, 4.0], (7, 1)))
-        ends.append(subject.posture().q_world_from_segment)
-        subject.restore(snapshot)
-    assert np.array_equal(ends[0], ends[1])
 
 
 def test_a_zero_pose_with_constraints_gives_headings_without_a_field() -> None:

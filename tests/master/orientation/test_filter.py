@@ -59,24 +59,6 @@ def test_restart_reaches_the_right_nodes(names: list[str]) -> None:
     assert np.allclose(found[~again], old.q_world_from_sensor()[~again], atol=1e-14)
 
 
-@pytest.mark.parametrize("names", [NAMES, ["vqf"] * 5, ["mahony"] * 5])
-def test_goes_on_from_a_snapshot(names: list[str]) -> None:
-    bank = bank_of(names)
-    for tick in readings(30, 5):
-        bank.update(*tick)
-    snapshot = bank.snapshot()
-    later = readings(30, 5, seed=1)
-    ends = []
-    for _ in range(2):
-        for tick in later:
-            bank.update(*tick)
-        ends.append(bank.q_world_from_sensor())
-        bank.restore(snapshot)
-    assert np.array_equal(ends[0], ends[1])
-    with pytest.raises(TypeError, match="not a snapshot"):
-        bank.restore([])
-
-
 def test_vqf_without_a_magnetometer_for_a_while_keeps_its_heading() -> None:
     vqf = VqfFilter(VqfConfig(), RATE_HZ, 2)
     rest = np.zeros((2, 3)), np.tile([0.0, 0.0, 9.81], (2, 1)), np.tile([20.0, 20.0, -39.0], (2, 1))
@@ -88,5 +70,3 @@ def test_vqf_without_a_magnetometer_for_a_while_keeps_its_heading() -> None:
     for _ in range(400):
         vqf.update(rest[0], rest[1], without)
     assert np.allclose(vqf.q_world_from_sensor(), before, atol=1e-3)
-    with pytest.raises(TypeError, match="not a snapshot"):
-        vqf.restore(None)

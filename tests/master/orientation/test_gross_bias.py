@@ -108,18 +108,6 @@ def test_without_a_field_a_wavering_turn_is_no_bias(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_goes_on_from_a_snapshot(name: str) -> None:
-    filter_, bias = FILTERS[name]().make(RATE_HZ, 1), np.array([[0.0, 7.0, 0.0]])
-    run(filter_, bias, 3.0, field=True, turn=np.zeros((1, 3)))
-    snapshot, other = filter_.snapshot(), FILTERS[name]().make(RATE_HZ, 1)
-    other.restore(snapshot)
-    assert np.array_equal(other.bias_rad_s(), filter_.bias_rad_s())
-    for each in (filter_, other):
-        run(each, bias, 1.0, field=True, turn=np.zeros((1, 3)))
-    assert np.array_equal(other.q_world_from_sensor(), filter_.q_world_from_sensor())
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_a_steady_rate_is_undecided_until_it_is_learnt(name: str) -> None:
     filter_, still = FILTERS[name]().make(RATE_HZ, 3), np.zeros((3, 3))
     biases = np.array([[0.0, 12.0, 0.0], [0.0, 0.0, 25.0], [0.5, 0.0, 0.0]])

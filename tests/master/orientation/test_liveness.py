@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from common.wire.messages import Mask
 from master.orientation.liveness import Liveness
@@ -64,16 +63,3 @@ def test_lost_wins_over_fresh() -> None:
     liveness = Liveness(1, 0)
     liveness.update(YES, YES)
     assert not liveness.alive[0]
-
-
-def test_goes_on_from_a_snapshot() -> None:
-    liveness = Liveness(1, 2)
-    liveness.update(YES, NO)
-    snapshot = liveness.snapshot()
-    liveness.update(NO, YES)
-    liveness.restore(snapshot)
-    assert liveness.alive[0]
-    liveness.update(YES, NO)
-    assert liveness.update(YES, NO).settled[0]
-    with pytest.raises(TypeError, match="not a snapshot"):
-        liveness.restore(None)

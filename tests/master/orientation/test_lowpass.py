@@ -103,20 +103,6 @@ def test_restart_forgets_only_the_nodes_named() -> None:
     assert np.all(out[0, [0, 2]] < 0.5)
 
 
-def test_goes_on_from_a_snapshot() -> None:
-    rng = np.random.default_rng(3)
-    lowpass = LowPass((30.0,), 4, RATE_HZ, 2)
-    for _ in range(10):
-        lowpass.update(rng.normal(size=(1, 2, 3)))
-    snapshot = lowpass.snapshot()
-    later = rng.normal(size=(10, 1, 2, 3))
-    first = [lowpass.update(sample).copy() for sample in later]
-    lowpass.restore(snapshot)
-    assert np.array_equal(first, [lowpass.update(sample).copy() for sample in later])
-    with pytest.raises(TypeError, match="not a snapshot"):
-        lowpass.restore("nonsense")
-
-
 @pytest.mark.parametrize("order", [0, 1, 3, -2])
 def test_an_order_that_is_not_even(order: int) -> None:
     with pytest.raises(ValueError, match="order must be even"):

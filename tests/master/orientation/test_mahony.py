@@ -186,20 +186,6 @@ def test_restart_takes_the_next_reading_and_only_for_the_nodes_named() -> None:
     assert errors[0] > 0.1
 
 
-def test_goes_on_from_a_snapshot() -> None:
-    truth = attitudes(3, 8)
-    filter_ = MahonyFilter(MahonyConfig(ki=0.1), RATE_HZ, 3)
-    run(filter_, truth, np.full((3, 3), 0.1), 20)
-    snapshot = filter_.snapshot()
-    run(filter_, truth, np.full((3, 3), 0.1), 20)
-    first = filter_.q_world_from_sensor()
-    filter_.restore(snapshot)
-    run(filter_, truth, np.full((3, 3), 0.1), 20)
-    assert np.array_equal(filter_.q_world_from_sensor(), first)
-    with pytest.raises(TypeError, match="not a snapshot"):
-        filter_.restore(3)
-
-
 def test_heading_comes_from_the_magnetometer_north_being_y() -> None:
     level = initial_orientation(GRAVITY[None], np.array([[28.0, 0.0, -39.0]]))
     # the sensor's x looks north: a quarter turn to the left of east

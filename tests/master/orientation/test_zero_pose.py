@@ -66,19 +66,6 @@ def test_once_known_it_stays_even_while_the_node_is_lost() -> None:
     assert np.array_equal(zero_pose.q_sensor_from_segment[0], kept)
 
 
-def test_zero_pose_goes_on_from_a_snapshot() -> None:
-    zero_pose = ZeroPose(SAME, 2, 0.0)
-    zero_pose.add(ASKEW, ALL)
-    snapshot = zero_pose.snapshot()
-    zero_pose.add(ASKEW, ALL)
-    zero_pose.restore(snapshot)
-    assert not zero_pose.known.any()
-    zero_pose.add(ASKEW, ALL)
-    assert zero_pose.known.all()
-    with pytest.raises(TypeError, match="not a snapshot"):
-        zero_pose.restore(None)
-
-
 def test_a_lost_heading_is_taken_up_again() -> None:
     memory = HeadingMemory(3)
     held = multiply(heading_turn(np.array([0.5, -2.0, 3.0])), from_rotation_vector(np.full((3, 3), 0.1)))
@@ -92,18 +79,6 @@ def test_a_lost_heading_is_taken_up_again() -> None:
     memory.lose(ALL, restarted)
     memory.find(ALL, held, NO_FIELD)
     assert np.allclose(angle_between(multiply(memory.turn, held), held)[:2], 0.0, atol=1e-7)
-
-
-def test_heading_memory_goes_on_from_a_snapshot() -> None:
-    memory = HeadingMemory(3)
-    snapshot = memory.snapshot()
-    memory.lose(ALL, heading_turn(np.ones(3)))
-    memory.find(ALL, SAME, NO_FIELD)
-    assert not np.allclose(memory.turn, SAME)
-    memory.restore(snapshot)
-    assert np.array_equal(memory.turn, SAME)
-    with pytest.raises(TypeError, match="not a snapshot"):
-        memory.restore(None)
 
 
 def test_of_aligned_nodes_it_takes_the_heading_and_their_lean() -> None:

@@ -65,15 +65,3 @@ def test_north_is_where_most_magnetometers_point_after_a_zero_pose() -> None:
     assert away[0] == pytest.approx(-0.8)
     np.testing.assert_allclose(away[1:], 0.0, atol=1e-12)
     assert disturbed[0] > 10.0 * SURE[0]
-
-
-def test_goes_on_from_a_snapshot() -> None:
-    field = MagneticHeadings(5, 30.0)
-    field.measure(fields(), np.zeros(5), SURE, DT_S)
-    snapshot = field.snapshot()
-    expected = field.measure(fields(0.2), np.zeros(5), SURE, DT_S)
-    field.set_north(np.ones(5, dtype=np.bool_), np.ones(5), fields())
-    field.restore(snapshot)
-    np.testing.assert_array_equal(field.measure(fields(0.2), np.zeros(5), SURE, DT_S), expected)
-    with pytest.raises(TypeError, match="not a snapshot"):
-        field.restore(None)

@@ -62,24 +62,3 @@ def test_a_steady_drift_is_learnt() -> None:
         headings.correct(np.eye(1) / 0.01, (0.02 * 0.1 * step - headings.theta_rad) / 0.01)
     assert headings.drift_rad_s[0] == pytest.approx(0.02, rel=0.02)
     assert headings.theta_rad[0] == pytest.approx(0.02 * 39.9, abs=1e-3)
-
-
-def test_a_reset_node_forgets_its_neighbours_until_a_snapshot() -> None:
-    headings, _ = example(0)
-    headings.correct(np.ones((4, 4)), np.zeros(4))
-    snapshot, covariance = headings.snapshot(), headings.covariance.copy()
-    one = np.array([False, True, False, False])
-    headings.set(one, np.full(4, 2.0), 0.25)
-    headings.restart_drift(one, 0.5)
-    assert headings.theta_rad[1] == 2.0
-    assert headings.drift_rad_s[1] == 0.0
-    others = [0, 2, 3, 4, 6, 7]
-    np.testing.assert_array_equal(headings.covariance[1, others], 0.0)
-    assert headings.covariance[[1, 5], [1, 5]].tolist() == [0.25, 0.5]
-    np.testing.assert_array_equal(
-        headings.covariance[np.ix_(others, others)], covariance[np.ix_(others, others)]
-    )
-    headings.restore(snapshot)
-    np.testing.assert_array_equal(headings.covariance, covariance)
-    with pytest.raises(TypeError, match="not a snapshot"):
-        headings.restore(None)

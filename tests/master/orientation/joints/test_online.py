@@ -153,27 +153,6 @@ def test_a_returning_node_begins_with_its_heading_or_its_field_s(arms: Skeleton)
     assert np.degrees(np.sqrt(online._headings.variance[2])) == pytest.approx(10.0)
 
 
-def test_goes_on_from_a_snapshot(arms: Skeleton) -> None:
-    online = OnlineHeadings(OnlineConfig(), arms, 200.0)
-    nodes, alignment = np.ones(5, dtype=np.bool_), np.tile(IDENTITY, (5, 1))
-    q = Rotation.random(5, rng=0).as_quat(scalar_first=True)
-    field = np.random.default_rng(0).normal(size=(5, 3))
-    online.correct(q, field, alignment, nodes)
-    assert not online.due()
-    snapshot = online.snapshot()
-    ends = []
-    for _ in range(2):
-        for _ in range(20):
-            if online.due():
-                online.correct(q, field, alignment, nodes)
-        ends.append(online.turn)
-        online.restore(snapshot)
-    np.testing.assert_array_equal(ends[0], ends[1])
-    assert not np.array_equal(online.turn, ends[0])
-    with pytest.raises(TypeError, match="not a snapshot"):
-        online.restore(None)
-
-
 class Sway:
     """Stands for 3.5 s, then all joints swing without a rest."""
 
