@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from common.clock import NS_PER_S
 from common.wire.messages import Action
-from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, ENGAGE, NOTICED_S, Reaction
+from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, ENGAGE, NOTICED_S
 from deploy.harness.faults.scene import Scene
-from deploy.harness.faults.virtual import VirtualFault
+from deploy.harness.faults.virtual import holds, stops
 from slave.guard import State
 
 HOUR_NS = 3_600 * NS_PER_S
@@ -32,10 +32,9 @@ def _estop(scene: Scene) -> None:
 
 
 CLOCKS = (
-    VirtualFault(
+    holds(
         name="master's clock an hour ahead",
         done="The clock that stamps the commands is set ahead by an hour.",
-        reaction=Reaction.HOLDS,
         robot="Takes no command from the future; brakes and stands. "
         "It measures the clock anew within a second.",
         person=ENGAGE,
@@ -43,28 +42,25 @@ CLOCKS = (
         reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S,
         refused_by={"future"}, held_by={"future", "clock"},
     ),
-    VirtualFault(
+    holds(
         name="master's clock an hour back",
         done="The same clock is set back by an hour.",
-        reaction=Reaction.HOLDS,
         robot="Takes no command so old; brakes and stands.",
         person=ENGAGE,
         act=_stepped(master_ns=-HOUR_NS),
         reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S, refused_by={"age"}, held_by={"age"},
     ),
-    VirtualFault(
+    holds(
         name="robot's clock an hour ahead",
         done="The clock by which the robot counts its own time-outs is set ahead by an hour.",
-        reaction=Reaction.HOLDS,
         robot="Takes everything for an hour late; brakes at once and stands.",
         person=ENGAGE,
         act=_stepped(slave_ns=HOUR_NS),
         reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by={"command", "lease", "encoder", "age"},
     ),
-    VirtualFault(
+    holds(
         name="robot's clock an hour back",
         done="The same clock is set back by an hour.",
-        reaction=Reaction.HOLDS,
         robot="Sees that its time went back; brakes at once and stands.",
         person=ENGAGE,
         act=_stepped(slave_ns=-HOUR_NS),
@@ -74,14 +70,13 @@ CLOCKS = (
 )  # fmt: skip
 
 ESTOPS = tuple(
-    VirtualFault(
+    stops(
         name=f"emergency stop in {state}",
         done="A visitor asks for an emergency stop; then the operator tries to go on, without the key.",
-        reaction=Reaction.STOPS,
         robot=does,
         person="Make sure that all is well, reset with the key at the robot, then engage.",
         act=_estop,
-        begins=state, ends=State.ESTOP, reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S,
+        begins=state, reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S,
     )
     for state, does in {
         State.BOOT: "Has not begun to move, and will not: nothing is written to the drives.",

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from common.clock import NS_PER_MS, to_ns
-from deploy.harness.faults.fault import BRAKED_S, ENGAGE, NOTHING, NOTICED_S, Reaction
+from deploy.harness.faults.fault import BRAKED_S, ENGAGE, NOTHING, NOTICED_S
 from deploy.harness.faults.scene import Scene
-from deploy.harness.faults.virtual import VirtualFault
+from deploy.harness.faults.virtual import goes_on, holds
 from deploy.sim.world.injection import Delivery, FaultInjection, Traffic
-from slave.guard import State
 
 
 def _cut(scene: Scene) -> None:
@@ -43,50 +42,45 @@ def _late_ms(*delays_ms: int) -> Callable[[Scene], None]:
 
 
 LINK = (
-    VirtualFault(
+    holds(
         name="link cut",
         done="No message passes, either way, for 1 s; then the link is whole again.",
-        reaction=Reaction.HOLDS,
         robot="Brakes and stands. When the link is back it still stands.",
         person=ENGAGE,
         act=_cut,
         reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S, lasts_s=1.0, held_by={"command", "lease"},
     ),
-    VirtualFault(
+    holds(
         name="link delayed 1 s, then released",
         done="All messages of one second arrive together at its end.",
-        reaction=Reaction.HOLDS,
         robot="Brakes and stands. What comes late moves nothing.",
         person=ENGAGE,
         act=_held_back,
         reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S, held_by={"command", "lease"},
     ),
-    VirtualFault(
+    holds(
         name="link slow",
         done="From one moment to the next every message takes half a second.",
-        reaction=Reaction.HOLDS,
         robot="Takes no command older than 0.3 s; brakes and stands.",
         person=ENGAGE,
         act=_late_ms(500),
         reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S, refused_by={"age"}, held_by={"age", "command"},
     ),
-    VirtualFault(
+    goes_on(
         name="packets reordered",
         done="Every second command arrives after its successor.",
-        reaction=Reaction.GOES_ON,
         robot="Follows. It never goes back to an older command; "
         "half of them missing, it follows less exactly.",
         person=NOTHING,
         act=_reordered,
-        ends=State.TRACK, strays_deg=10.0, refused_by={"sequence"}, held_by={"sequence"},
+        strays_deg=10.0, refused_by={"sequence"}, held_by={"sequence"},
     ),
-    VirtualFault(
+    goes_on(
         name="packets duplicated",
         done="Every message arrives three times: at once, 10 ms and 110 ms later.",
-        reaction=Reaction.GOES_ON,
         robot="Follows as if each had come once.",
         person=NOTHING,
         act=_late_ms(0, 10, 110),
-        ends=State.TRACK, strays_deg=0.0, refused_by={"sequence"}, held_by={"sequence"},
+        strays_deg=0.0, refused_by={"sequence"}, held_by={"sequence"},
     ),
 )  # fmt: skip

@@ -12,9 +12,9 @@ import numpy as np
 from common.clock import NS_PER_S, to_s
 from common.quaternion import Array
 from common.wire.messages import BaseAttitude
-from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, ENGAGE, NOTHING, Reaction
+from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, ENGAGE, NOTHING
 from deploy.harness.faults.scene import Scene
-from deploy.harness.faults.virtual import VirtualFault
+from deploy.harness.faults.virtual import goes_on, holds, holds_joints, stops
 from slave.attitude.config import BaseConfig
 from slave.attitude.frame import FrameAngles, FrameParser, encode
 from slave.attitude.port import of_frame
@@ -183,59 +183,53 @@ def _instrument(
 
 
 ROBOT = (
-    VirtualFault(
+    holds(
         name="CAN bus of the drives off",
         done="No reading comes from the drives, and no setpoint gets to them.",
-        reaction=Reaction.HOLDS,
         robot="The drives hold their last setpoint, and stop by themselves when they miss the robot's "
         "heartbeat.",
         person=SWITCH_ON,
         act=_bus_off,
         reacts_s=0.11, stands_s=0.11 + BRAKED_S, held_by={"encoder"},
     ),
-    VirtualFault(
+    holds(
         name="drive fault",
         done="The drive of a moving joint reports over-current and stands still.",
-        reaction=Reaction.HOLDS,
         robot="Brakes all joints and stands; names the joint and what its drive says.",
         person=SWITCH_ON,
         act=_drive_fault,
         reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by={"drive"},
     ),
-    VirtualFault(
+    holds(
         name="encoder silent",
         done="The encoder of a moving joint says that its readings are not valid: magnet lost, wrong parity.",
-        reaction=Reaction.HOLDS,
         robot="Brakes all joints and stands; names the joint.",
         person=ENGAGE,
         act=_encoder_silent,
         reacts_s=0.11, stands_s=0.11 + BRAKED_S, held_by={"encoder"},
     ),
-    VirtualFault(
+    holds_joints(
         name="encoder stuck",
         done="The encoder of a moving joint shows one angle for ever, and says that it is well.",
-        reaction=Reaction.HOLDS_JOINTS,
         robot="Holds that joint and names it; the others follow. "
         "More than three such joints: holds them all.",
         person="Mend the encoder, then disengage and engage.",
         act=_encoder_stuck,
-        ends=State.TRACK, concerns=_one_joint, strays_deg=1.0, sway_deg=1.0,
+        concerns=_one_joint, strays_deg=1.0, sway_deg=1.0,
         stands_s=0.1 + 0.1 + 0.1 + BRAKED_S,
     ),
-    VirtualFault(
+    stops(
         name="drive moves by itself",
         done="While nobody is engaged a drive turns its joint by 60°/s, whatever it is told.",
-        reaction=Reaction.STOPS,
         robot="Stops all drives by force; names the joint.",
         person="Find out why before you reset with the key at the robot; then engage.",
         act=_drive_runs_away,
-        begins=State.HOLD, ends=State.ESTOP, reacts_s=0.1, stands_s=0.1 + BRAKED_S,
+        begins=State.HOLD, reacts_s=0.1, stands_s=0.1 + BRAKED_S,
     ),
-    VirtualFault(
+    holds(
         name="drive and output encoder differ",
         done="A drive's own angle is 40° off its output encoder's: turns lost, or wrong zero, gear or "
         "direction.",
-        reaction=Reaction.HOLDS,
         robot="Brakes all joints and stands; names joint and both angles. "
         "At a start: does not enable the drive.",
         person="Look at the joint: correct the drive's zero, gear or direction, or mend the encoder; "
@@ -243,37 +237,33 @@ ROBOT = (
         act=_drive_lost_turns,
         reacts_s=0.02, stands_s=0.02 + BRAKED_S, held_by={"drive"},
     ),
-    VirtualFault(
+    holds(
         name="base tilted",
         done="The base leans by 12° where 10° is the most it may.",
-        reaction=Reaction.HOLDS,
         robot="Brakes all joints and stands.",
         person=ENGAGE,
         act=_base_tilted,
         reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by={"base"},
     ),
-    VirtualFault(
+    holds(
         name="base falls",
         done="The base tips over at 100°/s, as an instrument of ten frames a second tells it.",
-        reaction=Reaction.HOLDS,
         robot="Brakes all joints and stands, with the second frame beyond the limit.",
         person=ENGAGE,
         act=_base_falls,
         reacts_s=0.1 + 0.2 + AT_ONCE_S, stands_s=0.1 + 0.2 + AT_ONCE_S + BRAKED_S, held_by={"base"},
     ),
-    VirtualFault(
+    goes_on(
         name="attitude frames spoiled",
         done="Every fourth frame of the attitude instrument has one flipped bit; the base stands level.",
-        reaction=Reaction.GOES_ON,
         robot="Follows. Of three frames in a row each angle's median counts.",
         person=NOTHING,
         act=_frames_spoiled,
-        ends=State.TRACK, strays_deg=0.1,
+        strays_deg=0.1,
     ),
-    VirtualFault(
+    holds(
         name="second master at the drives",
         done="Another program sends SYNC on a bus of the drives.",
-        reaction=Reaction.HOLDS,
         robot="Stops all drives by NMT, brakes and stands; names the second master by what it sends.",
         person="End the other program, then emergency stop and its reset with the key; then engage.",
         act=_second_master,

@@ -9,11 +9,10 @@ from functools import cache
 from common.wire.codec import decode, encode
 from common.wire.messages import Action, ControlReply, ControlRequest
 from common.wire.presence import ProcessPresence
-from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, Reaction
+from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S
 from deploy.harness.faults.scene import ENGAGED_S, REACHING_S, Scene, reach, turned
-from deploy.harness.faults.virtual import VirtualFault
+from deploy.harness.faults.virtual import goes_on, holds
 from deploy.sim.world.world import VirtualWorld, WorldSettings
-from slave.guard import State
 
 
 def _replayed_yesterday(scene: Scene) -> None:
@@ -78,48 +77,43 @@ def _namesake(scene: Scene) -> None:
 
 
 STRANGERS = (
-    VirtualFault(
+    goes_on(
         name="yesterday's recording replayed",
         done="A session of another day, its requests to claim and to engage included, beside the operator's.",
-        reaction=Reaction.GOES_ON,
         robot="Follows its operator. Nothing of the recording is accepted.",
         person="Find out who sends it.",
         act=_replayed_yesterday,
-        ends=State.TRACK, strays_deg=0.0,
+        strays_deg=0.0,
         refused_by={"lease"}, held_by={"lease", "sequence", "age", "future"},
     ),
-    VirtualFault(
+    goes_on(
         name="this session's recording replayed",
         done="The operator's own commands of the last seconds once more.",
-        reaction=Reaction.GOES_ON,
         robot="Follows its operator. Nothing of the recording is accepted.",
         person="Find out who sends it.",
         act=_replayed_today,
-        ends=State.TRACK, strays_deg=0.0, refused_by={"sequence"}, held_by={"sequence", "age"},
+        strays_deg=0.0, refused_by={"sequence"}, held_by={"sequence", "age"},
     ),
-    VirtualFault(
+    goes_on(
         name="second operator",
         done="Another person claims, engages, disengages, releases, and sends commands 12.5 times a second.",
-        reaction=Reaction.GOES_ON,
         robot="Follows its operator, and tells the other who that is. "
         "Only an emergency stop is open to everybody.",
         person="Nothing; or the operator releases the robot, and the other claims it.",
         act=_second_operator,
-        ends=State.TRACK, strays_deg=0.0, refused_by={"lease"}, held_by={"lease"},
+        strays_deg=0.0, refused_by={"lease"}, held_by={"lease"},
     ),
-    VirtualFault(
+    goes_on(
         name="wrong robot",
         done="Commands for another robot arrive here, with this robot's own lease.",
-        reaction=Reaction.GOES_ON,
         robot="Follows its operator. What is not for it is not accepted.",
         person="Correct the robot's name in the file of the other side.",
         act=_wrong_robot,
-        ends=State.TRACK, strays_deg=0.0, refused_by={"robot"}, held_by={"robot"},
+        strays_deg=0.0, refused_by={"robot"}, held_by={"robot"},
     ),
-    VirtualFault(
+    holds(
         name="another robot of the same name",
         done="A second robot starts under this one's name: nobody knows which of the two an order is for.",
-        reaction=Reaction.HOLDS,
         robot="Brakes all joints and stands; names where the other is. "
         "Nobody can engage while both are there.",
         person="Give each robot a name of its own (`robot` in its file); then engage.",

@@ -7,10 +7,10 @@ from typing import Any
 
 from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING
-from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, ENGAGE, NOTICED_S, Reaction
+from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, ENGAGE, NOTICED_S
 from deploy.harness.faults.scene import Scene
 from deploy.harness.faults.setting import Setting
-from deploy.harness.faults.virtual import VirtualFault
+from deploy.harness.faults.virtual import goes_on, holds, holds_joints
 from deploy.sim.suit.faults import FaultsConfig, Loss, Twin
 from deploy.sim.suit.lies import Lie, LieKind
 from deploy.sim.suit.motion import OperatorMotion, parse_motion
@@ -71,74 +71,67 @@ IRON = Setting(
 )
 
 SUIT = (
-    VirtualFault(
+    holds_joints(
         name="sensor node lost",
         done="A node of the reaching arm does not answer any more.",
-        reaction=Reaction.HOLDS_JOINTS,
         robot="Holds the joints that need the node; the others follow.",
         person="Mend the node. Its joints come back slowly by themselves.",
         act=_suit(lose=[Loss(node=NODE)]),
-        ends=State.TRACK, concerns=_joints_of_node, strays_deg=1.0, sway_deg=1.0,
+        concerns=_joints_of_node, strays_deg=1.0, sway_deg=1.0,
         stands_s=0.1 + 0.08 + BRAKED_S,
     ),
     # the master sends a command out of turn to name a node: it is fresher, and the others follow closer
     *(
-        VirtualFault(
+        holds_joints(
             name=name,
             done=done,
-            reaction=Reaction.HOLDS_JOINTS,
             robot="Holds the joints that need the node; the others follow. "
             "The node is named with what is wrong.",
             person="Mend the node. Its joints come back slowly by themselves; until then nobody can engage.",
             act=_suit(lie=[Lie(node=NODE, kind=kind, axis=axis)]),
-            ends=State.TRACK, concerns=_joints_of_node, strays_deg=2.5, sway_deg=1.0, stands_s=0.2 + BRAKED_S,
+            concerns=_joints_of_node, strays_deg=2.5, sway_deg=1.0, stands_s=0.2 + BRAKED_S,
         )
         for name, done, kind, axis in LIARS
     ),
-    VirtualFault(
+    holds(
         name="zero pose of somebody who leans",
         done="The suit is put on, and the operator stands bowed by 25° where the zero pose is to be taken.",
-        reaction=Reaction.HOLDS,
         robot="Refuses to engage, and says which segment leaned by how much. It stands.",
         person="Stand upright, arms hanging, and still for `zero_pose_s`; then engage.",
         act=_leans,
         begins=State.HOLD, setting=LEANS, stands_s=AT_ONCE_S,
     ),
     # compared with an operator who stood still for less long, which alone makes 3° of difference
-    VirtualFault(
+    goes_on(
         name="gyro with a gross bias",
         done="A gyro of the reaching arm has read 12 °/s too much on each axis since it was put on; the "
         "operator stood still for 5 s before engaging.",
-        reaction=Reaction.GOES_ON,
         robot="Follows: the bias was learnt at rest. The node is named with its rate; beyond "
         "`rest_bias_limit_deg_s` its joints would be held, or engage refused.",
         person="Calibrate the node (`tandem calibrate imu`).",
         act=_from_the_beginning,
-        ends=State.TRACK, setting=GROSS_BIAS, strays_deg=5.0,
+        setting=GROSS_BIAS, strays_deg=5.0,
     ),
-    VirtualFault(
+    goes_on(
         name="iron at a magnetometer while it is worn",
         done="Iron sticks to a node of the reaching arm: 15 µT more on each axis, since 14 s before the "
         "trial.",
-        reaction=Reaction.GOES_ON,
         robot="Follows. The node's gyro keeps its heading; `tandem status` names the node.",
         person="Take the iron away, or calibrate the node (`tandem calibrate mag`).",
         act=_from_the_beginning,
-        ends=State.TRACK, setting=IRON, strays_deg=5.0,
+        setting=IRON, strays_deg=5.0,
     ),
-    VirtualFault(
+    holds(
         name="second suit on the bus",
         done="Another suit answers the same SYNCs with the same node numbers.",
-        reaction=Reaction.HOLDS,
         robot="Believes neither: brakes and stands. The log and `tandem status` name the nodes.",
         person="Take one suit off the bus, or give it other numbers. " + ENGAGE,
         act=_suit(twin=[Twin()]),
         reacts_s=0.02 + NOTICED_S, stands_s=0.02 + 0.08 + BRAKED_S, held_by={"valid"},
     ),
-    VirtualFault(
+    holds(
         name="CAN bus of the suit off",
         done="The bus between the suit and the master fails.",
-        reaction=Reaction.HOLDS,
         robot="Brakes and stands. When the bus is back it still stands.",
         person=ENGAGE,
         act=_bus_off,

@@ -9,11 +9,10 @@ import numpy as np
 
 from common.wire.codec import decode, encode
 from common.wire.messages import Command
-from deploy.harness.faults.fault import NOTHING, Reaction
+from deploy.harness.faults.fault import NOTHING
 from deploy.harness.faults.scene import Scene, turned
-from deploy.harness.faults.virtual import VirtualFault
+from deploy.harness.faults.virtual import follows_limited, goes_on
 from deploy.sim.world.injection import Delivery, Traffic
-from slave.guard import State
 
 LET_GO = "Let go of the deadman, or emergency stop."
 
@@ -76,58 +75,52 @@ def _jumps(scene: Scene) -> None:
 
 
 VALUES = (
-    VirtualFault(
+    goes_on(
         name="values that are not numbers",
         done="NaN and infinities as angles and as velocities, with the operator's lease.",
-        reaction=Reaction.GOES_ON,
         robot="Follows the sound commands; takes none of the others.",
         person="Replace the program that sends them.",
         act=_not_numbers,
-        ends=State.TRACK, strays_deg=0.0, refused_by={"codec", "valid"}, held_by={"valid"},
+        strays_deg=0.0, refused_by={"codec", "valid"}, held_by={"valid"},
     ),
-    VirtualFault(
+    goes_on(
         name="huge values",
         done="Angles beyond two turns, up to 1e30 rad, with the operator's lease.",
-        reaction=Reaction.GOES_ON,
         robot="Follows the sound commands; takes none of the others.",
         person="Replace the program that sends them.",
         act=_huge,
-        ends=State.TRACK, strays_deg=0.0, refused_by={"codec"},
+        strays_deg=0.0, refused_by={"codec"},
     ),
-    VirtualFault(
+    goes_on(
         name="negative zeros",
         done="Every zero comes with a minus.",
-        reaction=Reaction.GOES_ON,
         robot="Follows: it is the same number.",
         person=NOTHING,
         act=_negative_zeros,
-        ends=State.TRACK, strays_deg=0.0,
+        strays_deg=0.0,
     ),
-    VirtualFault(
+    follows_limited(
         name="largest values that a message can carry",
         done="The master asks for 12.5 rad at 99 rad/s of every joint, in command after command.",
-        reaction=Reaction.LIMITED,
         robot="Cannot know that this is not meant: goes to the ends of its ranges, slowly.",
         person=LET_GO,
         act=_largest,
-        ends=State.TRACK, held_by={"position", "velocity", "acceleration"},
+        held_by={"position", "velocity", "acceleration"},
     ),
-    VirtualFault(
+    follows_limited(
         name="valid but impossible jump",
         done="From one command to the next every joint is asked to be at the far end of its range.",
-        reaction=Reaction.LIMITED,
         robot="Cannot know that this is not meant: goes there, slowly.",
         person=LET_GO,
         act=_jump,
-        ends=State.TRACK, held_by={"velocity", "acceleration"},
+        held_by={"velocity", "acceleration"},
     ),
-    VirtualFault(
+    follows_limited(
         name="a jump with every command",
         done="Each command asks for the other end of every joint's range than the one before.",
-        reaction=Reaction.LIMITED,
         robot="Cannot know that this is not meant: goes to and fro, slowly.",
         person=LET_GO,
         act=_jumps,
-        ends=State.TRACK, held_by={"velocity", "acceleration"},
+        held_by={"velocity", "acceleration"},
     ),
 )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Set
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,13 @@ class VirtualFault(FaultRow):
     """The gates that must have refused commands; `codec` is the decoder before them."""
     held_by: Set[str] = frozenset()
     """The gates, watches and rules of the guard that hold the fault off: without them the row must fail."""
+
+
+holds = partial(VirtualFault, reaction=Reaction.HOLDS)
+holds_joints = partial(VirtualFault, reaction=Reaction.HOLDS_JOINTS, ends=State.TRACK)
+goes_on = partial(VirtualFault, reaction=Reaction.GOES_ON, ends=State.TRACK)
+follows_limited = partial(VirtualFault, reaction=Reaction.LIMITED, ends=State.TRACK)
+stops = partial(VirtualFault, reaction=Reaction.STOPS, ends=State.ESTOP)
 
 
 def try_on_virtual_clock(fault: VirtualFault, **guard_options: Any) -> FaultOutcome:
