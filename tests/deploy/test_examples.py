@@ -126,5 +126,3 @@ def test_the_deployment_page_names_commands_and_files_that_there_are() -> None:
             assert second in {str(getattr(c.callback, "__name__", "")) for c in group.registered_commands}
     for file in re.findall(r"\$D/([\w./@-]+)", page):
         assert (DEPLOY / file).exists() or any(DEPLOY.glob(f"{file}*")), file
-    for link in re.findall(r"\]\(([^)]+)\)", page):
-        assert (DEPLOY.parent / "docs" / link).exists(), link
