@@ -44,20 +44,12 @@ class LatencyBudget:
     def __init__(self) -> None:
         self._stages = StageTimes(*STAGES)
         self._bound_ns = 0
-        self.untrusted = 0
-        """Passages left out because the offset was not trusted."""
-        self.early = 0
-        """Passages received, by the measured offset, before they were put: the offset was off by that."""
 
     def record(self, passage: Passage, offset: Offset) -> None:
-        """Take one passage. `offset` is the master's clock minus the slave's."""
-        transit_ns = passage.one_way_ns(offset)
-        if transit_ns is None:
-            self.untrusted += 1
-            return
-        self.early += transit_ns < 0
-        self._stages.record(*passage.stages_ns(offset))
-        self._bound_ns = max(self._bound_ns, offset.bound_ns)
+        """Take one passage. `offset` is the master's clock minus the slave's; only a trusted one counts."""
+        if offset.trusted:
+            self._stages.record(*passage.stages_ns(offset))
+            self._bound_ns = max(self._bound_ns, offset.bound_ns)
 
     def summary(self) -> dict[str, Summary]:
         """A row a stage in ms; `put→received` also has `bound`, the widest its offset had."""

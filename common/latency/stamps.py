@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
 from common.clock_sync import Offset
-from common.latency.one_way import one_way_ns
 
 STAGES = (
     "sampled→frames in",
@@ -38,10 +37,6 @@ class Passage:
     """The first setpoint after that was handed to the servos."""
     moved_ns: int
     """The first encoder reading after that which differs; a robot that moves already differs at once."""
-
-    def one_way_ns(self, offset: Offset) -> int | None:
-        """From put to received; None if the offset is not trusted."""
-        return one_way_ns(self.put_ns, self.received_ns, offset)
 
     def stages_ns(self, offset: Offset) -> list[int]:
         """How long each of STAGES took. `offset` is the master's clock minus the slave's.

@@ -90,7 +90,7 @@ def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
 # one pair of functions a message, in the order of messages.py
 
 
-def _pack_command(m: Command) -> tuple[Any, ...]:
+def _pack_command(m: Command) -> tuple[object, ...]:
     s = m.stamps
     return (
         m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.angles_ns, s.put_ns,
@@ -99,7 +99,7 @@ def _pack_command(m: Command) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
+def _unpack_command(f: tuple[object, ...], joints: int) -> Command:
     fields.length(f, 14)
     lease, sequence, tick, sampled_ns, frames_in_ns, angles_ns, put_ns = fields.counts(f[1:8])
     position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
@@ -119,7 +119,7 @@ def _unpack_command(f: tuple[Any, ...], joints: int) -> Command:
     )
 
 
-def _pack_state(m: RobotState) -> tuple[Any, ...]:
+def _pack_state(m: RobotState) -> tuple[object, ...]:
     e = m.echo
     echo = None if e is None else (e.sequence, e.put_ns, e.received_ns, e.accepted_ns, e.written_ns)
     reason = fields.shorten(m.reason, MAX_DOUBT)
@@ -133,7 +133,7 @@ def _pack_state(m: RobotState) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
+def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
     fields.length(f, 16)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
@@ -158,7 +158,7 @@ def _unpack_state(f: tuple[Any, ...], joints: int) -> RobotState:
     )
 
 
-def _pack_base(base: BaseAttitude | None) -> tuple[Any, ...] | None:
+def _pack_base(base: BaseAttitude | None) -> tuple[object, ...] | None:
     if base is None:
         return None
     return (base.measured_ns, base.inclination_rad, base.azimuth_rad, base.tool_face_rad, base.tilt_rad)
@@ -189,11 +189,11 @@ def _unpack_echo(value: object) -> CommandEcho | None:
     return CommandEcho(*fields.counts(value))
 
 
-def _pack_control_request(m: ControlRequest) -> tuple[Any, ...]:
+def _pack_control_request(m: ControlRequest) -> tuple[object, ...]:
     return (m.robot, m.action.value, m.operator, m.key, m.clock, m.challenge)
 
 
-def _unpack_control_request(f: tuple[Any, ...], _: int) -> ControlRequest:
+def _unpack_control_request(f: tuple[object, ...], _: int) -> ControlRequest:
     fields.length(f, 6)
     try:
         action = Action(fields.text(f[1], MAX_NAME))
@@ -204,12 +204,12 @@ def _unpack_control_request(f: tuple[Any, ...], _: int) -> ControlRequest:
     return ControlRequest(robot, action, operator, key, fields.count(f[4]), fields.count(f[5]))
 
 
-def _pack_control_reply(m: ControlReply) -> tuple[Any, ...]:
+def _pack_control_reply(m: ControlReply) -> tuple[object, ...]:
     text, place = fields.shorten(m.text, MAX_TEXT), fields.shorten(m.place, MAX_DOUBT)
     return (m.done, m.guard, text, m.lease, m.challenge, m.instance, place)
 
 
-def _unpack_control_reply(f: tuple[Any, ...], _: int) -> ControlReply:
+def _unpack_control_reply(f: tuple[object, ...], _: int) -> ControlReply:
     fields.length(f, 7)
     guard, text = fields.text(f[1], MAX_NAME), fields.text(f[2], MAX_TEXT)
     lease, challenge, instance = fields.counts(f[3:6])
@@ -217,29 +217,29 @@ def _unpack_control_reply(f: tuple[Any, ...], _: int) -> ControlReply:
     return ControlReply(fields.flag(f[0]), guard, text, lease, challenge, instance=instance, place=place)
 
 
-def _pack_clock_query(m: ClockQuery) -> tuple[Any, ...]:
+def _pack_clock_query(m: ClockQuery) -> tuple[object, ...]:
     return (m.asked_ns, m.last_asked_ns, m.last_heard_ns, m.asker)
 
 
-def _unpack_clock_query(f: tuple[Any, ...], _: int) -> ClockQuery:
+def _unpack_clock_query(f: tuple[object, ...], _: int) -> ClockQuery:
     fields.length(f, 4)
     return ClockQuery(*fields.counts(f))
 
 
-def _pack_clock_reply(m: ClockReply) -> tuple[Any, ...]:
+def _pack_clock_reply(m: ClockReply) -> tuple[object, ...]:
     return (m.asked_ns, m.received_ns, m.replied_ns, m.instance)
 
 
-def _unpack_clock_reply(f: tuple[Any, ...], _: int) -> ClockReply:
+def _unpack_clock_reply(f: tuple[object, ...], _: int) -> ClockReply:
     fields.length(f, 4)
     return ClockReply(*fields.counts(f))
 
 
-def _pack_statistics(m: Statistics) -> tuple[Any, ...]:
+def _pack_statistics(m: Statistics) -> tuple[object, ...]:
     return (_ROLES[type(m.metrics)], m.sent_ns, to_tree(m.metrics))
 
 
-def _unpack_statistics(f: tuple[Any, ...], _: int) -> Statistics:
+def _unpack_statistics(f: tuple[object, ...], _: int) -> Statistics:
     fields.length(f, 3)
     role = fields.text(f[0], MAX_NAME)
     kind = _METRICS.get(role)
@@ -248,17 +248,17 @@ def _unpack_statistics(f: tuple[Any, ...], _: int) -> Statistics:
     return Statistics(fields.count(f[1]), from_tree(kind, f[2]))
 
 
-def _pack_truth(m: Truth) -> tuple[Any, ...]:
+def _pack_truth(m: Truth) -> tuple[object, ...]:
     return (m.tick, m.sampled_ns, fields.pack_floats(m.position_rad, m.velocity_rad_s))
 
 
-def _unpack_truth(f: tuple[Any, ...], joints: int) -> Truth:
+def _unpack_truth(f: tuple[object, ...], joints: int) -> Truth:
     fields.length(f, 3)
     position_rad, velocity_rad_s = fields.floats(f[2], joints, _POSTURE)
     return Truth(fields.count(f[0]), fields.count(f[1]), position_rad, velocity_rad_s)
 
 
-_ENCODERS: dict[type, tuple[str, Callable[[Any], tuple[Any, ...]]]] = {
+_ENCODERS: dict[type, tuple[str, Callable[[Any], tuple[object, ...]]]] = {
     Command: ("command", _pack_command),
     RobotState: ("state", _pack_state),
     ControlRequest: ("control", _pack_control_request),
@@ -268,7 +268,7 @@ _ENCODERS: dict[type, tuple[str, Callable[[Any], tuple[Any, ...]]]] = {
     Statistics: ("statistics", _pack_statistics),
     Truth: ("truth", _pack_truth),
 }
-_DECODERS: dict[type, tuple[str, Callable[[tuple[Any, ...], int], Any]]] = {
+_DECODERS: dict[type, tuple[str, Callable[[tuple[object, ...], int], Any]]] = {
     Command: ("command", _unpack_command),
     RobotState: ("state", _unpack_state),
     ControlRequest: ("control", _unpack_control_request),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,50 +62,47 @@ def mask(value: object, count: int) -> Mask:
     return np.frombuffer(value, np.bool_)
 
 
-def counts(values: tuple[Any, ...]) -> tuple[int, ...]:
+def counts(values: tuple[object, ...]) -> tuple[int, ...]:
     """Integers of 0 to 2**63 - 1: counters, ticks and stamps in ns."""
-    for value in values:
-        if type(value) is not int or not 0 <= value <= _U63:
-            raise CodecError(f"{short(value)} is not a 63-bit count")
-    return values
+    return tuple(map(count, values))
 
 
-def count(value: Any) -> int:
+def count(value: object) -> int:
     """One integer of 0 to 2**63 - 1."""
     if type(value) is not int or not 0 <= value <= _U63:
         raise CodecError(f"{short(value)} is not a 63-bit count")
     return value
 
 
-def signed(value: Any) -> int:
+def signed(value: object) -> int:
     """An integer of ±(2**63 - 1)."""
     if type(value) is not int or not -_U63 <= value <= _U63:
         raise CodecError(f"{short(value)} is not a 64-bit integer")
     return value
 
 
-def flag(value: Any) -> bool:
+def flag(value: object) -> bool:
     """True or false, not 0 or 1."""
     if type(value) is not bool:
         raise CodecError(f"{short(value)} is not a flag")
     return value
 
 
-def text(value: Any, most: int) -> str:
+def text(value: object, most: int) -> str:
     """A text of at most `most` characters."""
     if type(value) is not str or len(value) > most:
         raise CodecError(f"{short(value)} is not a text of at most {most} characters")
     return value
 
 
-def number(value: Any, lowest: float, highest: float) -> float:
+def number(value: object, lowest: float, highest: float) -> float:
     """A finite float between two bounds, both allowed."""
     if type(value) is not float or not lowest <= value <= highest:
         raise CodecError(f"{short(value)} is not a number from {lowest:g} to {highest:g}")
     return value
 
 
-def texts(value: Any, most_key: int, most: int) -> dict[str, str]:
+def texts(value: object, most_key: int, most: int) -> dict[str, str]:
     """A map from names to texts."""
     if type(value) is not dict:
         raise CodecError(f"{short(value)} is not a map")
@@ -136,7 +132,7 @@ def fit_texts(texts: dict[str, str], most_bytes: int) -> dict[str, str]:
     return fitting
 
 
-def length(fields: tuple[Any, ...], expected: int) -> None:
+def length(fields: tuple[object, ...], expected: int) -> None:
     """Refuse an array of any other length."""
     if len(fields) != expected:
         raise CodecError(f"{len(fields)} fields, expected {expected}")

@@ -11,7 +11,6 @@ answer:  msgpack [kind "controlled", 2, done, guard's state, text, instance, 0]
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import msgpack
 
@@ -81,7 +80,7 @@ def read_stop_answer(payload: bytes) -> StopAnswer | None:
     return StopAnswer(done, guard, text, instance)
 
 
-def _array(payload: bytes) -> list[Any] | None:
+def _array(payload: bytes) -> list[object] | None:
     if len(payload) > _MAX_BYTES:
         return None
     try:

@@ -116,4 +116,3 @@ def test_without_a_trusted_offset_nothing_is_called_latency() -> None:
     journeys = written(NEVER_MEASURED)
     journeys.read(reading(12, STILL + 100))
     assert journeys.budget.total().count == 0
-    assert journeys.budget.untrusted == 1
