@@ -11,9 +11,10 @@ demo: $(VENV)/.ready
 test: $(VENV)/.ready
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m "not live and not bench" -n auto --dist worksteal $(ARGS)
 
-# one after the other: two tests of real processes at a time would take each other's cores
-test-all: test
-	$(BIN)/python -m pytest -m "live and not bench" $(ARGS)
+# the live tests run one after the other: two at a time would take each other's cores
+test-all: $(VENV)/.ready
+	failed=0; $(MAKE) test || failed=1; \
+	$(BIN)/python -m pytest -m "live and not bench" $(ARGS) || failed=1; exit $$failed
 
 bench: $(VENV)/.ready
 	$(BIN)/tandem bench $(ARGS)
