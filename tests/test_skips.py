@@ -67,8 +67,9 @@ def run(folder: Path, reason: str, *arguments: str, ci: bool) -> tuple[int, str]
     return ended.returncode, ended.stdout + ended.stderr
 
 
-def test_ci_fails_for_a_reason_that_is_not_listed(tmp_path: Path) -> None:
-    status, said = run(tmp_path, "somebody was lazy", ci=True)
+@pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["one process", "two workers"])
+def test_ci_fails_for_a_reason_that_is_not_listed(tmp_path: Path, workers: list[str]) -> None:
+    status, said = run(tmp_path, "somebody was lazy", *workers, ci=True)
     assert status == 1, said
     assert "1 skipped for a reason that is not listed: somebody was lazy" in said
     assert "tests/skips.toml" in said
@@ -78,6 +79,6 @@ def test_a_part_of_the_suite_or_a_listed_reason_passes(tmp_path: Path) -> None:
     status, said = run(tmp_path, "somebody was lazy", ci=False)
     assert status == 0, said
     assert "1 skipped: somebody was lazy" in said
-    for part in (["test_one.py"], ["-k", "one"], ["-m", "not net"]):
+    for part in (["test_one.py"], ["-k", "one"], ["-m", "net or not net"]):
         assert run(tmp_path, "somebody was lazy", *part, ci=True)[0] == 0
     assert run(tmp_path, "root may use every device", ci=True)[0] == 0
