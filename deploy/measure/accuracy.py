@@ -1,11 +1,10 @@
 """Solved against truth at the same instants: every joint, the paper's Table 1, and its η (Eq. 25).
 
-The paper first shifts its solved angles by one 80 ms step, to take out the lag against its reference. Nothing
-is shifted here: rows are matched by capture tick, so a lag of the estimate counts as an error.
+The paper first shifts its angles by one step of 80 ms, to take out the lag against its reference. Nothing is
+shifted here: rows are matched by capture tick, so a lag of the estimate counts as an error.
 
-What was not estimated does not make a figure better: for an angle that is invalid or no number the error of
-the last valid one counts, or the joint's largest where that is larger. Below LEAST_ESTIMATED a figure is
-withheld.
+A missing estimate does not make a value better: an invalid angle counts with the error of the last valid one,
+or with the joint's largest error where that is larger. Below LEAST_ESTIMATED a value is withheld.
 """
 
 from __future__ import annotations
@@ -68,9 +67,9 @@ class FastAccuracy:
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """How well the angles were solved. What there was not enough data for is None.
+    """How well the joint angles were estimated. A value is None where there was too little data for it.
 
-    So is what was estimated for too small a share, and every figure over several joints of which one was.
+    It is also None where too small a share was estimated, of it or of one of the joints that it covers.
     """
 
     joints: Mapping[str, JointAccuracy | None]
@@ -92,7 +91,7 @@ class Accuracy:
         return [n for n, share in self.estimated.items() if min(share, fast.get(n, 1.0)) < LEAST_ESTIMATED]
 
     def _fast_rows(self, names: Sequence[str]) -> list[FastAccuracy]:
-        """Of those joints; empty where one of them is withheld, because the others' figure may be better."""
+        """The fast rows of some joints; none where one is withheld, as the rest may look better."""
         if any(self.estimated_fast.get(name, 1.0) < LEAST_ESTIMATED for name in names):
             return []
         return [row for name in names if (row := self.fast.get(name)) is not None]
@@ -126,7 +125,7 @@ class Accuracy:
 def accuracy(truth: TruthSeries, solved: SolvedSeries, joint_names: Sequence[str]) -> Accuracy:
     """Judge the solved angles, row by row of equal tick.
 
-    `joint_names` (J,) are in the order of the columns. Poor data raises nothing: what it cannot tell is None.
+    `joint_names` (J,) are in the order of the columns. Poor data raises nothing: what is unknown is None.
     Until a joint is first valid, for at most BEGIN_TICKS, its filters settle and its zero pose is taken.
     """
     ticks, t_row, s_row = np.intersect1d(truth.tick, solved.tick, return_indices=True)

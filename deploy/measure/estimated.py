@@ -1,4 +1,4 @@
-"""What was not estimated: how much of a run it is, and what it counts for in a figure."""
+"""Missing estimates: how much of a run they are, and with which error they count."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from common.wire.messages import Mask
 from deploy.measure.trace import Ticks
 
 LEAST_ESTIMATED = 0.95
-"""Below this share a figure is withheld: it would say nothing of what is missing."""
+"""Below this share a value is withheld, because it would leave out the missing part."""
 BEGIN_TICKS = 1000
-"""5 s at 200 Hz. So long at most may a joint settle, or wait for its zero pose, and not count as missing."""
+"""5 s at 200 Hz: a joint may settle, or wait for its zero pose, so long without counting as missing."""
 
 
 def after_beginning(ticks: Ticks, known: Mask) -> Mask:

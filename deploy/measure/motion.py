@@ -22,7 +22,7 @@ from deploy.measure.roughness import accelerations
 from deploy.measure.trace import MovedSeries, Nanoseconds, TruthSeries
 
 MOVING_DEG = 5.0
-"""A joint whose truth ranges over less is not judged: its error says nothing about following."""
+"""A joint that moves less is not judged: its error says nothing about following."""
 SETTLE_S = 1.0
 """Left out after each hand-over to `track`, where the last of the alignment still shows."""
 GAP_S = 0.1
@@ -30,7 +30,7 @@ GAP_S = 0.1
 MIN_SAMPLES = 50
 """Fewer usable readings (1 s of them at 50 Hz) give no figure."""
 SEARCH_MS = (-100, 500)
-"""Where the lag is looked for."""
+"""The range in which the lag is searched."""
 _COARSE_MS = 10
 _FINE_NS = NS_PER_MS / 10
 

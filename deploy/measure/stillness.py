@@ -44,7 +44,7 @@ class Stillness:
     peak_joint: str
     """The joint that came nearest to its speed limit."""
     peak_speed_rad_s: float
-    """Of that joint, over 50 ms."""
+    """The speed of that joint over 50 ms."""
     peak_share: float
     """That speed over the joint's limit."""
     way_rad: float
@@ -52,7 +52,7 @@ class Stillness:
     overshoot_rad: float
     """How far a joint went outside of the way between where it was at the fault and its last setpoint."""
     standstill_s: float | None
-    """From the fault until every joint stood for good; None where one still moved at the end."""
+    """From the fault until every joint stood still and stayed so; None where one still moved at the end."""
 
 
 def stillness(

@@ -1,4 +1,4 @@
-"""How a figure is taken: many short timings of one thing, told by their least, median and tail."""
+"""Times a call many times over, and sums up the timings by minimum, median and tail."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Figures = dict[str, float]
 
 
 def spread(values: Sequence[float]) -> Figures:
-    """The figures of some timings, in their own unit; only `count` where there are none."""
+    """The summary of some timings, in their own unit; only `count` where there are none."""
     if len(values) == 0:
         return {"count": 0}
     low, median, tail, high = np.percentile(values, [0, 50, 99, 100])
@@ -28,12 +28,12 @@ def spread(values: Sequence[float]) -> Figures:
 
 
 def spread_us(durations_ns: Sequence[float]) -> Figures:
-    """The same of durations in ns, told in µs."""
+    """The summary of durations in ns, in µs."""
     return spread([duration_ns / 1000.0 for duration_ns in durations_ns])
 
 
 def time_calls(call: Callable[[], object], seconds: float, batch: int = 1) -> Figures:
-    """Call again and again for about that long; µs a call. `batch` calls share one timing."""
+    """Call again and again for about `seconds`; µs for one call. `batch` calls share one timing."""
     freeze_heap()
     call()
     durations_ns: list[float] = []

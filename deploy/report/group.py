@@ -1,4 +1,4 @@
-"""A group of commands of which one may go without its name."""
+"""A group of commands with a default command."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typer.core import TyperGroup
 
 
 class FilesByDefault(TyperGroup):
-    """What begins with no command's name (and asks for no help) is for the command `files`."""
+    """Runs the command `files` where the first argument is neither a command nor `--help`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put the name in where it was left out."""
+        """Insert the default command's name."""
         if args and args[0] != "--help" and args[0] not in self.commands:
             args = ["files", *args]
         return super().parse_args(ctx, args)

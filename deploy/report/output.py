@@ -1,4 +1,4 @@
-"""What a command writes where a person told it to: reports, pictures, or one clear line on why it cannot."""
+"""Writes reports to the path that a person chose; if that fails, one clear line says why."""
 
 from __future__ import annotations
 

@@ -23,9 +23,9 @@ _FEW = 800
 """Samples to fit to, spread evenly."""
 _ROUNDS = 40
 _EXPLAINS = 0.4
-"""Of the RMS error at most is left where a reading of the file explains most of it."""
+"""The share of the RMS error that may be left if a change explains most of it."""
 _WORTH_RAD = math.radians(5.0)
-"""Errors below need no other explanation."""
+"""Smaller errors need no explanation."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Errors over time as a picture: a row a recording, a line a filter."""
+"""A plot of errors over time: a row for each recording, a line for each filter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POINTS = 1500
-"""So many points a line: each is the largest of its share of samples, so that no peak is lost."""
+"""Points for each line. A point is the largest of its samples, so that no peak is lost."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,7 +45,7 @@ class Trial:
         return out
 
     def beginning(self, samples: int) -> Trial:
-        """As much of it, from its first sample on, as holds that many samples."""
+        """The beginning of the recording, with that many kept samples."""
         kept = np.flatnonzero(~self.dropped)[:samples]
         rows = slice(int(kept[0]), int(kept[-1]) + 1)
         truth = self.q_world_from_sensor

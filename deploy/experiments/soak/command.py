@@ -116,7 +116,7 @@ def _tell(judged: JudgedSoak, folder: Path | None, console: Console) -> None:
 
 
 def _say(event: AnyEvent, console: Console) -> None:
-    """In a log file, where no table is redrawn, each fault and what came of it is a line."""
+    """In a log file, which shows no live table, print each event as a line."""
     from deploy.experiments.soak.view import HIDDEN, line
 
     if not console.is_terminal and event.what.kind not in HIDDEN:

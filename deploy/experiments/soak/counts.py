@@ -1,4 +1,4 @@
-"""From counters that only grow, and begin anew with each process, to what came since the last look. Pure."""
+"""Differences of counters that only grow, and start again at 0 with each process. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the joints were lately: how soon they stood after a fault, whether they move in `hold`. Pure."""
+"""The newest joint angles: how soon the joints stood after a fault, and whether they move in `hold`. Pure."""
 
 from __future__ import annotations
 

@@ -224,7 +224,7 @@ def _columns(name: str, life: int, used: Usage) -> dict[str, float | str]:
 
 
 def folder_for(report: Path | None, temporary: Path) -> Path:
-    """Where a soak writes: the folder that was asked for, which must be empty, or a temporary one."""
+    """The folder that a soak writes to: the chosen one, which must be empty, or a temporary one."""
     if report is None:
         return temporary
     try:

@@ -32,7 +32,7 @@ class Stage:
 
     @property
     def names(self) -> list[str]:
-        """Of all processes, in the order in which they are shown."""
+        """The names of all processes, in the order of the display."""
         return sorted(self.children, key=lambda name: (name == recording.NAME, name))
 
     async def start(self, name: str, through: Sequence[str] = ()) -> None:

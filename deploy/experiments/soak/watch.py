@@ -39,7 +39,7 @@ class Watch:
         self.state_ns = 0
         """When the newest state arrived, own clock."""
         self.accepted_ns = 0
-        """When a state last told that the robot accepted a command that it had not told of before."""
+        """When a state last showed a newly accepted command."""
         self.held_ns = 0
         """When the guard was last seen to go from moving to hold."""
         self.engaged = 0
@@ -73,7 +73,7 @@ class Watch:
             self._record(JointsUnknown(invalid))
 
     def on_state(self, payload: bytes, arrived_ns: int) -> None:
-        """The robot told what it does."""
+        """A state of the robot arrived."""
         try:
             state = decode(payload, RobotState, len(self._skeleton.joints))
         except CodecError:
@@ -102,7 +102,7 @@ class Watch:
             return
         this, offset = (echo.sequence, echo.put_ns), master_offset(state)
         written_ns = one_way_ns(echo.put_ns, echo.written_ns, offset)
-        # a state may tell that it was accepted, and only the next that it was written
+        # one state may show that a command was accepted, and only the next that it was written
         if written_ns is not None and echo.written_ns and this != self._written:
             self._written = this
             self._written_ms.append(to_ms(written_ns))
@@ -118,20 +118,20 @@ class Watch:
             self._row["offset_bound_ms"] = to_ms(offset.bound_ns)
 
     def on_statistics(self, payload: bytes, _: int) -> None:
-        """A process told what it counted."""
+        """Statistics of a process arrived."""
         try:
-            told = decode(payload, Statistics)
+            statistics = decode(payload, Statistics)
         except CodecError:
             self._add("undecodable", 1)
             return
-        if isinstance(told.metrics, MasterMetrics):
-            self._on_master(told.metrics)
+        if isinstance(statistics.metrics, MasterMetrics):
+            self._on_master(statistics.metrics)
         else:
-            self._on_slave(told.metrics)
+            self._on_slave(statistics.metrics)
 
     def _on_master(self, metrics: MasterMetrics) -> None:
         self._on_heap("master", metrics.heap)
-        # a message tells of the robot that it is sent to, and of no other
+        # a message holds the metrics of the robot that it is sent to, and of no other
         (robot,) = metrics.robots.values()
         counters = {
             "sent": robot.commands_sent,

@@ -1,4 +1,4 @@
-"""How far a trial is, and how long the rest will take. Pure but for the drawing."""
+"""The progress of a trial and the time that is left."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from common.clock import to_s
 from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 
 AROUND_S = 22.0
-"""What a cell takes beside its judged time and its outage, before any has shown it: start, align, stop."""
+"""The guess, before the first cell, for what a cell takes beside its judged time: start, align, stop."""
 AGAIN_S = 8.0
-"""And to come back after an outage."""
+"""The time to come back after an outage."""
 
 
 @dataclass(slots=True)
 class Progress:
-    """Counts cells and takes their times."""
+    """Counts cells and averages their times."""
 
     plan: TrialPlan
     total: int
@@ -42,14 +42,14 @@ class Progress:
         self._began_ns = now_ns
 
     def end(self, ran: bool, failed: bool, now_ns: int) -> None:
-        """It is over; `ran` where its time tells of others'."""
+        """A cell is over; `ran`: whether its time helps to predict the others'."""
         self.done += 1
         self.failed += failed
         if ran:
             self._took_s.append(to_s(now_ns - self._began_ns))
 
     def left_s(self, now_ns: int) -> float:
-        """Until all cells are done: as long each as those before took, on average."""
+        """The time until all cells are done, from the average of those before."""
         if self.done >= self.total:
             return 0.0
         each_s = sum(self._took_s) / len(self._took_s) if self._took_s else self._guess_s()
@@ -62,7 +62,7 @@ class Progress:
 
 
 def draw(progress: Progress, now_ns: int) -> RenderableType:
-    """Two lines: how far, and what is being done."""
+    """Two lines: the progress, and what is being done."""
     p = progress
     head = Table.grid(padding=(0, 2))
     beside = f"{p.done} of {p.total} cells"

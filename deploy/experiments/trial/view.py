@@ -26,7 +26,7 @@ def print_findings(findings: Findings, console: Console) -> None:
             console.print(Text.assemble((f"{row.setup.profile}, {row.setup.name}: ", "dim"), (why, "yellow")))
     failed = sum(len(row.failed) for row in findings.rows)
     if failed:
-        console.print(Text(f"{failed} failed: run, and came to nothing", "bold red"))
+        console.print(Text(f"{failed} failed: ran without a result", "bold red"))
     if findings.judged:
         console.print(verdict_table("targets", findings.judged))
     profile = ""

@@ -37,7 +37,7 @@ def doctor(
     Example: `tandem doctor /etc/tandem/operator.toml --recordings /var/lib/tandem`
     """
     from deploy.ops.doctor.examine import Options, examine
-    from deploy.ops.doctor.judge.finding import Grade, worst
+    from deploy.ops.doctor.judge.finding import Health, worst
     from deploy.ops.doctor.judge.needs import Needs, needs_of
     from deploy.ops.doctor.read.tree import Tree
     from deploy.ops.doctor.view import as_table, as_tree, in_words
@@ -51,5 +51,5 @@ def doctor(
         console = Console()
         console.print(as_table(found))
         console.print(words, highlight=False)
-    if worst(found) is Grade.FAIL:
+    if worst(found) is Health.FAIL:
         raise TandemError(f"not ready: {words}")

@@ -9,9 +9,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from deploy.ops.doctor.judge.finding import Finding, Grade, worst
+from deploy.ops.doctor.judge.finding import Finding, Health, worst
 
-_STYLE = {Grade.OK: "green", Grade.WARN: "yellow", Grade.FAIL: "bold red"}
+_STYLE = {Health.OK: "green", Health.WARN: "yellow", Health.FAIL: "bold red"}
 
 
 def as_table(findings: Sequence[Finding]) -> Table:
@@ -24,7 +24,7 @@ def as_table(findings: Sequence[Finding]) -> Table:
         style = _STYLE[finding.verdict]
         words = Text(finding.found)
         if finding.advice:
-            words.append(f"\n→ {finding.advice}", "dim" if finding.verdict is Grade.OK else style)
+            words.append(f"\n→ {finding.advice}", "dim" if finding.verdict is Health.OK else style)
         table.add_row(Text(finding.check), Text(finding.verdict, style), words)
     return table
 
@@ -43,6 +43,6 @@ def as_tree(role: str, findings: Sequence[Finding]) -> dict[str, Any]:
 
 def in_words(role: str, findings: Sequence[Finding]) -> str:
     """The end of the report, one line."""
-    counts = {verdict: sum(f.verdict is verdict for f in findings) for verdict in Grade}
-    worse = [f"{counts[v]} {v}" for v in (Grade.FAIL, Grade.WARN) if counts[v]]
-    return f"{role}: {', '.join([*worse, f'{counts[Grade.OK]} ok'])}"
+    counts = {verdict: sum(f.verdict is verdict for f in findings) for verdict in Health}
+    worse = [f"{counts[v]} {v}" for v in (Health.FAIL, Health.WARN) if counts[v]]
+    return f"{role}: {', '.join([*worse, f'{counts[Health.OK]} ok'])}"

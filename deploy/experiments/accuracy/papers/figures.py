@@ -1,4 +1,4 @@
-"""What an experiment yields: figures, each beside the paper's and ours to reach; and many seeds' together."""
+"""The values of an experiment beside the paper's and their targets, for one seed and over many."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from deploy.measure.verdict import Outcome, Verdict, at_most
 
 @dataclass(frozen=True, slots=True)
 class PaperValue:
-    """One figure of one seed. Of all of them less is better."""
+    """One value of one seed. Less is better."""
 
     name: str
     unit: str
     values: tuple[float, ...]
-    """One a side, axis or angle that the figure is of; empty where the run did not tell."""
+    """One for each side, axis or angle; empty where the run gave none."""
     paper: float | None = None
     """The paper's."""
     target: float | None = None
@@ -29,16 +29,16 @@ class Experiment:
     """One block of the output. `run` takes a seed, needs nothing else, and can be sent to another process."""
 
     key: str
-    """As `--only` names it."""
+    """Its name for `--only`."""
     title: str
     run: Callable[[int], list[PaperValue]]
     notes: tuple[str, ...] = ()
-    """What a reader must know to judge the figures, a sentence each."""
+    """What a reader must know to judge the values, one sentence each."""
 
 
 @dataclass(frozen=True, slots=True)
 class PaperComparison:
-    """A figure over all seeds."""
+    """A value over all seeds, beside the paper's."""
 
     name: str
     unit: str
@@ -48,7 +48,7 @@ class PaperComparison:
 
     @property
     def values(self) -> list[float]:
-        """Every seed's, in one row."""
+        """The values of all seeds."""
         return [value for values in self.by_seed.values() for value in values]
 
     @property
@@ -80,7 +80,7 @@ class PaperComparison:
 
     @property
     def outcome(self) -> Outcome | None:
-        """Of the verdict, where there is one."""
+        """The verdict's outcome; None where nothing is asked."""
         return None if self.verdict is None else self.verdict.outcome
 
 
@@ -91,7 +91,7 @@ def run_experiment(work: tuple[Experiment, int], _: OnProgress) -> list[PaperVal
 
 
 def gather(by_seed: Mapping[int, Sequence[PaperValue]]) -> list[PaperComparison]:
-    """One row a figure, in the order of their first appearance, over the seeds' figures."""
+    """One comparison for each value, in the order in which they first appear."""
     found: dict[str, PaperValue] = {}
     for figures in by_seed.values():
         for figure in figures:

@@ -25,7 +25,7 @@ ETA_TARGET_PERCENT = 1.0
 ARMS = ("chest", "left_upper_arm", "left_forearm", "right_upper_arm", "right_forearm")
 """The segments that Table 1's angles lie between."""
 ZERO_POSE_S = 2.0
-"""Of the motion's first 3.5 s, in which the operator stands in the zero pose."""
+"""Within the first 3.5 s of the motion, while the operator stands in the zero pose."""
 SECONDS = 32.5
 """Two periods of the motion, take and deliver a bottle."""
 

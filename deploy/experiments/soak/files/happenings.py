@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """Of any kind."""
+    """Any kind of event."""
 
     kind: ClassVar[str] = ""
 

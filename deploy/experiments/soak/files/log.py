@@ -16,7 +16,7 @@ SHOWN = 8
 
 
 class SoakLog:
-    """Writes as it goes, and keeps nothing but the newest few events."""
+    """Writes each event and sample at once, and keeps only the newest events in memory."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""What a person may choose of a soak."""
+"""The options of a soak."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class SoakOptions:
     duration_s: float
     transport: str = "tcp"
     profile: str | None = None
-    """Of the network between two namespaces; None: local endpoints."""
+    """The network between two namespaces; None: local endpoints."""
     router: bool = False
     """Whether master and robot meet at a router."""
     faults: tuple[str, ...] = ()

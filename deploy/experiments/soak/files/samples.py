@@ -23,9 +23,9 @@ SEEN = (
     "times_lost", "states_missed", "undecodable", "strayed_deg", "host_still_ms",
     "link_lost", "link_out", "link_odd",
 )  # fmt: skip
-"""What a row holds of the whole; those in ms are NaN in a second in which nothing was measured."""
+"""Columns for the whole system. A time in ms is NaN in a second without a measurement."""
 OF_PROCESS = ("life", "rss_mb", "fds", "threads", "cpu_s", "in_use_mb", "blocks")
-"""And of each process: how often it has been started, and what it uses; the last two if it publishes them."""
+"""Columns for each process: how often it was started, and what it uses; it may publish the last two."""
 FILE = "samples.csv"
 
 
@@ -77,7 +77,7 @@ class Samples:
 
     @property
     def processes(self) -> list[str]:
-        """Whose use was measured."""
+        """The processes whose use was measured."""
         return [name.removesuffix("_life") for name in self.columns if name.endswith("_life")]
 
 

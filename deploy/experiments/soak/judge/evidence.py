@@ -16,7 +16,7 @@ from deploy.experiments.soak.judge.windows import explained as in_windows
 from deploy.measure.verdict import Verdict, unproven
 
 LEAST_SHARE = 0.2
-"""Where less of a soak than this is free of faults and stalls, that nothing went wrong in it says little."""
+"""A soak with less than this share free of faults and stalls proves too little to pass."""
 
 
 @dataclass(frozen=True, slots=True)

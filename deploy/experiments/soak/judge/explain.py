@@ -1,4 +1,4 @@
-"""From the events of a soak to the windows in which things may go wrong. Pure."""
+"""Finds the windows of a soak in which a failure has a reason. Pure."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from deploy.experiments.soak.judge.windows import Window, explained, reason
 from deploy.harness.excuse import STILL_S
 
 LOST_WITHIN_S = 1.5
-LEFT_OFF = "after it left off"
-"""Explains what the robot does then, and not why it left off."""
+LEFT_OFF = "after it left track"
+"""Explains what the robot does then, not why it left track."""
 LOST_PACKETS = {"udp": 3, "quic-datagram": 3}
 """So many packets lost just before explain a hold. It takes three missed commands; on a stream, as all other
 transports are, one packet holds up those behind it until it is sent again, 0.2 s later or more (RTO)."""
@@ -51,7 +51,7 @@ class Explained:
 
     @property
     def causes(self) -> tuple[Window, ...]:
-        """Those that may be why the robot left off."""
+        """The windows that may be why the robot left track."""
         return tuple(window for window in self.all if window.why != LEFT_OFF)
 
     def still_s(self, from_s: float, until_s: float) -> float:
@@ -92,7 +92,7 @@ def explanation(events: Sequence[AnyEvent], samples: Samples) -> Explained:
         window for event in of_kind(events, HostStalled) if (window := _excused(event.what)) is not None
     ]
     own = tuple(faults)
-    # what the robot does once it has left off by itself is of one cause; that it left is judged on its own
+    # what the robot does after it left track has that as its cause; that it left is judged by itself
     for left in of_kind(events, RobotLeft):
         ends = [e.at_s for e in of_kind(events, FaultRecovered) if e.at_s > left.at_s]
         faults.append(Window(left.at_s, ends[0] if ends else math.inf, LEFT_OFF))
@@ -105,7 +105,7 @@ def _excused(still: HostStalled) -> Window | None:
     # a soak that was recorded before the evidence was kept shows none
     excused_s = still.excused_ms / 1e3
     until_s = still.from_s + still.still_ms / 1e3
-    why = f"the host stood still: {still.evidence}"
+    why = f"the host stalled: {still.evidence}"
     return Window(until_s - excused_s, until_s, why) if excused_s >= STILL_S else None
 
 
@@ -121,5 +121,5 @@ def _network(events: Sequence[AnyEvent], samples: Samples) -> tuple[tuple[Window
 
 
 def unexplained_lefts(events: Sequence[AnyEvent], explained: Explained) -> list[SoakEvent[RobotLeft]]:
-    """When the robot left off, and neither fault, host nor network accounts for it."""
+    """When the robot left track, and neither fault, host nor network explains it."""
     return [left for left in of_kind(events, RobotLeft) if not explained.accounts_for_hold(left.at_s)]

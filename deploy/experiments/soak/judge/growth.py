@@ -17,9 +17,9 @@ from deploy.measure.verdict import Outcome, Verdict, at_most
 WARM_UP_S = 120.0
 """A process takes what it needs for good in its first minutes; only after that growth means anything."""
 SHORTEST_S = 300.0
-"""Of what is left of the longest life: less says nothing of a slope."""
+"""The shortest remainder of the longest life that gives a slope."""
 BINS = 400
-"""At most, over a whole soak; a bin holds its median."""
+"""The most bins over a whole soak; a bin holds its median."""
 NARROWEST_S = 5.0
 RSS_MB_H = 0.5
 """Counts as nothing: 4 MB in 8 h. Resident memory comes in pages and in steps, and what was touched at the
@@ -102,7 +102,7 @@ def stretches(
 ) -> list[tuple[Array, Array]]:
     """A series (N,) life by life: without each one's warm-up, in bins; times in hours.
 
-    `parts` (N,) numbers what is to be told apart within a life too.
+    `parts` (N,): numbers of the parts into which a life is split too.
     """
     out = []
     for life in np.unique(lives[np.isfinite(lives)]):
@@ -162,7 +162,7 @@ def not_above(verdict: Verdict, slope: Slope | None) -> Verdict:
         return verdict
     why = f"{slope.low:+.3g} to {slope.high:+.3g} with 95 % confidence, {slope.points} points"
     if slope.low <= limit < slope.high:
-        return replace(verdict, measured=slope.value, why=f"too short to tell: {why}")
+        return replace(verdict, measured=slope.value, why=f"too short to judge: {why}")
     outcome = Outcome.PASSED if slope.high <= limit else Outcome.FAILED
     return replace(verdict, outcome=outcome, measured=slope.value, why=why)
 

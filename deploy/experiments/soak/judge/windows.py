@@ -1,4 +1,4 @@
-"""What can be put down to a fault, a start or the host: spans of time with a reason. Pure."""
+"""Spans of time in which a failure has a reason: a fault, a start, the host, the network. Pure."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from common.quaternion import Array
 from common.wire.messages import Mask
 
 AFTER_S = 2.5
-"""Counters are told once a second, and a sample is of the second before: so late a fault shows."""
+"""Counters are published once a second and a sample covers the second before: a fault shows up so late."""
 BEFORE_S = 0.25
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A span in which what goes wrong has a reason; seconds of the soak."""
+    """A span of the soak, in seconds, in which a failure has a reason."""
 
     from_s: float
     until_s: float
     why: str
 
     def includes(self, at_s: float) -> bool:
-        """Whether something that was seen at that time may come of it."""
+        """Whether a failure seen at that time may have this reason."""
         return self.from_s - BEFORE_S <= at_s <= self.until_s + AFTER_S
 
 
@@ -37,5 +37,5 @@ def explained(at_s: Array, windows: Iterable[Window]) -> Mask:
 
 
 def reason(at_s: float, windows: Sequence[Window]) -> str:
-    """Why, or nothing."""
+    """The reason of a failure at that time; empty where it has none."""
     return next((window.why for window in windows if window.includes(at_s)), "")

@@ -14,7 +14,7 @@ ALL = "all"
 
 
 def strategies() -> list[str]:
-    """Those that a slave knows."""
+    """The tracking strategies of the slave."""
     return list(STRATEGIES)
 
 

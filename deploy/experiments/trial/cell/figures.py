@@ -101,7 +101,7 @@ FIGURES = (
            "of the master's and slave's loops, the worse: of a machine that misses many, distrust every "
            "figure"),
 )  # fmt: skip
-"""In the order in which a report has them."""
+"""In the order of the report."""
 
 BY_NAME = {figure.name: figure for figure in FIGURES}
 
@@ -118,7 +118,7 @@ def rounded(values: Values) -> dict[str, float | None]:
 
 
 def printed(name: str, value: float | None, unit: bool = False) -> str:
-    """As people read it; a dash where it is not known."""
+    """The value for people; a dash where it is unknown."""
     figure = BY_NAME[name]
     if value is None:
         return "–"

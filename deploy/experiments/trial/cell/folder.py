@@ -17,14 +17,14 @@ PLAN = "plan.json"
 
 
 class Folder:
-    """What is there of a trial, to go on with and to report."""
+    """The folder of one trial."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._cells = path / "cells"
 
     def begin(self, plan: TrialPlan) -> TrialPlan:
-        """Take up a plan, beside what is there already; the plan of all its cells.
+        """Store a plan, merged with the one that is there already; returns the plan of all cells.
 
         Raises TandemError where the folder holds cells of a plan that this one does not continue.
         """
@@ -38,7 +38,7 @@ class Folder:
         return plan
 
     def plan(self) -> TrialPlan:
-        """Of the trial that lies here. Raises TandemError where none does."""
+        """The plan of the trial in this folder. Raises TandemError where there is none."""
         plan = self._plan()
         if plan is None:
             raise TandemError(f"{self.path}: there is no trial's {PLAN}; `tandem trial --report {self.path}`")

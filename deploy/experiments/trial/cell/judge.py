@@ -40,5 +40,5 @@ def _nothing_to_judge(course: CellCourse) -> str:
     if not echoes(course.judged.states):
         return "no command was accepted in the judged time: nothing to judge"
     if course.after is not None and not course.after.states:
-        return "nothing was heard of the robot after the outage: nobody can tell what it did"
+        return "the robot sent nothing after the outage: what it did is unknown"
     return ""

@@ -1,4 +1,4 @@
-"""Which cells a trial has, in which order they run, and when a folder's cells may be gone on with. Pure."""
+"""Which cells a trial has, in which order they run, and when a folder may be continued. Pure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Setup:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """Such as `udp with predict`."""
         return f"{self.transport} with {self.strategy}"
 
 
@@ -34,7 +34,7 @@ class CellKey:
 
     setup: Setup
     repetition: int
-    """From 1."""
+    """Counted from 1."""
 
     @property
     def slug(self) -> str:
@@ -50,13 +50,13 @@ class TrialPlan:
 
     transports: tuple[str, ...]
     profiles: tuple[str, ...]
-    """Of the network, by name or file."""
+    """Network profiles, by name or file."""
     strategies: tuple[str, ...]
     repeat: int
     seconds: float
     """Seconds that are judged in each run."""
     outage_s: float
-    """Of the outage after it; 0: none."""
+    """The outage after it; 0: none."""
     robot: str
     """Its profile: nursing, hand, lower_limb."""
     motion: str
@@ -90,11 +90,11 @@ class TrialPlan:
         return cells
 
     def seed_of(self, cell: CellKey) -> int:
-        """Of sensors and network: equal for all setups of a repetition, so that they compare in pairs."""
+        """The random seed of sensors and network, equal for all setups of a repetition."""
         return 1000 * self.seed + cell.repetition
 
     def tree(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """As JSON."""
         return {key: list(v) if isinstance(v, tuple) else v for key, v in asdict(self).items()}
 
     @classmethod

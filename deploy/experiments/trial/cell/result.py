@@ -1,4 +1,4 @@
-"""What one cell found, to JSON and back: a file of its own as soon as it is there. Pure."""
+"""The result of one cell, to JSON and back. Pure."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class CellStatus(StrEnum):
     IMPOSSIBLE = "impossible"
     """It cannot be run at all: a transport that does not cross hosts."""
     FAILED = "failed"
-    """It was run and came to nothing; the next run tries it again."""
+    """It ran without a result; the next run tries it again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    """A few seconds of one joint, to be looked at."""
+    """A few seconds of one joint, for a plot."""
 
     joint: str
     at_s: Sequence[float]
@@ -39,15 +39,15 @@ class Excerpt:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One run of a setup, and what came of it."""
+    """One run of a setup and its result."""
 
     key: CellKey
     status: CellStatus
     why: str = ""
-    """Where it is not done."""
+    """Why there is no result."""
     values: Values = field(default_factory=dict)
     remarks: Sequence[str] = ()
-    """What happened on the way, in words: a hold and its reason."""
+    """What happened meanwhile, such as a hold and its reason."""
     settings: Mapping[str, str] = field(default_factory=dict)
     """What was set for this profile over the example files."""
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
@@ -58,11 +58,11 @@ class Cell:
 
     @property
     def settled(self) -> bool:
-        """Whether another try would tell nothing new."""
+        """Whether the cell need not run again."""
         return self.status is not CellStatus.FAILED
 
     def tree(self) -> dict[str, Any]:
-        """As JSON has it, rounded."""
+        """As JSON, rounded."""
         setup, excerpt = self.key.setup, self.excerpt
         return {
             "version": VERSION,

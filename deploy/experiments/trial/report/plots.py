@@ -1,4 +1,4 @@
-"""The report's pictures, as SVG texts that need nothing from elsewhere."""
+"""The plots of the report, as SVG."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Plot:
 
 
 def plots(rows: Sequence[SetupResults]) -> list[Plot]:
-    """Those that there is data for."""
+    """The plots for which there is data."""
     rows = [row for row in rows if row.done]
     made = [
         _per_setup(rows, "rmse_deg", "Same-instant tracking error",
@@ -190,7 +190,7 @@ def _motion(rows: Sequence[SetupResults]) -> Plot | None:
 
 
 def _places(axes: Axes, rows: Sequence[SetupResults]) -> list[float]:
-    """Where each row stands along x: networks set apart, the transport named under it, the network above."""
+    """The x position of each setup: networks apart, the transport below, the network above."""
     places, labels, x, before = [], [], 0.0, None
     for row in rows:
         profile = row.setup.profile

@@ -27,11 +27,11 @@ class Ranked:
     figures: str
     """The task's figures, in words."""
     costs: str
-    """What it loses most points by; empty where it loses none."""
+    """The value that costs it most points; empty where none does."""
 
     @property
     def fit(self) -> bool:
-        """Whether it is ranked."""
+        """Whether the setup is ranked."""
         return self.score is not None and not self.barred
 
 
@@ -50,7 +50,7 @@ class Ranking:
 
     @property
     def ties(self) -> list[Ranked]:
-        """Those that these repeats do not tell apart from the best."""
+        """The setups whose score these repeats do not separate from the best."""
         best = self.best
         if best is None or best.score is None:
             return []
@@ -58,7 +58,7 @@ class Ranking:
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """The ranking as one sentence."""
         best = self.best
         if best is None or best.score is None:
             return "no setup is fit"
@@ -66,7 +66,7 @@ class Ranking:
         if best.costs:
             words += f", loses most by {best.costs}"
         if self.ties:
-            words += f". These repeats do not tell it from {_listed([t.setup.name for t in self.ties])}"
+            words += f". These repeats do not separate it from {_listed([t.setup.name for t in self.ties])}"
         if best.score.count < 2:
             words += ". One repeat only: no spread is known"
         return words

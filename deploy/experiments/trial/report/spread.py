@@ -13,7 +13,7 @@ from deploy.experiments.trial.cell.result import Cell, CellStatus
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """One figure over the repeats that measured it: with so few of them, all there is to say of them."""
+    """One value over the repeats that measured it: median and range, as there are only a few."""
 
     median: float
     low: float
@@ -21,7 +21,7 @@ class Spread:
     count: int
 
     def overlaps(self, other: Spread) -> bool:
-        """Whether the repeats of the two lie among each other: the figure does not tell them apart."""
+        """Whether the two ranges overlap, so that the value does not separate the two setups."""
         return self.low <= other.high and other.low <= self.high
 
 
@@ -31,18 +31,18 @@ class SetupResults:
 
     setup: Setup
     cells: Sequence[Cell]
-    """Those there are, in the order of their repetitions."""
+    """The cells that exist, in the order of their repetitions."""
     spreads: Mapping[str, Spread]
-    """By figure; none where no repeat measured it."""
+    """By name; missing where no repeat measured it."""
 
     @property
     def done(self) -> Sequence[Cell]:
-        """Those that measured."""
+        """The cells with a result."""
         return [cell for cell in self.cells if cell.status is CellStatus.DONE]
 
     @property
     def failed(self) -> Sequence[Cell]:
-        """Those that were run and came to nothing."""
+        """The cells that ran without a result."""
         return [cell for cell in self.cells if cell.status is CellStatus.FAILED]
 
     @property
@@ -51,7 +51,7 @@ class SetupResults:
         return list(dict.fromkeys(cell.why for cell in self.cells if cell.status is not CellStatus.DONE))
 
     def median(self, name: str) -> float | None:
-        """Of one figure."""
+        """The median of one value."""
         spread = self.spreads.get(name)
         return None if spread is None else spread.median
 

@@ -12,7 +12,7 @@ from common.errors import ConfigMistake
 from deploy.experiments.trial.cell.figures import BY_NAME
 
 TASKS = Path(__file__).with_name("tasks.toml")
-"""Those that come with the project."""
+"""The tasks that come with the project."""
 
 
 class Criterion(Section):
@@ -37,7 +37,7 @@ class Task(Section):
     name: str
     title: str
     needs: str
-    """In words."""
+    """What the task needs, as a sentence."""
     must: dict[str, float] = Field(default_factory=dict)
     """Figures and the most each may be in any repeat."""
     criteria: list[Criterion] = Field(min_length=1)

@@ -1,4 +1,4 @@
-"""From a folder's cells to its report: `report.html`, `report.json`, `cells.csv`. Run again, equal files."""
+"""Writes `report.html`, `report.json` and `cells.csv`. Equal cells give equal files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ HTML, JSON, CSV = "report.html", "report.json", "cells.csv"
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What a folder's cells say."""
+    """What a report holds."""
 
     plan: TrialPlan
     rows: list[SetupResults]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Grade(StrEnum):
+class Health(StrEnum):
     """How a check ended."""
 
     OK = "ok"
@@ -22,7 +22,7 @@ class Finding:
     """One row of the report."""
 
     check: str
-    verdict: Grade
+    verdict: Health
     found: str
     advice: str = ""
     """What to do; empty where there is nothing to do."""
@@ -30,20 +30,20 @@ class Finding:
 
 def ok(check: str, found: str, advice: str = "") -> Finding:
     """All is well; the advice is for those who want it better."""
-    return Finding(check, Grade.OK, found, advice)
+    return Finding(check, Health.OK, found, advice)
 
 
 def warn(check: str, found: str, advice: str) -> Finding:
     """Not as it should be."""
-    return Finding(check, Grade.WARN, found, advice)
+    return Finding(check, Health.WARN, found, advice)
 
 
 def fail(check: str, found: str, advice: str) -> Finding:
     """It must be mended first."""
-    return Finding(check, Grade.FAIL, found, advice)
+    return Finding(check, Health.FAIL, found, advice)
 
 
-def worst(findings: Sequence[Finding]) -> Grade:
+def worst(findings: Sequence[Finding]) -> Health:
     """Of all findings; ok where there is none."""
-    order = list(Grade)
-    return max((finding.verdict for finding in findings), key=order.index, default=Grade.OK)
+    order = list(Health)
+    return max((finding.verdict for finding in findings), key=order.index, default=Health.OK)

@@ -40,7 +40,7 @@ def test_cells_that_failed_are_told_with_the_targets(tmp_path: Path) -> None:
         folder.keep(one)
     out = io.StringIO()
     print_findings(find(folder), Console(file=out, width=120))
-    assert "1 failed: run, and came to nothing" in out.getvalue()
+    assert "1 failed: ran without a result" in out.getvalue()
     [flow] = [line for line in out.getvalue().splitlines() if "flow after outage  " in line]
     assert "failed" in flow
     assert "1 failed" in flow

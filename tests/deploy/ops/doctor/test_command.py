@@ -12,7 +12,7 @@ from rich.console import Console
 
 from common.errors import ConfigError, TandemError
 from deploy import cli
-from deploy.ops.doctor.judge.finding import Grade, fail, ok, warn, worst
+from deploy.ops.doctor.judge.finding import Health, fail, ok, warn, worst
 from deploy.ops.doctor.judge.needs import CameraNeed, needs_of
 from deploy.ops.doctor.view import as_table, as_tree, in_words
 from master.suit.protocol import SHIPPED_DBC, SuitProtocol
@@ -80,7 +80,7 @@ def test_the_report_says_what_was_found_and_what_to_do() -> None:
 
 
 def test_the_worst_decides() -> None:
-    assert [worst(FOUND[:n]) for n in range(4)] == [Grade.OK, Grade.OK, Grade.WARN, Grade.FAIL]
+    assert [worst(FOUND[:n]) for n in range(4)] == [Health.OK, Health.OK, Health.WARN, Health.FAIL]
 
 
 @pytest.mark.parametrize("fails", [True, False])

@@ -12,7 +12,7 @@ from common.can.config import BusConfig
 from common.can.interface import RECEIVE_BUFFER_BYTES
 from deploy.ops.doctor.judge.can import BUSY, judge_buses, judge_interfaces, share_of_time
 from deploy.ops.doctor.judge.devices import judge_camera, judge_port
-from deploy.ops.doctor.judge.finding import Grade
+from deploy.ops.doctor.judge.finding import Health
 from deploy.ops.doctor.judge.machine import (
     ENOUGH_MEMORY_BYTES,
     LITTLE_DISK_BYTES,
@@ -79,7 +79,7 @@ def need(channel: str = "can0", fd: bool = True, nodes: int = 0, interface: str 
     return BusNeed(BusConfig(name="suit", interface=interface, channel=channel, fd=fd), nodes, 200.0)
 
 
-def of_bus(host: Host, wanted: BusNeed, link: dict[str, object] | None = None) -> tuple[Grade, str, str]:
+def of_bus(host: Host, wanted: BusNeed, link: dict[str, object] | None = None) -> tuple[Health, str, str]:
     text = json.dumps([CAN0 if link is None else link])
     [finding] = judge_buses((wanted,), read_can(host.tree, text))
     return finding.verdict, finding.found, finding.advice
@@ -87,33 +87,33 @@ def of_bus(host: Host, wanted: BusNeed, link: dict[str, object] | None = None) -
 
 def test_a_bus_that_is_up_and_fast_enough_is_well(host: Host) -> None:
     verdict, found, _ = of_bus(host.interface(), need(nodes=36))
-    assert verdict is Grade.OK
+    assert verdict is Health.OK
     assert "CAN FD, 1 Mbit/s / 5 Mbit/s; 36 nodes take" in found
 
 
 def test_an_interface_that_is_missing_names_those_that_are_there(host: Host) -> None:
     host.interface("can1").interface("eth0", mtu=1500, kind=1)
     verdict, found, advice = of_bus(host, need())
-    assert (verdict, found) == (Grade.FAIL, "no CAN interface can0 (there: can1)")
+    assert (verdict, found) == (Health.FAIL, "no CAN interface can0 (there: can1)")
     assert "ip link" in advice
 
 
 def test_one_that_is_down_is_brought_up_by_its_unit(host: Host) -> None:
     verdict, _, advice = of_bus(host.interface(flags=0x40), need())
-    assert (verdict, advice) == (Grade.FAIL, "systemctl enable --now tandem-can@can0")
+    assert (verdict, advice) == (Health.FAIL, "systemctl enable --now tandem-can@can0")
 
 
 def test_fd_is_asked_for_only_where_the_file_says_so(host: Host) -> None:
     host.interface(mtu=16)
-    assert of_bus(host, need(fd=True))[0] is Grade.FAIL
-    assert of_bus(host, need(fd=False))[0] is Grade.OK
+    assert of_bus(host, need(fd=True))[0] is Health.FAIL
+    assert of_bus(host, need(fd=False))[0] is Health.OK
 
 
 @pytest.mark.parametrize(
     ("state", "verdict"),
-    [("ERROR-ACTIVE", Grade.OK), ("ERROR-PASSIVE", Grade.WARN), ("BUS-OFF", Grade.FAIL)],
+    [("ERROR-ACTIVE", Health.OK), ("ERROR-PASSIVE", Health.WARN), ("BUS-OFF", Health.FAIL)],
 )
-def test_the_controller_s_own_state_counts(host: Host, state: str, verdict: Grade) -> None:
+def test_the_controller_s_own_state_counts(host: Host, state: str, verdict: Health) -> None:
     data = {**CAN0["linkinfo"]["info_data"], "state": state}  # type: ignore[index]
     assert of_bus(host.interface(), need(), {"ifname": "can0", "linkinfo": {"info_data": data}})[0] is verdict
 
@@ -123,9 +123,9 @@ def test_too_many_nodes_for_a_bus_are_told_before_they_are_late(host: Host) -> N
     one = share_of_time(need(nodes=1), 1_000_000, 5_000_000)
     fit, fill = int(BUSY / one), int(1.0 / one)
     assert 36 <= fit < fill  # the whole suit fits at 5 Mbit/s, as it does on the emulated bus
-    assert of_bus(host, need(nodes=fit))[0] is Grade.OK
-    assert of_bus(host, need(nodes=fit + 1))[0] is Grade.WARN
-    assert of_bus(host, need(nodes=fill + 1))[0] is Grade.FAIL
+    assert of_bus(host, need(nodes=fit))[0] is Health.OK
+    assert of_bus(host, need(nodes=fit + 1))[0] is Health.WARN
+    assert of_bus(host, need(nodes=fill + 1))[0] is Health.FAIL
 
 
 def test_classic_can_carries_eight_nodes_and_no_suit() -> None:
@@ -135,12 +135,12 @@ def test_classic_can_carries_eight_nodes_and_no_suit() -> None:
 
 def test_bit_rates_that_cannot_be_asked_for_are_left_out(host: Host) -> None:
     [finding] = judge_buses((need(nodes=36),), read_can(host.interface().tree, None))
-    assert (finding.verdict, finding.found) == (Grade.OK, "can0 is up, CAN FD")
+    assert (finding.verdict, finding.found) == (Health.OK, "can0 is up, CAN FD")
     assert read_can(host.tree, "no json")["can0"].bitrate == 0
 
 
 def test_a_bus_that_is_no_interface_is_not_looked_for(host: Host) -> None:
-    assert of_bus(host, need("239.74.163.2", interface="udp_multicast"))[0] is Grade.OK
+    assert of_bus(host, need("239.74.163.2", interface="udp_multicast"))[0] is Health.OK
 
 
 def test_without_a_file_what_there_is_is_listed(host: Host) -> None:
@@ -160,53 +160,53 @@ def test_ip_of_this_host_is_understood() -> None:
 @pytest.mark.parametrize(
     ("priority", "limit", "capabilities", "verdict"),
     [
-        (20, 19, 0, Grade.WARN),
-        (20, 20, 0, Grade.OK),
-        (20, "unlimited", 0, Grade.OK),
-        (20, 0, 1 << 23, Grade.OK),
-        (20, 0, 1 << 22, Grade.WARN),
-        (0, 0, 0, Grade.OK),
+        (20, 19, 0, Health.WARN),
+        (20, 20, 0, Health.OK),
+        (20, "unlimited", 0, Health.OK),
+        (20, 0, 1 << 23, Health.OK),
+        (20, 0, 1 << 22, Health.WARN),
+        (0, 0, 0, Health.OK),
     ],
 )
 def test_a_priority_needs_the_limit_or_the_capability(
-    host: Host, priority: int, limit: object, capabilities: int, verdict: Grade
+    host: Host, priority: int, limit: object, capabilities: int, verdict: Health
 ) -> None:
     facts = read_process(host.process(limit, capabilities).tree)
     finding = judge_realtime(priority, facts)
     assert finding.verdict is verdict
-    assert ("rtprio 20" in finding.advice) == (verdict is Grade.WARN)
+    assert ("rtprio 20" in finding.advice) == (verdict is Health.WARN)
 
 
 def test_throttled_real_time_threads_are_told(host: Host) -> None:
     host.process(priority=50).put("/proc/sys/kernel/sched_rt_period_us", 1_000_000)
-    for runtime_us, verdict in ((950_000, Grade.OK), (-1, Grade.OK), (500_000, Grade.WARN)):
+    for runtime_us, verdict in ((950_000, Health.OK), (-1, Health.OK), (500_000, Health.WARN)):
         host.put("/proc/sys/kernel/sched_rt_runtime_us", runtime_us)
         assert judge_realtime(20, read_process(host.tree)).verdict is verdict
 
 
 def test_swap_is_told_where_nothing_is_locked(host: Host) -> None:
     facts = read_process(host.process(memlock=65536).tree)
-    assert judge_memory_lock(0, facts, 0).verdict is Grade.OK
+    assert judge_memory_lock(0, facts, 0).verdict is Health.OK
     finding = judge_memory_lock(0, facts, 2 << 30)
-    assert (finding.verdict, "2.0 GB" in finding.found) == (Grade.WARN, True)
+    assert (finding.verdict, "2.0 GB" in finding.found) == (Health.WARN, True)
 
 
 def test_with_a_priority_memory_needs_to_be_lockable_whole(host: Host) -> None:
     facts = read_process(host.process(memlock=65536).tree)
     finding = judge_memory_lock(20, facts, 0)
-    assert (finding.verdict, "64 kB" in finding.found) == (Grade.WARN, True)
+    assert (finding.verdict, "64 kB" in finding.found) == (Health.WARN, True)
     assert "LimitMEMLOCK" in finding.advice
     unlimited = read_process(host.process(memlock="unlimited").tree)
-    assert judge_memory_lock(20, unlimited, 1).verdict is Grade.OK
+    assert judge_memory_lock(20, unlimited, 1).verdict is Health.OK
     capable = read_process(host.process(memlock=65536, capabilities=1 << 14).tree)
-    assert judge_memory_lock(20, capable, 1).verdict is Grade.OK
+    assert judge_memory_lock(20, capable, 1).verdict is Health.OK
 
 
 def test_trials_need_a_capability_and_a_device(host: Host) -> None:
     facts = read_process(host.process().tree)
     assert "no CAP_NET_ADMIN and no /dev/net/tun" in judge_networks(facts).found
     host.process(capabilities=1 << 12).put("/dev/net/tun", "")
-    assert judge_networks(read_process(host.tree)).verdict is Grade.OK
+    assert judge_networks(read_process(host.tree)).verdict is Health.OK
 
 
 def well(host: Host) -> Host:
@@ -220,34 +220,34 @@ def well(host: Host) -> Host:
     return host.put("/proc/sys/net/core/rmem_max", RECEIVE_BUFFER_BYTES)
 
 
-def verdicts(host: Host) -> dict[str, Grade]:
+def verdicts(host: Host) -> dict[str, Health]:
     return {finding.check: finding.verdict for finding in judge_machine(read_machine(host.tree))}
 
 
 def test_a_machine_that_is_well(host: Host) -> None:
     facts = read_machine(well(host).tree)
     assert (facts.cores, facts.isolated, facts.preemption) == (4, "2-3", "rt")
-    assert set(verdicts(host).values()) == {Grade.OK}
+    assert set(verdicts(host).values()) == {Health.OK}
 
 
 @pytest.mark.parametrize(
     ("path", "text", "check", "verdict"),
     [
-        ("/sys/devices/system/cpu/cpu3/cpufreq/scaling_governor", "powersave", "CPU governor", Grade.WARN),
-        ("/proc/loadavg", "4.00 1 1", "load", Grade.OK),
-        ("/proc/loadavg", "4.01 1 1", "load", Grade.WARN),
-        ("/proc/meminfo", f"MemAvailable: {ENOUGH_MEMORY_BYTES // 1024} kB", "memory", Grade.OK),
-        ("/proc/meminfo", f"MemAvailable: {ENOUGH_MEMORY_BYTES // 1024 - 1} kB", "memory", Grade.FAIL),
+        ("/sys/devices/system/cpu/cpu3/cpufreq/scaling_governor", "powersave", "CPU governor", Health.WARN),
+        ("/proc/loadavg", "4.00 1 1", "load", Health.OK),
+        ("/proc/loadavg", "4.01 1 1", "load", Health.WARN),
+        ("/proc/meminfo", f"MemAvailable: {ENOUGH_MEMORY_BYTES // 1024} kB", "memory", Health.OK),
+        ("/proc/meminfo", f"MemAvailable: {ENOUGH_MEMORY_BYTES // 1024 - 1} kB", "memory", Health.FAIL),
     ],
 )
-def test_what_ails_a_machine(host: Host, path: str, text: str, check: str, verdict: Grade) -> None:
+def test_what_ails_a_machine(host: Host, path: str, text: str, check: str, verdict: Health) -> None:
     well(host).put(path, text)
     assert verdicts(host)[check] is verdict
 
 
 def test_one_core_is_few(host: Host) -> None:
     host.put("/sys/devices/system/cpu/cpu0/online", 1)
-    assert verdicts(host)["cores"] is Grade.WARN
+    assert verdicts(host)["cores"] is Health.WARN
 
 
 @pytest.mark.parametrize(
@@ -266,9 +266,9 @@ def test_how_a_kernel_gives_way(host: Host, version: str, kind: str) -> None:
 def test_the_socket_buffer_matters_to_multicast_alone(host: Host) -> None:
     multicast = (need("239.74.163.2", interface="udp_multicast"),)
     facts = read_machine(well(host).tree)
-    assert [f.verdict for f in judge_receive_buffer(multicast, facts)] == [Grade.OK]
+    assert [f.verdict for f in judge_receive_buffer(multicast, facts)] == [Health.OK]
     small = read_machine(host.put("/proc/sys/net/core/rmem_max", RECEIVE_BUFFER_BYTES - 1).tree)
-    assert [f.verdict for f in judge_receive_buffer(multicast, small)] == [Grade.WARN]
+    assert [f.verdict for f in judge_receive_buffer(multicast, small)] == [Health.WARN]
     assert judge_receive_buffer((need(),), small) == []
 
 
@@ -281,14 +281,14 @@ def test_an_empty_tree_is_read_without_an_error(host: Host) -> None:
 @pytest.mark.parametrize(
     ("free", "verdict"),
     [
-        (LITTLE_DISK_BYTES, Grade.OK),
-        (LITTLE_DISK_BYTES - 1, Grade.WARN),
-        (NO_DISK_BYTES, Grade.WARN),
-        (NO_DISK_BYTES - 1, Grade.FAIL),
-        (None, Grade.WARN),
+        (LITTLE_DISK_BYTES, Health.OK),
+        (LITTLE_DISK_BYTES - 1, Health.WARN),
+        (NO_DISK_BYTES, Health.WARN),
+        (NO_DISK_BYTES - 1, Health.FAIL),
+        (None, Health.WARN),
     ],
 )
-def test_room_for_recordings(free: int | None, verdict: Grade) -> None:
+def test_room_for_recordings(free: int | None, verdict: Health) -> None:
     assert judge_disk("/var/lib/tandem", free).verdict is verdict
 
 
@@ -300,19 +300,19 @@ def test_the_disk_of_a_folder_that_is_not_there(tmp_path: Path) -> None:
 def test_the_date_is_for_people() -> None:
     assert clock_is_synchronised() in (True, False, None)
     assert [judge_clock(state).verdict for state in (True, False, None)] == [
-        Grade.OK,
-        Grade.WARN,
-        Grade.OK,
+        Health.OK,
+        Health.WARN,
+        Health.OK,
     ]
 
 
 def test_a_serial_port_is_there_usable_or_a_url(host: Host) -> None:
     port = "/dev/ttyUSB0"
-    assert judge_port(port, read_device(host.tree, port)).verdict is Grade.FAIL
+    assert judge_port(port, read_device(host.tree, port)).verdict is Health.FAIL
     host.put(port, "")
-    assert judge_port(port, read_device(host.tree, port)).verdict is Grade.OK
+    assert judge_port(port, read_device(host.tree, port)).verdict is Health.OK
     assert "dialout" in judge_port(port, Device(port, there=True, usable=False)).advice
-    assert judge_port("socket://10.0.0.7:4000", None).verdict is Grade.OK
+    assert judge_port("socket://10.0.0.7:4000", None).verdict is Health.OK
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may use every device")
@@ -325,12 +325,12 @@ def test_a_camera_is_never_fatal(host: Host) -> None:
     there, missing = Device("/dev/video0", True, True), Device("/dev/video0", False, False)
     forbidden = Device("/dev/video0", True, False)
 
-    def verdict(source: CameraNeed, device: Device, egl: bool = True, v4l2: bool = True) -> Grade:
+    def verdict(source: CameraNeed, device: Device, egl: bool = True, v4l2: bool = True) -> Health:
         return judge_camera(source, device, egl, v4l2).verdict
 
-    assert verdict(CameraNeed.OFF, missing, egl=False, v4l2=False) is Grade.OK
-    assert verdict(CameraNeed.DRAWN, missing) is Grade.OK
-    assert verdict(CameraNeed.DRAWN, missing, egl=False) is Grade.WARN
-    assert verdict(CameraNeed.V4L2, there) is Grade.OK
-    assert verdict(CameraNeed.V4L2, there, v4l2=False) is Grade.WARN
-    assert verdict(CameraNeed.V4L2, missing) is verdict(CameraNeed.V4L2, forbidden) is Grade.WARN
+    assert verdict(CameraNeed.OFF, missing, egl=False, v4l2=False) is Health.OK
+    assert verdict(CameraNeed.DRAWN, missing) is Health.OK
+    assert verdict(CameraNeed.DRAWN, missing, egl=False) is Health.WARN
+    assert verdict(CameraNeed.V4L2, there) is Health.OK
+    assert verdict(CameraNeed.V4L2, there, v4l2=False) is Health.WARN
+    assert verdict(CameraNeed.V4L2, missing) is verdict(CameraNeed.V4L2, forbidden) is Health.WARN

@@ -24,7 +24,7 @@ from deploy.certificates.folder import stem, write_pair
 from deploy.certificates.make import new_authority, new_identity
 from deploy.ops.doctor.examine import others
 from deploy.ops.doctor.judge.endpoints import judge_endpoint
-from deploy.ops.doctor.judge.finding import Finding, Grade
+from deploy.ops.doctor.judge.finding import Finding, Health
 from deploy.ops.doctor.judge.keys import SOON_DAYS, judge_keys
 from deploy.ops.doctor.judge.needs import Needs
 from deploy.ops.doctor.judge.robots import OLDEST_MS, judge_robot
@@ -43,7 +43,7 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
-def by_check(findings: list[Finding]) -> dict[str, Grade]:
+def by_check(findings: list[Finding]) -> dict[str, Health]:
     return {finding.check: finding.verdict for finding in findings}
 
 
@@ -67,7 +67,7 @@ def test_real_keys_are_read(tmp_path: Path) -> None:
     assert (facts.trouble, facts.common_name, facts.open_to_all) == ("", "robot:robot-1", False)
     assert "127.0.0.1" in facts.hosts
     assert 299.0 < facts.days_left <= 300.0
-    assert set(by_check(judge_keys(slave(tls), facts)).values()) == {Grade.OK}
+    assert set(by_check(judge_keys(slave(tls), facts)).values()) == {Health.OK}
 
 
 def test_keys_that_prove_nothing_are_fatal(tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ def test_keys_that_prove_nothing_are_fatal(tmp_path: Path) -> None:
     missing = read_keys(tls, datetime.now(UTC))
     assert "cannot be read" in missing.trouble
     for facts in (expired, missing):
-        assert by_check(judge_keys(slave(tls), facts)) == {"certificate": Grade.FAIL}
+        assert by_check(judge_keys(slave(tls), facts)) == {"certificate": Health.FAIL}
 
 
 def test_a_key_that_everybody_can_read(tmp_path: Path) -> None:
@@ -87,28 +87,28 @@ def test_a_key_that_everybody_can_read(tmp_path: Path) -> None:
     assert not read_keys(tls, datetime.now(UTC)).open_to_all
     tls.key.chmod(0o644)
     facts = read_keys(tls, datetime.now(UTC))
-    assert by_check(judge_keys(slave(tls), facts))["key"] is Grade.WARN
+    assert by_check(judge_keys(slave(tls), facts))["key"] is Health.WARN
 
 
 def test_a_certificate_for_another_name_or_for_no_host(tmp_path: Path) -> None:
     tls = tls_of(tmp_path)
     other = KeyFacts("", "robot:robot-2", (), 300.0)
-    assert by_check(judge_keys(slave(tls), other))["certificate's name"] is Grade.WARN
+    assert by_check(judge_keys(slave(tls), other))["certificate's name"] is Health.WARN
     checks = by_check(judge_keys(slave(tls, access=True), other))
-    assert checks["certificate's name"] is Grade.FAIL  # access control would refuse it
-    assert checks["certificate's hosts"] is Grade.FAIL
+    assert checks["certificate's name"] is Health.FAIL  # access control would refuse it
+    assert checks["certificate's hosts"] is Health.FAIL
 
 
 def test_the_days_that_are_left() -> None:
-    for days, verdict in ((SOON_DAYS, Grade.OK), (SOON_DAYS - 0.01, Grade.WARN)):
+    for days, verdict in ((SOON_DAYS, Health.OK), (SOON_DAYS - 0.01, Health.WARN)):
         facts = KeyFacts("", "robot:robot-1", ("h",), days)
         assert by_check(judge_keys(Needs("slave"), facts))["certificate's time"] is verdict
 
 
 def test_a_link_without_keys_is_open_to_all() -> None:
-    assert by_check(judge_keys(Needs("slave"), None)) == {"certificate": Grade.OK}
+    assert by_check(judge_keys(Needs("slave"), None)) == {"certificate": Health.OK}
     link = LinkConfig(listen=["tcp/0.0.0.0:7447"])
-    assert by_check(judge_keys(Needs("slave", link=link), None)) == {"certificate": Grade.WARN}
+    assert by_check(judge_keys(Needs("slave", link=link), None)) == {"certificate": Health.WARN}
 
 
 def test_knocking_at_a_door_that_is_open_and_at_one_that_is_not() -> None:
@@ -133,7 +133,7 @@ def test_knocking_at_a_door_that_is_open_and_at_one_that_is_not() -> None:
 def test_every_answer_is_judged_with_what_to_do(answer: EndpointState) -> None:
     finding = judge_endpoint(EndpointFacts("tcp/h:1", answer))
     well = answer in (EndpointState.ACCEPTS, EndpointState.UNASKED, EndpointState.FREE)
-    assert (finding.verdict is Grade.OK) == well
+    assert (finding.verdict is Health.OK) == well
     assert bool(finding.advice) != well
 
 
@@ -149,47 +149,47 @@ def robot(trips: tuple[float, ...] = (10.0,) * EXCHANGES, **others: object) -> R
 
 
 def test_a_robot_that_is_well() -> None:
-    assert set(by_check(judge_robot(robot(), OURS)).values()) == {Grade.OK}
+    assert set(by_check(judge_robot(robot(), OURS)).values()) == {Health.OK}
 
 
 @pytest.mark.parametrize(
     ("trips", "verdict"),
     [
-        ((OLDEST_MS,) * EXCHANGES, Grade.OK),
-        ((OLDEST_MS,) * (EXCHANGES - 1), Grade.WARN),  # one was lost
-        ((*(10.0,) * (EXCHANGES - 1), OLDEST_MS * 1.01), Grade.WARN),
-        ((2 * OLDEST_MS,) * EXCHANGES, Grade.WARN),
-        ((2.01 * OLDEST_MS,) * EXCHANGES, Grade.FAIL),
-        ((), Grade.FAIL),
+        ((OLDEST_MS,) * EXCHANGES, Health.OK),
+        ((OLDEST_MS,) * (EXCHANGES - 1), Health.WARN),  # one was lost
+        ((*(10.0,) * (EXCHANGES - 1), OLDEST_MS * 1.01), Health.WARN),
+        ((2 * OLDEST_MS,) * EXCHANGES, Health.WARN),
+        ((2.01 * OLDEST_MS,) * EXCHANGES, Health.FAIL),
+        ((), Health.FAIL),
     ],
 )
-def test_a_way_that_is_too_long_for_the_guard(trips: tuple[float, ...], verdict: Grade) -> None:
+def test_a_way_that_is_too_long_for_the_guard(trips: tuple[float, ...], verdict: Health) -> None:
     assert by_check(judge_robot(robot(trips), OURS))["robot-1: round trip"] is verdict
 
 
 @pytest.mark.parametrize(
     ("theirs", "verdict"),
     [
-        (OURS, Grade.OK),
-        (replace(OURS, python="3.13"), Grade.OK),
-        (replace(OURS, tandem="1.3"), Grade.WARN),
-        (replace(OURS, zenoh="1.9"), Grade.WARN),
-        (replace(OURS, schema=4), Grade.FAIL),
-        (None, Grade.WARN),
+        (OURS, Health.OK),
+        (replace(OURS, python="3.13"), Health.OK),
+        (replace(OURS, tandem="1.3"), Health.WARN),
+        (replace(OURS, zenoh="1.9"), Health.WARN),
+        (replace(OURS, schema=4), Health.FAIL),
+        (None, Health.WARN),
     ],
 )
-def test_two_hosts_with_other_software(theirs: Software | None, verdict: Grade) -> None:
+def test_two_hosts_with_other_software(theirs: Software | None, verdict: Health) -> None:
     finding = judge_robot(robot(software=theirs), OURS)[-1]
     assert (finding.check, finding.verdict) == ("robot-1: versions", verdict)
 
 
 def test_a_robot_that_does_not_answer_or_in_another_schema() -> None:
     [silent] = judge_robot(RobotFacts("robot-1", "", "does not answer at tcp/h:1"), OURS)
-    assert (silent.check, silent.verdict) == ("robot-1", Grade.FAIL)
+    assert (silent.check, silent.verdict) == ("robot-1", Health.FAIL)
     [other] = judge_robot(RobotFacts("robot-1", "", "schema version 3, expected 2"), OURS)
-    assert (other.check, other.verdict) == ("robot-1: versions", Grade.FAIL)
+    assert (other.check, other.verdict) == ("robot-1: versions", Health.FAIL)
     [two] = judge_robot(RobotFacts("robot-1", "", several_bear("robot-1", ["room 1", "room 2"])), OURS)
-    assert (two.check, two.verdict) == ("robot-1: names", Grade.FAIL)
+    assert (two.check, two.verdict) == ("robot-1: names", Health.FAIL)
     assert "room 1 and room 2" in two.found
 
 
@@ -231,10 +231,10 @@ def test_a_robot_is_asked_over_a_real_link() -> None:
     assert abs(facts.offset_ms) <= facts.bound_ms
     assert facts.software == software()
     checks = by_check(found)
-    assert checks[f"connect {endpoint}"] is checks["robot-1: versions"] is Grade.OK
+    assert checks[f"connect {endpoint}"] is checks["robot-1: versions"] is Health.OK
 
 
 def test_a_robot_that_is_not_there_is_one_row_of_the_report() -> None:
     needs = Needs("master", link=LinkConfig(connect=[free_endpoint()]), robots=("robot-1",))
     checks = by_check(list(asyncio.run(others(needs))))
-    assert list(checks.values()) == [Grade.FAIL, Grade.FAIL]
+    assert list(checks.values()) == [Health.FAIL, Health.FAIL]

@@ -11,7 +11,7 @@ from common.link import open_session
 from common.link.config import LinkConfig
 from common.wire.path_probe import answer_probe
 from common.wire.topics import PATH
-from deploy.ops.doctor.judge.finding import Grade
+from deploy.ops.doctor.judge.finding import Health
 from deploy.ops.doctor.judge.path import judge_path
 from deploy.ops.doctor.read.path import SIZES, PathFacts, read_path
 
@@ -21,19 +21,19 @@ ALL = max(SIZES)
 @pytest.mark.parametrize(
     ("there", "back", "verdict", "words"),
     [
-        (ALL, ALL, Grade.OK, "up to 16000 bytes pass both ways"),
-        (1100, ALL, Grade.WARN, "messages of more than 1100 bytes to the robot vanish"),
-        (ALL, 1350, Grade.WARN, "messages of more than 1350 bytes from the robot vanish"),
-        (64, 1100, Grade.FAIL, "commands and states do not pass safely"),
+        (ALL, ALL, Health.OK, "up to 16000 bytes pass both ways"),
+        (1100, ALL, Health.WARN, "messages of more than 1100 bytes to the robot vanish"),
+        (ALL, 1350, Health.WARN, "messages of more than 1350 bytes from the robot vanish"),
+        (64, 1100, Health.FAIL, "commands and states do not pass safely"),
     ],
 )
 def test_what_does_not_pass_is_named_with_what_to_do(
-    there: int, back: int, verdict: Grade, words: str
+    there: int, back: int, verdict: Health, words: str
 ) -> None:
     [finding] = judge_path(PathFacts("robot-1", there, back))
     assert finding.verdict is verdict
     assert words in finding.found
-    assert ("quic" in finding.advice) == (verdict is not Grade.OK)
+    assert ("quic" in finding.advice) == (verdict is not Health.OK)
 
 
 def test_a_robot_that_answers_no_probe_is_not_judged() -> None:

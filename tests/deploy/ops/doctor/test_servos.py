@@ -11,7 +11,7 @@ import pytest
 from common.can.config import BusConfig
 from deploy.ops.doctor.judge.can import judge_buses
 from deploy.ops.doctor.judge.devices import judge_latency
-from deploy.ops.doctor.judge.finding import Grade
+from deploy.ops.doctor.judge.finding import Health
 from deploy.ops.doctor.judge.needs import BusNeed
 from deploy.ops.doctor.read.can import CanInterface
 from deploy.ops.doctor.read.servos import PINGS, Pinged, ping_servos
@@ -48,14 +48,14 @@ def test_servos_are_pinged_past_a_silent_one_and_nothing_is_written(port: Simula
     found, config = pinged(port, reply_timeout_s=0.1)
     assert found.answers == PINGS
     assert bytes(servo._table) == before
-    assert judge_latency(found, config.reply_timeout_s).verdict is Grade.OK
+    assert judge_latency(found, config.reply_timeout_s).verdict is Health.OK
 
 
 def test_a_late_port_fails_and_the_latency_timer_is_named(port: SimulatedPort) -> None:
     port.garble = late_by(0.017)
     found, config = pinged(port)
     finding = judge_latency(found, config.reply_timeout_s)
-    assert finding.verdict is Grade.FAIL
+    assert finding.verdict is Health.FAIL
     assert "all would be called silent" in finding.found
     assert "latency timer" in finding.advice
 
@@ -63,22 +63,22 @@ def test_a_late_port_fails_and_the_latency_timer_is_named(port: SimulatedPort) -
 @pytest.mark.parametrize(
     ("timer", "quickest_s", "verdict"),
     [
-        (16, 0.0162, Grade.FAIL),
-        (16, 0.0035, Grade.WARN),
-        (16, None, Grade.FAIL),
-        (1, 0.0012, Grade.OK),
-        (None, 0.0012, Grade.OK),
-        (None, None, Grade.OK),
-        (1, 0.0041, Grade.FAIL),
+        (16, 0.0162, Health.FAIL),
+        (16, 0.0035, Health.WARN),
+        (16, None, Health.FAIL),
+        (1, 0.0012, Health.OK),
+        (None, 0.0012, Health.OK),
+        (None, None, Health.OK),
+        (1, 0.0041, Health.FAIL),
     ],
 )
 def test_timer_and_measurement_are_judged(
-    timer: int | None, quickest_s: float | None, verdict: Grade
+    timer: int | None, quickest_s: float | None, verdict: Health
 ) -> None:
     found = Pinged("/dev/ttyUSB0", timer, quickest_s, PINGS, "the port is in use")
     finding = judge_latency(found, 0.004)
     assert finding.verdict is verdict
-    if verdict is not Grade.OK and timer == 16:
+    if verdict is not Health.OK and timer == 16:
         assert "latency timer of ttyUSB0 is 16 ms: set it to 1 ms" in finding.advice
 
 
@@ -90,15 +90,15 @@ def test_a_port_that_cannot_be_opened_and_one_that_must_not_be(tmp_path: Path) -
 
 @pytest.mark.parametrize(
     ("drives", "bitrate", "verdict"),
-    [(25, 1_000_000, Grade.FAIL), (18, 1_000_000, Grade.WARN), (12, 1_000_000, Grade.OK),
-     (12, 500_000, Grade.FAIL), (25, 0, Grade.FAIL)],
+    [(25, 1_000_000, Health.FAIL), (18, 1_000_000, Health.WARN), (12, 1_000_000, Health.OK),
+     (12, 500_000, Health.FAIL), (25, 0, Health.FAIL)],
 )  # fmt: skip
-def test_a_bus_s_load_is_judged_by_its_true_rate(drives: int, bitrate: int, verdict: Grade) -> None:
+def test_a_bus_s_load_is_judged_by_its_true_rate(drives: int, bitrate: int, verdict: Health) -> None:
     bus = BusConfig(name="left", interface="socketcan", channel="can0", fd=False)
     need = BusNeed(bus, rate_hz=200.0, drives=drives, bits_per_s=bits_per_s(drives, 200, 40, 100))
     there = CanInterface("can0", up=True, fd=False, bitrate=bitrate, state="ERROR-ACTIVE")
     (finding,) = judge_buses((need,), {"can0": there})
     assert finding.verdict is verdict
     assert f"{drives} drives at 200 Hz put" in finding.found
-    if verdict is Grade.FAIL:
+    if verdict is Health.FAIL:
         assert "sync_hz at most" in finding.advice

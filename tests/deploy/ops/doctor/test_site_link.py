@@ -22,7 +22,7 @@ from deploy import cli
 from deploy.certificates.folder import stem, write_pair
 from deploy.certificates.make import new_authority, new_identity
 from deploy.ops.doctor.examine import keys, others
-from deploy.ops.doctor.judge.finding import Finding, Grade
+from deploy.ops.doctor.judge.finding import Finding, Health
 from deploy.ops.doctor.judge.needs import needs_of
 from master.suit.protocol import SHIPPED_DBC
 from slave.config import SlaveConfig
@@ -67,7 +67,7 @@ async def examined(site: Path) -> Sequence[Finding]:
 def test_the_doctor_reaches_the_robot_with_the_operator_s_keys(site: Path) -> None:
     found = {finding.check: finding for finding in asyncio.run(examined(site))}
     for check in ("certificate's name", "certificate's time", "robot-1", "robot-1: clock"):
-        assert found[check].verdict is Grade.OK, found[check]
+        assert found[check].verdict is Health.OK, found[check]
     assert found["certificate's name"].found == "operator:nurse-1"
 
 
@@ -79,7 +79,7 @@ def test_another_authority_s_operator_is_not_let_in(site: Path) -> None:
         (site / "keys" / f"operator-nurse-1.{kind}").unlink()
     write_pair(site / "keys", "operator-nurse-1", pair)
     found = {finding.check: finding for finding in asyncio.run(examined(site))}
-    assert found["certificate"].verdict is Grade.FAIL
+    assert found["certificate"].verdict is Health.FAIL
     assert "not from the authority" in found["certificate"].found
     assert "robot-1" not in found
-    assert found["link"].verdict is Grade.FAIL
+    assert found["link"].verdict is Health.FAIL

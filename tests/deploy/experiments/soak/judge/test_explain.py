@@ -41,7 +41,7 @@ def test_after_a_robot_left_off_what_comes_has_a_reason(make: Make) -> None:
     left = happened(50.0, "left", {"guard": "hold"})
     events = (*STORY[:6], left, happened(53.0, "recovered", {"fault": "", "number": -1}))
     found = explained(make, *events)
-    assert found.why(52.0) == "after it left off"
+    assert found.why(52.0) == "after it left track"
     assert found.why(60.0) == ""
     assert unexplained_lefts(events, found) == [left]
 
