@@ -39,8 +39,8 @@ def open_port(port: str, baud: int) -> serial.Serial:
         )
     except (OSError, ValueError, serial.SerialException) as error:
         raise RobotError(
-            f"the attitude instrument's port {port} does not open ({error}): is it plugged in, is its name "
-            'right, may you use it? `--simulate` and [base] source = "simulated" need none'
+            f"the attitude instrument's port {port} does not open ({error}): check the cable, the name and "
+            'your permission; `--simulate` and [base] source = "simulated" need no port'
         ) from None
     return opened
 
@@ -63,7 +63,7 @@ class FrameReader:
     def start(self) -> None:
         """Open the port and read. Raises RobotError where it does not open now."""
         if self._thread is not None:
-            raise RobotError(f"{self._where[0]} is being read already")
+            raise RobotError(f"{self._where[0]} is already being read")
         port = open_port(*self._where)
         self._ending.clear()
         self._thread = threading.Thread(target=self._run, args=(port,), name="attitude", daemon=True)
@@ -175,7 +175,7 @@ class FrameWriter:
         try:
             self._port.write(encode(angles))
         except (OSError, serial.SerialException) as error:
-            raise RobotError(f"{self._name} takes no frame ({error}): is anyone reading it?") from None
+            raise RobotError(f"{self._name} accepts no frame ({error}): does a program read it?") from None
 
     def close(self) -> None:
         """Let go of the port."""

@@ -39,11 +39,6 @@ class CameraProcess:
         assert self._process.stdout is not None
         self._stdin, self._stdout = self._process.stdin.fileno(), self._process.stdout.fileno()
 
-    @property
-    def pid(self) -> int:
-        """The process's number."""
-        return self._process.pid
-
     def wait_ready(self) -> None:
         """Wait until it can be asked. Raises NeverError or RobotError."""
         reply = self._receive(START_S)

@@ -63,11 +63,6 @@ class RateControl:
         """What the next picture may weigh."""
         return int(self._budget)
 
-    @property
-    def under_way(self) -> int:
-        """Pictures sent and not yet seen."""
-        return len(self._under_way)
-
     def due_ns(self, now_ns: int) -> int | None:
         """When the next picture may be sent; None while as many are under way as may be."""
         self._give_up(now_ns)

@@ -50,7 +50,7 @@ class EncoderAgreement:
 def differ(drive_rad: float, encoder_rad: float) -> str:
     """What is wrong with a joint whose two angles differ."""
     return (
-        f"its drive says {math.degrees(drive_rad):.1f}°, "
+        f"its drive reads {math.degrees(drive_rad):.1f}°, "
         f"its output encoder {math.degrees(encoder_rad):.1f}°: "
         "check the drive's zero, gear ratio, direction and turns, and the encoder"
     )

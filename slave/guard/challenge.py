@@ -36,7 +36,7 @@ class Challenges:
         """Why a request that quotes this one is not of now, or None. It is used up either way."""
         given_ns = self._given_ns.pop(challenge, None)
         if given_ns is None:
-            return "the request quotes no challenge of this robot that is still unused: ask for status first"
+            return "the request carries no valid challenge: ask for status first, then repeat it"
         # absolute: an own clock that went back must not make an old request young
         age_ns = abs(now_ns - given_ns)
         if age_ns <= TIMEOUT_NS:

@@ -38,7 +38,7 @@ class Control:
         why, done = None, ""
         match action:
             case Action.NAMESAKE:
-                done = "holds while two bear its name"
+                done = "holds while two robots have its name"
             case Action.RELEASE:
                 why, done = holder_only(operator, guard.operator), "the lease is free"
                 if why is None:
@@ -63,7 +63,7 @@ class Control:
                     request, now_ns, "no reset_key is configured in [guard]: set one at the robot"
                 )
                 why = why or guard.home(now_ns)
-                done = "the joints count as standing where the robot says they do"
+                done = "the joint positions are confirmed"
         return ControlReply(why is None, guard.state, why or done)
 
     def _late(self, request: ControlRequest, now_ns: int) -> str | None:

@@ -120,15 +120,15 @@ class Guard:
         """
         dt_s = self._elapsed_s(now_ns)
         joints = self._joints
-        doubted, unbidden = joints.read(
+        doubted, uncommanded = joints.read(
             position_rad, encoder_valid, encoder_ns, drive_rad, moving=self.state in MOVING
         )
         for joint in doubted:
             self.counters.doubts[joint] += 1
             self.events.add(Doubt(now_ns, joint, self.doubts[joint]))
-        if unbidden is not None and self.state is not State.ESTOP:
-            self.counters.losses["unbidden"] += 1
-            self.estop(now_ns, unbidden)
+        if uncommanded is not None and self.state is not State.ESTOP:
+            self.counters.losses["uncommanded"] += 1
+            self.estop(now_ns, uncommanded)
         self._body = body.also(joints.placement.differ)
         self._watch(now_ns, self._watches)
         if not joints.seated:
@@ -234,7 +234,7 @@ class Guard:
     def home(self, now_ns: int) -> str | None:
         """A person has looked at the robot: it stands as it says. Or why that does not count."""
         if self._joints.seated:
-            return "where every joint stands is known already"
+            return "the joint positions are known already"
         if self._joints.life.silence(now_ns) is None:
             self._joints.placement.confirm(self._joints.life.position_rad)
         return self._joints.unplaced(now_ns)[0]

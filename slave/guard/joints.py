@@ -49,14 +49,14 @@ class JointReadings:
     ) -> tuple[list[str], str | None]:
         """Take a reading (J,), and the same angles by the drives' own encoders where they tell them.
 
-        Returns the joints whose encoder is doubted from now on, and which joint moves unbidden, in words.
+        Returns the joints whose encoder is doubted from now on, and which joint moves uncommanded, in words.
         """
         self.life.update(position_rad, valid, read_ns)
         self._drive_rad = drive_rad
         doubted = self.plausible.judge(position_rad, valid, read_ns, moving)
         if self.seated and self.plausible.span is None:
             return doubted, None  # an old reading
-        unbidden = self.placement.take(
+        uncommanded = self.placement.take(
             read_ns,
             position_rad,
             valid & np.isfinite(position_rad),
@@ -64,7 +64,7 @@ class JointReadings:
             span=self.plausible.span,
             under_way=moving,
         )
-        return doubted, unbidden
+        return doubted, uncommanded
 
     def written(self, now_ns: int, position_rad: Array, velocity_rad_s: Array) -> None:
         """Take the setpoint (J,) that is written now."""

@@ -61,10 +61,6 @@ class Lease:
         """End the lease."""
         self.operator, self.token = "", 0
 
-    def held_by(self, operator: str) -> bool:
-        """Whether an operator of that name holds it; call `lapse` first."""
-        return self.token != 0 and operator == self.operator
-
     def metrics(self, now_ns: int) -> LeaseMetrics | None:
         """Whose it is, which, since when, and how long ago a command renewed it; None: nobody holds it."""
         if not self.token:

@@ -17,7 +17,7 @@ from common.quaternion import Array
 from common.wire.messages import Mask
 from slave.encoders.agreement import READINGS as AGREEMENT_READINGS
 from slave.encoders.agreement import EncoderAgreement
-from slave.encoders.unbidden import MotionPatience, UnbiddenMotion
+from slave.encoders.uncommanded import MotionPatience, UncommandedMotion
 
 BEYOND_RAD = math.radians(8.0)
 """A joint further than this beyond its range is not where its encoder says."""
@@ -46,7 +46,7 @@ class Placement:
         known = last_known_rad
         self._known_rad = None if known is None else np.array([known.get(n, np.nan) for n in joint_names])
         self._agreement = EncoderAgreement(joint_names)
-        self._motion = UnbiddenMotion(joint_names, STILL_RAD, readings=READINGS, patience=PATIENCE)
+        self._motion = UncommandedMotion(joint_names, STILL_RAD, readings=READINGS, patience=PATIENCE)
         self._first_rad: Array = np.full(len(self._names), np.nan)
         self._read_ns: int | None = None
         self._compared = 0
@@ -66,7 +66,7 @@ class Placement:
         span: tuple[Array, Array] | None,
         under_way: bool = False,
     ) -> str | None:
-        """Take a reading (J,) that is `good` (J,). Who moves unbidden, in words, or None.
+        """Take a reading (J,) that is `good` (J,). Who moves uncommanded, in words, or None.
 
         `span` (J,) each: where the setpoint was lately, or None before there is any: then nothing may move.
         `under_way`: somebody is engaged. The same reading twice counts once.
@@ -118,9 +118,9 @@ class Placement:
         said = []
         for j in np.flatnonzero(far).tolist():
             known = self._known_rad[j]
-            before = "never known before" if np.isnan(known) else f"last known at {_deg(known)}"
-            said.append(f"{self._names[j]} says {_deg(position_rad[j])}, {before}")
-        return f"look at the robot, and confirm by `tandem home` that it stands so: {'; '.join(said)}"
+            before = "no earlier angle known" if np.isnan(known) else f"last known at {_deg(known)}"
+            said.append(f"{self._names[j]} reads {_deg(position_rad[j])}, {before}")
+        return f"compare with the robot, then confirm its posture by `tandem home`: {'; '.join(said)}"
 
 
 def _deg(angle_rad: float) -> str:

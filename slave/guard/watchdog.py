@@ -99,7 +99,7 @@ def _valid(signs: Signs) -> str | None:
     age_ns = abs(signs.now_ns - signs.somebody_ns)
     if age_ns <= signs.command_timeout_ns:
         return None
-    return f"no joint has been valid for {to_s(age_ns):.2f} s: is the operator's suit heard?"
+    return f"no joint has been valid for {to_s(age_ns):.2f} s: check the operator's suit"
 
 
 def _encoder(signs: Signs) -> str | None:

@@ -16,7 +16,7 @@ from deploy.harness.faults.table import FAULTS as EVERY
 from deploy.harness.faults.table import VIRTUAL as FAULTS
 from deploy.harness.faults.virtual import try_on_virtual_clock
 from slave.encoders.agreement import EncoderAgreement
-from slave.encoders.unbidden import UnbiddenMotion
+from slave.encoders.uncommanded import UncommandedMotion
 from slave.guard import GATES, states
 from slave.guard.states import GuardEvent
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES
@@ -70,7 +70,9 @@ def test_the_rules_of_the_limiter_are_what_bounds_a_jump(monkeypatch: pytest.Mon
 
 
 def test_a_drive_that_moves_by_itself_goes_on_without_the_watch(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(UnbiddenMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_))
+    monkeypatch.setattr(
+        UncommandedMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_)
+    )
     assert try_on_virtual_clock(TABLE["drive moves by itself"]).wrong
 
 

@@ -130,7 +130,7 @@ class DriveState:
         """It says that it has started. False: two said so at once, so there are two, and it has failed."""
         before_ns, self._booted_ns = self._booted_ns, now_ns
         if before_ns is not None and now_ns - before_ns < _BOOTS_APART_NS:
-            self.fail("has said twice within a second that it has started: two drives have its id", True)
+            self.fail("has reported two starts within one second: two drives have its id", True)
             return False
         return True
 

@@ -63,14 +63,14 @@ def _reference(place: JointPlace) -> str:
         return _by_encoder(place, place.encoder_rad)
     if place.last_known_rad is None:
         return (
-            f"says {_deg(place.drive_rad)}, and nothing confirms it: its output encoder says nothing "
-            "that can be believed, and no last position is known; mend the encoder"
+            f"reports {_deg(place.drive_rad)}, which nothing confirms: its output encoder gives no valid "
+            "angle, and no last position is known; repair the encoder"
         )
     if abs(place.drive_rad - place.last_known_rad) <= LAST_KNOWN_RAD:
         return ""
     return (
-        f"says {_deg(place.drive_rad)}, but the joint stood at {_deg(place.last_known_rad)} when it was last "
-        "known, and its output encoder says nothing that can be believed; mend the encoder"
+        f"reports {_deg(place.drive_rad)}, but the joint's last known angle is "
+        f"{_deg(place.last_known_rad)}, and its output encoder gives no valid angle; repair the encoder"
     )
 
 
@@ -80,9 +80,9 @@ def _by_encoder(place: JointPlace, encoder_rad: float) -> str:
         return ""
     zero = round(place.zero_increments + off * place.increments_per_rad)
     return (
-        f"says {_deg(place.drive_rad)}, its output encoder {_deg(encoder_rad)}: it has lost its turns, or "
-        "its zero, gear ratio or direction is wrong, or the encoder is; look at the joint: if the encoder is "
-        f"right and only the zero is wrong, zero_increments = {zero}"
+        f"reports {_deg(place.drive_rad)}, its output encoder {_deg(encoder_rad)}: the drive has lost its "
+        "turns, or its zero, gear ratio or direction is wrong, or the encoder is; look at the joint: if only "
+        f"the drive's zero is wrong, set zero_increments = {zero}"
     )
 
 

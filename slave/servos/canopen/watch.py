@@ -13,7 +13,7 @@ from common.quaternion import Array
 from common.wire.messages import Mask
 from slave.encoders.agreement import EncoderAgreement
 from slave.encoders.counts import Encoders
-from slave.encoders.unbidden import STILL_RAD, MotionPatience, UnbiddenMotion
+from slave.encoders.uncommanded import STILL_RAD, MotionPatience, UncommandedMotion
 from slave.servos.canopen.answers import DriveAnswers
 from slave.servos.canopen.start_check import CHECKED_SYNCS, JointPlace, refusal
 from slave.servos.canopen.status_bits import BAD_SYNCS, GOOD, WARNING, WATCHED, amiss
@@ -57,7 +57,7 @@ class DriveWatch:
         self._restless = [0] * joints
         self._anchor_rad: Array = np.full(joints, np.nan)
         self._bad_bits: NDArray[np.int64] = np.zeros(joints, np.int64)
-        self._motion = UnbiddenMotion(joint_names, patience=_PATIENCE)
+        self._motion = UncommandedMotion(joint_names, patience=_PATIENCE)
         self._agreement = EncoderAgreement(joint_names)
         self._targets_rad: Array = np.zeros((max(2, _SPAN_NS // period_ns), joints))
         self._row = 0

@@ -28,7 +28,7 @@ _FIRST_PAUSE_NS = to_ns(0.1)
 _LONGEST_PAUSE_NS = to_ns(2.0)
 _START_PATIENCE_S = 0.05
 """Waited for an answer while servos are made ready: nothing hurries then, and hosts may be busy."""
-_TAKE_IN = "it holds until an e-stop has been reset"
+_TAKE_IN = "it holds until an e-stop is reset"
 
 
 class Driver:
@@ -172,7 +172,7 @@ class Driver:
             self.lost += 1
             log.error("servo port lost: %s; retrying", error)
             for servo in self._servos:
-                self._faults[servo.joint] = f"the servos' port has gone ({error}); they stop by themselves"
+                self._faults[servo.joint] = f"servo port lost ({error}); the servos stop by themselves"
             self._goals.rejoin()
         self._drop()
         self._retry_ns = self._clock() + self._pause_ns
@@ -186,7 +186,7 @@ class Driver:
         self._misses[:] = 0
         log.info("%s: servo port open again", self._config.port)
         for servo in self._servos:
-            self._faults[servo.joint] = f"the servos' port had gone; {_TAKE_IN}"
+            self._faults[servo.joint] = f"servo port was lost; {_TAKE_IN}"
 
     # the servos
 

@@ -94,7 +94,7 @@ def health_words(stretch: bytes) -> str:
 
     error = hardware_words(value(HARDWARE_ERROR))
     if error:
-        return f"{error}; it has let go: mend the cause, switch its power off and on"
+        return f"{error}; its torque is off: fix the cause, then switch its power off and on"
     if value(BUS_WATCHDOG) == WATCHDOG_TRIPPED:
         return "stopped by itself: nothing came over the bus in time"
     return "" if value(TORQUE) else "its torque is off, as after a loss of power"

@@ -66,7 +66,7 @@ def know(bus: Bus, servo: Settings) -> list[Difference]:
         )
     error = x.hardware_words(bus.read(servo.id, x.HARDWARE_ERROR))
     if error:
-        raise ServoError(f"{error}; it has let go: mend the cause, switch its power off and on")
+        raise ServoError(f"{error}; its torque is off: fix the cause, then switch its power off and on")
     return differences(bus, servo)
 
 

@@ -94,7 +94,7 @@ def test_a_camera_killed_is_told_and_started_anew(monkeypatch: pytest.MonkeyPatc
 
     with running(open_camera) as (feed, link):
         last = link.wait(1)[-1].number
-        os.kill(opened[0].pid, signal.SIGKILL)
+        os.kill(opened[0]._process.pid, signal.SIGKILL)
         until(lambda: feed.fault != "")
         assert "the camera's process has ended" in feed.fault
         until(lambda: len(opened) == 2)

@@ -387,7 +387,7 @@ def never_held_where_nobody_knows(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.BOOT
 
 
-@about("UnbiddenMotion.judge")
+@about("UncommandedMotion.judge")
 def moves_by_itself(make_rig: MakeRig) -> None:
     rig = make_rig().to_leased()
     rig.run(0.6)
@@ -399,7 +399,7 @@ def moves_by_itself(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.ESTOP
 
 
-@about("UnbiddenMotion._for_long")
+@about("UncommandedMotion._for_long")
 def moves_against_its_setpoint(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
     began_ns, begins_rad = rig.now_ns, rig.measured[ELBOW]

@@ -39,7 +39,7 @@ class Machine(RuleBasedStateMachine):
         self.may_move = False
         """Whether `engage` was granted and nothing has ended it since."""
         self.latched = False
-        self.unbidden = 0
+        self.uncommanded = 0
         self.reseated = False
         """Whether a reset may have put joints where hands had moved them."""
         self.given: list[tuple[int, int]] = []
@@ -252,8 +252,8 @@ class Machine(RuleBasedStateMachine):
     @invariant()
     def an_estop_stays(self) -> None:
         # the guard stops by force who moves although it is held; nobody asked for that one
-        losses = self.rig.guard.counters.losses["unbidden"]
-        self.latched, self.unbidden = self.latched or losses > self.unbidden, losses
+        losses = self.rig.guard.counters.losses["uncommanded"]
+        self.latched, self.uncommanded = self.latched or losses > self.uncommanded, losses
         assert (self.rig.guard.state is State.ESTOP) == self.latched
 
     def posture(self, share: float) -> Any:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from slave.encoders import agreement, unbidden
+from slave.encoders import agreement, uncommanded
 from slave.guard import (
     admit,
     align,
@@ -128,8 +128,8 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (plausible.Past, "span", lambda self, _: (self._low.min(0) - 9.0, self._high.max(0) + 9.0)),
     (agreement.EncoderAgreement, "judge", nothing),
     (placed.Placement, "unplaced", nothing),
-    (unbidden.UnbiddenMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_)),
-    (unbidden.UnbiddenMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_)),
+    (uncommanded.UncommandedMotion, "judge", lambda self, *_, **__: np.zeros(len(self._names), np.bool_)),
+    (uncommanded.UncommandedMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_)),
     (joints.JointReadings, "strayed", nothing),
     (guard.Guard, "_elapsed_s", unbounded_s),
     (guard.Guard, "_believed", lambda self: np.ones_like(self._commands.valid)),

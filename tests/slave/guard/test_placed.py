@@ -12,7 +12,7 @@ import pytest
 from common.clock import NS_PER_MS
 from common.wire.messages import Action
 from slave.encoders.agreement import WINDOW_RAD, EncoderAgreement
-from slave.encoders.unbidden import ASTRAY_RAD, SHAKEN_NS, SHAKES_RAD, STILL_RAD, UnbiddenMotion
+from slave.encoders.uncommanded import ASTRAY_RAD, SHAKEN_NS, SHAKES_RAD, STILL_RAD, UncommandedMotion
 from slave.guard import State
 from slave.guard.placed import BEYOND_RAD, NEAR_RAD, PATIENCE, READINGS
 
@@ -90,7 +90,7 @@ def test_motion_against_the_setpoint_stops_within_50_ms(
 def test_without_the_patience_s_end_it_would_run_on(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(UnbiddenMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_))
+    monkeypatch.setattr(UncommandedMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_))
     assert stopped_after_s(make_rig(), State.TRACK, 60.0, 0.0) == math.inf
 
 
@@ -117,8 +117,8 @@ def test_an_arm_that_sags_under_a_load_while_it_follows_is_not_stopped(
 def test_called_settled_too_early_a_sagging_arm_would_be_stopped(
     make_rig: MakeRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    judge = UnbiddenMotion.judge
-    monkeypatch.setattr(UnbiddenMotion, "judge", lambda *args, **_: judge(*args))
+    judge = UncommandedMotion.judge
+    monkeypatch.setattr(UncommandedMotion, "judge", lambda *args, **_: judge(*args))
     rig = make_rig()
     rig.to_track().run(0.5)
     began_ns = rig.now_ns
@@ -132,7 +132,7 @@ def out_for(ms: int, width_rad: float, lately_ms: int = 0) -> bool:
 
     `width_rad`: of the arm's setpoint, until `lately_ms` before.
     """
-    part = UnbiddenMotion(["arm", "wrist"], readings=READINGS, patience=PATIENCE)
+    part = UncommandedMotion(["arm", "wrist"], readings=READINGS, patience=PATIENCE)
     both, zeros = np.ones(2, np.bool_), np.zeros(2)
     fast = np.array([width_rad, 0.0])
     part.judge(NS_PER_MS, (zeros, fast), zeros, both)
@@ -163,7 +163,7 @@ def test_a_joint_thrown_by_others_is_given_longer_and_no_more(
 
 
 def test_no_joint_is_thrown_by_itself() -> None:
-    part = UnbiddenMotion(["a"], readings=READINGS, patience=PATIENCE)
+    part = UncommandedMotion(["a"], readings=READINGS, patience=PATIENCE)
     low, high = np.zeros(1), np.full(1, 2.0 * SHAKES_RAD)
     out = [
         part.judge(i * NS_PER_MS, (low, high), high + ASTRAY_RAD + 0.002 * i, ONE)[0] for i in range(1, 30)
@@ -212,7 +212,7 @@ def test_an_angle_that_is_no_number_does_not_agree() -> None:
 
 @pytest.mark.parametrize("off_rad", [0.99 * STILL_RAD, 1.01 * STILL_RAD])
 def test_a_joint_that_stands_may_move_by_less_than_the_window(off_rad: float) -> None:
-    part = UnbiddenMotion(["a"])
+    part = UncommandedMotion(["a"])
     part.begin(0, ONE, np.zeros(1))
     still = np.zeros(1), np.zeros(1)
     assert not part.judge(TICK, still, np.zeros(1), ONE)[0]
@@ -221,7 +221,7 @@ def test_a_joint_that_stands_may_move_by_less_than_the_window(off_rad: float) ->
 
 def test_a_slow_sag_is_not_moving_and_a_faster_creep_is() -> None:
     for rate_deg_s, moves in ((0.2, False), (1.0, True)):
-        part = UnbiddenMotion(["a"])
+        part = UncommandedMotion(["a"])
         part.begin(0, ONE, np.zeros(1))
         seen = [
             part.judge(i * TICK, (np.zeros(1), np.zeros(1)), np.radians([rate_deg_s * i * 0.005]), ONE)[0]
@@ -231,7 +231,7 @@ def test_a_slow_sag_is_not_moving_and_a_faster_creep_is() -> None:
 
 
 def test_a_joint_that_is_shaken_by_one_that_moves_is_not_called_moving() -> None:
-    part = UnbiddenMotion(["stands", "moves"])
+    part = UncommandedMotion(["stands", "moves"])
     both = np.ones(2, np.bool_)
     part.begin(0, both, np.zeros(2))
     for i in range(1, 400):
@@ -241,7 +241,7 @@ def test_a_joint_that_is_shaken_by_one_that_moves_is_not_called_moving() -> None
 
 
 def test_a_joint_that_lags_within_the_span_is_not_against() -> None:
-    part = UnbiddenMotion(["a"])
+    part = UncommandedMotion(["a"])
     for i in range(1, 400):
         high = 0.01 * i
         span = np.array([high - 0.2]), np.array([high])
@@ -258,8 +258,8 @@ def test_without_a_last_known_position_a_person_confirms(make_rig: MakeRig) -> N
         assert not rig.step().ready
     assert rig.guard.state is State.BOOT
     assert "`tandem home`" in rig.guard.reason
-    assert "left_elbow_pitch says" in rig.guard.reason
-    assert "never known before" in rig.guard.reason
+    assert "left_elbow_pitch reads" in rig.guard.reason
+    assert "no earlier angle known" in rig.guard.reason
     assert not rig.ask(Action.HOME, key="wrong").done
     assert not rig.ask(Action.HOME, key=KEY, challenge=1).done
     rig.step()

@@ -75,8 +75,8 @@ def home(typed: str, *options: str, key: str = KEY, known: dict[str, float] | No
 def test_who_says_yes_is_told_first_what_the_robot_says_and_it_holds() -> None:
     said = home("y\n")
     assert said.status == 0, said.told
-    seen, question = said.told.index("left_elbow_pitch says"), said.told.index("Does the robot stand so?")
-    assert seen < question < said.told.index("count as standing where the robot says")
+    seen, question = said.told.index("left_elbow_pitch reads"), said.told.index("Does the robot stand so?")
+    assert seen < question < said.told.index("joint positions are confirmed")
     assert said.rig.guard.state is State.HOLD
     assert said.asked == [Action.STATUS, Action.STATUS, Action.HOME]
 
@@ -110,4 +110,4 @@ def test_a_robot_that_knows_where_it_stands_says_so() -> None:
     known = dict(zip(rig.skeleton.joint_names, rig.measured.tolist(), strict=True))
     said = home("", "--yes", known=known)
     assert said.status not in (0, None)
-    assert "home was refused: where every joint stands is known already" in said.told
+    assert "home was refused: the joint positions are known already" in said.told

@@ -8,7 +8,7 @@ import pytest
 from deploy.sim.drives.faults import DriveFault
 from deploy.sim.drives.peer import DrivePeer
 from slave.encoders.counts import EncoderConfig
-from slave.encoders.unbidden import ASTRAY_RAD
+from slave.encoders.uncommanded import ASTRAY_RAD
 from slave.guard import GuardConfig
 from slave.limit.limit import SetpointLimiter
 from slave.servos.canopen.cia402 import Power
@@ -59,10 +59,10 @@ def wrong_from_the_start(fault: DriveFault, elbow_deg: float = 40.0) -> Wired:
     ("fault", "said"),
     [
         (DriveFault.LOST_TURNS, "0.0°, its output encoder 40"),
-        (DriveFault.WRONG_ZERO, "says 70.0°, its output encoder 40"),
-        (DriveFault.WRONG_GEAR, "says 79.9°, its output encoder 40"),
-        (DriveFault.REVERSED, "says -40.0°, its output encoder 40"),
-        (DriveFault.ENCODER_ZERO, "says 40.0°, its output encoder 0.0°"),
+        (DriveFault.WRONG_ZERO, "reports 70.0°, its output encoder 40"),
+        (DriveFault.WRONG_GEAR, "reports 79.9°, its output encoder 40"),
+        (DriveFault.REVERSED, "reports -40.0°, its output encoder 40"),
+        (DriveFault.ENCODER_ZERO, "reports 40.0°, its output encoder 0.0°"),
         (DriveFault.DOUBLE_ID, "two drives have its id"),
         (
             DriveFault.WRONG_MODE,
@@ -167,7 +167,7 @@ def test_a_drive_that_moves_against_its_setpoint_stops_within_50_ms(
 def test_without_the_astray_window_a_drive_moves_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("slave.encoders.unbidden.ASTRAY_RAD", 9.0)
+    monkeypatch.setattr("slave.encoders.uncommanded.ASTRAY_RAD", 9.0)
     assert stopped_after_s(standing(20.0), -0.1, 0.2) == np.inf
 
 
@@ -352,10 +352,10 @@ def test_each_check_at_its_boundary(sign: int) -> None:
     assert refusal(place(drive_rad=at + sign * 1e-9, encoder_rad=at), READY)
     blind = {"encoder_rad": None}
     assert not refusal(place(**blind, last_known_rad=0.5 + sign * (LAST_KNOWN_RAD - 1e-9)), READY)
-    assert "mend the encoder" in refusal(
+    assert "repair the encoder" in refusal(
         place(**blind, last_known_rad=0.5 + sign * (LAST_KNOWN_RAD + 1e-9)), READY
     )
-    assert "mend the encoder" in refusal(place(**blind), READY)
+    assert "repair the encoder" in refusal(place(**blind), READY)
 
 
 @pytest.mark.parametrize("bit", [VOLTAGE, REMOTE, LIMITED, FOLLOWS])

@@ -254,7 +254,7 @@ def test_a_pulled_cable_faults_all_and_a_new_one_works_after_a_reset(rig: Rig) -
     rig.port.pull()
     rig.cycles(1)
     assert set(rig.driver.faults) == set(rig.names)
-    assert "port has gone" in rig.driver.faults[rig.names[0]]
+    assert "port lost" in rig.driver.faults[rig.names[0]]
     assert not rig.driver.reading.valid.any()
     rig.cycles(250)
     assert rig.driver.lost == 1
@@ -264,7 +264,7 @@ def test_a_pulled_cable_faults_all_and_a_new_one_works_after_a_reset(rig: Rig) -
         rig.driver._config = rig.config.model_copy(update={"port": port.device})
         rig.cycles(250)
         assert rig.driver.reading.valid.all()
-        assert "until an e-stop has been reset" in rig.driver.faults[rig.names[0]]
+        assert "until an e-stop is reset" in rig.driver.faults[rig.names[0]]
         rig.driver.recover()
         assert rig.driver.faults == {}
         rig.driver.close()

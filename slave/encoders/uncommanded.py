@@ -1,4 +1,4 @@
-"""Which joints move although nobody told them to, or against what they were told. Pure.
+"""Which joints move without a command, or against their command. Pure.
 
 Servos that have settled at setpoints that all stand must stay there. While setpoints move a servo follows
 late, but never leaves the span of the last setpoints far behind, outwards. Both are judged by distance,
@@ -48,7 +48,7 @@ class MotionPatience:
     """Where others have moved fast just now, and may have thrown it."""
 
 
-class UnbiddenMotion:
+class UncommandedMotion:
     """Watches J joints. Give it each reading once, with the span of the setpoints of the time just gone."""
 
     def __init__(
@@ -84,11 +84,6 @@ class UnbiddenMotion:
         self.words: dict[str, str] = {}
         """What moved in the last reading that was judged, by joint."""
 
-    def forget(self, joints: Mask) -> None:
-        """These joints (J,) begin anew: they have been told to be elsewhere, or were switched off."""
-        self._settled_ns[joints] = -1
-        self._rests_rad[joints] = self._before_rad[joints] = np.nan
-
     def begin(self, now_ns: int, joints: Mask, position_rad: Array) -> None:
         """These joints (J,) stand here (J,), and have settled already: they are switched on now."""
         self._settled_ns[joints] = now_ns - SETTLE_NS
@@ -104,7 +99,7 @@ class UnbiddenMotion:
         *,
         under_way: bool = False,
     ) -> Mask:
-        """(J,) who moves unbidden, by a reading (J,) of the joints that are `heard`; `words` says how.
+        """(J,) who moves uncommanded, by a reading (J,) of the joints that are `heard`; `words` says how.
 
         `span` is the lowest and the highest setpoint (J,) that may still be on its way into the motors.
         `under_way`: the robot moves or may any moment, and may take up a load: none is settled.
@@ -162,9 +157,7 @@ class UnbiddenMotion:
     def _say(self, out: Mask, left: Mask, moved: Array, beyond: Array) -> None:
         for j in np.flatnonzero(out).tolist():
             if left[j]:
-                words = f"moves by itself: {abs(math.degrees(moved[j])):.1f}° from where it was told to stay"
+                words = f"moves by itself: {abs(math.degrees(moved[j])):.1f}° away from where it was held"
             else:
-                words = (
-                    f"moves against its setpoint: {math.degrees(beyond[j]):.1f}° outside of where it was sent"
-                )
+                words = f"moves against its setpoint: {math.degrees(beyond[j]):.1f}° beyond where it was sent"
             self.words[self._names[j]] = words
