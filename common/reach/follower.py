@@ -38,7 +38,7 @@ from common.reach.choice import (
     worth_turning,
 )
 from common.reach.nearest import NOTHING, Nearest, nearest_angles, scalar_product, tensor
-from common.reach.step import Step, farthest_turn
+from common.reach.step import BoundedStep, farthest_turn
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 
@@ -114,7 +114,7 @@ class PostureFollower:
         if beyond.any() or late.any() or far.any():
             velocity[beyond] = 0.0
             self.short_rad[self._chart.segment_of_joint[:, 0]] = np.abs(free - position)
-            step_of = Step(elapsed_s, most, most_of_joint, self._last, free, position, velocity)
+            step_of = BoundedStep(elapsed_s, most, most_of_joint, self._last, free, position, velocity)
             position, velocity = self._together(q, step_of, beyond, late, far)
         velocity = np.minimum(np.maximum(velocity, -fastest), fastest)
         self._last, self._last_q = position, q.copy()
@@ -156,7 +156,9 @@ class PostureFollower:
         reference[known, 0] = self._last[known] / self._chart.weights[known, 0]
         return reference
 
-    def _together(self, q: Array, at: Step, beyond: Mask, late: Mask, far: Mask) -> tuple[Array, Array]:
+    def _together(
+        self, q: Array, at: BoundedStep, beyond: Mask, late: Mask, far: Mask
+    ) -> tuple[Array, Array]:
         """Positions and velocities (J,) where groups are beyond limits, or joints cannot keep up."""
         project = set(self._group_of_joint[beyond].tolist()) - {-1}
         behind = set(self._group_of_joint[late].tolist()) - {-1}
@@ -172,7 +174,7 @@ class PostureFollower:
             at.limit_turn(self._chart.groups[g])
         return np.array(at.position), np.array(at.velocity)
 
-    def _project(self, g: int, q: list[float], at: Step) -> None:
+    def _project(self, g: int, q: list[float], at: BoundedStep) -> None:
         """Put one group's nearest posture into `at`, and the velocities that go with it."""
         group = self._chart.groups[g]
         w, *vector = q

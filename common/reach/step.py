@@ -25,7 +25,7 @@ def farthest_turn(turned_rad: Array, elapsed_s: float) -> Array:
     return out
 
 
-class Step:
+class BoundedStep:
     """One step from the last posture to the next, as plain numbers: a dozen of them are quicker so."""
 
     def __init__(

@@ -92,54 +92,40 @@ def _joint(entry: dict[str, Any]) -> Joint:
 
 
 def _mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
-    mistakes = []
+    mistakes: list[ConfigMistake] = []
+
+    def wrong(key: str, value: object, expected: str) -> None:
+        mistakes.append(ConfigMistake(key, value, expected))
+
     seen = {WORLD}
     for segment in skeleton.segments:
         if segment.parent not in seen:
-            mistakes.append(
-                ConfigMistake(f"{segment.name}.parent", segment.parent, "a segment listed before it")
-            )
+            wrong(f"{segment.name}.parent", segment.parent, "a segment listed before it")
         if segment.name in seen:
-            mistakes.append(ConfigMistake("segment.name", segment.name, "a name used once"))
+            wrong("segment.name", segment.name, "a name used once")
         if sorted(tuple(map(abs, axis)) for axis in segment.axes) != [(0, 0, 1), (0, 1, 0), (1, 0, 0)]:
-            mistakes.append(ConfigMistake(f"{segment.name}.axes", segment.axes, "x, y and z in some order"))
+            wrong(f"{segment.name}.axes", segment.axes, "x, y and z in some order")
         unable = [a for a, turns in zip(segment.angles, segment.human, strict=True) if a and not turns]
         if unable:
-            mistakes.append(
-                ConfigMistake(f"{segment.name}.human", unable, "a movement wherever there is an angle")
-            )
+            wrong(f"{segment.name}.human", unable, "a movement wherever there is an angle")
         seen.add(segment.name)
     driven: set[str] = set()
     for joint in skeleton.joints:
         if not joint.lower_rad < joint.upper_rad:
-            mistakes.append(
-                ConfigMistake(f"{joint.name}.lower_deg", joint.lower_rad, "a limit below upper_deg")
-            )
+            wrong(f"{joint.name}.lower_deg", joint.lower_rad, "a limit below upper_deg")
         if not joint.drives or not all(joint.drives.values()):
-            mistakes.append(
-                ConfigMistake(f"{joint.name}.drives", joint.drives, "at least one angle, no ratio of 0")
-            )
+            wrong(f"{joint.name}.drives", joint.drives, "at least one angle, no ratio of 0")
         for angle in joint.drives:
             if angle not in skeleton.angle_slots or angle in driven:
-                mistakes.append(
-                    ConfigMistake(
-                        f"{joint.name}.drives", angle, "a segment's angle that no other joint drives"
-                    )
-                )
+                wrong(f"{joint.name}.drives", angle, "a segment's angle that no other joint drives")
             driven.add(angle)
-    return mistakes + _synergy_mistakes(skeleton)
-
-
-def _synergy_mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
-    """A synergy must be of joints that there are, each in one of them: least squares then stays a mean."""
-    mistakes, driven = [], set[str]()
+    # each joint is in one synergy at most: least squares then stays a mean
+    driven = set()
     for synergy in skeleton.synergies:
         if not synergy.drives or not all(synergy.drives.values()):
-            expected = "at least one joint, no ratio of 0"
-            mistakes.append(ConfigMistake(f"{synergy.name}.drives", synergy.drives, expected))
-        for joint in synergy.drives:
-            if joint not in skeleton.joint_names or joint in driven:
-                expected = "a joint that no other synergy drives"
-                mistakes.append(ConfigMistake(f"{synergy.name}.drives", joint, expected))
-            driven.add(joint)
+            wrong(f"{synergy.name}.drives", synergy.drives, "at least one joint, no ratio of 0")
+        for name in synergy.drives:
+            if name not in skeleton.joint_names or name in driven:
+                wrong(f"{synergy.name}.drives", name, "a joint that no other synergy drives")
+            driven.add(name)
     return mistakes

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any, TypeVar
 
 import msgpack
@@ -100,7 +101,7 @@ def _pack_command(m: Command) -> tuple[object, ...]:
 
 
 def _unpack_command(f: tuple[object, ...], joints: int) -> Command:
-    fields.length(f, 14)
+    fields.array(f, 14)
     lease, sequence, tick, sampled_ns, frames_in_ns, angles_ns, put_ns = fields.counts(f[1:8])
     position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
     return Command(
@@ -134,7 +135,7 @@ def _pack_state(m: RobotState) -> tuple[object, ...]:
 
 
 def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
-    fields.length(f, 16)
+    fields.array(f, 16)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -167,34 +168,24 @@ def _pack_base(base: BaseAttitude | None) -> tuple[object, ...] | None:
 def _unpack_base(value: object) -> BaseAttitude | None:
     if value is None:
         return None
-    if not isinstance(value, tuple):
-        raise CodecError("base is not an array")
-    fields.length(value, 5)
-    azimuth, tool_face = value[2:4]
+    measured_ns, inclination, azimuth, tool_face, tilt = fields.array(value, 5)
     return BaseAttitude(
-        fields.count(value[0]),
-        fields.number(value[1], 0.0, math.pi),
+        fields.count(measured_ns),
+        fields.number(inclination, 0.0, math.pi),
         None if azimuth is None else fields.number(azimuth, 0.0, math.tau),
         None if tool_face is None else fields.number(tool_face, 0.0, math.tau),
-        fields.number(value[4], 0.0, math.pi),
+        fields.number(tilt, 0.0, math.pi),
     )
 
 
 def _unpack_echo(value: object) -> CommandEcho | None:
     if value is None:
         return None
-    if not isinstance(value, tuple):
-        raise CodecError("echo is not an array")
-    fields.length(value, 5)
-    return CommandEcho(*fields.counts(value))
-
-
-def _pack_control_request(m: ControlRequest) -> tuple[object, ...]:
-    return (m.robot, m.action.value, m.operator, m.key, m.clock, m.challenge)
+    return CommandEcho(*fields.counts(fields.array(value, 5)))
 
 
 def _unpack_control_request(f: tuple[object, ...], _: int) -> ControlRequest:
-    fields.length(f, 6)
+    fields.array(f, 6)
     try:
         action = Action(fields.text(f[1], MAX_NAME))
     except ValueError:
@@ -210,29 +201,11 @@ def _pack_control_reply(m: ControlReply) -> tuple[object, ...]:
 
 
 def _unpack_control_reply(f: tuple[object, ...], _: int) -> ControlReply:
-    fields.length(f, 7)
+    fields.array(f, 7)
     guard, text = fields.text(f[1], MAX_NAME), fields.text(f[2], MAX_TEXT)
     lease, challenge, instance = fields.counts(f[3:6])
     place = fields.text(f[6], MAX_TEXT)
     return ControlReply(fields.flag(f[0]), guard, text, lease, challenge, instance=instance, place=place)
-
-
-def _pack_clock_query(m: ClockQuery) -> tuple[object, ...]:
-    return (m.asked_ns, m.last_asked_ns, m.last_heard_ns, m.asker)
-
-
-def _unpack_clock_query(f: tuple[object, ...], _: int) -> ClockQuery:
-    fields.length(f, 4)
-    return ClockQuery(*fields.counts(f))
-
-
-def _pack_clock_reply(m: ClockReply) -> tuple[object, ...]:
-    return (m.asked_ns, m.received_ns, m.replied_ns, m.instance)
-
-
-def _unpack_clock_reply(f: tuple[object, ...], _: int) -> ClockReply:
-    fields.length(f, 4)
-    return ClockReply(*fields.counts(f))
 
 
 def _pack_statistics(m: Statistics) -> tuple[object, ...]:
@@ -240,7 +213,7 @@ def _pack_statistics(m: Statistics) -> tuple[object, ...]:
 
 
 def _unpack_statistics(f: tuple[object, ...], _: int) -> Statistics:
-    fields.length(f, 3)
+    fields.array(f, 3)
     role = fields.text(f[0], MAX_NAME)
     kind = _METRICS.get(role)
     if kind is None:
@@ -253,7 +226,7 @@ def _pack_truth(m: Truth) -> tuple[object, ...]:
 
 
 def _unpack_truth(f: tuple[object, ...], joints: int) -> Truth:
-    fields.length(f, 3)
+    fields.array(f, 3)
     position_rad, velocity_rad_s = fields.floats(f[2], joints, _POSTURE)
     return Truth(fields.count(f[0]), fields.count(f[1]), position_rad, velocity_rad_s)
 
@@ -261,10 +234,10 @@ def _unpack_truth(f: tuple[object, ...], joints: int) -> Truth:
 _ENCODERS: dict[type, tuple[str, Callable[[Any], tuple[object, ...]]]] = {
     Command: ("command", _pack_command),
     RobotState: ("state", _pack_state),
-    ControlRequest: ("control", _pack_control_request),
+    ControlRequest: ("control", attrgetter("robot", "action.value", "operator", "key", "clock", "challenge")),
     ControlReply: ("controlled", _pack_control_reply),
-    ClockQuery: ("clock", _pack_clock_query),
-    ClockReply: ("clocked", _pack_clock_reply),
+    ClockQuery: ("clock", attrgetter("asked_ns", "last_asked_ns", "last_heard_ns", "asker")),
+    ClockReply: ("clocked", attrgetter("asked_ns", "received_ns", "replied_ns", "instance")),
     Statistics: ("statistics", _pack_statistics),
     Truth: ("truth", _pack_truth),
 }
@@ -273,8 +246,8 @@ _DECODERS: dict[type, tuple[str, Callable[[tuple[object, ...], int], Any]]] = {
     RobotState: ("state", _unpack_state),
     ControlRequest: ("control", _unpack_control_request),
     ControlReply: ("controlled", _unpack_control_reply),
-    ClockQuery: ("clock", _unpack_clock_query),
-    ClockReply: ("clocked", _unpack_clock_reply),
+    ClockQuery: ("clock", lambda f, _: ClockQuery(*fields.counts(fields.array(f, 4)))),
+    ClockReply: ("clocked", lambda f, _: ClockReply(*fields.counts(fields.array(f, 4)))),
     Statistics: ("statistics", _unpack_statistics),
     Truth: ("truth", _unpack_truth),
 }

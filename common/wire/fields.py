@@ -132,10 +132,13 @@ def fit_texts(texts: dict[str, str], most_bytes: int) -> dict[str, str]:
     return fitting
 
 
-def length(fields: tuple[object, ...], expected: int) -> None:
-    """Refuse an array of any other length."""
-    if len(fields) != expected:
-        raise CodecError(f"{len(fields)} fields, expected {expected}")
+def array(value: object, expected: int) -> tuple[object, ...]:
+    """An array of so many fields."""
+    if not isinstance(value, tuple):
+        raise CodecError(f"{short(value)} is not an array")
+    if len(value) != expected:
+        raise CodecError(f"{len(value)} fields, expected {expected}")
+    return value
 
 
 def short(value: object) -> str:

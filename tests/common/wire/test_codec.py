@@ -255,7 +255,7 @@ def test_each_other_field_of_a_command_is_checked(index: int, value: object, why
         (6, 5, "text of at most 64"),
         (7, "x" * (MAX_TEXT + 1), "text of at most 512"),
         (9, b"\x03\x00\x00", "mask of 3"),
-        (11, 5, "echo is not an array"),
+        (11, 5, "5 is not an array"),
         (11, [1, 2, 3, 4], "4 fields, expected 5"),
         (11, [1, 2, 3, 4, -5], "63-bit count"),
         (12, 2**63, "64-bit integer"),

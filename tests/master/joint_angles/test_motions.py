@@ -168,11 +168,11 @@ MUTANTS: dict[str, tuple[Callable[[pytest.MonkeyPatch], None], Callable[[Run], N
         lambda run: nearest_at_rest(run),
     ),
     "no bound of the joints' steps": (
-        lambda m: m.setattr(step.Step, "limit", lambda *_: None),
+        lambda m: m.setattr(step.BoundedStep, "limit", lambda *_: None),
         no_joint_jumps,
     ),
     "no bound of the segments' turns": (
-        lambda m: m.setattr(step.Step, "limit_turn", lambda *_: None),
+        lambda m: m.setattr(step.BoundedStep, "limit_turn", lambda *_: None),
         no_segment_jumps,
     ),
     "no bound of the told speed": (
