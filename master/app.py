@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 
 
 class Master:
-    """One operator's capture loop: each posture is solved once, and sent to every robot it commands."""
+    """One operator's capture loop: joint angles are computed once a posture and sent to every robot."""
 
     def __init__(self, config: MasterConfig, session: LinkSession, notifier: Notifier | None = None) -> None:
         self._config = config
@@ -75,7 +75,7 @@ class Master:
                 await bus.close()
 
     async def _serve(self, robot: CommandedRobot) -> None:
-        """Keep one robot. What fails there unforeseen ends the commands to that robot, not to the others."""
+        """Keep one robot. An unforeseen error stops the commands to this robot only."""
         try:
             await robot.run()
         except Exception:
@@ -90,7 +90,7 @@ class Master:
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
             for bus in self._buses:
-                bus.read()  # answers that are here already are not late, however late this tick runs
+                bus.read()  # answers that have arrived are not late, even if this tick runs late
             sync, late = self._pipeline.tick(due.tick, monotonic_ns())
             for bus in self._buses:
                 bus.send(sync)

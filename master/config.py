@@ -26,32 +26,32 @@ class CaptureConfig(Section):
     rate_hz: int = Field(200, ge=10, le=1000)
     """SYNC frames a second."""
     decimation: int = Field(16, ge=1, le=1000)
-    """Every so many ticks one is solved and sent: 200 / 16 = 12.5 Hz."""
+    """One tick in this many yields a command: 200 / 16 = 12.5 Hz."""
     lost_after: int = Field(20, ge=1, le=10_000)
     """Missed ticks in a row after which a node counts as lost."""
     dbc: RelativePath
-    """The frames' description."""
+    """The DBC file that describes the frames."""
     plausibility: PlausibilityConfig = PlausibilityConfig()
     buses: list[BusConfig] = Field(min_length=1)
 
 
 class OperatorConfig(Section):
-    """`[operator]`: who commands."""
+    """`[operator]`: the person who commands."""
 
     name: str = Field(min_length=1, max_length=64)
     deadman: Literal["always_held"]
-    """`always_held`: the operator has no pedal. There is no default, so that somebody decided it."""
+    """`always_held`: the operator has no pedal. There is no default, so that a person decides it."""
 
 
 class MasterConfig(Section):
     """The whole file."""
 
     robots: list[RobotName] = Field(default_factory=list)
-    """Whom to command, by the names in the slaves' own files. Each has a lease and a guard of its own."""
+    """Robots to command, by the names in the slaves' files. Each has its own lease and guard."""
     robot: RobotName | None = None
     """Short for `robots` with one name."""
     profile: str = "nursing"
-    """Of all the robots: they are commanded the same joint angles."""
+    """The skeleton profile of all robots: they are commanded the same joint angles."""
     operator: OperatorConfig
     capture: CaptureConfig
     estimation: EstimationConfig = EstimationConfig()

@@ -1,4 +1,4 @@
-"""What a master does while two robots bear one name: it tells them and people, and claims neither. Pure."""
+"""What a master does while two robots have one name: it reports both and claims neither. Pure."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from common.wire.messages import Action, ControlRequest
 from common.wire.presence import ProcessPresence, several_bear
 
 HEARD_S = 0.5
-"""A robot that was not heard for so long counts no more: one that starts anew takes longer than that."""
+"""A robot that was not heard for this long no longer counts; a restart takes longer."""
 
 
 class Homonyms:
@@ -34,7 +34,7 @@ class Homonyms:
         self._heard[instance] = now_ns
 
     def words(self, now_ns: int) -> str | None:
-        """Who bears the name, where more than one does."""
+        """Names the robots that share the name; None where there is only one."""
         recent = [number for number, heard in self._heard.items() if abs(now_ns - heard) <= to_ns(HEARD_S)]
         self._heard = {number: self._heard[number] for number in recent}
         if len(recent) < 2:
@@ -42,7 +42,7 @@ class Homonyms:
         return several_bear(self._robot, [self._place(number) for number in recent])
 
     def notice(self, now_ns: int) -> ControlRequest | None:
-        """What to tell all of them now, if it is time: each holds until it is told no more."""
+        """The notice to send to all of them now, if one is due: each robot holds while notices arrive."""
         words = self.words(now_ns)
         if words is None or now_ns < self._next_notice_ns:
             return None
@@ -50,12 +50,12 @@ class Homonyms:
         return ControlRequest(self._robot, Action.NAMESAKE, self._operator, words)
 
     def change(self, now_ns: int) -> str | None:
-        """What to tell people, once a change."""
+        """A line for the log when this changes."""
         words = self.words(now_ns)
         if words == self._said:
             return None
         self._said = words
-        return words or f"one robot alone bears the name {self._robot} again"
+        return words or f"only one robot has the name {self._robot} again"
 
     def _place(self, instance: int) -> str:
         shown = self._shown.get(instance)

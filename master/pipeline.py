@@ -1,4 +1,4 @@
-"""The master's whole way for one sample, without a clock, a bus or a link: frames in, commands out.
+"""From CAN frames to joint angles and commands, without a clock, a bus or a link.
 
 poll ▸ calibrate ▸ low-pass ▸ orientation ▸ (every 16th tick) joint angles ▸ command
 """
@@ -28,7 +28,7 @@ from master.suit.protocol import SuitProtocol
 from master.suit.sweep import Sweep
 
 MOST_BRIDGED = 20
-"""Ticks (0.1 s); what the operator did in a longer stall cannot be told from its ends."""
+"""Ticks (0.1 s). After a longer stall the motion in between is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class JointAngleSample:
     velocity_rad_s: Array
     valid: Mask
     doubt: str = ""
-    """Why nobody should engage on it, in words."""
+    """Why the robot must not be engaged on this sample, in words; empty where it may."""
 
 
 class MasterPipeline:
@@ -61,7 +61,7 @@ class MasterPipeline:
         self.solver = JointSolver(self.skeleton)
         self.beyond_reach = BeyondReach(self.skeleton.segment_names)
         self.to_tell: list[str] = []
-        """What the operator is to be told of the last joint angles."""
+        """Messages to the operator about the last joint angles."""
         self._angles_ns: int | None = None
         self.plausibility = PlausibilityWatch(
             config.capture.plausibility, len(nodes), config.capture.rate_hz, protocol.fd.scale,
@@ -74,7 +74,7 @@ class MasterPipeline:
         self._decided_period = -1
         self._parts: tuple[Callable[[], Doubts], ...] = (self._of_suit, self._of_estimator)
         self.doubts: Doubts = {}
-        """Nodes that were not believed, or not wholly, when joint angles were last computed."""
+        """Nodes whose readings were doubted when joint angles were last computed."""
 
     def tick(self, tick: int, now_ns: int) -> tuple[CanFrame, JointAngleSample | None]:
         """Open a tick: the SYNC frame for every bus, and what the last window gave if it was still open."""
@@ -87,7 +87,7 @@ class MasterPipeline:
         return self.poll.on_frame(bus, frame_id, data, now_ns) and self._window_open
 
     def bus_down(self, bus: str) -> None:
-        """Take a failed bus's nodes as lost at once: their joints are not valid until they answer again."""
+        """Count the nodes of a failed bus as lost: their joints are invalid until they answer again."""
         self.poll.bus_down(bus)
 
     def node_counts(self) -> dict[str, dict[str, int]]:
@@ -110,11 +110,11 @@ class MasterPipeline:
         for each in sweeps:
             self.estimator.update(each, dt_s)
         self._last_sweep = sweep
-        # a deciding tick that was missed is made up for by the next, or a command would fall out
+        # after a missed deciding tick the next one decides, so that no command is missing
         period = sweep.tick // self._decimation
         disbelieved, before = self.plausibility.doubted | clashing, self._disbelieved
         self._disbelieved = disbelieved
-        # a node that lies is told at once: in a period its joint would be driven on
+        # a doubted node is reported at once: otherwise its joint would be driven for another period
         if period == self._decided_period and not (disbelieved & ~before).any():
             return None
         self._decided_period = period
@@ -126,7 +126,7 @@ class MasterPipeline:
         known_nodes = posture.valid & self._believed()
         q = posture.q_world_from_segment
         if not known_nodes.all():
-            # of a node that is not heard, or not believed, the solver must not remember anything either
+            # the solver must not remember a node that is lost or doubted
             q = np.where(known_nodes[:, None], q, np.nan)
         before_ns, self._angles_ns = self._angles_ns, sweep.sampled_ns
         elapsed_s = math.inf if before_ns is None else to_s(sweep.sampled_ns - before_ns)
@@ -163,7 +163,7 @@ class MasterPipeline:
         names = self.skeleton.segment_names
         if not self.doubts:
             return np.ones(len(names), np.bool_)
-        told = NodeDoubt("", Weight.TOLD)
+        told = NodeDoubt("", Weight.NOTED)
         return np.array([self.doubts.get(name, told).weight < Weight.INVALID for name in names])
 
 
@@ -194,13 +194,13 @@ def _between(last: Sweep, now: Sweep, share: float) -> Sweep:
         now,
         acc_m_s2=last.acc_m_s2 + share * (now.acc_m_s2 - last.acc_m_s2),
         gyr_rad_s=last.gyr_rad_s + share * (now.gyr_rad_s - last.gyr_rad_s),
-        # not the magnetometer: where one reading is missing there is nothing between
+        # not the magnetometer: between a reading and a missing one there is nothing to interpolate
         fresh=last.fresh & now.fresh,
     )
 
 
 class CommandWriter:
-    """Turns solved postures into the numbered commands of one lease."""
+    """Writes joint angles into the numbered commands of one lease."""
 
     def __init__(self, robot: str) -> None:
         self._robot = robot

@@ -1,4 +1,4 @@
-"""One commanded robot as the master has it: its lease, clock and topics. Robots share none of this."""
+"""One commanded robot: its lease, clock and topics. Robots share none of this."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class CommandedRobot:
     def __init__(
         self, name: str, operator: str, joints: int, *, link: Link, endpoints: Sequence[str] = ()
     ) -> None:
-        """`endpoints`: where this master is, for people who find two of it."""
+        """`endpoints`: where this master is reached; shown where two masters have the same operator."""
         self.name = name
         self._instance = draw_instance()
         self._endpoints = endpoints
@@ -89,7 +89,7 @@ class CommandedRobot:
         self._homonyms.on_state(state.instance, arrived_ns)
         two = self._homonyms.words(arrived_ns) is not None
         if two and self._lease.token and state.instance != self._lease.instance:
-            return  # a namesake's: what this master's own robot does is not told by it
+            return  # from another robot of that name: it says nothing of the robot that this master commands
         self._lease.on_state(state, arrived_ns)
         self._watch.on_state(state, arrived_ns, ours=self._lease.holds(state))
 
@@ -112,7 +112,7 @@ class CommandedRobot:
             log.info("%s: claim: %s", self.name, reply.text)
 
     async def _two_answer(self, now_ns: int) -> bool:
-        """Whether two robots bear the name; then both are told, and neither is claimed."""
+        """Whether two robots have this name; then both are told so, and neither is claimed."""
         change = self._homonyms.change(now_ns)
         if change:
             log.warning("%s", change)
@@ -133,7 +133,7 @@ class CommandedRobot:
             try:
                 payload, arrived_ns = await self._link.ask_stamped(CLOCK, encode(query))
                 reply = decode(payload, ClockReply)
-                # a namesake's clock is another clock
+                # another robot of that name has another clock
                 if not self._lease.token or reply.instance == self._lease.instance:
                     self._clock.on_reply(reply, arrived_ns)
             except (LinkError, CodecError):
@@ -141,7 +141,7 @@ class CommandedRobot:
 
     @property
     def standing(self) -> str:
-        """How this robot and the master stand, in words."""
+        """The state of this robot as the master sees it, in words."""
         now_ns = monotonic_ns()
         two = self._homonyms.words(now_ns)
         if two is not None:

@@ -41,7 +41,7 @@ class RobotWatch:
         return self.state is None or now_ns - self._heard_ns > to_ns(STATE.timeout_s)
 
     def change(self, now_ns: int) -> str | None:
-        """What to tell people when the robot falls silent or is heard again, once a change."""
+        """A line for the log when the robot falls silent or is heard again."""
         silent = self.silent(now_ns)
         if silent == self._was_silent:
             return None

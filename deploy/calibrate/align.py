@@ -165,7 +165,7 @@ def _joint(joint: JointFinding) -> dict[str, Any]:
 
 
 def nodes_table(found: SuitAlignment) -> Table:
-    """One row a node: who told its heading, and how well it is known."""
+    """One row a node: what its heading was found by, and its uncertainty."""
     from rich import box
     from rich.table import Table
 

@@ -38,7 +38,7 @@ _ALIKE_RAD = math.radians(20.0)
 _GAIN_RAD = math.radians(0.2)
 """What a calibrated gyro's gains and cross-axis errors (0.2 %) turn an axis by, whatever the data."""
 _LEAST_RATE_RAD_S = 0.3
-"""RMS rate of bending below which nobody has moved the joint."""
+"""RMS rate of bending below which the joint counts as not moved."""
 _WORST_SIGMA_RAD = math.radians(4.0)
 _WORST_RIVAL = 1.3
 """Another answer with less than so many times the cost leaves it open which one is right."""
@@ -125,7 +125,7 @@ def check(hinge: HingeAxes, joint: str) -> None:
 
 
 def check_moved(hinge: HingeAxes, joint: str) -> None:
-    """Raise PoorMotionError where nobody moved the joint, or it moves like no hinge."""
+    """Raise PoorMotionError where the joint was not moved, or does not move like a hinge."""
     if hinge.bending_rad_s < _LEAST_RATE_RAD_S:
         raise PoorMotionError(
             f"{joint}: it was hardly bent ({math.degrees(hinge.bending_rad_s):.0f}°/s RMS, "

@@ -1,4 +1,4 @@
-"""All about a hinge from two units that nobody has aligned: its axes with signs, its centre, a zero angle.
+"""A hinge from two units that are not aligned: its axes with signs, its centre, a zero angle.
 
 The rates alone (paper C) leave the axes' relative sign open, and skin that shakes under a sensor can turn
 their answer far away: on a walking person's thigh by 80°, where the answer from rates, inclinations and

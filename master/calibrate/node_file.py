@@ -33,8 +33,8 @@ _DIGITS = 10
 def write_calibration(path: Path, parts: dict[Part, tuple[Array, Made]]) -> NodeCalibration:
     """Write parts into a node's file: affine maps (3, 4), or the alignment (4,), each with its `Made`.
 
-    Other parts and comments of an existing file stay. The file is replaced in one step, so that who reads
-    it meanwhile sees the old or the new one. Returns what the file now says.
+    Other parts and comments of an existing file stay. The file is replaced in one step: a reader
+    sees the old or the new one. Returns what the file now says.
     Raises ConfigError, before anything is written, when a part or the existing file is not sound, and
     TandemError where it cannot be written.
     """
@@ -100,7 +100,7 @@ def _replace(path: Path, text: str) -> None:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        # mkstemp makes it the owner's alone; a calibration is for whoever may read its folder
+        # mkstemp makes it the owner's alone; a calibration may be read by all who may read its folder
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
     except BaseException:

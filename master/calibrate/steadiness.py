@@ -23,7 +23,7 @@ _FEWEST = 2
 _KNOWN_RAD = math.radians(8.0)
 """A part that does not tell its answer as well as that is not compared."""
 _CHANCE = 2.0
-"""Standard deviations by which two parts differ anyhow."""
+"""Standard deviations by which two parts differ by chance."""
 
 
 @dataclass(frozen=True, slots=True)

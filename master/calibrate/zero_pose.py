@@ -9,7 +9,7 @@ from master.calibrate.hinge import PoorMotionError
 from master.calibrate.still import runs
 
 _STILL_RAD_S = 0.15
-"""Nobody who stands still turns a segment faster; sway is a fifth of it."""
+"""A person who stands still turns no segment faster; sway is a fifth of it."""
 _LEAST_S = 1.0
 _EDGE_S = 0.2
 """Left out at either end, where the movement begins."""

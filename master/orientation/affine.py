@@ -26,7 +26,7 @@ class Calibration:
     q_sensor_from_segment: Array
     """(N, 4)."""
     alignment_made: Mask | None = None
-    """(N,) whose file says how the alignment was found; None: nobody's."""
+    """(N,) nodes whose file records how the alignment was found; None: no node's."""
 
     @property
     def aligned(self) -> Mask:

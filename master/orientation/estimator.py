@@ -28,7 +28,7 @@ _GRAVITY_M_S2 = 9.81
 
 
 class Node(Protocol):
-    """What a node's configuration says to the estimator."""
+    """The part of a node's configuration that the estimator reads."""
 
     @property
     def filter(self) -> str | None:
@@ -151,14 +151,14 @@ class Estimator:
         if changes.came.any():
             self._lowpass.restart(changes.came)
             self._bank.restart(changes.came)
-        # what is absurd may overflow here; the filters leave it out
+        # absurd readings may overflow here; the filters leave them out
         with np.errstate(over="ignore", invalid="ignore"):
             filtered = self._lowpass.update(apply(self.affine, samples))
         self._gyr_rad_s = filtered[GYR]
         self._bank.update(filtered[GYR], filtered[ACC], filtered[MAG], dt_s)
         spoilt = self._bank.spoilt
         if spoilt is not None:
-            # a low-pass would pass it on for long
+            # a low-pass would pass it on for a long time
             self._lowpass.restart(spoilt)
             self._gyr_rad_s = np.where(spoilt[:, None], self._bank.bias_rad_s(), self._gyr_rad_s)
         if changes.settled.any():
@@ -188,11 +188,11 @@ class Estimator:
                 self._heading.stand(nodes, self._zero_pose.correction_rad, self._q_of_filters(), mag_ut)
 
     def doubts(self) -> dict[int, NodeDoubt]:
-        """Nodes that are not believed, or not wholly, by their number."""
+        """Doubts about nodes, by their number."""
         joints = self._heading.doubts() if isinstance(self._heading, OnlineHeadings) else {}
         filters = self._bank.doubts()
         asked = self._liveness.settled.copy()
-        # of a node whose joints are invalid anyhow no pose helps, and the others need not wait for it
+        # a node whose joints are invalid gains nothing from a pose: the others need not wait for it
         asked[[node for node, doubt in filters.items() if doubt.weight >= Weight.INVALID]] = False
         return {**joints, **filters, **self._zero_pose.doubts(asked)}
 
@@ -207,7 +207,7 @@ class Estimator:
         )
 
     def _idle(self, nodes: Mask) -> None:
-        """Nodes that say nothing rest, so that no filter runs away on a rate heard long ago."""
+        """Silent nodes are taken to rest, so that no filter integrates an old rate."""
         self._samples[ACC, nodes] = (0.0, 0.0, _GRAVITY_M_S2)
         self._samples[GYR, nodes] = 0.0
         self._samples[MAG, nodes] = np.nan

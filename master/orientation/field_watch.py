@@ -23,7 +23,7 @@ _COMMON_S = 5.0
 _WINDOW_S = 3.0
 """Time constant of the mean by which a node is judged."""
 _FIRST_S = 5.0
-"""After its start nobody is judged before."""
+"""No node is judged before this time after its start."""
 _LEAVE = 0.6
 """Of the threshold: below it a doubted field is believed again."""
 _DIP_DEG = 100.0

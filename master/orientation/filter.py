@@ -34,21 +34,21 @@ class OrientationFilter(Protocol):
         """
 
     def bias_rad_s(self) -> Array:
-        """What the filter takes for the gyros' bias, (n, 3): the true rate is the reading minus this."""
+        """The gyros' bias as estimated, (n, 3): the true rate is the reading minus this."""
 
     def undecided(self) -> Mask:
-        """(n,) whose steady rate may be a bias that is not learnt, so that it says nothing of a motion."""
+        """(n,) nodes whose steady rate may be a bias not learnt yet; it says nothing of the motion."""
 
     def doubts(self) -> dict[int, NodeDoubt]:
-        """Nodes that the filter does not, or not wholly, believe, by their number."""
+        """Doubts about nodes, by their number."""
 
     @property
     def spoilt(self) -> Mask | None:
-        """(n,) who had a reading that was none in the last update; None for nobody."""
+        """(n,) nodes with an unusable reading in the last update; None where no node had one."""
 
     @property
     def skipped(self) -> NDArray[np.int64]:
-        """(n,) ticks with a reading that was none (NaN, infinite, absurd), which was left out."""
+        """(n,) ticks with an unusable reading (NaN, infinite, absurd), which was left out."""
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""

@@ -92,7 +92,7 @@ class FilterBank:
 
     @property
     def spoilt(self) -> Mask | None:
-        """(N,), or None for nobody."""
+        """(N,), or None where no node had an unusable reading."""
         out = None
         for rows, part in self._parts:
             spoilt = part.spoilt

@@ -1,4 +1,4 @@
-"""What every filter does with a tick's readings before it believes them."""
+"""What every filter does first with a tick's readings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _WITHHELD_S, _SELDOM = 60.0, 16
 """For so long a doubted field does not count at all, then in one tick of so many."""
 _FIELD_LOOKS = 3
 """Of the gyros' to one of the fields, which cost the most; where the front weighs every field itself, one."""
-_TOLD_RAD_S = math.radians(2.0)
+_NOTED_RAD_S = math.radians(2.0)
 """A bias larger than this is one that calibration should have taken off."""
 
 
@@ -56,7 +56,7 @@ class FrontLimits:
 
 
 class Front:
-    """Leaves out what is no reading, fields that have changed and gross biases found at rest, of n nodes."""
+    """Leaves out unusable readings, changed magnetic fields and gross biases found at rest, of n nodes."""
 
     def __init__(
         self, limits: FrontLimits, rate_hz: float, count: int, q_inertial_from_sensor: Callable[[], Array]
@@ -74,9 +74,9 @@ class Front:
         self._ticks, self._seen = 0, np.zeros(count, dtype=np.int64)
         self._unsound = np.zeros(count)
         self.magnetic: Mask = self._sound.magnetic
-        """(n,) who has a field in what `take` gave last."""
+        """(n,) nodes with a magnetic field in what `take` returned last."""
         self.corrected: Mask | None = None
-        """(n,) whose bias was found with the readings taken last; None for nobody's. They lie still: gravity
+        """(n,) nodes whose bias was found with the last readings; None for no node. They lie still: gravity
         and field give their orientation, and what the filter made of the bias is to be forgotten."""
 
     @property
@@ -86,7 +86,7 @@ class Front:
 
     @property
     def skipped(self) -> NDArray[np.int64]:
-        """(n,) ticks with a reading that was none."""
+        """(n,) ticks with an unusable reading."""
         return self._sound.skipped
 
     def take(
@@ -134,7 +134,7 @@ class Front:
 
     @property
     def spoilt(self) -> Mask | None:
-        """(n,) who had a reading that was none in what was taken last; None for nobody."""
+        """(n,) nodes with an unusable reading in what was taken last; None where no node had one."""
         return self._sound.spoilt
 
     def with_offset(self, bias_rad_s: Array) -> Array:
@@ -142,7 +142,7 @@ class Front:
         return bias_rad_s + self._gross.offset_rad_s if self._gross.some else bias_rad_s
 
     def undecided(self) -> Mask:
-        """(n,) whose rate may be a bias that is not learnt."""
+        """(n,) nodes whose rate may be a bias not learnt yet."""
         return self._gross.undecided()
 
     def doubts(self) -> dict[int, NodeDoubt]:
@@ -151,13 +151,13 @@ class Front:
         gross = self._gross
         if self._field.doubted.any():
             for node in np.flatnonzero(self._field.doubted).tolist():
-                out[node] = NodeDoubt(self._field.words(node), Weight.TOLD)
+                out[node] = NodeDoubt(self._field.words(node), Weight.NOTED)
         if gross.some:
             off = np.abs(gross.offset_rad_s).max(axis=1)
-            for node in np.flatnonzero(off > _TOLD_RAD_S).tolist():
+            for node in np.flatnonzero(off > _NOTED_RAD_S).tolist():
                 rate = math.degrees(off[node])
                 words = f"its gyro reads {rate:.1f}°/s at rest, which is taken off; calibrate it"
-                out[node] = NodeDoubt(words, Weight.TOLD)
+                out[node] = NodeDoubt(words, Weight.NOTED)
         if gross.beyond_rad_s.any():
             for node in np.flatnonzero(gross.beyond_rad_s).tolist():
                 rate = math.degrees(gross.beyond_rad_s[node])
@@ -168,7 +168,7 @@ class Front:
                 out[node] = NodeDoubt(words, Weight.INVALID)
         for node in np.flatnonzero(self._unsound).tolist():
             words = f"{self._sound.skipped[node]} readings were no numbers, or beyond any sensor's range"
-            weight = Weight.INVALID if self._unsound[node] > _MANY else Weight.TOLD
+            weight = Weight.INVALID if self._unsound[node] > _MANY else Weight.NOTED
             out[node] = NodeDoubt(words, weight)
         return out
 

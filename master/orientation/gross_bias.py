@@ -77,7 +77,7 @@ class GrossBias:
         return self._state.beyond_rad_s
 
     def undecided(self) -> Mask:
-        """(n,) who reads a large and steady rate: a bias that is yet to be learnt, or is too large for it.
+        """(n,) nodes that read a large and steady rate: a bias yet to be learnt, or too large to be.
 
         Such a node may also turn as steadily as a machine. It says nothing of how its wearer moves.
         """
@@ -111,7 +111,7 @@ class GrossBias:
         rate = np.add.reduce(state.ring[:, :, _GYR], axis=0) / _LOOKS
         # comparisons with NaN are false: a window that is not full is no rest
         large = np.abs(rate - state.offset).max(axis=1) > self._reach
-        # the newest reading alone rules out most of those who move
+        # the newest reading alone rules out most nodes that move
         large &= np.abs(seen[:, _GYR] - rate).max(axis=1) < _NEAR_RAD_S
         if not large.any() and not state.beyond_rad_s.any():
             state.steady[:] = 0

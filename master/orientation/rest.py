@@ -27,7 +27,7 @@ class RestState:
     """For how long nothing has moved (n,)."""
 
     def gyr_rad_s(self) -> Array:
-        """Low-passed (n, 3): the bias of who is still."""
+        """Low-passed (n, 3): the bias of nodes that lie still."""
         return self.low[:, :3]
 
     def forget(self, nodes: Mask) -> None:
@@ -47,7 +47,7 @@ class Rest:
         return RestState(np.full((count, 6), np.nan), np.zeros(count))
 
     def update(self, state: RestState, gyr_rad_s: Array, acc_m_s2: Array, dt_s: float) -> Mask:
-        """Take one tick (n, 3) each; who has been still for long enough, (n,)."""
+        """Take one tick, (n, 3) each; which nodes have been still for long enough, (n,)."""
         readings = np.concatenate([gyr_rad_s, acc_m_s2], axis=1)
         new = np.isnan(state.low[:, 0])
         if new.any():

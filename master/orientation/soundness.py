@@ -30,9 +30,9 @@ class Soundness:
         self.everybody: Mask = np.ones(count, dtype=np.bool_)
         self._none: Mask = np.zeros(count, dtype=np.bool_)
         self.magnetic = self.everybody
-        """(n,) who has a field in what `take` gave last."""
+        """(n,) nodes with a magnetic field in what `take` returned last."""
         self.spoilt: Mask | None = None
-        """(n,) who had a reading that was none in what `take` was given last; None for nobody."""
+        """(n,) nodes with an unusable reading in what `take` was given last; None where no node had one."""
         self._gyr = np.zeros((count, 3))
 
     def take(self, gyr: Array, acc: Array, mag: Array) -> tuple[Array, Array, Array]:

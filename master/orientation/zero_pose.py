@@ -1,4 +1,4 @@
-"""What standing still in the zero pose tells of each node: its heading, or how its sensor sits.
+"""What standing in the zero pose determines for each node: its heading, or how its sensor sits.
 
 It assumes that every segment then stands as in the skeleton's zero pose and that the operator faces a known
 heading. Of a node whose alignment is calibrated only the heading is taken. Of any other node the alignment
@@ -63,7 +63,7 @@ class ZeroPose:
         self.known: Mask = np.full(count, ticks == 0)
         """(N,) nodes whose zero pose is complete."""
         self.refused = 0
-        """How often a pose was not the zero pose."""
+        """How many poses were refused."""
         self.reasons: dict[int, str] = {}
         """What was wrong with the last pose that was refused, by node, the worst first."""
         self.q_sensor_from_segment = q_sensor_from_segment.copy()
@@ -76,7 +76,7 @@ class ZeroPose:
     def add(self, q_world_from_sensor: Array, settled: Mask, rate_rad_s: Array | None = None) -> Mask:
         """One tick: orientations (N, 4), which of them count, and their rates (N, 3) without the bias.
 
-        Returns who is complete now, (N,). A node that drops out begins again.
+        Returns the nodes that are complete now, (N,). A node that drops out begins again.
         """
         gone = ~self.known & ~settled
         self._sum[gone] = 0.0
@@ -98,7 +98,7 @@ class ZeroPose:
         done = taking & (self._taken >= self._ticks)
         if not done.any():
             return done
-        # of who came later too: whoever leans, the operator does not stand in the zero pose
+        # nodes that came later count too: if any segment leans, the operator is not in the zero pose
         leaning = self._lean(taking & self._aligned)
         if leaning:
             self._refuse(leaning, taking)
@@ -107,7 +107,7 @@ class ZeroPose:
         return done
 
     def _motion(self, q: Array, taking: Mask, rate_rad_s: Array | None) -> dict[int, str]:
-        """Who turns, by node, the fastest first."""
+        """Nodes that turn, and how, the fastest first."""
         limit = self._limits.turn_rad_s
         out = {}
         if rate_rad_s is not None:

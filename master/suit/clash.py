@@ -1,4 +1,4 @@
-"""Two nodes that bear one id, two suits on one bus, two masters that ask: who must not be believed. Pure.
+"""Two nodes with one id, two suits on one bus, two masters on one bus: which answers are doubted. Pure.
 
 A CAN controller may repeat a frame, and udp_multicast may too; then both are the same. Two *different* sound
 answers to one tick come from two nodes. A SYNC that this master did not send comes from another master.

@@ -1,4 +1,4 @@
-"""Nodes that answer but are not, or not wholly, believed: the one form in which all of the master says so.
+"""Doubts about nodes that answer: the one form in which every part of the master states them.
 
 A part gives `{node: NodeDoubt}`. The pipeline puts the parts together. From there a doubt reaches the joints'
 validity, the log, the statistics (`doubts`), `tandem status` and, if heavy enough, the refusal of `engage`.
@@ -13,20 +13,20 @@ from enum import IntEnum
 from common.clock import to_ns
 
 MOST_NAMED = 3
-"""Nodes that a refusal names; the others are counted."""
+"""Number of nodes that a refusal names; the others are counted."""
 _AGAIN_S = 10.0
-"""Until other words for the same node are logged anew: figures in them change from tick to tick."""
+"""Time until changed words for the same node are logged again: numbers in them change every tick."""
 
 
 class Weight(IntEnum):
-    """What follows from a doubt; each includes the ones before it."""
+    """The consequence of a doubt; each includes the ones before it."""
 
-    TOLD = 0
-    """People are told."""
+    NOTED = 0
+    """Logged and shown."""
     INVALID = 1
     """The node's joints are not valid: the robot holds them."""
     REFUSED = 2
-    """Nobody engages while it lasts. Who is engaged already stays so: invalid joints are held anyway."""
+    """Engaging is refused while it lasts. A robot that is engaged stays so: its invalid joints are held."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ Doubts = Mapping[str, NodeDoubt]
 
 
 def together(*parts: Doubts) -> dict[str, NodeDoubt]:
-    """All that is said of each node: the heaviest first, and its weight for the whole."""
+    """All doubts about each node in one: the heaviest first, with its weight."""
     out: dict[str, NodeDoubt] = {}
     for part in parts:
         for node, doubt in part.items():
@@ -56,7 +56,7 @@ def together(*parts: Doubts) -> dict[str, NodeDoubt]:
 
 
 def refusal(doubts: Doubts) -> str:
-    """Why nobody should engage now, in words; empty where nothing speaks against it."""
+    """Why engaging is refused now, in words; empty where it is not."""
     by_words: dict[str, list[str]] = {}
     for node, doubt in doubts.items():
         if doubt.weight is Weight.REFUSED:
@@ -103,7 +103,7 @@ class DoubtLog:
 
 
 _CONSEQUENCE = {
-    Weight.TOLD: "",
+    Weight.NOTED: "",
     Weight.INVALID: " (its joints are invalid)",
     Weight.REFUSED: " (its joints are invalid; engage is refused)",
 }

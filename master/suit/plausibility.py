@@ -89,7 +89,7 @@ class PlausibilityWatch:
         self._gravity = GravityWatch(count, config.contradiction_deg, affine)
         self._judged_ns = 0
         self.doubted: Mask = np.zeros(count, np.bool_)
-        """(N,) whose readings are not to be used now."""
+        """(N,) nodes whose readings are not used now."""
         self.mag_doubted: Mask = np.zeros(count, np.bool_)
 
     def _blocks(self, seconds: float, rate_hz: float) -> int:
@@ -103,13 +103,13 @@ class PlausibilityWatch:
         """What is wrong with which node, by its index."""
         out = {node: NodeDoubt(words, Weight.REFUSED) for node, words in self._words.items()}
         for node, words in self._mag_words.items():
-            out.setdefault(node, NodeDoubt(words, Weight.TOLD))
+            out.setdefault(node, NodeDoubt(words, Weight.NOTED))
         return out
 
     def take(self, sweep: Sweep, readings: Array, saturated: Mask | None = None) -> Sweep:
-        """One tick's sweep with whoever is not believed taken as lost, and dead magnetometers left out.
+        """One tick's sweep with doubted nodes marked as lost, and stuck magnetometers left out.
 
-        `readings` (N, 9): the sweep's, in one array. `saturated` (N,): who says that a reading is clipped.
+        `readings` (N, 9): the sweep's, in one array. `saturated` (N,): nodes that report a clipped reading.
         """
         row = self._row
         self._ring[row] = readings

@@ -80,7 +80,7 @@ class Poll:
         self.clashes = Clashes(np.array([self._bus_names.index(node.bus) for node in nodes], np.intp))
         self._foreign: dict[str, int] = {}
         self.saturated: Mask = np.zeros(count, np.bool_)
-        """(N,) nodes that said in the last window that a reading is clipped."""
+        """(N,) nodes that reported a clipped reading in the last window."""
 
         self._tick = 0
         self._number = 0
@@ -176,7 +176,7 @@ class Poll:
         return frozenset(self._bus_of_node)
 
     def signs(self, bus: str, up: bool, counters: BusCounters) -> BusSigns:
-        """What tells why nobody on a bus answers, with what the bus itself counted."""
+        """What shows why no node on a bus answers, together with the bus's own counters."""
         here = np.array([name == bus for name in self._bus_of_node])
         nodes = self._counters
         return BusSigns(
@@ -248,7 +248,7 @@ class Poll:
         self._foreign[bus] = self._foreign.get(bus, 0) + 1
 
     def _take(self) -> tuple[Mask, Mask]:
-        """Judge what was sorted, node by node; returns who is fresh and who was heard at all."""
+        """Judge the sorted frames, node by node; returns which nodes are fresh and which were heard."""
         fresh = np.zeros(len(self._values), dtype=np.bool_)
         heard = np.zeros(len(self._values), dtype=np.bool_)
         differing, twice = np.zeros_like(fresh), np.zeros_like(fresh)

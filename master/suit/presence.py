@@ -35,7 +35,7 @@ class NodePresence:
         """(N,) how often each node went from there to lost."""
 
     def close(self, fresh: Mask, heard: Mask) -> None:
-        """End a window: who answered it, and who was heard with a sound frame of whatever tick."""
+        """End a window: which nodes answered it, and which sent a sound frame of any tick."""
         self._window += 1
         if self._steady and fresh.all():
             return

@@ -50,7 +50,7 @@ def advice(before: BusSigns, now: BusSigns) -> str:
     if more("error_frames"):
         causes.append("the controller reports errors: bit rate, sample point, 120 Ω at both ends, wiring")
     if more("send_errors"):
-        causes.append("SYNC is not acknowledged: no power, nobody else on the bus, or another bit rate")
+        causes.append("SYNC is not acknowledged: no power, no other device on the bus, or another bit rate")
     if not causes:
         causes.append(
             f"nothing is heard: the nodes' power and plug, the bit rate, 120 Ω at both ends, "

@@ -167,7 +167,7 @@ def test_a_doubted_node_invalidates_its_joints_and_refuses_engage(
     doubts[node] = NodeDoubt("two nodes answer", Weight.REFUSED)
     angles = settled.run(16)[-1]
     assert CommandWriter("r").write(angles, 1, True, 0, 0).doubt == "left_forearm: two nodes answer"
-    doubts[node] = NodeDoubt("its field is odd", Weight.TOLD)
+    doubts[node] = NodeDoubt("its field is odd", Weight.NOTED)
     angles = settled.run(16)[-1]
     assert angles.valid.all()
     assert angles.doubt == ""

@@ -52,7 +52,7 @@ class DisturbanceConfig(Section):
     local: list[LocalConfig] = Field(default=[])
 
     def unknown_nodes(self, known: list[str]) -> list[str]:
-        """Nodes that a local field names and nobody has."""
+        """Nodes that a local field names but the suit does not have."""
         named = [name for local in self.local if local.nodes != "all" for name in local.nodes]
         return [name for name in named if name not in known]
 

@@ -1,4 +1,4 @@
-"""Troubles on demand: lost nodes, liars (`lies`), twins, late, corrupt and duplicate answers; by seed."""
+"""Faults on demand: lost nodes, wrong readings (`lies`), twins, late, corrupt and duplicate answers."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Delay(TimeSpan):
 
 
 class Twin(TimeSpan):
-    """`[[faults.twin]]`: a second node with the same id on the same bus, worn by somebody else."""
+    """`[[faults.twin]]`: a second node with the same id on the same bus, worn by another person."""
 
     node: str | None = None
     """Its segment; None: every node, which is a second suit."""

@@ -108,7 +108,7 @@ class Imperfections:
 
 
 def quantise(readings: Array, scale: Array, random: np.random.Generator | None = None) -> tuple[Counts, Mask]:
-    """Counts (..., 9) of readings, for the value of one count a channel (9,); and who saturated, (...).
+    """Counts (..., 9) of readings, for the value of one count a channel (9,); and which saturated, (...).
 
     `random` moves the last bit (`LAST_BIT`); without it what stands still repeats exactly.
     """

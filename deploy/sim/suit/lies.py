@@ -54,7 +54,7 @@ class Lie(TimeSpan):
 
 
 class Lies:
-    """What liars last read, and what they say instead of what they read now."""
+    """Wrong readings: what such nodes last read, and what they send instead of the present readings."""
 
     def __init__(self, names: tuple[str, ...], scale: Array, seed: int) -> None:
         self._row = {name: row for row, name in enumerate(names)}
@@ -65,7 +65,7 @@ class Lies:
     def apply(
         self, lies: list[Lie], counts: Counts, status: NDArray[np.int64], t_s: float
     ) -> tuple[Counts, NDArray[np.int64]]:
-        """Counts (N, 9) and status (N,) as they are told; those given are not changed."""
+        """Counts (N, 9) and status (N,) as they are sent; those given are not changed."""
         active = [lie for lie in lies if lie.includes(t_s) and lie.node in self._row]
         self._began = {lie: held for lie, held in self._began.items() if lie in active}
         if not active:

@@ -1,4 +1,4 @@
-"""The simulated suit's process: answers on CAN, tells those who judge the truth, takes faults from them."""
+"""The simulated suit's process: answers on CAN, publishes the truth, takes faults over the link."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 
 
 async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
-    """Answer until `stop` is set. Without a link the truth is told to nobody."""
+    """Answer until `stop` is set. Without a link the truth is not published."""
     async with AsyncExitStack() as stack:
         link: Link | None = None
         tell: Callable[[Truth], None] | None = None
@@ -51,7 +51,7 @@ def _take(told: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:
 
 
 def told_faults(told: bytes, nodes: list[str]) -> FaultsConfig:
-    """The faults that somebody who tests asks for, as in the file's `[faults]`. Raises ConfigError."""
+    """The faults that a test asks for, written as in the file's `[faults]`. Raises ConfigError."""
     where = Path("told faults")
     try:
         table = tomllib.loads(told.decode("utf-8"))

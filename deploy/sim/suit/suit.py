@@ -38,12 +38,12 @@ class SuitAnswer:
 
     frames: list[Outgoing]
     truth: Truth | None
-    """None where a recording is played: nobody knows it."""
+    """None where a recording is played: its truth is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wearing:
-    """One instant of whoever wears the suit."""
+    """The wearer of the suit at one instant."""
 
     readings: Array
     """(N, 9) what the sensors read, before quantisation."""
@@ -52,7 +52,7 @@ class Wearing:
 
 
 class Wearer(Protocol):
-    """Whoever wears the suit: a simulated operator, or a recording of a real one."""
+    """The wearer of the suit: a simulated operator, or a recording of a real one."""
 
     @property
     def magnetic(self) -> bool:
@@ -100,7 +100,7 @@ class CalibratingOperator:
         self.noisy = imperfections.noisy
 
     def at(self, t_s: float) -> Wearing:
-        """The tray at that time, or whoever wears the units by then; no joints are true of a tray."""
+        """The tray at that time, or the wearer once the units are worn; a tray has no joints."""
         if self._then is not None and t_s >= self._tray.period_s:
             return self._then.at(t_s - self._tray.period_s)
         return Wearing(self._imperfections.apply(self._tray.readings(t_s, self._field_ut)), None)
@@ -163,7 +163,7 @@ class SimulatedSuit:
         answers = self._answers(number, counts, status)
         twins = self.faults.twins(t_ns) if self.faults.config.twin else set()
         if twins is None or twins:
-            # somebody else: the same readings about other axes
+            # another person: the same readings about other axes
             others = self._answers(number, counts[:, _OTHER_AXES], status)
             answers += [answer for answer in others if twins is None or answer.node in twins]
         truth = None if instant.joints is None else Truth(tick_of(number), now_ns, *instant.joints)

@@ -164,7 +164,7 @@ class OnlineHeadings:
                 f"turns by {found.degrees(k):.0f}° against {self._names[joints.parent[k]]} about an axis "
                 "about which the joint cannot: its alignment, zero pose or heading is wrong, or it slipped. "
                 "Take the zero pose again, or `tandem calibrate align`",
-                Weight.TOLD,
+                Weight.NOTED,
             )
             for k in np.flatnonzero(found.now).tolist()
         }

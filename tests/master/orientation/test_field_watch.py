@@ -46,7 +46,7 @@ def test_hard_iron_is_told_and_believed_less(name: str, axis: int) -> None:
     clean = turning(FILTERS[name]().make(RATE_HZ, 1), 50.0, 99.0, offset)
     watched, before = turning(filter_, 50.0, 20.0, offset), turning(unwatched(name), 50.0, 20.0, offset)
     (doubt,) = filter_.doubts().values()
-    assert doubt.weight is Weight.TOLD
+    assert doubt.weight is Weight.NOTED
     assert "its magnetic field is" in doubt.words
     assert watched < max(0.7 * before, clean + 1.5)
 

@@ -48,7 +48,7 @@ def test_a_gross_bias_is_learnt_at_rest(name: str, field: bool) -> None:
     truth = run(filter_, BIASES, 6.0, field=field, turn=np.zeros_like(BIASES))
     assert np.abs(np.degrees(filter_.bias_rad_s()) - BIASES).max() < 0.2
     assert {node: doubt.weight for node, doubt in filter_.doubts().items()} == dict.fromkeys(
-        range(len(BIASES)), Weight.TOLD
+        range(len(BIASES)), Weight.NOTED
     )
     words = r"its gyro reads 1[45]\.[019]°/s at rest, which is taken off; calibrate it"
     assert re.fullmatch(words, filter_.doubts()[3].words)
@@ -67,7 +67,7 @@ def test_beyond_the_setting_the_node_is_called_uncalibrated(name: str) -> None:
     doubts = filter_.doubts()
     assert doubts[0].weight is Weight.INVALID
     assert "uncalibrated: its gyro reads 2" in doubts[0].words
-    assert doubts[1].weight is Weight.TOLD
+    assert doubts[1].weight is Weight.NOTED
 
 
 def test_the_bound_is_a_setting() -> None:

@@ -92,7 +92,7 @@ def test_a_node_that_gives_no_numbers_is_named_and_invalid() -> None:
     for _ in range(41):
         subject.update(sound)
     (doubt,) = subject.doubts().values()
-    assert doubt.weight is Weight.TOLD
+    assert doubt.weight is Weight.NOTED
     assert doubt.words == "1 readings were no numbers, or beyond any sensor's range"
     for _ in range(41):
         subject.update(replace(sound, acc_m_s2=acc))

@@ -3,7 +3,7 @@
 from common.clock import NS_PER_S
 from master.suit.doubt import DoubtLog, NodeDoubt, Weight, as_figures, refusal, together
 
-FIELD = NodeDoubt("its field is not the earth's", Weight.TOLD)
+FIELD = NodeDoubt("its field is not the earth's", Weight.NOTED)
 FROZEN = NodeDoubt("it repeats one reading", Weight.INVALID)
 MOVED = NodeDoubt("moved in the zero pose", Weight.REFUSED)
 
@@ -38,6 +38,6 @@ def test_each_doubt_is_logged_as_it_begins_grows_and_ends() -> None:
 def test_figures_that_change_from_tick_to_tick_do_not_flood_the_log() -> None:
     log, lines = DoubtLog(), []
     for tenth in range(300):
-        words = NodeDoubt(f"off by {tenth}", Weight.TOLD)
+        words = NodeDoubt(f"off by {tenth}", Weight.NOTED)
         lines += log.lines({"waist": words}, tenth * NS_PER_S // 10)
     assert len(lines) == 3

@@ -104,7 +104,7 @@ def test_a_magnetometer_that_hangs_is_left_out_and_joints_stay_valid() -> None:
     assert invalid_after_s(bench) is None
     doubt = bench.pipeline.plausibility.doubts()[bench.pipeline.skeleton.segment_names.index(NODE)]
     assert "magnetometer" in doubt.words
-    assert doubt.weight is Weight.TOLD
+    assert doubt.weight is Weight.NOTED
 
 
 @pytest.mark.parametrize("kind", ["zero", "ones", "overflow_mag"])

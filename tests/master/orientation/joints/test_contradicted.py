@@ -57,4 +57,4 @@ def test_an_elbow_that_is_bent_sideways_for_good_is_named(deg: float) -> None:
     assert (forearm in doubts) == (deg > 0.0)
     if deg:
         assert "against left_upper_arm about an axis about which the joint cannot" in doubts[forearm].words
-        assert doubts[forearm].weight is Weight.TOLD
+        assert doubts[forearm].weight is Weight.NOTED
