@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING
@@ -26,11 +25,11 @@ LIARS: tuple[tuple[str, str, LieKind, int | None], ...] = (
 )
 
 
-def _suit(**faults: Any) -> Callable[[Scene], None]:
+def _suit(faults: FaultsConfig) -> Callable[[Scene], None]:
     """The simulated suit has these faults from now on."""
 
     def act(scene: Scene) -> None:
-        scene.run.suit.faults.config = FaultsConfig(**faults)
+        scene.run.suit.faults.config = faults
 
     return act
 
@@ -76,7 +75,7 @@ SUIT = (
         done="A node of the reaching arm does not answer any more.",
         robot="Holds the joints that need the node; the others follow.",
         person="Mend the node. Its joints come back slowly by themselves.",
-        act=_suit(lose=[Loss(node=NODE)]),
+        act=_suit(FaultsConfig(lose=[Loss(node=NODE)])),
         concerns=_joints_of_node, strays_deg=1.0, sway_deg=1.0,
         stands_s=0.1 + 0.08 + BRAKED_S,
     ),
@@ -88,7 +87,7 @@ SUIT = (
             robot="Holds the joints that need the node; the others follow. "
             "The node is named with what is wrong.",
             person="Mend the node. Its joints come back slowly by themselves; until then nobody can engage.",
-            act=_suit(lie=[Lie(node=NODE, kind=kind, axis=axis)]),
+            act=_suit(FaultsConfig(lie=[Lie(node=NODE, kind=kind, axis=axis)])),
             concerns=_joints_of_node, strays_deg=2.5, sway_deg=1.0, stands_s=0.2 + BRAKED_S,
         )
         for name, done, kind, axis in LIARS
@@ -126,7 +125,7 @@ SUIT = (
         done="Another suit answers the same SYNCs with the same node numbers.",
         robot="Believes neither: brakes and stands. The log and `tandem status` name the nodes.",
         person="Take one suit off the bus, or give it other numbers. " + ENGAGE,
-        act=_suit(twin=[Twin()]),
+        act=_suit(FaultsConfig(twin=[Twin()])),
         reacts_s=0.02 + NOTICED_S, stands_s=0.02 + 0.08 + BRAKED_S, held_by={"valid"},
     ),
     holds(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -15,7 +15,7 @@ from deploy.ops.network.figures import DELAY_MS, LOSS_POINTS, RATE_SHARE, Measur
 from deploy.ops.network.verify import measure
 from deploy.ops.network.view import measured_table, profiles_table
 from deploy.report.output import in_a_folder, write_json
-from deploy.sim.network.network import open_network
+from deploy.sim.network.network import Backend, open_network
 from deploy.sim.network.profile import Profile, load_profile, profile_names
 
 app = typer.Typer(no_args_is_help=True)
@@ -55,9 +55,7 @@ def verify(
     seconds: Annotated[
         float, typer.Option(help="Seconds for which each profile is measured.", min=1.0, max=600.0)
     ] = 10.0,
-    backend: Annotated[
-        Literal["auto", "forwarder", "netem"], typer.Option(help="Program that emulates the link.")
-    ] = "auto",
+    backend: Annotated[Backend, typer.Option(help="Program that emulates the link.")] = "auto",
     report: Annotated[
         Path | None,
         typer.Option(
@@ -95,7 +93,7 @@ def verify(
         raise TandemError(f"the emulated link is not as these profiles say: {', '.join(off)}")
 
 
-async def _measure(profile: Profile, seconds: float, backend: Any) -> Measured:
+async def _measure(profile: Profile, seconds: float, backend: Backend) -> Measured:
     # an outage is no property of the packets that pass
     async with open_network(profile.model_copy(update={"outages": []}), backend=backend) as network:
         return await measure(network, seconds)

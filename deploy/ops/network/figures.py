@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from statistics import fmean, median, pstdev
-from typing import Any
 
 from common.clock import NS_PER_MS
 from common.errors import NetworkError
@@ -89,7 +88,7 @@ class WayMeasured:
         """All of it."""
         return self.delay_kept and self.loss_kept and self.rate_kept
 
-    def tree(self) -> dict[str, Any]:
+    def tree(self) -> dict[str, object]:
         """For JSON."""
         offs = {"delay_off_ms": self.delay_off_ms, "loss_off_percent": self.loss_off_percent}
         kept = {"delay_kept": self.delay_kept, "loss_kept": self.loss_kept, "rate_kept": self.rate_kept}
@@ -110,7 +109,7 @@ class Measured:
         """Whether both are as the profile says."""
         return self.to_robot.kept and self.to_operator.kept
 
-    def tree(self) -> dict[str, Any]:
+    def tree(self) -> dict[str, object]:
         """For JSON."""
         ways = {"to_robot": self.to_robot.tree(), "to_operator": self.to_operator.tree()}
         return {"profile": self.profile, "backend": self.backend, "kept": self.kept, **ways}

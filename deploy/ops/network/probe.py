@@ -13,9 +13,9 @@ import struct
 import sys
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from common.clock import NS_PER_S, to_ns, to_s, wall_ns
+from common.metrics.tree import to_tree
 from common.process.realtime import enter_real_time
 
 PORT = 7450
@@ -49,6 +49,15 @@ class ProbePlan:
         return [json.dumps(asdict(self))]
 
 
+@dataclass(frozen=True, slots=True)
+class ProbeResult:
+    """What one end did and saw."""
+
+    sent: int
+    arrivals: list[tuple[int, int, int]]
+    """Number, time of sending and time of arrival, ns."""
+
+
 def open_end(plan: ProbePlan) -> socket.socket:
     """The socket: it hears from now on, and the kernel stamps what it hears."""
     end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -60,8 +69,8 @@ def open_end(plan: ProbePlan) -> socket.socket:
     return end
 
 
-def run(plan: ProbePlan, end: socket.socket, start_ns: int) -> dict[str, Any]:
-    """`sent`: how many were, and `arrivals`: number, time of sending and of arrival, ns."""
+def run(plan: ProbePlan, end: socket.socket, start_ns: int) -> ProbeResult:
+    """Send and listen as planned."""
     padding = bytes(plan.size - IP_UDP_BYTES - STAMP.size)
     period_ns = NS_PER_S / plan.rate_hz
     arrivals: list[tuple[int, int, int]] = []
@@ -79,7 +88,7 @@ def run(plan: ProbePlan, end: socket.socket, start_ns: int) -> dict[str, Any]:
         wait_ns = (next_ns if number < plan.packets else until_ns) - now_ns
         if select.select([end], [], [], to_s(max(wait_ns, 0)))[0]:
             arrivals.extend(_arrived(end))
-    return {"sent": number - refused, "arrivals": arrivals}
+    return ProbeResult(number - refused, arrivals)
 
 
 def _arrived(end: socket.socket) -> list[tuple[int, int, int]]:
@@ -101,7 +110,7 @@ def main() -> None:
     sys.stdout.flush()
     start = sys.stdin.readline()
     if start:  # else the parent has given up
-        json.dump(run(plan, end, int(start)), sys.stdout)
+        json.dump(to_tree(run(plan, end, int(start))), sys.stdout)
 
 
 if __name__ == "__main__":

@@ -5,16 +5,14 @@ from __future__ import annotations
 import asyncio
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
-from common.clock import to_ns, wall_ns
+from common.clock import to_ms, to_ns, wall_ns
 from common.errors import NetworkError
-from common.metrics.parts import Summary
+from common.metrics.tree import from_tree
 from deploy.ops.network.figures import Measured, WayMeasured, judge, rate_mbit
-from deploy.ops.network.probe import ProbePlan
-from deploy.sim.network.emulation import DIRECTIONS
+from deploy.ops.network.probe import ProbePlan, ProbeResult
 from deploy.sim.network.host import EmulatedHost
 from deploy.sim.network.network import Network
 from deploy.sim.network.profile import Way
@@ -37,14 +35,15 @@ async def measure(network: Network, seconds: float = 10.0, rate_hz: float = RATE
     """Send packets both ways, and judge what arrives. Raises NetworkError where nothing does."""
     hosts, emulation = (network.operator, network.robot), network.emulation
     ways = (network.profile.ways.to_robot, network.profile.ways.to_operator)
-    before, counted = emulation.planned(), emulation.counters()
+    before = emulation.counters()
     count = round(seconds * rate_hz)
     ends = await _run(hosts, ways, (rate_hz, rate_hz), (count, count), SMALL)
-    after, now = emulation.planned(), emulation.counters()
+    after = emulation.counters()
+    both = ((before.to_robot, after.to_robot), (before.to_operator, after.to_operator))
     judged = []
-    for number, (way, name) in enumerate(zip(ways, DIRECTIONS, strict=True)):
-        sent, arrivals = ends[number]["sent"], ends[1 - number]["arrivals"]
-        drawn = (_mean_ms(before, after, name), _loss_percent(getattr(counted, name), getattr(now, name)))
+    for number, (way, counters) in enumerate(zip(ways, both, strict=True)):
+        sent, arrivals = ends[number].sent, ends[1 - number].arrivals
+        drawn = (_mean_ms(*counters), _loss_percent(*counters))
         judged.append(judge(way, sent, arrivals, SMALL, seconds, *drawn))
     to_robot, to_operator = await _fill(hosts, ways, judged)
     return Measured(network.profile.name, emulation.name, to_robot, to_operator)
@@ -64,7 +63,7 @@ async def _fill(
     filled = []
     for number, (way, limit, one) in enumerate(zip(ways, limits, judged, strict=True)):
         if limit:
-            came = rate_mbit(ends[1 - number]["arrivals"], FULL)
+            came = rate_mbit(ends[1 - number].arrivals, FULL)
             # what is lost has had its time on the link; what comes twice had it once
             share = (1.0 - way.loss_percent / 100.0) * (1.0 + way.duplicate_percent / 100.0)
             one = replace(one, rate_mbit=came, expected_rate_mbit=limit * share)
@@ -78,7 +77,7 @@ async def _run(
     rates_hz: Sequence[float],
     counts: Sequence[int],
     size: int,
-) -> list[dict[str, Any]]:
+) -> list[ProbeResult]:
     last_s = max(count / rate for count, rate in zip(counts, rates_hz, strict=True))
     travel_ms = max(way.delay_ms + 6.0 * way.jitter_ms + way.reorder_ms + way.queue_ms for way in ways)
     plans = [
@@ -110,13 +109,12 @@ async def _start(host: EmulatedHost, plan: ProbePlan) -> asyncio.subprocess.Proc
     )
 
 
-async def _noted(host: EmulatedHost, process: asyncio.subprocess.Process, word: bytes) -> dict[str, Any]:
+async def _noted(host: EmulatedHost, process: asyncio.subprocess.Process, word: bytes) -> ProbeResult:
     said, failed = await process.communicate(word)
     if process.returncode:
         words = failed.decode(errors="replace").strip().splitlines()[-1:]
         raise NetworkError(f"the probe on the {host.name}'s host ended: {' '.join(words)}")
-    noted: dict[str, Any] = json.loads(said)
-    return noted
+    return from_tree(ProbeResult, json.loads(said))
 
 
 def _loss_percent(before: Counters, after: Counters) -> float | None:
@@ -127,10 +125,7 @@ def _loss_percent(before: Counters, after: Counters) -> float | None:
     return 100.0 * (after.dropped[LOSS] - before.dropped.get(LOSS, 0)) / packets
 
 
-def _mean_ms(before: Mapping[str, Summary], after: Mapping[str, Summary], way: str) -> float | None:
-    """Of the packets between the two; None where the emulation does not tell."""
-    if way not in after:
-        return None
-    was, now = before[way], after[way]
-    count = now.count - was.count
-    return (now.total - was.total) / count if count else None
+def _mean_ms(before: Counters, after: Counters) -> float | None:
+    """The mean delay drawn for the packets between the two; None where the emulation does not report it."""
+    count = after.planned - before.planned
+    return to_ms(after.planned_ns - before.planned_ns) / count if count else None

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
 
-from common.metrics.parts import Summary
-from common.metrics.tree import to_tree
 from deploy.sim.network.profile import Profile
 from deploy.sim.network.scheduler import Counters, PacketScheduler
 
 TO_ROBOT, TO_OPERATOR = "to_robot", "to_operator"
-DIRECTIONS = (TO_ROBOT, TO_OPERATOR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +18,16 @@ class LinkCounters:
 
     to_robot: Counters
     to_operator: Counters
+
+
+@dataclass(frozen=True, slots=True)
+class LinkRequest:
+    """A change of the link; the answer is its `LinkCounters`."""
+
+    profile: str = ""
+    """The new profile as JSON; empty: it stays."""
+    cut: bool | None = None
+    """Whether nothing passes; None: as before."""
 
 
 class Emulation(Protocol):
@@ -37,15 +44,12 @@ class Emulation(Protocol):
     def counters(self) -> LinkCounters:
         """Raises NetworkError."""
 
-    def planned(self) -> Mapping[str, Summary]:
-        """The delays that were drawn, each way since the start; empty where they are not reported."""
-
     def close(self) -> None:
         """End it; nothing passes any more."""
 
 
 class EmulatedLink:
-    """Two schedulers, and the requests by which another process steers them."""
+    """Two schedulers, and the requests by which another process changes them."""
 
     def __init__(self, profile: Profile, seed: int = 0, now_ns: int = 0) -> None:
         ways = profile.ways
@@ -71,18 +75,13 @@ class EmulatedLink:
         times = [ns for scheduler in self._ways.values() if (ns := scheduler.next_ns) is not None]
         return min(times, default=None)
 
-    def answer(self, request: dict[str, Any], now_ns: int) -> dict[str, Any]:
-        """`{"set": profile}` and `{"cut": bool}` change the link; every answer holds its counters."""
-        if "set" in request:
-            ways = Profile.model_validate(request["set"]).ways
-            self._ways[TO_ROBOT].set(ways.to_robot, now_ns)
-            self._ways[TO_OPERATOR].set(ways.to_operator, now_ns)
-        for scheduler in self._ways.values():
-            scheduler.cut = bool(request.get("cut", scheduler.cut))
-        return {
-            way: {
-                "counters": asdict(scheduler.counters),
-                "planned_ms": to_tree(scheduler.planned.summary()),
-            }
-            for way, scheduler in self._ways.items()
-        }
+    def answer(self, request: LinkRequest, now_ns: int) -> LinkCounters:
+        """Change the link as requested."""
+        to_robot, to_operator = self._ways[TO_ROBOT], self._ways[TO_OPERATOR]
+        if request.profile:
+            ways = Profile.model_validate_json(request.profile).ways
+            to_robot.set(ways.to_robot, now_ns)
+            to_operator.set(ways.to_operator, now_ns)
+        if request.cut is not None:
+            to_robot.cut = to_operator.cut = request.cut
+        return LinkCounters(to_robot.counters, to_operator.counters)

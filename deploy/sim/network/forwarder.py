@@ -15,8 +15,9 @@ import sys
 from contextlib import suppress
 
 from common.clock import monotonic_ns, to_s
+from common.metrics.tree import from_tree, to_tree
 from common.process.realtime import enter_real_time
-from deploy.sim.network.emulation import TO_OPERATOR, TO_ROBOT, EmulatedLink
+from deploy.sim.network.emulation import TO_OPERATOR, TO_ROBOT, EmulatedLink, LinkRequest
 from deploy.sim.network.profile import Profile
 
 PRIORITY = 60
@@ -41,7 +42,8 @@ def carry(link: EmulatedLink, operator: int, robot: int, control: socket.socket)
                 request = control.recv(REQUEST_BYTES)
                 if not request:
                     return
-                control.send(json.dumps(link.answer(json.loads(request), monotonic_ns())).encode())
+                counters = link.answer(from_tree(LinkRequest, json.loads(request)), monotonic_ns())
+                control.send(json.dumps(to_tree(counters)).encode())
             else:
                 _read(link, device, direction[device])
         for way, packet in link.due(monotonic_ns()):

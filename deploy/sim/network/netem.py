@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from common.errors import NetworkError
-from common.metrics.parts import Summary
 from deploy.sim.network.emulation import LinkCounters
 from deploy.sim.network.loss import gilbert_elliott
 from deploy.sim.network.namespaces import LINK, NetworkRun, ip, link_addresses
@@ -126,10 +125,6 @@ class Netem:
         self._count()
         to_robot, to_operator = (replace(one, dropped=dict(one.dropped)) for one in self._totals.values())
         return LinkCounters(to_robot, to_operator)
-
-    def planned(self) -> dict[str, Summary]:
-        """Empty: the kernel does not report the delays that it draws."""
-        return {}
 
     def close(self) -> None:
         """It ends with its hosts."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from common.clock import NS_PER_MS
-from common.latency.durations import Durations
 from deploy.sim.network.delay import DelayProcess
 from deploy.sim.network.loss import Losses, gilbert_elliott
 from deploy.sim.network.profile import Way
@@ -30,6 +29,10 @@ class Counters:
     duplicated: int = 0
     reordered: int = 0
     """Held back so that others could pass."""
+    planned: int = 0
+    """Packets whose delay the profile decided; 0 where the emulation does not report it."""
+    planned_ns: int = 0
+    """The sum of those delays, queueing included."""
     dropped: dict[str, int] = field(default_factory=lambda: dict.fromkeys((LOSS, QUEUE, SIZE, OUTAGE), 0))
 
 
@@ -42,8 +45,6 @@ class PacketScheduler(Generic[P]):
 
     def __init__(self, way: Way, seed: int = 0, now_ns: int = 0) -> None:
         self.counters = Counters()
-        self.planned = Durations()
-        """How long packets in their order take: what was drawn by the profile's chances, and queueing."""
         self.cut = False
         """While true, nothing passes: packets that enter or would arrive are dropped."""
         self._rng = random.Random(seed)
@@ -87,7 +88,8 @@ class PacketScheduler(Generic[P]):
             counters.dropped[LOSS] += 1
             return
         self._travel(sent_ns, packet, size)
-        self.planned.record(self._newest_ns - now_ns)
+        counters.planned += 1
+        counters.planned_ns += self._newest_ns - now_ns
         if way.duplicate_percent and self._rng.random() < way.duplicate_percent / 100.0:
             counters.duplicated += 1
             self._arrive(self._newest_ns, packet, size)

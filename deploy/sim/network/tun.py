@@ -10,15 +10,12 @@ import struct
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 from common.errors import NetworkError
-from common.metrics.parts import Summary
-from common.metrics.tree import from_tree
-from deploy.sim.network.emulation import TO_OPERATOR, TO_ROBOT, LinkCounters
+from common.metrics.tree import from_tree, to_tree
+from deploy.sim.network.emulation import LinkCounters, LinkRequest
 from deploy.sim.network.namespaces import LINK, NetworkRun, ip, link_addresses
 from deploy.sim.network.profile import Profile
-from deploy.sim.network.scheduler import Counters
 
 DEVICE = Path("/dev/net/tun")
 ANSWER_S = 5.0
@@ -60,22 +57,15 @@ class Forwarder:
 
     def set(self, profile: Profile) -> None:
         """Change the link to this profile."""
-        self._ask({"set": profile.model_dump(mode="json", exclude_unset=True)})
+        self._ask(LinkRequest(profile=profile.model_dump_json(exclude_unset=True)))
 
     def cut(self, cut: bool) -> None:
         """Let nothing pass, or let it pass again."""
-        self._ask({"cut": cut})
+        self._ask(LinkRequest(cut=cut))
 
     def counters(self) -> LinkCounters:
         """Packets and bytes each way so far."""
-        answer = self._ask({})
-        return LinkCounters(
-            Counters(**answer[TO_ROBOT]["counters"]), Counters(**answer[TO_OPERATOR]["counters"])
-        )
-
-    def planned(self) -> dict[str, Summary]:
-        """The delays that were drawn, each way."""
-        return {way: from_tree(Summary, answer["planned_ms"]) for way, answer in self._ask({}).items()}
+        return self._ask(LinkRequest())
 
     def close(self) -> None:
         """End the process."""
@@ -86,9 +76,9 @@ class Forwarder:
             self._process.kill()
             self._process.wait()
 
-    def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
+    def _ask(self, request: LinkRequest) -> LinkCounters:
         try:
-            self._control.send(json.dumps(request).encode())
+            self._control.send(json.dumps(to_tree(request)).encode())
             answer = self._control.recv(1_000_000)
         except OSError as error:
             answer = b""
@@ -97,8 +87,7 @@ class Forwarder:
             why = f" (status {self._process.poll()})"
         if not answer:
             raise NetworkError(f"the forwarder between the hosts does not answer{why}")
-        answered: dict[str, Any] = json.loads(answer)
-        return answered
+        return from_tree(LinkCounters, json.loads(answer))
 
 
 def _open_tun(name: str) -> int:

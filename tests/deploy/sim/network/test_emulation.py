@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
-from deploy.sim.network.emulation import TO_OPERATOR, TO_ROBOT, EmulatedLink
+from deploy.sim.network.emulation import TO_OPERATOR, TO_ROBOT, EmulatedLink, LinkRequest
 from deploy.sim.network.netem import child_arguments, faithful, netem_arguments
 from deploy.sim.network.profile import Profile, Way, load_profile, profile_names
 
@@ -28,13 +26,12 @@ def test_each_direction_has_its_own_delay() -> None:
 def test_requests_change_the_link_and_are_answered_with_what_it_counts() -> None:
     link = EmulatedLink(UNEVEN)
     link.push(TO_ROBOT, 0, b"1234")
-    request = json.loads(json.dumps({"set": load_profile("4g").model_dump(mode="json"), "cut": True}))
-    answer = json.loads(json.dumps(link.answer(request, 0)))
-    assert answer[TO_ROBOT]["counters"]["bytes"] == 4
-    assert answer[TO_OPERATOR]["counters"]["packets"] == 0
+    counters = link.answer(LinkRequest(load_profile("4g").model_dump_json(exclude_unset=True), cut=True), 0)
+    assert (counters.to_robot.bytes, counters.to_robot.planned_ns) == (4, 10 * MS)
+    assert counters.to_operator.packets == 0
     assert list(link.due(10 * MS)) == []  # cut
-    assert link.answer({}, 0)[TO_ROBOT]["counters"]["dropped"]["outage"] == 1
-    link.answer({"cut": False}, 20 * MS)
+    assert link.answer(LinkRequest(), 0).to_robot.dropped["outage"] == 1
+    link.answer(LinkRequest(cut=False), 20 * MS)
     link.push(TO_OPERATOR, 20 * MS, bytes(1250))
     assert link.next_ns is not None
     assert link.next_ns > 20 * MS + (33 - 20) * MS  # 4g's delay, not below its floor
