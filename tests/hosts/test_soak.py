@@ -39,13 +39,13 @@ def test_it_comes_back_from_each_fault_and_judges_itself(tmp_path: Path) -> None
     judged = criteria(report)
     # how soon and how many ticks is this machine's affair today; that it came back, and of whose will, is not
     for name in (
-        "recovery: faults after which it did not follow again",
+        "recovery: faults without recovery",
         "recovery: faults that could not be brought about",
-        "guard: began to move without being engaged",
+        "guard: moves without being engaged",
         "guard: moved while it held",
         "recorder: recordings that cannot be read",
-        "recorder: full disks that it did not live through, saying so once",
-        "loops: processes that ended by themselves",
+        "recorder: full disks that ended it or were not logged once",
+        "loops: processes that ended unasked",
     ):
         assert judged[name]["outcome"] == "passed", (judged[name], said)
     assert judged["memory: master's memory grows"]["outcome"] == "not judged"

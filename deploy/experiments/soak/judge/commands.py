@@ -15,7 +15,12 @@ from deploy.measure.verdict import Verdict, at_most, unproven
 AGE_MS = 300.0
 """`guard.max_age_s`, where no network needs a longer one: an accepted command is younger."""
 DATAGRAMS = frozenset(LOST_PACKETS)
-COUNTED = {"lost": "lost", "late": "out of order", "repeated": "twice", "refused": "refused by the guard"}
+COUNTED = {
+    "lost": "lost",
+    "late": "out of order",
+    "repeated": "duplicated",
+    "refused": "refused by the guard",
+}
 """Columns of what may happen to a command, and the words for it."""
 
 
@@ -33,7 +38,7 @@ def _any_came(seen: SoakEvidence) -> Verdict:
     """Without a single command all else here is true of nothing."""
     sent, arrived = seen.sum("sent"), seen.sum("arrived")
     why = f"the master sent {sent:.0f}, the robot took {arrived:.0f}"
-    return at_most("sides that saw none at all", float(sent == 0.0) + float(arrived == 0.0), 0.0, why=why)
+    return at_most("sides without a single command", float(sent == 0.0) + float(arrived == 0.0), 0.0, why=why)
 
 
 def _counted(seen: SoakEvidence, column: str) -> Verdict:
@@ -70,7 +75,7 @@ def _oldest(seen: SoakEvidence) -> Verdict:
     oldest = None if np.isnan(ages).all() else float(np.nanmax(ages))
     limit_s = seen.network.max_age_s
     most_ms = AGE_MS if limit_s is None else 1e3 * limit_s
-    verdict = at_most("oldest that was acted on", oldest, most_ms, "ms", why="put → accepted")
+    verdict = at_most("oldest accepted command", oldest, most_ms, "ms", why="put → accepted")
     share = _known_share(ages, seen.quiet & (seen.samples["sent"] > 0.0))
     if share >= LEAST_ESTIMATED:
         return verdict
@@ -84,7 +89,7 @@ def _known_share(values: Array, asked: Mask) -> float:
 
 def _came_when_due(seen: SoakEvidence) -> Verdict:
     """By time, not by number: where both sides stand still together nothing is sent and nothing is lost."""
-    name = "due and never came, unexplained"
+    name = "due but never arrived, unexplained"
     if np.isnan(seen.samples["due"]).all():
         return at_most(name, None, 0.0, why="the robot did not publish what was due")
     # a command that did not come when due is why a robot holds, so that it held explains nothing here

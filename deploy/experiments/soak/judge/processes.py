@@ -33,7 +33,7 @@ def loops(seen: SoakEvidence) -> list[Verdict]:
     return [
         *verdicts,
         at_most("times the master lost the robot, unexplained", lost, 0.0, why=in_all),
-        at_most("processes that ended by themselves", float(len(ends)), 0.0, why=words),
+        at_most("processes that ended unasked", float(len(ends)), 0.0, why=words),
     ]
 
 
@@ -46,7 +46,7 @@ def ending(seen: SoakEvidence) -> list[Verdict]:
     words = ", ".join(f"{name}: {status}" for name, status in unclean.items())
     return [
         at_most("ended by an error", float(ends[-1].error), 0.0, why=ends[-1].how),
-        at_most("processes that did not end in order", float(len(unclean)), 0.0, why=words),
+        at_most("processes with a bad exit status", float(len(unclean)), 0.0, why=words),
     ]
 
 
@@ -60,10 +60,10 @@ def recordings(seen: SoakEvidence) -> list[Verdict]:
     verdicts = [at_most("recordings that cannot be read", float(len(unreadable)), 0.0, why=why)]
     killed = [("recorder-kill", what.lost_s) for what in found if what.after == "kill"]
     if killed:
-        verdicts.append(slowest("lost when it was killed", killed, RECORDER_LOSES_S))
+        verdicts.append(slowest("lost by a kill", killed, RECORDER_LOSES_S))
     full = [what for what in found if what.after == "disk full"]
     if full:
         wrong = [what for what in full if not what.lived or what.said != 1]
-        name = "full disks that it did not live through, saying so once"
+        name = "full disks that ended it or were not logged once"
         verdicts.append(at_most(name, float(len(wrong)), 0.0, why=f"of {len(full)}"))
     return verdicts

@@ -43,10 +43,10 @@ def guard(seen: SoakEvidence) -> list[Verdict]:
     farthest = None if np.isnan(strayed).all() else float(np.nanmax(strayed))
     stray_why = "farthest joint, 0.7 s after it held and later"
     return [
-        slowest("holds on a fault, the slowest", held, HOLD_S + way_s),
-        slowest("stands after a fault, the slowest", stood, STANDS_S + way_s),
+        slowest("slowest hold after a fault", held, HOLD_S + way_s),
+        slowest("slowest standstill after a fault", stood, STANDS_S + way_s),
         of_enough(
-            at_most("holds that nothing explains", float(len(holds)), 0.0, why=_reasons(holds)),
+            at_most("unexplained holds", float(len(holds)), 0.0, why=_reasons(holds)),
             1.0 - float(explained_share),
         ),
         _needless_holds(seen),
@@ -64,7 +64,7 @@ def _needless_holds(seen: SoakEvidence) -> Verdict:
         and not seen.explained.accounts_for_hold(what.begun_s + what.held_s)
     ]
     why = ", ".join(sorted(set(needless)))
-    return at_most("holds on a fault that asks for none", float(len(needless)), 0.0, why=why)
+    return at_most("holds on a fault that requires none", float(len(needless)), 0.0, why=why)
 
 
 def _unasked_moves(seen: SoakEvidence) -> Verdict:
@@ -83,7 +83,7 @@ def _unasked_moves(seen: SoakEvidence) -> Verdict:
             unasked += 1
         else:
             engaged_s.remove(own)
-    return at_most("began to move without being engaged", float(unasked), 0.0, why=why)
+    return at_most("moves without being engaged", float(unasked), 0.0, why=why)
 
 
 def recovery(seen: SoakEvidence) -> list[Verdict]:
@@ -95,7 +95,7 @@ def recovery(seen: SoakEvidence) -> list[Verdict]:
     under_way = " (one under way when the soak ended)" if begun > len(done) else ""
     verdicts = [
         at_most(
-            "faults after which it did not follow again",
+            "faults without recovery",
             float(len(lost)) if done else None,
             0.0,
             why=f"of {len(done)}{under_way}" if begun else "there was no fault",
@@ -107,7 +107,7 @@ def recovery(seen: SoakEvidence) -> list[Verdict]:
         like = [(fault, what.flow_s) for what in done if what.fault == fault]
         verdicts.append(slowest(f"commands flow again after {fault}", like, limit_s))
     again = [(what.fault, what.track_s) for what in done if what.track_s is not None]
-    return [*verdicts, slowest("follows again once engaged", again, TRACK_S)]
+    return [*verdicts, slowest("slowest return to track once engaged", again, TRACK_S)]
 
 
 def _less_stalls(seen: SoakEvidence, fault: FaultCourse, took_s: float | None) -> float | None:
