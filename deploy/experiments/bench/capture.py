@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import resource
-from typing import Any
 
 import uvloop
 
@@ -31,12 +30,11 @@ _WRAP = 64
 """Ticks are numbered anew after so many, so that as many prepared answers serve for ever."""
 
 
-def capture(seconds: float, count: int, fd: bool) -> dict[str, Any]:
+def capture(seconds: float, count: int, fd: bool) -> dict[str, object]:
     """µs of processor a tick to receive and decode `count` nodes, how long they take, ticks missed."""
     port = free_port("udp")
     with beside(suit, port=port, count=count, fd=fd):
-        result: dict[str, Any] = in_worker(listen, seconds, port=port, count=count, fd=fd)
-        return result
+        return in_worker(listen, seconds, port=port, count=count, fd=fd)
 
 
 def suit(port: int, count: int, fd: bool) -> None:
@@ -57,7 +55,7 @@ def suit(port: int, count: int, fd: bool) -> None:
     uvloop.run(serve())
 
 
-def listen(seconds: float, port: int, count: int, fd: bool) -> dict[str, Any]:
+def listen(seconds: float, port: int, count: int, fd: bool) -> dict[str, object]:
     """The master's side of it, without anything that comes after decoding."""
     return uvloop.run(_listen(seconds, port, count, fd))
 
@@ -90,7 +88,7 @@ class _Listener:
             self.answered_ns.append(sweep.frames_in_ns - sweep.sampled_ns)
 
 
-async def _listen(seconds: float, port: int, count: int, fd: bool) -> dict[str, Any]:
+async def _listen(seconds: float, port: int, count: int, fd: bool) -> dict[str, object]:
     listener = _Listener(port, count, fd)
     listener.bus.open()
     freeze_heap()

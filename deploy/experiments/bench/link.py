@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Any
 
 from common.link.endpoint import SECURE, TRANSPORTS
 from deploy.experiments.bench.doors import ROBOT, Door
@@ -16,7 +15,7 @@ BARE = "bare zenoh"
 """Zenoh over tcp without tandem's link, with the same configuration."""
 
 
-def link(seconds: float) -> dict[str, Any]:
+def link(seconds: float) -> dict[str, object]:
     """µs one way through tandem's link, bare Zenoh and a bare UDP socket, and the ratios of the medians."""
     tandem, bare = (f"tcp/127.0.0.1:{port}" for port in free_ports("tcp", 2))
     [udp] = free_ports("udp", 1)
@@ -34,7 +33,7 @@ def link(seconds: float) -> dict[str, Any]:
     }
 
 
-def transports(seconds: float) -> dict[str, Any]:
+def transports(seconds: float) -> dict[str, object]:
     """µs one way by transport beside bare Zenoh; medians over tcp's; tcp over bare Zenoh."""
     with tempfile.TemporaryDirectory(prefix="tandem-bench-") as name:
         folder = Path(name)

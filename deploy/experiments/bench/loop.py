@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import uvloop
 
 from common.clock import monotonic_ns, to_ns
@@ -16,19 +14,19 @@ from deploy.measure.timing import spread_us
 RATE_HZ = 200
 
 
-def loop(seconds: float) -> dict[str, Any]:
+def loop(seconds: float) -> dict[str, object]:
     """Lateness in µs and ticks missed, `idle` and `busy`; half of the time goes to each."""
     idle = in_worker(lateness, seconds / 2)
     with beside(burn):
         return {"idle": idle, "busy": in_worker(lateness, seconds / 2)}
 
 
-def lateness(seconds: float) -> dict[str, Any]:
+def lateness(seconds: float) -> dict[str, object]:
     """Tick for a while and do nothing else."""
     return uvloop.run(_lateness(seconds))
 
 
-async def _lateness(seconds: float) -> dict[str, Any]:
+async def _lateness(seconds: float) -> dict[str, object]:
     freeze_heap()
     period_ns = to_ns(1 / RATE_HZ)
     begin_ns = monotonic_ns() + period_ns

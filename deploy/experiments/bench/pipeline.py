@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from common.skeleton import load_skeleton
 from common.skeleton.kinematics import orientations
 from common.wire.codec import decode, encode
 from common.wire.messages import Command, CommandStamps
-from deploy.measure.timing import spread_us, time_calls
+from deploy.measure.timing import Figures, spread_us, time_calls
 from master.joint_angles.solver import JointSolver
 from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
@@ -41,7 +40,7 @@ def nodes(count: int) -> list[NodeConfig]:
     return [NodeConfig(id=number, bus=BUS) for number in range(1, count + 1)]
 
 
-def pipeline(seconds: float) -> dict[str, Any]:
+def pipeline(seconds: float) -> dict[str, object]:
     """µs of every step, one after another in this process."""
     return {
         "nodes_36": ticks(0.3 * seconds, 36),
@@ -55,7 +54,7 @@ def pipeline(seconds: float) -> dict[str, Any]:
     }
 
 
-def ticks(seconds: float, count: int, fd: bool = True, filter_name: str = "vqf") -> dict[str, Any]:
+def ticks(seconds: float, count: int, fd: bool = True, filter_name: str = "vqf") -> dict[str, object]:
     """µs a tick: `decode_us` from frames to SI units, `orientation_us` to calibrate, low-pass and filter."""
     protocol = SuitProtocol.load()
     poll = Poll(nodes(count), protocol, LOST_AFTER, {BUS: fd})
@@ -75,7 +74,7 @@ def ticks(seconds: float, count: int, fd: bool = True, filter_name: str = "vqf")
     return {"decode_us": spread_us(decode_ns), "orientation_us": spread_us(orientation_ns)}
 
 
-def plausibility(seconds: float, count: int) -> dict[str, Any]:
+def plausibility(seconds: float, count: int) -> Figures:
     """µs a tick to judge whether that many nodes lie, at rest; over the two ways a judgement takes turns."""
     scale = SuitProtocol.load().fd.scale
     watch = PlausibilityWatch(PlausibilityConfig(), count, RATE_HZ, scale)
@@ -104,7 +103,7 @@ def answers(protocol: SuitProtocol, count: int, tick: int, fd: bool) -> list[Can
     return frames
 
 
-def joint_angles(seconds: float, beyond: bool = False) -> dict[str, Any]:
+def joint_angles(seconds: float, beyond: bool = False) -> Figures:
     """µs to compute all joint angles and their velocities once.
 
     The operator goes to and fro about the middle of the robot's range; or `beyond`, where trunk, head, both
@@ -121,7 +120,7 @@ def joint_angles(seconds: float, beyond: bool = False) -> dict[str, Any]:
     return time_calls(lambda: solver.solve(next(postures), rate), seconds)
 
 
-def codec(seconds: float) -> dict[str, Any]:
+def codec(seconds: float) -> Figures:
     """µs to encode a command and decode it again."""
     command = example_command()
     joints = len(command.position_rad)

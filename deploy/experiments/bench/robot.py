@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from common.process.heap import freeze_heap
 from common.skeleton import load_skeleton
 from deploy.measure.timing import time_calls
@@ -11,7 +9,7 @@ from slave.servos.mujoco.model import STEP_S
 from slave.servos.mujoco.simulated import CYCLE_NS, STEPS_PER_CYCLE, SimulatedRobot
 
 
-def robot(seconds: float) -> dict[str, Any]:
+def robot(seconds: float) -> dict[str, object]:
     """µs a MuJoCo step, taken over the drives' cycles, and percent of a core to keep up with real time."""
     simulated = SimulatedRobot(load_skeleton("nursing"))
     reach = simulated.position_rad + 0.3

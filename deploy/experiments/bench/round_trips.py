@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Mapping
 from contextlib import AsyncExitStack
-from typing import Any
 
 import uvloop
 
@@ -31,15 +30,14 @@ CONNECT_S = 10.0
 WARM_UP = 3
 """Rounds of each door that are not counted."""
 
-OneWay = dict[str, dict[str, Any]]
+OneWay = dict[str, Figures]
 """µs one way, by door."""
 
 
 def one_way_us(doors: Mapping[str, Door], seconds: float) -> OneWay:
     """Time the doors between two processes of their own."""
     with beside(_echo_all, doors=dict(doors)):
-        result: OneWay = in_worker(_ping_all, seconds, doors=dict(doors))
-        return result
+        return in_worker(_ping_all, seconds, doors=dict(doors))
 
 
 def ratio(figures: OneWay, above: str, below: str, of: str = "median") -> float | None:
@@ -54,7 +52,7 @@ def _ping_all(seconds: float, doors: dict[str, Door]) -> OneWay:
             stagger = Stagger()
             for name, door in doors.items():
                 stagger.doors[name] = await stack.enter_async_context(open_ping(door, stagger.on_echo))
-            return {**await stagger.measure(seconds)}
+            return await stagger.measure(seconds)
 
     _hear_refusals(doors, messages=False)  # as the services do, of which only the robot has a door
     return uvloop.run(run())
@@ -89,7 +87,7 @@ class Stagger:
         if self._arrived is not None and not self._arrived.done():
             self._arrived.set_result(arrived_ns)
 
-    async def measure(self, seconds: float) -> dict[str, Figures]:
+    async def measure(self, seconds: float) -> OneWay:
         """µs one way by door: half of each round trip. Raises LinkError for a door that gives no echo."""
         await self._until_all_answer()
         freeze_heap()

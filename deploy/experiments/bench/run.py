@@ -6,7 +6,6 @@ import os
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -18,7 +17,7 @@ from deploy.experiments.bench.link import link, transports
 from deploy.experiments.bench.loop import RATE_HZ, loop
 from deploy.experiments.bench.pipeline import pipeline
 from deploy.experiments.bench.robot import robot
-from deploy.experiments.bench.table import bench_table, value_at
+from deploy.experiments.bench.table import bench_table, figures_at
 from deploy.experiments.bench.targets import BENCH
 from deploy.experiments.bench.worker import BenchError, in_worker
 from deploy.measure.target import judge_targets
@@ -35,7 +34,7 @@ class _Bench:
     path: tuple[str, ...]
     """Where its figures stand in the report."""
     seconds: float
-    measure: Callable[[float], Any]
+    measure: Callable[[float], object]
 
 
 BENCHES = (
@@ -51,13 +50,14 @@ BENCHES = (
 )
 
 
-def bench(quick: bool, console: Console) -> dict[str, Any]:
+def bench(quick: bool, console: Console) -> dict[str, object]:
     """Run all benches and print their tables: below 60 s, or 15 s when quick, on a machine at rest.
 
     The report is plain JSON values: a key a bench, `core_percent`, `verdicts`, `machine` and `failed`.
     A bench that fails leaves its reason under `failed`, and the others go on.
     """
-    report: dict[str, Any] = {"machine": machine(), "quick": quick, "failed": {}}
+    failed: dict[str, str] = {}
+    report: dict[str, object] = {"machine": machine(), "quick": quick, "failed": failed}
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("bench", total=sum(b.seconds for b in BENCHES))
@@ -66,21 +66,21 @@ def bench(quick: bool, console: Console) -> dict[str, Any]:
             try:
                 figures = each.measure(each.seconds * (QUICK if quick else 1.0))
             except BenchError as error:
-                report["failed"][each.name] = str(error)
+                failed[each.name] = str(error)
                 figures = {}
             _put(report, each.path, figures)
             progress.advance(task, each.seconds)
-    report["core_percent"] = core_percent(report)
+    report["core_percent"] = shares = core_percent(report)
     judged = judge_targets(report, BENCH)
     report["verdicts"] = [verdict.tree() for verdict in judged]
-    console.print(bench_table(report))
+    console.print(bench_table(report, shares))
     console.print(verdict_table("is this machine good enough?", judged))
-    for name, reason in report["failed"].items():
+    for name, reason in failed.items():
         console.print(Text(f"{name}: {reason}", "bold red"))
     return report
 
 
-def machine() -> dict[str, Any]:
+def machine() -> dict[str, object]:
     """What was measured on, and how busy it was before."""
     return {
         "cores": os.cpu_count(),
@@ -90,7 +90,7 @@ def machine() -> dict[str, Any]:
     }
 
 
-def core_percent(report: dict[str, Any]) -> dict[str, float | None]:
+def core_percent(report: dict[str, object]) -> dict[str, float | None]:
     """Percent of one core, from the benches' medians: the master by its steps, the simulated robot, both.
 
     None where a bench did not give its part.
@@ -104,7 +104,7 @@ def core_percent(report: dict[str, Any]) -> dict[str, float | None]:
             return None
         return round(1e-4 * (RATE_HZ * a_tick + COMMAND.rate_hz * a_command), 2)
 
-    of_36, of_robot = master("nodes_36", "nodes_36"), report["robot"].get("core_percent")
+    of_36, of_robot = master("nodes_36", "nodes_36"), figures_at(report, "robot").get("core_percent")
     return {
         "master_36_nodes": of_36,
         "master_8_classic_nodes": master("nodes_8_classic", "nodes_8"),
@@ -113,13 +113,14 @@ def core_percent(report: dict[str, Any]) -> dict[str, float | None]:
     }
 
 
-def _median(report: dict[str, Any], *path: str) -> float | None:
-    median: float | None = value_at(report, path).get("median")
-    return median
+def _median(report: dict[str, object], *path: str) -> float | None:
+    return figures_at(report, *path).get("median")
 
 
-def _put(report: dict[str, Any], path: tuple[str, ...], figures: Any) -> None:
+def _put(report: dict[str, object], path: tuple[str, ...], figures: object) -> None:
     *above, last = path
     for key in above:
-        report = report.setdefault(key, {})
+        part = report.setdefault(key, {})
+        assert isinstance(part, dict)
+        report = part
     report[last] = figures

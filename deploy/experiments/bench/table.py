@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -39,25 +38,25 @@ _BENCH_ROWS = (
 )
 
 
-def bench_table(report: Mapping[str, Any]) -> RenderableType:
-    """The figures of `tandem bench`, then percent of a core."""
+def bench_table(report: Mapping[str, object], core_percent: Mapping[str, float | None]) -> RenderableType:
+    """The measurements of `tandem bench`, then percent of a core."""
     table = plain_table("", "min", "median", "p99", "max", title="bench")
     for name, path in _BENCH_ROWS:
-        figures = value_at(report, path)
+        figures = figures_at(report, *path)
         table.add_row(name, *(number(figures.get(key), 1) for key in ("min", "median", "p99", "max")))
-    shares = (f"{name.replace('_', ' ')} {number(v, 1)}" for name, v in report["core_percent"].items())
-    alone = value_at(report, ("loop", "idle"))
+    shares = (f"{name.replace('_', ' ')} {number(v, 1)}" for name, v in core_percent.items())
+    idle = figures_at(report, "loop", "idle")
     missed = Text(
-        f"ticks missed by a loop that does nothing else: {alone.get('missed', UNKNOWN)} "
-        f"of {alone.get('late_us', {}).get('count', UNKNOWN)} run; "
+        f"ticks missed by a loop that does nothing else: {idle.get('missed', UNKNOWN)} "
+        f"of {figures_at(report, 'loop', 'idle', 'late_us').get('count', UNKNOWN)} run; "
         "a pipeline on this machine can do no better"
     )
     return Group(table, Text("percent of one core: " + ", ".join(shares), "bold"), missed)
 
 
-def value_at(report: Mapping[str, Any], path: Iterable[str]) -> Any:
+def figures_at(report: Mapping[str, object], *path: str) -> Mapping[str, float]:
     """The part of a report at these keys; {} where a bench did not give it."""
-    found: Any = report
+    found: object = report
     for key in path:
-        found = found.get(key, {})
-    return found
+        found = found.get(key) if isinstance(found, Mapping) else None
+    return found if isinstance(found, Mapping) else {}

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TypeVar
 
 from common.errors import TandemError
 from common.process.runtime import SWITCH_INTERVAL_S
@@ -23,11 +23,14 @@ GRACE_S = 30.0
 """Beyond what a worker was asked to take: starting Python, importing, opening sessions."""
 
 
+Result = TypeVar("Result")
+
+
 class BenchError(TandemError):
     """A bench that failed in its process."""
 
 
-def in_worker(function: Callable[..., Any], seconds: float, **arguments: Any) -> Any:
+def in_worker(function: Callable[..., Result], seconds: float, **arguments: object) -> Result:
     """The result of `function(seconds, **arguments)`, called in another process.
 
     Raises BenchError with the last line that the process wrote.
@@ -41,23 +44,26 @@ def in_worker(function: Callable[..., Any], seconds: float, **arguments: Any) ->
         if process.returncode != 0:
             lines = err.strip().splitlines()
             raise BenchError(f"{name}: {lines[-1] if lines else f'ended with status {process.returncode}'}")
-        return json.loads(out.splitlines()[-1])
+        result: Result = json.loads(out.splitlines()[-1])
+        return result
 
 
 @contextlib.contextmanager
-def beside(function: Callable[..., None], **arguments: Any) -> Iterator[None]:
+def beside(function: Callable[..., None], **arguments: object) -> Iterator[None]:
     """Keep a function running in another process meanwhile."""
     with _process(function, arguments):
         yield
 
 
-def command_of(function: Callable[..., Any], arguments: dict[str, Any]) -> list[str]:
+def command_of(function: Callable[..., object], arguments: dict[str, object]) -> list[str]:
     """The command that runs a function in a process of its own."""
     return [sys.executable, "-m", __name__, pickle.dumps((function, arguments)).hex()]
 
 
 @contextlib.contextmanager
-def _process(function: Callable[..., Any], arguments: dict[str, Any]) -> Iterator[subprocess.Popen[str]]:
+def _process(
+    function: Callable[..., object], arguments: dict[str, object]
+) -> Iterator[subprocess.Popen[str]]:
     # the worker reads one end of a pipe, whose other end closes with this process, however it ends
     watched, held = os.pipe()
     pipe = subprocess.PIPE

@@ -64,7 +64,7 @@ def test_a_failed_bench_leaves_its_reason_and_the_others_their_figures(
     ]
     monkeypatch.setattr(run, "BENCHES", steps)
     console = quiet()
-    report = bench(quick=True, console=console)
+    report: dict[str, Any] = bench(quick=True, console=console)
     assert report["failed"] == {"unsound": "no such bus"}
     assert {v["name"]: v["outcome"] for v in report["verdicts"]} == {
         "orientations of 36 nodes": "passed",
