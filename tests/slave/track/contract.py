@@ -71,11 +71,12 @@ def _a_moving_operator_is_followed(make: Make) -> None:
     assert np.abs(targets - truth)[200:].max() < 0.25 * fastest_rad_s
 
 
-def _an_older_sample_changes_nothing(make: Make) -> None:
+def _a_sample_that_is_not_newer_changes_nothing(make: Make) -> None:
     trackers = make(), make()
     for tracker in trackers:
         _follow(tracker, 1.0)
-    trackers[1].accept(PERIOD_NS, 1_000 * NS_PER_MS, np.full(JOINTS, 3.0), np.zeros(JOINTS))
+    for sampled_ns in (PERIOD_NS, 960 * NS_PER_MS - TRANSIT_NS):  # the last is the newest one's stamp
+        trackers[1].accept(sampled_ns, 1_000 * NS_PER_MS, np.full(JOINTS, 3.0), np.zeros(JOINTS))
     first, second = (tracker.target(1_005 * NS_PER_MS) for tracker in trackers)
     assert first is not None
     assert second is not None
@@ -110,6 +111,6 @@ def check(make: Make) -> None:
     _no_target_after_a_reset(make)
     _a_standing_operator_is_reached(make)
     _a_moving_operator_is_followed(make)
-    _an_older_sample_changes_nothing(make)
+    _a_sample_that_is_not_newer_changes_nothing(make)
     _without_samples_it_comes_to_rest(make)
     _a_sample_is_not_changed_nor_kept(make)

@@ -1,34 +1,16 @@
 import numpy as np
 import pytest
 
-from common.quaternion import Array
 from slave.track.interpolate import Interpolate
 
-MS = 1_000_000
-PERIOD, TRANSIT, MARGIN = 80, 12, 10
+from .samples import MS, PERIOD, TRANSIT, course, feed
+
+MARGIN = 10
 DELAY_S = (PERIOD + TRANSIT + MARGIN) / 1e3
 
 
 def fresh() -> Interpolate:
     return Interpolate(0.08, MARGIN / 1e3)
-
-
-def course(tracker: Interpolate, at_ms: float) -> tuple[Array, Array]:
-    target = tracker.target(round(at_ms * MS))
-    assert target is not None
-    return target.position_rad, target.velocity_rad_s
-
-
-def feed(tracker: Interpolate, k: int, position: float, velocity: float, transit: int = TRANSIT) -> None:
-    tracker.accept(PERIOD * k * MS, (PERIOD * k + transit) * MS, np.array([position]), np.array([velocity]))
-
-
-def test_there_is_no_target_before_a_sample_nor_after_a_reset() -> None:
-    tracker = fresh()
-    assert tracker.target(0) is None
-    feed(tracker, 0, 1.0, 0.0)
-    tracker.reset()
-    assert tracker.target(MS) is None
 
 
 def test_a_reset_forgets_the_difference_being_worked_off() -> None:
@@ -99,16 +81,6 @@ def test_the_delay_follows_a_slower_link_and_ignores_a_lost_sample() -> None:
     for k in range(8, 250):
         feed(tracker, k, 0.0, 0.0, transit=60)
     assert tracker.delay_s == pytest.approx(0.15, abs=1e-3)
-
-
-def test_a_sample_that_is_not_newer_is_ignored() -> None:
-    tracker, other = fresh(), fresh()
-    for t in (tracker, other):
-        feed(t, 0, 0.0, 1.0)
-        feed(t, 1, 0.08, 1.0)
-    feed(tracker, 1, 5.0, 5.0)
-    feed(tracker, 0, 5.0, 5.0)
-    np.testing.assert_array_equal(course(tracker, 130.0), course(other, 130.0))
 
 
 def test_when_a_slow_link_becomes_fast_the_played_segment_stays() -> None:

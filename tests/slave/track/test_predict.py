@@ -3,36 +3,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.quaternion import Array
 from slave.guard import GuardConfig
 from slave.track.estimate import Estimate, relaxed
 from slave.track.predict import Predict
 
-MS = 1_000_000
-PERIOD, TRANSIT = 80, 12
+from .samples import MS, PERIOD, TRANSIT, course, feed
+
 LAG_S, HORIZON_S, BLEND_S = 0.031, 0.3, 0.08
 
 
 def fresh() -> Predict:
     return Predict(BLEND_S, LAG_S, HORIZON_S)
-
-
-def course(tracker: Predict, at_ms: float) -> tuple[Array, Array]:
-    target = tracker.target(round(at_ms * MS))
-    assert target is not None
-    return target.position_rad, target.velocity_rad_s
-
-
-def feed(tracker: Predict, k: int, position: float, velocity: float, transit: int = TRANSIT) -> None:
-    tracker.accept(PERIOD * k * MS, (PERIOD * k + transit) * MS, np.array([position]), np.array([velocity]))
-
-
-def test_there_is_no_target_before_a_sample_nor_after_a_reset() -> None:
-    tracker = fresh()
-    assert tracker.target(0) is None
-    feed(tracker, 0, 1.0, 0.0)
-    tracker.reset()
-    assert tracker.target(MS) is None
 
 
 def test_a_reset_forgets_the_difference_being_worked_off() -> None:
@@ -153,16 +134,6 @@ def test_after_a_long_silence_the_estimate_restarts_without_a_jump() -> None:
     assert course(tracker, settled)[0] == pytest.approx(-1.0)
 
 
-def test_a_sample_that_is_not_newer_is_ignored() -> None:
-    tracker, other = fresh(), fresh()
-    for t in (tracker, other):
-        feed(t, 0, 0.0, 1.0)
-        feed(t, 1, 0.08, 1.0)
-    feed(tracker, 1, 5.0, 5.0)
-    feed(tracker, 0, 5.0, 5.0)
-    np.testing.assert_array_equal(course(tracker, 130.0), course(other, 130.0))
-
-
 def test_without_velocities_it_goes_by_the_positions() -> None:
     tracker = fresh()
     for k in range(8):
@@ -171,14 +142,6 @@ def test_without_velocities_it_goes_by_the_positions() -> None:
     position, velocity = course(tracker, 8 * PERIOD + TRANSIT - 1)
     assert velocity == pytest.approx(0.8, abs=0.1)
     assert position == pytest.approx((8 * PERIOD + TRANSIT - 1) / 1e3 + LAG_S, rel=0.05)
-
-
-def test_what_the_caller_does_to_its_arrays_does_not_move_the_robot() -> None:
-    tracker = fresh()
-    position, velocity = np.ones(1), np.zeros(1)
-    tracker.accept(0, 0, position, velocity)
-    position[:], velocity[:] = 9.0, 9.0
-    assert course(tracker, 1.0)[0] == pytest.approx(1.0)
 
 
 def test_two_samples_at_nearly_one_instant_cause_no_acceleration() -> None:

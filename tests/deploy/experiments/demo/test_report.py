@@ -199,12 +199,6 @@ def test_a_hand_s_report_has_five_joints_curves_and_paper_b_s_targets() -> None:
         assert words not in shown
 
 
-def test_every_profile_has_its_targets() -> None:
-    assert set(BY_PROFILE) == {"nursing", "hand", "lower_limb"}
-    assert BY_PROFILE["nursing"] is DEMO
-    assert len(DEMO) == 14
-
-
 @pytest.mark.parametrize("profile", sorted(BY_PROFILE))
 def test_every_target_s_path_leads_to_a_figure_in_a_real_report(profile: str) -> None:
     """A renamed figure would not be missed otherwise: its target would only not be judged."""

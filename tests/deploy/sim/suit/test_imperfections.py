@@ -93,12 +93,6 @@ def test_readings_saturate_just_beyond_the_converters_range(
     assert counts[:, channel].tolist() == [sign * largest] * 2
 
 
-def test_the_ranges_are_those_of_the_data_sheets(protocol: SuitProtocol) -> None:
-    assert protocol.acc_scale * 32768 == pytest.approx(8.0 * GRAVITY_M_S2, rel=1e-6)
-    assert protocol.gyr_scale * 32768 == pytest.approx(np.radians(2000.0), rel=1e-6)
-    assert protocol.mag_scale * 1090 == pytest.approx(100.0, rel=1e-6)
-
-
 def test_noise_is_above_the_quantum_so_that_it_dithers(protocol: SuitProtocol, skeleton: Skeleton) -> None:
     grade = GRADES["calibrated"]
     assert grade.accelerometer.noise > protocol.acc_scale
