@@ -16,8 +16,8 @@ from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.progress import Progress, clock, draw
 
-Tell = Callable[[str], None]
-RunCell = Callable[[TrialPlan, CellKey, asyncio.Event, Tell], Awaitable[Cell]]
+Show = Callable[[str], None]
+RunCell = Callable[[TrialPlan, CellKey, asyncio.Event, Show], Awaitable[Cell]]
 
 
 def missing(plan: TrialPlan, folder: Folder) -> list[CellKey]:

@@ -9,8 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from deploy.experiments.trial.cell.figures import BY_NAME, printed
+from deploy.experiments.trial.report.findings import Findings
 from deploy.experiments.trial.report.spread import SetupResults
-from deploy.experiments.trial.report.write import Findings
 from deploy.measure.verdict import verdict_table
 from deploy.report.tables import plain_table
 

@@ -36,7 +36,7 @@ WATCH_S = 0.6
 LOOK_S = 0.1
 
 
-async def run_cell(plan: TrialPlan, key: CellKey, stop: asyncio.Event, tell: Callable[[str], None]) -> Cell:
+async def run_cell(plan: TrialPlan, key: CellKey, stop: asyncio.Event, show: Callable[[str], None]) -> Cell:
     """Run it and judge it. What goes wrong in it is its result; only an interruption raises TandemError."""
     reason = why_impossible(key.setup)
     if reason is not None:
@@ -52,15 +52,15 @@ async def run_cell(plan: TrialPlan, key: CellKey, stop: asyncio.Event, tell: Cal
             open_network(profile, seed=plan.seed_of(key)) as network,
             open_rig(key.setup.transport, overrides, plan.robot, routed=plan.router, network=network) as rig,
         ):
-            course = await _Story(plan, rig, network, stop, tell).play(age_s)
-            tell("stopping")
+            course = await _Story(plan, rig, network, stop, show).play(age_s)
+            show("stopping")
             statuses = await rig.stop()
     except TandemError as error:
         if stop.is_set():  # a Ctrl-C reaches the processes too: that they end is then no failure
             raise TandemError("interrupted") from None
         return Cell(key, CellStatus.FAILED, str(error), settings=settings)
     ended = tuple(f"the {name} ended with status {status}" for name, status in statuses.items() if status)
-    tell("judging")
+    show("judging")
     return await asyncio.to_thread(judged, key, course, config, settings, ended)
 
 
@@ -77,13 +77,13 @@ class _Story:
     """The steps of one cell, on a rig over a network."""
 
     def __init__(
-        self, plan: TrialPlan, rig: Rig, network: Network, stop: asyncio.Event, tell: Callable[[str], None]
+        self, plan: TrialPlan, rig: Rig, network: Network, stop: asyncio.Event, show: Callable[[str], None]
     ) -> None:
         self._plan = plan
         self._rig = rig
         self._network = network
         self._stop = stop
-        self._tell = tell
+        self._show = show
         self._recorder = MessageKeeper()
         self._remarks: list[str] = []
         rig.observer.listeners.append(self._recorder.hear)
@@ -108,13 +108,13 @@ class _Story:
         )
 
     async def _to_track(self) -> None:
-        self._tell("starting")
+        self._show("starting")
         await start_all(self._rig, START_S, self._look)
-        self._tell("aligning")
+        self._show("aligning")
         await until_tracking(self._rig, timeout_s=ALIGN_S, check=self._look)
 
     async def _judged_time(self) -> tuple[CellMessages, dict[str, float], float, float]:
-        self._tell(f"following for {self._plan.seconds:g} s")
+        self._show(f"following for {self._plan.seconds:g} s")
         children = self._rig.children
         self._recorder.take()
         for child in children.values():
@@ -134,11 +134,11 @@ class _Story:
 
     async def _outage(self) -> tuple[CellMessages, ScriptedOutage]:
         rig, observer = self._rig, self._rig.observer
-        self._tell(f"outage of {self._plan.outage_s:g} s")
+        self._show(f"outage of {self._plan.outage_s:g} s")
         cut_ns = monotonic_ns()
         await self._network.outage(self._plan.outage_s)
         back_ns = monotonic_ns()
-        self._tell("waiting for commands to flow again")
+        self._show("waiting for commands to flow again")
         ready_ns = act_ns = None
         try:
             await rig.until(lambda: observer.ready, RETURN_S, "readiness after the outage", self._look)

@@ -128,7 +128,7 @@ async def run_remote_cell(
     plan: TrialPlan,
     key: CellKey,
     stop: asyncio.Event,
-    tell: Callable[[str], None],
+    show: Callable[[str], None],
     tls: TlsConfig | None = None,
 ) -> Cell:
     """One cell over a real network. What goes wrong is its result; only an interruption raises TandemError.
@@ -148,14 +148,14 @@ async def run_remote_cell(
             await link.connected(talk.TALK)
             partner = Partner(link, stop)
             try:
-                course = await _play(plan, key, partner, tell, tls)
+                course = await _play(plan, key, partner, show, tls)
             finally:
                 await _farewell(link)
     except TandemError as error:
         if stop.is_set():
             raise TandemError("interrupted") from None
         return Cell(key, CellStatus.FAILED, str(error), settings=settings)
-    tell("judging")
+    show("judging")
     return await asyncio.to_thread(judged, key, course, config, settings, ())
 
 
@@ -168,10 +168,10 @@ async def _farewell(link: Link) -> None:
 
 
 async def _play(
-    plan: TrialPlan, key: CellKey, partner: Partner, tell: Callable[[str], None], tls: TlsConfig | None
+    plan: TrialPlan, key: CellKey, partner: Partner, show: Callable[[str], None], tls: TlsConfig | None
 ) -> CellCourse:
     skeleton = load_skeleton(plan.robot)
-    tell("starting the robot over there")
+    show("starting the robot over there")
     request = talk.Start(transport=key.setup.transport, strategy=key.setup.strategy, max_age_s=plan.max_age_s)
     there = await partner.do(request)
     robot = f"{key.setup.transport}/{robots_host(plan.hosts)}:{there.port}"
@@ -182,11 +182,11 @@ async def _play(
             await rig.start(name)
         await rig.until(lambda: rig.observer.command is not None, START_S, "command of the master")
         await partner.until(lambda a: a.taking and _whole(rig), START_S, "readiness of the robot")
-        tell("aligning")
+        show("aligning")
         check = partial(_check, rig)
         wanted = Operator(ROBOT, OperatorPatience(ALIGN_S), wanted_ns=monotonic_ns())
         await until_all_track([EngageDriver(wanted, PartnerRobot(partner))], check, LOOK_S)
-        tell(f"following for {plan.seconds:g} s")
+        show(f"following for {plan.seconds:g} s")
         await partner.do(talk.Record())
         recorder.take()
         for child in rig.children.values():
@@ -198,7 +198,7 @@ async def _play(
         for child in rig.children.values():
             child.measure()
         cpu = {"master": rig.children["master"].cpu_percent, "slave": answer.cpu_percent}
-        tell("fetching the robot's messages")
+        show("fetching the robot's messages")
         states, statistics = await partner.kept(skeleton)
     remarks = tuple(hold_remarks(operator.holds, began_ns))
     judged_time = replace(heard, states=on_masters_clock(states), statistics=[*heard.statistics, *statistics])

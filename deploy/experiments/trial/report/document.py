@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, CellMetric, printed
-from deploy.experiments.trial.cell.plan import TrialPlan
+from deploy.experiments.trial.report.findings import Findings
 from deploy.experiments.trial.report.plots import Plot
 from deploy.experiments.trial.report.ranking import Ranking
 from deploy.experiments.trial.report.spread import SetupResults, Spread
-from deploy.measure.verdict import Verdict
 from deploy.report.page import render
 
 GROUPS = {
@@ -32,27 +31,21 @@ class MetricTable:
     """Its columns: those that some setup has."""
 
 
-def as_html(
-    plan: TrialPlan,
-    rows: Sequence[SetupResults],
-    ranks: Sequence[Ranking],
-    judged: Sequence[Verdict],
-    plots: Sequence[Plot],
-    about: dict[str, str],
-) -> str:
+def as_html(findings: Findings, plots: Sequence[Plot], about: dict[str, str]) -> str:
     """The whole page; texts are escaped by the template."""
-    expected = len(plan.cells())
+    rows = findings.rows
+    expected = len(findings.plan.cells())
     finished = sum(cell.settled for row in rows for cell in row.cells)
     return render(
         "deploy.experiments.trial.report",
         "report.html.jinja",
         {"cell": _cell, "spread": _range, "plain": _plain},
-        plan=plan,
+        plan=findings.plan,
         about=about,
         rows=rows,
         tables=_tables(rows),
-        tasks=_by_task(ranks),
-        judged=judged,
+        tasks=_by_task(findings.rankings),
+        judged=findings.judged,
         plots=plots,
         incomplete=None if finished >= expected else f"{finished} of {expected} cells are there",
         failed=sum(len(row.failed) for row in rows),

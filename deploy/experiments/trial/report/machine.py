@@ -4,35 +4,28 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
 from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, rounded
-from deploy.experiments.trial.cell.plan import TrialPlan
 from deploy.experiments.trial.cell.result import Cell
+from deploy.experiments.trial.report.findings import Findings
 from deploy.experiments.trial.report.ranking import Ranking
 from deploy.experiments.trial.report.spread import SetupResults, Spread
-from deploy.measure.verdict import Verdict
 
 _KEYS = ("profile", "transport", "strategy", "repetition", "status")
 
 
-def tree(
-    plan: TrialPlan,
-    rows: Sequence[SetupResults],
-    ranks: Sequence[Ranking],
-    judged: Sequence[Verdict],
-    about: dict[str, str],
-) -> dict[str, Any]:
+def tree(findings: Findings, about: dict[str, str]) -> dict[str, Any]:
     """`compared` holds no time, host or version: those are in `about`. Figures are rounded as printed."""
     return {
         "about": about,
         "compared": {
-            "plan": plan.tree(),
-            "setups": {_path(row): _setup(row) for row in rows},
-            "rankings": [_ranking(ranking) for ranking in ranks],
-            "targets": [verdict.tree() for verdict in judged],
+            "plan": findings.plan.tree(),
+            "setups": {_path(row): _setup(row) for row in findings.rows},
+            "rankings": [_ranking(ranking) for ranking in findings.rankings],
+            "targets": [verdict.tree() for verdict in findings.judged],
         },
     }
 

@@ -4,49 +4,27 @@ from __future__ import annotations
 
 import datetime
 import platform
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 from deploy.experiments.trial.cell.folder import Folder, as_json
-from deploy.experiments.trial.cell.plan import TrialPlan
 from deploy.experiments.trial.report.document import as_html
+from deploy.experiments.trial.report.findings import Findings, find
 from deploy.experiments.trial.report.machine import as_csv, tree
 from deploy.experiments.trial.report.plots import plots
-from deploy.experiments.trial.report.ranking import Ranking, rankings
-from deploy.experiments.trial.report.spread import SetupResults, rows
-from deploy.experiments.trial.report.targets import judge
-from deploy.experiments.trial.report.tasks import TASKS, load_tasks
-from deploy.measure.verdict import Verdict
+from deploy.experiments.trial.report.tasks import TASKS
 from deploy.report.output import writing
 from deploy.sim.network.namespaces import congestion_control
 
 HTML, JSON, CSV = "report.html", "report.json", "cells.csv"
 
 
-@dataclass(frozen=True, slots=True)
-class Findings:
-    """What a report holds."""
-
-    plan: TrialPlan
-    rows: list[SetupResults]
-    rankings: list[Ranking]
-    judged: list[Verdict]
-
-
-def find(folder: Folder, tasks: Path = TASKS) -> Findings:
-    """Read and judge the cells. Raises TandemError where there is no trial, ConfigError for the tasks."""
-    plan = folder.plan()
-    found = rows(plan, folder.cells().values())
-    return Findings(plan, found, rankings(load_tasks(tasks), found), judge(found, outage=plan.outage_s > 0.0))
-
-
 def write(folder: Folder, tasks: Path = TASKS) -> Findings:
     """Write the three files. Raises TandemError where the disk does not let them."""
     f, about = find(folder, tasks), _about()
     texts = {
-        HTML: as_html(f.plan, f.rows, f.rankings, f.judged, plots(f.rows), about),
-        JSON: as_json(tree(f.plan, f.rows, f.rankings, f.judged, about)),
+        HTML: as_html(f, plots(f.rows), about),
+        JSON: as_json(tree(f, about)),
         CSV: as_csv(cell for row in f.rows for cell in row.cells),
     }
     for name, text in texts.items():

@@ -13,7 +13,7 @@ from deploy.experiments.trial.cell.folder import Folder
 from deploy.experiments.trial.cell.plan import CellKey, TrialPlan
 from deploy.experiments.trial.cell.result import Cell, CellStatus
 from deploy.experiments.trial.progress import Progress, clock
-from deploy.experiments.trial.run import Tell, run_trial
+from deploy.experiments.trial.run import Show, run_trial
 from tests.deploy.experiments.trial.made_up import PLAN, cell
 
 S = 1_000_000_000
@@ -53,10 +53,10 @@ def run(plan: TrialPlan, folder: Folder, act: dict[int, object]) -> tuple[Progre
     async def story() -> Progress:
         stop = asyncio.Event()
 
-        async def run_cell(_: TrialPlan, key: CellKey, stop: asyncio.Event, tell: Tell) -> Cell:
+        async def run_cell(_: TrialPlan, key: CellKey, stop: asyncio.Event, show: Show) -> Cell:
             ran.append(key)
             what = act.get(len(ran))
-            tell("following")
+            show("following")
             if what == "stop":
                 stop.set()
                 raise TandemError("interrupted")

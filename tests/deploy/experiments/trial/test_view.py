@@ -10,7 +10,7 @@ from rich.console import Console
 
 from deploy.experiments.trial.cell.folder import Folder
 from deploy.experiments.trial.cell.result import Cell, CellStatus
-from deploy.experiments.trial.report.write import find
+from deploy.experiments.trial.report.findings import find
 from deploy.experiments.trial.view import print_findings
 from tests.deploy.experiments.trial.made_up import PLAN, cells
 
