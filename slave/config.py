@@ -23,7 +23,7 @@ class LoopConfig(Section):
     rate_hz: int = Field(200, ge=20, le=1000)
     """Encoders read, guard stepped, servos written."""
     state_every: int = Field(4, ge=1, le=100)
-    """Every so many ticks the state is published: 200 / 4 = 50 Hz."""
+    """Ticks from one published state to the next: 200 / 4 = 50 Hz."""
 
 
 class SlaveConfig(Section):

@@ -1,6 +1,6 @@
-"""Commands that were due and did not come, by time: also those that nobody ever sent. Pure.
+"""Commands that were due and did not come, by time, those that were never sent included. Pure.
 
-Numbers alone do not tell of them. Where master and slave stand still together, no command is put, none is
+Sequence numbers alone do not show them. Where master and slave stall together, no command is put, none is
 lost, and each that does come is as fast as ever: the seconds in between are in no percentile (coordinated
 omission). Here every command that was due enters the corrected figures, as HdrHistogram's
 `record_corrected_value` would have it, with how long the robot went without what that command had to say.
@@ -16,7 +16,7 @@ from common.metrics.slave import DueMetrics
 from common.wire.topics import COMMAND
 
 PERIODS = 15
-"""The period is the median of so many: a master may be set to another rate than usual."""
+"""Commands whose median interval is the period: a master may be set to another rate than usual."""
 EARLY = 0.25
 """A command that comes this share of a period before the next is due makes that one not missing."""
 
@@ -28,7 +28,7 @@ class DueCommands:
         self.corrected = Durations()
         """One way, of every command that came and of every one that was due and did not."""
         self.recent = StreamedDurations()
-        """Of those that did not come, to be told one by one."""
+        """Of those that did not come, to be published one by one."""
         self.missing = 0
         """Was not there when it was due and a newer came; one that comes later yet stays counted."""
         self.came = 0
@@ -40,8 +40,8 @@ class DueCommands:
     def note(self, clock: int, sequence: int, put_ns: int, transit_ns: int | None) -> None:
         """Take one command.
 
-        `clock` is the number of the master's clock, which outlasts a lease: whoever stood still has to claim
-        the robot anew. `transit_ns`: put to received; None while the offset is not trusted.
+        `clock` is the number of the master's clock, which outlasts a lease: a master that stalled has to
+        claim the robot anew. `transit_ns`: put to received; None while the offset is not trusted.
         """
         self.came += 1
         if transit_ns is not None:

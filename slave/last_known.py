@@ -18,9 +18,9 @@ import numpy as np
 from common.quaternion import Array
 
 EVERY_S = 5.0
-"""At most so often it is written."""
+"""Least time between two writes."""
 CHANGED_RAD = math.radians(1.0)
-"""And only where some joint has moved by more than this."""
+"""Written only after some joint has moved by more than this."""
 
 log = logging.getLogger(__name__)
 
@@ -59,7 +59,7 @@ def save(file: Path, position_rad: Mapping[str, float]) -> None:
 
 
 class LastKnown:
-    """One robot's file. `due` is cheap and says whether to `keep`, which writes and belongs into a thread."""
+    """One robot's file. `due` is cheap; `keep` writes, so call it in a thread."""
 
     def __init__(self, file: Path, joint_names: tuple[str, ...]) -> None:
         self.file = file

@@ -290,7 +290,7 @@ class SlavePipeline:
 
     def _faults(self) -> dict[str, str]:
         named = {"base": self._body.base, "name": self._body.namesake, "camera": self.camera_fault}
-        # what a drive says of itself comes before what the guard makes of its encoder
+        # a drive's own fault comes before the guard's doubt of its encoder
         doubts_and_drives = {**self.guard.doubts, **self._body.drives}
         return {**doubts_and_drives, **{name: words for name, words in named.items() if words}}
 

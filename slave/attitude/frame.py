@@ -1,9 +1,9 @@
 """The instrument's serial frame (paper D, section 3): FF, then three angles in tenths of a degree, BCD.
 
 `FF 01 00 23 44 05 61` is inclination 10.0°, azimuth 234.4°, tool-face 56.1°. The azimuth is the magnetic one.
-An angle that has no meaning travels as EE EE, which is no BCD: an addition of ours. The frame has no check
-sum, but a header that no digit can be: whatever is lost or added, the next FF begins anew. What turns one
-digit into another is for `vote.py` to see. 360.0, as some instruments round 359.96, is 0.0.
+An angle that has no meaning travels as EE EE, which is no BCD: an addition to paper D's frame. The frame has
+no check sum, but a header that no digit can be: whatever is lost or added, the next FF begins anew. `vote.py`
+finds digits that were changed on the way. 360.0, as some instruments round 359.96, is 0.0.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _HALF_TURN, _TURN = 1800, 3600
 
 @dataclass(frozen=True, slots=True)
 class FrameAngles:
-    """What one frame says, in its own unit: tenths of a degree."""
+    """The angles of one frame, in its own unit: tenths of a degree."""
 
     inclination: int
     """0 to 1800."""

@@ -13,7 +13,7 @@ def open_base(config: BaseConfig, clock: Clock = monotonic_ns) -> BaseSensor | N
         case "none":
             return None
         case "serial":
-            # imported here: pyserial is for who has a port
+            # imported here: only a serial port needs pyserial
             from slave.attitude.port import SerialBase
 
             return SerialBase(config, clock)

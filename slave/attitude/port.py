@@ -32,7 +32,7 @@ _JOIN_S = 2.0
 
 
 def open_port(port: str, baud: int) -> serial.Serial:
-    """A port whose reads and writes wait at most 0.1 s. Raises RobotError that says what to look at."""
+    """A port whose reads and writes wait at most 0.1 s. Raises RobotError."""
     try:
         opened = serial.serial_for_url(
             port, baudrate=baud, timeout=_WAIT_S, write_timeout=_WAIT_S, do_not_open=False
@@ -132,7 +132,7 @@ class SerialBase:
         return self._attitude
 
     def counters(self) -> dict[str, int]:
-        """The reader's, frames that did not tell the tilt, and frames that contradict their neighbours."""
+        """The reader's, frames without a tilt, and frames that contradict their neighbours."""
         return {**self._reader.counters(), "unclear": self._unclear, "outvoted": self._vote.outvoted}
 
     def stop(self) -> None:
@@ -140,10 +140,10 @@ class SerialBase:
         self._reader.stop()
 
     def _on_frame(self, angles: FrameAngles, now_ns: int) -> None:
-        told = self._vote.hear(angles, now_ns)
-        if told is None:
+        trusted = self._vote.hear(angles, now_ns)
+        if trusted is None:
             return
-        attitude = of_frame(told.angles, told.came_ns, self._config)
+        attitude = of_frame(trusted.angles, trusted.came_ns, self._config)
         if attitude is None:
             self._unclear += 1
         else:
@@ -151,7 +151,7 @@ class SerialBase:
 
 
 def of_frame(angles: FrameAngles, now_ns: int, config: BaseConfig) -> BaseAttitude | None:
-    """What a frame says of the base, its azimuth made true; None where it does not tell the tilt."""
+    """The base's attitude by one frame, from true north; None where the frame does not give the tilt."""
     azimuth = None if angles.azimuth is None else radians(angles.azimuth)
     tool_face = None if angles.tool_face is None else radians(angles.tool_face)
     return base_attitude(

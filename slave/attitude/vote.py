@@ -45,12 +45,12 @@ class Vote:
         """`most_rad_s`: the base cannot turn faster."""
         self._most_rad_s = most_rad_s
         self._window: deque[TimedFrame] = deque(maxlen=FRAMES)
-        self._told: TimedFrame | None = None
+        self._trusted: TimedFrame | None = None
         self.outvoted = 0
         """Frames that contradict their neighbours."""
 
     def hear(self, angles: FrameAngles, came_ns: int) -> TimedFrame | None:
-        """What may be told after one more frame, None where nothing new may; `came_ns` never falls."""
+        """The newest trusted frame after one more frame, or None; `came_ns` never falls."""
         window = self._window
         if window and came_ns - window[-1].came_ns > _TOGETHER_NS:
             window.clear()
@@ -62,9 +62,9 @@ class Vote:
         if not self._plausible(window[-1], chosen):
             self.outvoted += 1
         settled = all(self._plausible(a, b) for a in window for b in window)
-        if self._told is not None and not settled and not self._plausible(self._told, chosen):
+        if self._trusted is not None and not settled and not self._plausible(self._trusted, chosen):
             return None
-        self._told = chosen
+        self._trusted = chosen
         return chosen
 
     def _plausible(self, a: TimedFrame, b: TimedFrame) -> bool:

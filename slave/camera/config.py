@@ -25,7 +25,7 @@ class CameraConfig(Section):
     most_rate_hz: float = Field(12.0, gt=0.0, le=60.0)
     """Pictures a second at best."""
     least_rate_hz: float = Field(1.0, gt=0.0, le=10.0)
-    """And at worst, which is also what is sent while no operator says that he sees any."""
+    """Pictures a second at worst, and while no operator acknowledges any."""
     most_delay_s: float = Field(0.03, gt=0.0, le=1.0)
     """How long a picture may keep the link busy: what is sent beside it waits for no longer."""
     most_kb: float = Field(40.0, ge=4.0, le=1000.0)

@@ -87,7 +87,7 @@ class CameraFeed:
         self._wake = threading.Event()
         self._stopping = False
         self._camera: CameraSource | None = None
-        # above any number of an earlier run on this machine, which the master may still tell of
+        # above any number of an earlier run on this machine, which the master may still acknowledge
         self._number = clock() // NS_PER_MS
         self._count = _Count(clock())
         self._make = Durations()
@@ -112,7 +112,7 @@ class CameraFeed:
         self._angles = position_rad, read_ns
 
     def on_command(self, command: Command, now_ns: int, offset: Offset) -> None:
-        """Take what an accepted command says of the picture that its master has."""
+        """Take an accepted command's acknowledgement of a picture."""
         seen = self.sight.on_command(command, now_ns, offset)
         if seen is not None:
             self._seen.append(seen)

@@ -1,4 +1,4 @@
-"""The best JPEG of a picture that keeps within so many bytes."""
+"""The best JPEG of a picture within a number of bytes."""
 
 from __future__ import annotations
 

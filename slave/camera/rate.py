@@ -78,7 +78,7 @@ class RateControl:
         self._last_sent_ns = now_ns
 
     def seen(self, number: int, now_ns: int, delay_ns: int | None) -> None:
-        """The operator's side has received this picture; those before it will not be told of any more.
+        """The operator's side has received this picture; those before it will not be acknowledged any more.
 
         `delay_ns`: by how much its transit was longer than an empty packet's on an idle link; None where the
         clocks' offset is not trusted, and then only the number under way is learnt.

@@ -1,4 +1,4 @@
-"""What the operator had seen when he moved: which picture, and how old it was by then. Pure."""
+"""Which picture the operator had seen when they moved, and how old it was by then. Pure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _KEPT = 256
 
 @dataclass(frozen=True, slots=True)
 class SeenPicture:
-    """A command's word on the newest picture its master had."""
+    """The newest picture that a command's master had seen."""
 
     number: int
     known_ns: int
@@ -32,7 +32,7 @@ class Sight:
         self._pictures: OrderedDict[int, tuple[int, int]] = OrderedDict()
         self._newest = 0
         self.observation_age = Durations()
-        """From a picture taken to the posture sampled of the operator who had seen none newer."""
+        """From a picture to the operator's posture that was sampled while it was the newest one seen."""
         self.transit = Durations()
         """From a picture sent to the master's receiving it."""
 
@@ -43,7 +43,7 @@ class Sight:
             self._pictures.popitem(last=False)
 
     def on_command(self, command: Command, now_ns: int, offset: Offset) -> SeenPicture | None:
-        """Take an accepted command; what it says of a picture that it is the first to tell of, else None."""
+        """Take an accepted command; the picture that it acknowledges first, else None."""
         known = self._pictures.get(command.seen_frame)
         if known is None:
             return None

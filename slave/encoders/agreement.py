@@ -1,8 +1,8 @@
-"""Do a drive's own angle and the encoder at the joint's output shaft say the same? Always compared. Pure.
+"""Whether each drive's own angle and its joint's output encoder agree. Always compared. Pure.
 
 The two see one joint from both ends of its gear. A wrong zero, gear ratio, direction or lost turn of the
 drive, an encoder that is stuck, and a gear that slips all show as a difference, before anything has moved or
-as soon as it does; which of the two is wrong cannot be told from here.
+as soon as it does. Which of the two is wrong cannot be known here.
 """
 
 from __future__ import annotations

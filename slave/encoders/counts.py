@@ -31,7 +31,7 @@ class EncoderConfig(Section):
     """Joints whose counts fall as the angle rises."""
 
     def mistakes_for(self, skeleton: Skeleton) -> list[ConfigMistake]:
-        """Joints that the robot has not got, and joints that turn too far for one encoder."""
+        """Joints that the robot does not have, and joints that turn too far for one encoder."""
         named = [(f"encoders.zero_counts.{name}", name) for name in self.zero_counts]
         named += [("encoders.reversed", name) for name in self.reversed]
         mistakes = [

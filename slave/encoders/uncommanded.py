@@ -30,9 +30,9 @@ SHAKEN_NS = 200 * NS_PER_MS
 RETURN_RAD = 0.045
 """Astray until it is back within this: the span's end moves in steps."""
 OUTWARD_RAD_S = 0.15
-"""Slower than this nobody "goes on outwards": it sags, or a count flickers."""
+"""Slower than this a joint does not count as going outwards: it sags, or a count flickers."""
 SETTLE_NS = 300 * NS_PER_MS
-"""A servo has come to rest so long after its setpoint has."""
+"""Time that a servo takes to come to rest after its setpoint has."""
 STANDS_RAD = 4e-3
 """A setpoint that moves by less than this within its span all but stands: its joint is right behind."""
 CREEP_RAD_S = math.radians(0.3)
@@ -99,7 +99,7 @@ class UncommandedMotion:
         *,
         under_way: bool = False,
     ) -> Mask:
-        """(J,) who moves uncommanded, by a reading (J,) of the joints that are `heard`; `words` says how.
+        """(J,) joints that move without a command, by a reading (J,) of those `heard`; `words` says how.
 
         `span` is the lowest and the highest setpoint (J,) that may still be on its way into the motors.
         `under_way`: the robot moves or may any moment, and may take up a load: none is settled.
@@ -120,7 +120,7 @@ class UncommandedMotion:
         rested = stands & (np.abs(read_ns - self._settled_ns) >= SETTLE_NS) & heard
         self._rests_rad = np.where(rested & np.isnan(self._rests_rad), position_rad, self._rests_rad)
         moved = position_rad - self._rests_rad
-        # comparing a NaN says False: not at rest, or never heard
+        # comparing a NaN gives False: not at rest, or never heard
         beyond = np.maximum(low - position_rad, position_rad - high)
         off = np.where(np.isnan(moved), np.where(position_rad > high, beyond, -beyond), moved)
         outwards = np.sign(off) * (position_rad - self._before_rad) > OUTWARD_RAD_S * dt_s
@@ -136,11 +136,11 @@ class UncommandedMotion:
         out: Mask = left | astray
         self.words = {}
         if out.any():
-            self._say(out, left, moved, beyond)
+            self._describe(out, left, moved, beyond)
         return out
 
     def _for_long(self, read_ns: int, patience: MotionPatience, astray: Mask, width: Array) -> Mask:
-        """Who of those that are astray (J,) has gone on for longer than it may."""
+        """(J,) those of the joints astray that have gone on for longer than they may."""
         np.copyto(self._fast_ns, read_ns, where=width > SHAKES_RAD)
         if not astray.any():
             self._astray_ns[:] = -1
@@ -154,7 +154,7 @@ class UncommandedMotion:
         long: Mask = astray & (np.abs(read_ns - self._astray_ns) >= allowed_ns)
         return long
 
-    def _say(self, out: Mask, left: Mask, moved: Array, beyond: Array) -> None:
+    def _describe(self, out: Mask, left: Mask, moved: Array, beyond: Array) -> None:
         for j in np.flatnonzero(out).tolist():
             if left[j]:
                 words = f"moves by itself: {abs(math.degrees(moved[j])):.1f}° away from where it was held"

@@ -1,4 +1,4 @@
-"""Between a command and the servos: who may move the robot, and when."""
+"""The first stage of the pipeline: which commands count, and when the robot may move."""
 
 from slave.guard.admit import GATES, Admission
 from slave.guard.config import GuardConfig

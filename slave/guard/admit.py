@@ -1,4 +1,4 @@
-"""The gates that every command must pass, in order, and what the newest accepted command said.
+"""The gates that every command must pass, in order, and what the newest accepted command contained.
 
 Each gate is a small pure function that refuses with its reason.
 """
@@ -124,7 +124,7 @@ GATES: tuple[Gate, ...] = (
     Gate("future", "it is ahead by at most the offset's bound plus `future_tolerance_s`", _future),
     Gate(DEADMAN, "the operator holds the deadman; if not, the robot holds at once", _deadman),
 )
-"""In this order, so that the deadman of a stranger's, stale or replayed command stops nobody."""
+"""In this order, so that the deadman of a foreign, stale or replayed command does not stop the robot."""
 
 
 def admit(command: Command, at: Situation, gates: Sequence[Gate] = GATES) -> Admission:
@@ -137,7 +137,7 @@ def admit(command: Command, at: Situation, gates: Sequence[Gate] = GATES) -> Adm
 
 
 class CommandGate:
-    """Judges one command after the other, and remembers what the newest accepted one said."""
+    """Judges one command after the other, and keeps the newest accepted one's validity and doubt."""
 
     def __init__(
         self,
@@ -152,7 +152,7 @@ class CommandGate:
         self.valid: Mask = np.zeros(joints, np.bool_)
         """(J,) joints that the newest accepted command gives a valid angle of."""
         self.operator_doubt = ""
-        """Why the master would have nobody engage, as that command said; empty where it would."""
+        """Why the master advises against an engage, by that command; empty where it does not."""
         self.arrived_ns: int | None = None
         """Arrival of the last accepted command, None where there was none since the last loss."""
         self.refusal = ""

@@ -83,7 +83,7 @@ class GuardConfig(Section):
     """A step that comes later than this after the last one moves the setpoint as if it came then."""
 
     reset_key: str = Field("", repr=False, max_length=512)
-    """Who sends it with `reset` may reset an e-stop; empty: nobody can, but by restarting the slave."""
+    """Required to reset an e-stop. Empty: only a restart of the slave resets it."""
     events_kept: int = Field(256, ge=1, le=100_000)
     """Newest events that are remembered."""
 

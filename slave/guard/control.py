@@ -1,4 +1,4 @@
-"""What people and masters may ask of a robot, who may ask it, and how they are answered."""
+"""Requests of people and masters: which are allowed, and the answers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Control:
         """Do what is asked, or say why not."""
         guard.watch_arrivals(now_ns)
         if request.action is Action.ESTOP:
-            # before any check: who it is from and whom it names does not matter to a person in danger
+            # before any check: neither the sender nor the robot's name matters to a person in danger
             guard.estop(now_ns, f"e-stop by {request.operator or 'somebody'}")
             return ControlReply(True, guard.state, "stopped; only a reset with the key leaves the e-stop")
         if request.robot != guard.robot:
@@ -70,7 +70,7 @@ class Control:
         return self._challenges.refusal(request.challenge, now_ns)
 
     def _not_at_the_robot(self, request: ControlRequest, now_ns: int, no_key: str) -> str | None:
-        """Why a request does not come, now, from a person who has the key that is kept at the robot."""
+        """Why a request is refused that needs the key kept at the robot and must be fresh; or None."""
         if not self._reset_key:
             return no_key
         if not hmac.compare_digest(request.key.encode("utf-8", "replace"), self._reset_key):

@@ -15,17 +15,17 @@ class Readiness:
     state: State
     reason: str
     operator: str
-    """Who asks."""
+    """The operator that asks."""
     holder: str
-    """Who holds the live lease, empty where nobody does."""
+    """The operator that holds the lease; empty: none."""
     command_loss: str | None
-    """What is amiss with the commands."""
+    """What is wrong with the commands."""
     encoder_loss: str | None
-    """What is amiss with the encoders."""
+    """What is wrong with the encoders."""
     body_fault: str | None
-    """What is amiss with the drives or the base."""
+    """What is wrong with the drives or the base."""
     operator_doubt: str
-    """What the operator's side has against it, as its last command said; empty where it has nothing."""
+    """Why the operator's side advises against it, by its last command; empty where it does not."""
     any_valid: bool
     """Whether the last command has a valid joint."""
     unsettled: str | None

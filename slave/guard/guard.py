@@ -72,7 +72,7 @@ class Guard:
 
     @property
     def operator(self) -> str:
-        """Who holds the lease, empty where nobody does."""
+        """The operator that holds the lease; empty: none."""
         return self.lease.operator
 
     @property
@@ -116,7 +116,7 @@ class Guard:
     ) -> Permission:
         """One turn of the servo loop: the encoders (J,) as read at `encoder_ns` in, what is allowed out.
 
-        `drive_rad` (J,): the same angles by the drives' own encoders, where they tell them.
+        `drive_rad` (J,): the same angles by the drives' own encoders, where they have any.
         """
         dt_s = self._elapsed_s(now_ns)
         joints = self._joints
@@ -194,7 +194,7 @@ class Guard:
                 holder=self.operator,
                 command_loss=arrival[1] if arrival else None,
                 encoder_loss=joints.life.silence(now_ns),
-                body_fault=self._body.amiss,
+                body_fault=self._body.first_fault,
                 unsettled=joints.plausible.unsettled(),
                 operator_doubt=commands.operator_doubt,
                 any_valid=bool(commands.valid.any()),
@@ -232,7 +232,7 @@ class Guard:
         return None
 
     def home(self, now_ns: int) -> str | None:
-        """A person has looked at the robot: it stands as it says. Or why that does not count."""
+        """A person confirms the joint positions. Returns why that is refused, or None."""
         if self._joints.seated:
             return "the joint positions are known already"
         if self._joints.life.silence(now_ns) is None:

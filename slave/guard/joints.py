@@ -47,7 +47,7 @@ class JointReadings:
         *,
         moving: bool,
     ) -> tuple[list[str], str | None]:
-        """Take a reading (J,), and the same angles by the drives' own encoders where they tell them.
+        """Take a reading (J,), and the same angles by the drives' own encoders where they have any.
 
         Returns the joints whose encoder is doubted from now on, and which joint moves uncommanded, in words.
         """

@@ -10,7 +10,7 @@ from common.metrics.slave import LeaseMetrics
 from common.wire.lease import lease_id
 
 DrawToken = Callable[[], int]
-"""Gives a new token, 1 to 2⁶³ - 1, that nobody can guess. Tests pass a counter."""
+"""Draws a new unpredictable token, 1 to 2⁶³ - 1. Tests pass a counter."""
 
 
 def random_token() -> int:
@@ -19,16 +19,16 @@ def random_token() -> int:
 
 
 class Lease:
-    """Who may move the robot. All times are the slave's own; a lease that has lapsed never revives."""
+    """The right to move the robot. All times are the slave's own; a lease that has lapsed never revives."""
 
     def __init__(self, timeout_ns: int, draw_token: DrawToken = random_token) -> None:
         self._timeout_ns = timeout_ns
         self._draw_token = draw_token
         self._granted_ns = self._renewed_ns = 0
         self.operator = ""
-        """The holder's name, empty where nobody holds it."""
+        """The holder's name; empty: none."""
         self.token = 0
-        """The holder's token, 0 where nobody holds it."""
+        """The holder's token; 0: none."""
 
     def claim(self, operator: str, now_ns: int) -> int:
         """The new token, or 0 where somebody holds a live lease, be it an operator of the same name.
@@ -62,7 +62,7 @@ class Lease:
         self.operator, self.token = "", 0
 
     def metrics(self, now_ns: int) -> LeaseMetrics | None:
-        """Whose it is, which, since when, and how long ago a command renewed it; None: nobody holds it."""
+        """Holder, id, age, and time since a command renewed it; None: no holder."""
         if not self.token:
             return None
         return LeaseMetrics(

@@ -1,8 +1,8 @@
-"""Does each joint truly stand where it is said to, and stay there? Asked in every state, of every backend.
+"""Whether each joint stands where its encoder says, and stays there. Checked in every state and backend.
 
 Before the robot is held anywhere: each joint within its range, and its angle confirmed by a second reading:
-the drive's own beside the encoder's, or the last one that was known, or a person who looked. Then
-the two readings agree always, and whoever moves without a setpoint, or against it, is stopped.
+the drive's own beside the encoder's, or the last known one, or a person's confirmation. Then
+the two readings must always agree, and a joint that moves without or against its setpoint is stopped.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from slave.encoders.uncommanded import MotionPatience, UncommandedMotion
 BEYOND_RAD = math.radians(8.0)
 """A joint further than this beyond its range is not where its encoder says."""
 NEAR_RAD = math.radians(5.0)
-"""A joint that nobody turned while it was off stands within this of where it was."""
+"""A joint that was not turned while it was off stands within this of its last angle."""
 STILL_RAD = math.radians(1.0)
 """At the output, behind the gear's play, a joint that stands may be moved by so much."""
 READINGS = 2
 PATIENCE = MotionPatience(plain_ns=20 * NS_PER_MS, shaken_ns=80 * NS_PER_MS)
-"""An arm that brakes at its limits throws a light wrist outwards for 56 ms; else nobody is astray at all."""
+"""An arm that brakes at its limits throws a light wrist outwards for 56 ms; else no joint is ever astray."""
 
 
 class Placement:
@@ -66,7 +66,7 @@ class Placement:
         span: tuple[Array, Array] | None,
         under_way: bool = False,
     ) -> str | None:
-        """Take a reading (J,) that is `good` (J,). Who moves uncommanded, in words, or None.
+        """Take a reading (J,) that is `good` (J,). Which joint moves uncommanded, in words, or None.
 
         `span` (J,) each: where the setpoint was lately, or None before there is any: then nothing may move.
         `under_way`: somebody is engaged. The same reading twice counts once.
@@ -105,7 +105,7 @@ class Placement:
         return self._unknown(position_rad)
 
     def confirm(self, position_rad: Array) -> None:
-        """A person has looked: the joints (J,) stand where they are said to."""
+        """A person has confirmed that the joints (J,) stand here."""
         if self._known_rad is not None:
             self._known_rad = position_rad.copy()
 

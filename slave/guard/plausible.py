@@ -1,4 +1,4 @@
-"""Do the encoders say what the joints were told? A joint whose encoder lies is held and named, alone.
+"""Whether each encoder shows where its joint was sent. A joint whose encoder does not is held alone, named.
 
 A servo follows its setpoint late, and never far from where the setpoint has been. So an honest encoder is
 within the span of the last setpoints, give or take a window: whatever the strategy, the network's delay or
@@ -105,7 +105,7 @@ class EncoderPlausibility:
     def note(self, now_ns: int, setpoint_rad: Array) -> None:
         """Take the setpoint (J,) that is written now."""
         before_ns, self._stepped_ns = self._stepped_ns, now_ns
-        # an own clock that went back tells nothing of when the setpoint was where
+        # after its own clock went back it is unknown when the setpoint was where
         if before_ns is None or now_ns < before_ns:
             self._past.restart(now_ns, setpoint_rad)
             self._heard[:] = False
@@ -174,6 +174,6 @@ class EncoderPlausibility:
         return None
 
     def trust(self) -> None:
-        """Doubt nobody any more: somebody engages, and was told nothing of unsettled joints."""
+        """Doubt no encoder any more: an operator engages, and no joint is unsettled."""
         self.doubted = np.zeros_like(self.doubted)
         self.words.clear()

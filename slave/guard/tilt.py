@@ -1,4 +1,4 @@
-"""How the base may stand: what its attitude sensor says, as a reason to hold or none."""
+"""Whether the base's attitude sensor gives a reason to hold."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class EncoderLife:
         """(J,) the last valid reading of each joint."""
 
     def update(self, position_rad: Array, valid: Mask, read_ns: int) -> None:
-        """Take one reading (J,). An angle that is not finite is not valid, whatever its flag says."""
+        """Take one reading (J,). An angle that is not finite is not valid, whatever its flag."""
         good = valid & np.isfinite(position_rad)
         np.copyto(self._seen_ns, read_ns, where=good)
         np.copyto(self.position_rad, position_rad, where=good)
@@ -67,12 +67,12 @@ class Signs:
     """More encoders than may be do not agree with the setpoint."""
     body: Body
     doubt: str = ""
-    """Why the master would have nobody engage, empty where it would."""
+    """Why the master advises against an engage; empty where it does not."""
 
 
 @dataclass(frozen=True, slots=True)
 class LossWatch:
-    """One thing that must not be lost. `loss` says in words what was, or None where nothing is amiss."""
+    """One thing that must not be lost. `loss` gives the loss in words, or None."""
 
     name: str
     loss: Callable[[Signs], str | None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 _SPREADS = 4.0
 _LOST = 2.0
-"""An age of more than this many usual ones tells of a loss: it counts as just so much."""
+"""An age of more than this many usual ones means a loss: it counts as this much."""
 
 
 class Lateness:

@@ -28,7 +28,7 @@ class Predict:
 
     The newest estimate is carried on (`estimate.py`) over s = age of the sample + servo lag, as far as its
     kind has come true (`confidence.py`). The horizon, up to which that is done at full rate, follows the
-    ages that samples usually reach on this link (`lateness.py`): older ones tell of a loss, and slow the
+    ages that samples usually reach on this link (`lateness.py`): older ones mean a loss, and slow the
     robot to rest, `max_horizon_s` after the sample at the latest.
     """
 

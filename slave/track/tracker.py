@@ -1,4 +1,4 @@
-"""What every strategy does: take samples of the operator as they come, say where to be now."""
+"""What every strategy does: take samples of the operator, and give the target for this instant."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from common.quaternion import Array
 
 @dataclass(frozen=True, slots=True)
 class TrackTarget:
-    """Where the joints should be told to go now."""
+    """Where the joints should go now."""
 
     position_rad: Array
     """(J,)"""

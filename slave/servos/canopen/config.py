@@ -72,11 +72,11 @@ class CanopenConfig(BackendConfig):
     heartbeat_ms: int = Field(40, ge=10, le=1000)
     """Between two heartbeats of the slave, rounded down to whole SYNC periods, one at least."""
     dead_ms: int = Field(200, ge=50, le=5000)
-    """Without the slave's heartbeat for so long a drive stops by itself and holds."""
+    """A drive that misses the slave's heartbeat for this time stops by itself and holds."""
     drive_heartbeat_ms: int = Field(100, ge=20, le=5000)
     """Between two heartbeats of a drive."""
     drive_dead_ms: int = Field(350, ge=50, le=10_000)
-    """A drive unheard for so long is lost."""
+    """A drive that is silent for this time is lost."""
     following_error_deg: float = Field(20.0, gt=0.0, le=180.0)
     """At the joint: further than this from its target for `following_error_ms` a drive faults."""
     following_error_ms: int = Field(200, ge=1, le=10_000)

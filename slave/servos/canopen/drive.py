@@ -17,7 +17,7 @@ from slave.servos.canopen.cia402 import (
 )
 from slave.servos.canopen.emergency import Emergency
 from slave.servos.canopen.sdo import Exchange, More, Read, Transfer, request
-from slave.servos.canopen.status_bits import amiss
+from slave.servos.canopen.status_bits import wrong_bits
 
 SDO_TIMEOUT_NS = 300 * NS_PER_MS
 SDO_TRIES = 3
@@ -55,7 +55,7 @@ class DriveState:
     emergency: Emergency | None = None
     configured: bool = False
     encoder: str = ""
-    """What its encoder says of itself."""
+    """What is wrong with its encoder, in words."""
     since_ns: int = 0
     """When the phase began."""
     _controlword: int = SHUTDOWN
@@ -75,7 +75,7 @@ class DriveState:
     def start(self, now_ns: int, may_reset: bool, configure: bool) -> bytes | None:
         """On the way to RUNNING, whatever was before; the SDO request that comes first, if any.
 
-        With `configure` all is told anew, and an answer waited for without end: the caller sets it.
+        With `configure` everything is sent anew, and an answer is waited for without end: the caller sets it.
         """
         self.failure, self.emergency, self._may_reset = "", None, may_reset
         self.since_ns = now_ns
@@ -127,7 +127,7 @@ class DriveState:
         return None
 
     def on_boot(self, now_ns: int) -> bool:
-        """It says that it has started. False: two said so at once, so there are two, and it has failed."""
+        """It reports its start. False: two did so at once, so two drives have its id, and it has failed."""
         before_ns, self._booted_ns = self._booted_ns, now_ns
         if before_ns is not None and now_ns - before_ns < _BOOTS_APART_NS:
             self.fail("has reported two starts within one second: two drives have its id", True)
@@ -160,7 +160,7 @@ class DriveState:
         return self._ask(now_ns)
 
     def controlword(self, statusword: int, answered: bool, stopping: bool, now_ns: int) -> int:
-        """What to tell it, by the statusword it last sent (`answered`: since the last SYNC)."""
+        """What to send it, by the statusword it last sent (`answered`: since the last SYNC)."""
         state = power(statusword)
         if self.phase is Phase.FAILED or stopping:
             if stopping and answered and state in (Power.FAULT, Power.FAULT_REACTION):
@@ -177,7 +177,7 @@ class DriveState:
         return self._controlword
 
     def _enable(self, state: Power | None, statusword: int, now_ns: int) -> None:
-        said = amiss(statusword) if state is Power.ENABLED else ""
+        said = wrong_bits(statusword) if state is Power.ENABLED else ""
         if state is Power.ENABLED and not said:
             self.phase = Phase.RUNNING
         elif said and now_ns - self.since_ns > ENABLE_TIMEOUT_NS:

@@ -119,7 +119,7 @@ class Drives:
         self._supervision.settled = False
 
     def on_bus(self, bus: str, down: str) -> None:
-        """A bus has failed, for the reason told, or works (again): an empty reason."""
+        """A bus has failed, for the reason `down`, or works again: an empty reason."""
         if down:
             self._down[bus] = down
         else:
@@ -165,10 +165,10 @@ class Drives:
                 self._silence.heartbeat(i, now_ns)
                 self._on_state(i, data[0] & 0x7F, now_ns)
             case pdo.EMERGENCY:
-                said = emergency(data)
-                if said is not None:
-                    drive.emergency = None if said.over else said
-                    if said.code == HEARTBEAT_MISSED and drive.phase is Phase.RUNNING:
+                message = emergency(data)
+                if message is not None:
+                    drive.emergency = None if message.over else message
+                    if message.code == HEARTBEAT_MISSED and drive.phase is Phase.RUNNING:
                         # told "enable" right after, it would go on as if nothing had been
                         drive.fail("has stopped by itself")
                     self._update_faults()

@@ -45,7 +45,7 @@ CLASSES = {
     0x9: "an external error",
     0xF: "of the manufacturer's own",
 }
-"""By the code's first digit, for codes that CODES has not got."""
+"""By the code's first digit, for codes that are not in CODES."""
 
 REGISTER = (
     "generic",
@@ -76,7 +76,7 @@ class Emergency:
 
     @property
     def words(self) -> str:
-        """What a person is told."""
+        """The message for a person."""
         named = CODES.get(self.code) or f"{CLASSES.get(self.code >> 12, 'unknown')}"
         bits = [name for bit, name in enumerate(REGISTER) if self.register >> bit & 1 and name != "generic"]
         return f"{named} (code {self.code:04X}{', ' if bits else ''}{', '.join(bits)})"

@@ -30,8 +30,8 @@ def bits_per_s(drives: int, sync_hz: int, heartbeat_ms: int, drive_heartbeat_ms:
 
 def told_bitrate(bus: BusConfig) -> int:
     """The bit rate that a file gives its adapter; the fastest there is where it gives none."""
-    told = bus.options.get("bitrate")
-    return told if isinstance(told, int) and told > 0 else FASTEST_BIT_S
+    rate = bus.options.get("bitrate")
+    return rate if isinstance(rate, int) and rate > 0 else FASTEST_BIT_S
 
 
 def too_much(drives: int, sync_hz: int, bits_s: float, bitrate: int) -> str:

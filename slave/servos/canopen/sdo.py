@@ -11,7 +11,7 @@ import struct
 from dataclasses import dataclass
 
 _DOWNLOAD, _UPLOAD = 0x23, 0x40
-"""Command specifiers of a request: write (expedited, size told), read."""
+"""Command specifiers of a request: write (expedited, with its size), read."""
 _DOWNLOADED, _UPLOADED, _ABORT = 0x60, 0x40, 0x80
 """Command specifiers of an answer; the lower bits of an upload's tell its form."""
 _EXPEDITED, _SIZED, _UPLOAD_BITS = 0x02, 0x01, 0xE0
@@ -95,7 +95,7 @@ class SdoAnswer:
     done: bool
     words: str = ""
     data: bytes = b""
-    """Of a read: what the entry holds, as many bytes as the drive told."""
+    """Of a read: what the entry holds, as many bytes as the drive sent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +116,8 @@ def request(transfer: Transfer) -> bytes:
 
 def answer(transfer: Transfer, data: bytes) -> SdoAnswer | None:
     """What `data` says to this transfer; None where it answers something else, or goes on in segments."""
-    said = Exchange(transfer).on_answer(data)
-    return said if isinstance(said, SdoAnswer) else None
+    found = Exchange(transfer).on_answer(data)
+    return found if isinstance(found, SdoAnswer) else None
 
 
 class Exchange:
@@ -130,7 +130,7 @@ class Exchange:
         self._length: int | None = None
         self._toggle = 0
         self.strange = ""
-        """An answer to this transfer in a form that CiA 301 has not got, in words."""
+        """An answer to this transfer in a form that is not in CiA 301, in words."""
 
     def begin(self) -> bytes:
         """The first request, also to begin all over."""

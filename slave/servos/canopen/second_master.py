@@ -1,7 +1,7 @@
 """A second master on a drives' bus: known by frames that only a master sends, and this one did not. Pure.
 
-Two masters tell the drives different things, SYNC by SYNC, and mix up each other's SDO answers. CANopen has
-one NMT master and one SDO client by default (CiA 301); the drives cannot tell one from another.
+Two masters send the drives different commands, SYNC by SYNC, and mix up each other's SDO answers. CANopen has
+one NMT master and one SDO client by default (CiA 301); the drives cannot distinguish two.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from common.clock import NS_PER_S
 from slave.servos.canopen import pdo
 
 GONE_NS = NS_PER_S
-"""Unheard for so long it has gone, and a start or reset is possible again."""
+"""A second master that is silent for this time is gone: a start or reset is possible again."""
 _RPDOS = (0x200, 0x300, 0x400, 0x500)
 _LSS = 0x7E5
 """LSS master to its slaves (CiA 305)."""

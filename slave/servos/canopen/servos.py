@@ -38,8 +38,8 @@ log = logging.getLogger(__name__)
 _POLL_S = 0.0005
 _LISTEN_NS = 250 * NS_PER_MS
 """Before the first frame is sent: SYNC and heartbeat of a second master come several times within this."""
-_TOLD = 3
-"""Of more drives than these only the number is told."""
+_NAMED = 3
+"""At most this many drives are named in a message."""
 _EARLY_NS = 2 * NS_PER_MS
 """A setpoint written this long before its SYNC is due goes with it: ticks jitter, SYNC must not skip one."""
 
@@ -203,9 +203,11 @@ class CanopenServos:
             time.sleep(_POLL_S)
 
     def _not_up(self) -> str:
-        said = self._drives.not_running
-        told = [f"{joint}: {words}" for joint, words in said.items()]
-        listed = "; ".join(told[:_TOLD]) + (f"; and {len(told) - _TOLD} more" if len(told) > _TOLD else "")
+        waiting = self._drives.not_running
+        named = [f"{joint}: {words}" for joint, words in waiting.items()]
+        listed = "; ".join(named[:_NAMED]) + (
+            f"; and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
+        )
         states = [
             f"the controller of bus {name} is {bus.state}"
             for name, bus in self._buses.items()
@@ -213,7 +215,7 @@ class CanopenServos:
         ]
         listed = "; ".join([listed, *states])
         return (
-            f"{len(said)} of {len(self._skeleton.joints)} drives do not start: {listed}; check their power, "
+            f"{len(waiting)} of {len(self._skeleton.joints)} drives do not start: {listed}; check power, "
             "node ids and buses in [servos.canopen]; without hardware, start `tandem drives` on the same file"
         )
 

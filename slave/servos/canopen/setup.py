@@ -1,4 +1,4 @@
-"""What each drive is told before it may move: entries of its object dictionary, by SDO. Pure."""
+"""The settings that each drive gets before it may move, by SDO. Pure."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What must be known of a drive before it may be enabled: that it stands where it says. Pure.
+"""Whether a drive stands where it reports, checked before it may be enabled. Pure.
 
-A drive is enabled at the position that it tells of itself, and every later target is told in that frame. So
-that frame must be right first, by somebody else's word: the encoder at the output shaft, or, where that says
-nothing, the last position that was known before.
+A drive is enabled at the position that it reports, and every later target counts from there. So that position
+must be confirmed first: by the encoder at the output shaft or, where that is not valid, by the last known
+position.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ import math
 from dataclasses import dataclass
 
 from slave.encoders.agreement import WINDOW_RAD
-from slave.servos.canopen.status_bits import amiss
+from slave.servos.canopen.status_bits import wrong_bits
 
 CHECKED_SYNCS = 5
-"""Seen so often, standing still, a drive may be enabled. Two drives of one id show by then."""
+"""Answers, standing still, after which a drive may be enabled. Two drives of one id show by then."""
 SLACK_RAD = math.radians(0.1)
 """At a software limit a drive may stand this far beyond it: encoders flicker."""
 LAST_KNOWN_RAD = math.radians(5.0)
-"""A joint that nobody turned while it was off stands within this of where it was."""
+"""A joint that was not turned while it was off stands within this of its last angle."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointPlace:
-    """Where one joint stands, by everybody who can say; rad."""
+    """Where one joint stands, by each source, rad."""
 
     drive_rad: float
     """By the drive."""
@@ -43,8 +43,8 @@ def refusal(place: JointPlace, statusword: int) -> str:
 
 
 def _bits(statusword: int) -> str:
-    said = amiss(statusword, enabled=False)
-    return f"is not ready: {said}" if said else ""
+    wrong = wrong_bits(statusword, enabled=False)
+    return f"is not ready: {wrong}" if wrong else ""
 
 
 def _range(place: JointPlace) -> str:

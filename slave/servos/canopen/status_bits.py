@@ -23,8 +23,8 @@ _WORDS = (
 )
 
 
-def amiss(statusword: int, enabled: bool = True) -> str:
+def wrong_bits(statusword: int, enabled: bool = True) -> str:
     """What is wrong, in words; empty where all is well. Bits 4 and 12 count only while `enabled`."""
     asked = WATCHED if enabled else REMOTE | LIMITED
-    said = [words for bit, bad, words in _WORDS if bit & asked and bool(statusword & bit) is bad]
-    return "; ".join(said)
+    wrong = [words for bit, bad, words in _WORDS if bit & asked and bool(statusword & bit) is bad]
+    return "; ".join(wrong)

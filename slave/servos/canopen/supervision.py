@@ -1,4 +1,4 @@
-"""Leads every drive to running, SYNC by SYNC, and stops the one that does what nobody asked for. Pure."""
+"""Leads every drive to running, SYNC by SYNC, and stops one that does what was not asked for. Pure."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Supervision:
         self.settled = False
 
     def look(self, now_ns: int, seen: DriveAnswers) -> None:
-        """Let those be enabled that may be, and stop those that do what nobody asked for."""
+        """Let those be enabled that may be, and stop those that do what was not asked for."""
         self._watch.take(seen)
         if not self.settled:
             self._check(now_ns, seen)

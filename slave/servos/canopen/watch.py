@@ -16,7 +16,7 @@ from slave.encoders.counts import Encoders
 from slave.encoders.uncommanded import STILL_RAD, MotionPatience, UncommandedMotion
 from slave.servos.canopen.answers import DriveAnswers
 from slave.servos.canopen.start_check import CHECKED_SYNCS, JointPlace, refusal
-from slave.servos.canopen.status_bits import BAD_SYNCS, GOOD, WARNING, WATCHED, amiss
+from slave.servos.canopen.status_bits import BAD_SYNCS, GOOD, WARNING, WATCHED, wrong_bits
 from slave.servos.canopen.units import DriveUnits
 
 _SPAN_NS = 120 * NS_PER_MS
@@ -24,7 +24,7 @@ _SPAN_NS = 120 * NS_PER_MS
 _PATIENCE = MotionPatience(plain_ns=0, shaken_ns=80 * NS_PER_MS)
 """SYNCs are 20 ms apart, and answers are judged before the next one: there is no time to wait for another."""
 _REFUSED_SYNCS = 10
-"""A drive that may not be enabled for so many SYNCs has failed."""
+"""SYNCs after which a drive that may not be enabled has failed."""
 _MOVES_SYNCS = 100
 """And so has one that does not come to rest."""
 _TWICE = 2
@@ -143,7 +143,7 @@ class DriveWatch:
 
     def _words(self, drive: int, statusword: int, ignores: Mask) -> str:
         name = self._names[drive]
-        said = [amiss(statusword)] if ignores[drive] else []
+        said = [wrong_bits(statusword)] if ignores[drive] else []
         said += [words[name] for words in (self._agreement.words, self._motion.words) if name in words]
         return "; ".join(said)
 

@@ -65,7 +65,7 @@ class Bus:
 
     @property
     def late_bytes(self) -> int:
-        """Bytes that came when nobody waited for them any more."""
+        """Bytes that came after the time-out."""
         return self._port.late_bytes
 
     def close(self) -> None:
@@ -128,7 +128,7 @@ class Bus:
         """One register of many servos at once: of all that answer in time.
 
         The library's own group read gives up at the first servo that is silent, and eats the answers
-        of those behind it; so the answers are told apart here.
+        of those behind it; so the answers are separated here.
         """
         out: dict[int, ServoAnswer] = {}
         if not servos:

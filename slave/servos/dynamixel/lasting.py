@@ -1,4 +1,4 @@
-"""What a servo keeps without power (EEPROM): compared at every start, replaced when a person says so."""
+"""What a servo keeps without power (EEPROM): compared at every start, replaced when a person asks for it."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ class Port:
         self._deadline_s = 0.0
         self._received = b""
         self.late_bytes = 0
-        """Bytes that came when nobody waited for them any more."""
+        """Bytes that came after the time-out."""
         with self._named():
             # the adapter would rather fail than let two programs write to one robot
             self._serial = serial.Serial(device, baud, timeout=0, write_timeout=1.0, exclusive=True)

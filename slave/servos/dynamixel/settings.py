@@ -1,4 +1,4 @@
-"""What each servo must be told before it may be used: pure."""
+"""The settings that each servo gets before it may be used. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The servos of a robot looked at, and what they keep replaced where a person says so: `tandem servos`."""
+"""`tandem servos`: look at each servo, and replace its lasting settings when a person asks for it."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class Machine(RuleBasedStateMachine):
             assert before is State.HOLD
             assert who
             assert who == self.rig.guard.operator
-            assert self.rig.body.amiss is None
+            assert self.rig.body.first_fault is None
             assert not self.rig.guard.doubts
             self.may_move = True
         self.note()
@@ -213,7 +213,7 @@ class Machine(RuleBasedStateMachine):
         doubted = [rig.skeleton.joint_names.index(name) for name in rig.guard.doubts]
         setpoint = rig.step(dt_ns)
         self.note()
-        assert rig.guard.state not in MOVING or rig.body.amiss is None, "moves though its body is not well"
+        assert rig.guard.state not in MOVING or rig.body.first_fault is None, "moves despite a fault"
         assert np.isfinite(setpoint.position_rad).all()
         if before is None or not before.ready:
             return

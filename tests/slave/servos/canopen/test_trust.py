@@ -15,7 +15,7 @@ from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drive import DriveState
 from slave.servos.canopen.start_check import LAST_KNOWN_RAD, SLACK_RAD, JointPlace, refusal
-from slave.servos.canopen.status_bits import FOLLOWS, GOOD, LIMITED, REMOTE, VOLTAGE, amiss
+from slave.servos.canopen.status_bits import FOLLOWS, GOOD, LIMITED, REMOTE, VOLTAGE, wrong_bits
 from slave.servos.canopen.watch import DriveWatch
 from tests.slave.servos.canopen.conftest import Wired
 
@@ -360,7 +360,7 @@ def test_each_check_at_its_boundary(sign: int) -> None:
 
 @pytest.mark.parametrize("bit", [VOLTAGE, REMOTE, LIMITED, FOLLOWS])
 def test_each_bit_alone_is_a_reason(bit: int) -> None:
-    assert amiss(GOOD) == ""
-    assert amiss(GOOD ^ bit)
+    assert wrong_bits(GOOD) == ""
+    assert wrong_bits(GOOD ^ bit)
     # before it is enabled a drive need neither follow nor have voltage
-    assert bool(amiss(READY & ~FOLLOWS ^ bit, enabled=False)) == (bit in (REMOTE, LIMITED))
+    assert bool(wrong_bits(READY & ~FOLLOWS ^ bit, enabled=False)) == (bit in (REMOTE, LIMITED))
