@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from common.config.load import load_config
 from common.errors import TandemError
@@ -63,7 +63,7 @@ class DemoOptions:
         for role, model in (("suit", SuitConfig), ("slave", SlaveConfig), ("master", MasterConfig)):
             load_config(example(role, self.profile), model, overrides[role])
 
-    def tree(self) -> dict[str, Any]:
+    def tree(self) -> dict[str, object]:
         """A report's `options`."""
         motion = self.motion or load_config(example("suit", self.profile), SuitConfig).motion
         return {
