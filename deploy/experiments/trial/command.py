@@ -27,8 +27,54 @@ Tasks = Annotated[
         dir_okay=False,
     ),
 ]
+Networks = Annotated[
+    str, typer.Option(help="Network profiles or TOML files of your own, separated by commas, or `all`.")
+]
+Strategies = Annotated[
+    str,
+    typer.Option(help="Tracking strategies: latest, interpolate, predict, separated by commas, or `all`."),
+]
+Seconds = Annotated[float, typer.Option(help="Seconds that are judged in each run.", min=3.0, max=3600.0)]
+OutageSeconds = Annotated[
+    float,
+    typer.Option(
+        help="Seconds of link outage after the judged time, at least 1; 0: no outage.", min=0.0, max=60.0
+    ),
+]
+Motion = Annotated[str, typer.Option(help="Motion of the simulated operator: bottle or sweep.")]
+Seed = Annotated[
+    int, typer.Option(help="Random seed for sensor errors, the network and the order of the runs.")
+]
+Router = Annotated[bool, typer.Option("--router", help="Connect master and slave through a router.")]
+MaxAge = Annotated[
+    float,
+    typer.Option(
+        help="Age in seconds at which the guard refuses a command; 0: as much as the network needs.",
+        min=0.0,
+        max=2.0,
+    ),
+]
+ReportFolder = Annotated[
+    Path, typer.Option(help="Folder for the report and the results of every run.", file_okay=False)
+]
+Remote = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ENDPOINT",
+        help="The robot is on another host, where `tandem trial serve` runs: its endpoint, such as "
+        "tcp/ROBOT_HOST:7440. The network is the real one, and `--profiles` only its name in the report.",
+    ),
+]
+LinkFile = Annotated[
+    Path | None,
+    typer.Option(
+        help="With --remote over tls or quic: the master's TOML file whose `[link.tls]` names the keys.",
+        exists=True,
+        dir_okay=False,
+    ),
+]
 SHORTEST_OUTAGE_S = 1.0
-"""A robot need not hold for a shorter one, so that nothing could be said of how it came back."""
+"""A robot need not hold in a shorter outage, so its recovery could not be judged."""
 STOP_S = 30.0
 """From a Ctrl-C until the cell's processes and hosts are gone."""
 
@@ -37,62 +83,19 @@ STOP_S = 30.0
 def trial(
     context: typer.Context,
     transports: Annotated[str, typer.Option(help="Transports, separated by commas, or `all`.")] = "tcp,udp",
-    profiles: Annotated[
-        str, typer.Option(help="Network profiles or TOML files of your own, separated by commas, or `all`.")
-    ] = "4g",
-    strategies: Annotated[
-        str,
-        typer.Option(
-            help="Tracking strategies: latest, interpolate, predict, separated by commas, or `all`."
-        ),
-    ] = ("latest,predict"),
+    profiles: Networks = "4g",
+    strategies: Strategies = "latest,predict",
     repeat: Annotated[int, typer.Option(help="Number of runs of each combination.", min=1, max=100)] = 3,
-    seconds: Annotated[
-        float, typer.Option(help="Seconds that are judged in each run.", min=3.0, max=3600.0)
-    ] = 20.0,
-    outage: Annotated[
-        float,
-        typer.Option(
-            help="Seconds of link outage after the judged time, at least 1; 0: no outage.", min=0.0, max=60.0
-        ),
-    ] = 2.0,
-    motion: Annotated[
-        str, typer.Option(help="Motion of the simulated operator: bottle or sweep.")
-    ] = "bottle",
-    seed: Annotated[
-        int, typer.Option(help="Random seed for sensor errors, the network and the order of the runs.")
-    ] = 1,
-    router: Annotated[
-        bool, typer.Option("--router", help="Connect master and slave through a router.")
-    ] = False,
-    max_age: Annotated[
-        float,
-        typer.Option(
-            help="Age in seconds at which the guard refuses a command; 0: as much as the network needs.",
-            min=0.0,
-            max=2.0,
-        ),
-    ] = 0.0,
-    report: Annotated[
-        Path, typer.Option(help="Folder for the report and the results of every run.", file_okay=False)
-    ] = Path("trial"),
+    seconds: Seconds = 20.0,
+    outage: OutageSeconds = 2.0,
+    motion: Motion = "bottle",
+    seed: Seed = 1,
+    router: Router = False,
+    max_age: MaxAge = 0.0,
+    report: ReportFolder = Path("trial"),
     tasks: Tasks = None,
-    remote: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ENDPOINT",
-            help="The robot is on another host, where `tandem trial serve` runs: its endpoint, such as "
-            "tcp/ROBOT_HOST:7440. The network is the real one, and `--profiles` only its name in the report.",
-        ),
-    ] = None,
-    link: Annotated[
-        Path | None,
-        typer.Option(
-            help="With --remote over tls or quic: the master's TOML file whose `[link.tls]` names the keys.",
-            exists=True,
-            dir_okay=False,
-        ),
-    ] = None,
+    remote: Remote = None,
+    link: LinkFile = None,
 ) -> None:
     """Run each transport over each network with each tracking strategy, and rank them for each care task.
 
