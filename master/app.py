@@ -82,7 +82,10 @@ class Master:
             self._given_up.add(robot.name)
             if len(self._given_up) == len(self._robots):
                 raise
-            log.exception("%s: no more commands to it, so its guard holds; the others go on", robot.name)
+            log.exception(
+                "%s: unexpected error: it gets no more commands, so its guard holds; other robots continue",
+                robot.name,
+            )
 
     async def _capture(self) -> None:
         period_ns = round(1e9 / self._config.capture.rate_hz)

@@ -56,7 +56,7 @@ def error_words(error_id: int, data: bytes) -> str:
     if error_id & _CONTROLLER and len(data) > 1:
         words += [text for bit, text in _OVERFLOW.items() if data[1] & bit]
     if error_id & _NO_ACK:
-        words.append("nobody acknowledges: no other node on the bus, or the wire is cut")
+        words.append("no node acknowledges: there is no other node on the bus, or the wire is cut")
     if error_id & (_PROTOCOL | _BUS_ERROR):
         words.append("frames are destroyed: look at the bit rate, the wiring, 120 Ω at both ends")
     if error_id & _TRANSCEIVER:

@@ -57,7 +57,7 @@ def open_bus(config: BusConfig) -> can.BusABC:
 
 def carries_classic_only(config: BusConfig, bus: can.BusABC, sysfs: Path = _SYSFS) -> str:
     """Why a bus that is to carry CAN FD cannot, and what to do; empty if it can, or if that is not known."""
-    otherwise = "or say fd = false, if the nodes speak classic CAN"
+    otherwise = "or set fd = false, if the nodes use classic CAN"
     if config.interface == "socketcan":
         try:
             room = int((sysfs / config.channel / "mtu").read_text())

@@ -115,10 +115,10 @@ class LinkConfig(Section):
             what = "the keys for it under [link.tls]: ca, certificate, key (make them with `tandem keys`)"
             return [ConfigMistake(f"link.{where}", end, what)]
         if self.access is not None and self.tls is None:
-            what = "[link.tls] beside it: certificates tell who somebody is"
+            what = "[link.tls] beside it: certificates prove who is at the other end"
             return [ConfigMistake("link.access", "…", what)]
         if self.access is not None:
-            what = f"one of {', '.join(SECURE)}, as there is [link.access]: elsewhere nobody proves who he is"
+            what = f"one of {', '.join(SECURE)}, as there is [link.access]: others do not prove who connects"
             return [ConfigMistake(f"link.{key}", end, what) for key, end in open_ends]
         return []
 

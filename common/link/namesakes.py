@@ -36,7 +36,7 @@ class Namesakes:
         """Where another of this name is, for people; None where none is known."""
         if self._shown:
             places = " and ".join(sorted(each.words for each in self._shown.values()))
-            return f"another robot bears this name: {places}. Give each its own (`robot` in its file)"
+            return f"another robot has the same name: {places}. Give each its own name (`robot` in its file)"
         if self._noticed_ns is not None and abs(now_ns - self._noticed_ns) <= to_ns(NOTICE_S):
             return self._notice
         return None

@@ -93,4 +93,6 @@ def present(robot: str, role: str, instance: int, endpoints: Sequence[str]) -> P
 def several_bear(robot: str, places: Sequence[str]) -> str:
     """The message that several robots have one name, and what to do."""
     where = " and ".join(sorted(places))
-    return f"{len(places)} robots bear the name {robot}: {where}. Give each its own (`robot` in its file)"
+    return (
+        f"{len(places)} robots have the name {robot}: {where}. Give each its own name (`robot` in its file)"
+    )

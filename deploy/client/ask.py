@@ -15,8 +15,10 @@ from deploy.client.destination import ROUTER_S, Destination
 OTHERS_S = 0.5
 """How long a question waits for endpoints other than the robot's own."""
 _NOT_THERE = "does not answer at {at}: is `tandem slave` running, with that robot name, and listening there?"
-_OR_NOT_ALLOWED = " And may your certificate ask it? Its log says who was refused"
-_LATE = "is there, but gave no answer in {s:g} s: what it did is not known, `tandem status` tells"
+_OR_NOT_ALLOWED = (
+    " Check also that [link.access] permits your certificate; the robot's log names refused ones"
+)
+_LATE = "is connected, but did not answer in {s:g} s: it is not known what it did; ask `tandem status`"
 
 
 async def ask_robots(where: Destination, action: Action, key: str = "") -> list[RobotAnswer]:

@@ -48,7 +48,7 @@ def destination(
         )
     if file is None and certificate is None and any(transport_of(each) in SECURE for each in endpoints):
         raise TandemError(
-            f"{', '.join(endpoints)}: who are you there? Name your certificate by --certificate (its .key "
+            f"{', '.join(endpoints)}: a certificate is needed there: name yours by --certificate (its .key "
             f"and {AUTHORITY}.pem beside it; `tandem keys` makes them), or the master's file by --master"
         )
     link = _link_of(file, endpoints, certificate)

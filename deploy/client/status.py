@@ -204,7 +204,7 @@ def _add_row(table: Table, name: str, one: Mapping[str, Any]) -> None:
 def _words(one: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
     words = [(str(one["reason"]), "")]
     if one["namesakes"]:
-        words.append((f"another robot bears this name; this one is at {one['place']}", "bold red"))
+        words.append((f"another robot has the same name; this one is at {one['place']}", "bold red"))
     words += [(f"{what}: {why}", "red") for what, why in (one["faults"] or {}).items()]
     due = one["due"]
     if due is not None and due["missing"]:

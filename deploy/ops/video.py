@@ -52,7 +52,9 @@ def video(
             try:
                 await link.connected()
             except LinkTimeoutError:
-                raise TandemError(f"nobody answers at {', '.join(connect)}: is the slave running?") from None
+                raise TandemError(
+                    f"no robot answers at {', '.join(connect)}: is the slave running?"
+                ) from None
             link.subscribe(video_topic(camera), seen.on_payload)
             with Live(console=Console(), refresh_per_second=4) as live:
                 while not stop.is_set() and not (seconds and seen.elapsed_s > seconds):

@@ -128,7 +128,7 @@ def judge_agreement(found: GravityAgreement | None) -> list[CrossCheck]:
             found.scatter,
             WORST_SCATTER,
             "g",
-            advice="its gyroscope and its accelerometer do not tell of one motion (gravity scatters by "
+            advice="its gyroscope and its accelerometer do not show the same motion (gravity scatters by "
             f"{found.scatter:.2f} g, expected below {WORST_SCATTER:g} g): look whether the gyroscope is "
             "clipped, its bias wanders, or the unit slipped; then calibrate it (`tandem calibrate imu`)",
         ),

@@ -154,7 +154,7 @@ def check_rates(
         found = find_hinge(_in_sensor(parent), _in_sensor(child), 1.0 / spacing_s)
         check(found, "the joint")
     except PoorMotionError as error:
-        return fit, not_judged(compared, f"the rates alone do not tell: {error}")
+        return fit, not_judged(compared, f"the rotation rates alone do not decide: {error}")
     apart = [_angle(a, b) for a, b in zip((found.axis1, found.axis2), fit.axes, strict=True)]
     sigma = (
         max(fit.axis_sigma_rad[0], _SHARE * apart[0]),

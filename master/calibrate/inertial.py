@@ -173,7 +173,7 @@ def _check_attitudes(fit: acc.AccelerometerFit, readings: Array, gravity_m_s2: f
     gain, bias = acc.determined(fit.theta, readings, gravity_m_s2, _TRIAL_ERROR_M_S2)
     if not (gain < _WORST_GAIN and bias < _WORST_BIAS_M_S2):
         raise RecordingError(
-            "the attitudes are too much alike to tell the accelerometer's nine unknowns; "
+            "the attitudes are too similar to find the accelerometer's nine unknowns; "
             "lay the node down on every face, also upside down, and on edges between them"
         )
     attitudes = distinct_attitudes(_unit((readings + fit.bias) @ fit.gain.T))

@@ -46,7 +46,7 @@ def axes_matrix(text: str) -> Array:
         matrix[row, AXES.index(place)] = -1.0 if word.startswith("-") else 1.0
     if np.linalg.det(matrix) < 0.0:
         raise ValueError(
-            f"{text} is a mirror image, which no way of mounting makes; correct the driver's signs"
+            f"{text} is a mirror image, which no sensor orientation can make; correct the driver's signs"
         )
     return matrix
 
@@ -55,7 +55,7 @@ def check_axes(recording: NodeRecording, field: Array, hemisphere: Hemisphere) -
     """Compare calibrated magnetometer readings (T, 3), NaN where none are, with the other sensors."""
     found = carried(field, recording.gyr_rad_s, recording.rate_hz)
     if found is None or not found.told:
-        return [not_judged(_WAYS, f"the recording does not tell; {_TURN}")]
+        return [not_judged(_WAYS, f"the recording does not decide; {_TURN}")]
     axes = found.axes if found.confused else np.eye(3)
     return [_handed(axes), _same_as_gravity(recording, found), *_signed(recording, field, found, hemisphere)]
 
@@ -77,7 +77,7 @@ def _same_as_gravity(recording: NodeRecording, found: Carried) -> CrossCheck:
     compared = "gyroscope's axes against gravity's turns"
     gravity = carried(recording.acc_m_s2, recording.gyr_rad_s, recording.rate_hz)
     if gravity is None or not gravity.told:
-        return not_judged(compared, f"the accelerometer does not tell; {_TURN}")
+        return not_judged(compared, f"the accelerometer does not decide; {_TURN}")
     wrong = gravity.confused and found.confused and np.array_equal(gravity.axes, found.axes)
     return at_most(
         compared,
@@ -139,8 +139,9 @@ def _offer(rotation: Array, hemisphere: Hemisphere, mirrored: bool) -> str:
         )
     other = "south" if hemisphere == "north" else "north"
     return (
-        f"{confusion(-rotation)}: a mirror image, which no way of mounting makes. Correct the signs in its "
-        f"driver, and record again (recorded in the {other}? Then say --hemisphere {other})"
+        f"{confusion(-rotation)}: a mirror image, which no sensor orientation can make. "
+        "Correct the signs in its driver, and record again "
+        f"(recorded in the {other}? Then say --hemisphere {other})"
     )
 
 

@@ -66,7 +66,7 @@ def align_magnetometer(acc: Array, mag: Array) -> MagnetometerRotation:
     """
     again = "rest the node in twenty attitudes, every side up and turned about the vertical too"
     if len(acc) < _FEWEST_ATTITUDES:
-        raise UndeterminedError(f"{len(acc)} attitudes do not tell how the magnetometer sits; {again}")
+        raise UndeterminedError(f"{len(acc)} attitudes do not show how the magnetometer is turned; {again}")
     up, field = normalise(acc), normalise(mag)
     q = np.array([1.0, 0.0, 0.0, 0.0])
     before = _dip_errors(up, field)
@@ -75,7 +75,7 @@ def align_magnetometer(acc: Array, mag: Array) -> MagnetometerRotation:
         product = np.sum(up * turned, axis=1)
         jacobian = np.column_stack([cross(turned, up), -np.ones(len(up))])
         if not np.linalg.cond(jacobian) < _WORST_CONDITION:
-            raise UndeterminedError(f"the attitudes do not tell how the magnetometer sits; {again}")
+            raise UndeterminedError(f"the attitudes do not show how the magnetometer is turned; {again}")
         step = np.linalg.lstsq(jacobian, np.mean(product) - product, rcond=None)[0]
         q = normalise(multiply(from_rotation_vector(step[:3]), q))
     after = _dip_errors(up, rotate(q, field))

@@ -55,7 +55,7 @@ def orient(recordings: Mapping[str, NodeRecording], names: Sequence[str]) -> Ori
     rate_hz = float(np.median(list(rates)))
     length = min(len(recordings[name].gyr_rad_s) for name in names)
     if length < _SHORTEST_S * rate_hz:
-        raise PoorMotionError(f"{length / rate_hz:.1f} s are too short to tell anything: record 20 s or more")
+        raise PoorMotionError(f"{length / rate_hz:.1f} s are too short: record 20 s or more")
     acc, gyr, q = [], [], []
     for name in names:
         a = bridged(recordings[name].acc_m_s2[:length], name, rate_hz)

@@ -198,7 +198,7 @@ def _load_mcap(path: Path) -> dict[str, NodeRecording]:
 
     sweeps = read_sweeps(path)
     if sweeps.cut:
-        log.warning("%s: %s; its first %.1f s are whole", path, sweeps.cut, sweeps.duration_s)
+        log.warning("%s: %s; only its first %.1f s are used", path, sweeps.cut, sweeps.duration_s)
     nodes = {}
     for i, name in enumerate(sweeps.nodes):
         acc, gyr, mag = (sweeps.readings[:, i, k : k + 3].astype(np.float64) for k in (0, 3, 6))

@@ -126,6 +126,6 @@ def _alive(gyr: Array) -> CrossCheck:
         float(len(dead)),
         0.0,
         "axes",
-        advice=f"its gyroscope says the same all the time on {', '.join(dead)}; is it alive? "
+        advice=f"its gyroscope reads the same value all the time on {', '.join(dead)}; is it alive? "
         "Replace the node",
     )

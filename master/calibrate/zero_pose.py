@@ -30,7 +30,7 @@ def find_zero_pose(gyr_rad_s: Array, rate_hz: float) -> slice:
         if end - begin >= (_LEAST_S + 2.0 * _EDGE_S) * rate_hz:
             return slice(begin + edge, min(end - edge, begin + edge + round(_LONGEST_S * rate_hz)))
     raise PoorMotionError(
-        "nobody stood still: begin with three seconds in the zero pose (arms hanging, palms to the thighs), "
+        "no node stood still: begin with three seconds in the zero pose (arms hanging, palms to the thighs), "
         "or name the zero pose with --zero-pose FROM:TO"
     )
 

@@ -91,7 +91,7 @@ def _described(path: Path, said: dict[str, str]) -> tuple[tuple[str, ...], float
         if not nodes or not all(isinstance(name, str) for name in nodes) or not 0.0 < rate_hz < 1e5:
             raise ValueError
     except (KeyError, ValueError, TypeError):
-        raise RecordingError(f"{path}: does not say which nodes it holds at what rate") from None
+        raise RecordingError(f"{path}: does not name its nodes and their rate") from None
     return tuple(nodes), rate_hz
 
 

@@ -49,7 +49,7 @@ def _state(at: Readiness) -> str | None:
 def holder_only(operator: str, holder: str) -> str | None:
     """Why somebody may not ask for what is the lease holder's alone, or None where they may."""
     if not holder:
-        return "nobody holds the lease: claim it first"
+        return "no operator holds the lease: claim it first"
     return None if operator == holder else f"{holder} holds the lease"
 
 

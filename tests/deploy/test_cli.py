@@ -109,7 +109,7 @@ def test_every_command_s_help_has_an_example_that_it_would_take(command: str) ->
         ("status --connect tcp/127.0.0.1:1 --robot a/b", ["robot 'a/b': expected a name"]),
         ("status --robot a", ["where is the robot?", "--connect", "--master"]),
         ("engage --connect tcp/127.0.0.1:1 --operator a", ["which robot?", "--robot"]),
-        ("engage --connect tcp/127.0.0.1:1 --robot a", ["who are you?", "--operator"]),
+        ("engage --connect tcp/127.0.0.1:1 --robot a", ["which operator?", "--operator"]),
         ("estop --connect tcp/127.0.0.1:1", ["which robot?", "--all"]),
         ("status --master nosuch.toml", ["nosuch.toml: file = 'nosuch.toml': expected a readable file"]),
     ],

@@ -214,7 +214,7 @@ def test_while_two_bear_the_name_both_are_told_and_neither_is_claimed() -> None:
     assert {request.action for request in link.told} == {Action.NAMESAKE}
     assert "room 1 (instance 00000001) and room 2 (instance 00000002)" in link.told[0].key
     (robot,) = master._robots
-    assert "2 robots bear the name a" in robot.standing
+    assert "2 robots have the name a" in robot.standing
 
 
 def test_a_namesake_s_states_do_not_end_the_lease_and_a_restart_does() -> None:

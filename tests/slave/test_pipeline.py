@@ -131,7 +131,7 @@ def test_every_answer_and_state_tells_which_process_it_is_of(pipeline: SlavePipe
 
 
 def test_told_of_a_namesake_it_is_said_with_the_state_and_passes(pipeline: SlavePipeline) -> None:
-    request = ControlRequest("robot-1", Action.NAMESAKE, "anna", "2 robots bear the name robot-1")
+    request = ControlRequest("robot-1", Action.NAMESAKE, "anna", "2 robots have the name robot-1")
     assert decode(pipeline.on_control(encode(request), NS_PER_S), ControlReply).done
     reading = EncoderReading(NS_PER_S, np.zeros(25, np.int64), np.ones(25, np.bool_))
 
@@ -139,7 +139,7 @@ def test_told_of_a_namesake_it_is_said_with_the_state_and_passes(pipeline: Slave
         pipeline.tick(now_ns, reading)
         return decode(pipeline.state(now_ns), RobotState, len(pipeline.skeleton.joints)).faults
 
-    assert faults(NS_PER_S) == {"name": "2 robots bear the name robot-1"}
+    assert faults(NS_PER_S) == {"name": "2 robots have the name robot-1"}
     assert faults(4 * NS_PER_S) == {}
 
 

@@ -214,7 +214,7 @@ def _run(plan: TrialPlan, path: Path, tasks: Path | None, run_cell: RunCell) -> 
     _finish(path, tasks, console)
     if progress is not None and progress.done < progress.total:
         left = progress.total - progress.done
-        raise TandemError(f"interrupted with {left} cells to go: the same command goes on with them")
+        raise TandemError(f"interrupted with {left} cells to go: run the same command again to continue")
     if progress is not None and progress.failed:
         raise TandemError(f"{progress.failed} cells failed: the same command tries them again")
 

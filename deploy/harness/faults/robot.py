@@ -213,7 +213,7 @@ ROBOT = (
         done="The encoder of a moving joint shows one angle for ever, and says that it is well.",
         robot="Holds that joint and names it; the others follow. "
         "More than three such joints: holds them all.",
-        person="Mend the encoder, then disengage and engage.",
+        person="Repair the encoder, then disengage and engage.",
         act=_encoder_stuck,
         concerns=_one_joint, strays_deg=1.0, sway_deg=1.0,
         stands_s=0.1 + 0.1 + 0.1 + BRAKED_S,
@@ -232,7 +232,7 @@ ROBOT = (
         "direction.",
         robot="Brakes all joints and stands; names joint and both angles. "
         "At a start: does not enable the drive.",
-        person="Look at the joint: correct the drive's zero, gear or direction, or mend the encoder; "
+        person="Look at the joint: correct the drive's zero, gear or direction, or repair the encoder; "
         "then engage.",
         act=_drive_lost_turns,
         reacts_s=0.02, stands_s=0.02 + BRAKED_S, held_by={"drive"},

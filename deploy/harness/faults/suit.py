@@ -74,7 +74,7 @@ SUIT = (
         name="sensor node lost",
         done="A node of the reaching arm does not answer any more.",
         robot="Holds the joints that need the node; the others follow.",
-        person="Mend the node. Its joints come back slowly by themselves.",
+        person="Repair the node. Its joints come back slowly by themselves.",
         act=_suit(FaultsConfig(lose=[Loss(node=NODE)])),
         concerns=_joints_of_node, strays_deg=1.0, sway_deg=1.0,
         stands_s=0.1 + 0.08 + BRAKED_S,
@@ -86,7 +86,8 @@ SUIT = (
             done=done,
             robot="Holds the joints that need the node; the others follow. "
             "The node is named with what is wrong.",
-            person="Mend the node. Its joints come back slowly by themselves; until then nobody can engage.",
+            person="Repair the node. Its joints come back slowly by themselves; "
+            "until then engage is refused.",
             act=_suit(FaultsConfig(lie=[Lie(node=NODE, kind=kind, axis=axis)])),
             concerns=_joints_of_node, strays_deg=2.5, sway_deg=1.0, stands_s=0.2 + BRAKED_S,
         )

@@ -60,7 +60,7 @@ def attitude(
     if (port is None) == (not simulate):
         raise typer.BadParameter("name the instrument's PORT, or else --simulate one")
     if to is not None and not simulate:
-        raise typer.BadParameter("--to sends what --simulate makes up; leave out the instrument's port")
+        raise typer.BadParameter("--to needs --simulate and no instrument port")
     from deploy.ops.attitude.run import AttitudeOptions, show_attitude
 
     options = AttitudeOptions(

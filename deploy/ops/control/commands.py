@@ -85,7 +85,7 @@ def estop(
         try:
             said = await stop_robots(where, all_, lambda answer: say(answer.line))
         except LinkError as error:
-            raise TandemError(f"NOBODY IS STOPPED BY THIS: {error}. Stop it at the robot itself") from None
+            raise TandemError(f"NO ROBOT IS STOPPED BY THIS: {error}. Stop it at the robot itself") from None
         failed = [answer for answer in said if not answer.done]
         if failed:
             raise TandemError("NOT EVERY ROBOT IS STOPPED: " + "; ".join(answer.line for answer in failed))
@@ -166,7 +166,7 @@ def status(
             Console().print(status_table(robots))
         silent = [f"{name} {one['reason']}" for name, one in robots.items() if not one["answers"]]
         silent += [
-            f"{name}: another robot bears this name; this one is at {one['place']}"
+            f"{name}: another robot has the same name; this one is at {one['place']}"
             for name, one in robots.items()
             if one["namesakes"]
         ]
@@ -211,7 +211,7 @@ def _holder(
 ) -> Destination:
     where = _named(destination(connect, robot, operator, master, certificate))
     if not where.operator:
-        raise TandemError("who are you? Give your name by --operator, or the master's file by --master")
+        raise TandemError("which operator? Give your name by --operator, or the master's file by --master")
     return where
 
 

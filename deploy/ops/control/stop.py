@@ -90,12 +90,12 @@ async def stop_robots(
         answers = await stopping.answers()
         if missing > 0:
             many = f"{missing} of {doors} endpoints"
-            text = f"NOT REACHED: {many} ({', '.join(endpoints)}); whoever is there is not stopped"
+            text = f"NOT REACHED: {many} ({', '.join(endpoints)}); robots there are not stopped"
             # where robots were named, each of them has answered or is said not to have
             answers.append(RobotAnswer("", not everyone, text))
             tell(answers[-1])
         elif everyone and not answers:
-            answers.append(RobotAnswer("", False, "NOBODY STOPPED: no robot showed itself at the endpoints"))
+            answers.append(RobotAnswer("", False, "NO ROBOT STOPPED: no robot was found at the endpoints"))
             tell(answers[-1])
     return answers
 

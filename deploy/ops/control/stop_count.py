@@ -52,7 +52,7 @@ class StopCount:
         return silent if silent or self._stopped else [RobotAnswer(self._robot, False, text)]
 
     def namesakes(self) -> str | None:
-        """What to say where several robots bear the name."""
+        """What to say where several robots have the name."""
         if not self._several:
             return None
         return several_bear(self._robot, [each.words for each in self._shown.values()] or ["unknown places"])

@@ -54,7 +54,7 @@ def authority(
     certificate, key = write_pair(folder, AUTHORITY, made)
     console = Console()
     console.print(f"{certificate}: copy it to every host", highlight=False)
-    console.print(f"{key}: whoever has it can make anybody's certificate; keep it off the network")
+    console.print(f"{key}: anyone who has it can make certificates for everybody; keep it off the network")
 
 
 @app.command()
@@ -100,7 +100,9 @@ def make(
     )  # fmt: skip
     console.print(Text("\n".join(lines)))
     if not host:
-        console.print(Text("\nWithout --host it can connect to others, but nobody to it.", "yellow"))
+        console.print(
+            Text("\nWithout --host it can connect to others, but others cannot connect to it.", "yellow")
+        )
 
 
 @app.command()

@@ -90,7 +90,7 @@ def verify(
         raise TandemError("interrupted: not all profiles were measured")
     off = [each.profile for each in measured if not each.kept]
     if off:
-        raise TandemError(f"the emulated link is not as these profiles say: {', '.join(off)}")
+        raise TandemError(f"the emulated link differs from these profiles: {', '.join(off)}")
 
 
 async def _measure(profile: Profile, seconds: float, backend: Backend) -> Measured:

@@ -106,4 +106,4 @@ def recording(
     for key, value in contents.metadata.items():
         console.print(f"{key}: {value}", highlight=False)
     if contents.cut:
-        console.print(f"[yellow]{contents.cut}: what is before that is shown", highlight=False)
+        console.print(f"[yellow]{contents.cut}: only the part before it is shown", highlight=False)

@@ -58,7 +58,7 @@ class Tape:
         try:
             self._recorder = McapRecorder(path, {**self._metadata, "continues": self.files[-1].name})
         except RecordingError as error:
-            log.error("%s; the recording ends here; the rest goes on", error)
+            log.error("%s; the recording stops here; tandem record continues without writing", error)
             self._recorder, self._closed.failed = None, str(error)
         else:
             self.files.append(path)

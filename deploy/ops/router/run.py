@@ -50,7 +50,7 @@ async def _route(config: RouterConfig, write_figures: WriteFigures) -> None:
     audit = Audit(config.link)
     async with open_session(config.link, "router", waits=notifier.waits) as session:
         audit.attach(session)
-        log.info("%s: routes at %s", config.name, ", ".join(config.link.listen))
+        log.info("%s: routing at %s", config.name, ", ".join(config.link.listen))
         try:
             await tend(session, notifier)
         finally:

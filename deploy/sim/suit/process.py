@@ -40,13 +40,13 @@ async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigur
                 link.answer(FAULTS, lambda told, _: _take(told, config, suit))
 
         buses = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in config.buses)
-        log.info("answers every SYNC for %d nodes on %s", len(config.nodes), buses)
+        log.info("simulated suit: answering every SYNC for %d nodes on %s", len(config.nodes), buses)
         write_figures(to_tree(await answer(config, stop, tell, on_suit)))
 
 
 def _take(told: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:
     suit.faults.config = told_faults(told, list(config.nodes))
-    log.info("faults from now on: %s", suit.faults.config.model_dump(exclude_defaults=True) or "none")
+    log.info("injected sensor faults: %s", suit.faults.config.model_dump(exclude_defaults=True) or "none")
     return b"done"
 
 

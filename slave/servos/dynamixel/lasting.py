@@ -59,7 +59,7 @@ def replace(bus: Bus, servo: Settings, different: Sequence[Difference]) -> None:
         bus.write(servo.id, difference.register, difference.wanted)
         name = NAMES.get(difference.register, "register")
         log.warning(
-            "%s (id %d): %s (address %d) was %d, is %d now, and stays so without power",
+            "%s (id %d): %s (address %d) changed permanently from %d to %d",
             servo.joint, servo.id, name, difference.register.address, difference.found, difference.wanted,
         )  # fmt: skip
 

@@ -18,7 +18,7 @@ from common.can.controller import Controller, bus_off_words, error_words, of_err
         (0x004, 0x01, None, "the controller lost frames that came in"),
         (0x040, 0x00, Controller.BUS_OFF, "the controller is bus-off"),
         (0x100, 0x00, Controller.ERROR_ACTIVE, "the controller was restarted"),
-        (0x020, 0x00, None, "nobody acknowledges: no other node on the bus, or the wire is cut"),
+        (0x020, 0x00, None, "no node acknowledges: there is no other node on the bus, or the wire is cut"),
         (0x008, 0x00, None, "frames are destroyed: look at the bit rate, the wiring, 120 Ω at both ends"),
         (0x001, 0x00, None, "error frame 0x1"),
     ],

@@ -31,7 +31,7 @@ def test_oneself_and_masters_are_no_namesakes(shown: ProcessPresence) -> None:
 
 def test_a_notice_counts_while_it_is_repeated() -> None:
     known = Namesakes(own=1)
-    known.on_notice("2 robots bear the name r", 5)
-    assert known.words(5 + to_ns(NOTICE_S)) == "2 robots bear the name r"
+    known.on_notice("2 robots have the name r", 5)
+    assert known.words(5 + to_ns(NOTICE_S)) == "2 robots have the name r"
     assert known.words(6 + to_ns(NOTICE_S)) is None
     assert known.words(4 - to_ns(NOTICE_S)) is None

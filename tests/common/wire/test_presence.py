@@ -47,7 +47,7 @@ def test_it_tells_where_it_is() -> None:
 
 def test_two_of_a_name_are_told_by_place_in_one_order() -> None:
     assert several_bear("r", ["b", "a"]) == several_bear("r", ["a", "b"])
-    assert "2 robots bear the name r: a and b" in several_bear("r", ["a", "b"])
+    assert "2 robots have the name r: a and b" in several_bear("r", ["a", "b"])
 
 
 def test_another_version_is_named_with_its_place_and_the_own_is_not() -> None:

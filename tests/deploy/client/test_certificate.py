@@ -64,11 +64,11 @@ def test_an_operator_engages_and_whoever_is_not_named_does_not(keys: Path) -> No
     assert (stopped.done, stopped.guard) == (True, "estop")
     (refused,) = asked(endpoint(), keys, "robot-robot-2", Action.ENGAGE)
     assert not refused.done
-    assert "may your certificate ask it? Its log says who was refused" in refused.text
+    assert "Check also that [link.access] permits your certificate" in refused.text
 
 
 def test_a_secure_endpoint_asks_who_you_are() -> None:
-    with pytest.raises(TandemError, match=r"who are you there\? Name your certificate by --certificate"):
+    with pytest.raises(TandemError, match=r"a certificate is needed there: name yours by --certificate"):
         destination(["tls/127.0.0.1:1"], ["robot-1"])
     assert destination(["tcp/127.0.0.1:1"], ["robot-1"]).link.tls is None
 

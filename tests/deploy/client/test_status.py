@@ -150,7 +150,7 @@ def test_one_of_two_of_a_name_is_shown_with_its_place() -> None:
     said = as_tree(answer, heard(), namesakes=1)
     assert (said["instance"], said["place"], said["namesakes"]) == (7, "room 1", 1)
     shown = rendered({"robot-1 00000007": said})
-    assert "another robot bears this name; this one is at room 1" in " ".join(shown.split())
+    assert "another robot has the same name; this one is at room 1" in " ".join(shown.split())
 
 
 class Topics:

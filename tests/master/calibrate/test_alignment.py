@@ -168,7 +168,7 @@ def test_without_any_motion_every_node_is_refused_with_what_to_do(upper_body: Wo
 
 
 def test_without_a_zero_pose_it_is_refused(upper_body: Worn) -> None:
-    with pytest.raises(PoorMotionError, match="nobody stood still"):
+    with pytest.raises(PoorMotionError, match="no node stood still"):
         find_alignment(still(upper_body, slice(500, 1500)), upper_body.skeleton)
 
 

@@ -91,7 +91,7 @@ def _came_when_due(seen: SoakEvidence) -> Verdict:
     """By time, not by number: where both sides stand still together nothing is sent and nothing is lost."""
     name = "due but never arrived, unexplained"
     if np.isnan(seen.samples["due"]).all():
-        return at_most(name, None, 0.0, why="the robot did not publish what was due")
+        return at_most(name, None, 0.0, why="the robot did not publish it")
     # a command that did not come when due is why a robot holds, so that it held explains nothing here
     judged = ~in_windows(seen.samples.at_s, seen.explained.causes)
     due, all_ = seen.sum("due", judged), seen.sum("due")

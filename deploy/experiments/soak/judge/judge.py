@@ -47,7 +47,7 @@ class JudgedSoak:
     def ended(self) -> str:
         """How it ended: in its time, interrupted, by an error, or unknown because it was killed."""
         ends = of_kind(self.seen.events, SoakEnded)
-        return ends[-1].what.how if ends else "it was killed: nothing says how it ended"
+        return ends[-1].what.how if ends else "it was killed, so its end is unknown"
 
     def tree(self) -> dict[str, Any]:
         """The report for machines."""

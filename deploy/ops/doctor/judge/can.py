@@ -60,8 +60,8 @@ def _judge(need: BusNeed, found: Mapping[str, CanInterface]) -> Finding:
     if bus.fd and not at.fd:
         return fail(
             check,
-            f"{at.name} carries classic CAN only, and the file says fd = true",
-            f"set it up with `dbitrate 5000000 fd on` (tandem-can@{at.name}), or say fd = false",
+            f"{at.name} carries classic CAN only, but the file sets fd = true",
+            f"set it up with `dbitrate 5000000 fd on` (tandem-can@{at.name}), or set fd = false",
         )
     return _judge_running(check, need, at)
 

@@ -18,10 +18,12 @@ def judge_endpoint(facts: EndpointFacts) -> Finding:
                 found += ", and counts this knock as a refused handshake"
             return ok(f"connect {facts.endpoint}", found)
         case EndpointState.UNASKED:
-            return ok(f"connect {facts.endpoint}", "cannot be knocked at; the robot's own row tells")
+            return ok(
+                f"connect {facts.endpoint}", "this transport cannot be tested alone; see the robot's own row"
+            )
         case EndpointState.REFUSED:
             advice = "start the other side (`systemctl status tandem-slave@robot`), or correct the port"
-            return fail(f"connect {facts.endpoint}", "nobody listens there", advice)
+            return fail(f"connect {facts.endpoint}", "no process listens there", advice)
         case EndpointState.SILENT:
             return fail(f"connect {facts.endpoint}", "no answer at all", _FIREWALL)
         case EndpointState.UNKNOWN:

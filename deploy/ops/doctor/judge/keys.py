@@ -15,7 +15,7 @@ def judge_keys(needs: Needs, facts: KeyFacts | None) -> list[Finding]:
     if facts is None:
         return [_without(needs)]
     if facts.trouble:
-        advice = "mend [link.tls]; `tandem keys show FOLDER` lists what is there"
+        advice = "correct [link.tls]; `tandem keys show FOLDER` lists the certificates"
         return [fail("certificate", facts.trouble, advice)]
     return [_name(needs, facts), _time(facts), *_hosts(needs, facts), *_key(facts)]
 
@@ -54,7 +54,7 @@ def _hosts(needs: Needs, facts: KeyFacts) -> list[Finding]:
     check = "certificate's hosts"
     if facts.hosts:
         return [ok(check, ", ".join(facts.hosts))]
-    return [fail(check, "none, so nobody can connect to it", f"{_NEW} and --host ADDRESS")]
+    return [fail(check, "none, so no other host can connect to it", f"{_NEW} and --host ADDRESS")]
 
 
 def _key(facts: KeyFacts) -> list[Finding]:

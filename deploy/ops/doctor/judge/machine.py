@@ -48,7 +48,7 @@ def judge_clock(synchronised: bool | None) -> Finding:
     """The date is for recordings, logs and certificates: the link measures by monotonic clocks."""
     check = "date"
     if synchronised is None:
-        return ok(check, "the kernel does not tell whether it is synchronised")
+        return ok(check, "the kernel does not report whether it is synchronised")
     if synchronised:
         return ok(check, "synchronised")
     advice = "apt install chrony: recordings and certificates need the date; the robot does not"

@@ -11,7 +11,7 @@ from slave.guard.config import GuardConfig
 
 OLDEST_MS = 1000.0 * GuardConfig().max_age_s
 """A command older than that is refused by a guard as it is shipped."""
-_NAMESAKES = "robots bear the name"
+_NAMESAKES = "robots have the name"
 _SCHEMA = "schema version"
 """In the words of the codec, where the two sides' messages differ."""
 
@@ -23,7 +23,7 @@ def judge_robot(facts: RobotFacts, ours: Software) -> list[Finding]:
         if _SCHEMA in facts.text:
             return [fail(f"{name}: versions", facts.text, "install the same tandem on both hosts")]
         if _NAMESAKES in facts.text:
-            return [fail(f"{name}: names", facts.text, "until then nobody can engage either of them")]
+            return [fail(f"{name}: names", facts.text, "until then neither can be engaged")]
         return [fail(name, facts.text, "on its host: `tandem doctor` with its own file, and its log")]
     reached = ok(name, f"answers: {facts.guard}: {facts.text}")
     return [reached, _time(facts), *_clock(facts), _versions(facts, ours)]
@@ -58,7 +58,7 @@ def _versions(facts: RobotFacts, ours: Software) -> Finding:
     theirs = facts.software
     if theirs is None:
         advice = "it runs an older tandem, or its statistics may not be heard: see [link.access]"
-        return warn(check, "the robot does not tell its own", advice)
+        return warn(check, "the robot does not report its version", advice)
     parts = {
         "tandem": (theirs.tandem, ours.tandem),
         "schema": (theirs.schema, ours.schema),

@@ -93,7 +93,7 @@ def test_the_commands_make_what_a_host_needs(tmp_path: Path) -> None:
     said, error = tandem("make", keys, "robot:robot-1", "--host", "127.0.0.1", "--days", "2")
     assert error is None
     assert 'certificate = "robot-robot-1.pem"' in said
-    assert "nobody to it" in tandem("make", keys, "operator:anna")[0]
+    assert "others cannot connect to it" in tandem("make", keys, "operator:anna")[0]
     check_tls(tls(keys, "robot-robot-1"), datetime.now(UTC))
     found = json.loads(tandem("show", keys, "--json")[0])
     assert [(each["common_name"], each["authority"]) for each in found] == [

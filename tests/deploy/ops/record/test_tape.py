@@ -66,4 +66,4 @@ def test_a_next_file_that_cannot_begin_ends_the_recording_said_once(
     counters = tape.counters()
     assert (counters.put, counters.written, counters.refused) == (45, 10, 35)
     assert "is there already" in counters.failed
-    assert len([r for r in caplog.records if "the recording ends here" in r.message]) == 1
+    assert len([r for r in caplog.records if "the recording stops here" in r.message]) == 1
