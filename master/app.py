@@ -15,9 +15,8 @@ from common.link.audit import Audit
 from common.link.place import own_endpoints
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Ticks
-from common.metrics.tree import to_tree
+from common.metrics.tree import WriteMetrics
 from common.process.heap import freeze_heap, heap_in_use, reserve_heap
-from common.process.launch import WriteFigures
 from common.process.notify import Notifier, open_notifier
 from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
@@ -166,13 +165,13 @@ class Master:
         return replace(self._shared_metrics(), robots={robot.name: robot.metrics() for robot in self._robots})
 
 
-async def run(config: MasterConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+async def run(config: MasterConfig, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
     """Run a master until `stop` is set. Raises BusError or LinkError when it cannot start."""
-    await until_stopped(stop, _run(config, write_figures))
+    await until_stopped(stop, _run(config, write_metrics))
     log.info("stopped")
 
 
-async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
+async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
     notifier = open_notifier()
     enter_real_time(config.process.realtime_priority)  # first, so that every thread has it
     audit = Audit(config.link)
@@ -188,4 +187,4 @@ async def _run(config: MasterConfig, write_figures: WriteFigures) -> None:
             await master.run()
         finally:
             notifier.stopping()
-            write_figures(to_tree(replace(master.metrics(), access=audit.metrics())))
+            write_metrics(replace(master.metrics(), access=audit.metrics()))

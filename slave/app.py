@@ -15,9 +15,8 @@ from common.link.audit import Audit
 from common.link.place import own_endpoints
 from common.metrics.parts import Ticks
 from common.metrics.slave import OffsetMetrics, SlaveMetrics
-from common.metrics.tree import to_tree
+from common.metrics.tree import WriteMetrics
 from common.process.heap import freeze_heap, heap_in_use, reserve_heap
-from common.process.launch import WriteFigures
 from common.process.notify import Notifier, open_notifier
 from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
@@ -207,13 +206,13 @@ class Slave:
         )
 
 
-async def run(config: SlaveConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+async def run(config: SlaveConfig, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
     """Run a slave until `stop` is set; the servos are left holding. Raises LinkError or RobotError."""
-    await until_stopped(stop, _run(config, write_figures))
+    await until_stopped(stop, _run(config, write_metrics))
     log.info("slave stopped; the servos hold their position")
 
 
-async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
+async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
     notifier = open_notifier()
     last_known = None
     if config.servos.entry.remembers:
@@ -242,7 +241,7 @@ async def _run(config: SlaveConfig, write_figures: WriteFigures) -> None:
             finally:
                 notifier.stopping()
                 slave.remember_last()
-                write_figures(to_tree(replace(slave.metrics(), access=audit.metrics())))
+                write_metrics(replace(slave.metrics(), access=audit.metrics()))
     finally:
         servos.stop()
         if base is not None:

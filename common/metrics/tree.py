@@ -7,9 +7,9 @@ missing fails the type checker, and on arrival the decoder: it never becomes a z
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Mapping
+from dataclasses import Field, asdict
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -23,12 +23,15 @@ _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 class Metrics:
-    """Base of every part of the tree."""
+    """Base of every part of the tree: a dataclass."""
 
     __slots__ = ()
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     __pydantic_config__ = _STRICT
 
 
+WriteMetrics = Callable[[Metrics], None]
+"""Takes what a process counted, when it stops."""
 _Part = TypeVar("_Part")
 
 

@@ -11,14 +11,12 @@ from common.config.load import Model, load_config
 from common.errors import TandemError
 from common.log.handler import log_level, print_error, start_log
 from common.log.streams import secure
+from common.metrics.tree import WriteMetrics
 from common.process.runtime import run
-
-WriteFigures = Callable[[dict[str, object]], None]
-"""What a side hands its counters to when it stops."""
 
 
 def launch(
-    role: str, model: type[Model], side: Callable[[Model, asyncio.Event, WriteFigures], Awaitable[None]]
+    role: str, model: type[Model], side: Callable[[Model, asyncio.Event, WriteMetrics], Awaitable[None]]
 ) -> int:
     """Run a side until SIGINT, SIGTERM or SIGHUP; the exit status. A mistake is one clear line each."""
     parser = argparse.ArgumentParser(prog=f"python -m {role}")

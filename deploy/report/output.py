@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from common.errors import TandemError
+from common.metrics.tree import Metrics, WriteMetrics, to_tree
 
 
 def in_a_folder(path: Path | None) -> Path | None:
@@ -36,11 +37,11 @@ def write_json(path: Path, tree: Any) -> None:
         path.write_text(text, "utf-8")
 
 
-def metrics_writer(path: Path | None) -> Callable[[dict[str, object]], None]:
-    """What a process calls with its counters when it stops: writes them to the file, if there is one."""
+def metrics_writer(path: Path | None) -> WriteMetrics:
+    """Writes what a process counted to the file, if there is one, when the process stops."""
 
-    def write(metrics: dict[str, object]) -> None:
+    def write(metrics: Metrics) -> None:
         if path is not None:
-            write_json(path, metrics)
+            write_json(path, to_tree(metrics))
 
     return write

@@ -13,7 +13,7 @@ from rich.console import Console
 from common.errors import TandemError
 from common.process.runtime import run as run_until_stopped
 from deploy.report.options import AsJson, MetricsFile
-from deploy.report.output import in_a_folder, write_json
+from deploy.report.output import in_a_folder, metrics_writer
 
 
 def record(
@@ -65,12 +65,8 @@ def record(
     console = Console(stderr=True)
 
     async def work(stop: asyncio.Event) -> None:
-        def write(tree: dict[str, object]) -> None:
-            if figures is not None:
-                write_json(figures, tree)
-
         with console.status("waiting for the robot") as status:
-            said = await record_until(options, stop, status.update, write)
+            said = await record_until(options, stop, status.update, metrics_writer(figures))
         console.print(said, highlight=False)
 
     run_until_stopped(work)

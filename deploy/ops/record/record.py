@@ -15,8 +15,7 @@ from common.errors import TandemError
 from common.link import Link, open_link
 from common.link.config import LinkConfig
 from common.metrics.recorder import RecorderMetrics
-from common.metrics.tree import to_tree
-from common.process.launch import WriteFigures
+from common.metrics.tree import WriteMetrics
 from common.process.runtime import until_stopped
 from common.wire.topics import COMMAND, STATE, STATISTICS, Topic, video
 from deploy.client.destination import destination
@@ -101,7 +100,7 @@ async def record(
     options: RecordOptions,
     stop: asyncio.Event,
     tell: Callable[[str], None],
-    write_figures: WriteFigures = lambda _: None,
+    write_metrics: WriteMetrics = lambda _: None,
 ) -> str:
     """Record until `stop` is set or the time is over; what was recorded, in words.
 
@@ -126,7 +125,7 @@ async def record(
     finally:
         await tape.close()
         overwritten = _overwritten(link)
-        write_figures(to_tree(_metrics(tape, taken, overwritten)))
+        write_metrics(_metrics(tape, taken, overwritten))
     _check(options, tape, taken, overwritten)
     said = f"{options.out}: {taken.words(tape, monotonic_ns()).strip()}"
     if overwritten:

@@ -12,8 +12,7 @@ from common.link.audit import Audit
 from common.link.router import RouterConfig
 from common.link.session import LinkSession, open_session
 from common.link.zenoh_config import zenoh_configuration
-from common.metrics.tree import to_tree
-from common.process.launch import WriteFigures
+from common.metrics.tree import WriteMetrics
 from common.process.notify import Notifier, open_notifier
 from common.process.pacing import TickGrid
 from common.process.runtime import until_stopped
@@ -36,16 +35,16 @@ def zenohd_text(config: RouterConfig) -> str:
     return head + json.dumps(zenohd_configuration(config), indent=2) + "\n"
 
 
-async def run(config: RouterConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+async def run(config: RouterConfig, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
     """Route until `stop` is set. Raises LinkError where it cannot listen."""
     if config.link.tls is None:
         log.warning("no [link.tls]: anyone who reaches this router may command every robot at it")
     # an address that is not there yet is waited for, so what stops the router must reach it then too
-    await until_stopped(stop, _route(config, write_figures))
+    await until_stopped(stop, _route(config, write_metrics))
     log.info("stopped")
 
 
-async def _route(config: RouterConfig, write_figures: WriteFigures) -> None:
+async def _route(config: RouterConfig, write_metrics: WriteMetrics) -> None:
     notifier = open_notifier()
     audit = Audit(config.link)
     async with open_session(config.link, "router", waits=notifier.waits) as session:
@@ -55,7 +54,7 @@ async def _route(config: RouterConfig, write_figures: WriteFigures) -> None:
             await tend(session, notifier)
         finally:
             notifier.stopping()
-            write_figures(to_tree(audit.metrics()))
+            write_metrics(audit.metrics())
 
 
 async def tend(session: LinkSession, notifier: Notifier) -> None:

@@ -14,7 +14,7 @@ from common.can.config import BusConfig
 from common.can.frame import CanFrame
 from common.can.without_echo import open_without_function_code
 from common.clock import monotonic_ns
-from common.metrics.tree import to_tree
+from common.metrics.drives import DrivesMetrics
 from common.process.heap import freeze_heap
 from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
@@ -36,7 +36,7 @@ def _open(config: BusConfig) -> can.BusABC:
 
 async def run(
     config: SlaveConfig, stop: asyncio.Event, faults: Sequence[PlannedDriveFault] = ()
-) -> dict[str, object]:
+) -> DrivesMetrics:
     """Be the drives that a slave's file names, until `stop` is set; returns what was counted.
 
     Raises BusError where a bus cannot be opened.
@@ -65,4 +65,4 @@ async def run(
         await until_stopped(stop, move())
     finally:
         await asyncio.gather(*(bus.close() for bus in buses.values()))
-    return {**asdict(peer.counters), "buses": {name: to_tree(bus.metrics()) for name, bus in buses.items()}}
+    return DrivesMetrics(**asdict(peer.counters), buses={name: bus.metrics() for name, bus in buses.items()})

@@ -44,10 +44,8 @@ def drives(
 
     checked = load_config(config, SlaveConfig, ['servos.backend="canopen"', *(set_ or ())])
     faults = [planned(text, checked.skeleton) for text in fault or ()]
-    counted: dict[str, object] = {}
 
     async def main(stop: asyncio.Event) -> None:
-        counted.update(await run(checked, stop, faults))
+        metrics_writer(figures)(await run(checked, stop, faults))
 
     run_until_stopped(main)
-    metrics_writer(figures)(counted)

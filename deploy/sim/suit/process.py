@@ -12,8 +12,7 @@ from pathlib import Path
 from common.config.load import check_config
 from common.errors import ConfigError, ConfigMistake
 from common.link import Link, open_link
-from common.metrics.tree import to_tree
-from common.process.launch import WriteFigures
+from common.metrics.tree import WriteMetrics
 from common.wire.codec import encode
 from common.wire.messages import Truth
 from common.wire.topics import FAULTS, TRUTH
@@ -25,7 +24,7 @@ from deploy.sim.suit.suit import SimulatedSuit
 log = logging.getLogger(__name__)
 
 
-async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+async def run(config: SuitConfig, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
     """Answer until `stop` is set. Without a link the truth is not published."""
     async with AsyncExitStack() as stack:
         link: Link | None = None
@@ -41,7 +40,7 @@ async def run(config: SuitConfig, stop: asyncio.Event, write_figures: WriteFigur
 
         buses = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in config.buses)
         log.info("simulated suit: answering every SYNC for %d nodes on %s", len(config.nodes), buses)
-        write_figures(to_tree(await answer(config, stop, tell, on_suit)))
+        write_metrics(await answer(config, stop, tell, on_suit))
 
 
 def _take(told: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:

@@ -11,7 +11,8 @@ import pytest
 
 from common.config.section import Section
 from common.errors import TandemError
-from common.process.launch import WriteFigures, launch
+from common.metrics.tree import Metrics, WriteMetrics
+from common.process.launch import launch
 
 ROOT = Path(__file__).parents[3]
 
@@ -34,9 +35,9 @@ def test_a_side_runs_with_its_file_and_what_is_set_over_it(
     monkeypatch.setattr(sys, "argv", ["python -m side", str(file), "--set", 'robot="robot-2"'])
     robots = []
 
-    async def side(config: OneKey, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+    async def side(config: OneKey, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
         robots.append(config.robot)
-        write_figures({"counted": 1})
+        write_metrics(Metrics())
         assert not stop.is_set()
 
     assert launch("side", OneKey, side) == 0
@@ -45,7 +46,7 @@ def test_a_side_runs_with_its_file_and_what_is_set_over_it(
 
 
 def test_what_a_side_cannot_do_is_told_line_by_line(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    async def side(config: OneKey, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+    async def side(config: OneKey, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
         raise TandemError("no bus\nno link")
 
     assert launch("side", OneKey, side) == 1
@@ -55,7 +56,7 @@ def test_what_a_side_cannot_do_is_told_line_by_line(file: Path, capsys: pytest.C
 def test_a_mistake_in_the_file_starts_nothing(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file.write_text("robots = 1\n")
 
-    async def side(config: OneKey, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+    async def side(config: OneKey, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
         raise AssertionError("started")
 
     assert launch("side", OneKey, side) == 1
@@ -69,7 +70,7 @@ def test_a_mistake_in_the_file_starts_nothing(file: Path, capsys: pytest.Capture
 def test_debug_shows_the_traceback(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["python -m side", str(file), "--debug"])
 
-    async def side(config: OneKey, stop: asyncio.Event, write_figures: WriteFigures) -> None:
+    async def side(config: OneKey, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
         raise TandemError("no bus")
 
     with pytest.raises(TandemError):

@@ -16,7 +16,7 @@ from common.errors import ConfigError, RecordingError, TandemError
 from common.link import open_link
 from common.link.config import LinkConfig
 from common.metrics.recorder import RecorderMetrics
-from common.metrics.tree import from_tree
+from common.metrics.tree import Metrics
 from common.recording import McapRecorder, read_recording
 from common.wire.topics import COMMAND, STATE, STATISTICS, video
 from deploy import cli
@@ -60,10 +60,10 @@ def test_every_topic_is_recorded_as_it_came_until_stopped(tmp_path: Path) -> Non
         endpoint, stop, out = free_endpoint(), asyncio.Event(), tmp_path / "a.mcap"
         options = RecordOptions(LinkConfig(connect=[endpoint]), ROBOT, out, cameras=("head",))
         told: list[str] = []
-        figures: dict[str, Any] = {}
+        counted: list[Metrics] = []
         async with open_link(LinkConfig(listen=[endpoint]), ROBOT) as robot:
             puts = {topic: robot.publish(topic) for topic in (COMMAND, STATE, STATISTICS, video("head"))}
-            recording = asyncio.create_task(record(options, stop, told.append, figures.update))
+            recording = asyncio.create_task(record(options, stop, told.append, counted.append))
             while not told or any(
                 name not in told[-1] for name in ("command", "state", "statistics", "video")
             ):
@@ -82,7 +82,9 @@ def test_every_topic_is_recorded_as_it_came_until_stopped(tmp_path: Path) -> Non
             "tandem/robot-1/statistics": b"statistics",
             "tandem/robot-1/video/head": b"video",
         }
-        assert figures["written"] == len(read.entries) == sum(figures["recorded"].values())
+        (metrics,) = counted
+        assert isinstance(metrics, RecorderMetrics)
+        assert metrics.written == len(read.entries) == sum(metrics.recorded.values())
 
     run(test)
 
@@ -152,11 +154,11 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 def test_states_that_never_came_are_reported_as_an_error(tmp_path: Path, may_miss: bool) -> None:
     async def test() -> None:
         endpoint, stop, told = free_endpoint(), asyncio.Event(), list[str]()
-        figures: dict[str, Any] = {}
+        counted: list[Metrics] = []
         options = RecordOptions(LinkConfig(connect=[endpoint]), ROBOT, tmp_path / "a.mcap", may_miss=may_miss)
         async with open_link(LinkConfig(listen=[endpoint]), ROBOT) as robot:
             put = robot.publish(STATE)
-            recording = asyncio.create_task(record(options, stop, told.append, figures.update))
+            recording = asyncio.create_task(record(options, stop, told.append, counted.append))
             while not told or "state" not in told[-1]:
                 put(state(7))
                 await asyncio.sleep(0.01)
@@ -171,7 +173,8 @@ def test_states_that_never_came_are_reported_as_an_error(tmp_path: Path, may_mis
                     TandemError, match=r"missing by their own numbers: 2200 of tandem/robot-1"
                 ):
                     await recording
-        metrics = from_tree(RecorderMetrics, figures)
+        (metrics,) = counted
+        assert isinstance(metrics, RecorderMetrics)
         assert metrics.missing == {"tandem/robot-1/state": 2200}
 
     run(test)
