@@ -15,7 +15,10 @@ app = typer.Typer(no_args_is_help=True)
 
 @app.callback()
 def _group() -> None:
-    """Find the sensors' errors and how they sit, and write them to TOML."""
+    """Find the errors of the sensors and how each is turned against its segment; write them to TOML files.
+
+    Example: `tandem calibrate live master.toml --out calibration`
+    """
 
 
 app.command("imu")(imu)

@@ -23,7 +23,10 @@ app = typer.Typer(no_args_is_help=True)
 
 @app.callback()
 def _group() -> None:
-    """Two hosts on this machine, and a link between them that behaves as a real network."""
+    """Show the emulated networks, and check that this machine emulates them correctly.
+
+    Example: `tandem network list 4g`
+    """
 
 
 @app.command("list")
