@@ -28,6 +28,18 @@ class StallEvidence(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class LoopsBegan:
+    """The first line of the reference loops."""
+
+    cores: list[int]
+    """Cores on which a loop runs."""
+    origin_ns: int
+    """Time of their first tick, by this host's monotonic clock."""
+    priority: bool
+    """Whether the loops have real-time priority."""
+
+
+@dataclass(frozen=True, slots=True)
 class Stall:
     """A core came back at `until_ns` and was due at `from_ns`, by this host's monotonic clock."""
 

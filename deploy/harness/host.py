@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import psutil
+from pydantic import TypeAdapter
 
 from common.clock import monotonic_ns, to_s
 from common.metrics.parts import Ticks
-from deploy.harness.excuse import Lost, Stall, lost, lost_before
+from deploy.harness.excuse import LoopsBegan, Lost, Stall, lost, lost_before
 from deploy.harness.reference_loop import PERIOD_NS
 
 START_S = 10.0
 """A host on which a reference loop does not start within this long is not measured."""
 STOP_S = 1.0
+_LINE: TypeAdapter[LoopsBegan | Stall] = TypeAdapter(LoopsBegan | Stall)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +55,12 @@ class HostWatch:
     def take(self, line: str) -> None:
         """Take one line of the loops' output."""
         self._reported.set()
-        report: dict[str, Any] = json.loads(line)
-        if "origin_ns" in report:
-            self.began_ns, self.priority, self.cpu_s = report["origin_ns"], report["priority"], _cpu_s()
-            self.known_ns = dict.fromkeys(report["cores"], self.began_ns)
+        report = _LINE.validate_json(line)
+        if isinstance(report, LoopsBegan):
+            self.began_ns, self.priority, self.cpu_s = report.origin_ns, report.priority, _cpu_s()
+            self.known_ns = dict.fromkeys(report.cores, self.began_ns)
             return
-        stall = Stall(**report, priority=self.priority)
+        stall = replace(report, priority=self.priority)
         self.known_ns[stall.core] = stall.until_ns
         if stall.missed:
             self.stalls.append(stall)

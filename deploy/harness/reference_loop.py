@@ -14,11 +14,13 @@ import signal
 import sys
 import threading
 import time
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from common.clock import NS_PER_S, monotonic_ns
 from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
+from deploy.harness.excuse import LoopsBegan, Stall
 
 PERIOD_NS = 5_000_000
 """As the master's capture and the slave's loop."""
@@ -35,7 +37,7 @@ def main() -> None:
     first = enter_real_time(PRIORITY)
     cores = sorted(os.sched_getaffinity(0))
     origin_ns = monotonic_ns() + PERIOD_NS
-    _write({"cores": cores, "origin_ns": origin_ns, "priority": first})
+    _write(LoopsBegan(cores, origin_ns, priority=first))
     for core in cores:
         threading.Thread(target=_tick, args=(core, TickGrid(origin_ns, PERIOD_NS)), daemon=True).start()
     sys.stdin.buffer.read()
@@ -44,7 +46,7 @@ def main() -> None:
 def _tick(core: int, grid: TickGrid) -> None:
     os.sched_setaffinity(0, {core})
     before_ns = _stolen_ns(core)
-    late: dict[str, object] = {}
+    late: Stall | None = None
     while True:
         awaited_ns = grid.next_ns
         time.sleep(max(0, awaited_ns - monotonic_ns()) / NS_PER_S)
@@ -55,15 +57,10 @@ def _tick(core: int, grid: TickGrid) -> None:
             # a tick after the stall: the kernel counts what was stolen only once it runs again
             stolen_ns = _stolen_ns(core)
             if late:
-                _write({**late, "stolen_ns": stolen_ns - before_ns})
-            before_ns, late = stolen_ns, {}
+                _write(replace(late, stolen_ns=stolen_ns - before_ns))
+            before_ns, late = stolen_ns, None
         if due is not None and (due.missed or regular):
-            report: dict[str, object] = {
-                "core": core,
-                "from_ns": awaited_ns,
-                "until_ns": now_ns,
-                "missed": due.missed,
-            }
+            report = Stall(core, from_ns=awaited_ns, until_ns=now_ns, missed=due.missed)
             if due.missed:
                 late = report
             else:
@@ -86,8 +83,8 @@ def _stolen_ns(core: int) -> int:
         return 0
 
 
-def _write(line: dict[str, object]) -> None:
-    sys.stdout.write(json.dumps(line) + "\n")  # one write: two threads' lines must not mix
+def _write(line: LoopsBegan | Stall) -> None:
+    sys.stdout.write(json.dumps(asdict(line)) + "\n")  # one write: two threads' lines must not mix
     sys.stdout.flush()
 
 

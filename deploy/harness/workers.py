@@ -9,7 +9,10 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from multiprocessing.connection import wait as wait_for
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from multiprocessing.sharedctypes import Synchronized
 
 MOST_JOBS = 4
 """A process holds some 150 MB."""
@@ -44,7 +47,7 @@ def run_each(
     others = set(multiprocessing.active_children())
     # spawn: a fork would copy this process's threads' locks
     context = multiprocessing.get_context("spawn")
-    counter = context.Value("q", 0)
+    counter: Synchronized[int] = context.Value("q", 0)
     pool = ProcessPoolExecutor(min(jobs, len(items)), context, _begin, (counter,))
     try:
         open_ = {pool.submit(_call, call, item): item for item in items}
@@ -65,10 +68,11 @@ def run_each(
         pool.shutdown(cancel_futures=True)
 
 
-_counter: Any = None
+_counter: Synchronized[int] | None = None
+"""In a worker process: how much all of them have done."""
 
 
-def _begin(counter: Any) -> None:
+def _begin(counter: Synchronized[int]) -> None:
     """Prepare a new process: the first process handles Ctrl-C, and this one ends with it."""
     global _counter
     _counter = counter
@@ -88,5 +92,6 @@ def _call(call: Callable[[Item, OnProgress], Result], item: Item) -> Result:
 
 
 def _tell(count: int) -> None:
+    assert _counter is not None
     with _counter.get_lock():
         _counter.value += count

@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 class FilesByDefault(TyperGroup):
     """Runs the command `files` where the first argument is neither a command nor `--help`."""
 
+    # Any: typer keeps the type of its context in a private module
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Insert the default command's name."""
         if args and args[0] != "--help" and args[0] not in self.commands:

@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import typer
 
@@ -30,7 +29,7 @@ def writing(path: Path) -> Iterator[None]:
         raise TandemError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
-def write_json(path: Path, tree: Any) -> None:
+def write_json(path: Path, tree: object) -> None:
     """A report for machines. Raises TandemError."""
     text = json.dumps(tree, indent=2, ensure_ascii=False) + "\n"
     with writing(path):

@@ -5,20 +5,23 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from deploy.report.output import writing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from matplotlib.typing import RcKeyType
 
 Draw = Callable[["Figure"], None]
 """Draws into an empty figure."""
+Save = Callable[["Figure", io.BytesIO], None]
+"""Writes a drawn figure in one file format."""
 
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Okabe and Ito's, which people with colour-blindness tell apart."""
 LIMIT_COLOUR, BAR_COLOUR, INK = "#cf1124", "#9fb3c8", "#102a43"
-_STYLE: dict[Any, Any] = {
+_STYLE: dict[RcKeyType, str | float | bool] = {
     "font.family": "sans-serif",
     "font.size": 9.0,
     "axes.spines.top": False,
@@ -46,12 +49,14 @@ def colour(number: int) -> str:
 def svg(draw: Draw, width: float, height: float) -> str:
     """An SVG of that size in inches; drawn again it is the same text."""
     undated = {"Date": None, "Creator": None}
-    return _saved(draw, (width, height), format="svg", metadata=undated).decode()
+    return _saved(
+        draw, (width, height), lambda figure, out: figure.savefig(out, format="svg", metadata=undated)
+    ).decode()
 
 
 def png(draw: Draw, width: float, height: float, dpi: int = 110) -> bytes:
     """A PNG of that size in inches."""
-    return _saved(draw, (width, height), format="png", dpi=dpi)
+    return _saved(draw, (width, height), lambda figure, out: figure.savefig(out, format="png", dpi=dpi))
 
 
 def save_png(path: Path, draw: Draw, width: float, height: float) -> None:
@@ -61,7 +66,7 @@ def save_png(path: Path, draw: Draw, width: float, height: float) -> None:
         path.write_bytes(image)
 
 
-def _saved(draw: Draw, size: tuple[float, float], **options: Any) -> bytes:
+def _saved(draw: Draw, size: tuple[float, float], save: Save) -> bytes:
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -71,5 +76,5 @@ def _saved(draw: Draw, size: tuple[float, float], **options: Any) -> bytes:
         FigureCanvasAgg(figure)
         draw(figure)
         out = io.BytesIO()
-        figure.savefig(out, **options)
+        save(figure, out)
     return out.getvalue()

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,8 @@ from deploy.sim.suit.motion import OperatorMotion, parse_motion
 from deploy.sim.world.injection import FaultInjection
 from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.encoders.counts import Encoders
-from slave.guard import Guard, State
+from slave.guard import GATES, Guard, State
+from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES
 from slave.limit.limit import Setpoint
 from slave.servos.servos import EncoderReading
 
@@ -69,9 +69,9 @@ def turned(command: Command, by_rad: float = JOINT_TURN_RAD) -> Command:
 
 
 class Scene:
-    """One run up to the fault, and beyond. `guard_options` may take gates and watches out of the guard."""
+    """One run up to the fault, and beyond. `without`: names of the gates and watches that the guard lacks."""
 
-    def __init__(self, setting: Setting = USUAL, **guard_options: Any) -> None:
+    def __init__(self, setting: Setting = USUAL, without: Set[str] = frozenset()) -> None:
         self._begins_s = setting.lead_s
         with files(setting) as master:
             overrides = {
@@ -83,9 +83,14 @@ class Scene:
         config = self.run.slave_config
         self.skeleton = config.skeleton
         self.run.slave.guard = Guard(
-            config.robot, self.skeleton, config.guard,
-            draw_token=itertools.count(TODAYS_TOKENS).__next__, **guard_options,
-        )  # fmt: skip
+            config.robot,
+            self.skeleton,
+            config.guard,
+            draw_token=itertools.count(TODAYS_TOKENS).__next__,
+            gates=[gate for gate in GATES if gate.name not in without],
+            arrival_watches=[watch for watch in ARRIVAL_WATCHES if watch.name not in without],
+            body_watches=[watch for watch in BODY_WATCHES if watch.name not in without],
+        )
         self.foul = 0
         """Commands that should never have been accepted, and were."""
         self.granted: list[str] = []
