@@ -86,7 +86,7 @@ def test_with_write_it_is_replaced_and_what_was_is_kept_in_the_report(
     found = look(rig, write=True)
     assert all(looked.written and not looked.wrong for looked in found.servos)
     assert [d.found for d in found.servos[0].different] == [1, 4, -300]
-    assert "operating mode (address 11) was 4, is 3 now" in caplog.text
+    assert "operating mode (address 11) changed permanently from 4 to 3" in caplog.text
     assert not any(looked.different for looked in look(rig, write=True).servos)
     rig.driver.start()
 
