@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, get_type_hints
 
 import typer
 
@@ -42,11 +42,11 @@ def debugging() -> bool:
     return _given == {"debug"}
 
 
-def _logged(command: Callable[..., Any]) -> Callable[..., Any]:
+def _logged(command: Callable[..., object]) -> Callable[..., object]:
     """The command with two options more. typer reads them from the signature."""
 
     @functools.wraps(command)
-    def run(*arguments: Any, debug: bool, quiet: bool, **options: Any) -> Any:
+    def run(*arguments: object, debug: bool, quiet: bool, **options: object) -> object:
         _add(debug=debug, quiet=quiet)
         return command(*arguments, **options)
 

@@ -7,7 +7,6 @@ import logging
 import os
 import socket
 from pathlib import Path
-from typing import Any
 
 import can
 
@@ -32,12 +31,13 @@ log = logging.getLogger(__name__)
 
 def open_bus(config: BusConfig) -> can.BusABC:
     """An open python-can bus. Raises BusError: which bus, why not, and what to do."""
-    options: dict[str, Any] = {"fd": config.fd, **config.options}
+    options: dict[str, object] = {"fd": config.fd, **config.options}
     try:
         # ignore_config: only tandem's TOML says what is opened, no ~/.canrc or CAN_CONFIG
         bus = can.Bus(
             channel=config.channel,
             interface=config.interface,
+            config_context=None,
             ignore_config=True,
             **options,
         )

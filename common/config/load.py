@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pydantic import ValidationError
 
@@ -44,7 +44,7 @@ def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -
     return check_config(path, table, model)
 
 
-def check_config(path: Path, table: dict[str, Any], model: type[Model]) -> Model:
+def check_config(path: Path, table: Mapping[str, object], model: type[Model]) -> Model:
     """The checked model of a table that was read from `path`."""
     try:
         checked = model.model_validate(table, context={"folder": path.parent})
@@ -64,7 +64,7 @@ def check_config(path: Path, table: dict[str, Any], model: type[Model]) -> Model
     return checked
 
 
-def _override(table: dict[str, Any], text: str) -> None:
+def _override(table: dict[str, object], text: str) -> None:
     key, equals, value = text.partition("=")
     if not equals:
         raise _mistake("--set", "--set", text, "section.key=value")
@@ -75,7 +75,7 @@ def _override(table: dict[str, Any], text: str) -> None:
             "--set", key, value, "a TOML value; texts need quotes, as in 'robot=\"robot-2\"'"
         ) from None
     *sections, last = key.strip().split(".")
-    place: Any = table
+    place: object = table
     for section in sections:
         if isinstance(place, list) and section.isdigit() and int(section) < len(place):
             place = place[int(section)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import Field, asdict
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
@@ -26,7 +26,7 @@ class Metrics:
     """Base of every part of the tree: a dataclass."""
 
     __slots__ = ()
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    __dataclass_fields__: ClassVar[dict[str, Field[object]]]
     __pydantic_config__ = _STRICT
 
 
@@ -43,19 +43,20 @@ def to_tree(metrics: DataclassInstance) -> dict[str, object]:
 def from_tree(kind: type[_Part], tree: object) -> _Part:
     """The metrics of plain values. CodecError names the first field that is missing, unknown or wrong."""
     try:
-        part: _Part = _adapter(kind).validate_python(tree)
+        part = _adapter(kind).validate_python(tree)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise CodecError(f"{kind.__name__}: {where}: {first['msg'].lower()}") from None
+    assert isinstance(part, kind)
     return part
 
 
-_ADAPTERS: dict[type, TypeAdapter[Any]] = {}
+_ADAPTERS: dict[type, TypeAdapter[object]] = {}
 """Made when first used: each takes some ms."""
 
 
-def _adapter(kind: type) -> TypeAdapter[Any]:
+def _adapter(kind: type) -> TypeAdapter[object]:
     if kind not in _ADAPTERS:
         _ADAPTERS[kind] = TypeAdapter(kind)
     return _ADAPTERS[kind]

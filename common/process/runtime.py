@@ -11,7 +11,6 @@ import threading
 from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import suppress
 from types import FrameType
-from typing import Any
 
 import uvloop
 
@@ -59,7 +58,7 @@ def run(
             signal.signal(number, before)
 
 
-async def until_stopped(stop: asyncio.Event, work: Coroutine[Any, Any, None]) -> None:
+async def until_stopped(stop: asyncio.Event, work: Coroutine[object, object, None]) -> None:
     """Run `work` until it ends or `stop` is set, then cancel it and wait for it. Its errors pass through."""
     running = asyncio.create_task(work)
     stopping = asyncio.create_task(stop.wait())

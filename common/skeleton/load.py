@@ -6,12 +6,46 @@ import math
 import tomllib
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import NotRequired, TypedDict
 
 from common.errors import ConfigError, ConfigMistake
 from common.skeleton.table import WORLD, Joint, Post, Segment, Shape, Skeleton, Synergy
 
 _UNIT = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
+
+_Point = tuple[float, float, float]
+
+
+class _ShapeEntry(TypedDict):
+    radius_m: NotRequired[float]
+    fan: NotRequired[bool]
+    tip_m: NotRequired[list[float]]
+
+
+class _SegmentEntry(TypedDict):
+    name: str
+    parent: str
+    axes: str
+    angles: str
+    human: NotRequired[str]
+    origin_m: list[float]
+    node_m: list[float]
+    shape: NotRequired[_ShapeEntry]
+
+
+class _PostEntry(TypedDict):
+    from_m: list[float]
+    to_m: list[float]
+    radius_m: float
+
+
+class _JointEntry(TypedDict):
+    name: str
+    lower_deg: float
+    upper_deg: float
+    max_velocity_deg_s: float
+    max_acceleration_deg_s2: float
+    drives: NotRequired[dict[str, float]]
 
 
 def profile_names() -> list[str]:
@@ -49,7 +83,7 @@ def parse_skeleton(text: str, source: str) -> Skeleton:
     return skeleton
 
 
-def _segment(entry: dict[str, Any]) -> Segment:
+def _segment(entry: _SegmentEntry) -> Segment:
     first, second, third = (_axis(a) for a in entry["axes"].split())
     one, two, three = (None if a == "_" else a for a in entry["angles"].split())
     flexes, tilts, twists = (m != "_" for m in entry.get("human", "1 2 3").split())
@@ -58,20 +92,25 @@ def _segment(entry: dict[str, Any]) -> Segment:
         parent=entry["parent"],
         axes=(first, second, third),
         angles=(one, two, three),
-        origin_m=tuple(entry["origin_m"]),
-        node_m=tuple(entry["node_m"]),
+        origin_m=_point(entry["origin_m"]),
+        node_m=_point(entry["node_m"]),
         human=(flexes, tilts, twists),
         shape=_shape(entry.get("shape", {})),
     )
 
 
-def _shape(entry: dict[str, Any]) -> Shape:
+def _shape(entry: _ShapeEntry) -> Shape:
     tip_m = entry.get("tip_m")
-    return Shape(entry.get("radius_m"), entry.get("fan", False), None if tip_m is None else tuple(tip_m))
+    return Shape(entry.get("radius_m"), entry.get("fan", False), None if tip_m is None else _point(tip_m))
 
 
-def _post(entry: dict[str, Any]) -> Post:
-    return Post(tuple(entry["from_m"]), tuple(entry["to_m"]), entry["radius_m"])
+def _post(entry: _PostEntry) -> Post:
+    return Post(_point(entry["from_m"]), _point(entry["to_m"]), entry["radius_m"])
+
+
+def _point(values: list[float]) -> _Point:
+    x, y, z = values
+    return (x, y, z)
 
 
 def _axis(text: str) -> tuple[int, int, int]:
@@ -80,7 +119,7 @@ def _axis(text: str) -> tuple[int, int, int]:
     return (sign * x, sign * y, sign * z)
 
 
-def _joint(entry: dict[str, Any]) -> Joint:
+def _joint(entry: _JointEntry) -> Joint:
     return Joint(
         name=entry["name"],
         lower_rad=math.radians(entry["lower_deg"]),

@@ -6,7 +6,7 @@ import math
 import re
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -128,7 +128,7 @@ def refusals(found: SuitAlignment) -> list[str]:
     ]
 
 
-def as_report(found: SuitAlignment, recording: Path) -> dict[str, Any]:
+def as_report(found: SuitAlignment, recording: Path) -> dict[str, object]:
     """Everything found, for machines; angles in degrees."""
     return {
         "recording": recording.name,
@@ -149,7 +149,7 @@ def as_report(found: SuitAlignment, recording: Path) -> dict[str, Any]:
     }
 
 
-def _joint(joint: JointFinding) -> dict[str, Any]:
+def _joint(joint: JointFinding) -> dict[str, object]:
     fit = joint.fit
     axes = fit is not None and joint.axes_known
     return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -84,7 +84,7 @@ def attitudes_method(gravity_m_s2: float, still_s: float) -> NodeMethod[Inertial
     def calibrate(raw: NodeRecording, progress: Callable[[float], None]) -> InertialCalibration:
         return calibrate_inertial(raw, options, progress)
 
-    def summary(found: InertialCalibration) -> dict[str, Any]:
+    def summary(found: InertialCalibration) -> dict[str, object]:
         return {
             "still_intervals": len(found.still),
             "attitudes": found.attitudes,
@@ -110,7 +110,7 @@ def six_position_method(
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> SixPositionCalibration:
         return calibrate_six_position(raw, options)
 
-    def summary(found: SixPositionCalibration) -> dict[str, Any]:
+    def summary(found: SixPositionCalibration) -> dict[str, object]:
         return {
             "method": "six-position",
             "still_intervals": len(found.still),

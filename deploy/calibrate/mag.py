@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -83,7 +83,7 @@ def rotation_method(
     def calibrate(raw: NodeRecording, _: Callable[[float], None]) -> MagneticCalibration:
         return calibrate_magnetic(raw, accelerometer_map(folder, raw.name), options)
 
-    def summary(found: MagneticCalibration) -> dict[str, Any]:
+    def summary(found: MagneticCalibration) -> dict[str, object]:
         return {
             "field_ut": found.fit.field_ut,
             "coverage": found.coverage,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from master.calibrate.inertial import InertialCalibration
 from master.calibrate.magnetic import MagneticCalibration
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _POINTS = 3000
@@ -70,7 +71,7 @@ def draw_magnetic(found: MagneticCalibration, path: Path) -> None:
     save_png(path, draw, 12.0, 7.0)
 
 
-def _bars(axes: Any, place: Array, height: Array, title: str, unit: str) -> None:
+def _bars(axes: Axes, place: Array, height: Array, title: str, unit: str) -> None:
     axes.bar(place, height)
     axes.set_title(f"{title}: mean {np.mean(np.abs(height)):.3g}")
     axes.set_ylabel(unit)

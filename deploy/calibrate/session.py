@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, track
@@ -55,7 +55,7 @@ class NodeMethod(Generic[Result]):
 
     calibrate: Calibrate[Result]
     table: Callable[[Mapping[str, Result]], Table]
-    summary: Callable[[Result], dict[str, Any]]
+    summary: Callable[[Result], dict[str, object]]
     """Figures for the JSON report, beside the parts that the node's file holds."""
     draw: Callable[[Result, Path], None] | None = None
     picture: str = ""
@@ -70,7 +70,7 @@ def calibrate_to_files(
     console: Console,
     *,
     pictures: bool = True,
-) -> tuple[NodeResults[Result], dict[str, Any]]:
+) -> tuple[NodeResults[Result], dict[str, object]]:
     """Calibrate nodes of a recording and write their files and pictures; the results, and the report."""
     day = date.today()
     results = calibrate_nodes(recording, names, method.calibrate, console)
@@ -158,8 +158,8 @@ def write_nodes(results: NodeResults[Result], recording: Path, folder: Path, day
 
 
 def report(
-    results: NodeResults[Result], recording: Path, day: date, gist: Callable[[Result], Any]
-) -> dict[str, Any]:
+    results: NodeResults[Result], recording: Path, day: date, gist: Callable[[Result], Mapping[str, object]]
+) -> dict[str, object]:
     """The figures for machines: a node's parts as its file has them, and the command's own figures."""
     return {
         "recording": recording.name,
@@ -179,7 +179,7 @@ def report(
     }
 
 
-def tell_machines(figures: dict[str, Any], path: Path | None, *, to_stdout: bool) -> None:
+def tell_machines(figures: Mapping[str, object], path: Path | None, *, to_stdout: bool) -> None:
     """As JSON to a file, to the standard output, or both."""
     if path is not None:
         write_json(path, figures)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -19,7 +19,7 @@ Certificate = Annotated[
 ]
 
 
-def tls_beside(certificate: Path | None) -> dict[str, Any]:
+def tls_beside(certificate: Path | None) -> dict[str, dict[str, Path]]:
     """`[link]`'s keys for it; empty where there is none."""
     if certificate is None:
         return {}

@@ -57,7 +57,7 @@ def destination(
 
 
 def _link_of(file: MasterConfig | None, endpoints: list[str], certificate: Path | None) -> LinkConfig:
-    asked = {"connect": endpoints, **tls_beside(certificate)}
+    asked: dict[str, object] = {"connect": endpoints, **tls_beside(certificate)}
     if file is not None:
         # who only asks stands behind no door, and lets nobody in: the rules are for the others' doors
         asked = {**file.link.model_dump(exclude={"listen", "access"}), **asked}

@@ -7,7 +7,6 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -18,8 +17,8 @@ from common.errors import CodecError
 from common.latency.one_way import master_offset
 from common.link import Link, open_session
 from common.metrics.master import MasterMetrics
-from common.metrics.slave import SlaveMetrics
-from common.metrics.tree import to_tree
+from common.metrics.parts import Summary, Ticks
+from common.metrics.slave import DueMetrics, LeaseMetrics, SlaveMetrics
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.wire.codec import decode
@@ -61,18 +60,18 @@ class Heard:
             self.all.set()
 
 
-async def ask_status(where: Destination, listen_s: float = LISTEN_S) -> dict[str, dict[str, Any]]:
-    """Each robot's status as plain values. Raises LinkError where the link cannot be opened at all."""
+async def ask_status(where: Destination, listen_s: float = LISTEN_S) -> dict[str, RobotStatus]:
+    """Each robot's status by name. Raises LinkError where the link cannot be opened at all."""
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
         links = [session.link(robot) for robot in where.robots]
         each = await asyncio.gather(*(_status(link, where, listen_s) for link in links))
-    trees: dict[str, dict[str, Any]] = {}
+    robots: dict[str, RobotStatus] = {}
     for answers, heard in each:
         for answer in answers:
             # of several that bear one name each is shown, by its instance number too
             name = answer.robot if len(answers) == 1 else f"{answer.robot} {answer.instance:08x}"
-            trees[name] = as_tree(answer, heard.of(answer.instance), namesakes=len(answers) - 1)
-    return trees
+            robots[name] = robot_status(answer, heard.of(answer.instance), namesakes=len(answers) - 1)
+    return robots
 
 
 async def _status(link: Link, where: Destination, listen_s: float) -> tuple[list[RobotAnswer], HeardOfAll]:
@@ -130,55 +129,103 @@ def decode_state(payload: bytes) -> RobotState | None:
     return None
 
 
-def as_tree(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> dict[str, Any]:
-    """A robot's status as plain JSON values; None where the robot did not tell."""
+@dataclass(frozen=True, slots=True)
+class BaseAngles:
+    """How the robot's base is tilted, degrees; None where the robot does not know."""
+
+    tilt_deg: float | None
+    inclination_deg: float | None
+    azimuth_deg: float | None
+    tool_face_deg: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class OffsetStatus:
+    """The master's clock minus the slave's, ms; no bound while it is not trusted."""
+
+    offset: float
+    bound: float | None
+    trusted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LatencyStatus:
+    """Latencies of the last second, ms; None where the robot sent none."""
+
+    one_way: Summary | None = None
+    one_way_corrected: Summary | None = None
+    end_to_end: Summary | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RobotStatus:
+    """One robot's status; None where the robot did not send it."""
+
+    answers: bool
+    guard: str | None
+    reason: str
+    instance: int
+    place: str
+    namesakes: int
+    """Other robots that have the same name."""
+    operator: str | None
+    lease: LeaseMetrics | None
+    faults: dict[str, str] | None
+    node_doubts: dict[str, str] | None
+    encoders_invalid: int | None
+    base: BaseAngles | None
+    offset_ms: OffsetStatus | None
+    latency_ms: LatencyStatus
+    due: DueMetrics | None
+    ticks: Ticks | None
+
+
+def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> RobotStatus:
+    """A robot's status from its answer and from what it sent."""
     state, metrics = heard.state, heard.metrics
-    figures: Mapping[str, Any] = to_tree(metrics) if metrics else {}
     base = state.base if state else None
-    return {
-        "answers": bool(answer.guard),
-        "guard": answer.guard or None,
-        "reason": answer.text,
-        "instance": answer.instance,
-        "place": answer.place,
-        "namesakes": namesakes,
-        "operator": state.operator if state else None,
-        "lease": figures.get("lease"),
-        "faults": dict(state.faults) if state else None,
-        "node_doubts": None if heard.master is None else heard.master.doubts,
-        "encoders_invalid": int((~state.encoder_valid).sum()) if state else None,
-        "base": None
+    return RobotStatus(
+        answers=bool(answer.guard),
+        guard=answer.guard or None,
+        reason=answer.text,
+        instance=answer.instance,
+        place=answer.place,
+        namesakes=namesakes,
+        operator=state.operator if state else None,
+        lease=metrics.lease if metrics else None,
+        faults=dict(state.faults) if state else None,
+        node_doubts=None if heard.master is None else heard.master.doubts,
+        encoders_invalid=int((~state.encoder_valid).sum()) if state else None,
+        base=None
         if base is None
-        else {
-            "tilt_deg": _degrees(base.tilt_rad),
-            "inclination_deg": _degrees(base.inclination_rad),
-            "azimuth_deg": _degrees(base.azimuth_rad),
-            "tool_face_deg": _degrees(base.tool_face_rad),
-        },
-        "offset_ms": _offset(state),
-        "latency_ms": {
-            "one_way": figures.get("one_way_ms"),
-            "one_way_corrected": figures.get("one_way_corrected_ms"),
-            "end_to_end": figures.get("end_to_end_ms"),
-        },
-        "due": figures.get("due"),
-        "ticks": figures.get("ticks"),
-    }
+        else BaseAngles(
+            _degrees(base.tilt_rad),
+            _degrees(base.inclination_rad),
+            _degrees(base.azimuth_rad),
+            _degrees(base.tool_face_rad),
+        ),
+        offset_ms=_offset(state),
+        latency_ms=LatencyStatus(metrics.one_way_ms, metrics.one_way_corrected_ms, metrics.end_to_end_ms)
+        if metrics
+        else LatencyStatus(),
+        due=metrics.due if metrics else None,
+        ticks=metrics.ticks if metrics else None,
+    )
 
 
 def _degrees(angle_rad: float | None) -> float | None:
     return None if angle_rad is None else round(math.degrees(angle_rad), 2)
 
 
-def _offset(state: RobotState | None) -> dict[str, Any] | None:
+def _offset(state: RobotState | None) -> OffsetStatus | None:
     if state is None:
         return None
     offset = master_offset(state)
     bound_ms = to_ms(offset.bound_ns) if offset.trusted else None
-    return {"offset": to_ms(offset.offset_ns), "bound": bound_ms, "trusted": offset.trusted}
+    return OffsetStatus(to_ms(offset.offset_ns), bound_ms, offset.trusted)
 
 
-def status_table(robots: Mapping[str, Mapping[str, Any]]) -> RenderableType:
+def status_table(robots: Mapping[str, RobotStatus]) -> RenderableType:
     """One row a robot, then each one's reason and faults in words."""
     table = plain_table("robot", "guard", "operator", "lease s", "tilt °", "± ms", "p99 ms", "faults")
     words = [Text(f"{name}: {why}", style) for name, one in robots.items() for why, style in _words(one)]
@@ -187,38 +234,39 @@ def status_table(robots: Mapping[str, Mapping[str, Any]]) -> RenderableType:
     return Group(table, *words)
 
 
-def _add_row(table: Table, name: str, one: Mapping[str, Any]) -> None:
-    guard = one["guard"] or "no answer"
+def _add_row(table: Table, name: str, one: RobotStatus) -> None:
+    guard = one.guard or "no answer"
     table.add_row(
         name,
-        Text(guard, GUARD_STYLE.get(guard, "bold red" if not one["answers"] else "")),
-        one["operator"] or UNKNOWN,
-        _number((one["lease"] or {}).get("held_s"), 0),
-        _number((one["base"] or {}).get("tilt_deg"), 1),
-        _number((one["offset_ms"] or {}).get("bound"), 3),
-        _number((one["latency_ms"]["end_to_end"] or {}).get("p99"), 1),
-        UNKNOWN if one["faults"] is None else str(len(one["faults"]) + one["encoders_invalid"]),
+        Text(guard, GUARD_STYLE.get(guard, "" if one.answers else "bold red")),
+        one.operator or UNKNOWN,
+        _number(one.lease.held_s if one.lease else None, 0),
+        _number(one.base.tilt_deg if one.base else None, 1),
+        _number(one.offset_ms.bound if one.offset_ms else None, 3),
+        _number(_p99(one.latency_ms.end_to_end), 1),
+        UNKNOWN if one.faults is None else str(len(one.faults) + (one.encoders_invalid or 0)),
     )
 
 
-def _words(one: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
-    words = [(str(one["reason"]), "")]
-    if one["namesakes"]:
-        words.append((f"another robot has the same name; this one is at {one['place']}", "bold red"))
-    words += [(f"{what}: {why}", "red") for what, why in (one["faults"] or {}).items()]
-    due = one["due"]
-    if due is not None and due["missing"]:
-        p99, corrected = (
-            (one["latency_ms"][key] or {}).get("p99") for key in ("one_way", "one_way_corrected")
-        )
-        missing = f"{due['missing']} of {due['expected']} commands were not there when they were due"
-        how = f"one way p99 {_number(p99, 1)} ms, {_number(corrected, 1)} ms with them"
-        words.append((f"{missing} ({how})", "yellow"))
-    words += [(f"node {node}: {why}", "yellow") for node, why in (one["node_doubts"] or {}).items()]
-    if one["encoders_invalid"]:
-        words.append((f"encoders not heard: {one['encoders_invalid']}", "red"))
+def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
+    words = [(one.reason, "")]
+    if one.namesakes:
+        words.append((f"another robot has the same name; this one is at {one.place}", "bold red"))
+    words += [(f"{what}: {why}", "red") for what, why in (one.faults or {}).items()]
+    due, latency = one.due, one.latency_ms
+    if due is not None and due.missing:
+        missing = f"{due.missing} of {due.expected} commands were not there when they were due"
+        p99, corrected = (_number(_p99(of), 1) for of in (latency.one_way, latency.one_way_corrected))
+        words.append((f"{missing} (one way p99 {p99} ms, {corrected} ms with them)", "yellow"))
+    words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
+    if one.encoders_invalid:
+        words.append((f"encoders not heard: {one.encoders_invalid}", "red"))
     return words
 
 
+def _p99(latency: Summary | None) -> float | None:
+    return latency.p99 if latency else None
+
+
 def _number(value: float | None, digits: int) -> str:
-    return UNKNOWN if value is None else f"{value:.{digits}f}"
+    return UNKNOWN if value is None or not math.isfinite(value) else f"{value:.{digits}f}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from common.errors import RecordingError
 
@@ -37,7 +37,7 @@ class CrossCheck:
         """Whether it refuses the result."""
         return self.verdict == "contradicts"
 
-    def as_report(self) -> dict[str, Any]:
+    def as_report(self) -> dict[str, object]:
         """For machines."""
         return {
             "compared": self.compared,

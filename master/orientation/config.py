@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, ModelWrapValidatorHandler, PrivateAttr, ValidationInfo, model_validator
 
@@ -51,7 +51,7 @@ class EstimationConfig(Section):
     @model_validator(mode="wrap")
     @classmethod
     def _read_filter_sections(
-        cls, data: Any, validate: ModelWrapValidatorHandler[Self], info: ValidationInfo
+        cls, data: object, validate: ModelWrapValidatorHandler[Self], info: ValidationInfo
     ) -> Self:
         """The tables that bear a filter's name are that filter's parameters."""
         if not isinstance(data, dict):

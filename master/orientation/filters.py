@@ -6,7 +6,7 @@ To add a filter, add its section to `FILTERS`; nothing else changes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +33,13 @@ def filter_mistakes(key: str, name: str) -> list[ConfigMistake]:
     return [] if name in FILTERS else [ConfigMistake(key, name, f"one of {', '.join(FILTERS)}")]
 
 
-def read_sections(tables: Mapping[str, object], context: Any = None) -> dict[str, FilterSection]:
+def read_sections(tables: Mapping[str, object], context: object = None) -> dict[str, FilterSection]:
     """The section of every filter, from `tables` or with defaults. Raises pydantic.ValidationError."""
-    fields: dict[str, Any] = {name: (section, section()) for name, section in FILTERS.items()}
-    sections = create_model("FilterSections", __base__=Section, **fields)
+    fields: dict[str, object] = {name: (section, section()) for name, section in FILTERS.items()}
+    create: Callable[..., type[Section]] = (
+        create_model  # its own signature takes no fields by a variable name
+    )
+    sections = create("FilterSections", __base__=Section, **fields)
     return dict(sections.model_validate(tables, context=context))
 
 

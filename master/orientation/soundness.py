@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -81,8 +79,8 @@ def _beyond(part: Array, limit: float) -> Mask:
     return out
 
 
-def _square(part: Array) -> np.floating[Any]:
+def _square(part: Array) -> np.floating:
     flat = part.ravel()
     # unlike dot it minds no overflow, and to silence that would cost more than all else here
-    out: np.floating[Any] = np.vdot(flat, flat)
+    out: np.floating = np.vdot(flat, flat)
     return out

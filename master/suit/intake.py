@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from common.wire.messages import Mask
 from master.suit.health import Counts, NodeCounters
 from master.suit.layout import Raw
 from master.suit.protocol import READINGS, AnswerFormat, NodeStatus
+
+_Number = TypeVar("_Number", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +142,7 @@ class Intake:
         counters.saturated[self.rows] += saturated
         return NodeAnswers(answered & ~fault, answered, self._by_node(self._raw), saturated, fault, fault)
 
-    def _by_node(self, per_slot: NDArray[Any]) -> NDArray[Any]:
+    def _by_node(self, per_slot: NDArray[_Number]) -> NDArray[_Number]:
         return per_slot.reshape(len(self.rows), -1)
 
     def _frames_a_node(self, slots: NDArray[np.intp]) -> Counts:

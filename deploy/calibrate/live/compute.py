@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
@@ -37,9 +36,9 @@ class Choice:
 
 def compute(
     config: MasterConfig, session: LiveRecordings, choice: Choice, folder: Path, console: Console
-) -> tuple[dict[str, Any], list[str]]:
+) -> tuple[dict[str, object], list[str]]:
     """Write every node that could be calibrated; the figures, and a line for each refusal."""
-    figures: dict[str, Any] = {**session.counters}
+    figures: dict[str, object] = {**session.counters}
     refusals: list[str] = []
     inherit(config, folder)
     if session.tray is not None and "imu" in choice.what:
@@ -82,7 +81,7 @@ def _nodes(
     folder: Path,
     console: Console,
     refusals: list[str],
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Calibrate single nodes by one method; the report."""
     results, figures = calibrate_to_files(method, recording, names, folder, console, pictures=choice.pictures)
     show(method, results, folder, console)
@@ -97,7 +96,7 @@ def _align(
     folder: Path,
     console: Console,
     refusals: list[str],
-) -> dict[str, Any]:
+) -> dict[str, object]:
     assert session.worn is not None
     try:
         found = align_to_files(

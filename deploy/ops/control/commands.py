@@ -6,12 +6,13 @@ import asyncio
 import json
 from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
 
 from common.errors import LinkError, TandemError
+from common.metrics.tree import to_tree
 from common.process.runtime import run as run_until_stopped
 from common.wire.messages import Action
 from deploy.client.certificate import Certificate
@@ -161,14 +162,16 @@ def status(
     async def tell() -> None:
         robots = await ask_status(where)
         if as_json:
-            typer.echo(json.dumps(robots, indent=2, ensure_ascii=False))
+            typer.echo(
+                json.dumps({name: to_tree(one) for name, one in robots.items()}, indent=2, ensure_ascii=False)
+            )
         else:
             Console().print(status_table(robots))
-        silent = [f"{name} {one['reason']}" for name, one in robots.items() if not one["answers"]]
+        silent = [f"{name} {one.reason}" for name, one in robots.items() if not one.answers]
         silent += [
-            f"{name}: another robot has the same name; this one is at {one['place']}"
+            f"{name}: another robot has the same name; this one is at {one.place}"
             for name, one in robots.items()
-            if one["namesakes"]
+            if one.namesakes
         ]
         if silent:
             raise TandemError("; ".join(silent))
@@ -215,13 +218,13 @@ def _holder(
     return where
 
 
-def _carry_out(act: Callable[[Say], Coroutine[Any, Any, None]]) -> None:
+def _carry_out(act: Callable[[Say], Coroutine[object, object, None]]) -> None:
     """Run an act to its end, whatever becomes of the terminal: closed, full, paused."""
     with telling() as say:
         _run(lambda: act(say), hangup_stops=False)
 
 
-def _run(work: Callable[[], Coroutine[Any, Any, None]], hangup_stops: bool = True) -> None:
+def _run(work: Callable[[], Coroutine[object, object, None]], hangup_stops: bool = True) -> None:
     """Run it; a Ctrl-C ends it, and says that it is not known what the robot did."""
 
     async def main(stop: asyncio.Event) -> None:

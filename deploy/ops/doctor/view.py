@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from rich import box
 from rich.table import Table
@@ -29,7 +28,7 @@ def as_table(findings: Sequence[Finding]) -> Table:
     return table
 
 
-def as_tree(role: str, findings: Sequence[Finding]) -> dict[str, Any]:
+def as_tree(role: str, findings: Sequence[Finding]) -> dict[str, object]:
     """Plain JSON values."""
     return {
         "role": role,

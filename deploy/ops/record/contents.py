@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 from common.clock import to_s
 from common.recording import RecordingStream
@@ -52,7 +51,7 @@ class Contents:
     cut: str = ""
     """How it ends too early; empty where it was closed in order."""
 
-    def tree(self) -> dict[str, Any]:
+    def tree(self) -> dict[str, object]:
         """Plain values for JSON."""
         topics = {name: {**asdict(topic), "rate_hz": topic.rate_hz} for name, topic in self.topics.items()}
         return {"metadata": self.metadata, "topics": topics, "cut": self.cut}

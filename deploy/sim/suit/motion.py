@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from importlib import resources
-from typing import Any, Protocol
+from typing import Protocol, TypedDict, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,6 +35,38 @@ SWEEP_MARGIN_RAD = math.radians(1.0)
 SWEEP_PAUSE_S = 0.2
 SWEEP_SHARE = 0.4
 """A sweep takes this share of each joint's velocity and acceleration limit at most."""
+
+
+class _MoveEntry(TypedDict):
+    start_s: float
+    duration_s: float
+    to_deg: dict[str, float]
+
+
+class _MovesTable(TypedDict):
+    period_s: float
+    rest_deg: dict[str, float]
+    move: list[_MoveEntry]
+
+
+class _CurveEntry(TypedDict):
+    mean_deg: float
+    cos_deg: list[float]
+    sin_deg: list[float]
+
+
+class _StridesEntry(TypedDict):
+    start_s: float
+    stop_s: float
+    ramp_s: float
+    stride_s: float
+
+
+class _GaitTable(TypedDict):
+    period_s: float
+    strides: _StridesEntry
+    ahead: dict[str, float]
+    curve: dict[str, _CurveEntry]
 
 
 class OperatorMotion(Protocol):
@@ -77,9 +109,10 @@ def load_motion(name: str, skeleton: Skeleton) -> OperatorMotion:
 
 def parse_motion(text: str, skeleton: Skeleton, source: str) -> OperatorMotion:
     """A motion from TOML text (its forms are described at the heads of bottle.toml and walk.toml)."""
-    table = tomllib.loads(text)
-    if "strides" in table:
-        return _gait(table, skeleton, source)
+    read = tomllib.loads(text)
+    if "strides" in read:
+        return _gait(cast(_GaitTable, read), skeleton, source)
+    table = cast(_MovesTable, read)
     mistakes = _mistakes(table, skeleton)
     if mistakes:
         raise ConfigError(source, mistakes)
@@ -96,7 +129,7 @@ def parse_motion(text: str, skeleton: Skeleton, source: str) -> OperatorMotion:
         raise ConfigError(source, [ConfigMistake("move", "", str(error))]) from None
 
 
-def _gait(table: dict[str, Any], skeleton: Skeleton, source: str) -> OperatorMotion:
+def _gait(table: _GaitTable, skeleton: Skeleton, source: str) -> OperatorMotion:
     curves = {
         f"{side}_{joint}": (_curve(curve), ahead)
         for side, ahead in table["ahead"].items()
@@ -108,8 +141,8 @@ def _gait(table: dict[str, Any], skeleton: Skeleton, source: str) -> OperatorMot
         raise ConfigError(source, [ConfigMistake("strides", table["strides"], str(error))]) from None
 
 
-def _curve(table: dict[str, Any]) -> Curve:
-    cosines, sines = (tuple(map(math.radians, table[key])) for key in ("cos_deg", "sin_deg"))
+def _curve(table: _CurveEntry) -> Curve:
+    cosines, sines = (tuple(map(math.radians, degrees)) for degrees in (table["cos_deg"], table["sin_deg"]))
     return Curve(math.radians(table["mean_deg"]), cosines, sines)
 
 
@@ -145,7 +178,7 @@ def _nearest_to_zero(skeleton: Skeleton, margin_rad: float) -> Array:
     return out
 
 
-def _mistakes(table: dict[str, Any], skeleton: Skeleton) -> list[ConfigMistake]:
+def _mistakes(table: _MovesTable, skeleton: Skeleton) -> list[ConfigMistake]:
     """Angles of joints that the skeleton does not have, or beyond their limits."""
     joints = {joint.name: joint for joint in skeleton.joints}
     angles = [("rest_deg", table["rest_deg"])]

@@ -16,13 +16,22 @@ from rich.console import Console
 
 from common.metrics.parts import Summary
 from common.metrics.slave import DueMetrics, LeaseMetrics
+from common.metrics.tree import to_tree
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.wire.codec import encode
 from common.wire.messages import BaseAttitude, RobotState
 from common.wire.topics import Topic
 from deploy.client.answer import RobotAnswer
-from deploy.client.status import Heard, HeardOfAll, as_tree, decode_state, status_table
+from deploy.client.status import (
+    Heard,
+    HeardOfAll,
+    OffsetStatus,
+    RobotStatus,
+    decode_state,
+    robot_status,
+    status_table,
+)
 from tests.published import master_metrics, slave_metrics
 
 
@@ -36,8 +45,8 @@ def state(joints: int = 25, bound_ns: int = 40_000) -> RobotState:
     )  # fmt: skip
 
 
-def tree(heard: Heard) -> dict[str, object]:
-    return as_tree(RobotAnswer("robot-1", True, "follows anna", "track"), heard)
+def status(heard: Heard) -> RobotStatus:
+    return robot_status(RobotAnswer("robot-1", True, "follows anna", "track"), heard)
 
 
 def heard() -> Heard:
@@ -49,7 +58,7 @@ def heard() -> Heard:
 
 
 def test_a_status_is_json_and_tells_all() -> None:
-    said = json.loads(json.dumps(tree(heard())))
+    said = json.loads(json.dumps(to_tree(status(heard()))))
     assert (said["guard"], said["reason"], said["operator"]) == ("track", "follows anna", "anna")
     assert said["faults"] == {"left_elbow": "over-current"}
     assert said["encoders_invalid"] == 1
@@ -64,15 +73,15 @@ def test_a_status_is_json_and_tells_all() -> None:
 
 
 def test_an_offset_that_is_not_trusted_has_no_bound() -> None:
-    said = tree(Heard(state(bound_ns=-1)))
-    assert said["offset_ms"] == {"offset": 5.0, "bound": None, "trusted": False}
+    said = status(Heard(state(bound_ns=-1)))
+    assert said.offset_ms == OffsetStatus(5.0, None, False)
 
 
 def test_what_the_operator_s_side_doubts_is_said_by_node() -> None:
     told = heard()
     told.take(master=master_metrics(doubts={"left_forearm": "its gyro is 5°/s off"}))
-    said = tree(told)
-    assert said["node_doubts"] == {"left_forearm": "its gyro is 5°/s off"}
+    said = status(told)
+    assert said.node_doubts == {"left_forearm": "its gyro is 5°/s off"}
     assert "robot-1: node left_forearm: its gyro is 5°/s off" in rendered({"robot-1": said})
 
 
@@ -90,25 +99,25 @@ def test_commands_that_were_due_are_counted_beside_both_figures() -> None:
         one_way_ms=Summary(938, p99=0.5),
         one_way_corrected_ms=Summary(1000, p99=4200.0),
     )
-    said = tree(Heard(state(), metrics))
-    assert said["due"] == {"expected": 1000, "missing": 62}
+    said = status(Heard(state(), metrics))
+    assert said.due == DueMetrics(1000, 62)
     shown = " ".join(rendered({"robot-1": said}).split())
     assert "62 of 1000 commands were not there when they were due" in shown
     assert "one way p99 0.5 ms, 4200.0 ms with them" in shown
-    assert "due" not in rendered({"robot-1": tree(heard())})
+    assert "due" not in rendered({"robot-1": status(heard())})
 
 
 def test_a_robot_that_told_nothing_is_said_to_have_told_nothing() -> None:
-    said = as_tree(RobotAnswer("robot-1", False, "does not answer"), Heard())
-    assert said["answers"] is False
-    assert said["faults"] is None
+    said = robot_status(RobotAnswer("robot-1", False, "does not answer"), Heard())
+    assert said.answers is False
+    assert said.faults is None
     shown = rendered({"robot-1": said})
     assert "no answer" in shown
     assert "robot-1: does not answer" in shown
 
 
 def test_the_table_fits_and_says_faults_in_words() -> None:
-    shown = rendered({"robot-1": tree(heard()), "robot-2": tree(Heard())})
+    shown = rendered({"robot-1": status(heard()), "robot-2": status(Heard())})
     assert max(map(len, shown.splitlines())) <= 80
     row = next(line for line in shown.splitlines() if line.split()[:1] == ["robot-1"])
     assert row.split() == ["robot-1", "track", "anna", "61", "2.0", "0.040", "31.2", "2"]
@@ -139,7 +148,7 @@ def test_it_waits_until_both_have_come() -> None:
     asyncio.run(story())
 
 
-def rendered(robots: dict[str, dict[str, object]]) -> str:
+def rendered(robots: dict[str, RobotStatus]) -> str:
     out = io.StringIO()
     Console(file=out, width=80).print(status_table(robots))
     return out.getvalue()
@@ -147,8 +156,8 @@ def rendered(robots: dict[str, dict[str, object]]) -> str:
 
 def test_one_of_two_of_a_name_is_shown_with_its_place() -> None:
     answer = RobotAnswer("robot-1", True, "waits", "hold", 7, "room 1")
-    said = as_tree(answer, heard(), namesakes=1)
-    assert (said["instance"], said["place"], said["namesakes"]) == (7, "room 1", 1)
+    said = robot_status(answer, heard(), namesakes=1)
+    assert (said.instance, said.place, said.namesakes) == (7, "room 1", 1)
     shown = rendered({"robot-1 00000007": said})
     assert "another robot has the same name; this one is at room 1" in " ".join(shown.split())
 

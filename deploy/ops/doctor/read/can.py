@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from deploy.ops.doctor.read.tree import Tree
 
@@ -57,19 +57,25 @@ def ask_ip() -> str | None:
     return asked.stdout if asked.returncode == 0 else None
 
 
-def _interface(tree: Tree, name: str, details: dict[str, Any]) -> CanInterface:
+def _interface(tree: Tree, name: str, details: Mapping[str, object]) -> CanInterface:
     flags = tree.text(f"/sys/class/net/{name}/flags") or "0"
     return CanInterface(
         name,
         up=bool(int(flags, 16) & _IFF_UP),
         fd=tree.number(f"/sys/class/net/{name}/mtu") == FD_MTU,
-        bitrate=int(details.get("bittiming", {}).get("bitrate", 0)),
-        data_bitrate=int(details.get("data_bittiming", {}).get("bitrate", 0)),
+        bitrate=_bitrate(details, "bittiming"),
+        data_bitrate=_bitrate(details, "data_bittiming"),
         state=str(details.get("state", "")),
     )
 
 
-def _details(ip_json: str | None) -> dict[str, dict[str, Any]]:
+def _bitrate(details: Mapping[str, object], of: str) -> int:
+    timing = details.get(of)
+    rate = timing.get("bitrate") if isinstance(timing, dict) else None
+    return rate if isinstance(rate, int) else 0
+
+
+def _details(ip_json: str | None) -> dict[str, dict[str, object]]:
     try:
         links = json.loads(ip_json or "[]")
     except ValueError:

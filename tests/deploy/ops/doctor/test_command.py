@@ -72,8 +72,7 @@ def test_the_report_says_what_was_found_and_what_to_do() -> None:
     text = io.StringIO()
     Console(file=text, width=80).print(as_table(FOUND))
     assert all(part in text.getvalue() for part in ("can0 is down", "→ bring it up", "fail", "→ see `top`"))
-    tree = as_tree("master", FOUND)
-    assert json.loads(json.dumps(tree)) == tree
+    tree = json.loads(json.dumps(as_tree("master", FOUND)))
     assert tree["verdict"] == "fail"
     assert tree["checks"][0] == {"check": "cores", "verdict": "ok", "found": "4", "do": None}
     assert in_words("master", FOUND) == "master: 1 fail, 1 warn, 1 ok"
