@@ -8,7 +8,7 @@ certificates.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TypedDict
 
 from common.link.config import AccessConfig
 from common.link.roles import Role, common_name
@@ -44,7 +44,41 @@ _WAYS = {
 _ALL = ("publish", "hear", "ask", "answer", "live", "watch", "watched")
 
 
-def access_control(access: AccessConfig) -> dict[str, Any]:
+class AccessRule(TypedDict):
+    """One entry of Zenoh's `access_control.rules`."""
+
+    id: str
+    permission: str
+    flows: list[str]
+    messages: list[str]
+    key_exprs: list[str]
+
+
+class AccessSubject(TypedDict):
+    """One host, by the common name of its certificate."""
+
+    id: str
+    cert_common_names: list[str]
+
+
+class AccessPolicy(TypedDict):
+    """Which rules apply to which subjects."""
+
+    rules: list[str]
+    subjects: list[str]
+
+
+class AccessControl(TypedDict):
+    """Zenoh's `access_control`."""
+
+    enabled: bool
+    default_permission: str
+    rules: list[AccessRule]
+    subjects: list[AccessSubject]
+    policies: list[AccessPolicy]
+
+
+def access_control(access: AccessConfig) -> AccessControl:
     """Zenoh's `access_control`: rules, subjects and policies for every name in [link.access]."""
     table = _AccessRules()
     for router in access.routers:
@@ -103,7 +137,7 @@ class _AccessRules:
 
     def __init__(self) -> None:
         self.subjects: set[str] = set()
-        self._rules: list[dict[str, Any]] = []
+        self._rules: list[AccessRule] = []
         self._applies: list[list[str]] = []
 
     def allow(self, names: Iterable[str], ways: Iterable[str], keys: list[str]) -> None:
@@ -119,7 +153,7 @@ class _AccessRules:
                 })  # fmt: skip
                 self._applies.append(names)
 
-    def zenoh(self) -> dict[str, Any]:
+    def zenoh(self) -> AccessControl:
         return {
             "enabled": True,
             "default_permission": "deny",

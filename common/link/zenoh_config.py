@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from common.link.access import access_control
 from common.link.config import LinkConfig, TlsConfig
 from common.link.endpoint import for_zenoh
 
 
-def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, Any]:
+def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, object]:
     """The configuration of a session that listens and connects only where [link] says.
 
     `mode` in place of the configuration's own: `router`, which no master or slave is.
     """
     settings = _endpoints_and_timing(config, mode or config.mode)
-    if config.tls is not None:
-        settings["transport"]["link"]["tls"] = _tls(config.tls)
     if config.access is not None:
-        # other transports prove no identity
-        settings["transport"]["link"]["protocols"] = ["tls", "quic"]
         settings["access_control"] = access_control(config.access)
     return settings
 
 
-def _tls(tls: TlsConfig) -> dict[str, Any]:
+def _link(config: LinkConfig) -> dict[str, object]:
+    link: dict[str, object] = {"tx": {"lease": 1000, "keep_alive": 4}}
+    if config.tls is not None:
+        link["tls"] = _tls(config.tls)
+    if config.access is not None:
+        # other transports prove no identity
+        link["protocols"] = ["tls", "quic"]
+    return link
+
+
+def _tls(tls: TlsConfig) -> dict[str, object]:
     # the same block serves quic; both sides show a certificate
     # absolute: a zenohd that reads them from a file of its own runs elsewhere
     ca, certificate, key = (str(path.absolute()) for path in (tls.ca, tls.certificate, tls.key))
@@ -40,7 +44,7 @@ def _tls(tls: TlsConfig) -> dict[str, Any]:
     }
 
 
-def _endpoints_and_timing(config: LinkConfig, mode: str) -> dict[str, Any]:
+def _endpoints_and_timing(config: LinkConfig, mode: str) -> dict[str, object]:
     open_ms = round(1e3 * config.open_timeout_s)
     return {
         "mode": mode,
@@ -61,7 +65,7 @@ def _endpoints_and_timing(config: LinkConfig, mode: str) -> dict[str, Any]:
         "transport": {
             # a black hole is noticed within a second, and no old message is delivered after it
             "unicast": {"open_timeout": open_ms, "accept_timeout": open_ms},
-            "link": {"tx": {"lease": 1000, "keep_alive": 4}},
+            "link": _link(config),
             # else payloads of 3 kB and more pass between processes of one host beside the link under test
             "shared_memory": {"enabled": False},
         },

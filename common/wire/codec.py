@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from operator import attrgetter
-from typing import Any, TypeVar
+from typing import TypeVar, assert_never
 
 import msgpack
 
@@ -59,8 +58,7 @@ _Decoded = TypeVar("_Decoded")
 def encode(message: Message) -> bytes:
     """The message's bytes. CodecError where it holds what no message of its kind can carry."""
     try:
-        kind, pack = _ENCODERS[type(message)]
-        out: bytes = _pack((kind, VERSION, *pack(message)))
+        out: bytes = _pack(_packed(message))
     except Exception as error:
         raise CodecError(f"{type(message).__name__} cannot be encoded: {error}") from error
     return out
@@ -84,7 +82,8 @@ def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
             f"schema version {fields.short(array[1])}, expected {VERSION}: the other side runs another "
             "version of tandem, install the same on both hosts"
         )
-    message: _Decoded = unpack(array[2:], joints)
+    message = unpack(array[2:], joints)
+    assert isinstance(message, kind)
     return message
 
 
@@ -231,17 +230,31 @@ def _unpack_truth(f: tuple[object, ...], joints: int) -> Truth:
     return Truth(fields.count(f[0]), fields.count(f[1]), position_rad, velocity_rad_s)
 
 
-_ENCODERS: dict[type, tuple[str, Callable[[Any], tuple[object, ...]]]] = {
-    Command: ("command", _pack_command),
-    RobotState: ("state", _pack_state),
-    ControlRequest: ("control", attrgetter("robot", "action.value", "operator", "key", "clock", "challenge")),
-    ControlReply: ("controlled", _pack_control_reply),
-    ClockQuery: ("clock", attrgetter("asked_ns", "last_asked_ns", "last_heard_ns", "asker")),
-    ClockReply: ("clocked", attrgetter("asked_ns", "received_ns", "replied_ns", "instance")),
-    Statistics: ("statistics", _pack_statistics),
-    Truth: ("truth", _pack_truth),
-}
-_DECODERS: dict[type, tuple[str, Callable[[tuple[object, ...], int], Any]]] = {
+def _packed(m: Message) -> tuple[object, ...]:
+    """The array that is sent: kind, version, then the fields."""
+    match m:
+        case Command():
+            return ("command", VERSION, *_pack_command(m))
+        case RobotState():
+            return ("state", VERSION, *_pack_state(m))
+        case ControlRequest():
+            return (
+                "control", VERSION, m.robot, m.action.value, m.operator, m.key, m.clock, m.challenge,
+            )  # fmt: skip
+        case ControlReply():
+            return ("controlled", VERSION, *_pack_control_reply(m))
+        case ClockQuery():
+            return ("clock", VERSION, m.asked_ns, m.last_asked_ns, m.last_heard_ns, m.asker)
+        case ClockReply():
+            return ("clocked", VERSION, m.asked_ns, m.received_ns, m.replied_ns, m.instance)
+        case Statistics():
+            return ("statistics", VERSION, *_pack_statistics(m))
+        case Truth():
+            return ("truth", VERSION, *_pack_truth(m))
+    assert_never(m)
+
+
+_DECODERS: dict[type, tuple[str, Callable[[tuple[object, ...], int], object]]] = {
     Command: ("command", _unpack_command),
     RobotState: ("state", _unpack_state),
     ControlRequest: ("control", _unpack_control_request),

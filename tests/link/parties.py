@@ -174,7 +174,7 @@ class Party:
 
 def open_party(name: str, link: LinkConfig, certificate: bool = True) -> Party:
     """A session without checks of one's own keys, and without access rules."""
-    settings = zenoh_configuration(link)
+    settings = json.loads(json.dumps(zenoh_configuration(link)))
     if not certificate:
         block = settings["transport"]["link"]["tls"]
         for key in [key for key in block if key.startswith(("listen_", "connect_"))]:

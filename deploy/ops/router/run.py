@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from typing import Any
 
 from common.clock import NS_PER_S, monotonic_ns
 from common.link.audit import Audit
@@ -21,7 +20,7 @@ from common.process.ticker import ticks
 log = logging.getLogger(__name__)
 
 
-def zenohd_configuration(config: RouterConfig) -> dict[str, Any]:
+def zenohd_configuration(config: RouterConfig) -> dict[str, object]:
     """What `zenohd --config` reads: the same endpoints, keys and rules, without this process around them."""
     return zenoh_configuration(config.link, "router")
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 import zenoh
 
-from common.link.access import access_control, named
+from common.link.access import AccessControl, access_control, named
 from common.link.config import AccessConfig
 from common.wire.presence import ProcessPresence
 
@@ -20,7 +18,7 @@ ACCESS = AccessConfig(
 RULES = access_control(ACCESS)
 
 
-def may(who: str, message: str, key: str, flow: str = "ingress", table: dict[str, Any] = RULES) -> bool:
+def may(who: str, message: str, key: str, flow: str = "ingress", table: AccessControl = RULES) -> bool:
     """As Zenoh decides: a rule's key must include the message's."""
     mine = {rule for policy in table["policies"] if who in policy["subjects"] for rule in policy["rules"]}
     return any(

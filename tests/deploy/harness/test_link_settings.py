@@ -1,3 +1,5 @@
+import json
+
 import pytest
 
 from common.link.config import LinkConfig
@@ -12,7 +14,8 @@ from deploy.sim.network import Profile, Way, load_profile, profile_names
 def test_a_slow_line_is_given_the_round_trips_that_opening_takes(profile: str, expected_s: float) -> None:
     opening_s = open_timeout_s(load_profile(profile))
     assert opening_s == expected_s
-    settings = zenoh_configuration(LinkConfig(listen=["tcp/127.0.0.1:7447"], open_timeout_s=opening_s))
+    config = LinkConfig(listen=["tcp/127.0.0.1:7447"], open_timeout_s=opening_s)
+    settings = json.loads(json.dumps(zenoh_configuration(config)))
     assert settings["transport"]["unicast"] == {
         "open_timeout": 1e3 * expected_s,
         "accept_timeout": 1e3 * expected_s,
