@@ -91,6 +91,6 @@ def test_an_interrupted_trial_writes_the_report_of_what_is_there(tmp_path: Path)
         finally:
             trial.kill()
     assert trial.returncode == 1, out + err
-    assert "the same command goes on" in err
+    assert "run the same command again to continue" in err
     assert "Traceback" not in err
     assert "report is not whole" in (folder / "report.html").read_text("utf-8")

@@ -181,7 +181,7 @@ def test_a_zero_pose_outside_the_recording_is_refused(upper_body: Worn) -> None:
     ("spoil", "said"),
     [
         (lambda acc, gyr: (acc * 0.1, gyr), "accelerometer reads"),
-        (lambda acc, gyr: (acc, gyr * 0.0), "gyroscope says the same"),
+        (lambda acc, gyr: (acc, gyr * 0.0), "gyroscope reads the same"),
         (lambda acc, gyr: (acc, np.where(np.arange(len(gyr))[:, None] < 900, gyr, np.nan)), "missing"),
     ],
 )

@@ -216,7 +216,7 @@ def test_what_cannot_be_calibrated_from_is_refused(
 
 def test_many_attitudes_in_one_plane_are_refused(worn: Worn, session) -> None:  # type: ignore[no-untyped-def]
     level_axis = np.cross(session(attitudes=1).acc[0], [1.0, 0.0, 0.0])
-    with pytest.raises(RecordingError, match=r"attitudes are too much alike"):
+    with pytest.raises(RecordingError, match=r"attitudes are too similar"):
         calibrate_inertial(worn(axis=level_axis))
 
 

@@ -99,7 +99,7 @@ def test_a_recording_that_does_not_say_what_it_holds_is_refused(
     tmp_path: Path, metadata: dict[str, str]
 ) -> None:
     path = written(tmp_path / "a.mcap", [encode_sweep(sweep(1))], metadata)
-    with pytest.raises(RecordingError, match="does not say which nodes"):
+    with pytest.raises(RecordingError, match="does not name its nodes"):
         load_recordings(path)
 
 
