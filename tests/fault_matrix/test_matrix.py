@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from _pytest.mark import ParameterSet
 
 import slave.limit.limit
 from common.errors import TandemError
@@ -30,7 +29,7 @@ BARED = (
 RULES = {str(rule) for rule, _ in slave.limit.limit.RULES}
 
 
-def rows() -> list[ParameterSet | str]:
+def rows() -> list[object]:
     """All, those that the table itself says are missed as expected failures."""
     return [
         pytest.param(f.name, marks=pytest.mark.xfail(strict=True, reason=f.missed)) if f.missed else f.name

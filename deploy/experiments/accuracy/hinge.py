@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -19,8 +20,53 @@ from deploy.report.tables import plain_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from master.calibrate.evidence import CrossCheck
     from master.calibrate.hinge_pair import HingePair
     from master.calibrate.recording import NodeRecording
+
+
+@dataclass(frozen=True, slots=True)
+class RatesAloneAxes:
+    """The axes by the angular rates alone."""
+
+    axis1: list[float]
+    axis2: list[float]
+    sigma_deg: list[float]
+    """Standard deviation of each axis."""
+    differs_deg: list[float]
+    """How far each axis is from the one that the report gives."""
+
+
+@dataclass(frozen=True, slots=True)
+class HingeAngleRange:
+    """The joint's angle over the recording."""
+
+    lowest: float
+    median: float
+    highest: float
+    fastest_deg_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class HingeReport:
+    """Everything found, as the JSON has it. Axes are unit vectors (3,) in the frame of their node."""
+
+    file: str
+    duration_s: float
+    axis1: list[float]
+    axis2: list[float]
+    sigma_deg: list[float]
+    """Standard deviation of each axis."""
+    rates_alone: RatesAloneAxes
+    evidence: list[CrossCheck]
+    condition: float
+    misfit_deg_s: float
+    bending_deg_s: float
+    next_best_answer_cost_ratio: float | None
+    """None where there is no other answer."""
+    lever1_m: list[float]
+    lever2_m: list[float]
+    angle_deg: HingeAngleRange
 
 
 def hinge(
@@ -62,12 +108,12 @@ def hinge(
     # the axes' common sign means nothing yet: let the joint bend to the positive side
     sign = 1.0 if track.angle_rad.max() >= -track.angle_rad.min() else -1.0
     angle = sign * track.angle_rad
-    figures = as_report(pair, angle, sign, file, one.rate_hz)
-    tell_machines(figures, report, to_stdout=as_json)
+    found = report_of(pair, angle, sign, file, one.rate_hz)
+    tell_machines(asdict(found), report, to_stdout=as_json)
     if picture is not None:
         draw(angle, track.deviation_rad, one.rate_hz, picture)
     if not as_json:
-        _print(figures, Console())
+        _print(found, Console())
 
 
 def load_pair(path: Path) -> tuple[NodeRecording, NodeRecording]:
@@ -97,8 +143,8 @@ def load_pair(path: Path) -> tuple[NodeRecording, NodeRecording]:
     return NodeRecording("unit 1", rate_hz, acc1, gyr1), NodeRecording("unit 2", rate_hz, acc2, gyr2)
 
 
-def as_report(pair: HingePair, angle_rad: Array, sign: float, file: Path, rate_hz: float) -> dict[str, Any]:
-    """Everything found, for machines."""
+def report_of(pair: HingePair, angle_rad: Array, sign: float, file: Path, rate_hz: float) -> HingeReport:
+    """The report of a hinge whose angle over time is `angle_rad` (T,)."""
     found, fit = pair.found, pair.fit
     assert fit.axes is not None
     rival = min(fit.rival, fit.axis_rival)
@@ -108,32 +154,32 @@ def as_report(pair: HingePair, angle_rad: Array, sign: float, file: Path, rate_h
         math.degrees(math.acos(min(1.0, abs(float(a @ b)))))
         for a, b in zip((found.axis1, found.axis2), fit.axes, strict=True)
     ]
-    return {
-        "file": file.name,
-        "duration_s": len(angle_rad) / rate_hz,
-        "axis1": (sign * fit.axes[0]).tolist(),
-        "axis2": (sign * fit.axes[1]).tolist(),
-        "sigma_deg": [math.degrees(s) for s in fit.axis_sigma_rad],
-        "rates_alone": {
-            "axis1": (sign * found.axis1).tolist(),
-            "axis2": (sign * found.axis2).tolist(),
-            "sigma_deg": [math.degrees(found.sigma1_rad), math.degrees(found.sigma2_rad)],
-            "differs_deg": apart,
-        },
-        "evidence": [pair.rates.as_report()],
-        "condition": found.condition,
-        "misfit_deg_s": math.degrees(found.misfit_rad_s),
-        "bending_deg_s": math.degrees(found.bending_rad_s),
-        "next_best_answer_cost_ratio": rival if math.isfinite(rival) else None,
-        "lever1_m": pair.hinge.lever1_m.tolist(),
-        "lever2_m": pair.hinge.lever2_m.tolist(),
-        "angle_deg": {
-            "lowest": float(degrees.min()),
-            "median": float(np.median(degrees)),
-            "highest": float(degrees.max()),
-            "fastest_deg_s": float(np.max(np.abs(speed))),
-        },
-    }
+    return HingeReport(
+        file=file.name,
+        duration_s=len(angle_rad) / rate_hz,
+        axis1=(sign * fit.axes[0]).tolist(),
+        axis2=(sign * fit.axes[1]).tolist(),
+        sigma_deg=[math.degrees(s) for s in fit.axis_sigma_rad],
+        rates_alone=RatesAloneAxes(
+            axis1=(sign * found.axis1).tolist(),
+            axis2=(sign * found.axis2).tolist(),
+            sigma_deg=[math.degrees(found.sigma1_rad), math.degrees(found.sigma2_rad)],
+            differs_deg=apart,
+        ),
+        evidence=[pair.rates],
+        condition=found.condition,
+        misfit_deg_s=math.degrees(found.misfit_rad_s),
+        bending_deg_s=math.degrees(found.bending_rad_s),
+        next_best_answer_cost_ratio=rival if math.isfinite(rival) else None,
+        lever1_m=pair.hinge.lever1_m.tolist(),
+        lever2_m=pair.hinge.lever2_m.tolist(),
+        angle_deg=HingeAngleRange(
+            lowest=float(degrees.min()),
+            median=float(np.median(degrees)),
+            highest=float(degrees.max()),
+            fastest_deg_s=float(np.max(np.abs(speed))),
+        ),
+    )
 
 
 def draw(angle_rad: Array, deviation_rad: Array, rate_hz: float, path: Path) -> None:
@@ -150,29 +196,28 @@ def draw(angle_rad: Array, deviation_rad: Array, rate_hz: float, path: Path) -> 
     save_png(path, draw_angle, 10.0, 3.5)
 
 
-def _print(figures: dict[str, Any], console: Console) -> None:
+def _print(found: HingeReport, console: Console) -> None:
     heads = ("axis x", "y", "z", "± °", "rates alone differ °")
-    table = plain_table("unit", *heads, title=f"hinge, {figures['duration_s']:.0f} s")
-    for i in (0, 1):
-        axis = figures[f"axis{i + 1}"]
+    table = plain_table("unit", *heads, title=f"hinge, {found.duration_s:.0f} s")
+    for i, axis in enumerate((found.axis1, found.axis2)):
         table.add_row(
             str(i + 1),
             *(f"{x:.4f}" for x in axis),
-            f"{figures['sigma_deg'][i]:.2f}",
-            f"{figures['rates_alone']['differs_deg'][i]:.2f}",
+            f"{found.sigma_deg[i]:.2f}",
+            f"{found.rates_alone.differs_deg[i]:.2f}",
         )
     console.print(table)
-    rival = figures["next_best_answer_cost_ratio"]
+    rival = found.next_best_answer_cost_ratio
     console.print(
-        f"conditioning {figures['condition']:.1f}; misfit {figures['misfit_deg_s']:.1f}°/s of "
-        f"{figures['bending_deg_s']:.0f}°/s bending; "
+        f"conditioning {found.condition:.1f}; misfit {found.misfit_deg_s:.1f}°/s of "
+        f"{found.bending_deg_s:.0f}°/s bending; "
         + ("no other answer" if rival is None else f"the next best answer costs {rival:.1f} times as much")
     )
-    for one in figures["evidence"]:
-        figure = one["advice"] if one["figure"] is None else f"{one['figure']:.0f} of {one['limit']:.0f}°"
-        console.print(f"{one['compared']}, low-passed: {one['verdict']}, {figure}")
-    angle = figures["angle_deg"]
+    for one in found.evidence:
+        figure = one.advice if one.figure is None else f"{one.figure:.0f} of {one.limit:.0f}°"
+        console.print(f"{one.compared}, low-passed: {one.verdict}, {figure}")
+    angle = found.angle_deg
     console.print(
-        f"angle {angle['lowest']:.1f} to {angle['highest']:.1f}°, median {angle['median']:.1f}°, "
-        f"fastest {angle['fastest_deg_s']:.0f}°/s"
+        f"angle {angle.lowest:.1f} to {angle.highest:.1f}°, median {angle.median:.1f}°, "
+        f"fastest {angle.fastest_deg_s:.0f}°/s"
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -38,9 +37,9 @@ class FilterScore:
     """Against the truth, or against the first filter; None for the first filter itself."""
     aligned: FrameRotations | None = None
 
-    def tree(self, reference: str | None) -> dict[str, Any]:
+    def tree(self, reference: str | None) -> dict[str, object]:
         """As JSON; `reference`: the filter that stands in for the truth."""
-        out: dict[str, Any] = {"us_per_sample": self.us_per_sample}
+        out: dict[str, object] = {"us_per_sample": self.us_per_sample}
         if self.aligned is not None:
             out |= {"aligned": self.aligned.tree(), "aligned_words": self.aligned.words()}
         if self.score is not None:
@@ -66,7 +65,7 @@ class RecordingScores:
         """The filter that stands in for the truth; None where there is truth."""
         return None if self.truth else next(iter(self.filters))
 
-    def tree(self) -> dict[str, Any]:
+    def tree(self) -> dict[str, object]:
         """As JSON."""
         plain = {each.name: getattr(self, each.name) for each in fields(self)}
         return plain | {"filters": {name: f.tree(self.reference) for name, f in self.filters.items()}}
@@ -97,7 +96,7 @@ class AccuracyReport:
             for name, each in scores.items()
         }
 
-    def tree(self) -> dict[str, Any]:
+    def tree(self) -> dict[str, object]:
         """As JSON: `files` ▸ name ▸ `filters` ▸ name ▸ values, and `mean` ▸ filter."""
         return {"files": {name: found.tree() for name, found in self.files.items()}, "mean": self.mean}
 

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, cast
 
 import zenoh
 from zenoh.handlers import Callback
@@ -48,7 +48,7 @@ class Door:
 
     def config(self, *, echoes: bool) -> LinkConfig:
         """The [link] of the side that echoes, or of the one that asks."""
-        tree: dict[str, Any] = {"listen" if echoes else "connect": [self.endpoint]}
+        tree: dict[str, object] = {"listen" if echoes else "connect": [self.endpoint]}
         if self.keys is not None:
             role, name = (Role.ROBOT, ROBOT) if echoes else (Role.OPERATOR, MASTER)
             tree["tls"] = tls_of(self.keys, role, name)
@@ -114,11 +114,11 @@ class _UdpPing(asyncio.DatagramProtocol):
 
 
 class _UdpEcho(asyncio.DatagramProtocol):
-    def connection_made(self, transport: Any) -> None:
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
         # uvloop's transport is a DatagramTransport in all but its bases
-        self._transport = transport
+        self._transport = cast(asyncio.DatagramTransport, transport)
 
-    def datagram_received(self, data: bytes, addr: Any) -> None:
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         self._transport.sendto(data, addr)
 
 

@@ -7,12 +7,13 @@ import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from common.clock import monotonic_ns, to_s
-from common.errors import TandemError
+from common.errors import CodecError, TandemError
 from common.link.config import LinkConfig
+from common.metrics.tree import from_tree
 from deploy.experiments.soak.files.happenings import RecordingChecked
 from deploy.harness.child import Child
 from deploy.harness.spawn import finished
@@ -22,6 +23,24 @@ FULL_BYTES = 40 * 1024
 """A disk of this size is full after about 4 s: commands, states and statistics are 10 kB/s, compressed."""
 ENDS_HERE = "the recording ends here"
 """What the recorder logs once when its disk fails."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTopic:
+    """What the soak reads about one topic from `tandem recording --json`."""
+
+    last_ns: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedContents:
+    """What the soak reads about a file from `tandem recording --json`."""
+
+    topics: Mapping[str, RecordedTopic] = field(default_factory=dict)
+    cut: str = ""
+    error: str = ""
+    """Why the file could not be read."""
 
 
 class RecorderProcess:
@@ -74,16 +93,16 @@ class RecorderProcess:
         size_mb = sum(file.stat().st_size for file in files) / 1e6
         for file in files:
             file.unlink()
-        topics = contents.get("topics", {})
-        last_ns = max((topic["last_ns"] for topic in topics.values()), default=None)
+        topics = contents.topics.values()
+        last_ns = max((topic.last_ns for topic in topics), default=None)
         lost_s = None if ended_ns is None or last_ns is None else max(0.0, to_s(ended_ns - last_ns))
         return RecordingChecked(
             readable=bool(topics),
-            messages=sum(topic["count"] for topic in topics.values()),
+            messages=sum(topic.count for topic in topics),
             size_mb=size_mb,
-            cut=contents.get("cut", ""),
+            cut=contents.cut,
             lost_s=lost_s,
-            why_not=contents.get("error", ""),
+            why_not=contents.error,
         )
 
     async def kill(self) -> int:
@@ -127,15 +146,16 @@ class SmallDisk:
             self._folder.rmdir()
 
 
-async def _contents(file: Path) -> Mapping[str, Any]:
+async def _contents(file: Path) -> RecordedContents:
     """Read in another process: a long recording must cost the soak neither memory nor time."""
     nice = ("nice", "-n", "15") if shutil.which("nice") else ()
     _, out, err = await finished([*nice, sys.executable, "-m", "deploy", "recording", str(file), "--json"])
     try:
-        contents: Mapping[str, Any] = json.loads(out)
+        return from_tree(RecordedContents, json.loads(out))
+    except CodecError as error:
+        return RecordedContents(error=str(error))
     except ValueError:
-        return {"error": err.decode("utf-8", "replace").strip()}
-    return contents
+        return RecordedContents(error=err.decode("utf-8", "replace").strip())
 
 
 async def _succeeds(*command: str) -> bool:

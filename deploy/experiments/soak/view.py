@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Group, RenderableType
 from rich.progress_bar import ProgressBar
@@ -67,7 +67,7 @@ def line(event: AnyEvent) -> Text:
     return Text(f"{event.at_s:8.1f} s  {event.what.kind}  {what}", "dim", overflow="ellipsis", no_wrap=True)
 
 
-def _figure(row: Mapping[str, Any], name: str, unit: str = "") -> str:
+def _figure(row: Mapping[str, float | str], name: str, unit: str = "") -> str:
     value = row.get(name)
     if not isinstance(value, float | int) or math.isnan(value):
         return UNKNOWN

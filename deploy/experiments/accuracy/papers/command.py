@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -52,7 +52,7 @@ def papers(
         for (experiment, seed), figures in run_each(run_experiment, work, jobs or jobs_here()):
             found[experiment.key][seed] = figures
             progress.advance(task)
-    trees: dict[str, Any] = {}
+    trees: dict[str, object] = {}
     missed = 0
     for experiment in wanted:
         rows = gather(dict(sorted(found[experiment.key].items())))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -26,7 +25,7 @@ def experiment_table(experiment: Experiment, rows: Sequence[PaperComparison]) ->
     return Group(table, *(Text(note, "dim") for note in experiment.notes))
 
 
-def experiment_tree(experiment: Experiment, rows: Sequence[PaperComparison]) -> dict[str, Any]:
+def experiment_tree(experiment: Experiment, rows: Sequence[PaperComparison]) -> dict[str, object]:
     """The same for a report."""
     return {
         "title": experiment.title,

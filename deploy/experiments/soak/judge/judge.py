@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from deploy.experiments.soak.files.events import of_kind, read_events
 from deploy.experiments.soak.files.happenings import FaultRecovered, HostStalled, SoakEnded
@@ -49,13 +48,18 @@ class JudgedSoak:
         ends = of_kind(self.seen.events, SoakEnded)
         return ends[-1].what.how if ends else "it was killed, so its end is unknown"
 
-    def tree(self) -> dict[str, Any]:
+    @property
+    def lasted_s(self) -> float:
+        """From its beginning to its last event, to 0.1 s."""
+        return round(max((event.at_s for event in self.seen.events), default=0.0), 1)
+
+    def tree(self) -> dict[str, object]:
         """The report for machines."""
         events = self.seen.events
         faults = [asdict(event.what) for event in of_kind(events, FaultRecovered)]
         return {
             "options": asdict(self.seen.begun),
-            "lasted_s": round(max((event.at_s for event in events), default=0.0), 1),
+            "lasted_s": self.lasted_s,
             "ended": self.ended,
             "verdict": "failed" if failed(self.verdicts) else "passed",
             "criteria": [verdict.tree() for verdict in self.verdicts],

@@ -33,7 +33,7 @@ def write_report(judged: JudgedSoak, folder: Path) -> None:
         "report.html.jinja",
         {},
         **tree,
-        lasted=in_words(tree["lasted_s"]),
+        lasted=in_words(judged.lasted_s),
         counts=counts(judged.verdicts),
         verdicts=judged.verdicts,
         columns=COLUMNS,

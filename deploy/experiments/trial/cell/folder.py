@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from common.errors import TandemError
 from deploy.experiments.trial.cell.plan import CellKey, TrialPlan, check_continues, merged
@@ -64,21 +63,21 @@ class Folder:
         return TrialPlan.of_tree(_read(file)) if file.exists() else None
 
 
-def as_json(tree: Mapping[str, Any]) -> str:
+def as_json(tree: Mapping[str, object]) -> str:
     """With sorted keys, so that two reports can be compared line by line."""
     return json.dumps(tree, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _write(path: Path, tree: Mapping[str, Any]) -> None:
+def _write(path: Path, tree: Mapping[str, object]) -> None:
     beside = path.with_suffix(".part")
     with writing(path):
         beside.write_text(as_json(tree), "utf-8")
         os.replace(beside, path)  # noqa: PTH105  # one step: a half-written cell is never read
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path) -> object:
     try:
-        tree: dict[str, Any] = json.loads(path.read_text("utf-8"))
+        tree: object = json.loads(path.read_text("utf-8"))
     except OSError as error:
         raise TandemError(f"{path}: cannot be read ({error.strerror or error})") from None
     except ValueError as error:

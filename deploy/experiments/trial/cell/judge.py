@@ -28,7 +28,7 @@ def judged(
         remarks=(*course.remarks, *remarks),
         settings=settings,
         counts=counts(course.judged),
-        one_way_ms=one_way_percentiles_ms(course.judged),
+        one_way_ms=tuple(one_way_percentiles_ms(course.judged)),
         excerpt=excerpt(course.judged, config),
     )
 

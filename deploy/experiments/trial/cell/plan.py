@@ -6,9 +6,10 @@ import random
 import re
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Self
+from typing import Self
 
-from common.errors import TandemError
+from common.errors import CodecError, TandemError
+from common.metrics.tree import from_tree
 
 AXES = ("transports", "profiles", "strategies", "repeat")
 """What may differ between the runs that fill one report: which cells there are, not how one is run."""
@@ -93,18 +94,20 @@ class TrialPlan:
         """The random seed of sensors and network, equal for all setups of a repetition."""
         return 1000 * self.seed + cell.repetition
 
-    def tree(self) -> dict[str, Any]:
+    def tree(self) -> dict[str, object]:
         """As JSON."""
         return {key: list(v) if isinstance(v, tuple) else v for key, v in asdict(self).items()}
 
     @classmethod
-    def of_tree(cls, tree: dict[str, Any]) -> Self:
+    def of_tree(cls, tree: object) -> Self:
         """Back from JSON. Raises TandemError where it is none."""
-        names = [field.name for field in fields(cls)]
-        if not isinstance(tree, dict) or set(tree) != set(names):
+        names = {field.name for field in fields(cls)}
+        if not isinstance(tree, dict) or set(tree) != names:
             raise TandemError("the report folder's plan is of another version of tandem")
-        values: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in tree.items()}
-        return cls(**values)
+        try:
+            return from_tree(cls, tree)
+        except CodecError as error:
+            raise TandemError(f"the report folder's plan cannot be read ({error})") from None
 
 
 def check_continues(old: TrialPlan, new: TrialPlan) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
-from common.errors import TandemError
+from common.errors import CodecError, TandemError
+from common.metrics.tree import from_tree
 from deploy.experiments.trial.cell.figures import FIGURES, Values, rounded
-from deploy.experiments.trial.cell.plan import CellKey, Setup
+from deploy.experiments.trial.cell.plan import CellKey
 
 VERSION = 1
 
@@ -46,13 +46,13 @@ class Cell:
     why: str = ""
     """Why there is no result."""
     values: Values = field(default_factory=dict)
-    remarks: Sequence[str] = ()
+    remarks: tuple[str, ...] = ()
     """What happened meanwhile, such as a hold and its reason."""
     settings: Mapping[str, str] = field(default_factory=dict)
     """What was set for this profile over the example files."""
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     """The guard's events in the judged time: dropped by gate, losses, clamps by rule."""
-    one_way_ms: Sequence[float] = ()
+    one_way_ms: tuple[float, ...] = ()
     """Percentiles 0, 1 … 100 of the true one-way of accepted commands."""
     excerpt: Excerpt | None = None
 
@@ -61,7 +61,7 @@ class Cell:
         """Whether the cell need not run again."""
         return self.status is not CellStatus.FAILED
 
-    def tree(self) -> dict[str, Any]:
+    def tree(self) -> dict[str, object]:
         """As JSON, rounded."""
         setup, excerpt = self.key.setup, self.excerpt
         return {
@@ -88,22 +88,20 @@ class Cell:
         }
 
     @classmethod
-    def of_tree(cls, tree: dict[str, Any]) -> Cell:
+    def of_tree(cls, tree: object) -> Cell:
         """Back from JSON. Raises TandemError where it is none of this version's."""
+        if not isinstance(tree, Mapping) or "version" not in tree:
+            raise TandemError("not a cell of a trial (it has no version)")
+        if tree["version"] != VERSION:
+            raise TandemError(f"a cell of version {tree['version']}, this tandem reads {VERSION}")
         try:
-            if tree["version"] != VERSION:
-                raise TandemError(f"a cell of version {tree['version']}, this tandem reads {VERSION}")
-            setup = Setup(tree["transport"], tree["profile"], tree["strategy"])
-            return cls(
-                key=CellKey(setup, int(tree["repetition"])),
-                status=CellStatus(tree["status"]),
-                why=tree["why"],
-                values={f.name: tree["figures"].get(f.name) for f in FIGURES},
-                remarks=tuple(tree["remarks"]),
-                settings=tree["settings"],
-                counts=tree["counts"],
-                one_way_ms=tuple(tree["one_way_ms"]),
-                excerpt=None if tree["excerpt"] is None else Excerpt(**tree["excerpt"]),
-            )
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            setup = {name: tree[name] for name in ("transport", "profile", "strategy")}
+            same = ("status", "why", "remarks", "settings", "counts", "one_way_ms", "excerpt")
+            found = {name: tree[name] for name in same}
+            found["key"] = {"setup": setup, "repetition": tree["repetition"]}
+            found["values"] = {f.name: tree["figures"].get(f.name) for f in FIGURES}
+            return from_tree(cls, found)
+        except (KeyError, AttributeError) as error:
             raise TandemError(f"not a cell of a trial ({error!r})") from None
+        except CodecError as error:
+            raise TandemError(f"not a cell of a trial ({error})") from None

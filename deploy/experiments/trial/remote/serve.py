@@ -5,11 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import tempfile
-from collections.abc import Coroutine
+from collections.abc import Awaitable
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from common.clock import monotonic_ns, to_ns
 from common.config.load import load_config
@@ -152,7 +151,7 @@ class RobotHost:
             )
         return ""
 
-    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+    def _begin(self, work: Awaitable[None]) -> None:
         async def attempt() -> None:
             try:
                 await work

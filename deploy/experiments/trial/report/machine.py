@@ -6,7 +6,6 @@ import csv
 import io
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any
 
 from deploy.experiments.trial.cell.figures import BY_NAME, FIGURES, rounded
 from deploy.experiments.trial.cell.result import Cell
@@ -17,7 +16,7 @@ from deploy.experiments.trial.report.spread import SetupResults, Spread
 _KEYS = ("profile", "transport", "strategy", "repetition", "status")
 
 
-def tree(findings: Findings, about: dict[str, str]) -> dict[str, Any]:
+def tree(findings: Findings, about: dict[str, str]) -> dict[str, object]:
     """`compared` holds no time, host or version: those are in `about`. Figures are rounded as printed."""
     return {
         "about": about,
@@ -50,7 +49,7 @@ def _path(row: SetupResults) -> str:
     return f"{row.setup.profile}/{row.setup.transport}/{row.setup.strategy}"
 
 
-def _setup(row: SetupResults) -> dict[str, Any]:
+def _setup(row: SetupResults) -> dict[str, object]:
     return {
         "repeats_done": len(row.done),
         "repeats_failed": len(row.failed),
@@ -65,7 +64,7 @@ def _spread(name: str, spread: Spread) -> dict[str, float]:
     return {key: round(value, digits) + 0.0 for key, value in asdict(spread).items()}
 
 
-def _ranking(ranking: Ranking) -> dict[str, Any]:
+def _ranking(ranking: Ranking) -> dict[str, object]:
     return {
         "task": ranking.task.name,
         "profile": ranking.profile,

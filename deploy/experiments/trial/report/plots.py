@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from deploy.experiments.trial.cell.figures import BY_NAME
-from deploy.experiments.trial.cell.result import CellStatus
+from deploy.experiments.trial.cell.plan import Setup
+from deploy.experiments.trial.cell.result import CellStatus, Excerpt
 from deploy.experiments.trial.report.spread import SetupResults
 from deploy.report.plots import BAR_COLOUR, INK, LIMIT_COLOUR, colour, svg
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -153,7 +152,7 @@ def _one_way(axes: Axes, row: SetupResults, x: float) -> None:
 
 def _motion(rows: Sequence[SetupResults]) -> Plot | None:
     """One joint for a few seconds: each strategy over each network, with the first transport."""
-    first: dict[tuple[str, str], Any] = {}
+    first: dict[tuple[str, str], tuple[Setup, Excerpt]] = {}
     for row in rows:
         found = [c.excerpt for c in row.cells if c.status is CellStatus.DONE and c.excerpt is not None]
         if found:
@@ -167,10 +166,11 @@ def _motion(rows: Sequence[SetupResults]) -> Plot | None:
         for i, profile in enumerate(profiles):
             for j, strategy in enumerate(strategies):
                 axes = grid[i][j]
-                setup, excerpt = first.get((profile, strategy), (None, None))
-                if excerpt is None:
+                shown = first.get((profile, strategy))
+                if shown is None:
                     axes.axis("off")
                     continue
+                setup, excerpt = shown
                 axes.plot(excerpt.at_s, excerpt.operator_deg, color=INK, linewidth=1.0, label="operator")
                 axes.plot(excerpt.at_s, excerpt.robot_deg, color=colour(j), linewidth=1.2,
                           label="robot (coloured by strategy)")  # fmt: skip
@@ -217,7 +217,7 @@ def _legend(axes: Axes, strategies: Sequence[str], profiles: Sequence[str] = ())
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _names(names: Iterator[str] | Any) -> list[str]:
+def _names(names: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 

@@ -81,7 +81,7 @@ def cell(key: CellKey) -> Cell:
         remarks=("held after 7.2 s: no command for 0.2 s; engaged again",) if key.repetition == 2 else (),
         settings={"guard.max_age_s": "0.45"},
         counts={"dropped": {"age": 2}, "clamps": {"velocity": 1}},
-        one_way_ms=[DELAY_MS[key.setup.profile] * (1 + 0.015 * p) for p in range(101)],
+        one_way_ms=tuple(DELAY_MS[key.setup.profile] * (1 + 0.015 * p) for p in range(101)),
         excerpt=Excerpt(
             "right_shoulder_pitch",
             at_s,
