@@ -50,7 +50,7 @@ class Child:
         self.name = name or role
         self._tandem = tandem
         self.log = folder / f"{self.name}.log"
-        self.figures_file = folder / f"{self.name}.figures.json"
+        self.metrics_file = folder / f"{self.name}.metrics.json"
         self._process: Spawned | None = None
         self._usage: psutil.Process | None = None
         self._cpu_from = (0.0, 0.0)
@@ -61,7 +61,7 @@ class Child:
 
     async def start(self, config: Path, overrides: Sequence[str], through: Sequence[str] = ()) -> None:
         """Start it; its output goes to the log. `through`: a command that becomes it, such as `unshare`."""
-        arguments = [str(config), "--figures", str(self.figures_file)]
+        arguments = [str(config), "--metrics", str(self.metrics_file)]
         for override in overrides:
             arguments += ["--set", override]
         await self.run(arguments, through)
@@ -136,7 +136,7 @@ class Child:
         Raises CodecError where the file holds something else.
         """
         try:
-            tree = json.loads(self.figures_file.read_text("utf-8"))
+            tree = json.loads(self.metrics_file.read_text("utf-8"))
         except (OSError, ValueError):
             return None
         return from_tree(kind, tree)

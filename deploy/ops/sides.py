@@ -8,7 +8,7 @@ from deploy.report.options import ConfigFile, MetricsFile, Overrides
 from deploy.report.output import metrics_writer
 
 
-def master(config: ConfigFile, set_: Overrides = None, figures: MetricsFile = None) -> None:
+def master(config: ConfigFile, set_: Overrides = None, metrics: MetricsFile = None) -> None:
     """Run the operator's side: read the worn nodes, compute joint angles, send them to the robots.
 
     Example: `tandem master deploy/examples/master.toml`
@@ -17,10 +17,10 @@ def master(config: ConfigFile, set_: Overrides = None, figures: MetricsFile = No
     from master.config import MasterConfig
 
     checked = load_config(config, MasterConfig, set_ or ())
-    run_until_stopped(lambda stop: run(checked, stop, metrics_writer(figures)))
+    run_until_stopped(lambda stop: run(checked, stop, metrics_writer(metrics)))
 
 
-def slave(config: ConfigFile, set_: Overrides = None, figures: MetricsFile = None) -> None:
+def slave(config: ConfigFile, set_: Overrides = None, metrics: MetricsFile = None) -> None:
     """Run the robot's side: check every command, drive the servos, measure the latency.
 
     Example: `tandem slave deploy/examples/slave.toml`
@@ -29,4 +29,4 @@ def slave(config: ConfigFile, set_: Overrides = None, figures: MetricsFile = Non
     from slave.config import SlaveConfig
 
     checked = load_config(config, SlaveConfig, set_ or ())
-    run_until_stopped(lambda stop: run(checked, stop, metrics_writer(figures)))
+    run_until_stopped(lambda stop: run(checked, stop, metrics_writer(metrics)))

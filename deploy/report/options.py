@@ -30,7 +30,7 @@ Overrides = Annotated[
 MetricsFile = Annotated[
     Path | None,
     typer.Option(
-        "--figures",
+        "--metrics",
         help="On exit, write all counters and timings to this JSON file.",
         dir_okay=False,
         callback=in_a_folder,

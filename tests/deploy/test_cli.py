@@ -139,7 +139,7 @@ def test_a_file_of_the_other_side_is_one_line_naming_the_key(tandem: Tandem) -> 
 
 
 @pytest.mark.parametrize(
-    "command", ["demo --report", "bench --report", f"slave {EXAMPLES}/slave.toml --figures"]
+    "command", ["demo --report", "bench --report", f"slave {EXAMPLES}/slave.toml --metrics"]
 )
 def test_a_report_that_could_not_be_written_is_said_before_the_work(
     tandem: Tandem, command: str, tmp_path: Path

@@ -59,7 +59,7 @@ async def place(
             head = f'listen = ["{endpoint}"]'
         else:
             router_file.write_text(link_toml(keys, "router-hub", f'listen = ["{endpoint}"]'))
-            command = ("-m", "deploy", "router", str(router_file), "--figures", str(folder / "figures.json"))
+            command = ("-m", "deploy", "router", str(router_file), "--metrics", str(folder / "metrics.json"))
             router = await stack.enter_async_context(started(*command, until="routes at"))
             head = f'mode = "client"\nconnect = ["{endpoint}"]'
         robot_file.write_text(f'robot = "{ROBOT}"\n' + link_toml(keys, "robot-robot-1", head))
@@ -127,7 +127,7 @@ def test_nobody_does_what_he_may_not(transport: str, routed: bool, keys: Path, t
             for party in everybody:
                 party.session.close()
             await guard.stop()
-            file = tmp_path / "figures.json"
+            file = tmp_path / "metrics.json"
             counted = (json.loads(file.read_text()) if routed else guard.figures)["refused"]
             put, look = "Put tandem/robot-1/command", "Declare Subscriber tandem/robot-1/video/head"
             puts = {who: kinds.get(put, 0) for who, kinds in counted["messages"].items()}

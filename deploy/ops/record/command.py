@@ -45,7 +45,7 @@ def record(
     may_miss: Annotated[
         bool, typer.Option("--may-miss", help="End with status 0 even if numbered messages are missing.")
     ] = False,
-    figures: MetricsFile = None,
+    metrics: MetricsFile = None,
 ) -> None:
     """Record a live robot's commands, states and statistics until Ctrl-C. It changes nothing.
 
@@ -66,7 +66,7 @@ def record(
 
     async def work(stop: asyncio.Event) -> None:
         with console.status("waiting for the robot") as status:
-            said = await record_until(options, stop, status.update, metrics_writer(figures))
+            said = await record_until(options, stop, status.update, metrics_writer(metrics))
         console.print(said, highlight=False)
 
     run_until_stopped(work)

@@ -27,7 +27,7 @@ def router(
             callback=in_a_folder,
         ),
     ] = None,
-    figures: MetricsFile = None,
+    metrics: MetricsFile = None,
 ) -> None:
     """Connect masters and robots that cannot reach each other, and enforce who may do what.
 
@@ -46,6 +46,6 @@ def router(
         return
 
     try:
-        run_until_stopped(lambda stop: run(checked, stop, metrics_writer(figures)))
+        run_until_stopped(lambda stop: run(checked, stop, metrics_writer(metrics)))
     except TandemError as error:
         raise TandemError(f"{config}: {error}") from None

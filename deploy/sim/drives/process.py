@@ -29,7 +29,7 @@ def drives(
             "warns, wrong-mode, position-stuck, or none, which ends what lasts.",
         ),
     ] = None,
-    figures: MetricsFile = None,
+    metrics: MetricsFile = None,
 ) -> None:
     """Simulate the robot's drives: CiA 402 drives on CANopen buses, which move the simulated robot.
 
@@ -46,6 +46,6 @@ def drives(
     faults = [planned(text, checked.skeleton) for text in fault or ()]
 
     async def main(stop: asyncio.Event) -> None:
-        metrics_writer(figures)(await run(checked, stop, faults))
+        metrics_writer(metrics)(await run(checked, stop, faults))
 
     run_until_stopped(main)

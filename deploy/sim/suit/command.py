@@ -8,7 +8,7 @@ from deploy.report.options import ConfigFile, MetricsFile, Overrides
 from deploy.report.output import metrics_writer
 
 
-def suit(config: ConfigFile, set_: Overrides = None, figures: MetricsFile = None) -> None:
+def suit(config: ConfigFile, set_: Overrides = None, metrics: MetricsFile = None) -> None:
     """Simulate the worn nodes: answer the master on a CAN bus as a real suit would.
 
     Example: `tandem suit deploy/examples/suit.toml --set 'motion="sweep"'`
@@ -17,4 +17,4 @@ def suit(config: ConfigFile, set_: Overrides = None, figures: MetricsFile = None
     from deploy.sim.suit.process import run
 
     checked = load_config(config, SuitConfig, set_ or ())
-    run_until_stopped(lambda stop: run(checked, stop, metrics_writer(figures)))
+    run_until_stopped(lambda stop: run(checked, stop, metrics_writer(metrics)))

@@ -66,12 +66,12 @@ async def ended(child: Child) -> None:
     await child._process.wait()
 
 
-def test_it_gets_role_file_figures_and_overrides(tmp_path: Path) -> None:
+def test_it_gets_role_file_metrics_and_overrides(tmp_path: Path) -> None:
     async def test(child: Child) -> None:
         await ended(child)
-        figures = ["--figures", str(tmp_path / "master.figures.json")]
-        assert json.loads(child.figures_file.read_text("utf-8")) == {
-            "argv": ["master", "some.toml", *figures, "--set", 'robot="r"']
+        metrics = ["--metrics", str(tmp_path / "master.metrics.json")]
+        assert json.loads(child.metrics_file.read_text("utf-8")) == {
+            "argv": ["master", "some.toml", *metrics, "--set", 'robot="r"']
         }
         assert await child.stop() == 0
 
