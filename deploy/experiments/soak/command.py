@@ -25,50 +25,56 @@ REPORT_S = 60.0
 """How long stopping, judging and drawing may take after a Ctrl-C."""
 
 
+Duration = Annotated[
+    str, typer.Option(help="How long the robot follows the operator, such as 8h, 30m or 90s.")
+]
+Transport = Annotated[
+    str,
+    typer.Option(
+        help="Transport between master and slave: tcp, udp, tls, quic, quic-datagram, ws or unixsock-stream."
+    ),
+]
+NetworkProfile = Annotated[
+    str | None,
+    typer.Option(
+        help="Run on two emulated hosts with this network between them: a profile "
+        "such as 4g or wifi, or a TOML file (needs root)."
+    ),
+]
+Router = Annotated[bool, typer.Option("--router", help="Connect master and slave through a router.")]
+FaultNames = Annotated[
+    str,
+    typer.Option(
+        help="Faults to inject: all, none, or names separated by commas; `--faults help` lists them."
+    ),
+]
+FaultInterval = Annotated[
+    float | None,
+    typer.Option(help="Mean number of seconds between faults; without it, each kind comes twice.", min=5.0),
+]
+Seed = Annotated[
+    int, typer.Option(help="Random seed for the fault schedule; the same seed gives the same faults.")
+]
+ReportFolder = Annotated[
+    Path | None,
+    typer.Option(help="New folder for the report and everything that is recorded.", file_okay=False),
+]
+EarlierSoak = Annotated[
+    Path | None,
+    typer.Option(help="Do not run: judge the report folder of an earlier soak.", exists=True),
+]
+
+
 def soak(
-    duration: Annotated[
-        str, typer.Option(help="How long the robot follows the operator, such as 8h, 30m or 90s.")
-    ] = "10m",
-    transport: Annotated[
-        str,
-        typer.Option(
-            help="Transport between master and slave: tcp, udp, tls, quic, quic-datagram, "
-            "ws or unixsock-stream."
-        ),
-    ] = "tcp",
-    profile: Annotated[
-        str | None,
-        typer.Option(
-            help="Run on two emulated hosts with this network between them: a profile "
-            "such as 4g or wifi, or a TOML file (needs root)."
-        ),
-    ] = None,
-    router: Annotated[
-        bool, typer.Option("--router", help="Connect master and slave through a router.")
-    ] = False,
-    faults: Annotated[
-        str,
-        typer.Option(
-            help="Faults to inject: all, none, or names separated by commas; `--faults help` lists them."
-        ),
-    ] = "all",
-    every: Annotated[
-        float | None,
-        typer.Option(
-            help="Mean number of seconds between faults; without it, each kind comes twice.", min=5.0
-        ),
-    ] = None,
-    seed: Annotated[
-        int, typer.Option(help="Random seed for the fault schedule; the same seed gives the same faults.")
-    ] = 1,
-    report: Annotated[
-        Path | None,
-        typer.Option(help="New folder for the report and everything that is recorded.", file_okay=False),
-    ] = None,
-    judge: Annotated[
-        Path | None,
-        typer.Option(help="Do not run: judge the report folder of an earlier soak.", exists=True),
-    ] = None,
+    duration: Duration = "10m",
+    transport: Transport = "tcp",
+    profile: NetworkProfile = None,
+    router: Router = False,
+    faults: FaultNames = "all",
+    every: FaultInterval = None,
+    seed: Seed = 1,
+    report: ReportFolder = None,
+    judge: EarlierSoak = None,
 ) -> None:
     """Run the whole system for hours, inject faults, and judge losses, recovery and memory growth.
 
