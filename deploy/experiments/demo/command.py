@@ -14,57 +14,64 @@ from common.process.runtime import run as run_until_stopped
 from deploy.report.options import PlotsFile, ReportFile
 from deploy.report.output import write_json
 
+Seconds = Annotated[float, typer.Option(help="How many seconds the robot follows the operator.", min=3.0)]
+Transport = Annotated[
+    str,
+    typer.Option(
+        help="Transport between master and slave: tcp, udp, tls, quic, quic-datagram, ws or unixsock-stream."
+    ),
+]
+ReplayFile = Annotated[
+    Path | None,
+    typer.Option(help="Play this recording of a person (.npz) instead of a simulated motion.", exists=True),
+]
+RobotProfile = Annotated[str, typer.Option(help="Robot profile: nursing, hand or lower_limb.")]
+Motion = Annotated[
+    str | None,
+    typer.Option(
+        help="Motion of the simulated operator: sweep, calibration_pose, or the "
+        "profile's own (bottle, grasp or walk), which is the default.",
+        show_default=False,
+    ),
+]
+Strategy = Annotated[
+    str, typer.Option(help="Tracking strategy of the slave: predict, interpolate or latest.")
+]
+Filter = Annotated[
+    str, typer.Option("--filter", help="Orientation filter of the master: vqf, mahony or ekf.")
+]
+Seed = Annotated[int, typer.Option(help="Random seed for the simulated sensor errors.")]
+RobotCount = Annotated[
+    int,
+    typer.Option(
+        help="Number of robots that follow the one operator; with several, the cameras are off.",
+        min=1,
+        max=32,
+    ),
+]
+ServoBackend = Annotated[
+    Literal["mujoco", "canopen"],
+    typer.Option(
+        help="Servo backend: mujoco simulates the robot inside the slave, canopen "
+        "simulates drives on CAN buses."
+    ),
+]
+Camera = Annotated[bool, typer.Option(help="Send video from the robot's camera.")]
+
 
 def demo(
-    seconds: Annotated[
-        float, typer.Option(help="How many seconds the robot follows the operator.", min=3.0)
-    ] = 20.0,
+    seconds: Seconds = 20.0,
     report: ReportFile = None,
-    transport: Annotated[
-        str,
-        typer.Option(
-            help="Transport between master and slave: tcp, udp, tls, quic, quic-datagram, "
-            "ws or unixsock-stream."
-        ),
-    ] = "tcp",
-    replay: Annotated[
-        Path | None,
-        typer.Option(
-            help="Play this recording of a person (.npz) instead of a simulated motion.", exists=True
-        ),
-    ] = None,
-    profile: Annotated[str, typer.Option(help="Robot profile: nursing, hand or lower_limb.")] = "nursing",
-    motion: Annotated[
-        str | None,
-        typer.Option(
-            help="Motion of the simulated operator: sweep, calibration_pose, or the "
-            "profile's own (bottle, grasp or walk), which is the default.",
-            show_default=False,
-        ),
-    ] = None,
-    strategy: Annotated[
-        str, typer.Option(help="Tracking strategy of the slave: predict, interpolate or latest.")
-    ] = "predict",
-    filter_: Annotated[
-        str, typer.Option("--filter", help="Orientation filter of the master: vqf, mahony or ekf.")
-    ] = "vqf",
-    seed: Annotated[int, typer.Option(help="Random seed for the simulated sensor errors.")] = 1,
-    robots: Annotated[
-        int,
-        typer.Option(
-            help="Number of robots that follow the one operator; with several, the cameras are off.",
-            min=1,
-            max=32,
-        ),
-    ] = 1,
-    servos: Annotated[
-        Literal["mujoco", "canopen"],
-        typer.Option(
-            help="Servo backend: mujoco simulates the robot inside the slave, canopen "
-            "simulates drives on CAN buses."
-        ),
-    ] = "mujoco",
-    camera: Annotated[bool, typer.Option(help="Send video from the robot's camera.")] = True,
+    transport: Transport = "tcp",
+    replay: ReplayFile = None,
+    profile: RobotProfile = "nursing",
+    motion: Motion = None,
+    strategy: Strategy = "predict",
+    filter_: Filter = "vqf",
+    seed: Seed = 1,
+    robots: RobotCount = 1,
+    servos: ServoBackend = "mujoco",
+    camera: Camera = True,
     plots: PlotsFile = None,
 ) -> None:
     """Run simulated suit, master and robot on this machine, and judge how well the robot follows.
