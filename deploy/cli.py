@@ -22,7 +22,7 @@ from deploy.experiments.trial.command import app as trial_app
 from deploy.log_options import Debug, Quiet, add_log_options, debugging, start_chosen_log
 from deploy.ops.attitude.command import attitude
 from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
-from deploy.ops.control.teller import acted
+from deploy.ops.control.printer import acted
 from deploy.ops.doctor.command import doctor
 from deploy.ops.keys.commands import app as keys_app
 from deploy.ops.network.command import app as network_app

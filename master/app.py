@@ -66,7 +66,7 @@ class Master:
                 bus.open_or_retry()
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._capture())
-                tasks.create_task(self._tell())
+                tasks.create_task(self._publish_metrics())
                 for robot in self._robots:
                     tasks.create_task(self._serve(robot))
         finally:
@@ -112,7 +112,7 @@ class Master:
 
     def _send(self, angles: JointAngleSample) -> None:
         angles_ns = monotonic_ns()
-        for line in self._pipeline.to_tell:
+        for line in self._pipeline.warnings:
             log.warning("%s", line)
         held = self._config.operator.deadman == "always_held"
         for robot in self._robots:
@@ -127,7 +127,7 @@ class Master:
         for line in self._doubt_log.lines(self._pipeline.doubts, angles_ns):
             log.warning("%s", line)
 
-    async def _tell(self) -> None:
+    async def _publish_metrics(self) -> None:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
             shared = self._shared_metrics()
             for robot in self._robots:

@@ -20,7 +20,7 @@ class Homonyms:
         self._heard: dict[int, int] = {}
         self._shown: dict[int, ProcessPresence] = {}
         self._next_notice_ns = 0
-        self._said: str | None = None
+        self._logged: str | None = None
 
     def on_presence(self, presence: ProcessPresence, here: bool) -> None:
         """A process of the robot's name showed itself, or went."""
@@ -52,9 +52,9 @@ class Homonyms:
     def change(self, now_ns: int) -> str | None:
         """A line for the log when this changes."""
         words = self.words(now_ns)
-        if words == self._said:
+        if words == self._logged:
             return None
-        self._said = words
+        self._logged = words
         return words or f"only one robot has the name {self._robot} again"
 
     def _place(self, instance: int) -> str:

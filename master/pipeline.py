@@ -60,7 +60,7 @@ class MasterPipeline:
         self.estimator = Estimator(config.estimation, nodes, config.capture.rate_hz, skeleton=self.skeleton)
         self.solver = JointSolver(self.skeleton)
         self.beyond_reach = BeyondReach(self.skeleton.segment_names)
-        self.to_tell: list[str] = []
+        self.warnings: list[str] = []
         """Messages to the operator about the last joint angles."""
         self._angles_ns: int | None = None
         self.plausibility = PlausibilityWatch(
@@ -131,7 +131,7 @@ class MasterPipeline:
         before_ns, self._angles_ns = self._angles_ns, sweep.sampled_ns
         elapsed_s = math.inf if before_ns is None else to_s(sweep.sampled_ns - before_ns)
         position, velocity = self.solver.solve(q, posture.rate_rad_s, elapsed_s)
-        self.to_tell = self.beyond_reach.note(sweep.sampled_ns, self.solver.short_rad)
+        self.warnings = self.beyond_reach.note(sweep.sampled_ns, self.solver.short_rad)
         # a joint is known only if the nodes on both its segments are
         missing = self.skeleton.joint_needs_node @ ~known_nodes
         known = np.isfinite(position) & np.isfinite(velocity) & ~missing
@@ -163,8 +163,8 @@ class MasterPipeline:
         names = self.skeleton.segment_names
         if not self.doubts:
             return np.ones(len(names), np.bool_)
-        told = NodeDoubt("", Weight.NOTED)
-        return np.array([self.doubts.get(name, told).weight < Weight.INVALID for name in names])
+        no_doubt = NodeDoubt("", Weight.NOTED)
+        return np.array([self.doubts.get(name, no_doubt).weight < Weight.INVALID for name in names])
 
 
 def bridged(last: Sweep | None, now: Sweep) -> list[Sweep]:

@@ -23,7 +23,7 @@ from common.log.streams import lossy
 PIPE_BYTES = 1 << 20
 LOOK_S = 0.1
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
-_TELLING = (b"unauthorized", b"intercepted", b"CertCommonName", b" WARN", b"\x1b[33m WARN")
+_RELEVANT = (b"unauthorized", b"intercepted", b"CertCommonName", b" WARN", b"\x1b[33m WARN")
 
 log = logging.getLogger(__name__)
 _heard: Refusals | None = None
@@ -63,8 +63,8 @@ def _listen(reading: int, refusals: Refusals) -> None:
         *lines, rest = (rest + os.read(reading, PIPE_BYTES)).split(b"\n")
         for line in lines:
             # most lines are messages that passed: one look, and nothing else holds the interpreter
-            if any(word in line for word in _TELLING):
+            if any(word in line for word in _RELEVANT):
                 text = _COLOURS.sub("", line.decode("utf-8", "replace"))
-                said = refusals.feed(text, monotonic_ns())
-                if said is not None:
-                    log.warning("%s", said)
+                refusal = refusals.feed(text, monotonic_ns())
+                if refusal is not None:
+                    log.warning("%s", refusal)

@@ -61,7 +61,7 @@ def align(
     Example: `tandem calibrate align session.mcap --profile nursing --out calibration`
     """
     from common.skeleton import load_skeleton
-    from deploy.calibrate.session import make_folder, tell_machines
+    from deploy.calibrate.session import make_folder, output_json
     from master.calibrate.alignment_files import of_profile
     from master.calibrate.recording import load_recordings
 
@@ -72,7 +72,7 @@ def align(
     nodes = of_profile(recorded, skeleton)
     found = align_to_files(nodes, skeleton, between, recording, out, Console(stderr=True))
     figures = as_report(found, recording)
-    tell_machines(figures, report, to_stdout=as_json)
+    output_json(figures, report, to_stdout=as_json)
     if not as_json:
         console = Console()
         console.print(nodes_table(found), joints_table(found))

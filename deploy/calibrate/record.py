@@ -14,7 +14,7 @@ from deploy.report.options import Overrides
 if TYPE_CHECKING:
     from master.config import MasterConfig
 
-_TELL_S = 0.2
+_PROGRESS_S = 0.2
 
 
 def record(
@@ -68,20 +68,20 @@ async def _record(
         if last is not None and ticks >= last:
             stop.set()
 
-    async def tell() -> None:
+    async def show_progress() -> None:
         with console.status("waiting for the suit") as status:
             while True:
                 took_s = ticks / config.capture.rate_hz
-                who = shared.heard(answered.tolist(), nodes)
-                status.update(f"recording, {took_s:6.1f} s: {who} (Ctrl-C ends it)")
-                await asyncio.sleep(_TELL_S)
+                heard_nodes = shared.heard(answered.tolist(), nodes)
+                status.update(f"recording, {took_s:6.1f} s: {heard_nodes} (Ctrl-C ends it)")
+                await asyncio.sleep(_PROGRESS_S)
 
     async def work() -> None:
-        telling = asyncio.create_task(tell())
+        showing = asyncio.create_task(show_progress())
         try:
             await shared.open_capture(config, on_sweep).run()
         finally:
-            telling.cancel()
+            showing.cancel()
 
     recorder = shared.open_recorder(config, out)
     try:

@@ -86,8 +86,8 @@ def show(method: NodeMethod[Result], results: NodeResults[Result], folder: Path,
     if not results.found:
         return
     console.print(method.table(results.found))
-    said = by_words((name, note) for name, node in results.found.items() for note in node.notes)
-    for note, names in said.items():
+    node_notes = by_words((name, note) for name, node in results.found.items() for note in node.notes)
+    for note, names in node_notes.items():
         console.print(Text(f"{', '.join(names)}: {note}", "yellow"))
     for name in results.found:
         console.print(Text(f"written: {folder / name}.toml", "dim"), soft_wrap=True)
@@ -106,7 +106,7 @@ def run_command(
     make_folder(folder)
     console = Console(stderr=True)
     results, figures = calibrate_to_files(method, recording, names or [], folder, console)
-    tell_machines(figures, report_file, to_stdout=as_json)
+    output_json(figures, report_file, to_stdout=as_json)
     if not as_json:
         show(method, results, folder, Console())
     refuse(results, recording)
@@ -132,14 +132,14 @@ def calibrate_nodes(
         for n, name in enumerate(chosen):
             progress.update(task, description=name)
 
-            def tell(share: float, before: int = n) -> None:
+            def report_progress(share: float, before: int = n) -> None:
                 progress.update(task, completed=before + share)
 
             try:
-                found[name] = calibrate(nodes[name], tell)
+                found[name] = calibrate(nodes[name], report_progress)
             except TandemError as error:
                 refused[name] = str(error)
-            tell(1.0)
+            report_progress(1.0)
     return NodeResults(found, refused)
 
 
@@ -179,7 +179,7 @@ def report(
     }
 
 
-def tell_machines(figures: Mapping[str, object], path: Path | None, *, to_stdout: bool) -> None:
+def output_json(figures: Mapping[str, object], path: Path | None, *, to_stdout: bool) -> None:
     """As JSON to a file, to the standard output, or both."""
     if path is not None:
         write_json(path, figures)
@@ -188,10 +188,10 @@ def tell_machines(figures: Mapping[str, object], path: Path | None, *, to_stdout
         Console().print(text, highlight=False, soft_wrap=True, markup=False)
 
 
-def by_words(said: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+def by_words(node_notes: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
     """Of (node, words): each words' nodes, so that what is true of a whole suit is said once."""
     nodes: dict[str, list[str]] = {}
-    for name, words in said:
+    for name, words in node_notes:
         nodes.setdefault(words, []).append(name)
     return nodes
 

@@ -88,10 +88,10 @@ def _begin(counter: Synchronized[int]) -> None:
 
 
 def _call(call: Callable[[Item, OnProgress], Result], item: Item) -> Result:
-    return call(item, _tell)
+    return call(item, _report)
 
 
-def _tell(count: int) -> None:
+def _report(count: int) -> None:
     assert _counter is not None
     with _counter.get_lock():
         _counter.value += count

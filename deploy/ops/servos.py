@@ -60,13 +60,13 @@ def as_table(found: SetUp) -> Table:
     """One row a servo."""
     table = Table("joint", "id", "found", title=f"quickest answer {1e3 * found.quickest_s:.1f} ms")
     for looked in found.servos:
-        said = [difference.words for difference in looked.different]
+        differences = [difference.words for difference in looked.different]
         if looked.written:
-            said = [
+            differences = [
                 f"{words.partition(', must')[0].replace(' is ', ' was ')}, is {d.wanted} now"
-                for words, d in zip(said, looked.different, strict=True)
+                for words, d in zip(differences, looked.different, strict=True)
             ]
-        words = "\n".join([*said, *([looked.wrong] if looked.wrong else [])]) or "as it must be"
+        words = "\n".join([*differences, *([looked.wrong] if looked.wrong else [])]) or "as it must be"
         table.add_row(looked.servo.joint, str(looked.servo.id), Text(words))
     return table
 

@@ -46,7 +46,7 @@ def video(
     if save is not None:
         save.mkdir(parents=True, exist_ok=True)
 
-    async def tell(stop: asyncio.Event) -> None:
+    async def watch_video(stop: asyncio.Event) -> None:
         seen = _ReceivedVideo(save)
         async with open_link(destination(connect, [robot], certificate=certificate).link, robot) as link:
             try:
@@ -65,7 +65,7 @@ def video(
         if not seen.watch.received:
             raise TandemError(f"{robot} sent no picture of {camera!r}: `[camera]` in its file, or its log")
 
-    run_until_stopped(tell)
+    run_until_stopped(watch_video)
 
 
 class _ReceivedVideo:

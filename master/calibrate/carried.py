@@ -58,7 +58,7 @@ class Carried:
     """(3, 3), A by least squares."""
     explained_by_matrix: float
     """Share that A explains, at most 1."""
-    signs_told: bool
+    signs_known: bool
     """Whether the best axes with any one of them negated would fit clearly worse."""
 
     @property
@@ -67,7 +67,7 @@ class Carried:
         return self.explained > _LEAST_EXPLAINED and self.left_over > _CLEARLY_BETTER
 
     @property
-    def told(self) -> bool:
+    def known(self) -> bool:
         """Whether the data tell anything: axes that are turned by other than quarter turns count too."""
         return self.explained_by_matrix > _LEAST_EXPLAINED
 

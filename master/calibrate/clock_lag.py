@@ -60,33 +60,33 @@ def check_lags(
     A joint that lags blames the end that has fewer joints in order; of two alike the child.
     """
     late: dict[int, list[float]] = {i: [] for i in range(len(names))}
-    good, told = dict.fromkeys(late, 0), dict.fromkeys(late, 0)
+    good, judged = dict.fromkeys(late, 0), dict.fromkeys(late, 0)
     for link, lag in zip(links, lags, strict=True):
         if lag is not None:
             for end in link:
-                told[end] += 1
+                judged[end] += 1
                 good[end] += abs(lag.seconds) <= WORST_LAG_S
     gains = dict.fromkeys(late, 0.0)
     for (parent, child), lag in zip(links, lags, strict=True):
         if lag is None or abs(lag.seconds) <= WORST_LAG_S:
             continue
-        share = {end: good[end] / told[end] for end in (parent, child)}
-        blamed = child if share[child] < share[parent] or _alone(share, told, parent, child) else parent
+        share = {end: good[end] / judged[end] for end in (parent, child)}
+        blamed = child if share[child] < share[parent] or _alone(share, judged, parent, child) else parent
         late[blamed].append(lag.seconds if blamed == child else -lag.seconds)
         gains[blamed] += math.log(lag.gain)
     return {
-        names[i]: (_evidence(float(np.median(late[i])) if late[i] else 0.0, told[i]), gains[i])
+        names[i]: (_evidence(float(np.median(late[i])) if late[i] else 0.0, judged[i]), gains[i])
         for i in range(len(names))
     }
 
 
-def _alone(share: dict[int, float], told: dict[int, int], parent: int, child: int) -> bool:
+def _alone(share: dict[int, float], judged: dict[int, int], parent: int, child: int) -> bool:
     """Both ends are equally bad: the one with more joints that say so is to blame, of two alike the child."""
-    return share[child] == share[parent] and told[child] >= told[parent]
+    return share[child] == share[parent] and judged[child] >= judged[parent]
 
 
-def _evidence(seconds: float, told: int) -> CrossCheck:
-    if not told:
+def _evidence(seconds: float, judged: int) -> CrossCheck:
+    if not judged:
         return not_judged(_COMPARED, "no joint of it moved enough")
     later = "later" if seconds > 0.0 else "earlier"
     return at_most(

@@ -36,7 +36,7 @@ class Axis:
     joint: int
     facing_rad: float
     sigma_rad: float
-    told: bool
+    known: bool
     """False: its sign is open, the facing may be half a turn off."""
 
 
@@ -94,12 +94,12 @@ def axes_by_node(
             _excess(skeleton, suit, i, joint, q_zero_pose, island, lead + turn) for turn in (0.0, math.pi)
         ]
         flip = math.pi if excess[1] < excess[0] else 0.0
-        told = abs(excess[1] - excess[0]) > _PLAIN_RAD
+        known = abs(excess[1] - excess[0]) > _PLAIN_RAD
         for name, axis_found in found:
             facing = axis_found.facing_rad
             if math.cos(facing - lead) < 0.0:
                 facing += math.pi
-            axis_found.facing_rad, axis_found.told = facing + flip, told
+            axis_found.facing_rad, axis_found.known = facing + flip, known
             out.setdefault(name, []).append(axis_found)
     return out
 
@@ -170,12 +170,12 @@ def facing_of(axes: dict[str, list[Axis]]) -> tuple[float, float] | None:
     Limbs are turned in or out alike on both sides: a pair of limbs says more than either.
     """
     every = [axis for mine in axes.values() for axis in mine]
-    told = [axis.facing_rad for axis in every if axis.told]
-    if not told:
+    known = [axis.facing_rad for axis in every if axis.known]
+    if not known:
         return None
-    about = _mean_angle(told)
+    about = _mean_angle(known)
     for axis in every:
-        if not axis.told and math.cos(axis.facing_rad - about) < 0.0:
+        if not axis.known and math.cos(axis.facing_rad - about) < 0.0:
             axis.facing_rad += math.pi
     by_segment = {name: _mean_angle([a.facing_rad for a in mine]) for name, mine in axes.items()}
     pairs = [
@@ -184,10 +184,12 @@ def facing_of(axes: dict[str, list[Axis]]) -> tuple[float, float] | None:
         if name.startswith("left_") and (other := name.replace("left_", "right_", 1)) in by_segment
     ]
     single = _ONE_LIMB_RAD if not pairs else _PAIR_RAD
-    said = pairs or list(by_segment.values())
-    facing = _mean_angle(said)
-    spread = math.sqrt(sum(math.remainder(s - facing, 2.0 * math.pi) ** 2 for s in said) / len(said))
-    return facing, max(single, spread) / math.sqrt(len(said))
+    estimates = pairs or list(by_segment.values())
+    facing = _mean_angle(estimates)
+    spread = math.sqrt(
+        sum(math.remainder(s - facing, 2.0 * math.pi) ** 2 for s in estimates) / len(estimates)
+    )
+    return facing, max(single, spread) / math.sqrt(len(estimates))
 
 
 def _mean_angle(angles_rad: list[float]) -> float:

@@ -47,12 +47,12 @@ def known_unit(norm: float, gravity_m_s2: float) -> CrossCheck:
 def acceleration_unit(norm: float, gravity_m_s2: float) -> CrossCheck:
     """The accelerometer's norm at rest against gravity."""
     known = known_unit(norm, gravity_m_s2)
-    said = f"the accelerometer reads {norm:.3g} m/s² at rest, not {gravity_m_s2:.3g}; "
+    reading = f"the accelerometer reads {norm:.3g} m/s² at rest, not {gravity_m_s2:.3g}; "
     return at_most(
         "norm of the acceleration at rest against gravity",
         abs(norm / gravity_m_s2 - 1.0),
         0.5,
-        advice=known.advice or f"{said}are its readings in m/s²?",
+        advice=known.advice or f"{reading}are its readings in m/s²?",
     )
 
 

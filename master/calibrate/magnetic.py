@@ -159,7 +159,7 @@ def calibrate_magnetic(
             f"±{1.96 * float(sigma[:, 3].max()):.2g} µT (95 %)"
         )
     rotation, words = _align(recording, mag, fit, accelerometer)
-    said = (*words, *unjudged(evidence))
+    remarks = (*words, *unjudged(evidence))
     if rotation is not None:
         sigma = rotation.widen(sigma, fit.affine)
     return MagneticCalibration(
@@ -170,7 +170,7 @@ def calibrate_magnetic(
         readings_ut=mag[known],
         hold_out_ut=hold_out,
         rotation=rotation,
-        notes=(*notes, *(("; ".join(said),) if said else ())),
+        notes=(*notes, *(("; ".join(remarks),) if remarks else ())),
         evidence=evidence,
         axes=axes,
     )

@@ -54,7 +54,7 @@ def axes_matrix(text: str) -> Array:
 def check_axes(recording: NodeRecording, field: Array, hemisphere: Hemisphere) -> list[CrossCheck]:
     """Compare calibrated magnetometer readings (T, 3), NaN where none are, with the other sensors."""
     found = carried(field, recording.gyr_rad_s, recording.rate_hz)
-    if found is None or not found.told:
+    if found is None or not found.known:
         return [not_judged(_WAYS, f"the recording does not decide; {_TURN}")]
     axes = found.axes if found.confused else np.eye(3)
     return [_handed(axes), _same_as_gravity(recording, found), *_signed(recording, field, found, hemisphere)]
@@ -76,7 +76,7 @@ def _handed(axes: Array) -> CrossCheck:
 def _same_as_gravity(recording: NodeRecording, found: Carried) -> CrossCheck:
     compared = "gyroscope's axes against gravity's turns"
     gravity = carried(recording.acc_m_s2, recording.gyr_rad_s, recording.rate_hz)
-    if gravity is None or not gravity.told:
+    if gravity is None or not gravity.known:
         return not_judged(compared, f"the accelerometer does not decide; {_TURN}")
     wrong = gravity.confused and found.confused and np.array_equal(gravity.axes, found.axes)
     return at_most(

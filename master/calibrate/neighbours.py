@@ -81,7 +81,7 @@ def check_order(fits: Fits, links: Sequence[tuple[int, int]]) -> CrossCheck:
         if len(links) < 2:
             return not_judged(compared, "fewer than two joints moved")
     order = list(range(len(fits.names)))
-    as_said = sum(rough[link] for link in links)
+    as_assigned = sum(rough[link] for link in links)
     best, pair = math.inf, (0, 0)
     for a, b in itertools.combinations(order, 2):
         swapped = order.copy()
@@ -92,11 +92,11 @@ def check_order(fits: Fits, links: Sequence[tuple[int, int]]) -> CrossCheck:
     one, other = (fits.names[i] for i in pair)
     return at_most(
         compared,
-        float(as_said) - best,
+        float(as_assigned) - best,
         _BETTER,
         advice=f"{one} and {other} seem to be exchanged: the suit's accelerations fit "
-        f"{math.exp(float(as_said) - best):.1f} times better with each in the other's place. Exchange the "
-        "two units, or their ids in the master's file, and record again",
+        f"{math.exp(float(as_assigned) - best):.1f} times better with each in the other's place. "
+        "Exchange the two units, or their ids in the master's file, and record again",
     )
 
 

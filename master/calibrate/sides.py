@@ -27,7 +27,7 @@ _KNOWN_M = 0.05
 def check_sides(skeleton: Skeleton, suit: Oriented, joints: list[JointFinding], ends: Ends) -> CrossCheck:
     """All pairs of limbs together, by their joints with the trunk."""
     compared = "the limbs' angles against their limits, this side and the other"
-    as_said = exchanged = 0.0
+    as_assigned = exchanged = 0.0
     pairs = 0
     for left in (n for n in ends if n.startswith("left_")):
         right = left.replace("left_", "right_", 1)
@@ -35,20 +35,20 @@ def check_sides(skeleton: Skeleton, suit: Oriented, joints: list[JointFinding], 
         if j is None or right not in ends or skeleton.segments[i].parent != skeleton.segments[j].parent:
             continue
         pairs += 1
-        as_said += _excess(skeleton, suit, ends, (i, i)) + _excess(skeleton, suit, ends, (j, j))
+        as_assigned += _excess(skeleton, suit, ends, (i, i)) + _excess(skeleton, suit, ends, (j, j))
         exchanged += _excess(skeleton, suit, ends, (i, j)) + _excess(skeleton, suit, ends, (j, i))
     if not pairs:
         return not_judged(compared, "no limb of either side is known")
     wrong_way = _wrong_way(joints, ends)
-    said = f"the limbs go {math.degrees(as_said / pairs):.0f}° beyond their limits on average, " + (
+    reason = f"the limbs go {math.degrees(as_assigned / pairs):.0f}° beyond their limits on average, " + (
         f"and {math.degrees(exchanged / pairs):.0f}° with left and right exchanged"
     )
-    figure = (as_said - exchanged) / pairs
-    if exchanged > 0.5 * as_said:
+    figure = (as_assigned - exchanged) / pairs
+    if exchanged > 0.5 * as_assigned:
         figure = min(figure, _WORST_RAD)
     if wrong_way is True:
         figure = max(figure, 2.0 * _WORST_RAD)
-        said = "the left joint's centre lies to the right of the right one's"
+        reason = "the left joint's centre lies to the right of the right one's"
     elif wrong_way is False:
         figure = min(figure, _WORST_RAD)
     return at_most(
@@ -56,7 +56,7 @@ def check_sides(skeleton: Skeleton, suit: Oriented, joints: list[JointFinding], 
         math.degrees(figure),
         math.degrees(_WORST_RAD),
         "°",
-        advice=f"left and right seem to be exchanged ({said}). Exchange the units of both sides, or their "
+        advice=f"left and right seem to be exchanged ({reason}). Exchange the units of both sides, or their "
         "ids in the master's file, and record again",
     )
 
@@ -86,8 +86,8 @@ def _wrong_way(joints: list[JointFinding], ends: Ends) -> bool | None:
         if name.startswith("left_") and (other := name.replace("left_", "right_", 1)) in sideways
         and _same_parent(joints, name, other)
     ]  # fmt: skip
-    told = [a for a in apart if abs(a) > _KNOWN_M]
-    return None if not told else sum(told) < 0.0
+    plain = [a for a in apart if abs(a) > _KNOWN_M]
+    return None if not plain else sum(plain) < 0.0
 
 
 def _same_parent(joints: list[JointFinding], one: str, other: str) -> bool:

@@ -116,7 +116,7 @@ def _axes(recording: NodeRecording, rates: Array, faces: SixFaces, turns: ThreeT
             advice=f"the gyroscope does not explain how gravity turns: {compare.whose(found.axes)}. Correct "
             "that in the driver, and record again",
         )
-    if found is None or not found.told or not found.signs_told:
+    if found is None or not found.known or not found.signs_known:
         return not_judged(
             _COMPARED,
             "the node was not recorded while each of its axes turned gravity; record the way from face to "

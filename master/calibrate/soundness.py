@@ -138,12 +138,12 @@ def clipped(samples: Array, least: float, run: int = _NOISY_RUN) -> Mask:
 
 def range_ends(samples: Array, where: Mask) -> str:
     """The axes that were clipped and at which value, for a message."""
-    said = []
+    bounds = []
     for name, values in zip(_AXES, samples.T, strict=True):
         if not where.any() or not np.isfinite(values).any():
             continue
         for end in (float(np.nanmax(values)), float(np.nanmin(values))):
             at = np.abs(values - end) <= _SAME * abs(end)
             if int((at & where).sum()) >= _NOISY_RUN:
-                said.append(f"{name} at {end:.4g}")
-    return ", ".join(said)
+                bounds.append(f"{name} at {end:.4g}")
+    return ", ".join(bounds)

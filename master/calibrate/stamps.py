@@ -70,7 +70,7 @@ def lay_out(where: str, time_s: Array) -> Grid:
         _check_loss(where, slots)
         rate, off = _line(slots, time)
         _check_even(where, slots, time, off)
-        notes = (_said(where, steps, rate, off, (int((~known).sum()), set_back)),)
+        notes = (_note(where, steps, rate, off, (int((~known).sum()), set_back)),)
     missing = int(slots[-1]) + 1 - len(slots)
     if missing:
         notes = (*notes, f"{where}: {missing} samples are missing by the times; their places stay empty")
@@ -197,7 +197,7 @@ def _slope(slots: Array, time: Array) -> float:
     return rise / max(float(np.median(slots[-tenth:]) - np.median(slots[:tenth])), 1e-9)
 
 
-def _said(where: str, steps: Array, rate_hz: float, off: Array, others: tuple[int, int]) -> str:
+def _note(where: str, steps: Array, rate_hz: float, off: Array, others: tuple[int, int]) -> str:
     without, set_back = others
     repeated, back = int(np.sum(steps == 0.0)), int(np.sum(steps < 0.0))
     words = []

@@ -103,14 +103,16 @@ def _complete(recording: NodeRecording) -> CrossCheck:
 
 def _gravity(norm: float) -> CrossCheck:
     """The unit of the accelerometer by its norm at rest."""
-    said = f"its accelerometer reads {norm:.4g} m/s² at rest; expected about 9.81"
+    reading = f"its accelerometer reads {norm:.4g} m/s² at rest; expected about 9.81"
     unit = next((u for u, one in _OTHER_UNITS.items() if abs(norm / one - 1.0) < 0.1), None)
     if unit is not None:
-        advice = f"{said}: these seem to be {unit}. Convert the recording to m/s², or set the node's scale"
+        advice = f"{reading}: these seem to be {unit}. Convert the recording to m/s², or set the node's scale"
     elif abs(norm / GRAVITY_M_S2 - 1.0) < 0.5:
-        advice = f"{said}. Calibrate it first (`tandem calibrate imu`)"
+        advice = f"{reading}. Calibrate it first (`tandem calibrate imu`)"
     else:
-        advice = f"{said}: another unit, raw counts, or it is broken. Look at the node's scale, or replace it"
+        advice = (
+            f"{reading}: another unit, raw counts, or it is broken. Look at the node's scale, or replace it"
+        )
     return at_most(
         "norm at rest against gravity", abs(norm / GRAVITY_M_S2 - 1.0), WORST_GRAVITY, advice=advice
     )

@@ -14,7 +14,7 @@ from common.quaternion import Array
 
 COUNTED_RAD = math.radians(5.0)
 """A segment farther from the operator's than this counts as beyond reach: the two never fit exactly."""
-_TOLD_RAD = math.radians(15.0)
+_REPORTED_RAD = math.radians(15.0)
 _LASTING_NS = to_ns(0.5)
 """What passes sooner is not worth a word."""
 _QUIET_NS = to_ns(10.0)
@@ -32,7 +32,7 @@ class BeyondReach:
         self._now_rad: Array = np.zeros(count)
         self._most_rad: Array = np.zeros(count)
         self._since_ns: dict[int, int] = {}
-        self._told_ns: dict[int, int] = {}
+        self._reported_ns: dict[int, int] = {}
 
     def note(self, now_ns: int, short_rad: Array) -> list[str]:
         """Take what each segment (N,) lacks of its posture; returns what to tell the operator."""
@@ -44,16 +44,16 @@ class BeyondReach:
         self._times += beyond
         np.maximum(self._most_rad, short, out=self._most_rad)
         self._since_ns = {i: self._since_ns.get(i, now_ns) for i in np.flatnonzero(beyond).tolist()}
-        said = []
+        messages = []
         for i, since_ns in self._since_ns.items():
-            quiet = i in self._told_ns and now_ns - self._told_ns[i] < _QUIET_NS
-            if short[i] > _TOLD_RAD and now_ns - since_ns >= _LASTING_NS and not quiet:
-                self._told_ns[i] = now_ns
-                said.append(
+            quiet = i in self._reported_ns and now_ns - self._reported_ns[i] < _QUIET_NS
+            if short[i] > _REPORTED_RAD and now_ns - since_ns >= _LASTING_NS and not quiet:
+                self._reported_ns[i] = now_ns
+                messages.append(
                     f"{self._names[i]}: the operator is {math.degrees(short[i]):.0f}° beyond what the robot "
                     "can reach; it stands at its nearest posture"
                 )
-        return said
+        return messages
 
     def metrics(self) -> dict[str, Unreached]:
         """The segments that were beyond reach."""

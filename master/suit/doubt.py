@@ -78,27 +78,27 @@ class DoubtLog:
     """Lines for the log: when a doubt begins, changes its weight or ends, and at times its newer words."""
 
     def __init__(self) -> None:
-        self._said: dict[str, tuple[NodeDoubt, int]] = {}
+        self._logged: dict[str, tuple[NodeDoubt, int]] = {}
 
     def lines(self, doubts: Doubts, now_ns: int) -> list[str]:
         """What to log now."""
-        if not doubts and not self._said:
+        if not doubts and not self._logged:
             return []
         new: dict[NodeDoubt, list[str]] = {}
         for node, doubt in doubts.items():
-            said, said_ns = self._said.get(node, (None, 0))
-            if said == doubt:
+            logged, logged_ns = self._logged.get(node, (None, 0))
+            if logged == doubt:
                 continue
-            stale = now_ns - said_ns > to_ns(_AGAIN_S)
-            if said is None or said.weight != doubt.weight or stale:
-                self._said[node] = doubt, now_ns
+            stale = now_ns - logged_ns > to_ns(_AGAIN_S)
+            if logged is None or logged.weight != doubt.weight or stale:
+                self._logged[node] = doubt, now_ns
                 new.setdefault(doubt, []).append(node)
         out = [
             f"node {_names(nodes)}: {doubt.words}{_CONSEQUENCE[doubt.weight]}" for doubt, nodes in new.items()
         ]
-        gone = [name for name in self._said if name not in doubts]
+        gone = [name for name in self._logged if name not in doubts]
         for node in gone:
-            del self._said[node]
+            del self._logged[node]
         return [*out, f"node {_names(gone)}: believed again"] if gone else out
 
 

@@ -135,10 +135,10 @@ class Intake:
 
     def _judge(self, got: Mask, status: NDArray[np.uint8], counters: NodeCounters) -> NodeAnswers:
         answered: Mask = np.logical_and.reduce(self._by_node(got), axis=1)
-        said = np.bitwise_or.reduce(self._by_node(status), axis=1)
-        fault = answered & (said & NodeStatus.FAULT > 0)
+        status_bits = np.bitwise_or.reduce(self._by_node(status), axis=1)
+        fault = answered & (status_bits & NodeStatus.FAULT > 0)
         counters.faults[self.rows] += fault
-        saturated = answered & (said & NodeStatus.SATURATED > 0)
+        saturated = answered & (status_bits & NodeStatus.SATURATED > 0)
         counters.saturated[self.rows] += saturated
         return NodeAnswers(answered & ~fault, answered, self._by_node(self._raw), saturated, fault, fault)
 

@@ -208,12 +208,12 @@ class PlausibilityWatch:
 
     def _find_clipped(self, low: Array, high: Array, found: dict[int, str]) -> None:
         ends = (high[:, :6] >= self._top) | (low[:, :6] <= -self._top)
-        said = self._saturated.sum(axis=0) >= _CLIPPED_ACC * self._rows
-        if not (ends.any() or said.any()):
+        reported = self._saturated.sum(axis=0) >= _CLIPPED_ACC * self._rows
+        if not (ends.any() or reported.any()):
             return
         share = (np.abs(self._ring[..., :6]) >= self._top).mean(axis=0)
         clipped = share >= np.repeat([_CLIPPED_ACC, _CLIPPED_GYR], 3)
-        for node in np.flatnonzero(clipped.any(axis=1) | said):
+        for node in np.flatnonzero(clipped.any(axis=1) | reported):
             axes = np.flatnonzero(clipped[node])
             which = _axes(axes) if len(axes) else "a reading is"
             found[int(node)] = f"{which} saturated: at the end of its range"
@@ -265,12 +265,12 @@ class PlausibilityWatch:
 def _frozen_words(counts: Array, repeats: Mask) -> str:
     which = {(True, True): "", (True, False): "its accelerometer ", (False, True): "its gyroscope "}
     part = which[bool(repeats[0]), bool(repeats[1])]
-    said = np.rint(np.concatenate([counts[3 * k : 3 * k + 3] for k in range(2) if repeats[k]]))
-    if (said == 0.0).all():
+    reported = np.rint(np.concatenate([counts[3 * k : 3 * k + 3] for k in range(2) if repeats[k]]))
+    if (reported == 0.0).all():
         return f"{part}reads zero on every axis: no power, asleep or just reset"
-    if (said == -1.0).all():
+    if (reported == -1.0).all():
         return f"{part}reads all ones (-1 on every axis): nothing drives its sensor's bus"
-    if (np.abs(said) >= 32767.0).all():
+    if (np.abs(reported) >= 32767.0).all():
         return f"{part}is saturated on every axis"
     return f"{part}is frozen: repeats one reading; its sensor or the bus to it hangs"
 

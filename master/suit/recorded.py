@@ -84,10 +84,10 @@ def read_sweeps(path: Path) -> Sweeps:
     return Sweeps(nodes, rate_hz, readings, recording.cut)
 
 
-def _described(path: Path, said: dict[str, str]) -> tuple[tuple[str, ...], float]:
+def _described(path: Path, entries: dict[str, str]) -> tuple[tuple[str, ...], float]:
     try:
-        nodes = json.loads(said["nodes"])
-        rate_hz = float(said["rate_hz"])
+        nodes = json.loads(entries["nodes"])
+        rate_hz = float(entries["rate_hz"])
         if not nodes or not all(isinstance(name, str) for name in nodes) or not 0.0 < rate_hz < 1e5:
             raise ValueError
     except (KeyError, ValueError, TypeError):

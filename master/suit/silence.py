@@ -64,7 +64,7 @@ class SilenceWatch:
 
     def __init__(self) -> None:
         self._before: dict[str, BusSigns] = {}
-        self._said: dict[str, tuple[str, int]] = {}
+        self._logged: dict[str, tuple[str, int]] = {}
 
     def lines(self, buses: dict[str, BusSigns], now_ns: int) -> list[str]:
         """What to log now, a line a bus."""
@@ -73,10 +73,10 @@ class SilenceWatch:
             before = self._before.get(name)
             self._before[name] = signs
             words = advice(before, signs) if before is not None and before.up else ""
-            said, said_ns = self._said.get(name, ("", -AGAIN_NS))
+            logged, logged_ns = self._logged.get(name, ("", -AGAIN_NS))
             if not words:
-                self._said.pop(name, None)
-            elif words != said or now_ns - said_ns >= AGAIN_NS:
-                self._said[name] = words, now_ns
+                self._logged.pop(name, None)
+            elif words != logged or now_ns - logged_ns >= AGAIN_NS:
+                self._logged[name] = words, now_ns
                 out.append(f"bus {name}: {words}")
         return out

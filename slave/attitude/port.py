@@ -56,7 +56,7 @@ class FrameReader:
         self._clock = clock
         self._parser = FrameParser()
         self._failures = 0
-        self._say = LogThrottle()
+        self._throttle = LogThrottle()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -97,7 +97,7 @@ class FrameReader:
             # TypeError: pyserial's own where the port is closed under a read
             except (OSError, TypeError, serial.SerialException, RobotError) as error:
                 self._failures += 1
-                if self._say.passes(self._clock()):
+                if self._throttle.passes(self._clock()):
                     log.warning("%s: %s", self._where[0], error)
                 if port is not None:
                     port.close()

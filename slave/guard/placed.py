@@ -115,12 +115,12 @@ class Placement:
         far = ~(np.abs(position_rad - self._known_rad) <= NEAR_RAD)
         if not far.any():
             return None
-        said = []
+        unconfirmed = []
         for j in np.flatnonzero(far).tolist():
             known = self._known_rad[j]
             before = "no earlier angle known" if np.isnan(known) else f"last known at {_deg(known)}"
-            said.append(f"{self._names[j]} reads {_deg(position_rad[j])}, {before}")
-        return f"compare with the robot, then confirm its posture by `tandem home`: {'; '.join(said)}"
+            unconfirmed.append(f"{self._names[j]} reads {_deg(position_rad[j])}, {before}")
+        return f"compare with the robot, then confirm its posture by `tandem home`: {'; '.join(unconfirmed)}"
 
 
 def _deg(angle_rad: float) -> str:

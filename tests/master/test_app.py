@@ -83,6 +83,6 @@ def test_a_capture_loop_that_hangs_does_not_feed_it(
 
 def test_what_is_told_beside_it_is_words_and_no_sign_of_life(master: tuple[app.Master, Counting]) -> None:
     running, notifier = master
-    asyncio.run(running._tell())
+    asyncio.run(running._publish_metrics())
     assert set(notifier.said) == {"robot-1: not heard"}
     assert notifier.beats == 0

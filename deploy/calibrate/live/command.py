@@ -62,7 +62,7 @@ def live(
     from common.errors import TandemError
     from deploy.calibrate.live.compute import Choice, compute
     from deploy.calibrate.live.guide import GuideOptions
-    from deploy.calibrate.session import make_folder, tell_machines
+    from deploy.calibrate.session import make_folder, output_json
     from master.calibrate.magnetometer_axes import hemisphere_named
     from master.config import MasterConfig
 
@@ -75,7 +75,7 @@ def live(
     session = _guided(checked, options, out, console)
     choice = Choice(wanted, gravity, still_s, hemisphere_named(hemisphere), pictures)
     figures, refusals = compute(checked, session, choice, out, console)
-    tell_machines(figures, report, to_stdout=as_json)
+    output_json(figures, report, to_stdout=as_json)
     if refusals:
         raise TandemError("\n".join(refusals))
 

@@ -59,7 +59,7 @@ class LiveSession:
         self._recorder: McapRecorder | None = None
         self._recorders: list[McapRecorder] = []
         self._ticks = 0
-        self._said_s = -_LOG_S
+        self._logged_s = -_LOG_S
         self.session = LiveRecordings()
 
     async def run(self, stop: asyncio.Event) -> None:
@@ -145,8 +145,8 @@ class LiveSession:
         now_s = self._ticks / self._config.capture.rate_hz
         if self._console.is_terminal:
             live.update(screen(view, self._names, now_s), refresh=True)
-        elif view.step != before or now_s >= self._said_s + _LOG_S:
-            self._said_s = now_s
+        elif view.step != before or now_s >= self._logged_s + _LOG_S:
+            self._logged_s = now_s
             self._log(view, now_s)
 
     def _log(self, view: View, now_s: float) -> None:

@@ -184,7 +184,7 @@ class ZeroPoseStep:
     def __init__(self, nodes: int, zero_pose_s: float, wait_for_word: bool) -> None:
         """With `wait_for_word` the zero pose counts only once the person says so."""
         self._wanted_s = zero_pose_s
-        self._said = not wait_for_word
+        self._confirmed = not wait_for_word
         if wait_for_word:
             self.todo += " Press Enter as you begin."
         self._rest_s = 0.0
@@ -195,7 +195,7 @@ class ZeroPoseStep:
 
     def word(self) -> None:
         """The person says: I stand."""
-        self._said = True
+        self._confirmed = True
 
     def add(self, window: ReadingsWindow) -> None:
         """Take the next window of readings."""
@@ -203,7 +203,7 @@ class ZeroPoseStep:
         if self._rest_s >= self._wanted_s:
             return
         self._still = window.still | ~window.answered
-        if self._said and self._still.all() and window.answered.any():
+        if self._confirmed and self._still.all() and window.answered.any():
             self._rest_s += window.seconds
             self._mean_rates.append(window.mean[:, 3:6])
         else:

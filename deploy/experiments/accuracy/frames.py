@@ -79,13 +79,13 @@ def hint(q_world_from_sensor: Array, truth: Array, counts: Mask) -> str | None:
     if now < _WORTH_RAD:
         return None
     # plain readings first: two rotations beside a conjugate would imitate another order of the elements
-    for aligned, (said, read) in product((False, True), READINGS):
+    for aligned, (reading, read) in product((False, True), READINGS):
         if not aligned and read is _as_it_is:
             continue
         other = read(t)
         left = _rms(q, fit(q, other, all_).applied(other) if aligned else other)
         if left < _EXPLAINS * now:
-            what = " and ".join([*([said] if said else []), *(["with --align"] if aligned else [])])
+            what = " and ".join([*([reading] if reading else []), *(["with --align"] if aligned else [])])
             return f"{_deg(now)}° in all would be {_deg(left)}° {what}"
     return None
 

@@ -95,7 +95,7 @@ def hinge(
 
     Example: `tandem accuracy hinge knee.npz --report knee.json --picture knee.png`
     """
-    from deploy.calibrate.session import tell_machines
+    from deploy.calibrate.session import output_json
     from master.calibrate.hinge_pair import find_hinge_pair, without_gaps
     from master.orientation.hinge_angle import HingeAngleConfig, hinge_angles
 
@@ -109,7 +109,7 @@ def hinge(
     sign = 1.0 if track.angle_rad.max() >= -track.angle_rad.min() else -1.0
     angle = sign * track.angle_rad
     found = report_of(pair, angle, sign, file, one.rate_hz)
-    tell_machines(asdict(found), report, to_stdout=as_json)
+    output_json(asdict(found), report, to_stdout=as_json)
     if picture is not None:
         draw(angle, track.deviation_rad, one.rate_hz, picture)
     if not as_json:

@@ -138,11 +138,11 @@ def judge(
     return AccuracyReport(files, panels)
 
 
-def _run(work: tuple[Path, str], tell: OnProgress) -> Array:
+def _run(work: tuple[Path, str], report_progress: OnProgress) -> Array:
     """Orientations (T, 4) of one recording by one filter."""
     path, name = work
     trial = load_trial(path)
-    return run_online(trial, _filter(trial, name), tell).q_world_from_sensor
+    return run_online(trial, _filter(trial, name), report_progress).q_world_from_sensor
 
 
 def _filter(trial: Trial, name: str) -> OrientationFilter:

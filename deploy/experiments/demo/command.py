@@ -90,7 +90,7 @@ def demo(
         strategy=strategy, filter=filter_, seed=seed, robots=robots, servos=servos, camera=camera,
     )  # fmt: skip
 
-    async def tell(stop: asyncio.Event) -> None:
+    async def run_and_report(stop: asyncio.Event) -> None:
         result = await run_demo(options, stop, console)
         if report is not None:
             write_json(report, report_tree(result))
@@ -101,4 +101,4 @@ def demo(
         if result.problems:
             raise TandemError("the demo failed: " + "; ".join(result.problems))
 
-    run_until_stopped(tell)
+    run_until_stopped(run_and_report)

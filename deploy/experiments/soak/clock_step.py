@@ -23,8 +23,8 @@ async def why_not() -> str:
     except OSError as error:
         return f"a clock is stepped by `unshare --time`: {error.strerror}"
     if status != 0:
-        said = err.decode("utf-8", "replace").strip().splitlines()
-        return f"`unshare --time` is refused: {said[-1] if said else status}"
+        lines = err.decode("utf-8", "replace").strip().splitlines()
+        return f"`unshare --time` is refused: {lines[-1] if lines else status}"
     if int(out) - monotonic_ns() < PROBE_S * NS_PER_S // 2:
         return "`unshare --time` leaves the clock as it is: the kernel is older than 6.0"
     return ""

@@ -93,7 +93,7 @@ def soak(
         console.print(table)
         return
     if judge is not None:
-        _tell(judge_soak(judge), judge, console)
+        _report(judge_soak(judge), judge, console)
         return
     options = SoakOptions(
         seconds(duration), transport, profile, router, faults=tuple(chosen(faults)), every_s=every, seed=seed
@@ -103,10 +103,10 @@ def soak(
 
         folder = folder_for(report, Path(temporary))
         run_until_stopped(lambda stop: _soak(options, folder, stop, console), shutdown_s=REPORT_S)
-        _tell(judge_soak(folder), folder if report is not None else None, console)
+        _report(judge_soak(folder), folder if report is not None else None, console)
 
 
-def _tell(judged: JudgedSoak, folder: Path | None, console: Console) -> None:
+def _report(judged: JudgedSoak, folder: Path | None, console: Console) -> None:
     from deploy.experiments.soak.report.write import write_report
     from deploy.measure.verdict import counts, failed, verdict_table
 
@@ -121,7 +121,7 @@ def _tell(judged: JudgedSoak, folder: Path | None, console: Console) -> None:
         raise TandemError("the soak failed: " + "; ".join(f"{v.group}: {v.name}" for v in wrong))
 
 
-def _say(event: AnyEvent, console: Console) -> None:
+def _print_event(event: AnyEvent, console: Console) -> None:
     """In a log file, which shows no live table, print each event as a line."""
     from deploy.experiments.soak.view import HIDDEN, line
 
@@ -159,7 +159,7 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
         log: SoakLog | None = None
         watch = Watch(rig.skeleton, lambda what: log.add(what) if log else None)
         stage = Stage(rig, watch, lambda what: log.add(what) if log else None)
-        log = SoakLog(folder, [*stage.names, SOAK], on_event=lambda event: _say(event, console))
+        log = SoakLog(folder, [*stage.names, SOAK], on_event=lambda event: _print_event(event, console))
         stack.callback(log.close)
         watch.listen(rig.link())
         how, error = "interrupted", False

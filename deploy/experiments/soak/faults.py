@@ -103,11 +103,11 @@ async def _restart_recorder(case: FaultCase) -> None:
 async def _lose_node(case: FaultCase) -> None:
     nodes = case.stage.rig.skeleton.segment_names
     case.node = case.draw.choice(nodes)
-    await case.stage.tell_suit(f'lose = [{{ node = "{case.node}" }}]')
+    await case.stage.inject_suit_faults(f'lose = [{{ node = "{case.node}" }}]')
 
 
 async def _find_node(case: FaultCase) -> None:
-    await case.stage.tell_suit("")
+    await case.stage.inject_suit_faults("")
 
 
 async def _fill_disk(case: FaultCase) -> None:

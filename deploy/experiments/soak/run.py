@@ -70,13 +70,13 @@ class Soak:
     async def run(self) -> None:
         """Raises TandemError where it cannot begin, or a process ends again and again."""
         sampling = asyncio.create_task(self._sample())
-        telling = asyncio.create_task(self._story())
+        injecting = asyncio.create_task(self._story())
         try:
-            done, _ = await asyncio.wait({sampling, telling}, return_when=asyncio.FIRST_COMPLETED)
+            done, _ = await asyncio.wait({sampling, injecting}, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
                 task.result()
         finally:
-            for task in (sampling, telling):
+            for task in (sampling, injecting):
                 task.cancel()
                 with suppress(asyncio.CancelledError, TandemError):
                     await task

@@ -57,7 +57,7 @@ class Stage:
         self.meant.discard(name)
         return await self.children[name].stop()
 
-    async def tell_suit(self, faults: str) -> None:
+    async def inject_suit_faults(self, faults: str) -> None:
         """Give the suit's nodes these faults, as TOML. Raises TandemError where it does not take them."""
         for _ in range(3):
             try:

@@ -1,4 +1,4 @@
-"""`tandem engage|disengage|estop|reset|home|status`: a person's acts, and what came of them."""
+"""`tandem engage|disengage|estop|reset|home|status`: a person's commands, and their results."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from common.process.runtime import run as run_until_stopped
 from common.wire.messages import Action
 from deploy.client.certificate import Certificate
 from deploy.client.destination import Destination, destination
-from deploy.ops.control.teller import Say, telling
+from deploy.ops.control.printer import PrintLine, line_printer
 from deploy.report.options import AsJson
 
 Connect = Annotated[
@@ -82,16 +82,16 @@ def estop(
     if not (all_ or where.robots):
         raise TandemError("which robot? Name it by --robot, or stop every one by --all")
 
-    async def tell(say: Say) -> None:
+    async def stop_all(print_line: PrintLine) -> None:
         try:
-            said = await stop_robots(where, all_, lambda answer: say(answer.line))
+            answers = await stop_robots(where, all_, lambda answer: print_line(answer.line))
         except LinkError as error:
             raise TandemError(f"NO ROBOT IS STOPPED BY THIS: {error}. Stop it at the robot itself") from None
-        failed = [answer for answer in said if not answer.done]
+        failed = [answer for answer in answers if not answer.done]
         if failed:
             raise TandemError("NOT EVERY ROBOT IS STOPPED: " + "; ".join(answer.line for answer in failed))
 
-    _carry_out(tell)
+    _carry_out(stop_all)
 
 
 def reset(
@@ -159,7 +159,7 @@ def status(
 
     where = _named(destination(connect, robot, master=master, certificate=certificate))
 
-    async def tell() -> None:
+    async def print_status() -> None:
         robots = await ask_status(where)
         if as_json:
             typer.echo(
@@ -176,7 +176,7 @@ def status(
         if silent:
             raise TandemError("; ".join(silent))
 
-    _run(tell)
+    _run(print_status)
 
 
 COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, home, status)
@@ -186,17 +186,17 @@ COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, home
 def _act(action: Action, where: Destination, key: str = "") -> None:
     from deploy.client.ask import ask_robots
 
-    async def tell(say: Say) -> None:
+    async def ask(print_line: PrintLine) -> None:
         answers = await ask_robots(where, action, key)
         for answer in answers:
             if answer.guard:
-                say(answer.line)
+                print_line(answer.line)
         silent = [f"{a.robot} {a.text}" for a in answers if not a.guard]
         refused = [f"{a.robot}: {action} was refused: {a.text}" for a in answers if a.guard and not a.done]
         if silent or refused:
             raise TandemError("\n".join([*silent, *refused]))
 
-    _carry_out(tell)
+    _carry_out(ask)
 
 
 def _named(where: Destination) -> Destination:
@@ -218,14 +218,14 @@ def _holder(
     return where
 
 
-def _carry_out(act: Callable[[Say], Coroutine[object, object, None]]) -> None:
-    """Run an act to its end, whatever becomes of the terminal: closed, full, paused."""
-    with telling() as say:
-        _run(lambda: act(say), hangup_stops=False)
+def _carry_out(act: Callable[[PrintLine], Coroutine[object, object, None]]) -> None:
+    """Run a command to its end, even if the terminal is closed, full or paused."""
+    with line_printer() as print_line:
+        _run(lambda: act(print_line), hangup_stops=False)
 
 
 def _run(work: Callable[[], Coroutine[object, object, None]], hangup_stops: bool = True) -> None:
-    """Run it; a Ctrl-C ends it, and says that it is not known what the robot did."""
+    """Run the work. Ctrl-C ends it with the error that the robot's reaction is not known."""
 
     async def main(stop: asyncio.Event) -> None:
         working = asyncio.create_task(work())

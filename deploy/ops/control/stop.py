@@ -29,7 +29,7 @@ SETTLE_S = 0.5
 
 OnAnswer = Callable[[Answered], None]
 AskAll = Callable[[bytes, OnAnswer], Awaitable[object]]
-Tell = Callable[[RobotAnswer], None]
+ReportAnswer = Callable[[RobotAnswer], None]
 
 log = logging.getLogger(__name__)
 
@@ -39,20 +39,20 @@ async def repeat_until_stopped(
     count: StopCount,
     payload: bytes,
     settled: asyncio.Event,
-    tell: Tell,
+    report: ReportAnswer,
     repeat_s: float = REPEAT_S,
 ) -> None:
     """Ask until the count is complete once it is `settled` which robots there are. It ends by itself only so.
 
-    `tell` hears each acknowledgement once, as it comes.
+    `report` hears each acknowledgement once, as it comes.
     """
     under_way: set[asyncio.Task[None]] = set()
 
     def on_answer(answered: Answered) -> None:
         answer = read_stop_answer(answered.payload)
-        said = None if answer is None else count.on_answer(answer, answered.replier)
-        if said is not None:
-            tell(said)
+        acknowledged = None if answer is None else count.on_answer(answer, answered.replier)
+        if acknowledged is not None:
+            report(acknowledged)
 
     async def ask() -> None:
         with suppress(LinkError):
@@ -69,18 +69,18 @@ async def repeat_until_stopped(
 
 
 async def stop_robots(
-    where: Destination, everyone: bool, tell: Tell = lambda _: None, within_s: float = WITHIN_S
+    where: Destination, everyone: bool, report: ReportAnswer = lambda _: None, within_s: float = WITHIN_S
 ) -> list[RobotAnswer]:
     """Stop the named robots and, with `everyone`, all that show themselves at the endpoints.
 
-    `tell` hears each answer as soon as it is known. An endpoint where no robot showed itself is an answer
+    `report` hears each answer as soon as it is known. An endpoint where no robot showed itself is an answer
     that is not done. Raises LinkError where the link cannot be opened at all.
     """
     endpoints = where.link.connect
     # through routers one that answers is all: it leads to every robot
     doors = 1 if where.link.mode == "client" else len(endpoints)
     async with open_session(where.link, router_within_s=within_s) as session:
-        stopping = _Stopping(session, where.operator, tell, within_s)
+        stopping = _Stopping(session, where.operator, report, within_s)
         for robot in where.robots:
             stopping.stop(robot)
         session.watch_presence(lambda presence, here: stopping.on_presence(presence, here, everyone))
@@ -93,20 +93,20 @@ async def stop_robots(
             text = f"NOT REACHED: {many} ({', '.join(endpoints)}); robots there are not stopped"
             # where robots were named, each of them has answered or is said not to have
             answers.append(RobotAnswer("", not everyone, text))
-            tell(answers[-1])
+            report(answers[-1])
         elif everyone and not answers:
             answers.append(RobotAnswer("", False, "NO ROBOT STOPPED: no robot was found at the endpoints"))
-            tell(answers[-1])
+            report(answers[-1])
     return answers
 
 
 class _Stopping:
     """The stops under way, one a name."""
 
-    def __init__(self, session: LinkSession, operator: str, tell: Tell, within_s: float) -> None:
+    def __init__(self, session: LinkSession, operator: str, report: ReportAnswer, within_s: float) -> None:
         self._session = session
         self._operator = operator
-        self._tell = tell
+        self._report = report
         self._within_s = within_s
         self.settled = asyncio.Event()
         """Whether all who are there have had the time to show themselves."""
@@ -142,9 +142,9 @@ class _Stopping:
 
         with suppress(TimeoutError):
             async with asyncio.timeout(self._within_s):
-                await repeat_until_stopped(ask_all, count, payload, self.settled, self._tell)
+                await repeat_until_stopped(ask_all, count, payload, self.settled, self._report)
         for answer in count.failures():
-            self._tell(answer)
+            self._report(answer)
         if (namesakes := count.namesakes()) is not None:
             log.warning("%s", namesakes)
 

@@ -24,14 +24,14 @@ class StopCount:
 
     def on_answer(self, answer: StopAnswer, session: str) -> RobotAnswer | None:
         """Take an answer; what to tell, where it is an acknowledgement that is new."""
-        who = answer.instance or session
-        if not answer.stopped or who in self._stopped:
+        replier = answer.instance or session
+        if not answer.stopped or replier in self._stopped:
             return None
         shown = self._shown.get(answer.instance)
         place = shown.words if shown is not None and self._several else ""
-        told = RobotAnswer(self._robot, True, answer.text, answer.guard, answer.instance, place)
-        self._stopped[who] = told
-        return told
+        acknowledged = RobotAnswer(self._robot, True, answer.text, answer.guard, answer.instance, place)
+        self._stopped[replier] = acknowledged
+        return acknowledged
 
     @property
     def complete(self) -> bool:

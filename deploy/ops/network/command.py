@@ -86,7 +86,7 @@ def verify(
                 progress.advance(task)
 
     run(lambda stop: until_stopped(stop, work()))
-    _tell(measured, seconds, console)
+    _report(measured, seconds, console)
     if report is not None:
         write_json(report, {"seconds": seconds, "profiles": [each.tree() for each in measured]})
     if len(measured) < len(chosen):
@@ -102,7 +102,7 @@ async def _measure(profile: Profile, seconds: float, backend: Backend) -> Measur
         return await measure(network, seconds)
 
 
-def _tell(measured: list[Measured], seconds: float, console: Console) -> None:
+def _report(measured: list[Measured], seconds: float, console: Console) -> None:
     if not measured:
         return
     console.print(measured_table(measured))

@@ -110,11 +110,11 @@ async def _start(host: EmulatedHost, plan: ProbePlan) -> asyncio.subprocess.Proc
 
 
 async def _noted(host: EmulatedHost, process: asyncio.subprocess.Process, word: bytes) -> ProbeResult:
-    said, failed = await process.communicate(word)
+    output, failed = await process.communicate(word)
     if process.returncode:
         words = failed.decode(errors="replace").strip().splitlines()[-1:]
         raise NetworkError(f"the probe on the {host.name}'s host ended: {' '.join(words)}")
-    return from_tree(ProbeResult, json.loads(said))
+    return from_tree(ProbeResult, json.loads(output))
 
 
 def _loss_percent(before: Counters, after: Counters) -> float | None:

@@ -66,8 +66,8 @@ def record(
 
     async def work(stop: asyncio.Event) -> None:
         with console.status("waiting for the robot") as status:
-            said = await record_until(options, stop, status.update, metrics_writer(metrics))
-        console.print(said, highlight=False)
+            summary = await record_until(options, stop, status.update, metrics_writer(metrics))
+        console.print(summary, highlight=False)
 
     run_until_stopped(work)
 

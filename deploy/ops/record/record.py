@@ -24,7 +24,7 @@ from deploy.ops.record.tape import Tape
 
 LIVE = (COMMAND, STATE, STATISTICS)
 """What is always recorded."""
-TELL_S = 0.5
+PROGRESS_S = 0.5
 
 
 class ObserverConfig(Section):
@@ -99,7 +99,7 @@ class Taken:
 async def record(
     options: RecordOptions,
     stop: asyncio.Event,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
     write_metrics: WriteMetrics = lambda _: None,
 ) -> str:
     """Record until `stop` is set or the time is over; what was recorded, in words.
@@ -121,18 +121,20 @@ async def record(
         async with open_link(options.link, options.robot) as link:
             for topic in options.topics:
                 link.subscribe(topic, partial(_take, tape, taken, topic, options.name(topic)))
-            await until_stopped(stop, _wait(options.seconds, tape, lambda: _tell(tape, taken, tell)))
+            await until_stopped(
+                stop, _wait(options.seconds, tape, lambda: _report_progress(tape, taken, report))
+            )
     finally:
         await tape.close()
         overwritten = _overwritten(link)
         write_metrics(_metrics(tape, taken, overwritten))
     _check(options, tape, taken, overwritten)
-    said = f"{options.out}: {taken.words(tape, monotonic_ns()).strip()}"
+    summary = f"{options.out}: {taken.words(tape, monotonic_ns()).strip()}"
     if overwritten:
-        said += f"; {overwritten} came too fast to be taken one by one"
+        summary += f"; {overwritten} came too fast to be taken one by one"
     if COMMAND.name not in taken.counts:
-        said += "; no commands: connect to where the master listens too"
-    return said
+        summary += "; no commands: connect to where the master listens too"
+    return summary
 
 
 def _take(tape: Tape, taken: Taken, topic: Topic, key: str, payload: bytes, arrived_ns: int) -> None:
@@ -147,11 +149,11 @@ async def _wait(seconds: float | None, tape: Tape, each: Callable[[], None]) -> 
     while end_s is None or loop.time() < end_s:
         each()
         await tape.turn()
-        await asyncio.sleep(TELL_S if end_s is None else max(0.0, min(TELL_S, end_s - loop.time())))
+        await asyncio.sleep(PROGRESS_S if end_s is None else max(0.0, min(PROGRESS_S, end_s - loop.time())))
 
 
-def _tell(tape: Tape, taken: Taken, tell: Callable[[str], None]) -> None:
-    tell(f"recording, {taken.words(tape, monotonic_ns())} (Ctrl-C ends it)")
+def _report_progress(tape: Tape, taken: Taken, report: Callable[[str], None]) -> None:
+    report(f"recording, {taken.words(tape, monotonic_ns())} (Ctrl-C ends it)")
 
 
 def _overwritten(link: Link | None) -> int:

@@ -92,7 +92,7 @@ class DrivePeer:
         addressed = self._by_id.get((bus, frame_id))
         if addressed is not None:
             for i in addressed:
-                self._tell(i, frame_id, data, now_ns)
+                self._pass_frame(i, frame_id, data, now_ns)
                 if frame_id != pdo.RPDO1 + self.drives[i].id:
                     self._take_in_settings(i)
             if frame_id & 0x780 == pdo.RPDO1:
@@ -101,10 +101,10 @@ class DrivePeer:
             self._on_sync(bus, now_ns)
         elif frame_id == pdo.NMT or frame_id & 0x780 == pdo.HEARTBEAT:
             for i in self._on_bus.get(bus, ()):
-                self._tell(i, frame_id, data, now_ns)
+                self._pass_frame(i, frame_id, data, now_ns)
         self._follow_states()
 
-    def _tell(self, i: int, frame_id: int, data: bytes, now_ns: int) -> None:
+    def _pass_frame(self, i: int, frame_id: int, data: bytes, now_ns: int) -> None:
         self.drives[i].on_frame(frame_id, data, now_ns)
         if i in self._twins:
             self._twins[i].on_frame(frame_id, data, now_ns)

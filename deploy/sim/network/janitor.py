@@ -30,11 +30,11 @@ class Janitor:
     def remove(self) -> None:
         """Remove the hosts and wait for it. Raises NetworkError with what it could not remove."""
         try:
-            _, said = self._process.communicate(timeout=REMOVE_S)
+            _, errors = self._process.communicate(timeout=REMOVE_S)
         except subprocess.TimeoutExpired:
             raise NetworkError("the emulated hosts are not removed yet: see `ip netns list`") from None
         if self._process.returncode:
-            raise NetworkError(f"the emulated hosts were not removed: {said.strip()}")
+            raise NetworkError(f"the emulated hosts were not removed: {errors.strip()}")
 
 
 def main() -> None:

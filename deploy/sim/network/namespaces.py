@@ -96,8 +96,8 @@ def ip(*arguments: str, tool: str = "ip") -> str:
     except subprocess.TimeoutExpired:
         raise NetworkError(f"{tool} {' '.join(arguments)}: did not end") from None
     if done.returncode:
-        said = done.stderr.strip().removeprefix("RTNETLINK answers: ")
-        raise NetworkError(f"{tool} {' '.join(arguments)}: {said}")
+        reason = done.stderr.strip().removeprefix("RTNETLINK answers: ")
+        raise NetworkError(f"{tool} {' '.join(arguments)}: {reason}")
     return done.stdout
 
 

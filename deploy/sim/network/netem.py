@@ -148,8 +148,8 @@ class Netem:
 
     def _count_one(self, host: str) -> int:
         """Add what has happened since it was last asked; returns how many packets are under way."""
-        told = json.loads(ip("-n", host, "-s", "-j", "qdisc", "show", "dev", LINK, tool="tc"))
-        (qdisc,) = [each for each in told if each["kind"] == "netem"]
+        qdiscs = json.loads(ip("-n", host, "-s", "-j", "qdisc", "show", "dev", LINK, tool="tc"))
+        (qdisc,) = [each for each in qdiscs if each["kind"] == "netem"]
         now = (qdisc["packets"], qdisc["bytes"], qdisc["drops"])
         sent, size, dropped = (new - old for new, old in zip(now, self._seen[host], strict=True))
         self._seen[host] = now

@@ -74,12 +74,12 @@ class Lies:
         for lie in active:
             row = self._row[lie.node]
             held = self._began.setdefault(lie, counts[row].copy())
-            counts[row] = self._told(lie, counts[row], held)
+            counts[row] = self._reported(lie, counts[row], held)
             if lie.kind == "saturated":
                 status[row] |= int(NodeStatus.SATURATED)
         return counts, status
 
-    def _told(self, lie: Lie, now: Counts, held: Counts) -> Counts:
+    def _reported(self, lie: Lie, now: Counts, held: Counts) -> Counts:
         out = now.copy()
         if lie.kind == "frozen":
             out[:] = held

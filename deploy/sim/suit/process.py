@@ -28,34 +28,34 @@ async def run(config: SuitConfig, stop: asyncio.Event, write_metrics: WriteMetri
     """Answer until `stop` is set. Without a link the truth is not published."""
     async with AsyncExitStack() as stack:
         link: Link | None = None
-        tell: Callable[[Truth], None] | None = None
+        publish_truth: Callable[[Truth], None] | None = None
         if config.link.connect or config.link.listen:
             link = await stack.enter_async_context(open_link(config.link, config.robot))
             put = link.publish(TRUTH)
-            tell = lambda truth: put(encode(truth))  # noqa: E731
+            publish_truth = lambda truth: put(encode(truth))  # noqa: E731
 
         def on_suit(suit: SimulatedSuit) -> None:
             if link is not None:
-                link.answer(FAULTS, lambda told, _: _take(told, config, suit))
+                link.answer(FAULTS, lambda payload, _: _take(payload, config, suit))
 
         buses = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in config.buses)
         log.info("simulated suit: answering every SYNC for %d nodes on %s", len(config.nodes), buses)
-        write_metrics(await answer(config, stop, tell, on_suit))
+        write_metrics(await answer(config, stop, publish_truth, on_suit))
 
 
-def _take(told: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:
-    suit.faults.config = told_faults(told, list(config.nodes))
+def _take(payload: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:
+    suit.faults.config = requested_faults(payload, list(config.nodes))
     log.info("injected sensor faults: %s", suit.faults.config.model_dump(exclude_defaults=True) or "none")
     return b"done"
 
 
-def told_faults(told: bytes, nodes: list[str]) -> FaultsConfig:
+def requested_faults(payload: bytes, nodes: list[str]) -> FaultsConfig:
     """The faults that a test asks for, written as in the file's `[faults]`. Raises ConfigError."""
     where = Path("told faults")
     try:
-        table = tomllib.loads(told.decode("utf-8"))
+        table = tomllib.loads(payload.decode("utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        mistake = ConfigMistake("faults", told[:80], f"valid TOML ({error})")
+        mistake = ConfigMistake("faults", payload[:80], f"valid TOML ({error})")
         raise ConfigError(where, [mistake]) from None
     faults = check_config(where, table, FaultsConfig)
     if mistakes := faults.unknown_nodes(nodes):

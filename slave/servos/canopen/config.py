@@ -14,7 +14,7 @@ from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
 from slave.servos.backend import BackendConfig
-from slave.servos.canopen.load import bits_per_s, told_bitrate, too_much
+from slave.servos.canopen.load import bits_per_s, configured_bitrate, too_much
 
 INCREMENTS_PER_TURN = 65536
 """Of a motor's own encoder."""
@@ -148,14 +148,14 @@ class CanopenConfig(BackendConfig):
 
     def _busy(self, skeleton: Skeleton) -> list[ConfigMistake]:
         loads = self.load(skeleton)
-        said = [
-            (bus.name, too_much(count, self.sync_hz, bits, told_bitrate(bus)))
+        overloaded = [
+            (bus.name, too_much(count, self.sync_hz, bits, configured_bitrate(bus)))
             for bus in self.buses
             for count, bits in (loads[bus.name],)
         ]
         return [
             ConfigMistake("servos.canopen.sync_hz", self.sync_hz, f"what bus {name} can carry: {words}")
-            for name, words in said
+            for name, words in overloaded
             if words
         ]
 

@@ -101,21 +101,21 @@ class DriveState:
         self._notice_second(data)
         if self.phase is not Phase.CONFIGURING or self.configured:
             return None
-        said = None if self._exchange is None else self._exchange.on_answer(data)
-        if said is None:
+        answered = None if self._exchange is None else self._exchange.on_answer(data)
+        if answered is None:
             return None
-        if isinstance(said, More):
+        if isinstance(answered, More):
             self._asked_ns = now_ns
-            return said.request
+            return answered.request
         transfer = self.setup[self._step]
-        if not said.done and isinstance(transfer, Read):
+        if not answered.done and isinstance(transfer, Read):
             if self._repeats < transfer.again:
                 self._repeats += 1
                 self._again_ns = now_ns + _AGAIN_NS
                 return None
-            said = replace(said, done=transfer.optional)
-        if not said.done:
-            self.fail(f"refuses its configuration: {said.words}")
+            answered = replace(answered, done=transfer.optional)
+        if not answered.done:
+            self.fail(f"refuses its configuration: {answered.words}")
             return None
         self._answered = data[1:4] if self._tries == 1 and not self._repeats else b""
         self._step += 1
@@ -177,11 +177,11 @@ class DriveState:
         return self._controlword
 
     def _enable(self, state: Power | None, statusword: int, now_ns: int) -> None:
-        said = wrong_bits(statusword) if state is Power.ENABLED else ""
-        if state is Power.ENABLED and not said:
+        wrong = wrong_bits(statusword) if state is Power.ENABLED else ""
+        if state is Power.ENABLED and not wrong:
             self.phase = Phase.RUNNING
-        elif said and now_ns - self.since_ns > ENABLE_TIMEOUT_NS:
-            self.fail(f"is enabled, but {said}")
+        elif wrong and now_ns - self.since_ns > ENABLE_TIMEOUT_NS:
+            self.fail(f"is enabled, but {wrong}")
             self._controlword = QUICK_STOP
             return
         elif now_ns - self.since_ns > ENABLE_TIMEOUT_NS or (state is Power.FAULT and not self._may_reset):
@@ -209,14 +209,14 @@ class DriveState:
     @property
     def words(self) -> str:
         """What is wrong with it; empty where all is well."""
-        said = [self.failure] if self.failure else []
+        problems = [self.failure] if self.failure else []
         if self.phase in (Phase.CONFIGURING, Phase.CHECKING, Phase.ENABLING):
-            said.append(self._silence if self._tries > 1 else "is being enabled")
+            problems.append(self._silence if self._tries > 1 else "is being enabled")
         if self.emergency is not None:
-            said.append(self.emergency.words)
+            problems.append(self.emergency.words)
         if self.encoder:
-            said.append(self.encoder)
-        return "; ".join(said)
+            problems.append(self.encoder)
+        return "; ".join(problems)
 
 
 def _why_not(state: Power | None, statusword: int) -> str:

@@ -28,7 +28,7 @@ def bits_per_s(drives: int, sync_hz: int, heartbeat_ms: int, drive_heartbeat_ms:
     return sync_hz * a_sync + beats * frame_bits(_HEARTBEAT_BYTES)
 
 
-def told_bitrate(bus: BusConfig) -> int:
+def configured_bitrate(bus: BusConfig) -> int:
     """The bit rate that a file gives its adapter; the fastest there is where it gives none."""
     rate = bus.options.get("bitrate")
     return rate if isinstance(rate, int) and rate > 0 else FASTEST_BIT_S

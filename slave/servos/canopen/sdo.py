@@ -158,13 +158,13 @@ class Exchange:
         self.strange = f"{self._name} is answered with command {command:02X}h, which is no answer to it"
         return None
 
-    def _on_upload(self, command: int, told: bytes) -> SdoAnswer | More:
+    def _on_upload(self, command: int, payload: bytes) -> SdoAnswer | More:
         if command & _EXPEDITED:
             # without its size an expedited answer has four bytes, the value's own among them
             size = 4 - (command >> 2 & 3) if command & _SIZED else 4
-            return self._judge(told[:size])
+            return self._judge(payload[:size])
         self._segments, self._toggle = bytearray(), 0
-        self._length = int.from_bytes(told, "little") if command & _SIZED else None
+        self._length = int.from_bytes(payload, "little") if command & _SIZED else None
         return More(bytes([_ASK_SEGMENT]) + bytes(7))
 
     def _on_segment(self, data: bytes) -> SdoAnswer | More:

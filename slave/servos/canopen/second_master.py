@@ -60,9 +60,9 @@ class SecondMaster:
         self.frames += 1
         self._last_ns[bus] = now_ns
         kind, node = what
-        told = self._heard.setdefault(bus, {}).setdefault(kind, [])
-        if node and node not in told:
-            told.append(node)
+        nodes_heard = self._heard.setdefault(bus, {}).setdefault(kind, [])
+        if node and node not in nodes_heard:
+            nodes_heard.append(node)
         return True
 
     def speaks(self, now_ns: int) -> bool:
@@ -92,8 +92,8 @@ class SecondMaster:
 
 def _listed(kinds: Mapping[str, list[str]]) -> str:
     """SYNC and the like first, then kinds with the nodes they went to: the first, and how many more."""
-    said = [kind for kind, nodes in kinds.items() if not nodes]
+    parts = [kind for kind, nodes in kinds.items() if not nodes]
     for kind, nodes in kinds.items():
         if nodes:
-            said.append(f"{kind} {nodes[0]}" + (f" and {len(nodes) - 1} more" if len(nodes) > 1 else ""))
-    return ", ".join(said)
+            parts.append(f"{kind} {nodes[0]}" + (f" and {len(nodes) - 1} more" if len(nodes) > 1 else ""))
+    return ", ".join(parts)

@@ -143,9 +143,9 @@ class DriveWatch:
 
     def _words(self, drive: int, statusword: int, ignores: Mask) -> str:
         name = self._names[drive]
-        said = [wrong_bits(statusword)] if ignores[drive] else []
-        said += [words[name] for words in (self._agreement.words, self._motion.words) if name in words]
-        return "; ".join(said)
+        problems = [wrong_bits(statusword)] if ignores[drive] else []
+        problems += [words[name] for words in (self._agreement.words, self._motion.words) if name in words]
+        return "; ".join(problems)
 
     def _place(self, drive: int, seen: DriveAnswers) -> JointPlace:
         units = self._units

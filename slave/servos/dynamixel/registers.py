@@ -78,11 +78,11 @@ def is_x_series(model: int) -> bool:
 
 def hardware_words(error: int) -> str:
     """HARDWARE_ERROR in words; empty where nothing is wrong."""
-    said = [words for bit, words in _HARDWARE_ERRORS if error & bit]
+    errors = [words for bit, words in _HARDWARE_ERRORS if error & bit]
     unknown = error & ~sum(bit for bit, _ in _HARDWARE_ERRORS)
     if unknown:
-        said.append(f"hardware error 0x{unknown:02x}")
-    return ", ".join(said)
+        errors.append(f"hardware error 0x{unknown:02x}")
+    return ", ".join(errors)
 
 
 def health_words(stretch: bytes) -> str:

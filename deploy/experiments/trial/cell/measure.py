@@ -146,11 +146,11 @@ def _accepted_percent(judged: CellMessages) -> float | None:
 
 def _delivered_percent(judged: CellMessages) -> float | None:
     """Between the slave's first and last word: what came, of what was due by numbers and by time."""
-    told = published(judged.statistics, SlaveMetrics)
-    if len(told) < 2:
+    published_metrics = published(judged.statistics, SlaveMetrics)
+    if len(published_metrics) < 2:
         return None
-    first, last = (told[i].metrics.commands for i in (0, -1))
-    due = told[-1].metrics.due.expected - told[0].metrics.due.expected
+    first, last = (published_metrics[i].metrics.commands for i in (0, -1))
+    due = published_metrics[-1].metrics.due.expected - published_metrics[0].metrics.due.expected
     came = (last.arrived - first.arrived) - (last.repeated - first.repeated)
     # one that was missing before the first word and came after it makes `lost` shrink
     sent = max(came + max(0, last.lost - first.lost), due - (last.repeated - first.repeated))
@@ -189,14 +189,14 @@ def _guard(judged: CellMessages) -> dict[str, float | None]:
     if not states:
         return {}
     left = sum(before.guard == "track" != after.guard for before, after in pairwise(states))
-    # a kind that is not in it did not grow; without two words nobody can tell
-    told = len(published(judged.statistics, SlaveMetrics)) > 1
+    # a kind that is absent did not grow; with fewer than two messages the growth is unknown
+    has_metrics = len(published(judged.statistics, SlaveMetrics)) > 1
     counted = counts(judged)
     return {
         "tracked": 100.0 * sum(s.guard == "track" for s in states) / len(states),
         "holds": float(left),
-        "refused": float(sum(counted.get("dropped", {}).values())) if told else None,
-        "clamps": float(sum(counted.get("clamps", {}).values())) if told else None,
+        "refused": float(sum(counted.get("dropped", {}).values())) if has_metrics else None,
+        "clamps": float(sum(counted.get("clamps", {}).values())) if has_metrics else None,
     }
 
 

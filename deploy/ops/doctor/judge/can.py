@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from deploy.ops.doctor.judge.finding import Finding, fail, ok, warn
 from deploy.ops.doctor.judge.needs import BusNeed
 from deploy.ops.doctor.read.can import CanInterface
-from slave.servos.canopen.load import told_bitrate, too_much
+from slave.servos.canopen.load import configured_bitrate, too_much
 
 BUSY = 0.8
 """Share of its time that a bus may be occupied before late answers are to be expected."""
@@ -85,7 +85,7 @@ def _judge_running(check: str, need: BusNeed, at: CanInterface) -> Finding:
 
 
 def _judge_drives(check: str, need: BusNeed, at: CanInterface) -> Finding:
-    bitrate = at.bitrate or told_bitrate(need.bus)
+    bitrate = at.bitrate or configured_bitrate(need.bus)
     share = need.bits_per_s / bitrate
     words = (
         f"{_words(at)}; {need.drives} drives at {need.rate_hz:g} Hz put {need.bits_per_s / 1e6:.2f} Mbit/s "

@@ -23,13 +23,13 @@ class Wire:
         self.events: list[str] = []
         self.truths: list[Truth] = []
         self.protocol = protocol
-        self.peer = SuitPeer(build_suit(config, protocol), protocol, self._sent, self._told)
+        self.peer = SuitPeer(build_suit(config, protocol), protocol, self._sent, self._on_truth)
 
     def _sent(self, outgoing: Outgoing) -> None:
         tick = int.from_bytes(outgoing.frame.data[18:22], "little")
         self.events.append(f"{outgoing.bus} {tick}")
 
-    def _told(self, truth: Truth) -> None:
+    def _on_truth(self, truth: Truth) -> None:
         self.events.append(f"truth {truth.tick}")
         self.truths.append(truth)
 

@@ -6,19 +6,19 @@ import pytest
 
 from common.errors import ConfigError
 from deploy.sim.suit.faults import FaultsConfig
-from deploy.sim.suit.process import told_faults
+from deploy.sim.suit.process import requested_faults
 
 NODES = ["chest", "head"]
 
 
 def test_they_are_read_as_those_of_the_file() -> None:
-    faults = told_faults(b'lose = [{ node = "head" }]', NODES)
+    faults = requested_faults(b'lose = [{ node = "head" }]', NODES)
     assert [loss.node for loss in faults.lose] == ["head"]
     assert faults.lose[0].includes(12.0)
 
 
 def test_nothing_told_is_no_fault() -> None:
-    assert told_faults(b"", NODES) == FaultsConfig()
+    assert requested_faults(b"", NODES) == FaultsConfig()
 
 
 @pytest.mark.parametrize(
@@ -32,4 +32,4 @@ def test_nothing_told_is_no_fault() -> None:
 )
 def test_what_is_no_fault_is_refused(told: bytes, expected: str) -> None:
     with pytest.raises(ConfigError, match=expected):
-        told_faults(told, NODES)
+        requested_faults(told, NODES)
