@@ -61,7 +61,7 @@ class Journeys:
         self.echo = CommandEcho(command.sequence, command.stamps.put_ns, received_ns, now_ns, 0)
 
     def forget(self) -> None:
-        """Somebody else's commands come from now on: the echo's stamps are of another clock than theirs."""
+        """Forget the old sender: the commands come from another operator, and so from another clock."""
         self.echo = self._underway = None
 
     def written(self, now_ns: int, counts: NDArray[np.int64]) -> None:

@@ -170,7 +170,7 @@ def nodes_table(found: SuitAlignment) -> Table:
     from rich.table import Table
 
     table = Table(title="alignment", box=box.SIMPLE_HEAD)
-    for head in ("node", "facing told by", "± °", "axis off level °", ""):
+    for head in ("node", "facing found by", "± °", "axis off level °", ""):
         table.add_column(head, justify="right" if "°" in head else "left")
     for name, node in found.nodes.items():
         tilt = "" if node.tilt_rad is None else f"{math.degrees(node.tilt_rad):.1f}"
@@ -181,7 +181,7 @@ def nodes_table(found: SuitAlignment) -> Table:
 
 
 def joints_table(found: SuitAlignment) -> Table:
-    """One row a joint: what its motion told."""
+    """One row per joint: what its motion shows."""
     from rich import box
     from rich.table import Table
 

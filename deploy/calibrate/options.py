@@ -34,8 +34,8 @@ HemisphereOption = Annotated[
     str,
     typer.Option(
         metavar="north|south",
-        help="Hemisphere where the recording was made; it tells a mirrored "
-        "magnetometer axis from the dip of the field.",
+        help="Hemisphere where the recording was made. The dip of the field there shows a "
+        "mirrored magnetometer axis.",
         callback=_hemisphere,
     ),
 ]

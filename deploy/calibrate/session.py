@@ -189,7 +189,7 @@ def output_json(figures: Mapping[str, object], path: Path | None, *, to_stdout: 
 
 
 def by_words(node_notes: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """Of (node, words): each words' nodes, so that what is true of a whole suit is said once."""
+    """Group (node, text) pairs by text, so that a text that holds for the whole suit is printed once."""
     nodes: dict[str, list[str]] = {}
     for name, words in node_notes:
         nodes.setdefault(words, []).append(name)

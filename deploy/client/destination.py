@@ -20,7 +20,7 @@ ROUTER_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Destination:
-    """Endpoints to connect to, robots by name, and who asks."""
+    """Endpoints to connect to, the robots' names, and the operator's name."""
 
     link: LinkConfig
     robots: tuple[str, ...]

@@ -95,7 +95,7 @@ class HeardOfAll:
         link.subscribe(STATISTICS, self._on_statistics)
 
     def of(self, instance: int) -> Heard:
-        """What that one said."""
+        """The messages of one robot process, by its instance number."""
         if instance not in self._heard:
             self._heard[instance] = Heard(master=self._master)
         return self._heard[instance]
@@ -113,7 +113,7 @@ class HeardOfAll:
         if isinstance(statistics.metrics, SlaveMetrics):
             self.of(statistics.metrics.instance).take(metrics=statistics.metrics)
         else:
-            # which of several robots it commands is not told: it is the operator's own affair
+            # the master's metrics do not name the robot process that it commands
             self._master = statistics.metrics
             for heard in self._heard.values():
                 heard.take(master=statistics.metrics)

@@ -106,7 +106,7 @@ class EngageDriver:
 async def until_all_track(
     drivers: Sequence[EngageDriver], check: Callable[[], None], pause_s: float = LOOK_S
 ) -> None:
-    """Engage every robot until all track. `check` may raise TandemError; so does an operator who gives up."""
+    """Engage every robot until all track. Raises TandemError from `check`, or if an operator gives up."""
     while True:
         check()
         for driver in drivers:

@@ -75,12 +75,12 @@ class Rig:
 
     @property
     def can_port(self) -> int:
-        """Of this run's CAN buses."""
+        """The UDP port of this run's CAN buses."""
         return self._endpoints.can_port
 
     @property
     def endpoints(self) -> Endpoints:
-        """Who listens where in this run."""
+        """The endpoints at which the processes of this run listen."""
         return self._endpoints
 
     def link(self, robot: str = ROBOT) -> Link:

@@ -55,7 +55,7 @@ class Comparison:
 
     @property
     def rmse_over_latest(self) -> float:
-        """Same-instant RMSE of the real run over that of `latest`."""
+        """Same-instant RMSE of the real run divided by the RMSE of `latest`."""
         return self.as_run.rmse_deg / self.replayed["latest"].rmse_deg
 
 

@@ -22,7 +22,7 @@ def in_a_folder(path: Path | None) -> Path | None:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Raise TandemError where the disk, or who owns it, does not let the path be written."""
+    """Raise TandemError if the path cannot be written."""
     try:
         yield
     except OSError as error:

@@ -15,7 +15,7 @@ class BaseSensor(Protocol):
         ...
 
     def read(self) -> BaseAttitude | None:
-        """The newest there is, None before the first; its `measured_ns` tells how old it is. Never blocks."""
+        """The newest reading, None before the first; `measured_ns` is its time. Never blocks."""
         ...
 
     def counters(self) -> dict[str, int]:

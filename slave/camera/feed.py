@@ -70,7 +70,7 @@ class CameraFeed:
         """`put` must be safe in another thread than the loop's, and must not block."""
         self.sight = Sight()
         self.fault = ""
-        """What is wrong with the camera, in words; empty where nothing is."""
+        """The camera's fault as text; empty if there is none."""
         self._put = put
         self._open = open_camera
         self._clock = clock

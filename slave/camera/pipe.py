@@ -28,14 +28,14 @@ class ReplyKind(IntEnum):
     """Open, and waiting to be asked."""
     PICTURE = 2
     TROUBLE = 3
-    """It failed, in words, and may go when tried again."""
+    """The camera failed, with the reason as text; another try may succeed."""
     NEVER = 4
-    """This machine cannot, in words: no use in trying again."""
+    """This machine cannot open a camera, with the reason as text; another try cannot succeed."""
 
 
 @dataclass(frozen=True, slots=True)
 class PictureRequest:
-    """One picture, please."""
+    """A request for one picture."""
 
     read_ns: int
     """When the angles were read."""
@@ -46,7 +46,7 @@ class PictureRequest:
 
 @dataclass(frozen=True, slots=True)
 class PictureReply:
-    """A picture, or words."""
+    """A picture, or a text."""
 
     answer: ReplyKind
     captured_ns: int = 0
@@ -57,7 +57,7 @@ class PictureReply:
 
     @property
     def words(self) -> str:
-        """What it says, where it is not a picture."""
+        """The text of a reply that is not a picture."""
         return self.body.decode("utf-8", "replace")
 
 

@@ -30,7 +30,7 @@ class EncoderAgreement:
         self._window_rad = window_rad
         self._apart: NDArray[np.int64] = np.zeros(len(joint_names), np.int64)
         self.words: dict[str, str] = {}
-        """Joints whose two angles differ now, in words, by joint; empty where all agree."""
+        """A text for each joint whose two angles differ now; empty if all agree."""
 
     def judge(self, drive_rad: Array, encoder_rad: Array, heard: Mask) -> Mask:
         """(J,) whose angles (J,) differ, of joints whose angles are both `heard`; others stay as judged."""

@@ -49,7 +49,7 @@ class Gate:
 
     name: str
     asks: str
-    """What it asks for, in words; the docs' table is made of these."""
+    """The rule as a sentence; the docs' table is made of these."""
     refusal: Callable[[Command, Situation], str | None]
 
 
@@ -195,7 +195,7 @@ class CommandGate:
         return now_ns if self.valid.any() else self._somebody_ns
 
     def claim(self, operator: str, now_ns: int) -> int:
-        """The token of a new lease, or 0 where somebody holds one. Its commands are counted from 0."""
+        """The token of a new lease, or 0 if an operator holds one. Its commands are counted from 0."""
         token = self.lease.claim(operator, now_ns)
         if token:
             self._newest_sequence, self.arrived_ns, self.refusal = -1, None, ""

@@ -11,7 +11,7 @@ class Body:
     """The faults now. Any of them ends motion, and no engage is possible until it is gone."""
 
     drives: Mapping[str, str] = field(default_factory=dict)
-    """Faults of the drives, in words, by joint."""
+    """The drives' faults as text, by joint."""
     base: str | None = None
     """What is wrong with how the base stands, or None."""
     namesake: str | None = None
@@ -23,7 +23,7 @@ class Body:
 
     @property
     def first_fault(self) -> str | None:
-        """The first fault, in words, or None."""
+        """The first fault as text, or None."""
         return self.drive_fault or self.base or self.namesake
 
     @property

@@ -1,4 +1,4 @@
-"""What must be so before anything moves. Each condition answers with what is missing, in words."""
+"""The conditions of an engage. Each returns a text for what is missing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from slave.guard.states import MOVING, State
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """What the guard knows when somebody wants to engage."""
+    """What the guard knows when an operator asks to engage."""
 
     state: State
     reason: str
@@ -47,7 +47,7 @@ def _state(at: Readiness) -> str | None:
 
 
 def holder_only(operator: str, holder: str) -> str | None:
-    """Why somebody may not ask for what is the lease holder's alone, or None where they may."""
+    """Why an operator may not make a request that only the lease holder may make, or None."""
     if not holder:
         return "no operator holds the lease: claim it first"
     return None if operator == holder else f"{holder} holds the lease"

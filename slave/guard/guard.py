@@ -67,7 +67,7 @@ class Guard:
 
     @property
     def lease(self) -> Lease:
-        """Who may move the robot."""
+        """The operator that may move the robot."""
         return self._commands.lease
 
     @property
@@ -174,7 +174,7 @@ class Guard:
         self._change(now_ns, GuardEvent.ESTOP, reason)
 
     def claim(self, operator: str, now_ns: int) -> int:
-        """The token of a new lease, or 0 where somebody holds one."""
+        """The token of a new lease, or 0 if an operator holds one."""
         return self._commands.claim(operator, now_ns)
 
     def release(self, now_ns: int, reason: str) -> None:

@@ -53,7 +53,7 @@ class Placement:
 
     @property
     def differ(self) -> Mapping[str, str]:
-        """Joints whose drive and encoder say different things, in words, by joint."""
+        """A text for each joint whose drive and encoder disagree, by joint."""
         return self._agreement.words
 
     def take(
@@ -66,7 +66,7 @@ class Placement:
         span: tuple[Array, Array] | None,
         under_way: bool = False,
     ) -> str | None:
-        """Take a reading (J,) that is `good` (J,). Which joint moves uncommanded, in words, or None.
+        """Take a reading (J,) that is `good` (J,). Returns a text if a joint moves uncommanded, else None.
 
         `span` (J,) each: where the setpoint was lately, or None before there is any: then nothing may move.
         `under_way`: somebody is engaged. The same reading twice counts once.

@@ -76,7 +76,7 @@ class Past:
 
 
 class EncoderPlausibility:
-    """Which encoders are doubted, until they agree again and somebody engages anew."""
+    """The doubted encoders, until they agree again and an operator engages anew."""
 
     def __init__(self, joint_names: Sequence[str], fastest_rad_s: Array, config: GuardConfig) -> None:
         """`fastest_rad_s` (J,) is what the joints can do, not what they may."""
@@ -167,7 +167,7 @@ class EncoderPlausibility:
         return f"{len(self.words)} encoders do not agree with the setpoint: {', '.join(self.words)}"
 
     def unsettled(self) -> str | None:
-        """The first doubted joint whose encoder has not agreed for long enough, in words, or None."""
+        """A text for the first doubted joint whose encoder has not agreed for long enough, or None."""
         for joint in self.words:
             if self._score_s[self._names.index(joint)] > 0.0:
                 return f"{joint}: {self.words[joint]}; it must agree for a while before it may move"

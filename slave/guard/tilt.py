@@ -10,7 +10,7 @@ from slave.guard.config import GuardConfig
 
 
 def base_loss(attitude: BaseAttitude | None, now_ns: int, config: GuardConfig) -> str | None:
-    """Why a robot whose base carries a sensor may not move, in words, or None: for `Body.base`.
+    """A text for why the base's attitude forbids motion, or None: for `Body.base`.
 
     Silence is doubt, and so is an attitude from the future or one that is no number. Where no sensor is
     configured do not ask.

@@ -36,7 +36,7 @@ class EncoderLife:
         np.copyto(self.position_rad, position_rad, where=good)
 
     def silence(self, now_ns: int) -> str | None:
-        """The joint that is silent longest, in words, or None where all have been heard in time.
+        """A text for the joint that is silent longest, or None if all were heard in time.
 
         A reading from the future counts as none: it comes of a clock that cannot be trusted.
         """
@@ -72,7 +72,7 @@ class Signs:
 
 @dataclass(frozen=True, slots=True)
 class LossWatch:
-    """One thing that must not be lost. `loss` gives the loss in words, or None."""
+    """One watched condition. `loss` returns a text for its loss, or None."""
 
     name: str
     loss: Callable[[Signs], str | None]

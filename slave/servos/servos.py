@@ -46,11 +46,11 @@ class Servos(Protocol):
         ...
 
     def read(self) -> EncoderReading:
-        """The newest reading there is. Never blocks; its `read_ns` tells how old it is."""
+        """The newest reading; `read_ns` is its time. Never blocks."""
         ...
 
     def faults(self) -> Mapping[str, str]:
-        """What the drives and encoders say is wrong, in words, by joint; empty where all are well."""
+        """The faults of drives and encoders as text, by joint; empty if there are none."""
         ...
 
     def quick_stop(self, stop: bool) -> None:

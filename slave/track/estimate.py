@@ -85,7 +85,7 @@ def farthest(motion: Array, span_s: float) -> Array:
 
 
 def first(sampled_ns: int, position_rad: Array, velocity_rad_s: Array) -> Estimate:
-    """All that one sample (J,) tells."""
+    """The motion of one sample (J,): what is known from it alone."""
     spread_rad_s = _VELOCITY_NOISE_RAD_S if velocity_rad_s.any() else _UNKNOWN_RAD_S
     motion = np.stack([position_rad, velocity_rad_s, np.zeros_like(position_rad)])
     covariance = np.diag([_POSITION_NOISE_RAD, spread_rad_s, _UNKNOWN_RAD_S2]) ** 2

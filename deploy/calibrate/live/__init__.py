@@ -1,1 +1,1 @@
-"""`tandem calibrate live`: a person at the suit is told what to do until every node can be calibrated."""
+"""`tandem calibrate live`: guides a person at the suit until every node can be calibrated."""

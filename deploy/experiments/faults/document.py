@@ -54,7 +54,7 @@ def words(fault: FaultRow) -> tuple[str, ...]:
 
 
 def bound(fault: FaultRow) -> str:
-    """By when, in words."""
+    """The limits of the reaction as text: time to decide, time to stand still, deviation."""
     if fault.stands_s is None:
         return "all the time" if fault.strays_deg is None else f"never more than {fault.strays_deg:g}° off"
     decided = "" if fault.reacts_s is None else f"decides in {fault.reacts_s:g} s, "

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from deploy.experiments.soak.stage import Stage
 
 HIDDEN = ("begin", "started", "guard", "lease", "joints", "undone", "still")
-"""Events that say little to who watches."""
+"""Events that the live view does not show."""
 
 
 def draw(

@@ -52,4 +52,4 @@ class FaultRow:
     strays_deg: float | None = None
     """How far the joints not concerned may be from where they would have been without the fault."""
     missed: str = ""
-    """What of this the robot does not keep yet, in words; empty where it keeps all."""
+    """The part of the expected reaction that the robot does not keep yet; empty if it keeps all."""

@@ -220,7 +220,7 @@ ROBOT = (
     ),
     stops(
         name="drive moves by itself",
-        done="While nobody is engaged a drive turns its joint by 60°/s, whatever it is told.",
+        done="While nobody is engaged a drive turns its joint by 60°/s, whatever its setpoint is.",
         robot="Stops all drives by force; names the joint.",
         person="Find out why before you reset with the key at the robot; then engage.",
         act=_drive_runs_away,
@@ -247,7 +247,7 @@ ROBOT = (
     ),
     holds(
         name="base falls",
-        done="The base tips over at 100°/s, as an instrument of ten frames a second tells it.",
+        done="The base tips over at 100°/s, as an instrument with ten frames a second reports it.",
         robot="Brakes all joints and stands, with the second frame beyond the limit.",
         person=ENGAGE,
         act=_base_falls,

@@ -100,7 +100,7 @@ class Scene:
         self.undo: Callable[[], None] = lambda: None
         """Ends the fault."""
         self.each_period: Callable[[], None] = lambda: None
-        """What somebody does to the robot at the rate of commands, 12.5 Hz, from the fault on."""
+        """Called at the rate of commands, 12.5 Hz, from the fault on."""
         self.encoders = Encoders(self.skeleton, config.encoders)
         self._seen: list[_RobotTick] = []
         self.inject.watch = self._watch

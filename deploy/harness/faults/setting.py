@@ -32,7 +32,7 @@ class Setting:
     master: tuple[str, ...] = ()
     """Overrides of the master's."""
     aligned: bool = False
-    """How each node sits is known, so that a lean from the zero pose can be told."""
+    """The nodes' alignment is known, so that a lean in the zero pose can be detected."""
     motion: Callable[[], OperatorMotion] | None = None
     """Of the operator, None for the usual reach."""
 

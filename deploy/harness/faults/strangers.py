@@ -81,7 +81,7 @@ STRANGERS = (
         name="yesterday's recording replayed",
         done="A session of another day, its requests to claim and to engage included, beside the operator's.",
         robot="Follows its operator. Nothing of the recording is accepted.",
-        person="Find out who sends it.",
+        person="Find the sender.",
         act=_replayed_yesterday,
         strays_deg=0.0,
         refused_by={"lease"}, held_by={"lease", "sequence", "age", "future"},
@@ -90,14 +90,14 @@ STRANGERS = (
         name="this session's recording replayed",
         done="The operator's own commands of the last seconds once more.",
         robot="Follows its operator. Nothing of the recording is accepted.",
-        person="Find out who sends it.",
+        person="Find the sender.",
         act=_replayed_today,
         strays_deg=0.0, refused_by={"sequence"}, held_by={"sequence", "age"},
     ),
     goes_on(
         name="second operator",
         done="Another person claims, engages, disengages, releases, and sends commands 12.5 times a second.",
-        robot="Follows its operator, and tells the other who that is. "
+        robot="Follows its operator, and names that operator to the other. "
         "Only an emergency stop is open to everybody.",
         person="Nothing; or the operator releases the robot, and the other claims it.",
         act=_second_operator,

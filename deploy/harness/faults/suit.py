@@ -49,7 +49,7 @@ def _from_the_beginning(_: Scene) -> None:
 
 
 def _leaning() -> OperatorMotion:
-    """An operator who stands bowed by 25°."""
+    """An operator that stands bowed by 25°."""
     moves = "".join(
         f"[[move]]\nstart_s = {start_s}\nduration_s = 1.0\nto_deg = {{ neck_yaw = {deg} }}\n"
         for start_s, deg in ((30.0, 10), (40.0, 0))

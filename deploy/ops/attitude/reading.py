@@ -17,7 +17,7 @@ ANGLES = (
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Angles in rad by name, of `ANGLES`; None where one has no meaning, left out where nobody tells it."""
+    """Angles in rad by name, of `ANGLES`; None where an angle has no meaning; a missing name is unknown."""
 
     at_s: float
     """Since the start."""

@@ -124,7 +124,7 @@ class SimulatedSource:
 
 
 def of_frame(frame: FrameAngles, at_s: float, declination_rad: float) -> Reading:
-    """What a frame tells: three of the angles, and the true azimuth."""
+    """The angles in a frame: three of `ANGLES`, and the true azimuth."""
     azimuth = None if frame.azimuth is None else radians(frame.azimuth)
     return Reading(
         at_s,

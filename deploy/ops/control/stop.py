@@ -109,12 +109,12 @@ class _Stopping:
         self._report = report
         self._within_s = within_s
         self.settled = asyncio.Event()
-        """Whether all who are there have had the time to show themselves."""
+        """Set when every process at the endpoints has had the time to announce itself."""
         self._counts: dict[str, StopCount] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     def on_presence(self, presence: ProcessPresence, here: bool, everyone: bool) -> None:
-        """Somebody showed himself: a robot is stopped if it is named, or everybody is."""
+        """A process announced itself: stop it if its robot is named, or if all robots are to stop."""
         if presence.role != "slave" or not here:
             return
         if everyone:

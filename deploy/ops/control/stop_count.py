@@ -23,7 +23,7 @@ class StopCount:
             self._shown[presence.instance] = presence
 
     def on_answer(self, answer: StopAnswer, session: str) -> RobotAnswer | None:
-        """Take an answer; what to tell, where it is an acknowledgement that is new."""
+        """Count an answer. Returns it for the report if it is a new acknowledgement, else None."""
         replier = answer.instance or session
         if not answer.stopped or replier in self._stopped:
             return None
@@ -35,7 +35,7 @@ class StopCount:
 
     @property
     def complete(self) -> bool:
-        """Whether somebody has acknowledged, and everybody who showed himself has."""
+        """Whether at least one process has acknowledged, and every process that announced itself."""
         return bool(self._stopped) and not self._silent()
 
     def answers(self) -> list[RobotAnswer]:
@@ -43,7 +43,7 @@ class StopCount:
         return [*self._stopped.values(), *self.failures()]
 
     def failures(self) -> list[RobotAnswer]:
-        """Those who were asked, or showed themselves, and did not acknowledge."""
+        """The processes that were asked or announced themselves, and did not acknowledge."""
         text = f"NOT STOPPED by this: no answer within {self._within_s:g} s. Stop it at the robot itself"
         silent = [
             RobotAnswer(self._robot, False, text, instance=each.instance, place=each.words)
@@ -52,7 +52,7 @@ class StopCount:
         return silent if silent or self._stopped else [RobotAnswer(self._robot, False, text)]
 
     def namesakes(self) -> str | None:
-        """What to say where several robots have the name."""
+        """The warning if several robots have the name, else None."""
         if not self._several:
             return None
         return several_bear(self._robot, [each.words for each in self._shown.values()] or ["unknown places"])

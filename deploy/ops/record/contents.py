@@ -58,7 +58,7 @@ class Contents:
 
 
 def survey(path: Path) -> Contents:
-    """Go through a file. Raises RecordingError where it is none of ours."""
+    """Read a whole file. Raises RecordingError if tandem did not write it."""
     stream = RecordingStream(path)
     topics: dict[str, TopicContents] = {}
     gaps: dict[str, Missing] = {}

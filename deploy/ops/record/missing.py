@@ -10,7 +10,7 @@ from common.wire.topics import COMMAND
 STREAMS = 64
 """Counted side by side, and so many only: each lease and each start of a robot is one."""
 ONE = 1
-"""Lease of every count: streams are told apart here."""
+"""The lease in every count: each count already holds one stream."""
 SLACK = 1.1
 """A sender may be this much faster than its topic's rate, and still be the one from before."""
 

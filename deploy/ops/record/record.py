@@ -28,7 +28,7 @@ PROGRESS_S = 0.5
 
 
 class ObserverConfig(Section):
-    """The TOML file of one who only looks on."""
+    """The TOML file of a process that only observes."""
 
     link: LinkConfig
 
@@ -102,11 +102,11 @@ async def record(
     report: Callable[[str], None],
     write_metrics: WriteMetrics = lambda _: None,
 ) -> str:
-    """Record until `stop` is set or the time is over; what was recorded, in words.
+    """Record until `stop` is set or the time is over. Returns a summary for people.
 
-    A disk that fails ends the writing, is said once, and is counted; hearing goes on. Raises LinkError and
-    RecordingError where it cannot start, TandemError in the end where the recording is not whole or empty:
-    whatever the sender numbered and the recording does not hold makes it so.
+    If the disk fails, writing stops, one error is logged and counted, and messages are still counted. Raises
+    LinkError and RecordingError if it cannot start; TandemError at the end if the recording is empty or lacks
+    a message that the sender numbered.
     """
     metadata = {
         "robot": options.robot,
@@ -190,7 +190,7 @@ def _check(options: RecordOptions, tape: Tape, taken: Taken, overwritten: int) -
     if not taken.counts:
         raise TandemError(
             f"{options.out}: nothing was heard of {options.robot}: is it running, is that its name, and does "
-            f"somebody listen at {', '.join(options.link.connect) or 'no endpoint'}?"
+            f"a process listen at {', '.join(options.link.connect) or 'no endpoint'}?"
         )
     missing = missing_in_words(taken.missing)
     if missing and not options.may_miss:

@@ -48,7 +48,7 @@ class Tape:
         return self._recorder.put(topic, payload, monotonic_ns)
 
     async def turn(self) -> None:
-        """Begin the next file if it is time. One that cannot begin ends the recording, which is said once."""
+        """Begin the next file if it is time. If that fails, recording stops and one error is logged."""
         recorder, each_s = self._recorder, self._each_s
         if recorder is None or each_s is None or recorder.counters.failed:
             return

@@ -1,4 +1,4 @@
-"""Routes until stopped; who comes and goes is logged by certificate, and what is refused is counted."""
+"""Routes until stopped. Connections are logged by certificate name; refusals are counted."""
 
 from __future__ import annotations
 

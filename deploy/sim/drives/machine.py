@@ -18,7 +18,7 @@ STATUSWORDS = {
 
 
 def statusword(state: Power) -> int:
-    """The word that tells a state (6041h): under remote control, and following its target while enabled."""
+    """The statusword of a state (6041h): under remote control, and following its target while enabled."""
     return STATUSWORDS[state] | VOLTAGE | REMOTE | (FOLLOWS if state is Power.ENABLED else 0)
 
 

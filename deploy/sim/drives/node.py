@@ -42,7 +42,7 @@ _IGNORES_TARGETS = (DriveFault.NOT_FOLLOWING, DriveFault.LOCAL, DriveFault.NO_VO
 
 
 class SimulatedDrive:
-    """A drive without its motor: `target` is what it wants, `position` and `count` are what it is told."""
+    """A drive without its motor: `target` is what it wants, `position` and `count` are its readings."""
 
     def __init__(self, node_id: int, send: Send, serial: int = 1) -> None:
         self.id = node_id
@@ -58,7 +58,7 @@ class SimulatedDrive:
         self.fault = DriveFault.NONE
         self.traits = Traits()
         self.rebooted = False
-        """Set where the drive has lost what it was told; whoever reads it clears it."""
+        """True once the drive has lost its settings; the reader clears it."""
         self._send_frame = send
         self._controlword = 0
         self._pending: bytes | None = None
@@ -125,7 +125,7 @@ class SimulatedDrive:
         return bool(self._node.nmt._state == _OPERATIONAL)
 
     def on_sync(self) -> None:
-        """Take in what was told since the last SYNC, and tell how things are."""
+        """Apply what was received since the last SYNC, and report the state."""
         if not self.operational:
             return
         if self._pending is not None and self._rpdo is not None:

@@ -88,7 +88,7 @@ class DrivePeer:
         self._show()
 
     def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
-        """One frame from the slave, or from whoever asks."""
+        """Handle one frame from the slave, or from another sender."""
         addressed = self._by_id.get((bus, frame_id))
         if addressed is not None:
             for i in addressed:

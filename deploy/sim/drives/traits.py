@@ -1,11 +1,11 @@
-"""How makers' drives differ within the standards: what a simulated drive can be told to be like. Pure."""
+"""How makers' drives differ within the standards: the options of a simulated drive. Pure."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
 
-_UNSIZED, _SEGMENTED, _LENGTH_TOLD = 0x42, 0x40, 0x01
+_UNSIZED, _SEGMENTED, _LENGTH_INDICATED = 0x42, 0x40, 0x01
 _UPLOAD_BITS, _UPLOADED, _EXPEDITED = 0xE0, 0x40, 0x02
 _ASK_SEGMENT, _TOGGLE, _ABORT, _TOGGLE_ERROR = 0x60, 0x10, 0x80, 0x0503_0000
 _SEGMENT_BYTES = 7
@@ -14,10 +14,10 @@ _SEGMENT_BYTES = 7
 class ReadForm(Enum):
     """The form in which a drive answers an SDO read of up to four bytes (CiA 301)."""
 
-    SIZED = "expedited, size told: 4F, 4B, 47, 43"
-    UNSIZED = "expedited, size not told: 42"
-    SEGMENTED = "segmented, length told: 41"
-    SEGMENTED_UNSIZED = "segmented, length not told: 40"
+    SIZED = "expedited, size indicated: 4F, 4B, 47, 43"
+    UNSIZED = "expedited, size not indicated: 42"
+    SEGMENTED = "segmented, length indicated: 41"
+    SEGMENTED_UNSIZED = "segmented, length not indicated: 40"
 
 
 @dataclass(slots=True)
@@ -49,7 +49,7 @@ class Reformed:
         size = 4 - (command >> 2 & 3)
         self._rest, self._toggle, self._serving = data[4 : 4 + size], 0, True
         if form is ReadForm.SEGMENTED:
-            return bytes([_SEGMENTED | _LENGTH_TOLD]) + data[1:4] + size.to_bytes(4, "little")
+            return bytes([_SEGMENTED | _LENGTH_INDICATED]) + data[1:4] + size.to_bytes(4, "little")
         return bytes([_SEGMENTED]) + data[1:4] + bytes(4)
 
     def segment(self, request: bytes) -> bytes | None:

@@ -30,7 +30,7 @@ class DipoleConfig(Section):
 
 
 class LocalConfig(Section):
-    """`[[disturbance.local]]`: a field at some nodes for some time, such as that of a tool in the hand."""
+    """`[[disturbance.local]]`: a field at some nodes for some time, such as from a tool in the hand."""
 
     nodes: list[str] | Literal["all"] = "all"
     """Segments."""
@@ -46,7 +46,7 @@ class LocalConfig(Section):
 
 
 class DisturbanceConfig(Section):
-    """`[disturbance]`: none unless told."""
+    """`[disturbance]`: none by default."""
 
     dipole: list[DipoleConfig] = Field(default=[])
     local: list[LocalConfig] = Field(default=[])

@@ -42,7 +42,7 @@ class Twin(TimeSpan):
 
 
 class FaultsConfig(Section):
-    """`[faults]`: none unless told."""
+    """`[faults]`: none by default."""
 
     lie: list[Lie] = Field(default=[])
     twin: list[Twin] = Field(default=[])

@@ -51,7 +51,7 @@ def _take(payload: bytes, config: SuitConfig, suit: SimulatedSuit) -> bytes:
 
 def requested_faults(payload: bytes, nodes: list[str]) -> FaultsConfig:
     """The faults that a test asks for, written as in the file's `[faults]`. Raises ConfigError."""
-    where = Path("told faults")
+    where = Path("requested faults")
     try:
         table = tomllib.loads(payload.decode("utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -153,7 +153,7 @@ class VirtualWorld:
         self._tick += ticks
 
     def ask(self, action: Action, key: str = "", operator: str | None = None) -> ControlReply:
-        """Ask the robot now; as the master's operator unless told."""
+        """Ask the robot now; as the master's operator by default."""
         operator = self.master_config.operator.name if operator is None else operator
         request = ControlRequest(self.robot, action, operator, key)
         if action in CHALLENGED:

@@ -9,7 +9,7 @@ CYCLIC_SYNCHRONOUS_POSITION = 8
 
 
 class Power(StrEnum):
-    """The states, in words for a person."""
+    """The states' names for people."""
 
     NOT_READY = "not ready to switch on"
     SWITCH_ON_DISABLED = "switch on disabled"
@@ -42,7 +42,7 @@ ENABLED_BITS = 0x27
 
 
 def power(statusword: int) -> Power | None:
-    """The state that a statusword tells, or None for a pattern that is not in the standard."""
+    """The state in a statusword, or None for a pattern that is not in the standard."""
     for mask, value, state in _PATTERNS:
         if statusword & mask == value:
             return state

@@ -23,7 +23,7 @@ SDO_TIMEOUT_NS = 300 * NS_PER_MS
 SDO_TRIES = 3
 ENABLE_TIMEOUT_NS = 2000 * NS_PER_MS
 TRANSITION_16_NS = 500 * NS_PER_MS
-"""In quick stop active, told "enable" for so long and still there: the drive does not know transition 16.
+"""A drive that stays in quick stop active for this long after "enable" does not know transition 16.
 Until then it has also braked: "disable voltage" lets the joint go for some SYNCs."""
 _AGAIN_NS = 20 * NS_PER_MS
 """Before an entry that must change is read again."""
@@ -42,7 +42,7 @@ class Phase(Enum):
     ENABLING = auto()
     RUNNING = auto()
     FAILED = auto()
-    """Latched: it is told to stop and stay, and is not enabled again before somebody asks for it."""
+    """Latched: the drive is commanded to stop and stay; only a request enables it again."""
 
 
 @dataclass(slots=True)
@@ -55,7 +55,7 @@ class DriveState:
     emergency: Emergency | None = None
     configured: bool = False
     encoder: str = ""
-    """What is wrong with its encoder, in words."""
+    """The fault of its encoder as text."""
     since_ns: int = 0
     """When the phase began."""
     _controlword: int = SHUTDOWN

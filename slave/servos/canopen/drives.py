@@ -83,7 +83,7 @@ class Drives:
         self._fault_words: dict[str, str] = {}
         self.reading = EncoderReading(0, np.zeros(count, np.int64), np.zeros(count, np.bool_))
         self.faults: Mapping[str, str] = MappingProxyType({})
-        """By joint, in words. Replaced, never changed."""
+        """The faults as text, by joint. Replaced, never changed."""
         self.outbox: list[Outgoing] = []
         """What must be sent at once: the adapter empties it."""
         self.answered_after_ns: int | None = None

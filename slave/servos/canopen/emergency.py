@@ -1,4 +1,4 @@
-"""Emergency messages of a drive, in words (CiA 301 emergency object, CiA 402-1 error codes). Pure."""
+"""A drive's emergency messages as text (CiA 301 emergency object, CiA 402-1 error codes). Pure."""
 
 from __future__ import annotations
 

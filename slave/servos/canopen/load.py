@@ -35,7 +35,7 @@ def configured_bitrate(bus: BusConfig) -> int:
 
 
 def too_much(drives: int, sync_hz: int, bits_s: float, bitrate: int) -> str:
-    """Why a bus cannot carry its drives and what to do, in words; empty where it can."""
+    """A text for why a bus cannot carry its drives and what to do; empty if it can."""
     if bits_s <= BUSIEST * bitrate:
         return ""
     per_sync = bits_s / sync_hz

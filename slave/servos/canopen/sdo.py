@@ -54,7 +54,7 @@ ABORTS = {
     0x0800_0023: "the drive has no object dictionary",
     0x0800_0024: "there is no data",
 }
-"""Abort codes in words."""
+"""The text of each abort code."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class Exchange:
         self._length: int | None = None
         self._toggle = 0
         self.strange = ""
-        """An answer to this transfer in a form that is not in CiA 301, in words."""
+        """A text for an answer to this transfer in a form that is not in CiA 301."""
 
     def begin(self) -> bytes:
         """The first request, also to begin all over."""
@@ -181,7 +181,7 @@ class Exchange:
             return More(bytes([_ASK_SEGMENT | self._toggle]) + bytes(7))
         held, self._segments = bytes(self._segments), None
         if self._length is not None and len(held) != self._length:
-            return SdoAnswer(False, f"{self._name}: {len(held)} bytes came, {self._length} were told")
+            return SdoAnswer(False, f"{self._name}: {len(held)} bytes received, {self._length} announced")
         return self._judge(held)
 
     def _judge(self, held: bytes) -> SdoAnswer:

@@ -66,21 +66,21 @@ class SecondMaster:
         return True
 
     def speaks(self, now_ns: int) -> bool:
-        """Whether one was heard within the last second."""
+        """Whether a second master was heard within the last second."""
         return any(now_ns - last_ns < GONE_NS for last_ns in self._last_ns.values())
 
     def forget(self) -> None:
-        """It has gone."""
+        """Forget the second master."""
         self._heard, self._last_ns = {}, {}
 
     @property
     def buses(self) -> Collection[str]:
-        """Where one was heard."""
+        """The buses on which a second master was heard."""
         return self._heard.keys()
 
     @property
     def words(self) -> str:
-        """Who it is, by what it sends, and what to do; empty where none was heard."""
+        """The other master, by what it sends, and what to do; empty if there is none."""
         if not self._heard:
             return ""
         parts = [f"bus {bus}: {_listed(kinds)}" for bus, kinds in self._heard.items()]

@@ -38,7 +38,7 @@ class JointPlace:
 
 
 def refusal(place: JointPlace, statusword: int) -> str:
-    """Why a drive may not be enabled, in words; empty where it may."""
+    """A text for why a drive may not be enabled; empty if it may."""
     return _bits(statusword) or _reference(place) or _range(place)
 
 

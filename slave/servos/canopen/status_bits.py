@@ -24,7 +24,7 @@ _WORDS = (
 
 
 def wrong_bits(statusword: int, enabled: bool = True) -> str:
-    """What is wrong, in words; empty where all is well. Bits 4 and 12 count only while `enabled`."""
+    """The fault as text; empty if there is none. Bits 4 and 12 count only while `enabled`."""
     asked = WATCHED if enabled else REMOTE | LIMITED
     wrong = [words for bit, bad, words in _WORDS if bit & asked and bool(statusword & bit) is bad]
     return "; ".join(wrong)

@@ -32,22 +32,22 @@ class Supervision:
         self.settled = False
         """Whether all drives run without a fault, so that none needs to be looked at by itself."""
         self.stopping = False
-        """Whether every drive is told to brake and stay."""
+        """Whether every drive is commanded to brake and stay."""
         self.warnings: Mapping[str, str] = MappingProxyType({})
         """What drives warn of, by joint: no reason to stop yet."""
 
     def restart(self, drive: int) -> None:
-        """A drive is led to running from the beginning."""
+        """Lead a drive to running from the beginning."""
         self.running[drive] = self.settled = False
         self._watch.restart(drive)
 
     def fail(self, drive: int, why: str) -> None:
-        """A drive is told to stop, and stays so until somebody asks for it."""
+        """Command a drive to stop; it stays stopped until a request enables it."""
         self._drives[drive].fail(why)
         self.settled = False
 
     def look(self, now_ns: int, seen: DriveAnswers) -> None:
-        """Let those be enabled that may be, and stop those that do what was not asked for."""
+        """Enable the drives that may be enabled, and stop those that do something else than commanded."""
         self._watch.take(seen)
         if not self.settled:
             self._check(now_ns, seen)

@@ -35,7 +35,7 @@ _REFUSALS = {
 
 
 class ServoError(RobotError):
-    """A servo that does not answer, or answers no; in words, without its name."""
+    """A servo does not answer, or refuses; the text leaves out its name."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ class Driver:
         self.reading = EncoderReading(clock(), self._stands.copy(), np.zeros(count, np.bool_))
         """Of the newest cycle."""
         self.faults: Mapping[str, str] = {}
-        """By joint, in words; replaced whole."""
+        """The faults as text, by joint; replaced whole."""
         self.missed = 0
         """Answers that did not come."""
         self.lost = 0

@@ -27,7 +27,7 @@ class ServoGoals:
         self._rejoining = np.zeros(len(servos), np.bool_)
         self._stopping = False
         self.counts: Counts = np.zeros(len(servos), np.int64)
-        """(J,) the newest. That of a servo with a fault does not matter: nobody writes it."""
+        """(J,) the newest goals. The goal of a servo with a fault is never written."""
 
     def rejoin(self, servo: int | slice = slice(None)) -> None:
         """Move one servo, or all, slowly until it is at its setpoint."""

@@ -45,7 +45,7 @@ def advice(device: str, timer: int | None) -> str:
 
 
 def too_late(device: str, quickest_s: float, waited_s: float, root: Path = Path("/")) -> str:
-    """Why servos that answer would be taken for silent, in words; empty where they would not."""
+    """A text for why servos that answer would be taken for silent; empty if they would not."""
     if quickest_s <= waited_s:
         return ""
     return (

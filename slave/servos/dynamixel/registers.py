@@ -77,7 +77,7 @@ def is_x_series(model: int) -> bool:
 
 
 def hardware_words(error: int) -> str:
-    """HARDWARE_ERROR in words; empty where nothing is wrong."""
+    """The text of HARDWARE_ERROR; empty if it is 0."""
     errors = [words for bit, words in _HARDWARE_ERRORS if error & bit]
     unknown = error & ~sum(bit for bit, _ in _HARDWARE_ERRORS)
     if unknown:
@@ -86,7 +86,7 @@ def hardware_words(error: int) -> str:
 
 
 def health_words(stretch: bytes) -> str:
-    """What HEALTH's bytes say is wrong, in words; empty where the servo is well."""
+    """The faults in HEALTH's bytes as text; empty if there are none."""
 
     def value(register: Register) -> int:
         at = register.address - HEALTH.address

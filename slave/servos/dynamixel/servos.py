@@ -66,7 +66,7 @@ class DynamixelServos:
         return self._driver.reading
 
     def faults(self) -> Mapping[str, str]:
-        """What is wrong, in words, by joint."""
+        """The faults as text, by joint."""
         return self._driver.faults
 
     def quick_stop(self, stop: bool) -> None:

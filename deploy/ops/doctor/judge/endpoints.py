@@ -13,7 +13,7 @@ def judge_endpoint(facts: EndpointFacts) -> Finding:
     """One that this host connects to, or listens at."""
     match facts.answer:
         case EndpointState.ACCEPTS:
-            found = "somebody listens there"
+            found = "a process listens there"
             if transport_of(facts.endpoint) == "tls":  # the knock ended before a handshake
                 found += ", and counts this knock as a refused handshake"
             return ok(f"connect {facts.endpoint}", found)

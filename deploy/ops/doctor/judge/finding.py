@@ -1,4 +1,4 @@
-"""What one check found: how it stands, in words, and what to do."""
+"""What one check found: the verdict, a description, and what to do."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Finding:
 
 
 def ok(check: str, found: str, advice: str = "") -> Finding:
-    """All is well; the advice is for those who want it better."""
+    """The check passed; the advice is optional."""
     return Finding(check, Health.OK, found, advice)
 
 

@@ -94,7 +94,7 @@ def _kernel(facts: MachineFacts) -> Finding:
     words = {"rt": "PREEMPT_RT", "dynamic": "preemptible (dynamic)", "full": "preemptible"}
     if facts.preemption == "rt":
         return ok("kernel", words["rt"])
-    found = words.get(facts.preemption, "not said to be preemptible")
+    found = words.get(facts.preemption, "not known to be preemptible")
     return ok("kernel", found, "on a busy host: apt install linux-image-rt-amd64")
 
 

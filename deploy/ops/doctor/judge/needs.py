@@ -44,7 +44,7 @@ class BusNeed:
     """Sensor nodes that answer each tick; 0 where others hang on it."""
     rate_hz: float = 0.0
     drives: int = 0
-    """Of a robot, each told and asked at every SYNC …"""
+    """A robot's drives, each commanded and read at every SYNC …"""
     bits_per_s: float = 0.0
     """… and what they put on the bus, heartbeats included."""
 
@@ -70,7 +70,7 @@ class Needs:
 
 
 def needs_of(path: Path, overrides: Sequence[str] = ()) -> Needs:
-    """From a master's, slave's, suit's or router's file, told apart by its keys. Raises ConfigError."""
+    """The needs of a master's, slave's, suit's or router's file, known by its keys. Raises ConfigError."""
     keys = _keys(path)
     if "capture" in keys or "operator" in keys:
         return _of_master(load_config(path, MasterConfig, overrides))

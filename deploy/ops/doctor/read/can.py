@@ -1,4 +1,4 @@
-"""CAN interfaces: what /sys/class/net shows of them, and the bit rates, which only netlink (`ip`) tells."""
+"""CAN interfaces: their state from /sys/class/net, and their bit rates from netlink (`ip`)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_can(tree: Tree, ip_json: str | None) -> dict[str, CanInterface]:
 
 
 def ask_ip() -> str | None:
-    """What `ip` tells of all interfaces; None where there is no such program, or it fails."""
+    """The output of `ip` for all interfaces; None if there is no such program, or it fails."""
     program = shutil.which("ip", path="/usr/sbin:/sbin:/usr/bin:/bin")
     if program is None:
         return None

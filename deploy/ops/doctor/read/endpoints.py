@@ -1,4 +1,4 @@
-"""Whether somebody answers where this host connects, and whether it can listen where it should."""
+"""Whether a process answers where this host connects, and whether this host can listen where it should."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class RobotFacts:
     guard: str
     """The guard's state; empty where the robot did not answer."""
     text: str
-    """What it said, or why it did not answer."""
+    """The robot's answer, or the reason for its silence."""
     round_trips_ms: tuple[float, ...] = ()
     asked: int = 0
     """Exchanges begun: those that were not answered are missing in `round_trips_ms`."""

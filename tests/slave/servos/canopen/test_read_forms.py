@@ -48,7 +48,7 @@ def test_a_segment_out_of_turn_and_a_wrong_length_are_told() -> None:
     assert said == SdoAnswer(False, "object 1000:0: toggle bit not alternated")
     exchange.on_answer(b"\x41" + HEAD + b"\x04\0\0\0")
     said = exchange.on_answer(b"\x0b\x92\x01" + bytes(5))
-    assert said == SdoAnswer(False, "object 1000:0: 2 bytes came, 4 were told")
+    assert said == SdoAnswer(False, "object 1000:0: 2 bytes received, 4 announced")
 
 
 def test_an_endless_answer_ends() -> None:
