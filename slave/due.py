@@ -28,7 +28,7 @@ class DueCommands:
         self.corrected = Durations()
         """One way, of every command that came and of every one that was due and did not."""
         self.recent = StreamedDurations()
-        """Of those that did not come, to be published one by one."""
+        """Durations of the commands that did not come, to be published one by one."""
         self.missing = 0
         """Was not there when it was due and a newer came; one that comes later yet stays counted."""
         self.came = 0

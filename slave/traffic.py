@@ -16,7 +16,7 @@ class CommandTraffic:
 
     def __init__(self) -> None:
         self.arrivals = Arrivals()
-        """By the commands' numbers."""
+        """The arrivals, counted by the commands' numbers."""
         self.one_way = StreamedDurations()
         """From put to received, while the offset was trusted."""
         self.due = DueCommands()

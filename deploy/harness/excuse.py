@@ -72,7 +72,7 @@ class Lost:
     """What a host lost between two times."""
 
     excused_s: float
-    """Of the stalls the part that the host caused: a result may be late by this much."""
+    """The part of the stalls that the host caused: a result may be late by this much."""
     still_s: float
     """All stalls, whatever caused them."""
     evidence: StallEvidence

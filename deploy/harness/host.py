@@ -27,7 +27,7 @@ class HostMetrics:
     """A report's `host`: what the host itself missed during a run."""
 
     ticks: Ticks
-    """Of the reference loop of the worst core."""
+    """The ticks of the reference loop on the worst core."""
     longest_ms: float
     """The longest stall of any core."""
     priority: bool
@@ -48,7 +48,7 @@ class HostWatch:
     """Whether the loops run before tandem's programs. If not, tandem's load may make them late too, and only
     the stolen part of a stall excuses."""
     cpu_s: tuple[float, float] = (0.0, 0.0)
-    """Of all cores when the loops began: stolen time, and all time."""
+    """Stolen time and total time of all cores when the loops began."""
 
     _reported: asyncio.Event = field(default_factory=asyncio.Event)
 

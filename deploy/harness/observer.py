@@ -53,7 +53,7 @@ class Observer:
         self._news = asyncio.Event()
         self._marks: dict[str, tuple[int, int]] = {}
         self.rates_hz: dict[str, float] = {}
-        """By the senders' numbers and clocks: this side receives only the newest of several that wait."""
+        """From the senders' numbers and clocks: this side receives only the newest of several that wait."""
         link.subscribe(COMMAND, lambda payload, _: self._take(payload, Command))
         link.subscribe(STATE, lambda payload, _: self._take(payload, RobotState))
         link.subscribe(TRUTH, lambda payload, _: self._take(payload, Truth))

@@ -23,7 +23,7 @@ from common.process.realtime import enter_real_time
 from deploy.harness.excuse import LoopsBegan, Stall
 
 PERIOD_NS = 5_000_000
-"""As the master's capture and the slave's loop."""
+"""The same period as the master's capture and the slave's loop."""
 REPORT_TICKS = 50
 """After so many ticks a loop reports that it still ticks: silence does not mean that it was in time."""
 PRIORITY = 90

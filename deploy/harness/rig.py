@@ -32,12 +32,12 @@ DRIVES = "drives"
 
 
 def robot_name(number: int) -> str:
-    """Of the first, second … robot of a run."""
+    """The name of the first, second … robot of a run."""
     return f"robot-{number}"
 
 
 def slave_name(number: int) -> str:
-    """Of the process of the first, second … robot of a run."""
+    """The process name of the first, second … robot of a run."""
     return "slave" if number == 1 else f"slave-{number}"
 
 
@@ -66,7 +66,7 @@ class Rig:
             robot: Observer(session.link(robot), self.skeleton) for robot in map(robot_name, numbers)
         }
         self.observer = self.observers[ROBOT]
-        """Of the first robot; the suit publishes the truth under its name."""
+        """The first robot's observer; the suit publishes the truth under its name."""
         self.slaves = tuple(map(slave_name, numbers))
         children = [Child("slave", folder, name=name) for name in self.slaves]
         others = [*ROLES[1:], *([DRIVES] if DRIVES in overrides else [])]

@@ -20,7 +20,7 @@ _SMALLEST_SINE = 1e-9
 
 
 def inclination_rad(up: Array) -> Array:
-    """Of the axis from the vertical, 0 (upwards) to π; (..., 3) in, (...) out. Eq. 10.
+    """The axis' angle from the vertical, 0 (upwards) to π; (..., 3) in, (...) out. Eq. 10.
 
     Not by arccos, which loses half of the digits near the vertical.
     """

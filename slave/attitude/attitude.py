@@ -52,7 +52,7 @@ def near_vertical(inclination: float) -> bool:
 
 
 def attitude(up: Array, field: Array, declination_rad: float = 0.0) -> Attitude | None:
-    """Of specific force and field (3,) in the instrument's frame; None where either is no finite vector.
+    """The attitude from specific force and field (3,), instrument's frame; None if either is not finite.
 
     A field of zero is one that is not measured: the inclination does not need it.
     """

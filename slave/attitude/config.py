@@ -18,22 +18,22 @@ class BaseConfig(Section):
     """`none`: the base carries no sensor, and its tilt is not watched. `serial`: an instrument that sends the
     7-byte frame. `simulated`: an ADXL330 and an HMC5843 that do not exist."""
     port: str = ""
-    """Of `serial`: such as /dev/ttyUSB0, or any URL that pyserial knows."""
+    """For `serial`: the port, such as /dev/ttyUSB0, or any URL that pyserial knows."""
     baud: int = Field(9600, ge=300, le=4_000_000)
     axis: Axis = "ahead"
     """Where the instrument's axis points on the base."""
     declination_deg: float = Field(0.0, ge=-180.0, le=180.0)
-    """Of the field at this place, positive where the needle points east of true north."""
+    """The field's declination at this place, positive where the needle points east of true north."""
     level_tool_face_deg: float = Field(0.0, ge=0.0, lt=360.0)
     """The tool-face that the instrument shows when the base stands level."""
     most_deg_s: float = Field(500.0, gt=0.0, le=5000.0)
-    """Of `serial`: the base cannot lean over faster. A base of 1 m that tips over lands at 310°/s."""
+    """For `serial`: the base cannot lean over faster. A base of 1 m that tips over lands at 310°/s."""
     calibration: RelativePath | None = None
-    """Of `simulated`: the file of the two sensors' maps, as a suit's node has one."""
+    """For `simulated`: the file of the two sensors' maps, as a suit's node has one."""
     time_constant_s: float = Field(3.0, ge=0.0, le=30.0)
-    """Of `simulated`: smoothing of the readings. Another instrument smooths by itself."""
+    """For `simulated`: smoothing of the readings. Another instrument smooths by itself."""
     lean_deg: float = Field(0.0, ge=-180.0, le=180.0)
-    """Of `simulated`: how far the base leans to its right …"""
+    """For `simulated`: how far the base leans to its right …"""
     lean_after_s: float = Field(0.0, ge=0.0)
     """… from so long after the start."""
 

@@ -128,7 +128,7 @@ class SerialBase:
         self._reader.start()
 
     def read(self) -> BaseAttitude | None:
-        """Of the newest frames that agree: see `vote.py`."""
+        """The attitude on which the newest frames agree: see `vote.py`."""
         return self._attitude
 
     def counters(self) -> dict[str, int]:

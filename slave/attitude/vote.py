@@ -93,7 +93,7 @@ def median(a: FrameAngles, b: FrameAngles, c: FrameAngles) -> FrameAngles:
 
 
 def _median_turn(three: list[int | None]) -> int | None:
-    """Of tenths of a degree on the circle; none where two of three have none."""
+    """The median of three angles on the circle, in tenths of a degree; None if two of them are None."""
     there = [angle for angle in three if angle is not None]
     if len(there) < 2:
         return None

@@ -18,7 +18,7 @@ class CameraConfig(Section):
     name: str = Field("head", pattern=VIDEO_NAME)
     """Names the topic, and with `robot` the model's camera; where it has none the whole robot is shown."""
     device: str = "/dev/video0"
-    """Of a `v4l2` camera."""
+    """The device of a `v4l2` camera."""
     width: int = Field(320, ge=80, le=1920, multiple_of=16)
     """Pixels at best; with `height`. A poor link gets a half or a quarter of each."""
     height: int = Field(240, ge=60, le=1080, multiple_of=4)

@@ -31,7 +31,7 @@ _WELL_AFTER = 20
 _IDLE_S = 0.25
 _JOIN_S = 1.0
 _BUSY_SHARE = 0.5
-"""Of one core, that making pictures may take."""
+"""The share of one core that making pictures may take."""
 
 log = logging.getLogger(__name__)
 

@@ -17,7 +17,7 @@ _LESS = 0.6
 _SLOWER, _FASTER = 1.5, 0.7
 _WINDOW = 2
 _SHARE = 0.5
-"""Of the link's time that pictures may take."""
+"""The share of the link's time that pictures may take."""
 _USED = 0.6
 """A picture that needed less of its budget says nothing about a larger one."""
 _LOST_NS = 1_000_000_000

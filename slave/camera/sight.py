@@ -22,7 +22,7 @@ class SeenPicture:
     known_ns: int
     """When the slave learnt of it, slave's clock."""
     delay_ns: int | None
-    """By how much it travelled longer than the clocks' quickest exchange; None while that is not trusted."""
+    """The picture's delay beyond the clocks' quickest exchange; None while that exchange is not trusted."""
 
 
 class Sight:

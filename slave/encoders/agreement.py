@@ -23,7 +23,7 @@ READINGS = 2
 
 
 class EncoderAgreement:
-    """Of J joints. Give it each reading once."""
+    """Compares the two angles of J joints. Give it each reading once."""
 
     def __init__(self, joint_names: Sequence[str], window_rad: float = WINDOW_RAD) -> None:
         self._names = tuple(joint_names)

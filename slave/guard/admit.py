@@ -27,7 +27,7 @@ class Situation:
     live_token: int
     """Token of the live lease, 0 where there is none."""
     newest_sequence: int
-    """Of the last command accepted within this lease, -1 before the first."""
+    """The number of the last command accepted within this lease, -1 before the first."""
     now_ns: int
     offset: Offset
     """The master's clock against the slave's."""

@@ -31,7 +31,10 @@ PATIENCE = MotionPatience(plain_ns=20 * NS_PER_MS, shaken_ns=80 * NS_PER_MS)
 
 
 class Placement:
-    """Of J joints. `last_known_rad` None: every joint has a second reading, or is simulated."""
+    """Whether J joints stand where their readings say.
+
+    `last_known_rad` None: every joint has a second reading, or is simulated.
+    """
 
     def __init__(
         self,

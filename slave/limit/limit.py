@@ -196,7 +196,7 @@ class SetpointLimiter:
         given: list[Array],
         motion: LimiterStep,
     ) -> list[Clamp]:
-        """Those that began in this step. A held joint brakes by order, and is not clamped by a rule."""
+        """The clamps that began in this step. A held joint brakes by order, and is not clamped by a rule."""
         clamps: list[Clamp] = []
         self._clamping = False
         for (rule, _), before, after in zip(RULES, given, given[1:], strict=False):

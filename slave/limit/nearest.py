@@ -23,7 +23,7 @@ from slave.guard.events import Clamp, Rule
 from slave.guard.limits import MotionLimits
 
 _H_S = 1e-4
-"""Of the central difference that gives the segments' rates."""
+"""The step of the central difference that gives the segments' rates."""
 _NOTICED_RAD = math.radians(0.1)
 
 

@@ -13,8 +13,8 @@ from slave.track.predict import Predict
 from slave.track.tracker import Tracker
 
 SERVO_LAG_S = 0.031
-"""Of the MuJoCo robot behind a ramp that is written at 200 Hz, measured: 26 ms are its servos', 3 ms go by
-until the drives take a setpoint in, and for 4 ms (2 on average) it stands."""
+"""The measured lag of the MuJoCo robot behind a ramp that is written at 200 Hz: 26 ms are its servos', 3 ms
+go by until the drives take a setpoint in, and for 4 ms (2 on average) it stands."""
 
 
 class TrackConfig(Section):

@@ -117,7 +117,7 @@ def corrected(before: Estimate, sampled_ns: int, position_rad: Array, velocity_r
 
 
 def _inverse(square: Array) -> Array:
-    """Of a (1, 1) or symmetric (2, 2): ten times as fast as the library's for any size."""
+    """The inverse of a (1, 1) or symmetric (2, 2): ten times as fast as the library's for any size."""
     if len(square) == 1:
         return np.reciprocal(square)
     a, b, d = square[0, 0], square[0, 1], square[1, 1]

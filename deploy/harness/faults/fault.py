@@ -23,7 +23,7 @@ class Reaction(StrEnum):
     HOLDS_JOINTS = "holds the joints concerned"
     """They brake and stand; the others go on."""
     GOES_ON = "goes on"
-    """As if nothing had happened."""
+    """The robot goes on as if nothing had happened."""
     LIMITED = "follows within its limits"
     """It cannot tell that this is not meant, and moves no faster and no farther than it ever may."""
     STOPS = "emergency stop"
@@ -46,9 +46,9 @@ class FaultRow:
     person: str
     """What a person does then."""
     reacts_s: float | None = None
-    """By then the guard must be in the state in which it ends; None where it goes on."""
+    """The guard must be in its final state by then; None if the robot goes on."""
     stands_s: float | None = None
-    """By then the joints concerned must stand, for good; None where they go on."""
+    """The affected joints must stand from then on; None if they go on."""
     strays_deg: float | None = None
     """How far the joints not concerned may be from where they would have been without the fault."""
     missed: str = ""

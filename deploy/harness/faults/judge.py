@@ -14,7 +14,7 @@ from deploy.harness.faults.fault import FaultRow
 from deploy.measure.stillness import SPEED_ERROR_RAD_S, Stillness, StoppingMotion, speeds
 
 SERVO_SHARE = 0.05
-"""By how much a servo may pass a setpoint that goes at the limit: 4.3 % for a second order at damping √½."""
+"""The share by which a servo may exceed a setpoint at its limit: 4.3 % for a second order at damping √½."""
 STOP_RAD = math.radians(3.0)
 """The mechanical stops stand this far outside the position limits. A joint that stands at its limit is shaken
 beyond it when its neighbours brake (a finger by 1°); the stop it must not reach."""
@@ -31,7 +31,7 @@ class FaultOutcome:
     reason: str
     """The guard's own words."""
     stillness: Stillness
-    """Of the joints concerned."""
+    """The stillness of the affected joints."""
     wrong: tuple[str, ...]
     """What should not have been; empty where all is as it must be."""
     reacted_s: float | None = None

@@ -31,7 +31,7 @@ JOINT = "right_shoulder_pitch"
 """In the middle of its reach when the fault comes."""
 RUNS_AWAY_RAD_S = math.radians(60.0)
 FRAMES_HZ = 10.0
-"""Of the attitude instrument: the slowest that one may be."""
+"""The attitude instrument's frame rate, the slowest allowed."""
 FALLS_DEG_S = 100.0
 SWITCH_ON = (
     "Remove the cause. Drives that stopped by themselves are switched on by an emergency stop and its reset "

@@ -57,7 +57,7 @@ class _RobotTick:
     now_ns: int
     """True time."""
     slave_ns: int
-    """By the slave's own clock."""
+    """Time on the slave's own clock."""
     state: State
     reading: EncoderReading
     setpoint: Setpoint
@@ -146,7 +146,7 @@ class Scene:
             raise TandemError(f"the trial cannot begin: {self.guard.state}, {self.guard.reason}")
 
     def engage(self) -> None:
-        """As the operator. Raises TandemError where the robot refuses."""
+        """Engage the robot as its operator. Raises TandemError if the robot refuses."""
         reply = self.run.ask(Action.ENGAGE)
         if not reply.done:
             raise TandemError(f"the trial cannot begin: {reply.text}")

@@ -34,7 +34,7 @@ class Setting:
     aligned: bool = False
     """The nodes' alignment is known, so that a lean in the zero pose can be detected."""
     motion: Callable[[], OperatorMotion] | None = None
-    """Of the operator, None for the usual reach."""
+    """The operator's motion, None for the usual reach."""
 
 
 USUAL = Setting()

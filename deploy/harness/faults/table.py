@@ -17,7 +17,7 @@ from deploy.harness.faults.virtual import VirtualFault, try_on_virtual_clock
 
 VIRTUAL: tuple[VirtualFault, ...] = (*LINK, *STRANGERS, *VALUES, *SUIT, *ROBOT, *CLOCKS, *ESTOPS)
 FAULTS: dict[str, FaultRow] = {fault.name: fault for fault in (*VIRTUAL, *PROCESSES)}
-"""By name."""
+"""Every fault, by name."""
 
 
 def try_fault(fault: FaultRow) -> FaultOutcome:

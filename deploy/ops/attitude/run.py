@@ -36,7 +36,7 @@ class AttitudeOptions:
     """The port that a simulated instrument sends its frames to."""
     declination_deg: float = 0.0
     inclination_deg: float = 10.0
-    """Of the simulated one, as its azimuth and tool-face: the paper's own test."""
+    """The simulated axis' inclination, as its azimuth and tool-face: the paper's own test."""
     azimuth_deg: float = 235.0
     tool_face_deg: float = 56.0
     seconds: float | None = None

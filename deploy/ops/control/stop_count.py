@@ -15,7 +15,7 @@ class StopCount:
         self._within_s = within_s
         self._shown: dict[int, ProcessPresence] = {}
         self._stopped: dict[int | str, RobotAnswer] = {}
-        """By instance; by session, where the robot is of schema 2 and has no instance number."""
+        """Acknowledgements by instance, or by session for a robot of schema 2, which has no instance."""
 
     def expect(self, presence: ProcessPresence) -> None:
         """A process of this name showed itself. One that goes again is not known to be stopped."""

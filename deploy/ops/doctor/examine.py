@@ -95,7 +95,7 @@ def devices(needs: Needs, tree: Tree) -> list[Finding]:
 
 
 def keys(needs: Needs) -> list[Finding]:
-    """Of the link; nothing where no file says how it is reached."""
+    """Check the link's keys; no finding if no file configures a link."""
     if needs.role in (GENERAL, "suit"):
         return []
     tls = needs.link.tls

@@ -40,7 +40,7 @@ class ProbePlan:
     packets: int
     """How many to send."""
     size: int
-    """Of the IP packet, bytes."""
+    """The size of the IP packet, bytes."""
     listen_s: float
     """How long to listen, from the start."""
 

@@ -118,7 +118,7 @@ async def _noted(host: EmulatedHost, process: asyncio.subprocess.Process, word: 
 
 
 def _loss_percent(before: Counters, after: Counters) -> float | None:
-    """Of the packets between the two; None where what is lost by chance is not counted by itself."""
+    """The loss between the two counts, %; None if random losses are not counted separately."""
     packets = after.packets - before.packets
     if LOSS not in after.dropped or not packets:
         return None

@@ -79,6 +79,6 @@ class Tape:
         all_.failed = all_.failed or one.failed
 
     def counters(self) -> RecorderCounters:
-        """Of all files that are closed."""
+        """The sum of the counters of all closed files."""
         put, refused = self._closed.put + self._refused, self._closed.refused + self._refused
         return RecorderCounters(put, self._closed.written, refused, self._closed.lost, self._closed.failed)

@@ -13,7 +13,7 @@ DEMAND = 0x2010
 
 
 class DriveFault(IntEnum):
-    """By the number in DEMAND."""
+    """The faults, by their number in DEMAND."""
 
     NONE = 0
     OVER_CURRENT = 1
@@ -54,7 +54,7 @@ class DriveFault(IntEnum):
 
     @property
     def option(self) -> str:
-        """As a person writes it."""
+        """The fault's name on the command line."""
         return self.name.lower().replace("_", "-")
 
 

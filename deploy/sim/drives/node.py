@@ -50,7 +50,7 @@ class SimulatedDrive:
         self.position = 0
         """Increments."""
         self.count = 0
-        """Of the output encoder."""
+        """The output encoder's count."""
         self.target = 0
         self.limited = False
         """Whether a limit of its own keeps it from its target."""

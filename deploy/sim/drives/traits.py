@@ -22,7 +22,7 @@ class ReadForm(Enum):
 
 @dataclass(slots=True)
 class Traits:
-    """Of one drive."""
+    """The options of one drive."""
 
     knows_16: bool = True
     """Whether "enable operation" leads out of quick stop active: transition 16, which is optional."""

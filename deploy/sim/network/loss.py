@@ -20,13 +20,13 @@ class GilbertElliott:
 
     @property
     def share_bad(self) -> float:
-        """Of packets that meet a bad state, in the long run."""
+        """The share of packets that meet the bad state, in the long run."""
         changes = self.to_bad + self.to_good
         return self.to_bad / changes if changes else 0.0
 
     @property
     def mean(self) -> float:
-        """Of packets lost, in the long run."""
+        """The share of packets that are lost, in the long run."""
         return self.lost_in_good + self.share_bad * (self.lost_in_bad - self.lost_in_good)
 
     def bound(self, packets: int, sigmas: float = 3.0) -> float:

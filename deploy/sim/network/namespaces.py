@@ -21,7 +21,7 @@ LINK = "emulated"
 """The emulated link's interface, in both hosts."""
 MANAGEMENT = "management"
 LINK_NETWORK = "198.18.0"
-"""Of the range for testing networks (RFC 2544): no other interface of a machine has it."""
+"""A network in the range for tests (RFC 2544): no other interface of a machine has it."""
 MANAGEMENT_NETWORK = "198.19"
 """Slots of eight addresses: each run takes one, as the caller's namespace is shared by runs."""
 MULTICAST = "239.0.0.0/8"
@@ -39,7 +39,7 @@ class NetworkRun:
 
     @property
     def name(self) -> str:
-        """Of what it makes."""
+        """The prefix of the names of all that the run makes."""
         return f"tandem-{self.pid}-{self.started}-{self.token}"
 
     @property
@@ -48,7 +48,7 @@ class NetworkRun:
         return f"td{self.token}"
 
     def namespace(self, host: str) -> str:
-        """Of a host."""
+        """The name of a host's namespace."""
         return f"{self.name}-{host}"
 
     @property
@@ -58,7 +58,7 @@ class NetworkRun:
 
 
 def new_run() -> NetworkRun:
-    """Of this process."""
+    """A new run of this process."""
     pid = os.getpid()
     return NetworkRun(pid, _started(pid) or 0, secrets.token_hex(3))
 
@@ -109,8 +109,9 @@ def link_addresses(run: NetworkRun) -> Iterator[tuple[str, str, str]]:
 
 
 CONGESTION_CONTROLS = ("cubic", "reno")
-"""Of tcp on every emulated host, the first that the kernel permits there. A namespace inherits the machine's,
-which decides how tcp fares on a long line: on 380 ms bbr is silent six times a minute, these never."""
+"""TCP's congestion control on every emulated host: the first that the kernel permits. A namespace
+inherits the machine's, which decides how tcp fares on a long line: on 380 ms bbr is silent
+six times a minute, these never."""
 _PERMITTED = Path("/proc/sys/net/ipv4/tcp_allowed_congestion_control")
 
 

@@ -25,20 +25,20 @@ class Way(Section):
     jitter_ms: float = Field(0.0, ge=0, le=1000)
     """Standard deviation of that time. It wanders, skewed towards late, and packets keep their order."""
     loss_percent: float = Field(0.0, ge=0, le=100)
-    """Of all packets, in the long run."""
+    """The share of all packets that are lost, in the long run."""
     burst_packets: float | None = Field(None, ge=1, le=10_000)
     """Mean length of a bad period (Gilbert–Elliott); unset: each packet is lost or not by itself."""
     loss_in_burst_percent: float = Field(100.0, gt=0, le=100)
-    """Of the packets in a bad period."""
+    """The share of packets that are lost in a bad period."""
     loss_between_percent: float = Field(0.0, ge=0, lt=100)
-    """Of the packets in a good period."""
+    """The share of packets that are lost in a good period."""
     reorder_percent: float = Field(0.0, ge=0, le=50)
-    """Of all packets: those are held back by `reorder_ms`, and others pass them."""
+    """The share of packets that are held back by `reorder_ms`, so that others pass them."""
     reorder_ms: float = Field(20.0, gt=0, le=1000)
     duplicate_percent: float = Field(0.0, ge=0, le=50)
-    """Of all packets: those arrive twice."""
+    """The share of packets that arrive twice."""
     largest_bytes: int | None = Field(None, ge=68, le=65_535)
-    """Of an IP packet: larger ones vanish without a word, as behind a tunnel whose ICMP is filtered."""
+    """The largest IP packet: larger ones are dropped without an error, as behind a tunnel without ICMP."""
     rate_mbit: float | None = Field(None, gt=0, le=10_000)
     """Bits of IP packets per second; unset: as fast as the machine."""
     queue_ms: float = Field(100.0, gt=0, le=10_000)
@@ -46,14 +46,14 @@ class Way(Section):
 
     @property
     def queue_bytes(self) -> int:
-        """Of a link with a rate: at least one full packet."""
+        """The queue of a link with a rate, bytes: at least one full packet."""
         if self.rate_mbit is None:
             return 0
         return round(max(self.queue_ms * self.rate_mbit * 1e3, PACKET_BITS) / 8)
 
     @property
     def share_in_bursts(self) -> float:
-        """Of packets that meet a bad period, so that `loss_percent` are lost."""
+        """The share of packets that meet a bad period, so that `loss_percent` are lost."""
         low, high = self.loss_between_percent, self.loss_in_burst_percent
         return (self.loss_percent - low) / (high - low) if self.loss_percent else 0.0
 
@@ -93,7 +93,7 @@ class Profile(Section):
     """The whole file."""
 
     name: str = ""
-    """Of the file, where it does not tell."""
+    """The name; the file's name by default."""
     about: str = ""
     source: str = ""
     """Where the figures are from."""
@@ -131,7 +131,7 @@ def _over(both: Way, one: Way) -> Way:
 
 
 def profile_names() -> list[str]:
-    """Of those that come with tandem, from the best network to the worst."""
+    """The names of the profiles that come with tandem, from the best network to the worst."""
     profiles = [(load_profile(path).ways.to_robot.delay_ms, path.stem) for path in PROFILES.glob("*.toml")]
     return [name for _, name in sorted(profiles)]
 

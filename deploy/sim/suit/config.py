@@ -44,7 +44,7 @@ class SuitConfig(Section):
     """Description of the frames."""
     buses: list[BusConfig] = Field(min_length=1)
     nodes: dict[str, NodeConfig]
-    """By segment; segments without a node stay silent."""
+    """The nodes by segment; segments without a node stay silent."""
     motion: str = "bottle"
     """What the operator does: `bottle`, `grasp`, `walk` (each of one profile), `calibration_pose`, `sweep`;
     to calibrate: `tray` (all units in it are turned about), `limber` (the zero pose, then every joint moves),

@@ -23,9 +23,9 @@ class SensorErrors:
 
     bias: float
     scale: float
-    """Of each axis's own gain, a fraction."""
+    """The error of each axis's own gain, a fraction."""
     cross_axis: float
-    """Of what an axis takes from each of the other two, a fraction."""
+    """The part of each of the other two axes that an axis picks up, a fraction."""
     noise: float
 
 

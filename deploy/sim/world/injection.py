@@ -22,7 +22,7 @@ class Traffic(StrEnum):
 
 
 Delivery = tuple[int, bytes]
-"""By how much a message is delayed beyond the link's own delay, ns, and its bytes."""
+"""The delay of a message beyond the link's own, ns, and its bytes."""
 
 
 @dataclass(slots=True)
@@ -32,7 +32,7 @@ class FaultInjection:
     carry: Callable[[Traffic, bytes], Sequence[Delivery]] = lambda _, payload: ((0, payload),)
     """The messages that arrive for one that was sent: none, one, or more."""
     master_stepped_ns: int = 0
-    """By how much the master's clock has been stepped; no other clock is."""
+    """The step of the master's clock, ns; no other clock is stepped."""
     slave_stepped_ns: int = 0
     suit_heard: bool = True
     """Whether the bus between suit and master works."""

@@ -17,7 +17,7 @@ from slave.servos.backend import BackendConfig
 from slave.servos.canopen.load import bits_per_s, configured_bitrate, too_much
 
 INCREMENTS_PER_TURN = 65536
-"""Of a motor's own encoder."""
+"""The resolution of a motor's own encoder."""
 _LIMIT_MARGIN_RAD = math.radians(2.0)
 """A drive's software limits lie this far beyond the joint's: the guard limits first."""
 _INT32 = 2**31 - 1
@@ -33,7 +33,7 @@ class DriveConfig(Section):
     gear_ratio: float = Field(1.0, gt=0.0, le=10_000.0)
     """Turns of the motor for one turn of the joint."""
     increments_per_turn: int = Field(INCREMENTS_PER_TURN, ge=256, le=2**24)
-    """Of the motor."""
+    """The resolution of the motor's encoder."""
     reversed: bool = False
     """True: the drive's position falls as the joint's angle rises."""
     zero_increments: int = Field(0, ge=-(2**30), le=2**30)
@@ -63,8 +63,8 @@ class CanopenConfig(BackendConfig):
     buses: list[BusConfig] = Field(default_factory=_two_groups, min_length=1)
     """`[[servos.canopen.buses]]`; without any: two multicast groups of this host, for `tandem drives`."""
     drives: dict[str, DriveConfig] = Field(default_factory=dict)
-    """By joint: all of them or none. Without any: ids from 1 upwards in the order of the joints, the right
-    side on the second bus where there is one, all else on the first."""
+    """The drives by joint: all of them or none. Without any: ids from 1 upwards in the order of the joints,
+    the right side on the second bus if there is one, all else on the first."""
     sync_hz: int = Field(50, ge=10, le=200)
     """SYNC: targets out, positions in."""
     node_id: int = Field(127, ge=1, le=127)
@@ -111,7 +111,7 @@ class CanopenConfig(BackendConfig):
         return drives
 
     def load(self, skeleton: Skeleton) -> dict[str, tuple[int, float]]:
-        """By bus: how many drives hang on it, and the bits a second that they put on it."""
+        """The number of drives on each bus, and the bits per second that they put on it."""
         drives = list(self.drives_of(skeleton).values())
         counts = {bus.name: sum(drive.bus == bus.name for drive in drives) for bus in self.buses}
         beat_ms = max(self.heartbeat_ms, 1000 // self.sync_hz)

@@ -31,7 +31,7 @@ CODES = {
     0x8612: "position limit reached",
     0xFF01: "fault asked for",
 }
-"""By error code."""
+"""The texts by error code."""
 
 CLASSES = {
     0x1: "generic error",
@@ -45,7 +45,7 @@ CLASSES = {
     0x9: "an external error",
     0xF: "of the manufacturer's own",
 }
-"""By the code's first digit, for codes that are not in CODES."""
+"""The texts by the code's first digit, for codes that are not in CODES."""
 
 REGISTER = (
     "generic",

@@ -12,7 +12,7 @@ BUSIEST = 0.9
 WELL = 0.8
 """Up to this share answers come in time."""
 _OVERHEAD_BITS, _STUFFED_BITS = 47, 34
-"""Of a frame with an 11-bit identifier, the gap behind it included; those of them that may be stuffed."""
+"""Bits of a frame with an 11-bit identifier besides its data, gap included; and those that may be stuffed."""
 _HEARTBEAT_BYTES = 1
 
 

@@ -17,7 +17,7 @@ TPDO_MAPPING = (0x6041_0010, ENCODER << 16 | 0x0010, 0x6064_0020)
 """Statusword, encoder word, actual position."""
 
 COUNT_BITS, MAGNET_LOST, PARITY_ERROR = 0x0FFF, 0x8000, 0x4000
-"""Of the encoder word: the AS5045's 12-bit count, its magnet flags, and an SSI frame of wrong parity."""
+"""Bits of the encoder word: the AS5045's 12-bit count, its magnet flags, and an SSI frame of wrong parity."""
 
 ENCODER_FLAGS = np.uint16(MAGNET_LOST | PARITY_ERROR)
 

@@ -17,7 +17,7 @@ _DOWNLOADED, _UPLOADED, _ABORT = 0x60, 0x40, 0x80
 _EXPEDITED, _SIZED, _UPLOAD_BITS = 0x02, 0x01, 0xE0
 _ASK_SEGMENT, _TOGGLE, _LAST = 0x60, 0x10, 0x01
 _MOST_BYTES = 4096
-"""Of a segmented read: no entry that is asked for here is longer than some tens of bytes."""
+"""The limit of a segmented read: no entry that is asked for here is longer than some tens of bytes."""
 _HEAD = struct.Struct("<BHB")
 TOGGLE_ERROR = 0x0503_0000
 
@@ -95,7 +95,7 @@ class SdoAnswer:
     done: bool
     words: str = ""
     data: bytes = b""
-    """Of a read: what the entry holds, as many bytes as the drive sent."""
+    """The content of an entry that was read, as many bytes as the drive sent."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ class SecondMaster:
         self._nodes = nodes
         self._own_id = own_id
         self._heard: dict[str, dict[str, list[str]]] = {}
-        """By bus, then by kind: the nodes that were spoken to."""
+        """The addressed nodes, by bus and then by kind of frame."""
         self._last_ns: dict[str, int] = {}
         self.frames = 0
 

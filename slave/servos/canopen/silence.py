@@ -13,7 +13,7 @@ _NEVER_NS = -(1 << 62)
 
 
 class DriveSilence:
-    """Of all J drives."""
+    """Which of all J drives are silent."""
 
     def __init__(self, config: CanopenConfig, drives: int) -> None:
         self._dead_ns = config.drive_dead_ms * NS_PER_MS

@@ -26,9 +26,9 @@ class JointPlace:
     """Where one joint stands, by each source, rad."""
 
     drive_rad: float
-    """By the drive."""
+    """The angle by the drive."""
     encoder_rad: float | None
-    """By the output encoder; None where its word cannot be believed."""
+    """The angle by the output encoder; None if its word is not valid."""
     last_known_rad: float | None
     """Before the robot was switched off; None where that is not known."""
     limits_rad: tuple[float, float]

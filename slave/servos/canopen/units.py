@@ -14,7 +14,7 @@ from slave.servos.canopen.config import CanopenConfig, limits_rad
 
 @dataclass(frozen=True, slots=True)
 class DriveUnits:
-    """Of all J drives."""
+    """The conversion between angles and increments for all J drives."""
 
     scale: Array
     """(J,) increments a radian, signed."""
@@ -25,7 +25,7 @@ class DriveUnits:
 
     @classmethod
     def of(cls, config: CanopenConfig, skeleton: Skeleton) -> DriveUnits:
-        """As the file configures them."""
+        """The units that the file configures."""
         drives = config.drives_of(skeleton).values()
         return cls(
             np.array([drive.increments_per_rad for drive in drives]),

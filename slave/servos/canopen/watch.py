@@ -96,7 +96,7 @@ class DriveWatch:
         self.encoder_rad = self._encoders.position_rad(seen.encoder_counts)
 
     def check(self, drive: int, seen: DriveAnswers) -> tuple[bool, str]:
-        """Of one that waits to be enabled and has answered: whether it may be, or why it never will be."""
+        """Whether a drive that waits and has answered may be enabled, or why it never may."""
         here = float(self.drive_rad[drive])
         if not abs(here - self._anchor_rad[drive]) <= STILL_RAD:
             first = math.isnan(self._anchor_rad[drive])

@@ -22,7 +22,7 @@ _ALERT = 0x80
 _ID, _LENGTH, _PARAMETERS = 4, 5, 9
 _STATUS_BYTES = 11
 _STATUS_LENGTH = 4
-"""Of an answer without parameters, as its length field counts."""
+"""The length of an answer without parameters, as its length field counts."""
 _REFUSALS = {
     1: "it failed to carry this out",
     2: "it does not know this instruction",
@@ -40,7 +40,7 @@ class ServoError(RobotError):
 
 @dataclass(frozen=True, slots=True)
 class ServoAnswer:
-    """Of one servo to a read that all were asked."""
+    """One servo's answer to a read of all servos."""
 
     value: int
     alert: bool

@@ -67,7 +67,7 @@ class Driver:
         self._stands: Counts = np.zeros(count, np.int64)  # as the servos tell it: below 0 past their end
         self._faults: dict[str, str] = {}
         self.reading = EncoderReading(clock(), self._stands.copy(), np.zeros(count, np.bool_))
-        """Of the newest cycle."""
+        """The reading of the newest cycle."""
         self.faults: Mapping[str, str] = {}
         """The faults as text, by joint; replaced whole."""
         self.missed = 0

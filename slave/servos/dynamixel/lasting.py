@@ -21,7 +21,7 @@ NAMES = {
     x.MAX_POSITION: "max position limit",
     x.MIN_POSITION: "min position limit",
 }
-"""As the maker's manual has them."""
+"""The names in the maker's manual."""
 HOW = "`tandem servos FILE` shows what differs, and with --write replaces it"
 
 
@@ -35,7 +35,7 @@ class Difference:
 
     @property
     def words(self) -> str:
-        """As in "operating mode (address 11) is 1, must be 3"."""
+        """A text such as "operating mode (address 11) is 1, must be 3"."""
         name = NAMES.get(self.register, "register")
         return f"{name} (address {self.register.address}) is {self.found}, must be {self.wanted}"
 

@@ -58,7 +58,7 @@ WATCHDOG_TRIPPED = -1
 WATCHDOG_FIRMWARE = 38
 """The oldest firmware that has a bus watchdog."""
 RAD_S_PER_UNIT = 0.229 * 2.0 * 3.141592653589793 / 60.0
-"""Of PROFILE_VELOCITY: 0.229 revolutions a minute."""
+"""The unit of PROFILE_VELOCITY: 0.229 revolutions a minute."""
 
 _X_SERIES = range(1000, 1300)
 _HARDWARE_ERRORS = (

@@ -21,7 +21,7 @@ _HEADROOM = 1.25
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Of one joint's servo."""
+    """The settings of one joint's servo."""
 
     joint: str
     id: int
@@ -52,7 +52,7 @@ class Settings:
 
 
 def settings_of(config: DynamixelConfig, skeleton: Skeleton, encoders: Encoders) -> list[Settings]:
-    """Of all joints, in the skeleton's order. The configuration must be free of mistakes."""
+    """The settings of all joints, in the skeleton's order. The configuration must be free of mistakes."""
     ends = np.sort(
         np.stack([encoders.counts(skeleton.lower_rad), encoders.counts(skeleton.upper_rad)]), axis=0
     )

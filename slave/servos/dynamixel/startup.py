@@ -26,7 +26,7 @@ def inspect(bus: Bus, servo: Settings) -> None:
 
 
 def inspect_all(bus: Bus, servos: Sequence[Settings]) -> list[tuple[Settings, str]]:
-    """Those that cannot be used, and why. Raises PortLostError."""
+    """The servos that cannot be used, and the reason. Raises PortLostError."""
     wrong = []
     for servo in servos:
         try:

@@ -23,7 +23,7 @@ STEP_S = 0.004
 
 BANDWIDTH_HZ = 8.0
 DAMPING_RATIO = math.sqrt(0.5)
-"""Of all dampings the one whose response is a pure delay to second order (s² term 4ζ² - 1 = 2ζ²)."""
+"""The damping whose response is a pure delay to second order (s² term 4ζ² - 1 = 2ζ²)."""
 
 _DENSITY_KG_M3 = 900.0
 _SLENDERNESS = 0.18

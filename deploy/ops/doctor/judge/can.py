@@ -34,7 +34,7 @@ def judge_interfaces(found: Mapping[str, CanInterface]) -> list[Finding]:
 
 
 def share_of_time(need: BusNeed, bitrate: int, data_bitrate: int) -> float:
-    """Of the bus that its nodes' answers occupy: 1 is all of it."""
+    """The share of the bus's time that its nodes' answers occupy: 1 is all of it."""
     if need.bus.fd:
         answer_s = _FD_SLOW_BITS / bitrate + _FD_FAST_BITS / (data_bitrate or bitrate)
     else:

@@ -10,7 +10,7 @@ from slave.servos.dynamixel.latency import BEST_MS, advice
 
 
 def is_url(port: str) -> bool:
-    """Of pyserial, such as socket://host:port: nothing to be seen on this host."""
+    """Whether the port is a URL of pyserial, such as socket://host:port: this host has no device for it."""
     return "://" in port
 
 

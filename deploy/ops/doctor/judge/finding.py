@@ -44,6 +44,6 @@ def fail(check: str, found: str, advice: str) -> Finding:
 
 
 def worst(findings: Sequence[Finding]) -> Health:
-    """Of all findings; ok where there is none."""
+    """The worst verdict of all findings; ok if there is none."""
     order = list(Health)
     return max((finding.verdict for finding in findings), key=order.index, default=Health.OK)

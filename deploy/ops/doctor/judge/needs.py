@@ -51,14 +51,14 @@ class BusNeed:
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """Of one host."""
+    """What one host must provide."""
 
     role: str = GENERAL
     buses: tuple[BusNeed, ...] = ()
     realtime_priority: int = 0
     serial_ports: tuple[str, ...] = ()
     servos: DynamixelConfig | None = None
-    """Those on a serial bus, which is one of the ports."""
+    """The servos on a serial bus, which is one of the ports."""
     camera: CameraNeed = CameraNeed.OFF
     camera_device: str = ""
     link: LinkConfig = field(default_factory=LinkConfig)

@@ -33,7 +33,7 @@ class CanInterface:
 
 
 def read_can(tree: Tree, ip_json: str | None) -> dict[str, CanInterface]:
-    """By name. `ip_json`: what `ip -details -json link show` prints, None where it could not be asked."""
+    """The interfaces by name. `ip_json`: the output of `ip -details -json link show`; None if it failed."""
     details = _details(ip_json)
     return {
         name: _interface(tree, name, details.get(name, {}))

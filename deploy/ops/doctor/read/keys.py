@@ -22,7 +22,7 @@ class KeyFacts:
     hosts: tuple[str, ...] = ()
     """Addresses and names under which others may connect to it."""
     days_left: float = 0.0
-    """Of the certificate or its authority's, whichever ends first."""
+    """Days until the certificate or its authority's certificate ends, whichever is first."""
     open_to_all: bool = False
     """Whether every user of this host can read the key."""
 

@@ -12,21 +12,21 @@ _CPU = "/sys/devices/system/cpu"
 
 @dataclass(frozen=True, slots=True)
 class MachineFacts:
-    """Of one host."""
+    """What one host's kernel and hardware are."""
 
     cores: int
     governors: tuple[str, ...]
-    """Of the cores whose frequency is scaled; empty where none is, as in a virtual machine."""
+    """The governors of the cores with frequency scaling; empty without it, as in a virtual machine."""
     isolated: str
     """Cores that the scheduler leaves alone, such as `2-3`; empty where none is."""
     preemption: str
     """`rt`, `dynamic`, `full` or empty where the kernel does not tell."""
     load: float
-    """Of the last minute."""
+    """The load average of the last minute."""
     receive_buffer_bytes: int
     """Most that a socket may ask for."""
     congestion_control: str
-    """Of tcp, where nobody chose another."""
+    """The default congestion control of TCP."""
     mtu_probing: bool
     """Whether tcp finds out by itself that a path swallows large packets."""
     available_bytes: int

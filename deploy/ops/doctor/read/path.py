@@ -14,7 +14,7 @@ from deploy.client.destination import ROUTER_S
 
 SMALL_BYTES = 64
 SIZES = (1100, 1350, 4000, 16_000)
-"""Of payloads: what control needs, nearly a full Ethernet packet, statistics, a picture."""
+"""Sizes of payloads: what control needs, nearly a full Ethernet packet, statistics, a picture."""
 TRIES = 2
 """A lost packet is not a path that swallows it."""
 

@@ -13,7 +13,7 @@ CAP_NET_ADMIN, CAP_IPC_LOCK, CAP_SYS_NICE = 12, 14, 23
 
 @dataclass(frozen=True, slots=True)
 class ProcessFacts:
-    """Of the process that reads them."""
+    """The limits of the process that reads them."""
 
     realtime_limit: float
     """Largest real-time priority that it may take without a capability (RLIMIT_RTPRIO)."""
@@ -22,7 +22,7 @@ class ProcessFacts:
     capabilities: int
     """The effective set."""
     realtime_share: float
-    """Of a second, that real-time threads may run; 1 where they are not throttled."""
+    """The share of each second that real-time threads may run; 1 if they are not throttled."""
     tun: bool
     """Whether /dev/net/tun is there."""
 

@@ -31,7 +31,7 @@ LISTEN_S = 2.5
 
 @dataclass(frozen=True, slots=True)
 class RobotFacts:
-    """Of one robot, as it is reached from here."""
+    """One robot as this host reaches it."""
 
     name: str
     guard: str
