@@ -55,7 +55,7 @@ def test_attitudes_that_do_not_tell_are_refused() -> None:
         align_magnetometer(*attitudes(1, 5, same))
     flat = np.linspace(0.0, 6.0, 20)[:, None] * np.array([0.0, 0.0, 1.0])
     turned = from_rotation_vector(flat)
-    with pytest.raises(TandemError, match="how the magnetometer sits"):
+    with pytest.raises(TandemError, match="how the magnetometer is turned"):
         align_magnetometer(rotate(turned, np.array([0.0, 0.0, 9.81])), rotate(turned, FIELD))
 
 
