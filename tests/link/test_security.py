@@ -60,7 +60,7 @@ async def place(
         else:
             router_file.write_text(link_toml(keys, "router-hub", f'listen = ["{endpoint}"]'))
             command = ("-m", "deploy", "router", str(router_file), "--metrics", str(folder / "metrics.json"))
-            router = await stack.enter_async_context(started(*command, until="routes at"))
+            router = await stack.enter_async_context(started(*command, until="routing at"))
             head = f'mode = "client"\nconnect = ["{endpoint}"]'
         robot_file.write_text(f'robot = "{ROBOT}"\n' + link_toml(keys, "robot-robot-1", head))
         robot = await stack.enter_async_context(started(child, str(robot_file), until="here"))
