@@ -24,7 +24,7 @@ _WORST_CONDITION = 1e3
 
 
 class UndeterminedError(RecordingError):
-    """The attitudes do not show how the magnetometer is turned; no evidence speaks against its axes either."""
+    """The attitudes do not show how the magnetometer is turned; nothing contradicts its axes either."""
 
 
 @dataclass(frozen=True, slots=True)
