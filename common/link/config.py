@@ -60,7 +60,7 @@ class TopicConfig(Section):
         if self.congestion == "block":
             raise ValueError(
                 'expected congestion = "drop": with "block" an outage of 5 s was measured to freeze '
-                "the servo loop for 5 s; drop loses what is old anyway"
+                "the servo loop for 5 s; use drop: it discards only outdated messages"
             )
         return self
 

@@ -26,7 +26,7 @@ def check_congestion_control(algorithm: str) -> None:
         except (OSError, AttributeError) as error:
             raise LinkError(
                 f"link.tcp_congestion_control = {algorithm!r}: {error}; "
-                f"`sysctl net.ipv4.tcp_available_congestion_control` lists what there is, "
+                f"`sysctl net.ipv4.tcp_available_congestion_control` lists the available algorithms, "
                 f"`modprobe tcp_{algorithm}` may add it"
             ) from None
 

@@ -154,9 +154,7 @@ class Asking:
             counters.timeouts += 1
             raise LinkTimeoutError(f"{self._key}: no answer within {topic.timeout_s:g} s") from None
         counters.unanswered += 1
-        raise LinkError(
-            f"{self._key}: {question.failure or 'there is no process that could answer'}"
-        ) from None
+        raise LinkError(f"{self._key}: {question.failure or 'no process answers there'}") from None
 
     def _send(self, question: Question, target: zenoh.QueryTarget, payload: bytes) -> None:
         topic = self._topic

@@ -103,4 +103,4 @@ def _decode(path: Path, payload: bytes, count: int) -> tuple[int, Mask, NDArray[
         values = np.frombuffer(readings, _F4).reshape(count, _CHANNELS)
         return tick, np.frombuffer(fresh, np.bool_), values
     except Exception:  # msgpack raises its own family, and the shape may be wrong too
-        raise RecordingError(f"{path}: a message of {TOPIC} is none of version {VERSION}") from None
+        raise RecordingError(f"{path}: a message of {TOPIC} is not of version {VERSION}") from None

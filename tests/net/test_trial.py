@@ -93,4 +93,4 @@ def test_an_interrupted_trial_writes_the_report_of_what_is_there(tmp_path: Path)
     assert trial.returncode == 1, out + err
     assert "run the same command again to continue" in err
     assert "Traceback" not in err
-    assert "report is not whole" in (folder / "report.html").read_text("utf-8")
+    assert "This report is incomplete" in (folder / "report.html").read_text("utf-8")

@@ -53,7 +53,7 @@ def live(
 ) -> None:
     """Calibrate the suit step by step: see what to do, which node needs more, and how good the result is.
 
-    First all nodes lie in one tray, which you put down in many attitudes and turn about; then you wear them.
+    First all nodes lie in one tray, which you put down in many attitudes and rotate; then you wear them.
     Ctrl-C keeps what was recorded for `calibrate imu`, `mag` and `align`.
 
     Example: `tandem calibrate live deploy/examples/master.toml --out calibration --what imu,mag`

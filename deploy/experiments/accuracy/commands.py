@@ -14,7 +14,7 @@ app = typer.Typer(no_args_is_help=True, cls=FilesByDefault)
 
 @app.callback()
 def _group() -> None:
-    """How good the estimation is: on recordings and beside the papers.
+    """Measure the accuracy of the orientation filters, on recordings and against the papers.
 
     `tandem accuracy FILE...` scores the filters on recordings: short for `tandem accuracy files FILE...`.
 

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.table import Table
 
 from common.errors import TandemError
 from common.process.runtime import run as run_until_stopped
@@ -83,11 +85,11 @@ def soak(
     from deploy.experiments.soak.faults import FAULTS, chosen
     from deploy.experiments.soak.files.options import SoakOptions, seconds
     from deploy.experiments.soak.judge.judge import judge_soak
-    from deploy.report.tables import plain_table
 
     console = Console()
     if faults == "help":
-        table = plain_table("fault", "what is done")
+        table = Table("fault", "what is done", box=SIMPLE_HEAD, pad_edge=False)
+        table.columns[0].no_wrap = True
         for fault in FAULTS.values():
             table.add_row(fault.name, fault.words)
         console.print(table)

@@ -17,7 +17,7 @@ def profiles_table(profiles: Iterable[Profile]) -> Table:
     """One row a direction where the two differ, else one for both."""
     table = plain_table("profile", "to", "delay", "jitter", "loss %", "burst", "Mbit/s", "queue")
     table.columns[0].no_wrap = True
-    table.caption = "delay, jitter and queue in ms; burst in packets, – where each is lost by itself"
+    table.caption = "delay, jitter and queue in ms; burst in packets, – for independent losses"
     for profile in profiles:
         ways = profile.ways
         rows = {"robot": ways.to_robot, "operator": ways.to_operator}

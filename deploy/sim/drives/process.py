@@ -23,10 +23,10 @@ def drives(
         list[str] | None,
         typer.Option(
             metavar="JOINT=FAULT@SECONDS",
-            help="Let a drive fail so long after the first SYNC: over-current, over-temperature, "
+            help="Make a drive fail this many seconds after the first SYNC: over-current, over-temperature, "
             "encoder-stuck, magnet-lost, parity, silent, restart, lost-turns, wrong-zero, wrong-gear, "
             "reversed, double-id, encoder-zero, runs-away, not-following, limit-active, local, no-voltage, "
-            "warns, wrong-mode, position-stuck, or none, which ends what lasts.",
+            "warns, wrong-mode, position-stuck, or none, which ends a lasting fault.",
         ),
     ] = None,
     metrics: MetricsFile = None,

@@ -71,10 +71,10 @@ def test_the_calibration_gets_the_nodes_that_answered(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("payload", "said"),
     [
-        (b"\xc1", "none of version 1"),
-        (msgpack.packb((2, 1, b"\1\1\1", bytes(108))), "none of version 1"),
-        (msgpack.packb((1, 1, b"\1\1", bytes(108))), "none of version 1"),
-        (msgpack.packb((1, 1, b"\1\1\1", bytes(104))), "none of version 1"),
+        (b"\xc1", "not of version 1"),
+        (msgpack.packb((2, 1, b"\1\1\1", bytes(108))), "not of version 1"),
+        (msgpack.packb((1, 1, b"\1\1", bytes(108))), "not of version 1"),
+        (msgpack.packb((1, 1, b"\1\1\1", bytes(104))), "not of version 1"),
         (encode_sweep(sweep(7)), "do not follow one another"),
         (encode_sweep(sweep(10**9)), "do not follow one another"),
     ],

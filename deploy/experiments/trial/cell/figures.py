@@ -55,7 +55,7 @@ FIGURES = (
            "same-instant tracking error: encoders against the operator's true angles at the same moment, "
            "over the joints that move: what the patient sees"),
     CellMetric("rmse_over_latest", "RMSE / latest", "", 3, MOTION,
-           "that error over the one plain hold makes of the very same commands, replayed with their "
+           "that error divided by the error of the strategy latest, for the same commands at the same "
            "arrival times"),
     CellMetric("lag_ms", "motion lag", "ms", 0, MOTION,
            "the shift in time that makes robot and operator fit best; negative: the robot is early"),

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from common.errors import ConfigError
 from common.latency.durations import Durations
+from deploy.experiments.soak.command import soak
 from deploy.experiments.soak.counts import Additions
 from deploy.experiments.soak.faults import FAULTS, chosen
 from deploy.experiments.soak.files.options import in_words, seconds
@@ -113,3 +114,13 @@ def test_faults_are_chosen_by_name() -> None:
     assert chosen("suit-kill, disk-full,suit-kill") == ["suit-kill", "disk-full"]
     with pytest.raises(ConfigError, match="--faults = 'flood': expected all, none or some of master-kill"):
         chosen("flood")
+
+
+def test_the_list_of_faults_fits_80_columns(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    soak(faults="help")
+    printed = capsys.readouterr().out
+    assert [name for name in FAULTS if name not in printed] == []
+    assert max(map(len, printed.splitlines())) <= 80
