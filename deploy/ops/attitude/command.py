@@ -53,7 +53,7 @@ def attitude(
     ] = False,
     seed: Annotated[int, typer.Option(help="Random seed for the simulated instrument's noise.")] = 1,
 ) -> None:
-    """Show the attitude that an instrument on a local serial port measures: inclination, azimuth and tool-face.
+    """Show what an attitude instrument on a local serial port measures: inclination, azimuth, tool-face.
 
     Example: `tandem attitude /dev/ttyUSB0 --declination -2.5`, or `tandem attitude --simulate --seconds 10`
     """
