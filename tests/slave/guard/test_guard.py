@@ -86,6 +86,14 @@ def test_what_came_before_engage_does_not_move_it_after(rig: Any) -> None:
     assert np.array_equal(rig.measured, held)
 
 
+def test_a_command_between_the_engage_and_the_next_tick_is_kept(rig: Any) -> None:
+    rig.to_leased()
+    rig.engage()
+    assert rig.send().accepted
+    rig.step()
+    assert rig.tracker.newest is not None
+
+
 @pytest.mark.parametrize("jump", [0.2, 0.5, -0.5, 5.0])
 def test_a_sudden_motion_cannot_make_it_jump(rig: Any, jump: float) -> None:
     rig.to_track()
