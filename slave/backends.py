@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from pydantic import ConfigDict, ValidationInfo, create_model, field_validator, model_validator
+from pydantic import ConfigDict, ValidationInfo, field_validator, model_validator
 
-from common.config.section import Section, one_of
+from common.config.section import Section, make_section, one_of
 from common.errors import NOT_SET, ConfigError, ConfigMistake, RobotError
 from common.process.extras import missing_extra
 from common.skeleton import Skeleton
@@ -41,7 +41,7 @@ class ServosConfig(Section):
         if not isinstance(table, dict):
             return table
         kinds = {name: (entry.section | None, None) for name, entry in BACKENDS.items()}
-        sections = create_model("ServosConfig", __base__=Section, **kinds)  # type: ignore[call-overload]
+        sections = make_section("ServosConfig", kinds)
         given = {key: value for key, value in table.items() if key != "backend"}
         return {**table, **dict(sections.model_validate(given, context=info.context))}
 

@@ -53,7 +53,7 @@ def real_person(recordings_folder: Path) -> Path:
 def on_this_host() -> OnThisHost:
     """Runs a story of real processes beside a loop that does nothing but tick.
 
-    Where it fails and the host is shown to have stood still meanwhile (deploy/harness/excuse.py), nothing was
+    Where it fails and the host is shown to have stalled meanwhile (deploy/harness/excuse.py), nothing was
     shown, and it is tried again, up to TRIES times in all; else it has failed. A host that spoilt every try
     is told as the reason to skip, and tests/skips.toml says how many such there may be.
     """
@@ -64,7 +64,7 @@ def on_this_host() -> OnThisHost:
             if not spoilt:
                 return
             print(f"tried again: {spoilt}")  # noqa: T201
-        pytest.skip(f"the host itself stood still in each of {TRIES} tries; last: {spoilt}")
+        pytest.skip(f"the host stalled in each of {TRIES} tries; last: {spoilt}")
 
     return run
 

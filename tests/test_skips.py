@@ -13,11 +13,11 @@ from .skips import Allowed, counted, read_allowed, too_many
 
 TESTS = Path(__file__).parent
 RULES = (
-    Allowed(r"host stood still in \d tries", 2, "it did"),
+    Allowed(r"host stalled in \d tries", 2, "it did"),
     Allowed("no recordings", 9, "they are elsewhere", without="DATA"),
     Allowed("no SocketCAN", 9, "run elsewhere", with_="RUNNER"),
 )
-STILL = ["the host stood still in 4 tries; last: a", "the host stood still in 4 tries; last: b"]
+STILL = ["the host stalled in 4 tries; last: a", "the host stalled in 4 tries; last: b"]
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ STILL = ["the host stood still in 4 tries; last: a", "the host stood still in 4 
     [
         ([], {}, []),
         (STILL, {}, []),
-        ([*STILL, STILL[0]], {}, ["3 skipped, at most 2 may: host stood still in \\d tries"]),
+        ([*STILL, STILL[0]], {}, ["3 skipped, at most 2 may: host stalled in \\d tries"]),
         (["nobody knows"], {}, ["1 skipped for a reason that is not listed: nobody knows"]),
         (["no recordings"] * 9, {}, []),
         (["no recordings"] * 10, {}, ["10 skipped, at most 9 may: no recordings"]),

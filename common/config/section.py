@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, create_model
 
 from common.errors import ConfigMistake
 
@@ -19,6 +19,12 @@ class Section(BaseModel):
     def mistakes(self) -> list[ConfigMistake]:
         """Contradictions between keys. Called once all keys are well formed."""
         return []
+
+
+def make_section(name: str, keys: Mapping[str, tuple[object, object]]) -> type[Section]:
+    """A section with one key per entry of a table: the type and the default of each key."""
+    create: Callable[..., type[Section]] = create_model  # its signature does not take computed key names
+    return create(name, __base__=Section, **keys)
 
 
 def one_of(name: str, known: Iterable[str]) -> str:

@@ -14,8 +14,8 @@ from enum import StrEnum
 from common.clock import to_ns, to_s
 
 STILL_S = 0.05
-"""A host that stood still for so long within WINDOW_S may have made a guard hold: half of its shortest
-time-out, 0.1 s of the encoders. Pieces count together: after each, every process catches up at once."""
+"""A host stall of this length within WINDOW_S can make a guard hold. It is half of the guard's shortest
+time-out (the encoders', 0.1 s). Several stalls are added: after each, every process catches up at once."""
 WINDOW_S = 0.5
 
 
@@ -85,7 +85,7 @@ class Lost:
     def __str__(self) -> str:
         """For a person, with the evidence."""
         if self.excused_s > 0.0:
-            return f"the host stood still for {1e3 * self.excused_s:.0f} ms: {self.evidence}"
+            return f"the host stalled for {1e3 * self.excused_s:.0f} ms: {self.evidence}"
         if self.still_s > 0.0:
             return f"a core came back {1e3 * self.still_s:.0f} ms late, not excused: {self.evidence}"
         return "the host kept its time"

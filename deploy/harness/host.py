@@ -1,4 +1,4 @@
-"""When the host itself stood still: a virtual machine may lose its cores, whatever its programs do."""
+"""Detects stalls of the host: a virtual machine may lose its cores, whatever its programs do."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class HostWatch:
         self._reported.set()
 
     def stood_still_s(self, since_ns: int, until_ns: int) -> float:
-        """The longest that any one core stood still without a break, as far as it lies between the two."""
+        """The longest single stall of any core, as far as it lies between the two times."""
         spans = (min(s.until_ns, until_ns) - max(s.from_ns, since_ns) for s in reversed(self.stalls))
         return to_s(max(0, max(spans, default=0)))
 
@@ -92,7 +92,7 @@ class HostWatch:
     async def excuse(self, since_ns: int) -> str:
         """Why a trial from then to now does not count, with the evidence; empty where it counts.
 
-        The host is shown to have stood still, somewhere within it, for long enough to make a guard hold.
+        The evidence shows a stall within this time that is long enough to make a guard hold.
         """
         now_ns = monotonic_ns()
         await self.known(now_ns)

@@ -13,7 +13,7 @@ from common.clock import to_s
 from deploy.harness.excuse import Lost, StallEvidence
 
 JUDGED_AFTER_S = 1.0
-"""A hold is judged this much later: a core that stands still reports its stall only when it runs again."""
+"""A hold is judged this much later: a core reports its stall only when it runs again."""
 
 HostLost = Callable[[int], Lost]
 """What the host lost just before a time of its clock, ns."""

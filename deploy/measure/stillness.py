@@ -52,7 +52,7 @@ class Stillness:
     overshoot_rad: float
     """How far a joint went outside of the way between where it was at the fault and its last setpoint."""
     standstill_s: float | None
-    """From the fault until every joint stood still and stayed so; None where one still moved at the end."""
+    """Time from the fault until every joint was at rest for good; None if one still moved at the end."""
 
 
 def stillness(

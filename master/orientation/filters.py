@@ -10,9 +10,8 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import create_model
 
-from common.config.section import Section
+from common.config.section import make_section
 from common.errors import ConfigMistake
 from common.quaternion import Array
 from common.wire.messages import Mask
@@ -35,11 +34,7 @@ def filter_mistakes(key: str, name: str) -> list[ConfigMistake]:
 
 def read_sections(tables: Mapping[str, object], context: object = None) -> dict[str, FilterSection]:
     """The section of every filter, from `tables` or with defaults. Raises pydantic.ValidationError."""
-    fields: dict[str, object] = {name: (section, section()) for name, section in FILTERS.items()}
-    create: Callable[..., type[Section]] = (
-        create_model  # its own signature takes no fields by a variable name
-    )
-    sections = create("FilterSections", __base__=Section, **fields)
+    sections = make_section("FilterSections", {name: (kind, kind()) for name, kind in FILTERS.items()})
     return dict(sections.model_validate(tables, context=context))
 
 

@@ -35,7 +35,7 @@ OVERRIDES = {
 
 
 def unexplained(states: list[RobotState], host: HostWatch) -> list[str]:
-    """Why the robot held each time that the host had not stood still just before."""
+    """Why the robot held each time that no host stall came just before."""
     held = [b for a, b in pairwise(states) if (a.guard, b.guard) in (("track", "hold"), ("align", "hold"))]
     return [s.reason for s in held if not host.lost_before(s.sent_ns).explains_hold]
 

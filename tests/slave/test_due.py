@@ -1,4 +1,4 @@
-"""What was due and did not come is counted, and is in the corrected figures, whoever stood still."""
+"""What was due and did not come is counted, and is in the corrected figures, whichever side stalled."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ SUIT = (
         act=_leans,
         begins=State.HOLD, setting=LEANS, stands_s=AT_ONCE_S,
     ),
-    # compared with an operator who stood still for less long, which alone makes 3° of difference
+    # compared with an operator who stood still for less time; that alone makes 3° of difference
     goes_on(
         name="gyro with a gross bias",
         done="A gyro of the reaching arm has read 12 °/s too much on each axis since it was put on; the "

@@ -37,7 +37,7 @@ class DriveSilence:
         self._answered_ns[fresh] = now_ns
         self._known_ns[fresh] = synced_ns
         if now_ns - self._cycled_ns > self._dead_ns // 2:
-            # it was this process that stood still: nobody else was silent
+            # this process stalled: no drive was silent
             self._answered_ns[:] = self._beat_ns[:] = now_ns
         self._cycled_ns = now_ns
 

@@ -62,7 +62,7 @@ class SimulatedRobot:
         self._setpoint = np.clip(position_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
 
     def resume(self, now_ns: int) -> None:
-        """Go on from `now_ns` after a pause in which time stood still for the robot."""
+        """Go on from `now_ns` after a pause that the robot's physics skips."""
         self.now_ns = now_ns
 
     def advance(self, until_ns: int) -> None:

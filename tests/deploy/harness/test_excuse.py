@@ -94,9 +94,9 @@ def test_without_any_part_of_the_rule_a_case_comes_out_otherwise(
     [
         (
             lost((stall(60, priority=True),), 0, AT_NS),
-            "the host stood still for 60 ms: the reference loop had",
+            "the host stalled for 60 ms: the reference loop had",
         ),
-        (lost((stall(60, 20),), 0, AT_NS), "the host stood still for 20 ms: /proc/stat shows steal"),
+        (lost((stall(60, 20),), 0, AT_NS), "the host stalled for 20 ms: /proc/stat shows steal"),
         (
             lost((stall(60),), 0, AT_NS),
             "a core came back 60 ms late, not excused: neither real-time priority nor",

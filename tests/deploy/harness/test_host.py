@@ -94,7 +94,7 @@ def test_without_priority_only_what_was_stolen_excuses() -> None:
     host.take(json.dumps({**stall, "stolen_ns": 50 * NS_PER_MS}))
     host.end()
     assert host.lost_before(3 * NS_PER_S).explains_hold
-    assert asyncio.run(host.excuse(NS_PER_S)) == "the host stood still for 50 ms: /proc/stat shows steal"
+    assert asyncio.run(host.excuse(NS_PER_S)) == "the host stalled for 50 ms: /proc/stat shows steal"
 
 
 def test_a_host_that_was_not_measured_excuses_nothing() -> None:

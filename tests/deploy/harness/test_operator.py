@@ -110,13 +110,13 @@ def test_three_holds_within_twenty_seconds_are_too_many(last_s: float, fails: bo
         (
             Lost(STILL_S, STILL_S, StallEvidence.PRIORITY),
             False,
-            "does not count: just before, the host stood still",
+            "does not count: just before, the host stalled",
         ),
         (Lost(STILL_S, STILL_S, StallEvidence.STEAL), False, "50 ms: /proc/stat shows steal"),
         (
             Lost(STILL_S - 0.001, STILL_S, StallEvidence.STEAL),
             True,
-            "counts: just before, the host stood still",
+            "counts: just before, the host stalled",
         ),
         (Lost(0.0, 1.0, StallEvidence.NONE), True, "not excused: neither real-time priority nor steal"),
     ],

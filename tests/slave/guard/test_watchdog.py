@@ -120,7 +120,7 @@ def test_a_senders_stamp_does_not_keep_a_command_alive(rig: Any, ahead_ms: int) 
 
 
 def test_a_command_after_a_gap_does_not_hide_the_gap(rig: Any) -> None:
-    """The loop stood still: the command that comes first afterwards is judged after the watchdog."""
+    """The loop stalled: the command that comes first afterwards is judged after the watchdog."""
     rig.to_track()
     rig.send()
     rig.now_ns += 200_000_001
@@ -289,7 +289,7 @@ def test_an_arrival_stamp_from_the_future_counts_as_now(rig: Any) -> None:
 
 
 def test_a_command_read_after_the_lease_has_lapsed_does_not_revive_it(rig: Any) -> None:
-    """It arrived in time, but the loop stood still until the lease was over."""
+    """It arrived in time, but the loop stalled until the lease was over."""
     rig.to_leased()
     rig.send()
     arrived_ns = rig.now_ns + 900_000_000

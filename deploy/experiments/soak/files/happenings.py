@@ -192,7 +192,7 @@ class RobotLeft(Happening):
 
 @dataclass(frozen=True, slots=True)
 class HostStalled(Happening):
-    """The host stood still."""
+    """The host stalled."""
 
     kind = "still"
     from_s: float = 0.0

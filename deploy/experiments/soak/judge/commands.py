@@ -88,7 +88,7 @@ def _known_share(values: Array, asked: Mask) -> float:
 
 
 def _came_when_due(seen: SoakEvidence) -> Verdict:
-    """By time, not by number: where both sides stand still together nothing is sent and nothing is lost."""
+    """By time, not by number: when both sides stall together, nothing is sent and nothing is lost."""
     name = "due but never arrived, unexplained"
     if np.isnan(seen.samples["due"]).all():
         return at_most(name, None, 0.0, why="the robot did not publish it")

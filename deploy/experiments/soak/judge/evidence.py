@@ -1,4 +1,4 @@
-"""All that a soak left behind, as its criteria read it. Pure."""
+"""Everything that a soak recorded, in the form that its criteria read. Pure."""
 
 from __future__ import annotations
 

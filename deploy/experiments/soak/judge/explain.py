@@ -60,7 +60,7 @@ class Explained:
         return max(0.0, max(spans, default=0.0))
 
     def accounts_for_hold(self, at_s: float) -> bool:
-        """Whether the host stood still, or the network lost enough, right before the robot held."""
+        """Whether a host stall or network loss just before explains that the robot held."""
         return any(window.includes(at_s) for window in self.stalls) or any(
             abs(lossy_s - at_s) <= LOST_WITHIN_S for lossy_s in self.lossy_s
         )

@@ -100,7 +100,7 @@ def _wrong(panel: Axes, samples: Samples, unit_s: float) -> None:
         ("lost", "commands lost", "x"), ("late", "out of order", "+"),
         ("link_lost", "packets lost by the network", "2"), ("refused", "refused", "1"),
         ("master_missed", "ticks missed, master", "."), ("slave_missed", "ticks missed, slave", "."),
-        ("host_still_ms", "host stood still, ms", "|"),
+        ("host_still_ms", "host stall, ms", "|"),
     ):  # fmt: skip
         some = np.nan_to_num(samples[column]) > 0.0
         if some.any():

@@ -68,7 +68,7 @@ def test_a_network_that_lost_enough_explains_a_hold(make: Make, transport: str, 
 
 @pytest.mark.parametrize("lossy_s", [(), (20.0,), (7.5, 30.5, 9.0)])
 def test_times_are_accounted_for_as_single_holds_are(lossy_s: tuple[float, ...]) -> None:
-    found = Explained((), (Window(50.0, 50.2, "the host stood still"),), (), lossy_s)
+    found = Explained((), (Window(50.0, 50.2, "the host stalled"),), (), lossy_s)
     at_s = np.arange(0.0, 60.0, 0.25)
     assert found.accounted(at_s).tolist() == [found.accounts_for_hold(float(s)) for s in at_s]
 

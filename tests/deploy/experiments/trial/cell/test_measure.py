@@ -141,7 +141,7 @@ def test_one_way_and_round_trip_are_of_the_judged_time() -> None:
 
 
 def test_commands_that_were_due_and_never_came_are_in_the_figures() -> None:
-    """Both sides stood still for 5 s: every number came, and each that came was fast."""
+    """Both sides stalled for 5 s: every number came, and each that came was fast."""
     told = [
         Statistics(BEGIN_NS, slave_metrics(commands=ArrivalCounts(12, 0, 0, 0), due=DueMetrics(12, 0))),
         Statistics(
