@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable
 
 import can
@@ -18,6 +19,8 @@ from deploy.sim.suit.faults import Outgoing
 from deploy.sim.suit.peer import NewestSync, PublishTruth, SuitPeer
 from deploy.sim.suit.suit import SimulatedSuit, build_suit
 from master.suit.protocol import SuitProtocol
+
+log = logging.getLogger(__name__)
 
 
 async def run(
@@ -54,6 +57,8 @@ async def run(
     try:
         for bus in buses.values():
             bus.open()
+        opened = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in config.buses)
+        log.info("simulated suit: answering every SYNC for %d nodes on %s", len(config.nodes), opened)
         await stop.wait()
     finally:
         await asyncio.gather(*(bus.close() for bus in buses.values()))

@@ -38,8 +38,6 @@ async def run(config: SuitConfig, stop: asyncio.Event, write_metrics: WriteMetri
             if link is not None:
                 link.answer(FAULTS, lambda payload, _: _take(payload, config, suit))
 
-        buses = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in config.buses)
-        log.info("simulated suit: answering every SYNC for %d nodes on %s", len(config.nodes), buses)
         write_metrics(await answer(config, stop, publish_truth, on_suit))
 
 
