@@ -9,8 +9,7 @@ from typing import TypeVar
 from pydantic import ConfigDict, ValidationInfo, field_validator, model_validator
 
 from common.config.section import Section, make_section, one_of
-from common.errors import NOT_SET, ConfigError, ConfigMistake, RobotError
-from common.process.extras import missing_extra
+from common.errors import NOT_SET, ConfigError, ConfigMistake
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
 from slave.servos.backend import BackendConfig
@@ -81,13 +80,7 @@ class ServosConfig(Section):
         self, skeleton: Skeleton, encoders: EncoderConfig, last_known_rad: LastKnownAngles | None = None
     ) -> Servos:
         """The chosen backend's servos, not started yet. Raises RobotError where they cannot be had."""
-        try:
-            return self.entry.open(self, skeleton, encoders, last_known_rad or {})
-        except ModuleNotFoundError as error:
-            missing = missing_extra(error)
-            if missing is None:
-                raise
-            raise RobotError(f"servos.backend {self.backend!r}: {missing}") from None
+        return self.entry.open(self, skeleton, encoders, last_known_rad or {})
 
 
 LastKnownAngles = Mapping[str, float]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 EXTRAS = {
     "canopen": "simulation",
-    "mujoco": "simulation",
     "dynamixel_sdk": "dynamixel",
     "linuxpy": "v4l2",
 }

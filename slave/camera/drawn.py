@@ -23,7 +23,7 @@ class DrawnCamera:
             import mujoco
 
             from common.skeleton import load_skeleton
-            from slave.servos.mujoco.model import build_model, unit_rates
+            from slave.model.build import build_model, unit_rates
 
             skeleton = load_skeleton(profile)
             model = build_model(skeleton)

@@ -22,7 +22,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["slave/servos", "slave/track"],
     ["slave/limit"],
     ["slave/guard", "slave/attitude"],
-    ["slave/encoders"],
+    ["slave/encoders", "slave/model"],
     ["common/link"],
     ["common/latency", "common/reach"],
     ["common/clock_sync", "common/recording"],
@@ -40,7 +40,7 @@ IMPURE = [
     "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
 ]  # fmt: skip
 """The adapters. Nothing else in common, master and slave may touch a bus, link, clock or event loop."""
-RIM = {"asyncio", "zenoh", "can", "time", "socket", "uvloop", "mujoco", "serial", "canopen", "dynamixel_sdk"}
+RIM = {"asyncio", "zenoh", "can", "time", "socket", "uvloop", "serial", "canopen", "dynamixel_sdk"}
 
 
 def room_of(path: str) -> str:

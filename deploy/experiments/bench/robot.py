@@ -5,7 +5,7 @@ from __future__ import annotations
 from common.process.heap import freeze_heap
 from common.skeleton import load_skeleton
 from deploy.measure.timing import time_calls
-from slave.servos.mujoco.model import STEP_S
+from slave.model.build import STEP_S
 from slave.servos.mujoco.simulated import CYCLE_NS, STEPS_PER_CYCLE, SimulatedRobot
 
 

@@ -11,7 +11,7 @@ from common.clock import to_ns
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig, Encoders
-from slave.servos.mujoco.model import STEP_S, build_model, leader, unit_rates
+from slave.model.build import STEP_S, build_model, leader, unit_rates
 from slave.servos.servos import EncoderReading, check_setpoint
 
 STEPS_PER_CYCLE = 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import os
 import sys
 import tomllib
 from pathlib import Path
@@ -11,10 +12,9 @@ import pytest
 
 from common.errors import RobotError
 from common.process.extras import EXTRAS, missing_extra
-from common.skeleton import load_skeleton
 from deploy import cli
-from slave.backends import BACKENDS, ServosConfig
-from slave.encoders.counts import EncoderConfig
+from slave.servos.dynamixel.bus import Bus
+from slave.servos.dynamixel.port import Port
 
 PROJECT = tomllib.loads((Path(cli.__file__).parents[1] / "pyproject.toml").read_text("utf-8"))["project"]
 
@@ -47,11 +47,11 @@ def test_any_other_missing_module_is_a_fault() -> None:
     assert missing_extra(ModuleNotFoundError(name="common.no_such_file")) is None
 
 
-def test_a_backend_without_its_package_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "mujoco" in BACKENDS
-    without("mujoco", monkeypatch)
-    with pytest.raises(RobotError, match=r"servos\.backend 'mujoco': .*pip install 'tandem\[simulation\]'"):
-        ServosConfig().open(load_skeleton("nursing"), EncoderConfig())
+def test_servos_without_their_package_say_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    without("dynamixel_sdk", monkeypatch)
+    _, terminal = os.openpty()
+    with pytest.raises(RobotError, match=r"pip install 'tandem\[dynamixel\]'"):
+        Bus(Port(os.ttyname(terminal), 1_000_000, reply_timeout_s=0.01))
 
 
 def test_a_command_without_its_package_says_what_to_install(

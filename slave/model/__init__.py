@@ -1,0 +1,1 @@
+"""The robot as a rigid-body model: built from its profile; servos, limits and contact read it."""
