@@ -12,6 +12,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig, Encoders
 from slave.model.build import STEP_S, build_model, leader, unit_rates
+from slave.servos.mujoco.effort import MotorTorque
 from slave.servos.servos import EncoderReading, check_setpoint
 
 STEPS_PER_CYCLE = 1
@@ -50,6 +51,7 @@ class SimulatedRobot:
         leaders = [leader(joint) for joint in skeleton.joints]
         self._leaders = np.array([self._model.joint(angle).qposadr[0] for angle, _ in leaders])
         self._joint_per_hinge = np.array([1.0 / ratio for _, ratio in leaders])
+        self._torque = MotorTorque(skeleton, self._model, self._data)
         self._all_valid = np.ones(len(leaders), dtype=np.bool_)
         self.now_ns = origin_ns
         """Time that the physics has reached."""
@@ -73,7 +75,9 @@ class SimulatedRobot:
             self.now_ns += (due - MOST_CYCLES) * CYCLE_NS
             due = MOST_CYCLES
         for _ in range(due):
+            self._torque.before()
             mujoco.mj_step(self._model, self._data, nstep=STEPS_PER_CYCLE)
+            self._torque.after()
             self._taken_in[:] = self._setpoint
             self.now_ns += CYCLE_NS
 
@@ -83,7 +87,8 @@ class SimulatedRobot:
         # one sum finds any NaN or infinity
         if not math.isfinite(position.sum()):
             return EncoderReading(self.now_ns, np.zeros(len(position), np.int64), ~self._all_valid)
-        return EncoderReading(self.now_ns, self._encoders.counts(position), self._all_valid)
+        counts = self._encoders.counts(position)
+        return EncoderReading(self.now_ns, counts, self._all_valid, effort_nm=self._torque.joint_nm)
 
     @property
     def position_rad(self) -> Array:

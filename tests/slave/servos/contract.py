@@ -59,6 +59,7 @@ def _readings_are_well_formed(subject: Subject, reading: EncoderReading) -> None
     assert reading.counts.dtype == np.int64
     assert reading.valid.dtype == np.bool_
     assert reading.drive_rad is None or reading.drive_rad.shape == (joints,)
+    assert reading.effort_nm is None or reading.effort_nm.shape == (joints,)
     good = reading.counts[reading.valid]
     assert ((good >= 0) & (good < 4096)).all()
 
