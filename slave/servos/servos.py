@@ -27,8 +27,8 @@ class EncoderReading:
     drive_rad: Array | None = None
     """(J,) the joints' angles by the drives' own encoders at that time; None where they have none."""
     effort_nm: Array | None = None
-    """(J,) torque that each motor gives at the joint's output, N m, positive in the joint's positive direction;
-    NaN where a drive tells none. None where no drive does."""
+    """(J,) torque of each motor at the joint's output, N m, positive in the joint's positive direction; NaN
+    where a drive tells none. None where no drive does."""
 
 
 def check_setpoint(position_rad: Array, joints: int) -> None:

@@ -18,7 +18,7 @@ def test_the_torque_told_is_what_the_motion_took(profile: str) -> None:
     rates, torque = unit_rates(skeleton, model), MotorTorque(skeleton, model, data)
     middle, span = 0.5 * (skeleton.lower_rad + skeleton.upper_rad), skeleton.upper_rad - skeleton.lower_rad
     data.qpos[:] = middle @ rates
-    carried_by_motor = model.jnt_actgravcomp.astype(bool)[model.dof_jntid]
+    by_motor = model.jnt_actgravcomp.astype(bool)[model.dof_jntid]
     seen, off = [], []
     # flung so far that motors reach their limits
     for k in range(500):
@@ -29,9 +29,7 @@ def test_the_torque_told_is_what_the_motion_took(profile: str) -> None:
         torque.after()
         inertial = np.empty(model.nv)
         mujoco.mj_mulM(model, data, inertial, (data.qvel - before) / model.opt.timestep)
-        others = (
-            data.qfrc_passive - np.where(carried_by_motor, 0.0, data.qfrc_gravcomp) + data.qfrc_constraint
-        )
+        others = data.qfrc_passive - np.where(by_motor, 0.0, data.qfrc_gravcomp) + data.qfrc_constraint
         seen.append(rates @ (inertial + data.qfrc_bias - others))
         off.append(torque.joint_nm - seen[-1])
     assert (np.std(seen, axis=0) > 1e-4).all()
