@@ -17,6 +17,7 @@ import numpy as np
 
 from common.quaternion import Array
 from common.skeleton import WORLD, Joint, Segment, Skeleton
+from slave.model.capsules import capsules
 
 STEP_S = 0.004
 """Physics step: 31 to a period of the servos' 8 Hz. README.md has what a finer one would change."""
@@ -26,8 +27,6 @@ DAMPING_RATIO = math.sqrt(0.5)
 """The damping whose response is a pure delay to second order (s² term 4ζ² - 1 = 2ζ²)."""
 
 _DENSITY_KG_M3 = 900.0
-_SLENDERNESS = 0.18
-"""Radius over length of segments whose radius the skeleton does not tell."""
 _ROTOR_TO_LOAD = 1.0
 """Rotor inertia seen through the gear, over the heaviest load's: matched, as gears are chosen."""
 _LEAST_ARMATURE_KG_M2 = 2e-4
@@ -122,14 +121,15 @@ def _body(
         # MuJoCo turns a body by its hinges in their order: the table's intrinsic sequence
         if angle in hinges:
             ET.SubElement(body, "joint", hinges[angle], type="hinge", axis=_text(axis))
-    for end in _ends_m(segment, skeleton):
-        radius = segment.shape.radius_m or _SLENDERNESS * float(np.linalg.norm(end))
+    for capsule in capsules(skeleton):
+        if skeleton.segments[capsule.segment] is not segment:
+            continue
         ET.SubElement(
             body,
             "geom",
             type="capsule",
-            fromto=_text((0.0, 0.0, 0.0, *end)),
-            size=f"{radius!r}",
+            fromto=_text((*capsule.from_m, *capsule.to_m)),
+            size=f"{capsule.radius_m!r}",
             density=f"{_DENSITY_KG_M3}",
             rgba="0.85 0.85 0.9 1",
         )
@@ -138,16 +138,6 @@ def _body(
         # at the eyes, looking ahead: image right is -y, image up is z
         ET.SubElement(body, "camera", name="head", pos="0.09 0 0.1", xyaxes="0 -1 0 0 0 1", fovy="70")
     return body
-
-
-def _ends_m(segment: Segment, skeleton: Skeleton) -> list[tuple[float, ...]]:
-    """Where its bars end: at or amid its children's joints, at its tip, or twice as far as its node."""
-    children = [s.origin_m for s in skeleton.segments if s.parent == segment.name]
-    if children and segment.shape.fan:
-        return list(children)
-    if children:
-        return [tuple(float(x) for x in np.mean(children, axis=0))]
-    return [segment.shape.tip_m or (0.0, 0.0, 2.0 * segment.node_m[2])]
 
 
 def _couplings(equality: ET.Element, joint: Joint) -> None:
