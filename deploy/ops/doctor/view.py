@@ -20,11 +20,11 @@ def as_table(findings: Sequence[Finding]) -> Table:
     table.add_column("", no_wrap=True)
     table.add_column("found, and what to do", overflow="fold")
     for finding in findings:
-        style = _STYLE[finding.verdict]
+        style = _STYLE[finding.health]
         words = Text(finding.found)
         if finding.advice:
-            words.append(f"\n→ {finding.advice}", "dim" if finding.verdict is Health.OK else style)
-        table.add_row(Text(finding.check), Text(finding.verdict, style), words)
+            words.append(f"\n→ {finding.advice}", "dim" if finding.health is Health.OK else style)
+        table.add_row(Text(finding.check), Text(finding.health, style), words)
     return table
 
 
@@ -32,9 +32,9 @@ def as_tree(role: str, findings: Sequence[Finding]) -> dict[str, object]:
     """Plain JSON values."""
     return {
         "role": role,
-        "verdict": str(worst(findings)),
+        "health": str(worst(findings)),
         "checks": [
-            {"check": f.check, "verdict": str(f.verdict), "found": f.found, "do": f.advice or None}
+            {"check": f.check, "health": str(f.health), "found": f.found, "do": f.advice or None}
             for f in findings
         ],
     }
@@ -42,6 +42,6 @@ def as_tree(role: str, findings: Sequence[Finding]) -> dict[str, object]:
 
 def in_words(role: str, findings: Sequence[Finding]) -> str:
     """The end of the report, one line."""
-    counts = {verdict: sum(f.verdict is verdict for f in findings) for verdict in Health}
-    worse = [f"{counts[v]} {v}" for v in (Health.FAIL, Health.WARN) if counts[v]]
+    counts = {health: sum(f.health is health for f in findings) for health in Health}
+    worse = [f"{counts[h]} {h}" for h in (Health.FAIL, Health.WARN) if counts[h]]
     return f"{role}: {', '.join([*worse, f'{counts[Health.OK]} ok'])}"

@@ -1,4 +1,4 @@
-"""What one check found: the verdict, a description, and what to do."""
+"""What one check found: how well it is, a description, and what to do."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Finding:
     """One row of the report."""
 
     check: str
-    verdict: Health
+    health: Health
     found: str
     advice: str = ""
     """What to do; empty where there is nothing to do."""
@@ -44,6 +44,6 @@ def fail(check: str, found: str, advice: str) -> Finding:
 
 
 def worst(findings: Sequence[Finding]) -> Health:
-    """The worst verdict of all findings; ok if there is none."""
+    """The worst health of all findings; ok if there is none."""
     order = list(Health)
-    return max((finding.verdict for finding in findings), key=order.index, default=Health.OK)
+    return max((finding.health for finding in findings), key=order.index, default=Health.OK)

@@ -73,8 +73,8 @@ def test_the_report_says_what_was_found_and_what_to_do() -> None:
     Console(file=text, width=80).print(as_table(FOUND))
     assert all(part in text.getvalue() for part in ("can0 is down", "→ bring it up", "fail", "→ see `top`"))
     tree = json.loads(json.dumps(as_tree("master", FOUND)))
-    assert tree["verdict"] == "fail"
-    assert tree["checks"][0] == {"check": "cores", "verdict": "ok", "found": "4", "do": None}
+    assert tree["health"] == "fail"
+    assert tree["checks"][0] == {"check": "cores", "health": "ok", "found": "4", "do": None}
     assert in_words("master", FOUND) == "master: 1 fail, 1 warn, 1 ok"
 
 
@@ -96,13 +96,13 @@ def test_the_exit_status_is_1_only_where_something_fails(
     said = capsys.readouterr()
     tree = json.loads(said.out)
     bus_row = next(check for check in tree["checks"] if check["check"] == "bus suit")
-    assert bus_row["verdict"] == ("fail" if fails else "ok")
+    assert bus_row["health"] == ("fail" if fails else "ok")
     if fails:
         assert left.value.code == 1
         assert "not ready" in said.err
     else:
         # whatever else ails this machine is not of this test
-        assert (left.value.code == 0) == (tree["verdict"] != "fail")
+        assert (left.value.code == 0) == (tree["health"] != "fail")
 
 
 def test_a_router_s_file_is_known_by_having_nothing_else() -> None:

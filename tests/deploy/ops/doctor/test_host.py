@@ -82,25 +82,25 @@ def need(channel: str = "can0", fd: bool = True, nodes: int = 0, interface: str 
 def of_bus(host: Host, wanted: BusNeed, link: dict[str, object] | None = None) -> tuple[Health, str, str]:
     text = json.dumps([CAN0 if link is None else link])
     [finding] = judge_buses((wanted,), read_can(host.tree, text))
-    return finding.verdict, finding.found, finding.advice
+    return finding.health, finding.found, finding.advice
 
 
 def test_a_bus_that_is_up_and_fast_enough_is_well(host: Host) -> None:
-    verdict, found, _ = of_bus(host.interface(), need(nodes=36))
-    assert verdict is Health.OK
+    health, found, _ = of_bus(host.interface(), need(nodes=36))
+    assert health is Health.OK
     assert "CAN FD, 1 Mbit/s / 5 Mbit/s; 36 nodes take" in found
 
 
 def test_an_interface_that_is_missing_names_those_that_are_there(host: Host) -> None:
     host.interface("can1").interface("eth0", mtu=1500, kind=1)
-    verdict, found, advice = of_bus(host, need())
-    assert (verdict, found) == (Health.FAIL, "no CAN interface can0 (there: can1)")
+    health, found, advice = of_bus(host, need())
+    assert (health, found) == (Health.FAIL, "no CAN interface can0 (there: can1)")
     assert "ip link" in advice
 
 
 def test_one_that_is_down_is_brought_up_by_its_unit(host: Host) -> None:
-    verdict, _, advice = of_bus(host.interface(flags=0x40), need())
-    assert (verdict, advice) == (Health.FAIL, "systemctl enable --now tandem-can@can0")
+    health, _, advice = of_bus(host.interface(flags=0x40), need())
+    assert (health, advice) == (Health.FAIL, "systemctl enable --now tandem-can@can0")
 
 
 def test_fd_is_asked_for_only_where_the_file_says_so(host: Host) -> None:
@@ -110,12 +110,12 @@ def test_fd_is_asked_for_only_where_the_file_says_so(host: Host) -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "verdict"),
+    ("state", "health"),
     [("ERROR-ACTIVE", Health.OK), ("ERROR-PASSIVE", Health.WARN), ("BUS-OFF", Health.FAIL)],
 )
-def test_the_controller_s_own_state_counts(host: Host, state: str, verdict: Health) -> None:
+def test_the_controller_s_own_state_counts(host: Host, state: str, health: Health) -> None:
     data = {**CAN0["linkinfo"]["info_data"], "state": state}  # type: ignore[index]
-    assert of_bus(host.interface(), need(), {"ifname": "can0", "linkinfo": {"info_data": data}})[0] is verdict
+    assert of_bus(host.interface(), need(), {"ifname": "can0", "linkinfo": {"info_data": data}})[0] is health
 
 
 def test_too_many_nodes_for_a_bus_are_told_before_they_are_late(host: Host) -> None:
@@ -135,7 +135,7 @@ def test_classic_can_carries_eight_nodes_and_no_suit() -> None:
 
 def test_bit_rates_that_cannot_be_asked_for_are_left_out(host: Host) -> None:
     [finding] = judge_buses((need(nodes=36),), read_can(host.interface().tree, None))
-    assert (finding.verdict, finding.found) == (Health.OK, "can0 is up, CAN FD")
+    assert (finding.health, finding.found) == (Health.OK, "can0 is up, CAN FD")
     assert read_can(host.tree, "no json")["can0"].bitrate == 0
 
 
@@ -158,7 +158,7 @@ def test_ip_of_this_host_is_understood() -> None:
 
 
 @pytest.mark.parametrize(
-    ("priority", "limit", "capabilities", "verdict"),
+    ("priority", "limit", "capabilities", "health"),
     [
         (20, 19, 0, Health.WARN),
         (20, 20, 0, Health.OK),
@@ -169,44 +169,44 @@ def test_ip_of_this_host_is_understood() -> None:
     ],
 )
 def test_a_priority_needs_the_limit_or_the_capability(
-    host: Host, priority: int, limit: object, capabilities: int, verdict: Health
+    host: Host, priority: int, limit: object, capabilities: int, health: Health
 ) -> None:
     facts = read_process(host.process(limit, capabilities).tree)
     finding = judge_realtime(priority, facts)
-    assert finding.verdict is verdict
-    assert ("rtprio 20" in finding.advice) == (verdict is Health.WARN)
+    assert finding.health is health
+    assert ("rtprio 20" in finding.advice) == (health is Health.WARN)
 
 
 def test_throttled_real_time_threads_are_told(host: Host) -> None:
     host.process(priority=50).put("/proc/sys/kernel/sched_rt_period_us", 1_000_000)
-    for runtime_us, verdict in ((950_000, Health.OK), (-1, Health.OK), (500_000, Health.WARN)):
+    for runtime_us, health in ((950_000, Health.OK), (-1, Health.OK), (500_000, Health.WARN)):
         host.put("/proc/sys/kernel/sched_rt_runtime_us", runtime_us)
-        assert judge_realtime(20, read_process(host.tree)).verdict is verdict
+        assert judge_realtime(20, read_process(host.tree)).health is health
 
 
 def test_swap_is_told_where_nothing_is_locked(host: Host) -> None:
     facts = read_process(host.process(memlock=65536).tree)
-    assert judge_memory_lock(0, facts, 0).verdict is Health.OK
+    assert judge_memory_lock(0, facts, 0).health is Health.OK
     finding = judge_memory_lock(0, facts, 2 << 30)
-    assert (finding.verdict, "2.0 GB" in finding.found) == (Health.WARN, True)
+    assert (finding.health, "2.0 GB" in finding.found) == (Health.WARN, True)
 
 
 def test_with_a_priority_memory_needs_to_be_lockable_whole(host: Host) -> None:
     facts = read_process(host.process(memlock=65536).tree)
     finding = judge_memory_lock(20, facts, 0)
-    assert (finding.verdict, "64 kB" in finding.found) == (Health.WARN, True)
+    assert (finding.health, "64 kB" in finding.found) == (Health.WARN, True)
     assert "LimitMEMLOCK" in finding.advice
     unlimited = read_process(host.process(memlock="unlimited").tree)
-    assert judge_memory_lock(20, unlimited, 1).verdict is Health.OK
+    assert judge_memory_lock(20, unlimited, 1).health is Health.OK
     capable = read_process(host.process(memlock=65536, capabilities=1 << 14).tree)
-    assert judge_memory_lock(20, capable, 1).verdict is Health.OK
+    assert judge_memory_lock(20, capable, 1).health is Health.OK
 
 
 def test_trials_need_a_capability_and_a_device(host: Host) -> None:
     facts = read_process(host.process().tree)
     assert "no CAP_NET_ADMIN and no /dev/net/tun" in judge_networks(facts).found
     host.process(capabilities=1 << 12).put("/dev/net/tun", "")
-    assert judge_networks(read_process(host.tree)).verdict is Health.OK
+    assert judge_networks(read_process(host.tree)).health is Health.OK
 
 
 def well(host: Host) -> Host:
@@ -220,18 +220,18 @@ def well(host: Host) -> Host:
     return host.put("/proc/sys/net/core/rmem_max", RECEIVE_BUFFER_BYTES)
 
 
-def verdicts(host: Host) -> dict[str, Health]:
-    return {finding.check: finding.verdict for finding in judge_machine(read_machine(host.tree))}
+def healths(host: Host) -> dict[str, Health]:
+    return {finding.check: finding.health for finding in judge_machine(read_machine(host.tree))}
 
 
 def test_a_machine_that_is_well(host: Host) -> None:
     facts = read_machine(well(host).tree)
     assert (facts.cores, facts.isolated, facts.preemption) == (4, "2-3", "rt")
-    assert set(verdicts(host).values()) == {Health.OK}
+    assert set(healths(host).values()) == {Health.OK}
 
 
 @pytest.mark.parametrize(
-    ("path", "text", "check", "verdict"),
+    ("path", "text", "check", "health"),
     [
         ("/sys/devices/system/cpu/cpu3/cpufreq/scaling_governor", "powersave", "CPU governor", Health.WARN),
         ("/proc/loadavg", "4.00 1 1", "load", Health.OK),
@@ -240,14 +240,14 @@ def test_a_machine_that_is_well(host: Host) -> None:
         ("/proc/meminfo", f"MemAvailable: {ENOUGH_MEMORY_BYTES // 1024 - 1} kB", "memory", Health.FAIL),
     ],
 )
-def test_what_ails_a_machine(host: Host, path: str, text: str, check: str, verdict: Health) -> None:
+def test_what_ails_a_machine(host: Host, path: str, text: str, check: str, health: Health) -> None:
     well(host).put(path, text)
-    assert verdicts(host)[check] is verdict
+    assert healths(host)[check] is health
 
 
 def test_one_core_is_few(host: Host) -> None:
     host.put("/sys/devices/system/cpu/cpu0/online", 1)
-    assert verdicts(host)["cores"] is Health.WARN
+    assert healths(host)["cores"] is Health.WARN
 
 
 @pytest.mark.parametrize(
@@ -266,9 +266,9 @@ def test_how_a_kernel_gives_way(host: Host, version: str, kind: str) -> None:
 def test_the_socket_buffer_matters_to_multicast_alone(host: Host) -> None:
     multicast = (need("239.74.163.2", interface="udp_multicast"),)
     facts = read_machine(well(host).tree)
-    assert [f.verdict for f in judge_receive_buffer(multicast, facts)] == [Health.OK]
+    assert [f.health for f in judge_receive_buffer(multicast, facts)] == [Health.OK]
     small = read_machine(host.put("/proc/sys/net/core/rmem_max", RECEIVE_BUFFER_BYTES - 1).tree)
-    assert [f.verdict for f in judge_receive_buffer(multicast, small)] == [Health.WARN]
+    assert [f.health for f in judge_receive_buffer(multicast, small)] == [Health.WARN]
     assert judge_receive_buffer((need(),), small) == []
 
 
@@ -279,7 +279,7 @@ def test_an_empty_tree_is_read_without_an_error(host: Host) -> None:
 
 
 @pytest.mark.parametrize(
-    ("free", "verdict"),
+    ("free", "health"),
     [
         (LITTLE_DISK_BYTES, Health.OK),
         (LITTLE_DISK_BYTES - 1, Health.WARN),
@@ -288,8 +288,8 @@ def test_an_empty_tree_is_read_without_an_error(host: Host) -> None:
         (None, Health.WARN),
     ],
 )
-def test_room_for_recordings(free: int | None, verdict: Health) -> None:
-    assert judge_disk("/var/lib/tandem", free).verdict is verdict
+def test_room_for_recordings(free: int | None, health: Health) -> None:
+    assert judge_disk("/var/lib/tandem", free).health is health
 
 
 def test_the_disk_of_a_folder_that_is_not_there(tmp_path: Path) -> None:
@@ -299,7 +299,7 @@ def test_the_disk_of_a_folder_that_is_not_there(tmp_path: Path) -> None:
 
 def test_the_date_is_for_people() -> None:
     assert clock_is_synchronised() in (True, False, None)
-    assert [judge_clock(state).verdict for state in (True, False, None)] == [
+    assert [judge_clock(state).health for state in (True, False, None)] == [
         Health.OK,
         Health.WARN,
         Health.OK,
@@ -308,11 +308,11 @@ def test_the_date_is_for_people() -> None:
 
 def test_a_serial_port_is_there_usable_or_a_url(host: Host) -> None:
     port = "/dev/ttyUSB0"
-    assert judge_port(port, read_device(host.tree, port)).verdict is Health.FAIL
+    assert judge_port(port, read_device(host.tree, port)).health is Health.FAIL
     host.put(port, "")
-    assert judge_port(port, read_device(host.tree, port)).verdict is Health.OK
+    assert judge_port(port, read_device(host.tree, port)).health is Health.OK
     assert "dialout" in judge_port(port, Device(port, there=True, usable=False)).advice
-    assert judge_port("socket://10.0.0.7:4000", None).verdict is Health.OK
+    assert judge_port("socket://10.0.0.7:4000", None).health is Health.OK
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may use every device")
@@ -325,12 +325,12 @@ def test_a_camera_is_never_fatal(host: Host) -> None:
     there, missing = Device("/dev/video0", True, True), Device("/dev/video0", False, False)
     forbidden = Device("/dev/video0", True, False)
 
-    def verdict(source: CameraNeed, device: Device, egl: bool = True, v4l2: bool = True) -> Health:
-        return judge_camera(source, device, egl, v4l2).verdict
+    def health(source: CameraNeed, device: Device, egl: bool = True, v4l2: bool = True) -> Health:
+        return judge_camera(source, device, egl, v4l2).health
 
-    assert verdict(CameraNeed.OFF, missing, egl=False, v4l2=False) is Health.OK
-    assert verdict(CameraNeed.DRAWN, missing) is Health.OK
-    assert verdict(CameraNeed.DRAWN, missing, egl=False) is Health.WARN
-    assert verdict(CameraNeed.V4L2, there) is Health.OK
-    assert verdict(CameraNeed.V4L2, there, v4l2=False) is Health.WARN
-    assert verdict(CameraNeed.V4L2, missing) is verdict(CameraNeed.V4L2, forbidden) is Health.WARN
+    assert health(CameraNeed.OFF, missing, egl=False, v4l2=False) is Health.OK
+    assert health(CameraNeed.DRAWN, missing) is Health.OK
+    assert health(CameraNeed.DRAWN, missing, egl=False) is Health.WARN
+    assert health(CameraNeed.V4L2, there) is Health.OK
+    assert health(CameraNeed.V4L2, there, v4l2=False) is Health.WARN
+    assert health(CameraNeed.V4L2, missing) is health(CameraNeed.V4L2, forbidden) is Health.WARN

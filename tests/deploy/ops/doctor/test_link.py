@@ -44,7 +44,7 @@ def free_endpoint() -> str:
 
 
 def by_check(findings: list[Finding]) -> dict[str, Health]:
-    return {finding.check: finding.verdict for finding in findings}
+    return {finding.check: finding.health for finding in findings}
 
 
 def tls_of(folder: Path, days: float = 300.0) -> TlsConfig:
@@ -100,9 +100,9 @@ def test_a_certificate_for_another_name_or_for_no_host(tmp_path: Path) -> None:
 
 
 def test_the_days_that_are_left() -> None:
-    for days, verdict in ((SOON_DAYS, Health.OK), (SOON_DAYS - 0.01, Health.WARN)):
+    for days, health in ((SOON_DAYS, Health.OK), (SOON_DAYS - 0.01, Health.WARN)):
         facts = KeyFacts("", "robot:robot-1", ("h",), days)
-        assert by_check(judge_keys(Needs("slave"), facts))["certificate's time"] is verdict
+        assert by_check(judge_keys(Needs("slave"), facts))["certificate's time"] is health
 
 
 def test_a_link_without_keys_is_open_to_all() -> None:
@@ -133,7 +133,7 @@ def test_knocking_at_a_door_that_is_open_and_at_one_that_is_not() -> None:
 def test_every_answer_is_judged_with_what_to_do(answer: EndpointState) -> None:
     finding = judge_endpoint(EndpointFacts("tcp/h:1", answer))
     well = answer in (EndpointState.ACCEPTS, EndpointState.UNASKED, EndpointState.FREE)
-    assert (finding.verdict is Health.OK) == well
+    assert (finding.health is Health.OK) == well
     assert bool(finding.advice) != well
 
 
@@ -153,7 +153,7 @@ def test_a_robot_that_is_well() -> None:
 
 
 @pytest.mark.parametrize(
-    ("trips", "verdict"),
+    ("trips", "health"),
     [
         ((OLDEST_MS,) * EXCHANGES, Health.OK),
         ((OLDEST_MS,) * (EXCHANGES - 1), Health.WARN),  # one was lost
@@ -163,12 +163,12 @@ def test_a_robot_that_is_well() -> None:
         ((), Health.FAIL),
     ],
 )
-def test_a_way_that_is_too_long_for_the_guard(trips: tuple[float, ...], verdict: Health) -> None:
-    assert by_check(judge_robot(robot(trips), OURS))["robot-1: round trip"] is verdict
+def test_a_way_that_is_too_long_for_the_guard(trips: tuple[float, ...], health: Health) -> None:
+    assert by_check(judge_robot(robot(trips), OURS))["robot-1: round trip"] is health
 
 
 @pytest.mark.parametrize(
-    ("theirs", "verdict"),
+    ("theirs", "health"),
     [
         (OURS, Health.OK),
         (replace(OURS, python="3.13"), Health.OK),
@@ -178,18 +178,18 @@ def test_a_way_that_is_too_long_for_the_guard(trips: tuple[float, ...], verdict:
         (None, Health.WARN),
     ],
 )
-def test_two_hosts_with_other_software(theirs: Software | None, verdict: Health) -> None:
+def test_two_hosts_with_other_software(theirs: Software | None, health: Health) -> None:
     finding = judge_robot(robot(software=theirs), OURS)[-1]
-    assert (finding.check, finding.verdict) == ("robot-1: versions", verdict)
+    assert (finding.check, finding.health) == ("robot-1: versions", health)
 
 
 def test_a_robot_that_does_not_answer_or_in_another_schema() -> None:
     [silent] = judge_robot(RobotFacts("robot-1", "", "does not answer at tcp/h:1"), OURS)
-    assert (silent.check, silent.verdict) == ("robot-1", Health.FAIL)
+    assert (silent.check, silent.health) == ("robot-1", Health.FAIL)
     [other] = judge_robot(RobotFacts("robot-1", "", "schema version 3, expected 2"), OURS)
-    assert (other.check, other.verdict) == ("robot-1: versions", Health.FAIL)
+    assert (other.check, other.health) == ("robot-1: versions", Health.FAIL)
     [two] = judge_robot(RobotFacts("robot-1", "", several_bear("robot-1", ["room 1", "room 2"])), OURS)
-    assert (two.check, two.verdict) == ("robot-1: names", Health.FAIL)
+    assert (two.check, two.health) == ("robot-1: names", Health.FAIL)
     assert "room 1 and room 2" in two.found
 
 

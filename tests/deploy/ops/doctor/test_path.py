@@ -19,7 +19,7 @@ ALL = max(SIZES)
 
 
 @pytest.mark.parametrize(
-    ("there", "back", "verdict", "words"),
+    ("there", "back", "health", "words"),
     [
         (ALL, ALL, Health.OK, "up to 16000 bytes pass both ways"),
         (1100, ALL, Health.WARN, "messages of more than 1100 bytes to the robot vanish"),
@@ -28,12 +28,12 @@ ALL = max(SIZES)
     ],
 )
 def test_what_does_not_pass_is_named_with_what_to_do(
-    there: int, back: int, verdict: Health, words: str
+    there: int, back: int, health: Health, words: str
 ) -> None:
     [finding] = judge_path(PathFacts("robot-1", there, back))
-    assert finding.verdict is verdict
+    assert finding.health is health
     assert words in finding.found
-    assert ("quic" in finding.advice) == (verdict is not Health.OK)
+    assert ("quic" in finding.advice) == (health is not Health.OK)
 
 
 def test_a_robot_that_answers_no_probe_is_not_judged() -> None:

@@ -48,20 +48,20 @@ def test_servos_are_pinged_past_a_silent_one_and_nothing_is_written(port: Simula
     found, config = pinged(port, reply_timeout_s=0.1)
     assert found.answers == PINGS
     assert bytes(servo._table) == before
-    assert judge_latency(found, config.reply_timeout_s).verdict is Health.OK
+    assert judge_latency(found, config.reply_timeout_s).health is Health.OK
 
 
 def test_a_late_port_fails_and_the_latency_timer_is_named(port: SimulatedPort) -> None:
     port.garble = late_by(0.017)
     found, config = pinged(port)
     finding = judge_latency(found, config.reply_timeout_s)
-    assert finding.verdict is Health.FAIL
+    assert finding.health is Health.FAIL
     assert "all would be called silent" in finding.found
     assert "latency timer" in finding.advice
 
 
 @pytest.mark.parametrize(
-    ("timer", "quickest_s", "verdict"),
+    ("timer", "quickest_s", "health"),
     [
         (16, 0.0162, Health.FAIL),
         (16, 0.0035, Health.WARN),
@@ -73,12 +73,12 @@ def test_a_late_port_fails_and_the_latency_timer_is_named(port: SimulatedPort) -
     ],
 )
 def test_timer_and_measurement_are_judged(
-    timer: int | None, quickest_s: float | None, verdict: Health
+    timer: int | None, quickest_s: float | None, health: Health
 ) -> None:
     found = Pinged("/dev/ttyUSB0", timer, quickest_s, PINGS, "the port is in use")
     finding = judge_latency(found, 0.004)
-    assert finding.verdict is verdict
-    if verdict is not Health.OK and timer == 16:
+    assert finding.health is health
+    if health is not Health.OK and timer == 16:
         assert "latency timer of ttyUSB0 is 16 ms: set it to 1 ms" in finding.advice
 
 
@@ -89,16 +89,16 @@ def test_a_port_that_cannot_be_opened_and_one_that_must_not_be(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("drives", "bitrate", "verdict"),
+    ("drives", "bitrate", "health"),
     [(25, 1_000_000, Health.FAIL), (18, 1_000_000, Health.WARN), (12, 1_000_000, Health.OK),
      (12, 500_000, Health.FAIL), (25, 0, Health.FAIL)],
 )  # fmt: skip
-def test_a_bus_s_load_is_judged_by_its_true_rate(drives: int, bitrate: int, verdict: Health) -> None:
+def test_a_bus_s_load_is_judged_by_its_true_rate(drives: int, bitrate: int, health: Health) -> None:
     bus = BusConfig(name="left", interface="socketcan", channel="can0", fd=False)
     need = BusNeed(bus, rate_hz=200.0, drives=drives, bits_per_s=bits_per_s(drives, 200, 40, 100))
     there = CanInterface("can0", up=True, fd=False, bitrate=bitrate, state="ERROR-ACTIVE")
     (finding,) = judge_buses((need,), {"can0": there})
-    assert finding.verdict is verdict
+    assert finding.health is health
     assert f"{drives} drives at 200 Hz put" in finding.found
-    if verdict is Health.FAIL:
+    if health is Health.FAIL:
         assert "sync_hz at most" in finding.advice

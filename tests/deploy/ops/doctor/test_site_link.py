@@ -67,7 +67,7 @@ async def examined(site: Path) -> Sequence[Finding]:
 def test_the_doctor_reaches_the_robot_with_the_operator_s_keys(site: Path) -> None:
     found = {finding.check: finding for finding in asyncio.run(examined(site))}
     for check in ("certificate's name", "certificate's time", "robot-1", "robot-1: clock"):
-        assert found[check].verdict is Health.OK, found[check]
+        assert found[check].health is Health.OK, found[check]
     assert found["certificate's name"].found == "operator:nurse-1"
 
 
@@ -79,7 +79,7 @@ def test_another_authority_s_operator_is_not_let_in(site: Path) -> None:
         (site / "keys" / f"operator-nurse-1.{kind}").unlink()
     write_pair(site / "keys", "operator-nurse-1", pair)
     found = {finding.check: finding for finding in asyncio.run(examined(site))}
-    assert found["certificate"].verdict is Health.FAIL
+    assert found["certificate"].health is Health.FAIL
     assert "not from the authority" in found["certificate"].found
     assert "robot-1" not in found
-    assert found["link"].verdict is Health.FAIL
+    assert found["link"].health is Health.FAIL
