@@ -29,7 +29,7 @@ class Arrivals:
         self._missing: set[int] = set()
 
     def note(self, lease: int, sequence: int) -> None:
-        """Take one command of the live lease; the first of a lease begins its count."""
+        """Take one command of the current lease; the first of a lease begins its count."""
         self.arrived += 1
         if lease != self._lease:
             self._lease, self._newest = lease, sequence

@@ -25,7 +25,7 @@ class Situation:
     robot: str
     joints: int
     live_token: int
-    """Token of the live lease, 0 where there is none."""
+    """Token of the current lease, 0 where there is none."""
     newest_sequence: int
     """The number of the last command accepted within this lease, -1 before the first."""
     now_ns: int
@@ -116,7 +116,7 @@ def _deadman(command: Command, _: Situation) -> str | None:
 DEADMAN = "deadman"
 GATES: tuple[Gate, ...] = (
     Gate("robot", "it is for this robot", _robot),
-    Gate("lease", "it carries the token of the live lease", _lease),
+    Gate("lease", "it carries the token of the current lease", _lease),
     Gate("valid", "one finite position and velocity a joint", _valid),
     Gate("sequence", "its number is above that of the last accepted one", _sequence),
     Gate("clock", "the offset between the two clocks is trusted", _clock),

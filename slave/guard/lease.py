@@ -31,7 +31,7 @@ class Lease:
         """The holder's token; 0: none."""
 
     def claim(self, operator: str, now_ns: int) -> int:
-        """The new token, or 0 if any operator holds a live lease, even one of the same name.
+        """The new token, or 0 if any operator holds a current lease, even one of the same name.
 
         A master that was restarted waits until its own old lease has lapsed.
         """

@@ -45,7 +45,7 @@ def test_it_comes_back_from_each_fault_and_judges_itself(tmp_path: Path) -> None
         "guard: moved while it held",
         "recorder: recordings that cannot be read",
         "recorder: full disks that ended it or were not logged once",
-        "loops: processes that ended unasked",
+        "loops: processes that ended by themselves",
     ):
         assert judged[name]["outcome"] == "passed", (judged[name], said)
     assert judged["memory: master's memory grows"]["outcome"] == "not judged"

@@ -41,7 +41,9 @@ def live(
             help="Share of all directions that each magnetometer must have seen, 0 to 1.", min=0.5, max=0.95
         ),
     ] = 0.85,
-    limber_s: Annotated[float, typer.Option(help="Seconds in which every joint is to move.", min=2.0)] = 20.0,
+    move_joints_s: Annotated[
+        float, typer.Option(help="Seconds in which every joint is to move.", min=2.0)
+    ] = 20.0,
     gravity: Annotated[float, typer.Option(help="Gravity at your place, m/s².", min=9.7, max=9.9)] = 9.80665,
     hemisphere: HemisphereOption = "north",
     pictures: Annotated[
@@ -71,7 +73,9 @@ def live(
     make_folder(out)
     console = Console(stderr=True)
     by_word = console.is_terminal
-    options = GuideOptions(wanted, still_s, attitudes, coverage, tumble_s, limber_s=limber_s, by_word=by_word)
+    options = GuideOptions(
+        wanted, still_s, attitudes, coverage, tumble_s, move_joints_s=move_joints_s, by_word=by_word
+    )
     session = _guided(checked, options, out, console)
     choice = Choice(wanted, gravity, still_s, hemisphere_named(hemisphere), pictures)
     figures, refusals = compute(checked, session, choice, out, console)

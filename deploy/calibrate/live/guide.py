@@ -1,6 +1,6 @@
 """What the person is to do now, which node still wants what: a state machine on the readings' own time.
 
-    attitudes ▸ tumble ▸ wear ▸ zero pose ▸ limber ▸ done
+    attitudes ▸ tumble ▸ wear ▸ zero pose ▸ move joints ▸ done
 
 Parts that were not asked for are left out. Pure: readings go in, the view comes out.
 """
@@ -19,7 +19,7 @@ from deploy.calibrate.live.window import WINDOW_S, NodeProgress, ReadingsWindow,
 
 What = Literal["imu", "mag", "align"]
 WHATS: tuple[What, ...] = ("imu", "mag", "align")
-StepName = Literal["attitudes", "tumble", "wear", "zero_pose", "limber", "done"]
+StepName = Literal["attitudes", "tumble", "wear", "zero_pose", "move_joints", "done"]
 _SILENT_S = 2.0
 
 
@@ -36,7 +36,7 @@ class GuideOptions:
     tumble_s: float = 30.0
     """At least so long."""
     zero_pose_s: float = 3.0
-    limber_s: float = 20.0
+    move_joints_s: float = 20.0
     """So long must every joint have moved."""
     by_word: bool = False
     """The zero pose begins when the person says so."""
@@ -153,8 +153,8 @@ class Guide:
                 return WearStep(self._count)
             case "zero_pose":
                 return self._zero_pose
-            case "limber":
-                return MoveJointsStep(self._parents, o.limber_s, self._zero_pose.bias_rad_s)
+            case "move_joints":
+                return MoveJointsStep(self._parents, o.move_joints_s, self._zero_pose.bias_rad_s)
             case "done":
                 return None
 
@@ -166,5 +166,5 @@ def _steps(what: Sequence[What]) -> list[StepName]:
     if "mag" in what:
         names.append("tumble")
     if "align" in what:
-        names += ["wear", "zero_pose", "limber"]
+        names += ["wear", "zero_pose", "move_joints"]
     return [*names, "done"]

@@ -23,7 +23,12 @@ from master.suit.sweep import Sweep
 
 _SHOW_S = 0.2
 _LOG_S = 5.0
-_FILE: dict[StepName, str] = {"attitudes": "tray", "tumble": "tray", "zero_pose": "worn", "limber": "worn"}
+_FILE: dict[StepName, str] = {
+    "attitudes": "tray",
+    "tumble": "tray",
+    "zero_pose": "worn",
+    "move_joints": "worn",
+}
 """Which recording a step belongs to: with `wear` there is none, as units are handled one by one."""
 
 
@@ -102,7 +107,7 @@ class LiveSession:
         session = self.session
         session.finished = self._guide.step == "done"
         session.counters["recordings"] = [recorder.summary() for recorder in self._recorders]
-        if session.worn is not None and self._guide.step in ("limber", "done"):
+        if session.worn is not None and self._guide.step in ("move_joints", "done"):
             session.zero_pose_s = self._guide.zero_pose_s
 
     async def _work(self, polling: object) -> None:

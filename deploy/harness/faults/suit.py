@@ -1,4 +1,4 @@
-"""Faults of the suit: nodes that fail or lie, a zero pose that is none, its CAN bus."""
+"""Faults of the suit: nodes that fail or read wrongly, a zero pose that is none, its CAN bus."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from deploy.harness.faults.scene import Scene
 from deploy.harness.faults.setting import Setting
 from deploy.harness.faults.virtual import goes_on, holds, holds_joints
 from deploy.sim.suit.faults import FaultsConfig, Loss, Twin
-from deploy.sim.suit.lies import Lie, LieKind
 from deploy.sim.suit.motion import OperatorMotion, parse_motion
+from deploy.sim.suit.wrong_readings import WrongReading, WrongReadingKind
 from slave.guard import State
 
 NODE = "right_forearm"
 """A node of the reaching arm."""
-LIARS: tuple[tuple[str, str, LieKind, int | None], ...] = (
+LIARS: tuple[tuple[str, str, WrongReadingKind, int | None], ...] = (
     ("sensor node frozen", "A node of the reaching arm repeats one reading.", "frozen", None),
     ("sensor node reads zero", "The node answers with zeros, as after a reset.", "zero", None),
     ("sensor axis stuck", "One axis of the node's accelerometer stands.", "stuck", 0),
@@ -64,9 +64,11 @@ def _leans(scene: Scene) -> None:
 
 
 LEANS = Setting(aligned=True, master=("estimation.zero_pose_s=1.0",), motion=_leaning)
-GROSS_BIAS = Setting(lead_s=4.0, suit=(f'faults.lie=[{{node="{NODE}",kind="biased_gyro",offset=12.0}}]',))
+GROSS_BIAS = Setting(
+    lead_s=4.0, suit=(f'faults.wrong_reading=[{{node="{NODE}",kind="biased_gyro",offset=12.0}}]',)
+)
 IRON = Setting(
-    lead_s=20.0, suit=(f'faults.lie=[{{node="{NODE}",kind="magnetised",offset=15.0,from_s=6.0}}]',)
+    lead_s=20.0, suit=(f'faults.wrong_reading=[{{node="{NODE}",kind="magnetised",offset=15.0,from_s=6.0}}]',)
 )
 
 SUIT = (
@@ -88,7 +90,7 @@ SUIT = (
             "The node is named with what is wrong.",
             person="Repair the node. Its joints come back slowly by themselves; "
             "until then engage is refused.",
-            act=_suit(FaultsConfig(lie=[Lie(node=NODE, kind=kind, axis=axis)])),
+            act=_suit(FaultsConfig(wrong_reading=[WrongReading(node=NODE, kind=kind, axis=axis)])),
             concerns=_joints_of_node, strays_deg=2.5, sway_deg=1.0, stands_s=0.2 + BRAKED_S,
         )
         for name, done, kind, axis in LIARS

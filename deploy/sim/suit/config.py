@@ -47,8 +47,8 @@ class SuitConfig(Section):
     """The nodes by segment; segments without a node stay silent."""
     motion: str = "bottle"
     """What the operator does: `bottle`, `grasp`, `walk` (each of one profile), `calibration_pose`, `sweep`;
-    to calibrate: `tray` (all units in it are turned about), `limber` (the zero pose, then every joint moves),
-    `calibration` (the tray once, then limber). Not used with `replay`."""
+    to calibrate: `tray` (all units in it are turned about), `move_joints` (the zero pose, then every joint
+    moves), `calibration` (the tray once, then move_joints). Not used with `replay`."""
     tray: TrayConfig = TrayConfig()
     seed: int = Field(default=0, ge=0)
     """Decides the units' errors, their noise and the faults."""

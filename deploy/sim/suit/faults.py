@@ -1,4 +1,4 @@
-"""Faults on demand: lost nodes, wrong readings (`lies`), twins, late, corrupt and duplicate answers."""
+"""Faults on demand: lost nodes, wrong readings, twins, late, corrupt and duplicate answers."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from common.can.frame import CanFrame
 from common.clock import NS_PER_MS, to_s
 from common.config.section import Section
 from common.errors import ConfigMistake
-from deploy.sim.suit.lies import Lie
 from deploy.sim.suit.span import TimeSpan
+from deploy.sim.suit.wrong_readings import WrongReading
 
 
 class Loss(TimeSpan):
@@ -44,7 +44,7 @@ class Twin(TimeSpan):
 class FaultsConfig(Section):
     """`[faults]`: none by default."""
 
-    lie: list[Lie] = Field(default=[])
+    wrong_reading: list[WrongReading] = Field(default=[])
     twin: list[Twin] = Field(default=[])
     lose: list[Loss] = Field(default=[])
     delay: list[Delay] = Field(default=[])
@@ -56,7 +56,9 @@ class FaultsConfig(Section):
     def unknown_nodes(self, nodes: Sequence[str]) -> list[ConfigMistake]:
         """Faults of nodes that there are not."""
         named = [(f"faults.lose.{i}.node", loss.node) for i, loss in enumerate(self.lose)]
-        named += [(f"faults.lie.{i}.node", lie.node) for i, lie in enumerate(self.lie)]
+        named += [
+            (f"faults.wrong_reading.{i}.node", wrong.node) for i, wrong in enumerate(self.wrong_reading)
+        ]
         named += [(f"faults.twin.{i}.node", t.node) for i, t in enumerate(self.twin) if t.node is not None]
         named += [(f"faults.delay.{i}.node", d.node) for i, d in enumerate(self.delay) if d.node is not None]
         expected = "the segment of a configured node"

@@ -14,7 +14,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from deploy.sim.suit.gait import Curve, Gait, GaitError, Strides
-from deploy.sim.suit.limber import Limber
+from deploy.sim.suit.joint_moves import JointMoves
 from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, MotionError, Move
 
 MOTIONS = {
@@ -23,7 +23,7 @@ MOTIONS = {
     "walk": "lower_limb",
     "calibration_pose": None,
     "sweep": None,
-    "limber": None,
+    "move_joints": None,
     "tray": None,
     "calibration": None,
 }
@@ -99,8 +99,8 @@ def load_motion(name: str, skeleton: Skeleton) -> OperatorMotion:
         raise ConfigError("motion", mistakes)
     if name == "sweep":
         return sweep(skeleton)
-    if name in ("limber", "tray", "calibration"):  # off the tray the operator always does this
-        return Limber(skeleton)
+    if name in ("move_joints", "tray", "calibration"):  # off the tray the operator always does this
+        return JointMoves(skeleton)
     if name == "calibration_pose":
         return stand_still(skeleton)
     text = resources.files(__package__).joinpath(f"{name}.toml").read_text("utf-8")

@@ -19,11 +19,11 @@ from deploy.sim.suit.disturbance import Disturbance, DisturbanceConfig
 from deploy.sim.suit.encode import BatchEncoder
 from deploy.sim.suit.faults import Faults, NodeAnswer, Outgoing
 from deploy.sim.suit.imperfections import Counts, Imperfections, quantise
-from deploy.sim.suit.lies import Lies
 from deploy.sim.suit.motion import OperatorMotion, load_motion
 from deploy.sim.suit.replay import Replay, load_replay
 from deploy.sim.suit.sensors import IdealSensors, earth_field_ut
 from deploy.sim.suit.tray import Tray
+from deploy.sim.suit.wrong_readings import WrongReadings
 from master.suit.nodes import NodeConfig
 from master.suit.number import tick_of
 from master.suit.protocol import NO_VALUE, NodeStatus, SuitProtocol
@@ -147,7 +147,7 @@ class SimulatedSuit:
         self._scale = protocol.fd.scale
         self._first_sync_ns: int | None = None
         self._random = np.random.default_rng([len(nodes), 4])
-        self._lies = Lies(skeleton.segment_names, self._scale, seed=len(nodes))
+        self._wrong_readings = WrongReadings(skeleton.segment_names, self._scale, seed=len(nodes))
 
     def on_sync(self, number: int, now_ns: int) -> SuitAnswer:
         """The answers of all nodes on all buses to the SYNC of that number, which they receive `now_ns`.
@@ -159,7 +159,9 @@ class SimulatedSuit:
         t_ns = now_ns - self._first_sync_ns
         instant = self._wearer.at(to_s(t_ns))
         counts, status = self._counts(instant.readings)
-        counts, status = self._lies.apply(self.faults.config.lie, counts, status, to_s(t_ns))
+        counts, status = self._wrong_readings.apply(
+            self.faults.config.wrong_reading, counts, status, to_s(t_ns)
+        )
         answers = self._answers(number, counts, status)
         twins = self.faults.twins(t_ns) if self.faults.config.twin else set()
         if twins is None or twins:

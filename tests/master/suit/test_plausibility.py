@@ -1,4 +1,4 @@
-"""Nodes that answer but lie are not believed within 0.2 s of the evidence; those that stand still are."""
+"""Wrong readings are not believed within 0.2 s of the evidence; those of a node that stands still are."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.quaternion import Array
-from deploy.sim.suit.lies import LieKind
+from deploy.sim.suit.wrong_readings import WrongReadingKind
 from master.suit.doubt import Weight
 from master.suit.plausibility import PlausibilityWatch
 from master.suit.plausibility_config import PlausibilityConfig
@@ -20,12 +20,12 @@ BEGINS_S = 3.0
 
 
 def lying(kind: str, motion: str, more: str = "") -> Bench:
-    lie = f'faults.lie=[{{node="{NODE}",kind="{kind}",from_s={BEGINS_S}{more}}}]'
-    return Bench(f'motion="{motion}"', lie)
+    wrong = f'faults.wrong_reading=[{{node="{NODE}",kind="{kind}",from_s={BEGINS_S}{more}}}]'
+    return Bench(f'motion="{motion}"', wrong)
 
 
 def invalid_after_s(bench: Bench, begins_s: float = BEGINS_S, most_s: float = 5.0) -> float | None:
-    """From the lie until a command says so; every other joint must stay valid."""
+    """From the wrong reading until a command says so; every other joint must stay valid."""
     names = bench.pipeline.skeleton.joint_names
     bench.run(round(200 * begins_s))
     while bench.tick < 200 * (begins_s + most_s):
@@ -56,7 +56,7 @@ AT_ONCE = [
 @pytest.mark.parametrize(("kind", "more", "words"), AT_ONCE)
 @pytest.mark.parametrize("motion", ["calibration_pose", "bottle"])
 def test_a_liar_is_named_within_a_fifth_of_a_second(
-    motion: str, kind: LieKind, more: str, words: str
+    motion: str, kind: WrongReadingKind, more: str, words: str
 ) -> None:
     bench = lying(kind, motion, more)
     after_s = invalid_after_s(bench)
@@ -70,7 +70,9 @@ def test_a_liar_is_named_within_a_fifth_of_a_second(
 @pytest.mark.parametrize(("begins_s", "within_s"), [(3.0, 0.55), (4.6, 0.2)], ids=["at rest", "turning"])
 def test_a_stuck_gyro_axis_is_named_once_chance_is_ruled_out(begins_s: float, within_s: float) -> None:
     """At rest a gyro's reading repeats by chance, and one that stands near zero does no harm yet."""
-    bench = Bench('motion="bottle"', f'faults.lie=[{{node="{NODE}",kind="stuck",axis=4,from_s={begins_s}}}]')
+    bench = Bench(
+        'motion="bottle"', f'faults.wrong_reading=[{{node="{NODE}",kind="stuck",axis=4,from_s={begins_s}}}]'
+    )
     after_s = invalid_after_s(bench, begins_s=begins_s)
     assert after_s is not None
     assert after_s <= within_s
@@ -80,8 +82,10 @@ def test_a_stuck_gyro_axis_is_named_once_chance_is_ruled_out(begins_s: float, wi
 @pytest.mark.parametrize(
     ("kind", "more"), [("flipped_gyro", ""), ("flipped_gyro", ",axis=4"), ("dead_gyro", "")]
 )
-def test_a_gyro_that_contradicts_gravity_is_named_once_the_node_turns(kind: LieKind, more: str) -> None:
-    """The bottle's forearm begins to turn two seconds after the lie."""
+def test_a_gyro_that_contradicts_gravity_is_named_once_the_node_turns(
+    kind: WrongReadingKind, more: str
+) -> None:
+    """The bottle's forearm begins to turn two seconds after the wrong readings begin."""
     bench = lying(kind, "bottle", more)
     after_s = invalid_after_s(bench)
     assert after_s is not None
@@ -108,7 +112,7 @@ def test_a_magnetometer_that_hangs_is_left_out_and_joints_stay_valid() -> None:
 
 
 @pytest.mark.parametrize("kind", ["zero", "ones", "overflow_mag"])
-def test_what_no_magnetometer_can_read_is_no_reading(kind: LieKind) -> None:
+def test_what_no_magnetometer_can_read_is_no_reading(kind: WrongReadingKind) -> None:
     bench = lying(kind, "calibration_pose")
     bench.run(round(200 * BEGINS_S) + 20)
     node = bench.pipeline.skeleton.segment_names.index(NODE)
@@ -119,16 +123,16 @@ def test_a_mended_liar_settles_before_its_joints_are_valid() -> None:
     bench = lying("frozen", "calibration_pose", ",until_s=3.5")
     assert invalid_after_s(bench) is not None
     valid_at = next(s.tick / 200 for _ in range(1200) for s in bench.run(1) if s.valid.all() and not s.doubt)
-    # until 3.5 s it lies; then nothing may be wrong for `clear_s`, and the filter settles for a second
+    # wrong until 3.5 s; then nothing may be wrong for `clear_s`, and the filter settles for a second
     assert 3.5 + 2.0 + 1.0 <= valid_at < 3.5 + 2.0 + 1.0 + 0.3
 
 
 def test_one_zero_reading_is_left_out() -> None:
     """A unit that resets itself now and then: each zero is no sample, and the node stays believed."""
-    calm = Bench("faults.lie=[]")
+    calm = Bench("faults.wrong_reading=[]")
     calm.run(400)
     odd = Bench(
-        "faults.lie=["
+        "faults.wrong_reading=["
         + ",".join(
             f'{{node="{NODE}",kind="zero",from_s={2 + k / 10},until_s={2 + k / 10 + 0.004}}}'
             for k in range(9)

@@ -33,7 +33,7 @@ def loops(seen: SoakEvidence) -> list[Verdict]:
     return [
         *verdicts,
         at_most("times the master lost the robot, unexplained", lost, 0.0, why=in_all),
-        at_most("processes that ended unasked", float(len(ends)), 0.0, why=words),
+        at_most("processes that ended by themselves", float(len(ends)), 0.0, why=words),
     ]
 
 

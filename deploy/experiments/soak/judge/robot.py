@@ -1,4 +1,4 @@
-"""The robot holds on a fault, stands, never moves unasked, and follows again after it. Pure."""
+"""The robot holds on a fault, stands, never moves without an engage, and follows again after it. Pure."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def guard(seen: SoakEvidence) -> list[Verdict]:
             1.0 - float(explained_share),
         ),
         _needless_holds(seen),
-        _unasked_moves(seen),
+        _moves_without_engage(seen),
         at_most("moved while it held", farthest, STRAYS_DEG, "°", why=stray_why),
     ]
 
@@ -67,7 +67,7 @@ def _needless_holds(seen: SoakEvidence) -> Verdict:
     return at_most("holds on a fault that requires none", float(len(needless)), 0.0, why=why)
 
 
-def _unasked_moves(seen: SoakEvidence) -> Verdict:
+def _moves_without_engage(seen: SoakEvidence) -> Verdict:
     """Moves without an engagement of their own. An engagement that led to none serves for no later move."""
     engaged_s = [e.at_s for e in of_kind(seen.events, EngageAnswered) if e.what.done]
     moved_s = [
@@ -76,14 +76,14 @@ def _unasked_moves(seen: SoakEvidence) -> Verdict:
         if e.what.to in MOVING and e.what.from_ not in MOVING
     ]
     why = f"engaged {len(engaged_s)} times, began to move {len(moved_s)} times"
-    unasked = 0
+    unengaged = 0
     for at_s in moved_s:
         own = next((t for t in engaged_s if at_s - MOVES_WITHIN_S <= t <= at_s + ANSWERED_WITHIN_S), None)
         if own is None:
-            unasked += 1
+            unengaged += 1
         else:
             engaged_s.remove(own)
-    return at_most("moves without being engaged", float(unasked), 0.0, why=why)
+    return at_most("moves without being engaged", float(unengaged), 0.0, why=why)
 
 
 def recovery(seen: SoakEvidence) -> list[Verdict]:

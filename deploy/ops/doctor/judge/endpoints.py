@@ -17,7 +17,7 @@ def judge_endpoint(facts: EndpointFacts) -> Finding:
             if transport_of(facts.endpoint) == "tls":  # the knock ended before a handshake
                 found += ", and counts this knock as a refused handshake"
             return ok(f"connect {facts.endpoint}", found)
-        case EndpointState.UNASKED:
+        case EndpointState.NOT_ASKED:
             return ok(
                 f"connect {facts.endpoint}", "this transport cannot be tested alone; see the robot's own row"
             )

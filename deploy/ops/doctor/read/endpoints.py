@@ -23,7 +23,7 @@ class EndpointState(StrEnum):
     SILENT = "silent"
     UNKNOWN = "unknown"
     """No such host name, or no way to it."""
-    UNASKED = "unasked"
+    NOT_ASKED = "not asked"
     """A datagram transport: nobody answers a knock."""
     FREE = "free"
     TAKEN = "taken"
@@ -50,7 +50,7 @@ async def knock(endpoint: str, timeout_s: float = TIMEOUT_S) -> EndpointFacts:
     """Open a connection and close it: no more than the endpoint's port is asked."""
     transport = transport_of(endpoint)
     if transport not in _STREAMS:
-        return EndpointFacts(endpoint, EndpointState.UNASKED)
+        return EndpointFacts(endpoint, EndpointState.NOT_ASKED)
     try:
         async with asyncio.timeout(timeout_s):
             _, writer = await asyncio.open_connection(*_host_and_port(endpoint))

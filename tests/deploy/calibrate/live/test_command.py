@@ -28,11 +28,13 @@ def test_every_option_reaches_the_guide(tmp_path: Path, monkeypatch: pytest.Monk
         raise TandemError("enough")
 
     monkeypatch.setattr(live_run, "LiveSession", session)
-    asked = "--what align,mag --still-s 4 --attitudes 30 --coverage 0.7 --tumble-s 50 --limber-s 15"
+    asked = "--what align,mag --still-s 4 --attitudes 30 --coverage 0.7 --tumble-s 50 --move-joints-s 15"
     with pytest.raises(TandemError, match="enough"):
         run(f"{EXAMPLES}/master.toml --out {tmp_path} {asked}")
     assert heard == [
-        GuideOptions(("mag", "align"), 4.0, 30, coverage=0.7, tumble_s=50.0, limber_s=15.0, by_word=False)
+        GuideOptions(
+            ("mag", "align"), 4.0, 30, coverage=0.7, tumble_s=50.0, move_joints_s=15.0, by_word=False
+        )
     ]
 
 

@@ -19,7 +19,7 @@ from master.suit.nodes import NodeConfig
 RATE_HZ = 50.0
 HAND = load_skeleton("hand")
 TRAY = TrayConfig(attitudes=22, still_s=2.0, tumble_s=25.0)
-OPTIONS = GuideOptions(still_s=1.0, attitudes=20, tumble_s=5.0, zero_pose_s=3.0, limber_s=6.0)
+OPTIONS = GuideOptions(still_s=1.0, attitudes=20, tumble_s=5.0, zero_pose_s=3.0, move_joints_s=6.0)
 
 
 def suit(motion: str, **changes: object) -> SuitConfig:
@@ -60,7 +60,7 @@ def led(readings: Array, options: GuideOptions = OPTIONS, guide: Guide | None = 
 
 def test_it_leads_through_all_steps_in_order_to_the_end(readings: Array) -> None:
     run = led(readings)
-    assert list(run.began_s) == ["attitudes", "tumble", "wear", "zero_pose", "limber", "done"]
+    assert list(run.began_s) == ["attitudes", "tumble", "wear", "zero_pose", "move_joints", "done"]
     assert run.guide.view().nodes == []
     begin, end = run.guide.zero_pose_s
     zero_pose = readings[:, :, 3:6][round((run.began_s["zero_pose"] + begin) * RATE_HZ) :][
@@ -144,7 +144,7 @@ def test_the_zero_pose_waits_for_the_word_where_a_person_can_give_it(readings: A
     assert run.guide.step == "zero_pose"
     run.guide.word()
     led(readings[worn_from:], options, run.guide)
-    assert run.guide.step in ("limber", "done")
+    assert run.guide.step in ("move_joints", "done")
 
 
 def test_a_person_may_go_on_with_what_there_is(readings: Array) -> None:

@@ -35,7 +35,7 @@ SLOW = (
     f"capture.rate_hz={RATE_HZ}",
     *(f"estimation.{s}_cutoff_hz=0.0" for s in ("accelerometer", "gyroscope", "magnetometer")),
 )
-OPTIONS = GuideOptions(still_s=1.5, attitudes=20, tumble_s=5.0, zero_pose_s=3.0, limber_s=12.0)
+OPTIONS = GuideOptions(still_s=1.5, attitudes=20, tumble_s=5.0, zero_pose_s=3.0, move_joints_s=12.0)
 
 
 @dataclass

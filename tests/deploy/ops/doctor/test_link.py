@@ -120,7 +120,7 @@ def test_knocking_at_a_door_that_is_open_and_at_one_that_is_not() -> None:
         assert try_to_listen(endpoint).answer is EndpointState.TAKEN
     assert asyncio.run(knock(endpoint)).answer is EndpointState.REFUSED
     assert try_to_listen(endpoint).answer is EndpointState.FREE
-    assert asyncio.run(knock("udp/127.0.0.1:9")).answer is EndpointState.UNASKED
+    assert asyncio.run(knock("udp/127.0.0.1:9")).answer is EndpointState.NOT_ASKED
     assert try_to_listen("udp/127.0.0.1:0".replace(":0", ":47447")).answer in (
         EndpointState.FREE,
         EndpointState.TAKEN,
@@ -132,7 +132,7 @@ def test_knocking_at_a_door_that_is_open_and_at_one_that_is_not() -> None:
 @pytest.mark.parametrize("answer", EndpointState)
 def test_every_answer_is_judged_with_what_to_do(answer: EndpointState) -> None:
     finding = judge_endpoint(EndpointFacts("tcp/h:1", answer))
-    well = answer in (EndpointState.ACCEPTS, EndpointState.UNASKED, EndpointState.FREE)
+    well = answer in (EndpointState.ACCEPTS, EndpointState.NOT_ASKED, EndpointState.FREE)
     assert (finding.health is Health.OK) == well
     assert bool(finding.advice) != well
 

@@ -175,8 +175,9 @@ def test_nothing_passes_while_it_is_cut() -> None:
 @settings(max_examples=20)
 @given(WAYS, WAYS)
 def test_a_profile_set_on_the_way_changes_nothing_that_is_under_way(before: Way, after: Way) -> None:
-    before = before.model_copy(update={"reorder_percent": 0.0, "loss_percent": 0.0, "duplicate_percent": 0.0})
-    after = after.model_copy(update={"reorder_percent": 0.0, "loss_percent": 0.0, "duplicate_percent": 0.0})
+    # a queue that holds both: on a slow line the first still waits when the second comes
+    sure = {"reorder_percent": 0.0, "loss_percent": 0.0, "duplicate_percent": 0.0, "queue_ms": 500.0}
+    before, after = before.model_copy(update=sure), after.model_copy(update=sure)
     scheduler: PacketScheduler[int] = PacketScheduler(before)
     scheduler.push(0, 1, 500)
     due_ns = scheduler.next_ns

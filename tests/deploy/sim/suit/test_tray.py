@@ -7,7 +7,7 @@ import pytest
 
 from common.quaternion import conjugate, from_rotation_vector, multiply, rotate
 from common.skeleton import load_skeleton
-from deploy.sim.suit.limber import Limber
+from deploy.sim.suit.joint_moves import JointMoves
 from deploy.sim.suit.sensors import GRAVITY_M_S2
 from deploy.sim.suit.tray import PITCH_M, Tray, TrayConfig
 
@@ -63,17 +63,17 @@ def test_it_loops_without_a_jump() -> None:
 
 
 @pytest.mark.parametrize("profile", ["nursing", "hand", "lower_limb"])
-def test_limber_moves_every_joint_within_its_limits_and_consistently(profile: str) -> None:
+def test_it_moves_every_joint_within_its_limits_and_consistently(profile: str) -> None:
     skeleton = load_skeleton(profile)
-    limber = Limber(skeleton)
-    t = np.arange(0.0, limber.period_s + 1.0, 1e-3)
-    position, velocity, acceleration = limber.state(t)
+    move_joints = JointMoves(skeleton)
+    t = np.arange(0.0, move_joints.period_s + 1.0, 1e-3)
+    position, velocity, acceleration = move_joints.state(t)
     assert (position >= skeleton.lower_rad - 1e-9).all()
     assert (position <= skeleton.upper_rad + 1e-9).all()
     assert (np.ptp(position, axis=0) > np.radians(15.0)).all()
     assert np.abs(np.gradient(position, 1e-3, axis=0) - velocity)[1:-1].max() < 1e-3
     # the jerk of a quintic is not continuous
     assert np.abs(np.gradient(velocity, 1e-3, axis=0) - acceleration)[1:-1].max() < 0.1
-    zero_pose = (t > limber.zero_pose_from_s) & (t < limber.zero_pose_until_s)
+    zero_pose = (t > move_joints.zero_pose_from_s) & (t < move_joints.zero_pose_until_s)
     assert (velocity[zero_pose] == 0.0).all()
     assert (position[zero_pose] == np.clip(0.0, skeleton.lower_rad, skeleton.upper_rad)).all()

@@ -267,7 +267,7 @@ def test_missed_ticks_are_judged_without_those_of_the_host(make: Make) -> None:
 
 def test_a_process_that_ends_by_itself_fails(make: Make) -> None:
     ended = (*STORY, happened(300.0, "ended", {"process": "suit", "words": "a bug"}))
-    assert failing(make(events=ended)) == {"loops: processes that ended unasked"}
+    assert failing(make(events=ended)) == {"loops: processes that ended by themselves"}
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Nodes that answer but lie: what inertial units give when they, or the bus to them, have failed.
+"""Nodes that answer with wrong readings: what inertial units give when they, or the bus to them, have failed.
 
 | kind | what it plays |
 |---|---|
@@ -31,7 +31,7 @@ from deploy.sim.suit.imperfections import Counts
 from deploy.sim.suit.span import TimeSpan
 from master.suit.protocol import MAG_OVERFLOW, NodeStatus
 
-LieKind = Literal[
+WrongReadingKind = Literal[
     "frozen", "zero", "ones", "stuck", "dead_gyro", "saturated", "flipped_gyro", "swapped_gyro", "rescaled",
     "self_test", "biased_gyro", "magnetised", "frozen_mag", "overflow_mag",
 ]  # fmt: skip
@@ -39,12 +39,12 @@ _ACC, _GYR, _MAG = slice(0, 3), slice(3, 6), slice(6, 9)
 _SELF_TEST_M_S2, _SELF_TEST_RAD_S = 5.0, math.radians(30.0)
 
 
-class Lie(TimeSpan):
-    """`[[faults.lie]]`: a node whose answers are sound frames with wrong content."""
+class WrongReading(TimeSpan):
+    """`[[faults.wrong_reading]]`: a node whose answers are sound frames with wrong content."""
 
     node: str
     """Its segment."""
-    kind: LieKind
+    kind: WrongReadingKind
     axis: int | None = Field(default=None, ge=0, le=8)
     """Accelerometer 0–2, gyro 3–5, magnetometer 6–8, for the kinds that concern one axis."""
     factor: float = Field(default=2.0, gt=0.0, le=16.0)
@@ -53,62 +53,62 @@ class Lie(TimeSpan):
     """For `biased_gyro` °/s, for `magnetised` µT."""
 
 
-class Lies:
+class WrongReadings:
     """Wrong readings: what such nodes last read, and what they send instead of the present readings."""
 
     def __init__(self, names: tuple[str, ...], scale: Array, seed: int) -> None:
         self._row = {name: row for row, name in enumerate(names)}
         self._scale = scale
         self._random = np.random.default_rng([seed, 3])
-        self._began: dict[Lie, Counts] = {}
+        self._began: dict[WrongReading, Counts] = {}
 
     def apply(
-        self, lies: list[Lie], counts: Counts, status: NDArray[np.int64], t_s: float
+        self, wrong: list[WrongReading], counts: Counts, status: NDArray[np.int64], t_s: float
     ) -> tuple[Counts, NDArray[np.int64]]:
         """Counts (N, 9) and status (N,) as they are sent; those given are not changed."""
-        active = [lie for lie in lies if lie.includes(t_s) and lie.node in self._row]
-        self._began = {lie: held for lie, held in self._began.items() if lie in active}
+        active = [each for each in wrong if each.includes(t_s) and each.node in self._row]
+        self._began = {each: held for each, held in self._began.items() if each in active}
         if not active:
             return counts, status
         counts, status = counts.copy(), status.copy()
-        for lie in active:
-            row = self._row[lie.node]
-            held = self._began.setdefault(lie, counts[row].copy())
-            counts[row] = self._reported(lie, counts[row], held)
-            if lie.kind == "saturated":
+        for each in active:
+            row = self._row[each.node]
+            held = self._began.setdefault(each, counts[row].copy())
+            counts[row] = self._reported(each, counts[row], held)
+            if each.kind == "saturated":
                 status[row] |= int(NodeStatus.SATURATED)
         return counts, status
 
-    def _reported(self, lie: Lie, now: Counts, held: Counts) -> Counts:
+    def _reported(self, wrong: WrongReading, now: Counts, held: Counts) -> Counts:
         out = now.copy()
-        if lie.kind == "frozen":
+        if wrong.kind == "frozen":
             out[:] = held
-        elif lie.kind in ("zero", "ones"):
-            out[:] = 0 if lie.kind == "zero" else -1
-        elif lie.kind == "stuck":
-            out[_one(lie, 4)] = held[_one(lie, 4)]
-        elif lie.kind == "dead_gyro":
+        elif wrong.kind in ("zero", "ones"):
+            out[:] = 0 if wrong.kind == "zero" else -1
+        elif wrong.kind == "stuck":
+            out[_one(wrong, 4)] = held[_one(wrong, 4)]
+        elif wrong.kind == "dead_gyro":
             out[_GYR] = np.rint(self._random.normal(0.0, 0.8, 3))
-        elif lie.kind == "saturated":
-            out[slice(0, 6) if lie.axis is None else lie.axis] = 32767
-        elif lie.kind == "flipped_gyro":
-            turned = _GYR if lie.axis is None else slice(lie.axis, lie.axis + 1)
+        elif wrong.kind == "saturated":
+            out[slice(0, 6) if wrong.axis is None else wrong.axis] = 32767
+        elif wrong.kind == "flipped_gyro":
+            turned = _GYR if wrong.axis is None else slice(wrong.axis, wrong.axis + 1)
             out[turned] = np.clip(-out[turned].astype(np.int32), -32767, 32767)
-        elif lie.kind == "swapped_gyro":
+        elif wrong.kind == "swapped_gyro":
             out[_GYR] = now[[4, 3, 5]]
-        elif lie.kind == "rescaled":
-            out[:6] = np.clip(np.rint(now[:6] * lie.factor), -32767, 32767)
-        elif lie.kind == "self_test":
+        elif wrong.kind == "rescaled":
+            out[:6] = np.clip(np.rint(now[:6] * wrong.factor), -32767, 32767)
+        elif wrong.kind == "self_test":
             force = np.repeat([_SELF_TEST_M_S2, _SELF_TEST_RAD_S], 3) / self._scale[:6]
             out[:6] = np.clip(np.rint(now[:6] + force), -32767, 32767)
-        elif lie.kind == "biased_gyro":
-            out[_GYR] = _more(now[_GYR], math.radians(lie.offset) / self._scale[_GYR])
-        elif lie.kind == "magnetised":
-            out[_MAG] = _more(now[_MAG], lie.offset / self._scale[_MAG])
-        elif lie.kind == "frozen_mag":
+        elif wrong.kind == "biased_gyro":
+            out[_GYR] = _more(now[_GYR], math.radians(wrong.offset) / self._scale[_GYR])
+        elif wrong.kind == "magnetised":
+            out[_MAG] = _more(now[_MAG], wrong.offset / self._scale[_MAG])
+        elif wrong.kind == "frozen_mag":
             out[_MAG] = held[_MAG]
         else:
-            out[_one(lie, 6)] = MAG_OVERFLOW
+            out[_one(wrong, 6)] = MAG_OVERFLOW
         return out
 
 
@@ -117,5 +117,5 @@ def _more(counts: Counts, offset: Array) -> Array:
     return np.clip(np.rint(counts + offset), -32767, 32767)
 
 
-def _one(lie: Lie, default: int) -> int:
-    return default if lie.axis is None else lie.axis
+def _one(wrong: WrongReading, default: int) -> int:
+    return default if wrong.axis is None else wrong.axis

@@ -1,4 +1,4 @@
-"""A node that lies: nobody engages on it, the words say which, and who is engaged holds its joints alone."""
+"""A node with wrong readings is named, nobody engages on it, and who is engaged holds its joints alone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ HELD = {"right_elbow_pitch", "right_elbow_roll", "right_wrist_yaw"}
 
 
 def lying(kind: str, from_s: float, more: str = "") -> WorldSettings:
-    lie = f'faults.lie=[{{node="{NODE}",kind="{kind}",from_s={from_s}{more}}}]'
+    lie = f'faults.wrong_reading=[{{node="{NODE}",kind="{kind}",from_s={from_s}{more}}}]'
     return WorldSettings(overrides={"suit": [lie]})
 
 

@@ -23,7 +23,7 @@ _SLOWEST_HZ, _FASTEST_HZ = 0.35, 0.85
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
-class Limber:
+class JointMoves:
     """Some movement as the suit is put on, the zero pose, then all joints swing, each at a rhythm of its own.
 
     Position = rest + e(t) (middle − rest + A sin(ω t + φ)) with an envelope e that rises and falls smoothly
