@@ -275,6 +275,7 @@ class SlavePipeline:
                 base=self.base,
                 lease_id=lease_id(self.guard.lease.token),
                 instance=self.instance,
+                resting=self.guard.resting.names,
             )
         )
 

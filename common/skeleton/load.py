@@ -28,6 +28,7 @@ class _SegmentEntry(TypedDict):
     axes: str
     angles: str
     human: NotRequired[str]
+    group: NotRequired[str]
     origin_m: list[float]
     node_m: list[float]
     shape: NotRequired[_ShapeEntry]
@@ -96,6 +97,7 @@ def _segment(entry: _SegmentEntry) -> Segment:
         node_m=_point(entry["node_m"]),
         human=(flexes, tilts, twists),
         shape=_shape(entry.get("shape", {})),
+        group=entry.get("group"),
     )
 
 

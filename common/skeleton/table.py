@@ -53,6 +53,8 @@ class Segment:
     node_m: tuple[float, float, float]
     human: tuple[bool, bool, bool] = (True, True, True)
     shape: Shape = Shape()
+    group: str | None = None
+    """Name of the joint group that begins here (`groups.py`); None: if one begins, the segment's name."""
 
 
 @dataclass(frozen=True, slots=True)

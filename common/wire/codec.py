@@ -33,7 +33,7 @@ from common.wire.messages import (
     Truth,
 )
 
-VERSION = 3
+VERSION = 4
 CONTROL_BYTES = 1100
 """Of a command, a state, and whatever else the robot is controlled by. With the headers of IPv6, TCP, TLS and
 Zenoh a packet stays below 1280 bytes, which every path carries; many VPNs swallow larger ones silently."""
@@ -124,17 +124,17 @@ def _pack_state(m: RobotState) -> tuple[object, ...]:
     echo = None if e is None else (e.sequence, e.put_ns, e.received_ns, e.accepted_ns, e.written_ns)
     reason = fields.shorten(m.reason, MAX_DOUBT)
     mask, angles = fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad)
-    named = (m.robot, m.guard, reason, m.operator)
+    named = (m.robot, m.guard, reason, m.operator, *m.resting)
     taken = _STATE_NUMBERS_BYTES + len(mask) + len(angles) + sum(len(name.encode("utf-8")) for name in named)
     return (
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
         m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
-        _pack_base(m.base), m.lease_id, m.instance,
+        _pack_base(m.base), m.lease_id, m.instance, m.resting,
     )  # fmt: skip
 
 
 def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
-    fields.array(f, 16)
+    fields.array(f, 17)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -155,6 +155,7 @@ def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
         base=_unpack_base(f[13]),
         lease_id=fields.count(f[14]),
         instance=fields.count(f[15]),
+        resting=fields.names(f[16], MAX_NAME),
     )
 
 
@@ -184,14 +185,16 @@ def _unpack_echo(value: object) -> CommandEcho | None:
 
 
 def _unpack_control_request(f: tuple[object, ...], _: int) -> ControlRequest:
-    fields.array(f, 6)
+    fields.array(f, 7)
     try:
         action = Action(fields.text(f[1], MAX_NAME))
     except ValueError:
         raise CodecError(f"action {fields.short(f[1])}, expected one of {', '.join(Action)}") from None
     operator, key = fields.text(f[2], MAX_NAME), fields.text(f[3], MAX_TEXT)
     robot = fields.text(f[0], MAX_NAME)
-    return ControlRequest(robot, action, operator, key, fields.count(f[4]), fields.count(f[5]))
+    clock, challenge = fields.counts(f[4:6])
+    groups = fields.names(f[6], MAX_NAME)
+    return ControlRequest(robot, action, operator, key, clock, challenge, groups)
 
 
 def _pack_control_reply(m: ControlReply) -> tuple[object, ...]:
@@ -240,6 +243,7 @@ def _packed(m: Message) -> tuple[object, ...]:
         case ControlRequest():
             return (
                 "control", VERSION, m.robot, m.action.value, m.operator, m.key, m.clock, m.challenge,
+                m.groups,
             )  # fmt: skip
         case ControlReply():
             return ("controlled", VERSION, *_pack_control_reply(m))

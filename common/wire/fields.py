@@ -109,6 +109,13 @@ def texts(value: object, most_key: int, most: int) -> dict[str, str]:
     return {text(key, most_key): text(item, most) for key, item in value.items()}
 
 
+def names(value: object, most: int) -> tuple[str, ...]:
+    """A list of texts."""
+    if type(value) is not tuple:
+        raise CodecError(f"{short(value)} is not a list of names")
+    return tuple(text(item, most) for item in value)
+
+
 def shorten(words: str, most_bytes: int) -> str:
     """The text, cut where its UTF-8 would be longer than that."""
     packed = words.encode("utf-8")

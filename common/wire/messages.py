@@ -117,6 +117,8 @@ class RobotState:
     """Which lease it is (`wire.lease.lease_id`): two masters may bear one name. 0 where there is none."""
     instance: int = 0
     """Which process sent it (`common.wire.instance`): two robots may have one name by mistake."""
+    resting: tuple[str, ...] = ()
+    """Joint groups that hold until the operator takes them up again."""
 
 
 class Action(StrEnum):
@@ -133,6 +135,10 @@ class Action(StrEnum):
     """Another robot of this name answers too: its holder of the lease says so, and the robot holds."""
     HOME = "home"
     """Confirm, with the key, that the robot stands as it says, where nothing else can."""
+    REST = "rest"
+    """Joint groups hold where they are; the others follow."""
+    TAKE_UP = "take-up"
+    """Joint groups that rest follow the operator again, slowly at first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +154,9 @@ class ControlRequest:
     clock: int = 0
     """For `claim`: the asker of the clock queries that measure the clock of this master's stamps."""
     challenge: int = 0
-    """For `engage`, `reset` and `home`: the one of the robot's last `status`. Else a late one would count."""
+    """Where motion may follow: the one of the robot's last `status`. Else a late request would count."""
+    groups: tuple[str, ...] = ()
+    """For `rest` and `take-up`: which joint groups (`common.skeleton.groups`)."""
 
 
 @dataclass(frozen=True, slots=True)

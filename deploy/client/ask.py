@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from contextlib import suppress
 
 from common.errors import CodecError, LinkError, LinkTimeoutError
@@ -21,15 +22,19 @@ _OR_NOT_ALLOWED = (
 _LATE = "is connected, but did not answer in {s:g} s: it is not known what it did; ask `tandem status`"
 
 
-async def ask_robots(where: Destination, action: Action, key: str = "") -> list[RobotAnswer]:
+async def ask_robots(
+    where: Destination, action: Action, key: str = "", groups: Sequence[str] = ()
+) -> list[RobotAnswer]:
     """The answers, in the robots' order. Raises LinkError where the link cannot be opened at all."""
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
         links = [session.link(robot) for robot in where.robots]
-        each = await asyncio.gather(*(ask(link, where, action, key) for link in links))
+        each = await asyncio.gather(*(ask(link, where, action, key, groups) for link in links))
     return [answer for answers in each for answer in answers]
 
 
-async def ask(link: Link, where: Destination, action: Action, key: str = "") -> list[RobotAnswer]:
+async def ask(
+    link: Link, where: Destination, action: Action, key: str = "", groups: Sequence[str] = ()
+) -> list[RobotAnswer]:
     """What the robots of one name answer, or that none did: at least one. It never raises for their absence.
 
     Where several bear the name, nothing that could move one is asked of any.
@@ -46,7 +51,7 @@ async def ask(link: Link, where: Destination, action: Action, key: str = "") -> 
         return [answer.payload for answer in await link.ask_all(topic, payload)]
 
     try:
-        request = ControlRequest(link.robot, action, where.operator, key)
+        request = ControlRequest(link.robot, action, where.operator, key, groups=tuple(groups))
         replies = await ask_everybody(ask_all, request)
     except LinkTimeoutError:
         return [RobotAnswer(link.robot, False, _LATE.format(s=topic.timeout_s))]

@@ -178,6 +178,8 @@ class RobotStatus:
     latency_ms: LatencyStatus
     due: DueMetrics | None
     ticks: Ticks | None
+    resting: tuple[str, ...] = ()
+    """Joint groups that hold until the operator takes them up."""
 
 
 def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> RobotStatus:
@@ -210,6 +212,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         else LatencyStatus(),
         due=metrics.due if metrics else None,
         ticks=metrics.ticks if metrics else None,
+        resting=state.resting if state else (),
     )
 
 
@@ -253,6 +256,9 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     if one.namesakes:
         words.append((f"another robot has the same name; this one is at {one.place}", "bold red"))
     words += [(f"{what}: {why}", "red") for what, why in (one.faults or {}).items()]
+    if one.resting:
+        groups = " ".join(one.resting)
+        words.append((f"at rest: {groups}; to follow again: tandem take-up {groups}", "yellow"))
     due, latency = one.due, one.latency_ms
     if due is not None and due.missing:
         missing = f"{due.missing} of {due.expected} commands were not there when they were due"

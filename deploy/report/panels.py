@@ -6,10 +6,12 @@ import typer
 
 PANELS = {
     "Run": ("demo", "master", "slave", "suit", "router", "drives"),
-    "People": ("engage", "disengage", "estop", "reset", "home", "status", "attitude", "video"),
+    "People": (
+        "engage", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude", "video",
+    ),
     "Set up": ("doctor", "servos", "calibrate", "keys", "record", "recording"),
     "Judge": ("trial", "soak", "faults", "bench", "accuracy", "network"),
-}
+}  # fmt: skip
 """In the order of the help."""
 _PANEL = {name: panel for panel, names in PANELS.items() for name in names}
 
@@ -18,7 +20,7 @@ def arrange(app: typer.Typer) -> None:
     """Put every command that the table names under its heading, in the table's order; others stay last."""
     order = list(_PANEL)
     for command in app.registered_commands:
-        command.name = command.name or getattr(command.callback, "__name__", "")
+        command.name = command.name or getattr(command.callback, "__name__", "").replace("_", "-")
         if command.name in _PANEL:
             command.rich_help_panel = _PANEL[command.name]
     for group in app.registered_groups:

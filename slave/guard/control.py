@@ -50,7 +50,14 @@ class Control:
                 done = guard.reason
             case Action.ENGAGE:
                 why = self._late(request, now_ns) or guard.engage(operator, now_ns)
-                done = "moves slowly to the operator's posture"
+                done = "moves slowly to the operator's posture" + guard.resting.words
+            case Action.REST:
+                why = holder_only(operator, guard.operator) or guard.resting.rest(request.groups)
+                done = "holds these joints" + guard.resting.words
+            case Action.TAKE_UP:
+                why = holder_only(operator, guard.operator) or self._late(request, now_ns)
+                why = why or guard.resting.take_up(request.groups)
+                done = "follows the operator again, slowly at first" + guard.resting.words
             case Action.RESET:
                 reason = f"reset by {operator or 'somebody'}; engage to move"
                 why = self._not_at_the_robot(

@@ -22,6 +22,7 @@ from slave.guard.events import Change, Clamp, Doubt, GuardCounters, Journal
 from slave.guard.joints import JointReadings
 from slave.guard.lease import DrawToken, Lease, random_token
 from slave.guard.permission import Permission
+from slave.guard.resting import RestingJoints
 from slave.guard.states import MOVING, GuardEvent, State, next_state
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES, LossWatch, Signs, first_loss
 
@@ -54,6 +55,7 @@ class Guard:
         """Goes up whenever what the operator did before must not move the robot after."""
         self.counters = GuardCounters()
         self.events = Journal(config.events_kept)
+        self.resting = RestingJoints(skeleton)
         self._config = config
         self._commands = CommandGate(robot, len(skeleton.joints), config, self.counters, draw_token, gates)
         self._joints = JointReadings(skeleton, config, last_known_rad)
@@ -287,6 +289,6 @@ class Guard:
             self.reason = unplaced
 
     def _believed(self) -> Mask:
-        """(J,) joints of which both the operator's node and the joint's own encoder are believed."""
-        free: Mask = self._commands.valid & ~self._joints.plausible.doubted
+        """(J,) joints that do not rest; both the operator's node and the joint's encoder are believed."""
+        free: Mask = self._commands.valid & ~self._joints.plausible.doubted & ~self.resting.joints
         return free

@@ -17,7 +17,7 @@ class Permission:
     dt_s: float
     """Time by which the setpoint may move on."""
     free: Mask
-    """(J,) joints that may move: the operator's node and the joint's own encoder are believed."""
+    """(J,) joints that may move: they do not rest, and the operator's node and their encoder are believed."""
     ready: bool
     """False until it is known where every joint stands: then there is no setpoint."""
     seat_rad: Array | None = None

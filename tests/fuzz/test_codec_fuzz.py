@@ -44,7 +44,7 @@ SEEDS: dict[str, Any] = {
         -9,
         5,
     ),
-    "control": ControlRequest("robot-1", Action.RESET, "nurse", "key"),
+    "control": ControlRequest("robot-1", Action.REST, "nurse", "key", groups=("left_arm", "head")),
     "controlled": ControlReply(True, "hold", "claimed", 2**40),
     "clock": ClockQuery(2**50, 2**49, 2**48),
     "clocked": ClockReply(1, 2, 3),

@@ -1,4 +1,4 @@
-"""`tandem engage|disengage|estop|reset|home|status`: a person's commands, and their results."""
+"""`tandem engage|disengage|rest|take-up|estop|reset|home|status`: a person's commands, and their results."""
 
 from __future__ import annotations
 
@@ -60,6 +60,42 @@ def disengage(
     Example: `tandem disengage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
     """
     _act(Action.DISENGAGE, _holder(connect, robot, operator, master, certificate))
+
+
+Groups = Annotated[
+    list[str],
+    typer.Argument(help="Joint groups, such as left_arm, right_hand, head or trunk; each has all beyond it."),
+]
+
+
+def rest(
+    groups: Groups,
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """Let an arm rest: its joints hold on the robot, all others follow. `tandem take-up` ends it.
+
+    Example: `tandem rest left_arm --master /etc/tandem/master.toml`
+    """
+    _act(Action.REST, _holder(connect, robot, operator, master, certificate), groups=groups)
+
+
+def take_up(
+    groups: Groups,
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """End the rest of an arm: its joints move slowly to the operator's posture, then follow.
+
+    Example: `tandem take-up left_arm --master /etc/tandem/master.toml`
+    """
+    _act(Action.TAKE_UP, _holder(connect, robot, operator, master, certificate), groups=groups)
 
 
 def estop(
@@ -179,15 +215,15 @@ def status(
     _run(print_status)
 
 
-COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, estop, reset, home, status)
+COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, rest, take_up, estop, reset, home, status)
 """In the order of the help."""
 
 
-def _act(action: Action, where: Destination, key: str = "") -> None:
+def _act(action: Action, where: Destination, key: str = "", groups: Sequence[str] = ()) -> None:
     from deploy.client.ask import ask_robots
 
     async def ask(print_line: PrintLine) -> None:
-        answers = await ask_robots(where, action, key)
+        answers = await ask_robots(where, action, key, groups)
         for answer in answers:
             if answer.guard:
                 print_line(answer.line)

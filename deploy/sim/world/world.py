@@ -152,10 +152,12 @@ class VirtualWorld:
         self.now_ns += ticks * PERIOD_NS
         self._tick += ticks
 
-    def ask(self, action: Action, key: str = "", operator: str | None = None) -> ControlReply:
+    def ask(
+        self, action: Action, key: str = "", operator: str | None = None, groups: tuple[str, ...] = ()
+    ) -> ControlReply:
         """Ask the robot now; as the master's operator by default."""
         operator = self.master_config.operator.name if operator is None else operator
-        request = ControlRequest(self.robot, action, operator, key)
+        request = ControlRequest(self.robot, action, operator, key, groups=groups)
         if action in CHALLENGED:
             request = replace(request, challenge=self.ask(Action.STATUS, operator=operator).challenge)
         return read_reply(self.slave.on_control(request_bytes(request), self.slave_ns), action)

@@ -113,9 +113,10 @@ class Rig:
         key: str = "",
         robot: str = ROBOT,
         challenge: int | None = None,
+        groups: tuple[str, ...] = (),
     ) -> ControlReply:
         """Ask in the way of `common.wire.control`, or with a challenge of one's own."""
-        request = ControlRequest(robot, action, operator, key, challenge=challenge or 0)
+        request = ControlRequest(robot, action, operator, key, challenge=challenge or 0, groups=groups)
         if challenge is None and action in CHALLENGED:
             given = self.pipeline.control.answer(
                 self.guard, replace(request, action=Action.STATUS), self.now_ns

@@ -330,6 +330,16 @@ def lost_joint(make_rig: MakeRig) -> None:
     assert rig.setpoints[-1].position_rad[ELBOW] == held
 
 
+@about("RestingJoints.rest")
+def a_rested_arm_holds(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    held = rig.setpoints[-1].position_rad[ELBOW]
+    rig.ask(Action.REST, groups=("left_arm",))
+    rig.target = rig.target + 0.3
+    rig.run(0.4)
+    assert rig.setpoints[-1].position_rad[ELBOW] == held
+
+
 # encoders that lie
 
 
