@@ -25,7 +25,7 @@ def test_the_nursing_robot_has_36_nodes_and_25_joints() -> None:
 
 
 def test_it_is_read_once_and_can_be_a_key() -> None:
-    assert load_skeleton("nursing") is SKELETON
+    assert load_skeleton("nursing") is load_skeleton("nursing")
     assert {SKELETON: 1}[SKELETON] == 1
 
 
