@@ -12,6 +12,7 @@ from common.latency.budget import StageTimes
 from common.latency.durations import Durations
 from common.link import LinkSession, open_session
 from common.link.audit import Audit
+from common.link.certificates import check_keys, check_operator
 from common.link.place import own_endpoints
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Ticks
@@ -174,6 +175,8 @@ async def run(config: MasterConfig, stop: asyncio.Event, write_metrics: WriteMet
 async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
     notifier = open_notifier()
     enter_real_time(config.process.realtime_priority)  # first, so that every thread has it
+    check_keys(config.link)
+    check_operator(config.link, config.operator.name)
     audit = Audit(config.link)
     async with open_session(config.link, waits=notifier.waits) as session:
         audit.attach(session)

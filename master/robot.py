@@ -45,6 +45,7 @@ class CommandedRobot:
         self._link = link
         asker = 1 + secrets.randbelow((1 << 63) - 1)
         self._writer = CommandWriter(name)
+        self._control = CONTROL.of(operator)
         self._clock = MasterExchange(asker)
         self._lease = LeaseKeeper(name, operator, asker)
         self._watch = RobotWatch()
@@ -52,7 +53,7 @@ class CommandedRobot:
         self._undecodable = 0
         self._unread, self._unread_ns = "", 0
         self._throttle = LogThrottle()
-        self._put_command: Callable[[bytes], None] = link.publish(COMMAND)
+        self._put_command: Callable[[bytes], None] = link.publish(COMMAND.of(operator))
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
         self.video = VideoWatch()
         link.subscribe(STATE, self._on_state)
@@ -104,7 +105,7 @@ class CommandedRobot:
             if request is None or self._watch.silent(monotonic_ns()):
                 continue
             try:
-                reply = decode(await self._link.ask(CONTROL, encode(request)), ControlReply)
+                reply = decode(await self._link.ask(self._control, encode(request)), ControlReply)
             except (LinkError, CodecError) as error:
                 log.info("%s: claim: %s", self.name, error)
                 continue
@@ -119,7 +120,7 @@ class CommandedRobot:
         notice = self._homonyms.notice(now_ns)
         if notice is not None:
             with suppress(LinkError):
-                await self._link.ask_all(CONTROL, encode(notice))
+                await self._link.ask_all(self._control, encode(notice))
         return self._homonyms.words(now_ns) is not None
 
     def _on_presence(self, presence: ProcessPresence, here: bool) -> None:

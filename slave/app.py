@@ -26,6 +26,7 @@ from common.wire.codec import encode
 from common.wire.messages import Statistics
 from common.wire.path_probe import answer_probe
 from common.wire.presence import ProcessPresence, place
+from common.wire.sender import operator_of
 from common.wire.topics import CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, video
 from common.wire.version import software
 from slave.attitude.open import open_base
@@ -76,8 +77,8 @@ class Slave:
         if config.camera.source != "off":
             self._camera = open_feed(config.camera, config.profile, link.publish(video(config.camera.name)))
             self._pipeline.on_accepted = self._camera.on_command
-        link.subscribe(COMMAND, self._on_command)
-        link.answer(CONTROL, self._on_control)
+        link.subscribe_keys(COMMAND, self._on_command)
+        link.answer_keys(CONTROL, self._on_control)
         link.answer(STOP, self._on_stop)
         link.answer(CLOCK, self._on_clock)
         link.answer(PATH, lambda question, _: answer_probe(question))
@@ -156,11 +157,11 @@ class Slave:
         if here and presence.other_version and presence.role == "master":
             log.warning("%s: %s", self._config.robot, presence.other_version)
 
-    def _on_command(self, payload: bytes, received_ns: int) -> None:
-        self._pipeline.on_command(payload, received_ns, monotonic_ns())
+    def _on_command(self, key: str, payload: bytes, received_ns: int) -> None:
+        self._pipeline.on_command(payload, received_ns, monotonic_ns(), sender=operator_of(key))
 
-    def _on_control(self, payload: bytes, _: int) -> bytes:
-        return self._pipeline.on_control(payload, monotonic_ns())
+    def _on_control(self, key: str, payload: bytes, _: int) -> bytes:
+        return self._pipeline.on_control(payload, monotonic_ns(), sender=operator_of(key))
 
     def _on_stop(self, payload: bytes, _: int) -> bytes:
         return self._pipeline.on_stop(payload, monotonic_ns())

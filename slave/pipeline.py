@@ -35,7 +35,7 @@ from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
 from slave.guard import Admission, Guard, Permission
 from slave.guard.body import WELL, Body
-from slave.guard.control import Control
+from slave.guard.control import Control, not_on_own_key
 from slave.guard.lease import DrawToken, random_token
 from slave.guard.states import MOVING, State
 from slave.limit.limit import Setpoint, SetpointLimiter
@@ -104,16 +104,20 @@ class SlavePipeline:
         self._position_rad = np.zeros(len(self.skeleton.joints))
         self._setpoint = Setpoint(self._position_rad, np.zeros_like(self._position_rad), ready=False)
 
-    def on_command(self, payload: bytes, received_ns: int, now_ns: int) -> None:
-        """Take a command from the link; whatever is wrong with it is counted and changes nothing."""
+    def on_command(self, payload: bytes, received_ns: int, now_ns: int, *, sender: str | None) -> None:
+        """Take a command from the link; whatever is wrong with it is counted and changes nothing.
+
+        `sender`: the operator on whose key it arrived; None: a key of no operator.
+        """
         try:
             command = decode(payload, Command, len(self.skeleton.joints))
+            command = replace(command, operator=sender or "")
         except CodecError as error:
             self._count("command", error, now_ns)
             return
         offset = self.clock.estimator.estimate(now_ns)
         # another operator's stamps are of another clock
-        if command.lease and command.lease == self.guard.lease.token:
+        if command.lease and command.lease == self.guard.lease.token and sender == self.guard.operator:
             self.traffic.received(command, received_ns, offset)
         if self.take(command, received_ns, now_ns, offset).accepted:
             self.traffic.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
@@ -137,19 +141,30 @@ class SlavePipeline:
 
     def on_stop(self, payload: bytes, now_ns: int) -> bytes:
         """Answer a client that may only stop the robot or ask for its status; every request is answered."""
-        return self.on_control(payload, now_ns, OPEN)
+        return self._answer(payload, now_ns, OPEN)
 
     def _stopped(self, by: str, now_ns: int) -> bytes:
         """Stop, and answer in the form that every version reads."""
         reply = self.control.answer(self.guard, ControlRequest(self.robot, Action.ESTOP, by), now_ns)
         return pack_stop_answer(StopAnswer(reply.done, reply.guard, reply.text, self.instance))
 
-    def on_control(
-        self, payload: bytes, now_ns: int, allowed: frozenset[Action] = frozenset(Action)
-    ) -> bytes:
+    def on_control(self, payload: bytes, now_ns: int, *, sender: str | None) -> bytes:
         """Answer a request of a person or a master. Every request is answered.
 
-        A stop comes before all else: whatever its version, and whatever else is wrong with it.
+        `sender`: the operator on whose key it arrived; None: a key of no operator.
+        """
+        return self._answer(payload, now_ns, frozenset(Action), lambda named: not_on_own_key(named, sender))
+
+    def _answer(
+        self,
+        payload: bytes,
+        now_ns: int,
+        allowed: frozenset[Action],
+        foreign: Callable[[str], str | None] = lambda _: None,
+    ) -> bytes:
+        """A stop comes before all else: whatever its version, and whatever else is wrong with it.
+
+        `foreign`: why the operator that a request names is not the one that sent it.
         """
         by = read_stop(payload)
         if by is not None:
@@ -162,6 +177,10 @@ class SlavePipeline:
         if request.action not in allowed:
             text = f"{request.action} is for operators only: send it on the control topic"
             return self._reply(ControlReply(False, self.guard.state, text))
+        why = foreign(request.operator)
+        if why is not None:
+            self.guard.counters.foreign_requests += 1
+            return self._reply(ControlReply(False, self.guard.state, why))
         reply = self.control.answer(self.guard, request, now_ns)
         if request.action is Action.NAMESAKE and reply.done:
             self.namesakes.on_notice(request.key, now_ns)

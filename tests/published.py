@@ -62,6 +62,7 @@ def guard_metrics(**changes: Any) -> GuardMetrics:
         "losses": {},
         "clamps": {},
         "doubts": {},
+        "foreign_requests": 0,
         "late_steps": 0,
     }
     return GuardMetrics(**{**given, **changes})

@@ -2,7 +2,8 @@
 
 Flows are named from this host's side: `ingress` comes from the subject, `egress` goes to it. A publisher of a
 key must also receive its subscribers' declarations, or it would send nothing. Subjects are common names of
-certificates.
+certificates. A robot hears every operator's key by one declaration with a wildcard, which each operator
+receives; what an operator sends is allowed on the operator's own keys alone.
 """
 
 from __future__ import annotations
@@ -29,9 +30,11 @@ from common.wire.topics import (
 HEARD = (COMMAND, STATE, STATISTICS, TRUTH)
 """Topics that an observer of a robot receives; viewers and operators receive the video too."""
 _WAYS = {
-    "publish": ((("put", "delete"), "ingress"), (("declare_subscriber",), "egress")),
+    "put": ((("put", "delete"), "ingress"),),
+    "hears": ((("declare_subscriber",), "egress"),),
     "hear": ((("declare_subscriber",), "ingress"), (("put", "delete"), "egress")),
-    "ask": ((("query",), "ingress"), (("declare_queryable", "reply"), "egress")),
+    "query": ((("query",), "ingress"), (("reply",), "egress")),
+    "answers": ((("declare_queryable",), "egress"),),
     "answer": ((("declare_queryable", "reply"), "ingress"), (("query",), "egress")),
     "live": ((("liveliness_token",), "ingress"),),
     "watch": (
@@ -41,7 +44,9 @@ _WAYS = {
     "watched": ((("declare_liveliness_subscriber", "liveliness_query"), "egress"),),
 }
 """Each permission for a key, as Zenoh's messages and their direction."""
-_ALL = ("publish", "hear", "ask", "answer", "live", "watch", "watched")
+_PUBLISH = ("put", "hears")
+_ASK = ("query", "answers")
+_ALL = (*_PUBLISH, "hear", *_ASK, "answer", "live", "watch", "watched")
 
 
 class AccessRule(TypedDict):
@@ -88,7 +93,7 @@ def access_control(access: AccessConfig) -> AccessControl:
     everyone = sorted(named(access))
     # every named host may see who is present, and may stop a robot
     table.allow(everyone, ("watch", "watched"), [_alive("*", "**")])
-    table.allow(everyone, ("ask",), [STOP.key_for("*")])
+    table.allow(everyone, _ASK, [STOP.key_for("*")])
     return table.zenoh()
 
 
@@ -106,22 +111,32 @@ def _robot(table: _AccessRules, access: AccessConfig, robot: str) -> None:
     viewers = _named(Role.OBSERVER, access.viewers, robot)
     observers = _named(Role.OBSERVER, access.observers, robot)
     video = _key(VIDEO, robot).rpartition("/")[0] + "/*"
-    table.allow(me, ("publish",), [_key(STATE, robot), _key(STATISTICS, robot), video])
+    table.allow(me, _PUBLISH, [_key(STATE, robot), _key(STATISTICS, robot), video])
     table.allow(me, ("hear",), [_key(COMMAND, robot)])
     table.allow(
         me, ("answer",), [_key(CONTROL, robot), _key(STOP, robot), _key(CLOCK, robot), _key(PATH, robot)]
     )
     table.allow(me, ("live",), [_alive(robot, "slave/**")])
-    table.allow(operators, ("publish",), [_key(COMMAND, robot), _key(STATISTICS, robot), _key(TRUTH, robot)])
+    table.allow(operators, _PUBLISH, [_key(STATISTICS, robot), _key(TRUTH, robot)])
+    table.allow(operators, ("hears",), [_key(COMMAND, robot)])
+    table.allow(operators, ("answers",), [_key(CONTROL, robot)])
+    for name in _names(access.operators, robot):
+        operator = [common_name(Role.OPERATOR, name)]
+        table.allow(operator, ("put",), [_key(COMMAND.of(name), robot)])
+        table.allow(operator, ("query",), [_key(CONTROL.of(name), robot)])
     table.allow(operators, ("hear",), [*(_key(topic, robot) for topic in HEARD), video])
-    table.allow(operators, ("ask",), [_key(CONTROL, robot), _key(CLOCK, robot), _key(PATH, robot)])
+    table.allow(operators, _ASK, [_key(CLOCK, robot), _key(PATH, robot)])
     table.allow(operators, ("live",), [_alive(robot, "master/**")])
     table.allow([*observers, *viewers], ("hear",), [_key(topic, robot) for topic in HEARD])
     table.allow(viewers, ("hear",), [video])
 
 
 def _named(role: Role, table: dict[str, list[str]], robot: str) -> list[str]:
-    return [common_name(role, name) for name, robots in table.items() if robot in robots]
+    return [common_name(role, name) for name in _names(table, robot)]
+
+
+def _names(table: dict[str, list[str]], robot: str) -> list[str]:
+    return [name for name, robots in table.items() if robot in robots]
 
 
 def _key(topic: Topic, robot: str) -> str:

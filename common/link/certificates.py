@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from common.errors import LinkError
 from common.link.config import LinkConfig, TlsConfig
+from common.link.roles import Role, common_name
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -45,6 +46,26 @@ def check_tls(tls: TlsConfig, now: datetime) -> None:
         if now < certificate.not_valid_before_utc:
             begins = f"{certificate.not_valid_before_utc:%Y-%m-%d %H:%M} UTC"
             raise LinkError(f"{path} is not valid before {begins}: is this host's clock right?")
+
+
+def check_operator(config: LinkConfig, operator: str) -> None:
+    """Raises LinkError where [link.access] would refuse what this operator sends: another's certificate."""
+    if config.access is None or config.tls is None:
+        return
+    own, holder = common_name(Role.OPERATOR, operator), common_name_in(config.tls.certificate)
+    if holder != own:
+        raise LinkError(
+            f"{config.tls.certificate} is the certificate of {holder or 'nobody'}, expected {own}: an "
+            "operator commands under the name in the certificate. Correct [operator] name or [link.tls]"
+        )
+
+
+def common_name_in(path: Path) -> str:
+    """The common name in a certificate's file; empty where it has none. Raises LinkError."""
+    from cryptography.x509.oid import NameOID
+
+    names = read_certificate(path).subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return str(names[0].value) if names else ""
 
 
 def read_certificate(path: Path) -> x509.Certificate:

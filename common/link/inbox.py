@@ -18,12 +18,12 @@ log = logging.getLogger(__name__)
 
 
 class Inbox:
-    """Hands a topic's payloads to `on_payload(payload, arrived_ns)` on the loop, newest only."""
+    """Hands a topic's payloads to `on_payload(key, payload, arrived_ns)` on the loop, each key's newest."""
 
     def __init__(
         self,
         key: str,
-        on_payload: Callable[[bytes, int], None],
+        on_payload: Callable[[str, bytes, int], None],
         loop: asyncio.AbstractEventLoop,
         counters: TopicCounters,
     ) -> None:
@@ -40,7 +40,7 @@ class Inbox:
         arrived_ns = monotonic_ns()
         if self._closed:
             return
-        if self._mailbox.put((sample.payload.to_bytes(), arrived_ns)):
+        if self._mailbox.put(str(sample.key_expr), (sample.payload.to_bytes(), arrived_ns)):
             wake(self._loop, self._deliver)
         self._counters.received += 1
 
@@ -49,12 +49,15 @@ class Inbox:
         self._closed = True
 
     def _deliver(self) -> None:
-        item = self._mailbox.take()
+        items = self._mailbox.take()
         self._counters.overwritten = self._mailbox.overwritten
-        if item is None or self._closed:
-            return
+        for key, (payload, arrived_ns) in items.items():
+            if not self._closed:
+                self._hand_over(key, payload, arrived_ns)
+
+    def _hand_over(self, key: str, payload: bytes, arrived_ns: int) -> None:
         try:
-            self._on_payload(*item)
+            self._on_payload(key, payload, arrived_ns)
         except CodecError as error:
             self._counters.handler_errors += 1
             if self._throttle.passes(monotonic_ns()):

@@ -58,7 +58,7 @@ class Link:
         counters = self._count(topic)
         throttle = LogThrottle()
         publisher = self._session.declare_publisher(
-            topic.key_for(self.robot),
+            self._own_key(topic),
             congestion_control=zenoh.CongestionControl.DROP,
             priority=getattr(zenoh.Priority, topic.priority.name),
             express=topic.express,
@@ -84,6 +84,10 @@ class Link:
 
         `arrived_ns` is stamped in Zenoh's thread, before the loop is woken.
         """
+        self.subscribe_keys(topic, lambda _, payload, arrived_ns: on_payload(payload, arrived_ns))
+
+    def subscribe_keys(self, topic: Topic, on_payload: Callable[[str, bytes, int], None]) -> None:
+        """As `subscribe`, with the key on which each payload came: the newest of each key is handed over."""
         key = topic.key_for(self.robot)
         inbox = Inbox(key, on_payload, self._loop, self._count(topic))
         self._receivers.append(inbox)
@@ -94,6 +98,10 @@ class Link:
 
         An exception in the handler is counted, logged, and sent to the asker as an error's text.
         """
+        self.answer_keys(topic, lambda _, payload, arrived_ns: handler(payload, arrived_ns))
+
+    def answer_keys(self, topic: Topic, handler: Callable[[str, bytes, int], bytes]) -> None:
+        """As `answer`, with the key on which each question came."""
         key = topic.key_for(self.robot)
         answerer = Answerer(key, handler, self._loop, self._count(topic), self._quality(topic).express)
         self._receivers.append(answerer)
@@ -106,7 +114,7 @@ class Link:
 
         Raises LinkTimeoutError when none comes.
         """
-        key = None if topic is None else topic.key_for(self.robot)
+        key = None if topic is None else self._own_key(topic)
         await wait_for_peer(self._session, key, timeout_s)
 
     async def ask(self, topic: Topic, payload: bytes) -> bytes:
@@ -116,7 +124,7 @@ class Link:
     async def ask_stamped(self, topic: Topic, payload: bytes) -> tuple[bytes, int]:
         """As `ask`, with the answer's arrival in ns, stamped in Zenoh's thread."""
         topic = self._quality(topic)
-        asking = Asking(self._session, topic, topic.key_for(self.robot), self._count(topic))
+        asking = Asking(self._session, topic, self._own_key(topic), self._count(topic))
         return await asking.first(payload)
 
     async def ask_all(
@@ -127,7 +135,7 @@ class Link:
         It lasts until each has answered, or for the topic's time-out. Raises as `ask` if none answered.
         """
         topic = self._quality(topic)
-        asking = Asking(self._session, topic, topic.key_for(self.robot), self._count(topic))
+        asking = Asking(self._session, topic, self._own_key(topic), self._count(topic))
         return await asking.all(payload, on_answer)
 
     def declare_alive(self, role: str, instance: int = 0, endpoints: Sequence[str] = ()) -> None:
@@ -162,6 +170,13 @@ class Link:
         self._closed = True
         for receiver in self._receivers:
             receiver.close()
+
+    def _own_key(self, topic: Topic) -> str:
+        """The key on which this session sends. Raises ValueError for a topic that lacks the operator."""
+        key = topic.key_for(self.robot)
+        if "*" in key:
+            raise ValueError(f"{topic.name}: whose key? Send on {topic.name.upper()}.of(operator)")
+        return key
 
     def _alive_key(self, role: str) -> str:
         return f"{ALIVE.key_for(self.robot)}/{role}"

@@ -1,4 +1,4 @@
-"""A place for the newest value of a live stream: a late reader finds the latest, and how many it missed."""
+"""A place for the newest value of each sender: a late reader finds the latest, and how many it missed."""
 
 from __future__ import annotations
 
@@ -6,28 +6,37 @@ import threading
 from typing import Generic, TypeVar
 
 Value = TypeVar("Value")
+MOST_KEYS = 64
+"""Senders that are kept apart between two looks; what more of them send is counted and lost."""
 
 
 class Mailbox(Generic[Value]):
-    """Holds one value; a newer one overwrites it and is counted. Safe between threads, never waits long."""
+    """Holds one value a key; a newer one overwrites it and is counted. Safe between threads, waits little.
+
+    One sender's values never overwrite another's, so that a flood on one key does not silence the others.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._slot: tuple[Value] | None = None
+        self._slots: dict[str, Value] = {}
         self.overwritten = 0
-        """Values that were replaced before they were taken."""
+        """Values that were replaced before they were taken, or that came on one key too many."""
 
-    def put(self, value: Value) -> bool:
+    def put(self, key: str, value: Value) -> bool:
         """Leave a value. True if the box was empty, so that its reader must be woken."""
         with self._lock:
-            was_empty = self._slot is None
-            self._slot = (value,)
-            if not was_empty:
+            was_empty = not self._slots
+            if key in self._slots:
                 self.overwritten += 1
+                del self._slots[key]  # the newest comes last
+            elif len(self._slots) >= MOST_KEYS:
+                self.overwritten += 1
+                return False
+            self._slots[key] = value
         return was_empty
 
-    def take(self) -> Value | None:
-        """The newest value, once; None where there is none."""
+    def take(self) -> dict[str, Value]:
+        """The newest value of each key, once, in the order of their arrival."""
         with self._lock:
-            slot, self._slot = self._slot, None
-        return None if slot is None else slot[0]
+            slots, self._slots = self._slots, {}
+        return slots

@@ -29,12 +29,12 @@ log = logging.getLogger(__name__)
 
 
 class Answerer:
-    """Answers a key's questions with `handler(payload, arrived_ns) -> reply`, run on the loop in order."""
+    """Answers a key's questions with `handler(key, payload, arrived_ns) -> reply`, on the loop, in order."""
 
     def __init__(
         self,
         key: str,
-        handler: Callable[[bytes, int], bytes],
+        handler: Callable[[str, bytes, int], bytes],
         loop: asyncio.AbstractEventLoop,
         counters: TopicCounters,
         express: bool = True,
@@ -81,8 +81,9 @@ class Answerer:
             log.debug("no answer on %s: %s", self._key, error)
 
     def _reply(self, query: zenoh.Query, payload: bytes, arrived_ns: int) -> None:
+        key = str(query.key_expr)
         try:
-            reply = self._handler(payload, arrived_ns)
+            reply = self._handler(key, payload, arrived_ns)
         except CodecError as error:
             self._counters.handler_errors += 1
             if self._throttle.passes(monotonic_ns()):
@@ -95,7 +96,7 @@ class Answerer:
                 log.exception("%s: the handler failed", self._key)
             query.reply_err(f"{type(error).__name__}: {error}")
             return
-        query.reply(self._key, reply, express=self._express)
+        query.reply(key, reply, express=self._express)
         self._counters.answered += 1
 
 

@@ -26,6 +26,8 @@ class GuardMetrics(Metrics):
     """Clamps begun, by rule."""
     doubts: dict[str, int]
     """Times that a joint was held because its encoder was not believed, by joint."""
+    foreign_requests: int
+    """Requests in another operator's name than that of the key on which they came: refused."""
     late_steps: int
 
 

@@ -18,9 +18,12 @@ OPEN = frozenset({Action.ESTOP, Action.STATUS})
 """Requests allowed to every host with a certificate; all others are for the robot's operators."""
 
 
-def topic_for(action: Action) -> Topic:
-    """The topic of a request: access control goes by keys, so requests open to all have their own key."""
-    return STOP if action in OPEN else CONTROL
+def topic_for(action: Action, operator: str) -> Topic:
+    """The topic of a request: requests open to all have a key of their own, others go on the operator's.
+
+    Access control goes by keys alone.
+    """
+    return STOP if action in OPEN else CONTROL.of(operator)
 
 
 def request_bytes(request: ControlRequest) -> bytes:

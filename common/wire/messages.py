@@ -53,6 +53,8 @@ class Command:
     doubt: str = ""
     """Why nobody should engage on this posture, in words (a zero pose that was not taken, a node that lies);
     empty where the operator's side has nothing against it."""
+    operator: str = ""
+    """On whose key it arrived (`common.wire.sender`). Not on the wire: the receiver fills it in."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from common.wire.sender import operator_chunk
+
 
 class Priority(StrEnum):
     """Names as Zenoh has them."""
@@ -20,7 +22,7 @@ class Priority(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A key expression with `{robot}` to fill in, and how it travels."""
+    """A key expression with `{robot}`, and `{operator}` for an operator's own keys; how it travels."""
 
     name: str
     key: str
@@ -36,8 +38,12 @@ class Topic:
     """Never batched."""
 
     def key_for(self, robot: str) -> str:
-        """The key of one robot."""
-        return self.key.format(robot=robot)
+        """The key of one robot; of an operator's topic that of every operator, as who hears them needs it."""
+        return self.key.format(robot=robot, operator="*")
+
+    def of(self, operator: str) -> Topic:
+        """The topic on the keys of one operator, as who sends on it needs it."""
+        return replace(self, key=self.key.replace("{operator}", operator_chunk(operator)))
 
     def with_quality(self, reliable: bool | None, priority: Priority | None, express: bool | None) -> Topic:
         """The same topic, travelling otherwise where a value is given."""
@@ -49,9 +55,15 @@ class Topic:
         )
 
 
-COMMAND = Topic("command", "tandem/{robot}/command", 12.5, 0.2, Priority.REAL_TIME, False, True, True)
+COMMAND = Topic(
+    "command", "tandem/{robot}/operator/{operator}/command", 12.5, 0.2, Priority.REAL_TIME, False, True, True
+)  # fmt: skip
+"""On the operator's own key: access control binds it to the name in the operator's certificate."""
 STATE = Topic("state", "tandem/{robot}/state", 50.0, 0.2, Priority.INTERACTIVE_HIGH, False, True, True)
-CONTROL = Topic("control", "tandem/{robot}/control", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
+CONTROL = Topic(
+    "control", "tandem/{robot}/operator/{operator}/control", 0.0, 1.0, Priority.REAL_TIME, True, True, True
+)
+"""As COMMAND: the robot takes who asks from the key on which the question arrived."""
 STOP = Topic("stop", "tandem/{robot}/stop", 0.0, 1.0, Priority.REAL_TIME, True, True, True)
 """As CONTROL, for stops and status requests alone: access control does not look into messages, so a key of
 their own is needed to allow them to every named host."""

@@ -39,7 +39,7 @@ async def ask(
 
     Where several bear the name, nothing that could move one is asked of any.
     """
-    topic = topic_for(action)
+    topic = topic_for(action, where.operator)
     try:
         await link.connected(topic)
     except LinkTimeoutError:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.config.load import check_config, load_config
-from common.errors import TandemError
+from common.errors import LinkError, TandemError
+from common.link.certificates import common_name_in
 from common.link.config import LinkConfig
 from common.link.endpoint import SECURE, transport_of
+from common.link.roles import Role, role_of
 from deploy.certificates import AUTHORITY
 from deploy.client.certificate import tls_beside
 from master.config import MasterConfig
@@ -26,6 +28,8 @@ class Destination:
     robots: tuple[str, ...]
     """Empty where nobody named any."""
     operator: str = ""
+    claimed: str = ""
+    """The operator's name as it was given; a certificate may prove another."""
 
 
 def destination(
@@ -53,7 +57,19 @@ def destination(
         )
     link = _link_of(file, endpoints, certificate)
     named = dict.fromkeys(robots or (file.commanded if file else ()))
-    return Destination(link, tuple(named), operator or (file.operator.name if file else ""))
+    operator = operator or (file.operator.name if file else "")
+    return Destination(link, tuple(named), _proved(link, operator), operator)
+
+
+def _proved(link: LinkConfig, operator: str) -> str:
+    """The operator's name as the certificate proves it; without one of an operator, as it was given."""
+    if link.tls is None:
+        return operator
+    try:
+        role, name = role_of(common_name_in(link.tls.certificate))
+    except (ValueError, LinkError):
+        return operator  # what is wrong with the certificate is said when the link opens
+    return name if role is Role.OPERATOR else operator
 
 
 def _link_of(file: MasterConfig | None, endpoints: list[str], certificate: Path | None) -> LinkConfig:

@@ -128,7 +128,7 @@ class Rig:
         """Ask a robot."""
         link = self.link(robot)
         request = ControlRequest(robot, action, operator, key)
-        return await ask_control(lambda payload: link.ask(topic_for(action), payload), request)
+        return await ask_control(lambda payload: link.ask(topic_for(action, operator), payload), request)
 
     async def until(
         self,

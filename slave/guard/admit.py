@@ -26,6 +26,8 @@ class Situation:
     joints: int
     live_token: int
     """Token of the current lease, 0 where there is none."""
+    holder: str
+    """The operator to whom that lease was granted."""
     newest_sequence: int
     """The number of the last command accepted within this lease, -1 before the first."""
     now_ns: int
@@ -70,6 +72,12 @@ def _lease(command: Command, at: Situation) -> str | None:
     if at.live_token == 0:
         return "nobody holds the lease"
     return None if command.lease == at.live_token else "not from the holder of the lease"
+
+
+def _operator(command: Command, at: Situation) -> str | None:
+    if command.operator == at.holder:
+        return None
+    return f"bears the lease of {at.holder}, but came from {command.operator or 'nobody'}"
 
 
 def _valid(command: Command, at: Situation) -> str | None:
@@ -117,6 +125,7 @@ DEADMAN = "deadman"
 GATES: tuple[Gate, ...] = (
     Gate("robot", "it is for this robot", _robot),
     Gate("lease", "it carries the token of the current lease", _lease),
+    Gate("operator", "it came on the key of the operator that holds the lease", _operator),
     Gate("valid", "one finite position and velocity a joint", _valid),
     Gate("sequence", "its number is above that of the last accepted one", _sequence),
     Gate("clock", "the offset between the two clocks is trusted", _clock),
@@ -172,8 +181,8 @@ class CommandGate:
         """
         self.lease.lapse(now_ns)
         situation = Situation(
-            self._robot, len(self.valid), self.lease.token, self._newest_sequence, now_ns, offset,
-            self._max_age_ns, self._future_tolerance_ns,
+            self._robot, len(self.valid), self.lease.token, self.lease.operator, self._newest_sequence,
+            now_ns, offset, self._max_age_ns, self._future_tolerance_ns,
         )  # fmt: skip
         admission = admit(command, situation, self._gates)
         if not admission.accepted:

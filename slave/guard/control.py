@@ -85,6 +85,18 @@ class Control:
         return self._late(request, now_ns)
 
 
+def not_on_own_key(named: str, sender: str | None) -> str | None:
+    """Why a request that names an operator is not one of that operator's, or None. Pure.
+
+    The key on which it came tells who sent it: only that is bound to a certificate.
+    """
+    if sender is None:
+        return "the request did not come on the key of an operator"
+    if named == sender:
+        return None
+    return f"the request is in the name of {named or 'nobody'}, but came from {sender or 'nobody'}"
+
+
 def _claim(guard: Guard, operator: str, now_ns: int) -> ControlReply:
     if not operator:
         return ControlReply(False, guard.state, "an operator needs a name")

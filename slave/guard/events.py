@@ -83,6 +83,8 @@ class GuardCounters:
     """Clamps begun, by rule."""
     doubts: Counter[str] = field(default_factory=Counter)
     """Times that a joint was held because its encoder was not believed, by joint."""
+    foreign_requests: int = 0
+    """Requests in another operator's name than that of the key on which they came: refused."""
     late_steps: int = 0
     """Steps so late that the setpoint was moved by less than the time that had passed."""
 
@@ -97,5 +99,6 @@ class GuardCounters:
             losses=dict(self.losses),
             clamps={str(rule): count for rule, count in self.clamps.items()},
             doubts=dict(self.doubts),
+            foreign_requests=self.foreign_requests,
             late_steps=self.late_steps,
         )

@@ -28,7 +28,7 @@ DAY = timedelta(days=1)
 HERE = ["127.0.0.1"]
 ACCESS = """
 [link.access]
-operators = { anna = ["robot-1"], ben = ["robot-2"] }
+operators = { anna = ["robot-1"], ben = ["robot-2"], carl = ["robot-1"] }
 observers = { screen = ["robot-1"] }
 viewers = { chief = ["robot-1"] }
 routers = ["hub"]
@@ -45,6 +45,7 @@ def make_keys(folder: Path) -> None:
     write_pair(folder, "rogue-ca", rogue)
     people = [
         (Role.ROBOT, ROBOT), (Role.ROBOT, "robot-2"), (Role.OPERATOR, "anna"), (Role.OPERATOR, "ben"),
+        (Role.OPERATOR, "carl"),
         (Role.OBSERVER, "screen"), (Role.OBSERVER, "chief"), (Role.OBSERVER, "stranger"),
         (Role.ROUTER, "hub"),
     ]  # fmt: skip
@@ -162,14 +163,14 @@ class Party:
         self.states += 1
 
     def answered(self, topic: Topic) -> bool:
-        """Whether a question to the robot is answered."""
+        """Whether a question to the robot on a key is answered."""
         replies = self.session.get(topic.key_for(ROBOT), payload=b"", timeout=topic.timeout_s)
         return any(reply.ok is not None for reply in replies)
 
-    def command(self) -> None:
-        self.session.put(
-            COMMAND.key_for(ROBOT), self.name.encode(), allowed_destination=zenoh.Locality.REMOTE
-        )
+    def command(self, key_of: str) -> None:
+        """Put a command on the key of an operator."""
+        key = COMMAND.of(key_of).key_for(ROBOT)
+        self.session.put(key, self.name.encode(), allowed_destination=zenoh.Locality.REMOTE)
 
 
 def open_party(name: str, link: LinkConfig, certificate: bool = True) -> Party:

@@ -17,6 +17,7 @@ from common.link.audit import Audit
 from common.link.config import LinkConfig
 from common.metrics.tree import to_tree
 from common.process.runtime import run
+from common.wire.sender import operator_of
 from common.wire.topics import COMMAND, CONTROL, STATE, STOP, VIDEO
 
 
@@ -36,7 +37,9 @@ async def robot(stop: asyncio.Event) -> None:
         audit.attach(session)
         link = session.link(config.robot)
         state, video = link.publish(STATE), link.publish(VIDEO)
-        link.subscribe(COMMAND, lambda payload, _: heard.update([payload.decode()]))
+        link.subscribe_keys(
+            COMMAND, lambda key, payload, _: heard.update([f"{payload.decode()} as {operator_of(key)}"])
+        )
         link.answer(CONTROL, lambda payload, _: payload)
         link.answer(STOP, lambda payload, _: payload)
         link.declare_alive("slave")

@@ -32,6 +32,9 @@ from tests.link.parties import (
 
 pytestmark = pytest.mark.live
 COMMANDS = 20
+BOTH = {"anna as anna", "carl as carl"}
+"""Two operators of one robot: each is heard on the own key alone."""
+OF_ANNA = "tandem/robot-1/operator/anna/command"
 REFUSED_AT_THE_DOOR = {
     "rogue": "certificate: ",
     "expired": "certificate expired",
@@ -75,7 +78,7 @@ def parties(endpoint: str, keys: Path) -> tuple[dict[str, Party], dict[str, Part
         return LinkConfig.model_validate({"connect": [endpoint], "mode": mode, "tls": security})
 
     names = {
-        "anna": "operator-anna", "ben": "operator-ben", "robot-2": "robot-robot-2",
+        "anna": "operator-anna", "ben": "operator-ben", "carl": "operator-carl", "robot-2": "robot-robot-2",
         "screen": "observer-screen", "chief": "observer-chief", "stranger": "observer-stranger",
     }  # fmt: skip
     inside = {name: open_party(name, link("client", keys, who)) for name, who in names.items()}
@@ -96,43 +99,52 @@ def test_nobody_does_what_he_may_not(transport: str, routed: bool, keys: Path, t
 
             def anna_is_heard() -> bool:
                 for party in everybody:
-                    party.command()
-                return robot.heard.get("anna", 0) >= COMMANDS and inside["anna"].seen >= COMMANDS
+                    party.command(key_of="anna")
+                    if party.name != "anna":
+                        party.command(key_of="ben")
+                inside["carl"].command(key_of="carl")
+                fewest = min(robot.heard.get(each, 0) for each in BOTH)
+                return fewest >= COMMANDS and inside["anna"].seen >= COMMANDS
 
             await reached(anna_is_heard, robot, "anna's commands")
-            assert set(robot.heard) == {"anna"}
+            assert set(robot.heard) == BOTH
             assert inside["chief"].seen >= 1
             assert inside["screen"].states >= 1
-            may_see = {"anna", "chief"}
+            may_see = {"anna", "carl", "chief"}
             assert {party.name for party in everybody if party.seen} == may_see
             assert {party.name for party in everybody if party.states} == {*may_see, "screen"}
-            assert {p.name for p in inside.values() if await asyncio.to_thread(p.answered, CONTROL)} == {
-                "anna"
-            }
+            for own in ("anna", "carl"):
+                control = CONTROL.of(own)
+                asking = {p.name for p in inside.values() if await asyncio.to_thread(p.answered, control)}
+                assert asking == {own}
             stopping = {p.name for p in inside.values() if await asyncio.to_thread(p.answered, STOP)}
             assert stopping == set(inside) - {"stranger"}
             for who, why in REFUSED_AT_THE_DOOR.items():
                 await reached(lambda why=why: guard.said(why), guard, f"the refusal of {who}")
                 assert not outside[who].session.info.peers_zid()
             for who, what in (
-                ("operator:ben", "Put tandem/robot-1/command"),
-                ("robot:robot-2", "Put tandem/robot-1/command"),
+                ("operator:ben", f"Put {OF_ANNA}"),
+                ("operator:carl", f"Put {OF_ANNA}"),
+                ("robot:robot-2", f"Put {OF_ANNA}"),
                 ("observer:screen", "Declare Subscriber tandem/robot-1/video/head"),
             ):
                 await reached(
                     lambda w=who, s=what: guard.said(f"{w} was refused: {s}"), guard, f"{who} {what}"
                 )
-            assert not guard.said("operator:anna was refused")
+            assert not guard.said("operator:anna was refused: Put")
             assert guard.said("observer:stranger connected: [link.access] does not name it")
             for party in everybody:
                 party.session.close()
             await guard.stop()
             file = tmp_path / "metrics.json"
             counted = (json.loads(file.read_text()) if routed else guard.figures)["refused"]
-            put, look = "Put tandem/robot-1/command", "Declare Subscriber tandem/robot-1/video/head"
+            put, look = f"Put {OF_ANNA}", "Declare Subscriber tandem/robot-1/video/head"
             puts = {who: kinds.get(put, 0) for who, kinds in counted["messages"].items()}
-            assert "operator:anna" not in puts
-            assert min(puts[who] for who in ("operator:ben", "robot:robot-2", "observer:chief")) >= COMMANDS
+            assert puts["operator:anna"] == 0, "anna only asked on a key that is not hers"
+            assert (
+                min(puts[who] for who in ("operator:ben", "operator:carl", "robot:robot-2", "observer:chief"))
+                >= COMMANDS
+            )
             assert counted["messages"]["observer:stranger"][look] == 1
             assert sorted(counted["handshakes"]) == [
                 "invalid peer certificate: BadSignature",

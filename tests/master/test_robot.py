@@ -79,7 +79,7 @@ class FakeLink:
         if topic is CLOCK:
             query = decode(payload, ClockQuery)
             return encode(ClockReply(query.asked_ns, 10**15, 10**15, self.instance)), query.asked_ns + 1000
-        assert topic is CONTROL
+        assert topic == CONTROL.of("nurse-1")
         self.asked.append(decode(payload, ControlRequest).action)
         return encode(ControlReply(True, "hold", "yours", self.token, instance=self.instance)), 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import msgpack
 import numpy as np
@@ -18,7 +19,9 @@ from common.wire.messages import (
     Action,
     ClockQuery,
     ClockReply,
+    Command,
     CommandEcho,
+    CommandStamps,
     ControlReply,
     ControlRequest,
     RobotState,
@@ -45,7 +48,7 @@ def converse(pipeline: SlavePipeline, master: MasterExchange, ahead_ns: int, now
 
 def claim(pipeline: SlavePipeline, operator: str, clock: int, now_ns: int) -> ControlReply:
     request = ControlRequest("robot-1", Action.CLAIM, operator, clock=clock)
-    return decode(pipeline.on_control(encode(request), now_ns), ControlReply)
+    return decode(pipeline.on_control(encode(request), now_ns, sender=operator), ControlReply)
 
 
 def test_commands_are_judged_by_the_clock_of_who_holds_the_lease(pipeline: SlavePipeline) -> None:
@@ -100,7 +103,14 @@ def test_where_anybody_may_ask_the_robot_is_stopped_but_not_engaged(
     assert read_reply(pipeline.on_stop(pack_stop("robot-1", "ben"), NS_PER_S), Action.ESTOP).guard == "estop"
 
 
-@pytest.mark.parametrize("way", [SlavePipeline.on_stop, SlavePipeline.on_control])
+@pytest.mark.parametrize(
+    "way",
+    [
+        SlavePipeline.on_stop,
+        partial(SlavePipeline.on_control, sender="carl"),
+        partial(SlavePipeline.on_control, sender=None),
+    ],
+)
 @pytest.mark.parametrize(
     "payload",
     [
@@ -125,14 +135,17 @@ def test_every_answer_and_state_tells_which_process_it_is_of(pipeline: SlavePipe
     assert pipeline.instance > 0
     asked = encode(ControlRequest("robot-1", Action.STATUS, "ben"))
     for payload in (asked, b"garbage"):
-        assert decode(pipeline.on_control(payload, NS_PER_S), ControlReply).instance == pipeline.instance
+        assert (
+            decode(pipeline.on_control(payload, NS_PER_S, sender="ben"), ControlReply).instance
+            == pipeline.instance
+        )
     state = decode(pipeline.state(NS_PER_S), RobotState, len(pipeline.skeleton.joints))
     assert state.instance == pipeline.instance
 
 
 def test_told_of_a_namesake_it_is_said_with_the_state_and_passes(pipeline: SlavePipeline) -> None:
     request = ControlRequest("robot-1", Action.NAMESAKE, "anna", "2 robots have the name robot-1")
-    assert decode(pipeline.on_control(encode(request), NS_PER_S), ControlReply).done
+    assert decode(pipeline.on_control(encode(request), NS_PER_S, sender="anna"), ControlReply).done
     reading = EncoderReading(NS_PER_S, np.zeros(25, np.int64), np.ones(25, np.bool_))
 
     def faults(now_ns: int) -> dict[str, str]:
@@ -154,8 +167,35 @@ def test_other_versions_are_counted_and_reported_once_a_second(pipeline: SlavePi
     pipeline.warn = said.append
     later = msgpack.packb(["command", VERSION + 1, "robot-1", 0])
     for tick in range(30):
-        pipeline.on_command(later, 1, NS_PER_S + tick * NS_PER_S // 10)
+        pipeline.on_command(later, 1, NS_PER_S + tick * NS_PER_S // 10, sender="anna")
     assert pipeline.undecodable == {"command": 30}
     assert len(said) == 3
     assert f"schema version {VERSION + 1}, expected {VERSION}" in said[0]
     assert said[-1].endswith("(21 so far)")
+
+
+@pytest.mark.parametrize("sender", ["ben", "", "Anna", None])
+def test_nobody_asks_in_another_s_name(pipeline: SlavePipeline, sender: str | None) -> None:
+    for action in set(Action) - {Action.ESTOP}:
+        request = ControlRequest("robot-1", action, "anna", key="k")
+        reply = decode(pipeline.on_control(encode(request), NS_PER_S, sender=sender), ControlReply)
+        assert not reply.done
+    assert pipeline.guard.counters.foreign_requests == len(Action) - 1
+    assert pipeline.guard.operator == ""
+    assert claim(pipeline, "anna", 1, NS_PER_S).done
+
+
+def test_a_stolen_token_is_worth_nothing_on_another_key(pipeline: SlavePipeline) -> None:
+    token = claim(pipeline, "anna", 1, NS_PER_S).lease
+    joints = len(pipeline.skeleton.joints)
+    zeros, valid = np.zeros(joints), np.ones(joints, np.bool_)
+    stamps = CommandStamps(NS_PER_S, NS_PER_S, NS_PER_S, NS_PER_S)
+    stolen = encode(Command("robot-1", token, 1, 1, stamps, True, valid, zeros, zeros, operator="anna"))
+    for sender in ("ben", "", None):
+        pipeline.on_command(stolen, NS_PER_S, NS_PER_S, sender=sender)
+    assert pipeline.guard.counters.dropped == {"operator": 3}
+    assert pipeline.traffic.arrivals.metrics().arrived == 0
+    pipeline.on_command(stolen, NS_PER_S, NS_PER_S, sender="anna")
+    assert pipeline.guard.counters.dropped == {"operator": 3, "clock": 1}, (
+        "past the gate; its clock is unknown"
+    )

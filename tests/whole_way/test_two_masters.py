@@ -31,7 +31,7 @@ class Robot:
         keeper.on_state(state, self.now_ns)
         request = keeper.request(self.now_ns)
         if request is not None:
-            reply = self.slave.on_control(encode(request), self.now_ns)
+            reply = self.slave.on_control(encode(request), self.now_ns, sender=request.operator)
             keeper.on_reply(decode(reply, ControlReply), self.now_ns)
 
     def wait(self, seconds: float) -> None:

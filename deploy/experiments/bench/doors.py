@@ -62,7 +62,7 @@ async def open_ping(door: Door, on_echo: OnEcho) -> AsyncIterator[SendPing]:
     if door.carrier == "link":
         async with open_link(door.config(echoes=False), ROBOT) as link:
             link.subscribe(STATE, lambda _, arrived_ns: on_echo(arrived_ns))
-            yield link.publish(COMMAND)
+            yield link.publish(COMMAND.of(MASTER))
     elif door.carrier == "zenoh":
         session = await asyncio.to_thread(_open_zenoh, door.config(echoes=False))
         held = _on_zenoh(session, BACK, on_echo)

@@ -156,16 +156,17 @@ class Scene:
         self.fault_ns = self.run.now_ns
         self.dropped_before = self.refused()
 
-    def command(self, payload: bytes) -> None:
-        """A foul command reaches the robot now."""
+    def command(self, payload: bytes, sender: str | None = None) -> None:
+        """A foul command reaches the robot now, on the key of its operator or of another."""
         before = self.guard.counters.accepted
-        self.run.on_command(payload)
+        self.run.on_command(payload, sender)
         self.foul += self.guard.counters.accepted - before
 
     def command_decoded(self, command: Command) -> None:
         """The same, had the codec let it pass."""
         now_ns = self.run.slave_ns
         offset = self.run.slave.clock.estimator.estimate(now_ns)
+        command = replace(command, operator=self.run.master_config.operator.name)
         self.foul += self.run.slave.take(command, now_ns, now_ns, offset).accepted
 
     def ask(self, action: Action, operator: str) -> None:

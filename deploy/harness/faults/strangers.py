@@ -18,7 +18,8 @@ from deploy.sim.world.world import VirtualWorld, WorldSettings
 def _replayed_yesterday(scene: Scene) -> None:
     requests, commands = _yesterday()
     for request in requests:
-        if decode(scene.run.slave.on_control(request, scene.run.slave_ns), ControlReply).done:
+        own = scene.run.master_config.operator.name
+        if decode(scene.run.slave.on_control(request, scene.run.slave_ns, sender=own), ControlReply).done:
             scene.granted.append("yesterday's request")
     _play(scene, commands)
 

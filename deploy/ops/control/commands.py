@@ -238,6 +238,11 @@ def _act(action: Action, where: Destination, key: str = "", groups: Sequence[str
 def _named(where: Destination) -> Destination:
     if not where.robots:
         raise TandemError("which robot? Name it by --robot, or the master's file by --master")
+    if where.claimed not in ("", where.operator):
+        raise TandemError(
+            f"your certificate is that of operator {where.operator}, not of {where.claimed}: correct "
+            "--operator, [operator] name or --certificate"
+        )
     return where
 
 

@@ -60,7 +60,7 @@ class RecordOptions:
         return (*LIVE, *map(video, self.cameras))
 
     def name(self, topic: Topic) -> str:
-        """What a topic is called in the file: its key."""
+        """What a topic is called in the file's head: its key; commands are under their operators' keys."""
         return topic.key_for(self.robot)
 
 
@@ -120,7 +120,7 @@ async def record(
     try:
         async with open_link(options.link, options.robot) as link:
             for topic in options.topics:
-                link.subscribe(topic, partial(_take, tape, taken, topic, options.name(topic)))
+                link.subscribe_keys(topic, partial(_take, tape, taken, topic))
             await until_stopped(
                 stop, _wait(options.seconds, tape, lambda: _report_progress(tape, taken, report))
             )

@@ -160,7 +160,8 @@ class VirtualWorld:
         request = ControlRequest(self.robot, action, operator, key, groups=groups)
         if action in CHALLENGED:
             request = replace(request, challenge=self.ask(Action.STATUS, operator=operator).challenge)
-        return read_reply(self.slave.on_control(request_bytes(request), self.slave_ns), action)
+        answer = self.slave.on_control(request_bytes(request), self.slave_ns, sender=operator)
+        return read_reply(answer, action)
 
     def _step(self) -> None:
         begin_ns = self.now_ns
@@ -205,9 +206,10 @@ class VirtualWorld:
         self.trace.add(command)
         self._carry(Traffic.COMMAND, encode(command), self.on_command, ANGLES_NS)
 
-    def on_command(self, payload: bytes) -> None:
-        """A command reaches the slave now."""
-        self.slave.on_command(payload, self.slave_ns, self.slave_ns)
+    def on_command(self, payload: bytes, sender: str | None = None) -> None:
+        """A command reaches the slave now, on the key of the master's operator by default."""
+        sender = self.master_config.operator.name if sender is None else sender
+        self.slave.on_command(payload, self.slave_ns, self.slave_ns, sender=sender)
 
     def _carry(
         self, traffic: Traffic, payload: bytes, arrive: Callable[[bytes], None], after_ns: int = 0
@@ -244,7 +246,7 @@ class VirtualWorld:
         self._lease.on_state(state, self.master_ns)
         request = self._lease.request(self.master_ns)
         if request is not None:
-            reply = self.slave.on_control(encode(request), self.slave_ns)
+            reply = self.slave.on_control(encode(request), self.slave_ns, sender=request.operator)
             self._lease.on_reply(decode(reply, ControlReply), self.master_ns)
 
     def _exchange_clocks(self) -> None:

@@ -50,23 +50,30 @@ def test_the_table(who: str, robot: str) -> None:
     observer = robot == "r1" and who in {"observer:screen", "observer:chief"}
     viewer = robot == "r1" and who == "observer:chief"
     itself = who == f"robot:{robot}"
-    assert may(who, "put", f"{key}/command") == (operator or router)
+    own = who.removeprefix("operator:") if operator else ""
+    for name in ("anna", "ben", "%61nna", "-", "*"):
+        assert may(who, "put", f"{key}/operator/{name}/command") == (name == own or router)
+        assert may(who, "query", f"{key}/operator/{name}/control") == (name == own or router)
+    assert may(who, "declare_subscriber", f"{key}/operator/*/command", "egress") == (operator or router)
+    assert may(who, "declare_queryable", f"{key}/operator/*/control", "egress") == (operator or router)
     assert may(who, "put", f"{key}/state") == (itself or router)
     assert may(who, "put", f"{key}/video/head") == (itself or router)
     assert may(who, "declare_subscriber", f"{key}/video/head") == (operator or viewer or router)
     assert may(who, "put", f"{key}/video/head", "egress") == (operator or viewer or router)
     assert may(who, "declare_subscriber", f"{key}/state") == (operator or observer or router)
-    assert may(who, "declare_subscriber", f"{key}/command") == (operator or observer or itself or router)
-    assert may(who, "declare_queryable", f"{key}/control") == (itself or router)
+    assert may(who, "declare_subscriber", f"{key}/operator/*/command") == (
+        operator or observer or itself or router
+    )
+    assert may(who, "declare_queryable", f"{key}/operator/*/control") == (itself or router)
     assert may(who, "query", f"{key}/clock") == (operator or router)
-    assert may(who, "query", f"{key}/control") == (operator or router)
     assert may(who, "query", f"{key}/stop") == (who in EVERYBODY), "anyone who is named may stop a robot"
     assert may(who, "declare_queryable", f"{key}/stop") == (itself or router)
     assert may(who, "liveliness_token", f"{key}/alive/slave") == (itself or router)
     assert may(who, "liveliness_token", f"{key}/alive/master") == (operator or router)
     assert may(who, "declare_liveliness_subscriber", "tandem/*/alive/slave") == (who in EVERYBODY)
     assert not may(who, "declare_subscriber", "tandem/**") or router
-    assert not may(who, "put", f"{key}/control") or router
+    assert not may(who, "put", f"{key}/operator/{own or 'anna'}/control") or router
+    assert not may(who, "put", f"{key}/command") or router, "the key of versions before 4"
 
 
 def test_an_empty_table_lets_nobody_do_anything() -> None:

@@ -27,7 +27,7 @@ async def connect(stop):
     link_open = open_link(LinkConfig(connect=[ENDPOINT]), "robot-1")
     link = await link_open.__aenter__()
     await link.connected()
-    publish = link.publish(COMMAND)
+    publish = link.publish(COMMAND.of("anna"))
     publish(bytes(300))
     subprocess.run(["ip", "link", "set", "lo", "down"], check=True)
     worst_ns = 0

@@ -92,7 +92,7 @@ def test_payloads_and_answers_pass_over_each_protocol(protocol: str, tmp_path: P
             heard = Heard()
             slave.subscribe(COMMAND, heard)
             slave.answer(CLOCK, lambda payload, arrived_ns: payload + b"!")
-            publish = master.publish(COMMAND)
+            publish = master.publish(COMMAND.of("anna"))
             await heard_through(publish, heard, b"first")
             before_ns = monotonic_ns()
             await heard_through(publish, heard, bytes(300))
@@ -123,14 +123,14 @@ def test_the_quality_of_service_is_that_of_the_table_or_the_file(
         settings = zenoh.Config.from_json5(f'{{mode: "peer", listen: {{endpoints: ["{endpoint}"]}}}}')
         settings.insert_json5("scouting/multicast/enabled", "false")
         with zenoh.open(settings) as raw:
-            raw.declare_subscriber(f"tandem/{ROBOT}/*", Callback(samples.append, indirect=False))
+            raw.declare_subscriber(f"tandem/{ROBOT}/**", Callback(samples.append, indirect=False))
             async with open_link(LinkConfig(connect=[endpoint], topics=topics), ROBOT) as link:
-                command, state = link.publish(COMMAND), link.publish(STATE)
+                command, state = link.publish(COMMAND.of("anna")), link.publish(STATE)
                 await until(
                     lambda: len({str(s.key_expr) for s in samples}) == 2, lambda: (command(b"c"), state(b"s"))
                 )
         by_key = {str(s.key_expr): s for s in samples}
-        sample = by_key[f"tandem/{ROBOT}/command"]
+        sample = by_key[f"tandem/{ROBOT}/operator/anna/command"]
         assert sample.priority == priority
         assert sample.congestion_control == zenoh.CongestionControl.DROP
         assert sample.express == express
@@ -157,13 +157,13 @@ def test_a_link_does_not_hear_itself() -> None:
             own, other = Heard(), Heard()
             master.subscribe(COMMAND, own)
             slave.subscribe(COMMAND, other)
-            await heard_through(master.publish(COMMAND), other, b"of master")
-            await heard_through(slave.publish(COMMAND), own, b"of slave")
+            await heard_through(master.publish(COMMAND.of("anna")), other, b"of master")
+            await heard_through(slave.publish(COMMAND.of("anna")), own, b"of slave")
             assert set(own.payloads) == {b"of slave"}
             assert set(other.payloads) == {b"of master"}
             master.answer(CONTROL, lambda payload, _: b"own answer")
             with pytest.raises(LinkError, match="no process"):
-                await master.ask(CONTROL, b"")
+                await master.ask(CONTROL.of("anna"), b"")
 
     run(test)
 
@@ -173,7 +173,7 @@ def test_the_newest_payload_wins_and_the_others_are_counted() -> None:
         async with pair(free_endpoint()) as (slave, master):
             heard = Heard()
             slave.subscribe(COMMAND, heard)
-            publish = master.publish(COMMAND)
+            publish = master.publish(COMMAND.of("anna"))
             await heard_through(publish, heard, b"ready")
             publish(b"fence")  # in order: when it is heard, nothing is under way
             await until(lambda: b"fence" in heard.payloads)
@@ -197,7 +197,7 @@ def test_a_command_put_before_the_subscriber_existed_never_reaches_it() -> None:
         async with pair(free_endpoint()) as (slave, master):
             witness, late = Heard(), Heard()
             slave.subscribe(COMMAND, witness)
-            publish = master.publish(COMMAND)
+            publish = master.publish(COMMAND.of("anna"))
             await heard_through(publish, witness, b"old")
             slave.subscribe(COMMAND, late)
             await heard_through(publish, late, b"new")
@@ -220,7 +220,7 @@ def test_a_failing_handler_is_counted_logged_once_and_survived(caplog: pytest.Lo
                     raise KeyError("planted")
 
             slave.subscribe(COMMAND, on_payload)
-            publish = master.publish(COMMAND)
+            publish = master.publish(COMMAND.of("anna"))
             await heard_through(publish, heard, b"bad")
             first = len(heard.payloads)
             await until(lambda: len(heard.payloads) > first, lambda: publish(b"bad"))
@@ -242,11 +242,11 @@ def test_a_failing_answer_is_told_to_who_asked_and_the_next_one_passes() -> None
                 return b"fine"
 
             slave.answer(CONTROL, handler)
-            await master.connected(CONTROL)
+            await master.connected(CONTROL.of("anna"))
             with pytest.raises(LinkError, match="planted") as caught:
-                await master.ask(CONTROL, b"bad")
+                await master.ask(CONTROL.of("anna"), b"bad")
             assert not isinstance(caught.value, LinkTimeoutError)
-            assert await master.ask(CONTROL, b"good") == b"fine"
+            assert await master.ask(CONTROL.of("anna"), b"good") == b"fine"
             assert slave.counters()["control"].handler_errors == 1
             asked = master.counters()["control"]
             assert (asked.asked, asked.unanswered, asked.timeouts) == (2, 1, 0)
@@ -257,6 +257,7 @@ def test_a_failing_answer_is_told_to_who_asked_and_the_next_one_passes() -> None
 def test_questions_wait_for_the_loop_only_up_to_a_limit() -> None:
     class Query:
         payload = None
+        key_expr = "key"
         refused = ""
 
         def __enter__(self) -> None: ...
@@ -270,7 +271,7 @@ def test_questions_wait_for_the_loop_only_up_to_a_limit() -> None:
 
     async def test() -> None:
         counters = TopicCounters()
-        answerer = Answerer("key", lambda payload, _: b"", asyncio.get_running_loop(), counters)
+        answerer = Answerer("key", lambda *_: b"", asyncio.get_running_loop(), counters)
         queries: list[Any] = [Query() for _ in range(MAX_WAITING + 1)]
         for query in queries:
             answerer.on_query(query)
@@ -291,15 +292,15 @@ def test_a_question_that_nobody_can_answer_fails_at_once() -> None:
     async def test() -> None:
         async with open_link(LinkConfig(connect=[free_endpoint()]), ROBOT) as alone:
             with pytest.raises(LinkError, match="no process") as caught:
-                await alone.ask(CONTROL, b"")
+                await alone.ask(CONTROL.of("anna"), b"")
             assert not isinstance(caught.value, LinkTimeoutError)
             with pytest.raises(LinkTimeoutError, match="no link to anyone who answers"):
-                await alone.connected(CONTROL, timeout_s=0.05)
+                await alone.connected(CONTROL.of("anna"), timeout_s=0.05)
             with pytest.raises(LinkTimeoutError, match="no link to another session"):
                 await alone.connected(timeout_s=0.05)
         async with pair(free_endpoint()) as (_, master):
             with pytest.raises(LinkError, match="no process"):
-                await master.ask(CONTROL, b"")
+                await master.ask(CONTROL.of("anna"), b"")
 
     run(test)
 
@@ -329,7 +330,7 @@ def test_either_side_may_start_first_and_come_back() -> None:
     async def test() -> None:
         endpoint = free_endpoint()
         async with open_link(LinkConfig(connect=[endpoint]), ROBOT) as master:
-            publish = master.publish(COMMAND)
+            publish = master.publish(COMMAND.of("anna"))
             publish(b"to nobody")
             for life in (b"first", b"second"):
                 async with open_link(LinkConfig(listen=[endpoint]), ROBOT) as slave:
@@ -352,7 +353,7 @@ def test_an_observer_hears_both_sides_through_two_endpoints() -> None:
             commands, states = Heard(), Heard()
             observer.subscribe(COMMAND, commands)
             observer.subscribe(STATE, states)
-            await heard_through(master.publish(COMMAND), commands, b"command")
+            await heard_through(master.publish(COMMAND.of("anna")), commands, b"command")
             await heard_through(slave.publish(STATE), states, b"state")
             assert observer.peers == 2
 
@@ -381,7 +382,7 @@ def test_a_link_that_cannot_be_opened_says_why_in_one_line() -> None:
 def test_a_put_after_the_end_is_counted_and_a_question_refused() -> None:
     async def test() -> None:
         async with open_link(LinkConfig(listen=[free_endpoint()]), ROBOT) as link:
-            publish = link.publish(COMMAND)
+            publish = link.publish(COMMAND.of("anna"))
         publish(b"late")
         assert link.counters()["command"].put_errors == 1
         assert link.peers == 0
@@ -434,21 +435,23 @@ def test_one_session_serves_many_robots_and_keeps_them_apart() -> None:
             heard = {robot: Heard() for robot in ends}
             first.subscribe(COMMAND, heard["robot-1"])
             first.declare_alive("slave")
-            await heard_through(links["robot-1"].publish(COMMAND), heard["robot-1"], b"for 1")
+            await heard_through(links["robot-1"].publish(COMMAND.of("anna")), heard["robot-1"], b"for 1")
             async with open_link(LinkConfig(listen=[ends["robot-2"]]), "robot-2") as second:
                 second.subscribe(COMMAND, heard["robot-2"])
                 second.answer(CONTROL, lambda payload, _: b"robot-2")
                 second.declare_alive("slave")
-                await heard_through(links["robot-2"].publish(COMMAND), heard["robot-2"], b"for 2")
-                await links["robot-2"].connected(CONTROL)
-                assert await links["robot-2"].ask(CONTROL, b"") == b"robot-2"
+                await heard_through(links["robot-2"].publish(COMMAND.of("anna")), heard["robot-2"], b"for 2")
+                await links["robot-2"].connected(CONTROL.of("anna"))
+                assert await links["robot-2"].ask(CONTROL.of("anna"), b"") == b"robot-2"
                 with pytest.raises(LinkError, match="no process"):
-                    await links["robot-1"].ask(CONTROL, b"")
+                    await links["robot-1"].ask(CONTROL.of("anna"), b"")
                 await until(lambda: len(seen) == 2)
                 assert session.peers == 2
             await until(lambda: len(seen) == 3)
             # the other went, this one goes on
-            await heard_through(links["robot-1"].publish(COMMAND), heard["robot-1"], b"again for 1")
+            await heard_through(
+                links["robot-1"].publish(COMMAND.of("anna")), heard["robot-1"], b"again for 1"
+            )
         assert set(heard["robot-2"].payloads) == {b"for 2"}
         assert seen == [("robot-1", True), ("robot-2", True), ("robot-2", False)]
 
@@ -507,7 +510,7 @@ def test_two_clients_meet_through_a_router(protocol: str, tmp_path: Path) -> Non
             slave.answer(CLOCK, lambda payload, _: payload)
             slave.declare_alive("slave")
             master.watch_presence(lambda process, here: alive.update({process.role: here}))
-            await heard_through(master.publish(COMMAND), heard, b"command")
+            await heard_through(master.publish(COMMAND.of("anna")), heard, b"command")
             await master.connected(CLOCK)
             assert await master.ask(CLOCK, b"hello") == b"hello"
             await until(lambda: alive == {"slave": True})

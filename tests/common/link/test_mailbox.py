@@ -1,25 +1,44 @@
 import threading
 
-from common.link.mailbox import Mailbox
+from common.link.mailbox import MOST_KEYS, Mailbox
 
 
 def test_the_newest_value_is_taken_once() -> None:
     box: Mailbox[int] = Mailbox()
-    assert box.take() is None
-    assert box.put(1)
-    assert not box.put(2)
-    assert not box.put(3)
-    assert box.take() == 3
-    assert box.take() is None
+    assert box.take() == {}
+    assert box.put("a", 1)
+    assert not box.put("a", 2)
+    assert not box.put("a", 3)
+    assert box.take() == {"a": 3}
+    assert box.take() == {}
     assert box.overwritten == 2
-    assert box.put(4)
+    assert box.put("a", 4)
+
+
+def test_one_sender_s_flood_overwrites_no_other_s_value() -> None:
+    box: Mailbox[int] = Mailbox()
+    box.put("anna", 1)
+    for i in range(100):
+        box.put("ben", i)
+    assert box.take() == {"anna": 1, "ben": 99}
+    assert box.overwritten == 99
+
+
+def test_more_senders_than_it_keeps_apart_are_counted() -> None:
+    box: Mailbox[int] = Mailbox()
+    for i in range(MOST_KEYS + 3):
+        box.put(str(i), i)
+    assert not box.put("0", 7)
+    assert len(box.take()) == MOST_KEYS
+    assert box.overwritten == 4
+    assert box.put("new", 1)
 
 
 def test_false_values_are_values() -> None:
     box: Mailbox[bytes] = Mailbox()
-    box.put(b"")
-    assert not box.put(b"")
-    assert box.take() == b""
+    box.put("a", b"")
+    assert not box.put("a", b"")
+    assert box.take() == {"a": b""}
     assert box.overwritten == 1
 
 
@@ -30,7 +49,7 @@ def test_every_value_is_either_taken_or_counted_between_threads() -> None:
 
     def write() -> None:
         for i in range(total):
-            if box.put(i):
+            if box.put("a", i):
                 woken.release()
 
     threads = [threading.Thread(target=write) for _ in range(writers)]
@@ -39,8 +58,8 @@ def test_every_value_is_either_taken_or_counted_between_threads() -> None:
     taken = 0
     while taken + box.overwritten < total * writers:
         assert woken.acquire(timeout=10), "a put into an empty box woke nobody"
-        taken += box.take() is not None
+        taken += len(box.take())
     for thread in threads:
         thread.join(10)
     assert taken + box.overwritten == total * writers
-    assert box.take() is None
+    assert box.take() == {}

@@ -7,15 +7,18 @@ import socket
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from common.errors import ConfigError, LinkError, TandemError
 from common.link import open_link
+from common.link.certificates import check_operator
 from common.link.config import AccessConfig, LinkConfig
 from common.link.roles import Role
 from common.wire.codec import decode, encode
 from common.wire.messages import Action, ControlReply, ControlRequest
 from common.wire.stop import StopAnswer, pack_stop_answer, read_stop
 from common.wire.topics import CONTROL, STOP
+from deploy import cli
 from deploy.certificates.folder import stem
 from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask_robots
@@ -123,3 +126,33 @@ def test_with_rules_a_robot_is_seen_and_stopped_by_those_named(keys: Path) -> No
 
     (answer,) = asyncio.run(story())
     assert (answer.robot, answer.done, answer.instance) == ("robot-1", True, 7)
+
+
+def test_the_certificate_tells_who_the_operator_is(keys: Path) -> None:
+    own = keys / "operator-nurse-1.pem"
+
+    def of(operator: str, certificate: Path) -> tuple[str, str]:
+        where = destination(["tls/127.0.0.1:1"], ["robot-1"], operator, certificate=certificate)
+        return where.operator, where.claimed
+
+    assert of("", own) == ("nurse-1", "")
+    assert of("nurse-2", own) == ("nurse-1", "nurse-2")
+    assert of("nurse-2", keys / "robot-robot-1.pem") == ("nurse-2", "nurse-2")
+    assert of("nurse-2", keys / "absent.pem") == ("nurse-2", "nurse-2")
+    at = ["--connect", "tls/127.0.0.1:1", "--robot", "robot-1", "--certificate", str(own)]
+    engaged = CliRunner().invoke(cli.app, ["engage", *at, "--operator", "nurse-2"])
+    assert isinstance(engaged.exception, TandemError)
+    assert "your certificate is that of operator nurse-1, not of nurse-2" in str(engaged.exception)
+
+
+def test_a_master_commands_under_the_name_in_its_certificate(keys: Path) -> None:
+    link = LinkConfig(
+        connect=["tls/127.0.0.1:1"], tls=tls_of(keys, Role.OPERATOR, "nurse-1"), access=AccessConfig()
+    )
+    check_operator(link, "nurse-1")
+    for name in ("nurse-2", "Nurse-1", ""):
+        with pytest.raises(
+            LinkError, match=rf"is the certificate of operator:nurse-1, expected operator:{name}:"
+        ):
+            check_operator(link, name)
+    check_operator(link.model_copy(update={"access": None}), "nurse-2")

@@ -82,6 +82,8 @@ class Rig:
         self.offset = GOOD_OFFSET
         self.sequence = 0
         self.lease = 0
+        self.operator = "anna"
+        """On whose key commands arrive."""
         self.setpoints: list[Setpoint] = []
         self._since_command = 0
 
@@ -93,7 +95,7 @@ class Rig:
         stamps = CommandStamps(sampled_ns, sampled_ns, sampled_ns, sampled_ns)
         good = Command(
             ROBOT, self.lease, self.sequence, 0, stamps, True, np.ones(self.joints, np.bool_),
-            self.target.copy(), np.zeros(self.joints),
+            self.target.copy(), np.zeros(self.joints), operator=self.operator,
         )  # fmt: skip
         return replace(good, **changes)
 
@@ -127,7 +129,7 @@ class Rig:
     def claim(self, operator: str = "anna") -> ControlReply:
         reply = self.ask(Action.CLAIM, operator)
         if reply.done:
-            self.lease, self.sequence = reply.lease, 0
+            self.lease, self.sequence, self.operator = reply.lease, 0, operator
         return reply
 
     def step(self, dt_ns: int = PERIOD_NS) -> Setpoint:

@@ -436,6 +436,13 @@ def second_operator(make_rig: MakeRig) -> None:
     assert rig.guard.operator == "anna"
 
 
+@about("gate operator")
+def stolen_token(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    assert rig.send(operator="ben").gate == "operator"
+    assert rig.send().accepted
+
+
 @about("control.holder_only")
 def somebody_else(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()

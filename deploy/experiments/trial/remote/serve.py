@@ -195,7 +195,7 @@ class RobotHost:
         link = self._link
         assert link is not None
         request = ControlRequest(self._config.robot, Action.ENGAGE, operator)
-        reply = await ask_control(lambda payload: link.ask(CONTROL, payload), request)
+        reply = await ask_control(lambda payload: link.ask(CONTROL.of(operator), payload), request)
         if not reply.done:
             raise TandemError(f"engage was refused: {reply.text}")
 

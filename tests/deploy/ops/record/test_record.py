@@ -62,7 +62,10 @@ def test_every_topic_is_recorded_as_it_came_until_stopped(tmp_path: Path) -> Non
         told: list[str] = []
         counted: list[Metrics] = []
         async with open_link(LinkConfig(listen=[endpoint]), ROBOT) as robot:
-            puts = {topic: robot.publish(topic) for topic in (COMMAND, STATE, STATISTICS, video("head"))}
+            puts = {
+                topic: robot.publish(topic)
+                for topic in (COMMAND.of("anna"), STATE, STATISTICS, video("head"))
+            }
             recording = asyncio.create_task(record(options, stop, told.append, counted.append))
             while not told or any(
                 name not in told[-1] for name in ("command", "state", "statistics", "video")
@@ -77,7 +80,7 @@ def test_every_topic_is_recorded_as_it_came_until_stopped(tmp_path: Path) -> Non
         assert read.cut == ""
         assert read.metadata["robot"] == ROBOT
         assert {e.topic: e.payload for e in read.entries} == {
-            "tandem/robot-1/command": b"command",
+            "tandem/robot-1/operator/anna/command": b"command",
             "tandem/robot-1/state": b"state",
             "tandem/robot-1/statistics": b"statistics",
             "tandem/robot-1/video/head": b"video",

@@ -199,7 +199,7 @@ class Session:
 
     def ask(self, action: Action, **more: Any) -> ControlReply:
         request = ControlRequest("robot-1", action, "anna", **more)
-        return read_reply(self.pipeline.on_control(encode(request), self.rig.now_ns), action)
+        return read_reply(self.pipeline.on_control(encode(request), self.rig.now_ns, sender="anna"), action)
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds * NS_PER_S / TICK_NS)):
@@ -211,7 +211,7 @@ class Session:
         now_ns = rig.now_ns
         if self.lease and self.ticks % 16 == 0:
             self.sequence += 1
-            self.pipeline.on_command(self._command(now_ns), now_ns, now_ns)
+            self.pipeline.on_command(self._command(now_ns), now_ns, now_ns, sender="anna")
         body = Body(drives=rig.driver.faults)
         self.setpoint = self.pipeline.tick(now_ns, rig.driver.reading, body)
         if self.ticks % 2 == 0:
