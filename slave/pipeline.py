@@ -295,6 +295,7 @@ class SlavePipeline:
                 lease_id=lease_id(self.guard.lease.token),
                 instance=self.instance,
                 resting=self.guard.resting.names,
+                effort_nm=reading.effort_nm if reading else None,
             )
         )
 

@@ -124,17 +124,19 @@ def _pack_state(m: RobotState) -> tuple[object, ...]:
     echo = None if e is None else (e.sequence, e.put_ns, e.received_ns, e.accepted_ns, e.written_ns)
     reason = fields.shorten(m.reason, MAX_DOUBT)
     mask, angles = fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad)
+    torques = fields.pack_torques(m.effort_nm), fields.pack_torques(m.external_nm)
     named = (m.robot, m.guard, reason, m.operator, *m.resting)
-    taken = _STATE_NUMBERS_BYTES + len(mask) + len(angles) + sum(len(name.encode("utf-8")) for name in named)
+    blocks = (mask, angles, *(block or b"" for block in torques), *(name.encode("utf-8") for name in named))
+    taken = _STATE_NUMBERS_BYTES + sum(map(len, blocks))
     return (
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
         m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
-        _pack_base(m.base), m.lease_id, m.instance, m.resting,
+        _pack_base(m.base), m.lease_id, m.instance, m.resting, *torques,
     )  # fmt: skip
 
 
 def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
-    fields.array(f, 17)
+    fields.array(f, 19)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -156,6 +158,8 @@ def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
         lease_id=fields.count(f[14]),
         instance=fields.count(f[15]),
         resting=fields.names(f[16], MAX_NAME),
+        effort_nm=fields.torques(f[17], joints),
+        external_nm=fields.torques(f[18], joints),
     )
 
 

@@ -121,6 +121,10 @@ class RobotState:
     """Which process sent it (`common.wire.instance`): two robots may have one name by mistake."""
     resting: tuple[str, ...] = ()
     """Joint groups that hold until the operator takes them up again."""
+    effort_nm: Array | None = None
+    """(J,) torque of each motor at the joint, N m; NaN where its drive tells none, None if no drive does."""
+    external_nm: Array | None = None
+    """(J,) torque from outside at the joint, N m, as the slave estimates it; NaN and None as above."""
 
 
 class Action(StrEnum):

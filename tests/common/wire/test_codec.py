@@ -53,6 +53,11 @@ def values(joints: int, limit: float) -> st.SearchStrategy[Any]:
     return st.lists(item, min_size=joints, max_size=joints).map(lambda v: np.array(v, np.float64))
 
 
+def torques(joints: int) -> st.SearchStrategy[Any]:
+    item = st.floats(-10_000.0, 10_000.0, width=16) | st.just(math.nan)
+    return st.none() | st.lists(item, min_size=joints, max_size=joints).map(lambda v: np.array(v, np.float64))
+
+
 def masks(joints: int) -> st.SearchStrategy[Any]:
     return st.lists(flags, min_size=joints, max_size=joints).map(lambda v: np.array(v, np.bool_))
 
@@ -105,6 +110,8 @@ def states(draw: st.DrawFn, joints: int = 25) -> RobotState:
         faults=draw(st.dictionaries(brief, brief, max_size=2)),
         base=draw(st.none() | bases),
         resting=draw(st.lists(brief, max_size=2).map(tuple)),
+        effort_nm=draw(torques(joints)),
+        external_nm=draw(torques(joints)),
     )
 
 
@@ -219,6 +226,21 @@ def test_a_signalling_nan_is_refused_without_a_warning() -> None:
         decode(payload, Command, 3)
 
 
+def test_a_torque_that_is_not_known_stays_so_without_a_warning() -> None:
+    signalling = b"\x01\x7c" + np.array([-1.5, 10_000.0], "<f2").tobytes()
+    decoded = decode(tampered(STATE, put(19, signalling)), RobotState, 3)
+    assert decoded.effort_nm is not None
+    np.testing.assert_array_equal(decoded.effort_nm, [math.nan, -1.5, 10_000.0])
+    assert decoded.external_nm is None
+
+
+def test_a_torque_is_told_to_a_thousandth() -> None:
+    told_nm = np.array([0.012, -3.456, 287.6])
+    decoded = decode(encode(replace(STATE, external_nm=told_nm)), RobotState, 3)
+    assert decoded.external_nm is not None
+    np.testing.assert_allclose(decoded.external_nm, told_nm, rtol=1e-3)
+
+
 def test_the_limits_themselves_pass() -> None:
     edge = np.array([ANGLE_LIMIT_RAD, -ANGLE_LIMIT_RAD, -0.0])
     rate = np.array([RATE_LIMIT_RAD_S, -RATE_LIMIT_RAD_S, -0.0])
@@ -240,6 +262,7 @@ def test_each_count_of_a_command_is_checked(index: int, value: object) -> None:
     [
         (0, "state", "kind 'state', expected command"),
         (1, VERSION + 1, f"schema version {VERSION + 1}, expected {VERSION}"),
+        (0, 5, "kind 5, expected command"),
         (1, True, "schema version True"),
         (2, "x" * (MAX_NAME + 1), "text of at most 64"),
         (2, b"robot-1", "text of at most 64"),
@@ -269,6 +292,10 @@ def test_each_other_field_of_a_command_is_checked(index: int, value: object, why
         (11, [1, 2, 3, 4, -5], "63-bit count"),
         (12, 2**63, "64-bit integer"),
         (13, 0.5, "64-bit integer"),
+        (19, bytes(5), "not 3 float16 values"),
+        (20, [0.0, 0.0, 0.0], "not 3 float16 values"),
+        (19, b"\x00\x7c" * 3, "a torque is beyond"),
+        (20, b"\x00\xf1" * 3, "a torque is beyond"),
     ],
 )
 def test_each_field_of_a_state_is_checked(index: int, value: object, why: str) -> None:
@@ -368,7 +395,8 @@ def test_a_state_fits_in_a_packet_of_every_path(faults: dict[str, str], reason: 
     most = 2**62
     state = RobotState(
         name, most, most, most, name, reason, name, mask, zeros, zeros,
-        CommandEcho(most, most, most, most, most), -most, most, faults, None, most, most,
+        CommandEcho(most, most, most, most, most), -most, most, faults,
+        BaseAttitude(most, 1.0, 1.0, 1.0, 1.0), most, most, effort_nm=zeros, external_nm=zeros,
     )  # fmt: skip
     payload = encode(state)
     assert len(payload) <= CONTROL_BYTES
