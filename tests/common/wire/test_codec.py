@@ -6,7 +6,7 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from common.errors import CodecError
@@ -388,13 +388,16 @@ def test_a_command_is_encoded_and_decoded_within_15_us() -> None:
     assert best / 100 < 15e-6
 
 
-@given(st.dictionaries(names, texts, max_size=60), texts, names)
+@given(
+    st.dictionaries(names, texts, max_size=60), texts, st.from_regex(r"[A-Za-z0-9_.-]{1,64}", fullmatch=True)
+)
+@example({f"joint {i}": "🤖" * MAX_TEXT for i in range(25)}, "🤖" * MAX_TEXT, "n" * MAX_NAME)
 def test_a_state_fits_in_a_packet_of_every_path(faults: dict[str, str], reason: str, name: str) -> None:
     """With 25 joints, whatever there is to say of them; what is left out is counted."""
     zeros, mask = np.zeros(25), np.ones(25, np.bool_)
     most = 2**62
     state = RobotState(
-        name, most, most, most, name, reason, name, mask, zeros, zeros,
+        name, most, most, most, "estop", reason, name, mask, zeros, zeros,
         CommandEcho(most, most, most, most, most), -most, most, faults,
         BaseAttitude(most, 1.0, 1.0, 1.0, 1.0), most, most, effort_nm=zeros, external_nm=zeros,
     )  # fmt: skip
