@@ -45,27 +45,34 @@ async def measure(network: Network, seconds: float = 10.0, rate_hz: float = RATE
         sent, arrivals = ends[number].sent, ends[1 - number].arrivals
         drawn = (_mean_ms(*counters), _loss_percent(*counters))
         judged.append(judge(way, sent, arrivals, SMALL, seconds, *drawn))
-    to_robot, to_operator = await _fill(hosts, ways, judged)
+    to_robot, to_operator = await _fill(network, judged)
     return Measured(network.profile.name, emulation.name, to_robot, to_operator)
 
 
-async def _fill(
-    hosts: Sequence[EmulatedHost], ways: Sequence[Way], judged: Sequence[WayMeasured]
-) -> list[WayMeasured]:
+async def _fill(network: Network, judged: Sequence[WayMeasured]) -> list[WayMeasured]:
     """With the rate that came through when more was sent, where the link is slow enough to be filled."""
+    hosts = (network.operator, network.robot)
+    ways = (network.profile.ways.to_robot, network.profile.ways.to_operator)
     limits = [way.rate_mbit if way.rate_mbit and way.rate_mbit <= MOST_MBIT else 0.0 for way in ways]
     if not any(limits):
         return list(judged)
     # packets a second; an end that has nothing to fill sends one packet
     rates = [FLOOD_OVER * limit * 1e6 / (8 * FULL) or 1.0 for limit in limits]
     counts = [round(FLOOD_S * rate) if limit else 1 for rate, limit in zip(rates, limits, strict=True)]
+    before = network.emulation.counters()
     ends = await _run(hosts, ways, rates, counts, FULL)
+    after = network.emulation.counters()
+    both = ((before.to_robot, after.to_robot), (before.to_operator, after.to_operator))
+    drawn = [_carried_loss(*counters) for counters in both]
     filled = []
     for number, (way, limit, one) in enumerate(zip(ways, limits, judged, strict=True)):
         if limit:
             came = rate_mbit(ends[1 - number].arrivals, FULL)
-            # what is lost has had its time on the link; what comes twice had it once
-            share = (1.0 - way.loss_percent / 100.0) * (1.0 + way.duplicate_percent / 100.0)
+            # what is lost has had its time on the link; what comes twice had it once. One burst is much
+            # of a short flood: what was drawn counts, where it is known, and not the profile's mean
+            known = drawn[number]
+            lost = way.loss_percent / 100.0 if known is None else known
+            share = (1.0 - lost) * (1.0 + way.duplicate_percent / 100.0)
             one = replace(one, rate_mbit=came, expected_rate_mbit=limit * share)
         filled.append(one)
     return filled
@@ -123,6 +130,15 @@ def _loss_percent(before: Counters, after: Counters) -> float | None:
     if LOSS not in after.dropped or not packets:
         return None
     return 100.0 * (after.dropped[LOSS] - before.dropped.get(LOSS, 0)) / packets
+
+
+def _carried_loss(before: Counters, after: Counters) -> float | None:
+    """The share lost by chance of the packets that the queue let on the link; None where it is not known."""
+    if LOSS not in after.dropped:
+        return None
+    refused = sum(after.dropped[why] - before.dropped.get(why, 0) for why in after.dropped if why != LOSS)
+    carried = after.packets - before.packets - refused
+    return (after.dropped[LOSS] - before.dropped.get(LOSS, 0)) / carried if carried else None
 
 
 def _mean_ms(before: Counters, after: Counters) -> float | None:
