@@ -39,6 +39,7 @@ from slave.guard.tilt import base_loss
 from slave.last_known import EVERY_S, LastKnown, state_file
 from slave.pipeline import SlavePipeline
 from slave.servos import Servos
+from slave.stop_inputs.robot_stops import RobotStops
 
 log = logging.getLogger(__name__)
 
@@ -55,8 +56,13 @@ class Slave:
         notifier: Notifier | None = None,
         *,
         last_known: LastKnown | None = None,
+        stops: RobotStops | None = None,
     ) -> None:
-        """`last_known`: the file that keeps the joints' last angles; None: none does."""
+        """`last_known`: the file that keeps the joints' last angles; None: none does.
+
+        `stops`: the emergency stop inputs, started; None: there are none.
+        """
+        self._stops = stops
         self._config = config
         self._link = link
         self._servos = servos
@@ -140,11 +146,12 @@ class Slave:
             self._notifier.beat(monotonic_ns())  # last, so that a servo or sensor that hangs is noticed too
 
     def _body(self) -> Body:
-        if self._base is None:
-            return Body(drives=self._servos.faults())
-        attitude = self._pipeline.base = self._base.read()
+        attitude = self._pipeline.base = None if self._base is None else self._base.read()
         # the clock after the reading, or a thread's fresh one would be from the future
-        return Body(self._servos.faults(), base_loss(attitude, monotonic_ns(), self._config.guard))
+        now_ns = monotonic_ns()
+        base = None if self._base is None else base_loss(attitude, now_ns, self._config.guard)
+        stops = {} if self._stops is None else self._stops.read(now_ns)
+        return Body(self._servos.faults(), base, stops=stops)
 
     def _brake_drives(self, stop: bool) -> None:
         """On an e-stop the drives also brake by themselves, whatever happens to this process."""
@@ -221,15 +228,20 @@ async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
     before_rad = last_known.before_rad if last_known else None
     servos = config.servos.open(config.skeleton, config.encoders, before_rad)
     base = open_base(config.base)
+    stops = RobotStops(config.estop, servos)
     # after a simulator has been built, which takes long; before any thread starts, so that each has it
     enter_real_time(config.process.realtime_priority)
     try:
         if base is not None:
             base.start()
+        # before the drives are: a robot whose button is pressed at the start begins in an e-stop
+        stops.start()
         audit = Audit(config.link)
         async with open_session(config.link, waits=notifier.waits) as session:
             audit.attach(session)
-            slave = Slave(config, session.link(config.robot), servos, base, notifier, last_known=last_known)
+            slave = Slave(
+                config, session.link(config.robot), servos, base, notifier, last_known=last_known, stops=stops
+            )
             where = ", ".join(config.link.listen or config.link.connect)
             log.info("%s: waiting for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick
@@ -245,5 +257,6 @@ async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
                 write_metrics(replace(slave.metrics(), access=audit.metrics()))
     finally:
         servos.stop()
+        stops.stop()
         if base is not None:
             base.stop()

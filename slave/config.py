@@ -14,6 +14,8 @@ from slave.backends import ServosConfig
 from slave.camera.config import CameraConfig
 from slave.encoders.counts import EncoderConfig
 from slave.guard.config import GuardConfig
+from slave.servos.canopen.config import CanopenConfig
+from slave.stop_inputs.config import EstopConfig
 from slave.track.config import TrackConfig
 
 
@@ -33,6 +35,7 @@ class SlaveConfig(Section):
     profile: str = "nursing"
     loop: LoopConfig = LoopConfig()
     guard: GuardConfig = GuardConfig()
+    estop: EstopConfig = EstopConfig()
     track: TrackConfig = TrackConfig()
     servos: ServosConfig = ServosConfig()
     encoders: EncoderConfig = EncoderConfig()
@@ -54,8 +57,17 @@ class SlaveConfig(Section):
             return error.mistakes
         return [
             *self.guard.mistakes_for(skeleton),
+            *self._wrong_stops(skeleton),
             *self.encoders.mistakes_for(skeleton),
             *self.servos.mistakes_for(skeleton, self.encoders),
             *self.base.mistakes(),
             *self.link.mistakes(),
         ]
+
+    def _wrong_stops(self, skeleton: Skeleton) -> list[ConfigMistake]:
+        try:
+            servos = self.servos.chosen
+        except ConfigError:  # told by the servos
+            return []
+        telling = servos.tell_inputs if isinstance(servos, CanopenConfig) else None
+        return self.estop.mistakes_for(skeleton.joint_names, telling)

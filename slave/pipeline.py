@@ -312,8 +312,8 @@ class SlavePipeline:
     def _faults(self) -> dict[str, str]:
         named = {"base": self._body.base, "name": self._body.namesake, "camera": self.camera_fault}
         # a drive's own fault comes before the guard's doubt of its encoder
-        doubts_and_drives = {**self.guard.doubts, **self._body.drives}
-        return {**doubts_and_drives, **{name: words for name, words in named.items() if words}}
+        others = {**self._body.stops, **self.guard.doubts, **self._body.drives}
+        return {**others, **{name: words for name, words in named.items() if words}}
 
     def _count(self, topic: str, error: CodecError, now_ns: int) -> None:
         count = self.undecodable[topic] = self.undecodable.get(topic, 0) + 1

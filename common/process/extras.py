@@ -5,6 +5,7 @@ from __future__ import annotations
 EXTRAS = {
     "canopen": "simulation",
     "dynamixel_sdk": "dynamixel",
+    "gpiod": "gpio",
     "linuxpy": "v4l2",
 }
 """The extra of pyproject.toml that brings each optional module."""

@@ -1,14 +1,14 @@
-"""Faults of the robot besides its encoders: drives, a base that tilts, another robot of the same name."""
+"""Faults of the robot besides its encoders: drives, base, a namesake; and its emergency stop inputs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """The faults now. Any of them ends motion, and no engage is possible until it is gone."""
+    """The faults now. Any of them ends motion, and no engage is possible until it is gone. `stops` e-stop."""
 
     drives: Mapping[str, str] = field(default_factory=dict)
     """The drives' faults as text, by joint."""
@@ -16,15 +16,25 @@ class Body:
     """What is wrong with how the base stands, or None."""
     namesake: str | None = None
     """Where another robot of the same name is, or None. With two it is unknown which one is commanded."""
+    stops: Mapping[str, str] = field(default_factory=dict)
+    """Emergency stop inputs that are pressed or broken, by name: where each is connected, and why."""
 
     def also(self, drives: Mapping[str, str]) -> Body:
         """The same with further drive faults, by joint."""
-        return Body({**drives, **self.drives}, self.base) if drives else self
+        return replace(self, drives={**drives, **self.drives}) if drives else self
 
     @property
     def first_fault(self) -> str | None:
         """The first fault as text, or None."""
         return self.drive_fault or self.base or self.namesake
+
+    @property
+    def estop(self) -> str | None:
+        """The emergency stop inputs that stop the robot now, as the reason of an e-stop, or None."""
+        for name, why in self.stops.items():
+            more = f", and {len(self.stops) - 1} more" if len(self.stops) > 1 else ""
+            return f"e-stop by {name} ({why}){more}"
+        return None
 
     @property
     def drive_fault(self) -> str | None:

@@ -128,9 +128,10 @@ class Guard:
         for joint in doubted:
             self.counters.doubts[joint] += 1
             self.events.add(Doubt(now_ns, joint, self.doubts[joint]))
-        if uncommanded is not None and self.state is not State.ESTOP:
-            self.counters.losses["uncommanded"] += 1
-            self.estop(now_ns, uncommanded)
+        for what, reason in (("stop input", body.estop), ("uncommanded", uncommanded)):
+            if reason is not None and self.state is not State.ESTOP:
+                self.counters.losses[what] += 1
+                self.estop(now_ns, reason)
         self._body = body.also(joints.placement.differ)
         self._watch(now_ns, self._watches)
         if not joints.seated:
@@ -223,6 +224,8 @@ class Guard:
         if self.state is not State.ESTOP:
             return f"there is no e-stop to reset, the robot is in {self.state}"
         silent = self._joints.life.silence(now_ns)
+        if pressed := self.still_pressed():
+            return pressed
         if not self._joints.seated or silent:
             return silent or "not every encoder has been read yet"
         if not self._joints.at_rest:
@@ -232,6 +235,10 @@ class Guard:
             self._seat_rad = self._joints.seat(seat_rad)
         self._change(now_ns, GuardEvent.RESET, reason)
         return None
+
+    def still_pressed(self) -> str | None:
+        """Why an emergency stop input forbids a reset, or None."""
+        return None if self._body.estop is None else f"{self._body.estop}: release or mend it first"
 
     def home(self, now_ns: int) -> str | None:
         """A person confirms the joint positions. Returns why that is refused, or None."""

@@ -18,7 +18,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["master/joint_angles"],
     ["master/orientation"],
     ["master/suit"],
-    ["slave/camera"],
+    ["slave/camera", "slave/stop_inputs"],
     ["slave/servos", "slave/track"],
     ["slave/limit"],
     ["slave/guard", "slave/attitude"],
@@ -38,9 +38,10 @@ IMPURE = [
     "common/process/*", "common/recording/recorder.py",
     "master/__main__.py", "master/app.py", "master/robot.py",
     "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
+    "slave/stop_inputs/gpio.py",
 ]  # fmt: skip
 """The adapters. Nothing else in common, master and slave may touch a bus, link, clock or event loop."""
-RIM = {"asyncio", "zenoh", "can", "time", "socket", "uvloop", "serial", "canopen", "dynamixel_sdk"}
+RIM = {"asyncio", "zenoh", "can", "time", "socket", "uvloop", "serial", "canopen", "dynamixel_sdk", "gpiod"}
 
 
 def room_of(path: str) -> str:

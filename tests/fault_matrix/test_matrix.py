@@ -15,9 +15,11 @@ from deploy.harness.faults.table import VIRTUAL as FAULTS
 from deploy.harness.faults.virtual import try_on_virtual_clock
 from slave.encoders.agreement import EncoderAgreement
 from slave.encoders.uncommanded import UncommandedMotion
-from slave.guard import GATES, states
+from slave.guard import GATES, Guard, states
+from slave.guard.body import Body
 from slave.guard.states import GuardEvent
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES
+from slave.stop_inputs.rule import StopInput
 
 TABLE = {fault.name: fault for fault in FAULTS}
 BARED = (
@@ -70,6 +72,24 @@ def test_drives_that_differ_from_encoders_go_on_without_the_comparison(
 ) -> None:
     monkeypatch.setattr(EncoderAgreement, "judge", lambda *_: None)
     assert try_on_virtual_clock(TABLE["drive and output encoder differ"]).wrong
+
+
+@pytest.mark.parametrize(
+    ("name", "owner", "part", "by"),
+    [
+        ("stop button", Body, "estop", None),
+        ("stop button", Guard, "still_pressed", lambda _: None),
+        ("stop button tapped", StopInput, "_open", lambda *_: ""),
+        ("stop wire broken", StopInput, "step", lambda self, *a: StopInput._open(self, *a)),
+        ("stop input unplugged", StopInput, "_open", lambda _, now_ns, level, awake: level.on is False),
+        ("stop input silent", StopInput, "_open", lambda _, now_ns, level, awake: level.on is not True),
+    ],
+)
+def test_a_stop_input_s_row_fails_without_what_holds_it(
+    monkeypatch: pytest.MonkeyPatch, name: str, owner: type, part: str, by: object
+) -> None:
+    monkeypatch.setattr(owner, part, by)
+    assert try_on_virtual_clock(TABLE[name]).wrong
 
 
 @pytest.mark.parametrize(

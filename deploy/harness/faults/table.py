@@ -10,12 +10,22 @@ from deploy.harness.faults.judge import FaultOutcome
 from deploy.harness.faults.link import LINK
 from deploy.harness.faults.processes import PROCESSES, ProcessFault, try_with_processes
 from deploy.harness.faults.robot import ROBOT
+from deploy.harness.faults.stop_inputs import STOP_INPUTS
 from deploy.harness.faults.strangers import STRANGERS
 from deploy.harness.faults.suit import SUIT
 from deploy.harness.faults.values import VALUES
 from deploy.harness.faults.virtual import VirtualFault, try_on_virtual_clock
 
-VIRTUAL: tuple[VirtualFault, ...] = (*LINK, *STRANGERS, *VALUES, *SUIT, *ROBOT, *CLOCKS, *ESTOPS)
+VIRTUAL: tuple[VirtualFault, ...] = (
+    *LINK,
+    *STRANGERS,
+    *VALUES,
+    *SUIT,
+    *ROBOT,
+    *CLOCKS,
+    *ESTOPS,
+    *STOP_INPUTS,
+)
 FAULTS: dict[str, FaultRow] = {fault.name: fault for fault in (*VIRTUAL, *PROCESSES)}
 """Every fault, by name."""
 

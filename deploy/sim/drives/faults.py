@@ -7,6 +7,7 @@ from enum import IntEnum
 
 from common.errors import ConfigError, ConfigMistake
 from common.skeleton import Skeleton
+from slave.servos.canopen.status_bits import FOLLOWS, LIMITED, REMOTE, VOLTAGE, WARNING
 
 DEMAND = 0x2010
 """The manufacturer's object: a fault's number written to it happens at once."""
@@ -51,6 +52,16 @@ class DriveFault(IntEnum):
     """It displays profile position, whatever mode is asked for."""
     POSITION_STUCK = 21
     """The drive's position stays what it was."""
+    STO = 22
+    """Safe torque off: "switch on disabled", bit 4 clear, until the input closes again."""
+    STO_FAULT = 23
+    """The same, told as a fault with an emergency message, not to be reset meanwhile; bit 4 stays set."""
+    STO_QUIET = 24
+    """The same, told by nothing but "switch on disabled", and bit 31 of 60FDh."""
+    INPUT_OPEN = 25
+    """The contact at its first digital input (60FDh, bit 16) is open."""
+    INPUTS_SILENT = 26
+    """It sends its digital inputs no more."""
 
     @property
     def option(self) -> str:
@@ -58,6 +69,16 @@ class DriveFault(IntEnum):
         return self.name.lower().replace("_", "-")
 
 
+STATUS_BITS = {
+    DriveFault.NOT_FOLLOWING: (FOLLOWS, 0),
+    DriveFault.LIMIT_ACTIVE: (0, LIMITED),
+    DriveFault.LOCAL: (REMOTE, 0),
+    DriveFault.NO_VOLTAGE: (VOLTAGE, 0),
+    DriveFault.WARNS: (0, WARNING),
+    DriveFault.STO: (VOLTAGE, 0),
+}
+"""Bits of the statusword that a fault clears and sets."""
+IGNORES_TARGETS = (DriveFault.NOT_FOLLOWING, DriveFault.LOCAL, DriveFault.NO_VOLTAGE)
 CODES = {DriveFault.OVER_CURRENT: (0x2310, 0x03), DriveFault.OVER_TEMPERATURE: (0x4310, 0x09)}
 """Emergency code and error register of those that are the drive's own."""
 OPTIONS = {fault.option: fault for fault in DriveFault}

@@ -13,32 +13,23 @@ import canopen
 from canopen.sdo.exceptions import SdoAbortedError
 
 from common.clock import NS_PER_MS
-from deploy.sim.drives.faults import CODES, DEMAND, DriveFault
+from deploy.sim.drives.faults import CODES, DEMAND, IGNORES_TARGETS, STATUS_BITS, DriveFault
 from deploy.sim.drives.machine import after, statusword
+from deploy.sim.drives.mapping import GIVEN, TAKEN, PdoLayout, layout
+from deploy.sim.drives.torque_off import DROPS, STO_EMERGENCY, inputs, without_torque
 from deploy.sim.drives.traits import Reformed, Traits
 from deploy.sim.drives.wire import Send, Wire, dictionary
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION, Power
-from slave.servos.canopen.status_bits import FOLLOWS, LIMITED, REMOTE, VOLTAGE, WARNING
+from slave.servos.canopen.status_bits import LIMITED
 
-_RPDO_COMMUNICATION, _RPDO_ENTRIES, _TPDO_COMMUNICATION, _TPDO_ENTRIES = 0x1400, 0x1600, 0x1800, 0x1A00
+_RPDO, _TPDO, _TPDOS = 0x1400, 0x1800, range(0x1800, 0x1804)
+"""Communication parameters; a PDO's mapping is 200h further on."""
 _INVALID = 0x8000_0000
-_FORMATS = {8: "B", 16: "H", 32: "i"}
-_TAKEN = {0x6040: "controlword", 0x607A: "target"}
-_GIVEN = {0x6041: "statusword", pdo.ENCODER: "encoder", 0x6064: "position"}
-_NOT_MAPPABLE, _PRESENT_STATE = 0x0604_0041, 0x0800_0022
+_PRESENT_STATE = 0x0800_0022
 _BOOT, _PRE_OPERATIONAL, _OPERATIONAL = 0x00, 0x7F, 0x05
 _RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
 _PROFILE_POSITION = 1
-_BITS = {
-    DriveFault.NOT_FOLLOWING: (FOLLOWS, 0),
-    DriveFault.LIMIT_ACTIVE: (0, LIMITED),
-    DriveFault.LOCAL: (REMOTE, 0),
-    DriveFault.NO_VOLTAGE: (VOLTAGE, 0),
-    DriveFault.WARNS: (0, WARNING),
-}
-"""Bits of the statusword that a fault clears and sets."""
-_IGNORES_TARGETS = (DriveFault.NOT_FOLLOWING, DriveFault.LOCAL, DriveFault.NO_VOLTAGE)
 
 
 class SimulatedDrive:
@@ -62,8 +53,8 @@ class SimulatedDrive:
         self._send_frame = send
         self._controlword = 0
         self._pending: bytes | None = None
-        self._rpdo: tuple[struct.Struct, list[str]] | None = None
-        self._tpdo: tuple[struct.Struct, list[str]] | None = None
+        self._pdos: dict[int, PdoLayout] = {}
+        """Of the PDOs that are on, by the index of their communication parameters."""
         self._stuck = 0
         self._beaten_ns = 0
         self._heard_ns: int | None = None
@@ -79,7 +70,7 @@ class SimulatedDrive:
         node: Any = self._node  # half of the library is untyped
         node.add_read_callback(self._read)
         node.add_write_callback(self._write)
-        self._rpdo = self._tpdo = self._pending = self._heard_ns = None
+        self._pdos, self._pending, self._heard_ns = {}, None, None
         # fetched where they are written, as they are needed hundreds of times a second
         self._master_beat = pdo.HEARTBEAT
         self._dead_ns = self._beat_ns = 0
@@ -128,19 +119,24 @@ class SimulatedDrive:
         """Apply what was received since the last SYNC, and report the state."""
         if not self.operational:
             return
-        if self._pending is not None and self._rpdo is not None:
-            layout, names = self._rpdo
-            if len(self._pending) == layout.size:
-                taken = dict(zip(names, layout.unpack(self._pending), strict=True))
+        if self._pending is not None and _RPDO in self._pdos:
+            form, names = self._pdos[_RPDO]
+            if len(self._pending) == form.size:
+                taken = dict(zip(names, form.unpack(self._pending), strict=True))
                 self.target = taken.get("target", self.target)
                 self._command(taken.get("controlword", self._controlword))
             else:
                 self._emergency(0x8210, 0x11)
             self._pending = None
-        if self._tpdo is not None:
-            layout, names = self._tpdo
-            now = {"statusword": self.statusword, "encoder": self.encoder, "position": self.position}
-            self._send(pdo.TPDO1 + self.id, layout.pack(*(now[name] for name in names)))
+        for index, (form, names) in self._pdos.items():
+            if index not in _TPDOS or (index != _TPDO and self.fault is DriveFault.INPUTS_SILENT):
+                continue
+            now = {
+                "statusword": self.statusword, "encoder": self.encoder, "position": self.position,
+                "inputs": inputs(self.fault),
+            }  # fmt: skip
+            code = pdo.TPDO1 + 0x100 * (index - _TPDO)
+            self._send(code + self.id, form.pack(*(now[name] for name in names)))
 
     def beat(self, now_ns: int) -> None:
         """Send a heartbeat or an answer that is due, and miss the master's heartbeat that is overdue."""
@@ -173,6 +169,8 @@ class SimulatedDrive:
         self.fault, self.limited = fault, False
         if fault in CODES:
             self.fail(*CODES[fault])
+        elif fault in (*DROPS, DriveFault.STO_FAULT):
+            self._lose_torque(self.state)
         elif fault is DriveFault.RESTART:
             self.fault = DriveFault.NONE
             self._lose_connection()
@@ -184,13 +182,13 @@ class SimulatedDrive:
     def statusword(self) -> int:
         """6041h."""
         word = statusword(self.state) | (LIMITED if self.limited else 0)
-        clear, set_ = _BITS.get(self.fault, (0, 0))
+        clear, set_ = STATUS_BITS.get(self.fault, (0, 0))
         return word & ~clear | set_
 
     @property
     def follows(self) -> bool:
         """Whether it goes where its target is."""
-        return self.state is Power.ENABLED and self.fault not in _IGNORES_TARGETS
+        return self.state is Power.ENABLED and self.fault not in IGNORES_TARGETS
 
     @property
     def encoder(self) -> int:
@@ -219,11 +217,22 @@ class SimulatedDrive:
         if state is Power.ENABLED and self.value(0x6060) != CYCLIC_SYNCHRONOUS_POSITION:
             state = was
         self.state, self._controlword = state, controlword
+        self._lose_torque(was)
+        state = self.state
         recovered = was is Power.FAULT or (was is Power.QUICK_STOP and state is Power.ENABLED)
         if recovered and state is not was and self.value(0x603F):
             if self.fault in CODES:
                 self.fault = DriveFault.NONE
             self._emergency(0, 0)
+
+    def _lose_torque(self, was: Power) -> None:
+        before, self.state = self.state, without_torque(self.fault, was, self.state)
+        if (
+            self.fault is DriveFault.STO_FAULT
+            and self.state is Power.FAULT
+            and Power.FAULT not in (before, was)
+        ):
+            self._emergency(*STO_EMERGENCY)
 
     def _lose_connection(self) -> None:
         if self.state is Power.ENABLED:
@@ -262,12 +271,14 @@ class SimulatedDrive:
                 return self._serial
             case pdo.ENCODER:
                 return self.encoder
+            case pdo.INPUTS:
+                return inputs(self.fault)
         return None
 
     def _write(self, index: int, subindex: int, data: bytes, **_: object) -> None:
-        if index in (0x1400, 0x1800) and subindex == 1:
+        if index in (_RPDO, *_TPDOS) and subindex == 1:
             self._activate(index, int.from_bytes(data, "little"))
-        elif index in (0x1600, 0x1A00) and (self._rpdo if index == 0x1600 else self._tpdo) is not None:
+        elif index - 0x200 in self._pdos:
             raise SdoAbortedError(_PRESENT_STATE)
         elif index == 0x1016:
             consumer = int.from_bytes(data, "little")
@@ -283,17 +294,9 @@ class SimulatedDrive:
             self.happen(DriveFault(data[0]))
 
     def _activate(self, index: int, cob_id: int) -> None:
-        known = _TAKEN if index == _RPDO_COMMUNICATION else _GIVEN
-        layout = None
-        if not cob_id & _INVALID:
-            entries = index + 0x200
-            mapped = [self.value(entries, sub) for sub in range(1, self.value(entries) + 1)]
-            names = [known.get(entry >> 16, "") for entry in mapped]
-            formats = [_FORMATS.get(entry & 0xFF, "") for entry in mapped]
-            if not mapped or not all(names) or not all(formats):
-                raise SdoAbortedError(_NOT_MAPPABLE)
-            layout = struct.Struct("<" + "".join(formats)), names
-        if index == _RPDO_COMMUNICATION:
-            self._rpdo = layout
-        else:
-            self._tpdo = layout
+        if cob_id & _INVALID:
+            self._pdos.pop(index, None)
+            return
+        entries = index + 0x200
+        mapped = [self.value(entries, sub) for sub in range(1, self.value(entries) + 1)]
+        self._pdos[index] = layout(mapped, TAKEN if index == _RPDO else GIVEN)

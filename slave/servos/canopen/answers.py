@@ -51,6 +51,10 @@ class SyncAnswers:
         """Whether every drive has answered this SYNC."""
         return self._missing == 0
 
+    def statusword(self, drive: int) -> int:
+        """The newest of one drive."""
+        return int(self._table["statusword"][drive])
+
     def begin(self) -> None:
         """A new SYNC: nobody has answered it yet. Values stay until they are overwritten."""
         self._fresh[:] = bytes(len(self._fresh))

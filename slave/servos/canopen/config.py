@@ -14,6 +14,7 @@ from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
 from slave.servos.backend import BackendConfig
+from slave.servos.canopen.emergency import SAFE_TORQUE_OFF
 from slave.servos.canopen.load import bits_per_s, configured_bitrate, too_much
 
 INCREMENTS_PER_TURN = 65536
@@ -65,6 +66,10 @@ class CanopenConfig(BackendConfig):
     drives: dict[str, DriveConfig] = Field(default_factory=dict)
     """The drives by joint: all of them or none. Without any: ids from 1 upwards in the order of the joints,
     the right side on the second bus if there is one, all else on the first."""
+    tell_inputs: list[str] = Field(default_factory=list)
+    """Joints whose drives also send their digital inputs (60FDh) at every SYNC, for `[[estop.inputs]]`."""
+    sto_codes: list[int] = Field(default_factory=lambda: [SAFE_TORQUE_OFF])
+    """Emergency codes by which the drives say that safe torque off (STO) is active; each maker has others."""
     sync_hz: int = Field(50, ge=10, le=200)
     """SYNC: targets out, positions in."""
     node_id: int = Field(127, ge=1, le=127)
@@ -114,9 +119,14 @@ class CanopenConfig(BackendConfig):
         """The number of drives on each bus, and the bits per second that they put on it."""
         drives = list(self.drives_of(skeleton).values())
         counts = {bus.name: sum(drive.bus == bus.name for drive in drives) for bus in self.buses}
+        named = self.drives_of(skeleton).items()
+        telling = {
+            bus.name: sum(drive.bus == bus.name and name in self.tell_inputs for name, drive in named)
+            for bus in self.buses
+        }
         beat_ms = max(self.heartbeat_ms, 1000 // self.sync_hz)
         return {
-            name: (count, bits_per_s(count, self.sync_hz, beat_ms, self.drive_heartbeat_ms))
+            name: (count, bits_per_s(count, self.sync_hz, beat_ms, self.drive_heartbeat_ms, telling[name]))
             for name, count in counts.items()
         }
 
@@ -137,6 +147,10 @@ class CanopenConfig(BackendConfig):
             if name not in skeleton.joint_names:
                 expected = f"a joint of the {skeleton.name} profile"
                 mistakes.append(ConfigMistake(f"{key}.drives.{name}", name, expected))
+        for name in self.tell_inputs:
+            if name not in skeleton.joint_names:
+                expected = f"joints of the {skeleton.name} profile"
+                mistakes.append(ConfigMistake(f"{key}.tell_inputs", name, expected))
         missing = [name for name in skeleton.joint_names if self.drives and name not in self.drives]
         mistakes += [
             ConfigMistake(f"{key}.drives.{name}", NOT_SET, "a drive for each joint") for name in missing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 
@@ -15,7 +16,7 @@ from slave.servos.canopen.cia402 import (
     power,
     towards_enabled,
 )
-from slave.servos.canopen.emergency import Emergency
+from slave.servos.canopen.emergency import HEARTBEAT_MISSED, SAFE_TORQUE_OFF, Emergency
 from slave.servos.canopen.sdo import Exchange, More, Read, Transfer, request
 from slave.servos.canopen.status_bits import wrong_bits
 
@@ -29,6 +30,7 @@ _AGAIN_NS = 20 * NS_PER_MS
 """Before an entry that must change is read again."""
 _UPLOADED = 0x40
 """The least command specifier of an answer that names its entry."""
+_WITHOUT_FAULT = (Power.SWITCH_ON_DISABLED, Power.READY, Power.SWITCHED_ON)
 _BOOTS_APART_NS = 1000 * NS_PER_MS
 """Two boot-ups of one id closer together are of two drives."""
 
@@ -58,8 +60,17 @@ class DriveState:
     """The fault of its encoder as text."""
     since_ns: int = 0
     """When the phase began."""
+    sto_codes: Sequence[int] = (SAFE_TORQUE_OFF,)
+    """Emergency codes that say that safe torque off is active."""
+    torque_off_ns: int = 0
+    """When it said last that safe torque off is active, or behaved as if it were; 0: never."""
+    torque_off: str = ""
+    """What it said."""
+    torqueless: bool = False
+    """It is well, but cannot be enabled: as if its safe torque off input were open."""
     _controlword: int = SHUTDOWN
     _may_reset: bool = False
+    _told_sto: bool = False
     _asked_ns: int = 0
     _step: int = 0
     _tries: int = 0
@@ -78,6 +89,7 @@ class DriveState:
         With `configure` everything is sent anew, and an answer is waited for without end: the caller sets it.
         """
         self.failure, self.emergency, self._may_reset = "", None, may_reset
+        self.torqueless = False
         self.since_ns = now_ns
         self._was_running = self.phase is Phase.RUNNING and not configure
         if not configure and self.configured:
@@ -134,6 +146,16 @@ class DriveState:
             return False
         return True
 
+    def on_emergency(self, message: Emergency, now_ns: int) -> None:
+        """An emergency message: an error, or that all errors are gone."""
+        self.emergency = None if message.over else message
+        self._told_sto = message.code in self.sto_codes
+        if self._told_sto:
+            self.torque_off_ns, self.torque_off = now_ns, f"says: {message.words}"
+        if message.code == HEARTBEAT_MISSED and self.phase is Phase.RUNNING:
+            # told "enable" right after, it would go on as if nothing had been
+            self.fail("has stopped by itself")
+
     def admit(self, now_ns: int) -> None:
         """Checked: from now on it is led to RUNNING."""
         if self.phase is Phase.CHECKING:
@@ -172,6 +194,7 @@ class DriveState:
         elif self.phase is Phase.ENABLING and answered:
             self._enable(state, statusword, now_ns)
         elif self.phase is Phase.RUNNING and answered and state is not Power.ENABLED:
+            self._drop(state, now_ns)
             self.fail(_why_not(state, statusword))
             self._controlword = QUICK_STOP
         return self._controlword
@@ -185,6 +208,7 @@ class DriveState:
             self._controlword = QUICK_STOP
             return
         elif now_ns - self.since_ns > ENABLE_TIMEOUT_NS or (state is Power.FAULT and not self._may_reset):
+            self._drop(state, now_ns)
             self.fail(f"cannot be enabled: it is in {state or 'no state'}")
             self._controlword = QUICK_STOP
             return
@@ -192,6 +216,14 @@ class DriveState:
         self._controlword = towards_enabled(state, self._controlword, self._may_reset, knows_16=knows_16)
         if self._controlword == FAULT_RESET:
             self.emergency = None
+
+    def _drop(self, state: Power | None, now_ns: int) -> None:
+        """It has no torque, or loses it, in this state: a fault, or what safe torque off looks like."""
+        self.torqueless = self._told_sto or state in _WITHOUT_FAULT
+        if self.torqueless:
+            self.torque_off_ns = now_ns
+            if not self._told_sto:
+                self.torque_off = f"has no torque: {state}"
 
     def _ask(self, now_ns: int) -> bytes:
         self._asked_ns = now_ns

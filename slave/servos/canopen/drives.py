@@ -6,6 +6,7 @@ configure (SDO) ▸ operational (NMT) ▸ enable (402) ▸ run: each SYNC takes 
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -19,10 +20,12 @@ from slave.servos.canopen import pdo
 from slave.servos.canopen.answers import SyncAnswers
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drive import DriveState, Phase
-from slave.servos.canopen.emergency import HEARTBEAT_MISSED, emergency
+from slave.servos.canopen.emergency import emergency
 from slave.servos.canopen.second_master import SecondMaster
 from slave.servos.canopen.setup import transfers
+from slave.servos.canopen.signs import DriveSigns
 from slave.servos.canopen.silence import DriveSilence
+from slave.servos.canopen.status_bits import VOLTAGE
 from slave.servos.canopen.supervision import LISTENED, Supervision
 from slave.servos.canopen.targets import DriveTargets
 from slave.servos.canopen.units import DriveUnits
@@ -55,7 +58,7 @@ class Drives:
         self._wiring = DriveWiring(config, skeleton)
         self._units = DriveUnits.of(config, skeleton)
         self._drives = [
-            DriveState(transfers(config, drive, joint))
+            DriveState(transfers(config, drive, joint), sto_codes=config.sto_codes)
             for drive, joint in zip(config.drives_of(skeleton).values(), skeleton.joints, strict=True)
         ]
         count = len(self._drives)
@@ -74,6 +77,8 @@ class Drives:
         self._answers = SyncAnswers(count)
         self._beat_every = max(1, config.heartbeat_ms * config.sync_hz // 1000)
         self._supervision = Supervision(self._drives, self._watch, self._silence)
+        self._inputs = dict.fromkeys(config.tell_inputs, (0, 0))
+        """When each drive's digital inputs came last, and what they were."""
         self._encoder_flags = np.zeros(count, np.uint16)
         self._down: dict[str, str] = {}
         """Why each bus that has failed did, by name."""
@@ -167,11 +172,10 @@ class Drives:
             case pdo.EMERGENCY:
                 message = emergency(data)
                 if message is not None:
-                    drive.emergency = None if message.over else message
-                    if message.code == HEARTBEAT_MISSED and drive.phase is Phase.RUNNING:
-                        # told "enable" right after, it would go on as if nothing had been
-                        drive.fail("has stopped by itself")
+                    drive.on_emergency(message, now_ns)
                     self._update_faults()
+            case pdo.TPDO3 if self._wiring.joints[i] in self._inputs and len(data) == pdo.INPUTS_BYTES:
+                self._inputs[self._wiring.joints[i]] = now_ns, int.from_bytes(data, "little")
             case _:
                 self.unknown += 1
 
@@ -254,8 +258,24 @@ class Drives:
 
     @property
     def failed(self) -> bool:
-        """Whether any drive has failed for good."""
-        return any(drive.phase is Phase.FAILED for drive in self._drives)
+        """Whether any drive has failed for good, otherwise than by lacking torque."""
+        return any(drive.phase is Phase.FAILED and not drive.torqueless for drive in self._drives)
+
+    @property
+    def waiting_for_torque(self) -> bool:
+        """Whether every drive runs, or would with torque; and at least one lacks it."""
+        drives = self._drives
+        lacking = [drive.torqueless for drive in drives]
+        return any(lacking) and all(map(operator.or_, lacking, [d.phase is Phase.RUNNING for d in drives]))
+
+    def signs(self, joint: str) -> DriveSigns:
+        """What the drive of a joint tells of its torque and its digital inputs."""
+        i = self._wiring.joints.index(joint)
+        drive, statusword = self._drives[i], self._answers.statusword(i)
+        return DriveSigns(
+            self._silence.known_ns(i), bool(statusword & VOLTAGE), drive.torque_off_ns, drive.torque_off,
+            *self._inputs.get(joint, (0, 0)),
+        )  # fmt: skip
 
     @property
     def not_running(self) -> dict[str, str]:

@@ -6,6 +6,8 @@ import struct
 from dataclasses import dataclass
 
 NO_ERROR, HEARTBEAT_MISSED = 0x0000, 0x8130
+SAFE_TORQUE_OFF = 0x8A88
+"""maxon EPOS4 ("STO error"). CiA 402 names no code for it, so each maker has another."""
 
 CODES = {
     0x1000: "generic error",
@@ -29,6 +31,7 @@ CODES = {
     0x8210: "a PDO was too short",
     0x8611: "following error",
     0x8612: "position limit reached",
+    SAFE_TORQUE_OFF: "safe torque off is active",
     0xFF01: "fault asked for",
 }
 """The texts by error code."""

@@ -30,6 +30,7 @@ from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drives import Drives
 from slave.servos.canopen.load import WELL, too_much
 from slave.servos.canopen.pdo import RPDO1
+from slave.servos.canopen.signs import DriveSigns
 from slave.servos.canopen.wiring import Outgoing
 from slave.servos.servos import EncoderReading, check_setpoint
 
@@ -130,6 +131,10 @@ class CanopenServos:
         """What drives, encoders and buses say is wrong, by joint."""
         return self._drives.faults
 
+    def signs(self, joint: str) -> DriveSigns:
+        """What the drive of a joint tells of its torque and its digital inputs."""
+        return self._drives.signs(joint)
+
     def quick_stop(self, stop: bool) -> None:
         """Brake and stay, at once; or enable all drives again, those with a fault too (`fault_reset`)."""
         if stop:
@@ -198,6 +203,11 @@ class CanopenServos:
                 bus.read()
             if now_ns >= self._due_ns:
                 self._cycle()
+            if self._drives.waiting_for_torque:
+                # an emergency stop at the start is no reason not to start: the robot begins stopped
+                log.warning("drives are not enabled: %s", self._not_up())
+                self._drives.stop()
+                return
             if self._drives.failed or now_ns > deadline_ns:
                 raise RobotError(self._not_up())
             time.sleep(_POLL_S)

@@ -7,7 +7,7 @@ import math
 from common.skeleton import Joint
 from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION
 from slave.servos.canopen.config import CanopenConfig, DriveConfig, limits_rad
-from slave.servos.canopen.pdo import RPDO1, RPDO_MAPPING, TPDO1, TPDO_MAPPING
+from slave.servos.canopen.pdo import INPUTS_MAPPING, RPDO1, RPDO_MAPPING, TPDO1, TPDO3, TPDO_MAPPING
 from slave.servos.canopen.sdo import Read, Transfer, Write
 
 _INVALID = 0x8000_0000
@@ -39,6 +39,11 @@ def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint) -> list[T
         Write(0x1017, 0, 2, config.drive_heartbeat_ms),
         *_pdo(0x1400, RPDO1 + drive.id, RPDO_MAPPING),
         *_pdo(0x1800, TPDO1 + drive.id | _NO_RTR, TPDO_MAPPING),
+        *(
+            _pdo(0x1802, TPDO3 + drive.id | _NO_RTR, INPUTS_MAPPING)
+            if joint.name in config.tell_inputs
+            else ()
+        ),
         Write(0x6007, 0, 2, _ON_ABORT_QUICK_STOP),
         Write(0x605A, 0, 2, _QUICK_STOP_AND_STAY),
         Write(0x6060, 0, 1, CYCLIC_SYNCHRONOUS_POSITION),

@@ -32,6 +32,10 @@ class DriveSilence:
         """A drive's heartbeat has come."""
         self._beat_ns[drive] = now_ns
 
+    def known_ns(self, drive: int) -> int:
+        """The newest SYNC that this drive answered; 0: none."""
+        return max(0, int(self._known_ns[drive]))
+
     def cycle(self, now_ns: int, fresh: Mask, synced_ns: int) -> None:
         """The drives that are `fresh` (J,) have answered the SYNC of `synced_ns`."""
         self._answered_ns[fresh] = now_ns

@@ -146,6 +146,56 @@ def namesake(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.HOLD  # it goes on only when a person says so
 
 
+# emergency stop inputs
+
+PRESSED = Body(stops={"red button": "gpio line STOP: pressed, or its wire is broken"})
+
+
+@about("Body.estop")
+def pressed_in_every_state(make_rig: MakeRig) -> None:
+    """Nobody commands, no operator is there, the robot has not even begun: the button stops it anyway."""
+    for state in State:
+        rig = make_rig().to(state)
+        rig.body = PRESSED
+        rig.step()
+        assert rig.guard.state is State.ESTOP
+        rig.body = Body()
+        rig.run(0.2)
+        assert rig.guard.state is State.ESTOP  # latched
+    rig = make_rig().to_track()
+    rig.body = PRESSED
+    rig.step()
+    assert "red button (gpio line STOP: pressed" in rig.guard.reason
+    assert not rig.ask(Action.ENGAGE).done
+
+
+@about("Guard.still_pressed")
+def not_reset_while_pressed(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.body = PRESSED
+    rig.run(0.5)
+    reply = rig.ask(Action.RESET, key=KEY)
+    assert not reply.done
+    assert "release or mend it first" in reply.text
+    rig.body = Body()
+    rig.run(0.01)
+    assert rig.ask(Action.RESET, key=KEY).done
+
+
+@about("Body.also")
+def two_faults_at_once(make_rig: MakeRig) -> None:
+    """A drive that differs from its encoder hides neither a pressed button nor another robot of this name."""
+    rig = make_rig()
+    rig.drive_off_rad = np.zeros(rig.joints)
+    rig.step()
+    rig.to_leased()
+    rig.drive_off_rad[ELBOW] = math.radians(2.1)
+    rig.body = Body(namesake="another robot bears this name", stops=PRESSED.stops)
+    rig.run(0.5)
+    assert rig.guard.state is State.ESTOP
+    assert not rig.ask(Action.RESET, key=KEY).done
+
+
 # before it moves
 
 

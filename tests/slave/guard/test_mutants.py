@@ -19,6 +19,7 @@ from slave.encoders import agreement, uncommanded
 from slave.guard import (
     admit,
     align,
+    body,
     challenge,
     control,
     engage,
@@ -106,6 +107,9 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (admit.Situation, "age_ns", lambda *_: 0),
     (watchdog.EncoderLife, "silence", nothing),
     (tilt, "base_loss", nothing),
+    (body.Body, "estop", None),
+    (guard.Guard, "still_pressed", nothing),
+    (body.Body, "also", lambda self, drives: body.Body({**drives, **self.drives}, self.base)),
     (engage, "holder_only", nothing),
     (control, "holder_only", nothing),
     (hmac, "compare_digest", lambda *_: True),
