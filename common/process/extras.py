@@ -7,6 +7,7 @@ EXTRAS = {
     "dynamixel_sdk": "dynamixel",
     "gpiod": "gpio",
     "linuxpy": "v4l2",
+    "evdev": "input",
 }
 """The extra of pyproject.toml that brings each optional module."""
 

@@ -26,7 +26,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["common/link"],
     ["common/latency", "common/reach"],
     ["common/clock_sync", "common/recording"],
-    ["common/wire", "common/process", "common/can", "common/skeleton"],
+    ["common/wire", "common/process", "common/can", "common/skeleton", "common/inputs"],
     ["common/config", "common/metrics", "common/log"],
     ["common"],
 ]  # fmt: skip
@@ -34,14 +34,17 @@ ORDER: Sequence[Sequence[str]] = [
 Rooms on one line do not import each other."""
 
 IMPURE = [
-    "common/clock.py", "common/can/*", "common/link/*", "common/log/handler.py", "common/log/streams.py",
+    "common/clock.py", "common/can/*", "common/inputs/device.py", "common/inputs/reader.py",
+    "common/link/*", "common/log/handler.py", "common/log/streams.py",
     "common/process/*", "common/recording/recorder.py",
     "master/__main__.py", "master/app.py", "master/robot.py",
     "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
     "slave/stop_inputs/gpio.py",
 ]  # fmt: skip
 """The adapters. Nothing else in common, master and slave may touch a bus, link, clock or event loop."""
-RIM = {"asyncio", "zenoh", "can", "time", "socket", "uvloop", "serial", "canopen", "dynamixel_sdk", "gpiod"}
+RIM = {
+    "asyncio", "zenoh", "can", "time", "socket", "uvloop", "serial", "canopen", "dynamixel_sdk", "evdev", "gpiod",
+}  # fmt: skip
 
 
 def room_of(path: str) -> str:

@@ -1,4 +1,4 @@
-"""Where this kernel lacks SocketCAN or netem, TANDEM_KERNEL_RUNNER runs their tests on one that has them."""
+"""Where this kernel lacks SocketCAN, netem or uinput, TANDEM_KERNEL_RUNNER runs their tests on one that has it."""
 
 from __future__ import annotations
 
@@ -70,4 +70,14 @@ def test_the_contract_holds_on_a_kernel_with_socketcan() -> None:
 def test_the_profiles_hold_on_a_kernel_with_netem() -> None:
     said = on_kernel("tests/net/test_netem.py")
     assert re.search(r"::test_\S+ PASSED", said)
+    assert "SKIPPED" not in said
+
+
+def test_pedals_work_on_a_kernel_with_uinput() -> None:
+    if os.access("/dev/uinput", os.W_OK):
+        pytest.skip("this kernel has uinput: its tests have run on it")
+    said = on_kernel("tests/common/inputs/test_uinput.py")
+    if "this kernel has no uinput" in said:
+        pytest.skip("the kernel of TANDEM_KERNEL_RUNNER has no uinput either")
+    assert len(re.findall(r"::test_\S+ PASSED", said)) == 4, said[-5000:]
     assert "SKIPPED" not in said
