@@ -43,7 +43,8 @@ IMPURE = [
 ]  # fmt: skip
 """The adapters. Nothing else in common, master and slave may touch a bus, link, clock or event loop."""
 RIM = {
-    "asyncio", "zenoh", "can", "time", "socket", "uvloop", "serial", "canopen", "dynamixel_sdk", "evdev", "gpiod",
+    "asyncio", "zenoh", "can", "time", "socket", "uvloop", "serial", "canopen", "dynamixel_sdk", "evdev",
+    "gpiod",
 }  # fmt: skip
 
 

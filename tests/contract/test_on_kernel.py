@@ -1,4 +1,4 @@
-"""Where this kernel lacks SocketCAN, netem or uinput, TANDEM_KERNEL_RUNNER runs their tests on one that has it."""
+"""What this kernel lacks (SocketCAN, netem, uinput) is tested by TANDEM_KERNEL_RUNNER on one that has it."""
 
 from __future__ import annotations
 
