@@ -95,12 +95,12 @@ def _pack_command(m: Command) -> tuple[object, ...]:
     return (
         m.robot, m.lease, m.sequence, m.tick, s.sampled_ns, s.frames_in_ns, s.angles_ns, s.put_ns,
         m.deadman_held, fields.pack_mask(m.valid), fields.pack_floats(m.position_rad, m.velocity_rad_s),
-        m.seen_frame, m.seen_ns, fields.shorten(m.doubt, MAX_DOUBT),
+        m.seen_frame, m.seen_ns, fields.shorten(m.doubt, MAX_DOUBT), m.clutch_out,
     )  # fmt: skip
 
 
 def _unpack_command(f: tuple[object, ...], joints: int) -> Command:
-    fields.array(f, 14)
+    fields.array(f, 15)
     lease, sequence, tick, sampled_ns, frames_in_ns, angles_ns, put_ns = fields.counts(f[1:8])
     position_rad, velocity_rad_s = fields.floats(f[10], joints, _POSTURE)
     return Command(
@@ -116,6 +116,7 @@ def _unpack_command(f: tuple[object, ...], joints: int) -> Command:
         fields.count(f[11]),
         fields.count(f[12]),
         fields.text(f[13], MAX_DOUBT),
+        fields.flag(f[14]),
     )
 
 

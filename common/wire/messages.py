@@ -53,6 +53,8 @@ class Command:
     doubt: str = ""
     """Why nobody should engage on this posture, in words (a zero pose that was not taken, a node that lies);
     empty where the operator's side has nothing against it."""
+    clutch_out: bool = False
+    """The operator has released the clutch: he repositions himself, and is not to be followed meanwhile."""
     operator: str = ""
     """On whose key it arrived (`common.wire.sender`). Not on the wire: the receiver fills it in."""
 

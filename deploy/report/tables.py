@@ -10,7 +10,13 @@ from rich.text import Text
 
 UNKNOWN = "–"
 """Stands where there is no value."""
-GUARD_STYLE = {"track": "bold green", "align": "bold cyan", "hold": "yellow", "estop": "bold red"}
+GUARD_STYLE = {
+    "track": "bold green",
+    "align": "bold cyan",
+    "hold": "yellow",
+    "clutch": "yellow",
+    "estop": "bold red",
+}
 
 
 def plain_table(first: str, *others: str, title: str = "") -> Table:

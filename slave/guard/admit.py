@@ -162,6 +162,8 @@ class CommandGate:
         """(J,) joints that the newest accepted command gives a valid angle of."""
         self.operator_doubt = ""
         """Why the master advises against an engage, by that command; empty where it does not."""
+        self.clutch_out = False
+        """Whether the operator has released the clutch, by that command."""
         self.arrived_ns: int | None = None
         """Arrival of the last accepted command, None where there was none since the last loss."""
         self.refusal = ""
@@ -195,6 +197,7 @@ class CommandGate:
         self.lease.renew(received_ns)
         self._newest_sequence, self.arrived_ns, self.refusal = command.sequence, received_ns, ""
         self.valid, self.operator_doubt = command.valid.copy(), command.doubt
+        self.clutch_out = command.clutch_out
         if command.valid.any():
             self._somebody_ns = received_ns
         return admission

@@ -54,6 +54,8 @@ class GuardConfig(Section):
     """How long every valid joint must have been aligned before `track` begins."""
     align_timeout_s: float = Field(15.0, gt=0.0, le=120.0)
     """`align` that takes longer ends in `hold`."""
+    clutch_max_s: float = Field(60.0, gt=0.0, le=600.0)
+    """An operator who releases the clutch for longer than this must engage again."""
     jump_window_rad: float = Field(0.7, gt=0.0, le=4.0)
     """When in `track` any joint is further than this from its target, all come back at the speed of `align`.
     Followed motion stays within 0.55 (measured: three profiles, `latest` and `predict`, 60 ms one way)."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from slave.guard.admit import CommandGate
+from slave.guard.joints import JointReadings
 from slave.guard.states import MOVING, State
 
 
@@ -24,15 +26,10 @@ class Readiness:
     """What is wrong with the encoders."""
     body_fault: str | None
     """What is wrong with the drives or the base."""
-    operator_doubt: str
-    """Why the operator's side advises against it, by its last command; empty where it does not."""
-    any_valid: bool
-    """Whether the last command has a valid joint."""
-    unsettled: str | None
-    """The doubted joint whose encoder does not agree yet."""
-    at_rest: bool
-    strayed: str | None
-    """The joint that is not where it is held."""
+    commands: CommandGate
+    """The last accepted command."""
+    joints: JointReadings
+    """Where the joints are, and are held."""
 
 
 Condition = Callable[[Readiness], str | None]
@@ -43,6 +40,8 @@ def _state(at: Readiness) -> str | None:
         return at.reason
     if at.state is State.ESTOP:
         return "the e-stop is latched: reset it first"
+    if at.state is State.CLUTCH:
+        return "already engaged: the robot follows again once the clutch is pressed"
     return f"already in {at.state}" if at.state in MOVING else None
 
 
@@ -62,11 +61,15 @@ def _command(at: Readiness) -> str | None:
 
 
 def _operator_side(at: Readiness) -> str | None:
-    return at.operator_doubt or None
+    return at.commands.operator_doubt or None
+
+
+def _clutch(at: Readiness) -> str | None:
+    return "the clutch is released: press it, and hold it" if at.commands.clutch_out else None
 
 
 def _valid(at: Readiness) -> str | None:
-    return None if at.any_valid else "no joint of the last command is valid"
+    return None if at.commands.valid.any() else "no joint of the last command is valid"
 
 
 def _encoder(at: Readiness) -> str | None:
@@ -78,19 +81,19 @@ def _body(at: Readiness) -> str | None:
 
 
 def _unsettled(at: Readiness) -> str | None:
-    return at.unsettled
+    return at.joints.plausible.unsettled()
 
 
 def _rest(at: Readiness) -> str | None:
-    return None if at.at_rest else "still braking"
+    return None if at.joints.at_rest else "still braking"
 
 
 def _strayed(at: Readiness) -> str | None:
-    return at.strayed
+    return at.joints.strayed()
 
 
 CONDITIONS: tuple[Condition, ...] = (
-    _state, _holder, _command, _operator_side, _valid, _encoder, _body, _unsettled, _rest, _strayed,
+    _state, _holder, _command, _operator_side, _clutch, _valid, _encoder, _body, _unsettled, _rest, _strayed,
 )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from common.clock import to_ns, to_s
+from common.clock import to_ns
 from common.clock_sync import Offset
 from common.errors import ConfigError
 from common.quaternion import Array
@@ -17,13 +17,14 @@ from slave.guard.admit import DEADMAN, GATES, Admission, CommandGate, Gate
 from slave.guard.align import AlignProgress
 from slave.guard.body import WELL, Body
 from slave.guard.config import GuardConfig
+from slave.guard.elapsed import StepTime
 from slave.guard.engage import Readiness, refusal
 from slave.guard.events import Change, Clamp, Doubt, GuardCounters, Journal
 from slave.guard.joints import JointReadings
 from slave.guard.lease import DrawToken, Lease, random_token
 from slave.guard.permission import Permission
 from slave.guard.resting import RestingJoints
-from slave.guard.states import MOVING, GuardEvent, State, next_state
+from slave.guard.states import ENGAGED, MOVING, GuardEvent, State, next_state
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES, LossWatch, Signs, first_loss
 
 
@@ -63,8 +64,10 @@ class Guard:
         self._arrival_watches = tuple(arrival_watches)
         self._watches = (*arrival_watches, *body_watches)
         self._command_timeout_ns = to_ns(config.command_timeout_s)
+        self._clutch_max_ns = to_ns(config.clutch_max_s)
+        self._clutch_ns = 0
         self._body = WELL
-        self._stepped_ns: int | None = None
+        self._step_time = StepTime(config.max_step_s, self.counters)
         self._seat_rad: Array | None = None
 
     @property
@@ -102,6 +105,8 @@ class Guard:
         admission = self._commands.judge(command, received_ns, now_ns, master_offset)
         if admission.gate == DEADMAN:
             self.lose(now_ns, DEADMAN, admission.reason)
+        elif admission.accepted:
+            self._clutch(now_ns)
         return admission
 
     # the servo loop
@@ -120,7 +125,7 @@ class Guard:
 
         `drive_rad` (J,): the same angles by the drives' own encoders, where they have any.
         """
-        dt_s = self._elapsed_s(now_ns)
+        dt_s = self._step_time.elapsed_s(now_ns)
         joints = self._joints
         doubted, uncommanded = joints.read(
             position_rad, encoder_valid, encoder_ns, drive_rad, moving=self.state in MOVING
@@ -161,8 +166,8 @@ class Guard:
             self.lose(now_ns, "align", overdue)
 
     def lose(self, now_ns: int, what: str, reason: str) -> None:
-        """Hold, where the robot moves: something was lost."""
-        if self.state in MOVING:
+        """Hold, where somebody has engaged the robot: something was lost."""
+        if self.state in ENGAGED:
             self.counters.losses[what] += 1
             self._change(now_ns, GuardEvent.LOSS, reason)
 
@@ -187,26 +192,9 @@ class Guard:
 
     def engage(self, operator: str, now_ns: int) -> str | None:
         """Begin to move to the operator's posture; or why not."""
-        arrival = first_loss(self._arrival_watches, self._signs(now_ns))
-        joints, commands = self._joints, self._commands
-        why = refusal(
-            Readiness(
-                state=self.state,
-                reason=self.reason,
-                operator=operator,
-                holder=self.operator,
-                command_loss=arrival[1] if arrival else None,
-                encoder_loss=joints.life.silence(now_ns),
-                body_fault=self._body.first_fault,
-                unsettled=joints.plausible.unsettled(),
-                operator_doubt=commands.operator_doubt,
-                any_valid=bool(commands.valid.any()),
-                at_rest=joints.at_rest,
-                strayed=joints.strayed(),
-            )
-        )
+        why = self._refusal(operator, self.state, now_ns)
         if why is None:
-            joints.plausible.trust()
+            self._joints.plausible.trust()
             self._progress.begin(now_ns)
             self._change(now_ns, GuardEvent.ENGAGE, f"engaged by {operator}")
         return why
@@ -250,17 +238,41 @@ class Guard:
 
     # the rest is the guard's own
 
+    def _clutch(self, now_ns: int) -> None:
+        """Stand while the operator repositions himself. Go slowly to his posture once he presses again."""
+        if self._commands.clutch_out:
+            self._clutch_ns = self._clutch_ns if self.state is State.CLUTCH else now_ns
+            self._change(now_ns, GuardEvent.CLUTCH_OUT, "clutch: stands until it is pressed again")
+        elif self.state is State.CLUTCH and self._joints.at_rest:
+            why = self._refusal(self.operator, State.HOLD, now_ns)
+            if why is not None:
+                self.lose(now_ns, "clutch", f"clutch pressed, but {why}")
+                return
+            self._progress.begin(now_ns)
+            self._change(now_ns, GuardEvent.CLUTCH_IN, f"clutch pressed by {self.operator}")
+
+    def _refusal(self, operator: str, state: State, now_ns: int) -> str | None:
+        """Why the robot may not begin to move for this operator, were it in that state; None where it may."""
+        arrival = first_loss(self._arrival_watches, self._signs(now_ns))
+        return refusal(
+            Readiness(
+                state, self.reason, operator, self.operator, arrival[1] if arrival else None,
+                self._joints.life.silence(now_ns), self._body.first_fault, self._commands, self._joints,
+            )
+        )  # fmt: skip
+
     def _signs(self, now_ns: int) -> Signs:
         commands = self._commands
         return Signs(
             now_ns, self.lease.token != 0, commands.arrived_ns, commands.somebody_ns(now_ns),
             self._command_timeout_ns, commands.refusal, self._joints.life, self._joints.plausible.too_many(),
-            self._body, doubt=commands.operator_doubt,
+            self._body, self._clutch_ns if self.state is State.CLUTCH else None, self._clutch_max_ns,
+            commands.operator_doubt,
         )  # fmt: skip
 
     def _watch(self, now_ns: int, watches: Sequence[LossWatch]) -> None:
         self.lease.lapse(now_ns)
-        if self.state not in MOVING:
+        if self.state not in ENGAGED:
             return
         loss = first_loss(watches, self._signs(now_ns))
         if loss is not None:
@@ -276,15 +288,6 @@ class Guard:
             self.episode += 1
         if after in (State.HOLD, State.ESTOP):
             self._commands.arrived_ns = None
-
-    def _elapsed_s(self, now_ns: int) -> float:
-        before_ns, self._stepped_ns = self._stepped_ns, now_ns
-        if before_ns is None:
-            return 0.0
-        dt_s = to_s(now_ns - before_ns)
-        if not 0.0 <= dt_s <= self._config.max_step_s:
-            self.counters.late_steps += 1
-        return min(max(dt_s, 0.0), self._config.max_step_s)
 
     def _try_to_seat(self, now_ns: int) -> None:
         """Hold the joints where they stand, once that is known of every one."""

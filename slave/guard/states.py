@@ -16,6 +16,8 @@ class State(StrEnum):
     """Moves slowly to the operator's posture."""
     TRACK = "track"
     """Follows the operator within the joints' limits."""
+    CLUTCH = "clutch"
+    """Brakes to standstill and stays there until the operator, who never let go, presses the clutch again."""
     ESTOP = "estop"
     """Brakes to standstill and stays there until it is reset."""
 
@@ -28,6 +30,8 @@ class GuardEvent(StrEnum):
     ALIGNED = "every joint within its window"
     DISENGAGE = "disengage"
     LOSS = "loss of lease, deadman, command or encoder"
+    CLUTCH_OUT = "clutch released"
+    CLUTCH_IN = "clutch pressed again"
     ESTOP = "e-stop"
     RESET = "reset"
 
@@ -40,6 +44,11 @@ TRANSITIONS: dict[tuple[State, GuardEvent], State] = {
     (State.ALIGN, GuardEvent.LOSS): State.HOLD,
     (State.TRACK, GuardEvent.DISENGAGE): State.HOLD,
     (State.TRACK, GuardEvent.LOSS): State.HOLD,
+    (State.ALIGN, GuardEvent.CLUTCH_OUT): State.CLUTCH,
+    (State.TRACK, GuardEvent.CLUTCH_OUT): State.CLUTCH,
+    (State.CLUTCH, GuardEvent.CLUTCH_IN): State.ALIGN,
+    (State.CLUTCH, GuardEvent.DISENGAGE): State.HOLD,
+    (State.CLUTCH, GuardEvent.LOSS): State.HOLD,
     **{(state, GuardEvent.ESTOP): State.ESTOP for state in State},
     (State.ESTOP, GuardEvent.RESET): State.HOLD,
 }
@@ -47,6 +56,8 @@ TRANSITIONS: dict[tuple[State, GuardEvent], State] = {
 
 MOVING = frozenset({State.ALIGN, State.TRACK})
 """The only states in which the robot follows anybody."""
+ENGAGED = MOVING | {State.CLUTCH}
+"""The states that end with any loss: from there on somebody must engage again."""
 
 
 def next_state(state: State, event: GuardEvent) -> State:

@@ -66,6 +66,9 @@ class Signs:
     implausible: str | None
     """More encoders than may be do not agree with the setpoint."""
     body: Body
+    clutch_ns: int | None = None
+    """Since when the robot waits for the operator's clutch; None where it does not."""
+    clutch_max_ns: int = 0
     doubt: str = ""
     """Why the master advises against an engage; empty where it does not."""
 
@@ -102,6 +105,12 @@ def _valid(signs: Signs) -> str | None:
     return f"no joint has been valid for {to_s(age_ns):.2f} s: check the operator's suit"
 
 
+def _clutch(signs: Signs) -> str | None:
+    if signs.clutch_ns is None or abs(signs.now_ns - signs.clutch_ns) <= signs.clutch_max_ns:
+        return None
+    return f"the clutch was released for more than {to_s(signs.clutch_max_ns):g} s"
+
+
 def _encoder(signs: Signs) -> str | None:
     return signs.encoders.silence(signs.now_ns)
 
@@ -127,6 +136,7 @@ ARRIVAL_WATCHES: tuple[LossWatch, ...] = (
     LossWatch("lease", _lease),
     # commands without one valid joint come from nobody: a suit that is heard again must not move the robot
     LossWatch("valid", _valid),
+    LossWatch("clutch", _clutch),
 )
 """Looked at in every step, and before a command is judged: what comes after a gap must not hide the gap."""
 BODY_WATCHES: tuple[LossWatch, ...] = (

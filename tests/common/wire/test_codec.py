@@ -76,6 +76,7 @@ def commands(draw: st.DrawFn, joints: int = 25) -> Command:
         velocity_rad_s=draw(values(joints, RATE_LIMIT_RAD_S)),
         seen_frame=draw(counts),
         doubt=draw(st.text(max_size=MAX_DOUBT)),
+        clutch_out=draw(flags),
     )
 
 

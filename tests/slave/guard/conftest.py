@@ -199,6 +199,9 @@ class Rig:
                 self.to_align()
             case State.TRACK:
                 self.to_track()
+            case State.CLUTCH:
+                self.to_track()
+                self.send(clutch_out=True)
             case State.ESTOP:
                 self.to_leased()
                 self.guard.estop(self.now_ns)

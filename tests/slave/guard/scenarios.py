@@ -252,6 +252,9 @@ about("condition _valid")(
 )
 about("condition _encoder")(not_engaged(deaf))
 about("condition _body")(not_engaged(sick))
+about("condition _clutch")(
+    not_engaged(lambda rig: rig.to_leased().run(0.1, clutch_out=True)),
+)
 about("condition _rest")(not_engaged(braking))
 about("condition _strayed", "JointReadings.strayed")(not_engaged(astray))
 about("condition _unsettled", "EncoderPlausibility.unsettled")(not_engaged(doubtful))
@@ -317,7 +320,7 @@ def brakes(make_rig: MakeRig) -> None:
     assert (rig.setpoints[-1].velocity_rad_s == 0.0).all()
 
 
-@about("Guard._elapsed_s")
+@about("StepTime.elapsed_s")
 def late_step(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
     rig.target = rig.skeleton.lower_rad.copy()
@@ -515,6 +518,48 @@ def wrong_key(make_rig: MakeRig) -> None:
     assert not rig.ask(Action.RESET, key="wrong").done
 
 
+# the clutch
+
+
+@about(f"({State.TRACK}, clutch released)", "Guard._clutch")
+def repositions(make_rig: MakeRig) -> None:
+    """The operator goes elsewhere with the clutch released: the robot stands, and is still engaged."""
+    rig = make_rig().to_track()
+    rig.send(clutch_out=True)
+    rig.target = rig.target.copy()
+    rig.target[ELBOW] += 0.5
+    rig.run(0.5, clutch_out=True)
+    assert rig.guard.state is State.CLUTCH
+    stood_rad = rig.measured.copy()
+    rig.run(0.5, clutch_out=True)
+    assert (rig.measured == stood_rad).all()
+
+
+@about(f"({State.ALIGN}, clutch released)")
+def repositions_while_it_aligns(make_rig: MakeRig) -> None:
+    rig = make_rig().to(State.ALIGN)
+    rig.send(clutch_out=True)
+    assert rig.guard.state is State.CLUTCH
+
+
+@about(f"({State.CLUTCH}, clutch pressed again)")
+def follows_again(make_rig: MakeRig) -> None:
+    """Slowly, and without anybody's engage."""
+    rig = make_rig().to(State.CLUTCH)
+    rig.send()
+    assert rig.guard.state is State.ALIGN
+    rig.run(0.5)
+    assert rig.guard.state is State.TRACK
+
+
+@about("watch clutch")
+def repositions_for_too_long(make_rig: MakeRig) -> None:
+    rig = make_rig(GuardConfig(clutch_max_s=1.0)).to(State.CLUTCH)
+    rig.run(1.1, clutch_out=True)
+    rig.run(0.5)
+    assert rig.guard.state is State.HOLD
+
+
 # states
 
 
@@ -532,7 +577,7 @@ def ends_motion(state: State, end: Callable[[Any], None]) -> Scenario:
     return scenario
 
 
-for _state in (State.ALIGN, State.TRACK):
+for _state in (State.ALIGN, State.TRACK, State.CLUTCH):
     about(f"({_state}, disengage)")(ends_motion(_state, lambda rig: rig.ask(Action.DISENGAGE)))
     about(f"({_state}, loss of lease, deadman, command or encoder)")(
         ends_motion(_state, lambda rig: rig.ask(Action.RELEASE))

@@ -63,6 +63,11 @@ def encoder_doubted(rig: Any) -> None:
     rig.run(0.1)
 
 
+def clutch_out(rig: Any) -> None:
+    rig.to_leased()
+    rig.run(0.1, clutch_out=True)
+
+
 def still_moving(rig: Any) -> None:
     rig.to_track()
     rig.target = rig.skeleton.lower_rad.copy()
@@ -84,6 +89,7 @@ CASES: list[tuple[Callable[..., Any], Callable[[Any], None], str]] = [
     (engage._holder, stranger, "ben holds the lease"),
     (engage._command, silent_master, "no command for"),
     (engage._operator_side, operator_side_refuses, "waist: turned at 30°/s in the zero pose"),
+    (engage._clutch, clutch_out, "the clutch is released"),
     (engage._valid, all_nodes_lost, "no joint of the last command is valid"),
     (engage._encoder, encoder_lost, "left_elbow_pitch"),
     (engage._body, drive_faulty, "the drive of left_elbow_pitch: over-current"),

@@ -18,7 +18,7 @@ from hypothesis.stateful import (
 from common.wire.messages import Action
 from slave.guard import State
 from slave.guard.body import WELL, Body
-from slave.guard.states import MOVING
+from slave.guard.states import ENGAGED, MOVING
 
 KEY = "a key kept at the robot"
 EPS = 1e-9
@@ -99,8 +99,8 @@ class Machine(RuleBasedStateMachine):
         reply = self.rig.ask(action, who)
         if action is not Action.STATUS and reply.done:
             assert who == holder
-            assert self.rig.guard.state not in MOVING
-        elif before not in MOVING:
+            assert self.rig.guard.state not in ENGAGED
+        elif before not in ENGAGED:
             assert self.rig.guard.state is before
         self.note()
 
@@ -128,8 +128,11 @@ class Machine(RuleBasedStateMachine):
         late_ms=st.sampled_from([-200, -20, 0, 10, 290, 400]),
         deadman=st.sampled_from([True, True, True, False]),
         lost=st.sampled_from([(), (), (6,), (0, 6, 20), tuple(range(25))]),
+        clutch_out=st.sampled_from([False, False, True]),
     )
-    def command(self, share: float, rate: float, late_ms: int, deadman: bool, lost: tuple[int, ...]) -> None:
+    def command(
+        self, share: float, rate: float, late_ms: int, deadman: bool, lost: tuple[int, ...], clutch_out: bool
+    ) -> None:
         rig = self.rig
         rig.target = self.posture(share)
         valid = np.ones(rig.joints, np.bool_)
@@ -139,6 +142,7 @@ class Machine(RuleBasedStateMachine):
             rig.command(
                 sampled_ns=rig.now_ns - late_ms * 1_000_000,
                 deadman_held=deadman,
+                clutch_out=clutch_out,
                 valid=valid,
                 velocity_rad_s=np.full(rig.joints, rate),
             )
@@ -234,18 +238,18 @@ class Machine(RuleBasedStateMachine):
         assert (beyond <= np.where(jumped, np.inf, np.maximum(before_beyond, 0.0))).all()
         slower = np.maximum(np.abs(before.velocity_rad_s) - gain, 0.0)
         assert (np.abs(v) <= slower + EPS)[doubted].all(), "a joint whose encoder is not believed moves on"
-        if not self.may_move:
+        if not self.may_move or rig.guard.state is State.CLUTCH:
             assert np.allclose(np.abs(v), slower, rtol=0, atol=EPS), "moves though nobody is engaged"
         elif rig.guard.state is State.ALIGN:
             assert (np.abs(v) <= rig.config.align_velocity_rad_s + EPS).all()
 
     def note(self) -> None:
         """Motion that has ended stays ended until the next `engage`."""
-        self.may_move = self.may_move and self.rig.guard.state in MOVING
+        self.may_move = self.may_move and self.rig.guard.state in ENGAGED
 
     @invariant()
     def moving_needs_engage_and_a_lease(self) -> None:
-        if self.rig.guard.state in MOVING:
+        if self.rig.guard.state in ENGAGED:
             assert self.may_move
             assert self.rig.guard.operator
 

@@ -22,6 +22,7 @@ from slave.guard import (
     body,
     challenge,
     control,
+    elapsed,
     engage,
     guard,
     joints,
@@ -98,7 +99,7 @@ def free_for_all(self: lease.Lease, operator: str, now_ns: int) -> int:
     return self.token
 
 
-def unbounded_s(self: guard.Guard, now_ns: int) -> float:
+def unbounded_s(self: elapsed.StepTime, now_ns: int) -> float:
     before_ns, self._stepped_ns = self._stepped_ns, now_ns
     return 0.0 if before_ns is None else (now_ns - before_ns) * 1e-9
 
@@ -137,7 +138,8 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (uncommanded.UncommandedMotion, "_for_long", lambda self, *_: np.zeros(len(self._names), np.bool_)),
     (joints.JointReadings, "strayed", nothing),
     (resting.RestingJoints, "rest", nothing),
-    (guard.Guard, "_elapsed_s", unbounded_s),
+    (elapsed.StepTime, "elapsed_s", unbounded_s),
+    (guard.Guard, "_clutch", nothing),
     (guard.Guard, "_believed", lambda self: np.ones_like(self._commands.valid)),
     (tracker.TrackTarget, "finite", True),
 )

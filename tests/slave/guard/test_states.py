@@ -4,15 +4,21 @@ import pytest
 
 import slave.guard
 from slave.guard import GATES, State
-from slave.guard.states import MOVING, TRANSITIONS, GuardEvent, mermaid, next_state
+from slave.guard.states import ENGAGED, MOVING, TRANSITIONS, GuardEvent, mermaid, next_state
 
 README = (Path(slave.guard.__file__).parent / "README.md").read_text("utf-8")
 
 
-def test_only_engage_from_hold_begins_to_move() -> None:
+def test_only_engage_from_hold_begins_to_move_and_the_clutch_of_a_robot_that_is_engaged() -> None:
     assert {pair for pair, after in TRANSITIONS.items() if after is State.ALIGN} == {
-        (State.HOLD, GuardEvent.ENGAGE)
+        (State.HOLD, GuardEvent.ENGAGE),
+        (State.CLUTCH, GuardEvent.CLUTCH_IN),
     }
+
+
+def test_only_a_robot_that_moves_can_wait_for_the_clutch() -> None:
+    before = {state for (state, _), after in TRANSITIONS.items() if after is State.CLUTCH}
+    assert before == MOVING
 
 
 def test_only_alignment_leads_to_track() -> None:
@@ -37,9 +43,9 @@ def test_reset_leads_to_hold_and_only_from_estop() -> None:
         assert next_state(state, GuardEvent.RESET) is state
 
 
-@pytest.mark.parametrize("state", sorted(MOVING))
+@pytest.mark.parametrize("state", sorted(ENGAGED))
 @pytest.mark.parametrize("event", [GuardEvent.LOSS, GuardEvent.DISENGAGE])
-def test_every_loss_while_moving_holds(state: State, event: GuardEvent) -> None:
+def test_every_loss_while_engaged_holds(state: State, event: GuardEvent) -> None:
     assert next_state(state, event) is State.HOLD
 
 
