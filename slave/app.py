@@ -73,7 +73,7 @@ class Slave:
             config, place=place(endpoints), last_known_rad=last_known.before_rad if last_known else None
         )
         self._last_known = last_known
-        self._pipeline.warn = log.warning
+        self._pipeline.unread.warn = log.warning
         self._stopped = False
         self._ticks_expected = 0
         self._ticks_missed = 0
@@ -89,6 +89,10 @@ class Slave:
         link.answer(CLOCK, self._on_clock)
         link.answer(PATH, lambda question, _: answer_probe(question))
         link.watch_presence(self._on_presence)
+
+    def on_revoked(self, names: frozenset[str]) -> None:
+        """Take the names of the revoked certificates."""
+        self._pipeline.on_revoked(names, monotonic_ns())
 
     async def run(self) -> None:
         """Run the servo loop and publish statistics until cancelled."""
@@ -206,7 +210,7 @@ class Slave:
             early=pipeline.traffic.one_way.clamped,
             unmoved=pipeline.traffic.journeys.unmoved,
             offset=OffsetMetrics(to_ms(offset.offset_ns), to_ms(offset.bound_ns), offset.trusted),
-            undecodable=dict(pipeline.undecodable),
+            undecodable=dict(pipeline.unread.counts),
             base=self._base.counters() if self._base else {},
             servos=self._servos.metrics(),
             video=self._camera.metrics() if self._camera else None,
@@ -242,6 +246,7 @@ async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
             slave = Slave(
                 config, session.link(config.robot), servos, base, notifier, last_known=last_known, stops=stops
             )
+            session.watch_revoked(slave.on_revoked)
             where = ", ".join(config.link.listen or config.link.connect)
             log.info("%s: waiting for a master at %s", config.robot, where)
             # the simulator came after the first freeze: to collect what it built takes longer than a tick

@@ -14,33 +14,29 @@ import numpy as np
 from common.clock_sync import Offset, SlaveExchange
 from common.errors import CodecError
 from common.link.namesakes import Namesakes
-from common.log.throttle import LogThrottle
+from common.link.revoked import revoked_operators
 from common.quaternion import Array
 from common.wire.codec import decode, encode
-from common.wire.control import OPEN
 from common.wire.instance import draw_instance
 from common.wire.lease import lease_id
 from common.wire.messages import (
-    Action,
     BaseAttitude,
     ClockQuery,
     Command,
-    ControlReply,
-    ControlRequest,
     Mask,
     RobotState,
 )
-from common.wire.stop import StopAnswer, pack_stop_answer, read_stop
 from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
 from slave.guard import Admission, Guard, Permission
 from slave.guard.body import WELL, Body
-from slave.guard.control import Control, not_on_own_key
+from slave.guard.control import Control
 from slave.guard.lease import DrawToken, random_token
 from slave.guard.states import MOVING, State
 from slave.limit.limit import Setpoint, SetpointLimiter
 from slave.limit.nearest import NearestPosture
 from slave.limit.pace import Pace
+from slave.requests import Requests, UnreadMessages
 from slave.servos.servos import EncoderReading
 from slave.track import Tracker, TrackTarget
 from slave.track.config import make_tracker
@@ -67,10 +63,7 @@ class SlavePipeline:
         """
         self.robot = config.robot
         self.instance = instance or draw_instance()
-        self.place = place
-        self.warn: Callable[[str], None] = lambda _: None
-        """Called, at most once a second, with a warning about messages that cannot be read."""
-        self._throttle = LogThrottle()
+        self.unread = UnreadMessages(config.robot)
         self.namesakes = Namesakes(self.instance)
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
@@ -91,7 +84,10 @@ class SlavePipeline:
         """The guard's episode when the tracker was reset last."""
         self.clock = SlaveExchange()
         self.traffic = CommandTraffic()
-        self.undecodable: dict[str, int] = {}
+        self._requests = Requests(
+            self.instance, place, self.control, self.clock, traffic=self.traffic, namesakes=self.namesakes,
+            unread=self.unread,
+        )  # fmt: skip
         self.on_accepted: Callable[[Command, int, Offset], None] | None = None
         """Called with every command that the guard accepts, now_ns, and the clocks' offset."""
         self.camera_fault = ""
@@ -113,7 +109,7 @@ class SlavePipeline:
             command = decode(payload, Command, len(self.skeleton.joints))
             command = replace(command, operator=sender or "")
         except CodecError as error:
-            self._count("command", error, now_ns)
+            self.unread.count("command", error, now_ns)
             return
         offset = self.clock.estimator.estimate(now_ns)
         # another operator's stamps are of another clock
@@ -141,58 +137,18 @@ class SlavePipeline:
 
     def on_stop(self, payload: bytes, now_ns: int) -> bytes:
         """Answer a client that may only stop the robot or ask for its status; every request is answered."""
-        return self._answer(payload, now_ns, OPEN)
-
-    def _stopped(self, by: str, now_ns: int) -> bytes:
-        """Stop, and answer in the form that every version reads."""
-        reply = self.control.answer(self.guard, ControlRequest(self.robot, Action.ESTOP, by), now_ns)
-        return pack_stop_answer(StopAnswer(reply.done, reply.guard, reply.text, self.instance))
+        return self._requests.answer(self.guard, payload, now_ns)
 
     def on_control(self, payload: bytes, now_ns: int, *, sender: str | None) -> bytes:
         """Answer a request of a person or a master. Every request is answered.
 
         `sender`: the operator on whose key it arrived; None: a key of no operator.
         """
-        return self._answer(payload, now_ns, frozenset(Action), lambda named: not_on_own_key(named, sender))
+        return self._requests.answer_operator(self.guard, payload, now_ns, sender)
 
-    def _answer(
-        self,
-        payload: bytes,
-        now_ns: int,
-        allowed: frozenset[Action],
-        foreign: Callable[[str], str | None] = lambda _: None,
-    ) -> bytes:
-        """A stop comes before all else: whatever its version, and whatever else is wrong with it.
-
-        `foreign`: why the operator that a request names is not the one that sent it.
-        """
-        by = read_stop(payload)
-        if by is not None:
-            return self._stopped(by, now_ns)
-        try:
-            request = decode(payload, ControlRequest)
-        except CodecError as error:
-            self._count("control", error, now_ns)
-            return self._reply(ControlReply(False, self.guard.state, f"not understood: {error}"))
-        if request.action not in allowed:
-            text = f"{request.action} is for operators only: send it on the control topic"
-            return self._reply(ControlReply(False, self.guard.state, text))
-        why = foreign(request.operator)
-        if why is not None:
-            self.guard.counters.foreign_requests += 1
-            return self._reply(ControlReply(False, self.guard.state, why))
-        reply = self.control.answer(self.guard, request, now_ns)
-        if request.action is Action.NAMESAKE and reply.done:
-            self.namesakes.on_notice(request.key, now_ns)
-        if request.action is Action.CLAIM and reply.done:
-            self.clock.follow(request.clock)
-            self.traffic.claimed(request.clock)
-        if request.action is Action.RELEASE and reply.done:
-            self.traffic.released()
-        return self._reply(reply)
-
-    def _reply(self, reply: ControlReply) -> bytes:
-        return encode(replace(reply, instance=self.instance, place=self.place))
+    def on_revoked(self, names: frozenset[str], now_ns: int) -> None:
+        """Take the common names of the certificates that are revoked now."""
+        self.guard.revoke(revoked_operators(names), now_ns)
 
     def on_clock(self, payload: bytes, received_ns: int, now_ns: int) -> bytes:
         """Answer the master's clock query. Raises CodecError, which the link counts."""
@@ -314,8 +270,3 @@ class SlavePipeline:
         # a drive's own fault comes before the guard's doubt of its encoder
         others = {**self._body.stops, **self.guard.doubts, **self._body.drives}
         return {**others, **{name: words for name, words in named.items() if words}}
-
-    def _count(self, topic: str, error: CodecError, now_ns: int) -> None:
-        count = self.undecodable[topic] = self.undecodable.get(topic, 0) + 1
-        if self._throttle.passes(now_ns):
-            self.warn(f"{self.robot}: a {topic} message cannot be read: {error} ({count} so far)")

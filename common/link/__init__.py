@@ -4,6 +4,7 @@ Read zenoh_config, inbox (foreign thread → loop), queries, waiting, link, then
 """
 
 from common.link.link import Link
-from common.link.session import LinkSession, open_link, open_session
+from common.link.link_session import LinkSession
+from common.link.session import open_link, open_session
 
 __all__ = ["Link", "LinkSession", "open_link", "open_session"]

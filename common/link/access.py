@@ -83,9 +83,25 @@ class AccessControl(TypedDict):
     policies: list[AccessPolicy]
 
 
-def access_control(access: AccessConfig) -> AccessControl:
-    """Zenoh's `access_control`: rules, subjects and policies for every name in [link.access]."""
-    table = _AccessRules()
+def all_but(revoked: frozenset[str]) -> AccessControl:
+    """Zenoh's `access_control` without [link.access]: every certificate may do everything but the revoked."""
+    messages = sorted({message for way in _WAYS.values() for each, _ in way for message in each})
+    names = sorted(revoked)
+    return {
+        "enabled": True,
+        "default_permission": "allow",
+        "rules": [{
+            "id": "revoked", "permission": "deny", "flows": ["ingress", "egress"], "messages": messages,
+            "key_exprs": ["**"],
+        }],
+        "subjects": [{"id": name, "cert_common_names": [name]} for name in names],
+        "policies": [{"rules": ["revoked"], "subjects": names}],
+    }  # fmt: skip
+
+
+def access_control(access: AccessConfig, revoked: frozenset[str] = frozenset()) -> AccessControl:
+    """Zenoh's `access_control`: rules, subjects and policies for [link.access], less the revoked."""
+    table = _AccessRules(revoked)
     for router in access.routers:
         table.allow([common_name(Role.ROUTER, router)], _ALL, ["tandem/**"])
     for robot in access.robots:
@@ -150,13 +166,14 @@ def _alive(robot: str, role: str) -> str:
 class _AccessRules:
     """The rules so far, each with the subjects to which it applies."""
 
-    def __init__(self) -> None:
+    def __init__(self, revoked: frozenset[str]) -> None:
+        self._revoked = revoked
         self.subjects: set[str] = set()
         self._rules: list[AccessRule] = []
         self._applies: list[list[str]] = []
 
     def allow(self, names: Iterable[str], ways: Iterable[str], keys: list[str]) -> None:
-        names = list(names)
+        names = [name for name in names if name not in self._revoked]
         if not names:
             return
         self.subjects.update(names)

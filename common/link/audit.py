@@ -7,8 +7,8 @@ from collections import Counter
 
 from common.link.access import named
 from common.link.config import LinkConfig
+from common.link.link_session import LinkSession
 from common.link.refusals import Refusals
-from common.link.session import LinkSession
 from common.link.zenoh_log import hear_refusals
 from common.metrics.link import AccessMetrics
 
@@ -23,6 +23,7 @@ class Audit:
         guards = bool(link.listen)
         self._refusals: Refusals | None = hear_refusals(messages=guards) if link.tls else None
         self._known = named(link.access) if link.access else None
+        self._revoked: frozenset[str] = frozenset()
         self._here: Counter[str] = Counter()
         self._connections: Counter[str] = Counter()
         if self._refusals is not None and self._known is None:
@@ -34,6 +35,10 @@ class Audit:
         """Follow which hosts are connected from now on."""
         if self._refusals is not None:
             session.watch_peers(self._on_change)
+            session.watch_revoked(self._on_revoked)
+
+    def _on_revoked(self, names: frozenset[str]) -> None:
+        self._revoked = names
 
     def _on_change(self, session_id: str, name: str, here: bool) -> None:
         if self._refusals is not None and name:
@@ -47,6 +52,8 @@ class Audit:
             del self._here[name]
         if not here:
             log.info("%s disconnected", name)
+        elif name in self._revoked:
+            log.warning("%s connected: its certificate is revoked, so it may do nothing", name)
         elif self._known is not None and name not in self._known:
             log.warning("%s connected: [link.access] does not name it, so it may do nothing", name)
         else:

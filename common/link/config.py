@@ -85,6 +85,8 @@ class LinkConfig(Section):
     """Of this process's tcp, tls and ws connections, such as `cubic`; unset: the host's. Set it on both
     hosts: each decides how it sends."""
     tls: TlsConfig | None = None
+    revoked: RelativePath | None = None
+    """A list of certificates' names that are refused before they expire; it is read again while running."""
     access: AccessConfig | None = None
     topics: dict[str, TopicConfig] = Field(default_factory=dict)
 
@@ -114,6 +116,9 @@ class LinkConfig(Section):
             where, end = secure[0]
             what = "the keys for it under [link.tls]: ca, certificate, key (make them with `tandem keys`)"
             return [ConfigMistake(f"link.{where}", end, what)]
+        if self.revoked is not None and self.tls is None:
+            what = "[link.tls] beside it: without certificates there is none to revoke"
+            return [ConfigMistake("link.revoked", str(self.revoked), what)]
         if self.access is not None and self.tls is None:
             what = "[link.tls] beside it: certificates prove who is at the other end"
             return [ConfigMistake("link.access", "…", what)]

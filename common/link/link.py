@@ -11,6 +11,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from common.clock import monotonic_ns
+from common.link.declared import Declarations
 from common.link.inbox import Inbox
 from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
@@ -34,19 +35,18 @@ class Link:
 
     def __init__(
         self,
-        session: zenoh.Session,
+        declared: Declarations,
         robot: str,
         loop: asyncio.AbstractEventLoop,
         quality: Callable[[Topic], Topic] = lambda topic: topic,
     ) -> None:
-        """`quality`: the topic as it shall travel on this link."""
+        """`declared`: the session and what it holds. `quality`: the topic as it shall travel on this link."""
         self.robot = robot
         self._quality = quality
-        self._session = session
+        self._declared = declared
         self._loop = loop
         self._counters: dict[str, TopicCounters] = {}
         self._receivers: list[Inbox | Answerer] = []
-        self._held: list[object] = []
         self._roles: set[str] = set()
         self._closed = False
 
@@ -57,15 +57,21 @@ class Link:
         topic = self._quality(topic)
         counters = self._count(topic)
         throttle = LogThrottle()
-        publisher = self._session.declare_publisher(
-            self._own_key(topic),
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=getattr(zenoh.Priority, topic.priority.name),
-            express=topic.express,
-            reliability=zenoh.Reliability.RELIABLE if topic.reliable else zenoh.Reliability.BEST_EFFORT,
-            allowed_destination=zenoh.Locality.REMOTE,
-        )
-        put = publisher.put
+        key = self._own_key(topic)
+        put: Callable[[bytes], None]
+
+        def declare(session: zenoh.Session) -> object:
+            nonlocal put
+            publisher = session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=getattr(zenoh.Priority, topic.priority.name),
+                express=topic.express,
+                reliability=zenoh.Reliability.RELIABLE if topic.reliable else zenoh.Reliability.BEST_EFFORT,
+                allowed_destination=zenoh.Locality.REMOTE,
+            )
+            put = publisher.put
+            return publisher
 
         def publish(payload: bytes) -> None:
             try:
@@ -77,6 +83,7 @@ class Link:
             else:
                 counters.sent += 1
 
+        self._declared.add(declare)
         return publish
 
     def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
@@ -91,7 +98,7 @@ class Link:
         key = topic.key_for(self.robot)
         inbox = Inbox(key, on_payload, self._loop, self._count(topic))
         self._receivers.append(inbox)
-        self._held.append(self._session.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
+        self._declared.add(lambda s: s.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
 
     def answer(self, topic: Topic, handler: Callable[[bytes, int], bytes]) -> None:
         """Answer other sessions' questions with `handler(payload, arrived_ns)`, run on the loop.
@@ -105,8 +112,8 @@ class Link:
         key = topic.key_for(self.robot)
         answerer = Answerer(key, handler, self._loop, self._count(topic), self._quality(topic).express)
         self._receivers.append(answerer)
-        self._held.append(
-            self._session.declare_queryable(key, Callback(answerer.on_query, indirect=False), complete=True)
+        self._declared.add(
+            lambda s: s.declare_queryable(key, Callback(answerer.on_query, indirect=False), complete=True)
         )
 
     async def connected(self, topic: Topic | None = None, timeout_s: float = CONNECT_TIMEOUT_S) -> None:
@@ -115,7 +122,7 @@ class Link:
         Raises LinkTimeoutError when none comes.
         """
         key = None if topic is None else self._own_key(topic)
-        await wait_for_peer(self._session, key, timeout_s)
+        await wait_for_peer(self._declared.session, key, timeout_s)
 
     async def ask(self, topic: Topic, payload: bytes) -> bytes:
         """The answer. LinkTimeoutError after the topic's time-out; LinkError if no session answers it."""
@@ -124,7 +131,7 @@ class Link:
     async def ask_stamped(self, topic: Topic, payload: bytes) -> tuple[bytes, int]:
         """As `ask`, with the answer's arrival in ns, stamped in Zenoh's thread."""
         topic = self._quality(topic)
-        asking = Asking(self._session, topic, self._own_key(topic), self._count(topic))
+        asking = Asking(self._declared.session, topic, self._own_key(topic), self._count(topic))
         return await asking.first(payload)
 
     async def ask_all(
@@ -135,7 +142,7 @@ class Link:
         It lasts until each has answered, or for the topic's time-out. Raises as `ask` if none answered.
         """
         topic = self._quality(topic)
-        asking = Asking(self._session, topic, self._own_key(topic), self._count(topic))
+        asking = Asking(self._declared.session, topic, self._own_key(topic), self._count(topic))
         return await asking.all(payload, on_answer)
 
     def declare_alive(self, role: str, instance: int = 0, endpoints: Sequence[str] = ()) -> None:
@@ -147,14 +154,14 @@ class Link:
         keys = [self._alive_key(role)]
         if instance:
             keys.append(present(self.robot, role, instance, endpoints).key)
-        self._held += [self._session.liveliness().declare_token(key) for key in keys]
+        self._declared.add(lambda s: [s.liveliness().declare_token(key) for key in keys])
 
     def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None]) -> None:
         """Call `on_change(presence, alive)` on the loop as processes of this robot's name come and go.
 
         Those already alive are reported at once, this session's own among them.
         """
-        watch_presence(self._session, self._loop, self.robot, on_change, self._held)
+        watch_presence(self._declared, self._loop, self.robot, on_change)
 
     def counters(self) -> dict[str, TopicCounters]:
         """A copy of the counters, by topic name."""
@@ -163,7 +170,7 @@ class Link:
     @property
     def peers(self) -> int:
         """How many sessions this one is connected to now."""
-        return 0 if self._closed else count_peers(self._session)
+        return 0 if self._closed else count_peers(self._declared.session)
 
     def close(self) -> None:
         """Hear and answer nothing from now on. The session stays open for the other robots' links."""

@@ -36,6 +36,7 @@ async def open_zenoh(
     mode: str = "",
     within_s: float = math.inf,
     waits: Callable[[str], None] = lambda _: None,
+    revoked: frozenset[str] = frozenset(),
 ) -> zenoh.Session:
     """The session. It waits `within_s` for what the host does not have yet, and logs it. Raises LinkError.
 
@@ -45,7 +46,7 @@ async def open_zenoh(
     pause_s = RETRY_S
     while True:
         try:
-            return await _open_off_the_loop(_in_turn(config, turn), mode)
+            return await _open_off_the_loop(zenoh_configuration(_in_turn(config, turn), mode, revoked))
         except zenoh.ZError as error:
             words = _RUST_PLACE.sub("", str(error))
         missing = _missing(config, words)
@@ -80,8 +81,8 @@ def _in_turn(config: LinkConfig, turn: int) -> LinkConfig:
     return config.model_copy(update={"connect": [*config.connect[first:], *config.connect[:first]]})
 
 
-async def _open_off_the_loop(config: LinkConfig, mode: str) -> zenoh.Session:
-    settings = zenoh.Config.from_json5(json.dumps(zenoh_configuration(config, mode)))
+async def _open_off_the_loop(tree: dict[str, object]) -> zenoh.Session:
+    settings = zenoh.Config.from_json5(json.dumps(tree))
     opening = asyncio.ensure_future(asyncio.to_thread(zenoh.open, settings))
     try:
         return await asyncio.shield(opening)

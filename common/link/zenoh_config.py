@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from common.link.access import access_control
+from common.link.access import access_control, all_but
 from common.link.config import LinkConfig, TlsConfig
 from common.link.endpoint import for_zenoh
 
 
-def zenoh_configuration(config: LinkConfig, mode: str = "") -> dict[str, object]:
+def zenoh_configuration(
+    config: LinkConfig, mode: str = "", revoked: frozenset[str] = frozenset()
+) -> dict[str, object]:
     """The configuration of a session that listens and connects only where [link] says.
 
-    `mode` in place of the configuration's own: `router`, which no master or slave is.
+    `mode` in place of the configuration's own: `router`, which no master or slave is. `revoked`: common names
+    of certificates whose holders may do nothing.
     """
     settings = _endpoints_and_timing(config, mode or config.mode)
     if config.access is not None:
-        settings["access_control"] = access_control(config.access)
+        settings["access_control"] = access_control(config.access, revoked)
+    elif revoked:
+        settings["access_control"] = all_but(revoked)
     return settings
 
 

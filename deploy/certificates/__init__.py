@@ -4,6 +4,8 @@ from common.errors import TandemError
 
 AUTHORITY = "ca"
 """Its files' name: `ca.pem` and `ca.key`."""
+REVOKED = "revoked.txt"
+"""The list of revoked names, in the folder of the authority; hosts keep a copy of it."""
 
 
 class KeysError(TandemError):

@@ -76,5 +76,5 @@ def _link_of(file: MasterConfig | None, endpoints: list[str], certificate: Path 
     asked: dict[str, object] = {"connect": endpoints, **tls_beside(certificate)}
     if file is not None:
         # who only asks stands behind no door, and lets nobody in: the rules are for the others' doors
-        asked = {**file.link.model_dump(exclude={"listen", "access"}), **asked}
+        asked = {**file.link.model_dump(exclude={"listen", "access", "revoked"}), **asked}
     return check_config(Path("command line"), asked, LinkConfig)

@@ -28,6 +28,8 @@ class Situation:
     """Token of the current lease, 0 where there is none."""
     holder: str
     """The operator to whom that lease was granted."""
+    revoked: frozenset[str]
+    """Operators whose certificates are revoked."""
     newest_sequence: int
     """The number of the last command accepted within this lease, -1 before the first."""
     now_ns: int
@@ -66,6 +68,15 @@ class Admission:
 
 def _robot(command: Command, at: Situation) -> str | None:
     return None if command.robot == at.robot else f"is for {command.robot!r}, this is {at.robot!r}"
+
+
+def _revoked(command: Command, at: Situation) -> str | None:
+    return revocation(command.operator, at.revoked)
+
+
+def revocation(operator: str, revoked: frozenset[str]) -> str | None:
+    """Why an operator may not command any more, or None."""
+    return f"the certificate of {operator} is revoked" if operator in revoked else None
 
 
 def _lease(command: Command, at: Situation) -> str | None:
@@ -124,6 +135,7 @@ def _deadman(command: Command, _: Situation) -> str | None:
 DEADMAN = "deadman"
 GATES: tuple[Gate, ...] = (
     Gate("robot", "it is for this robot", _robot),
+    Gate("revoked", "the certificate of its operator is not revoked", _revoked),
     Gate("lease", "it carries the token of the current lease", _lease),
     Gate("operator", "it came on the key of the operator that holds the lease", _operator),
     Gate("valid", "one finite position and velocity a joint", _valid),
@@ -158,6 +170,8 @@ class CommandGate:
         gates: Sequence[Gate] = GATES,
     ) -> None:
         self.lease = Lease(to_ns(config.lease_timeout_s), draw_token)
+        self.revoked: frozenset[str] = frozenset()
+        """Operators whose certificates are revoked."""
         self.valid: Mask = np.zeros(joints, np.bool_)
         """(J,) joints that the newest accepted command gives a valid angle of."""
         self.operator_doubt = ""
@@ -183,8 +197,8 @@ class CommandGate:
         """
         self.lease.lapse(now_ns)
         situation = Situation(
-            self._robot, len(self.valid), self.lease.token, self.lease.operator, self._newest_sequence,
-            now_ns, offset, self._max_age_ns, self._future_tolerance_ns,
+            self._robot, len(self.valid), self.lease.token, self.lease.operator, self.revoked,
+            self._newest_sequence, now_ns, offset, self._max_age_ns, self._future_tolerance_ns,
         )  # fmt: skip
         admission = admit(command, situation, self._gates)
         if not admission.accepted:

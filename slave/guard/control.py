@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 
 from common.wire.messages import Action, ControlReply, ControlRequest
+from slave.guard.admit import revocation
 from slave.guard.challenge import Challenges
 from slave.guard.engage import holder_only
 from slave.guard.guard import Guard
@@ -30,6 +31,9 @@ class Control:
         if request.robot != guard.robot:
             return ControlReply(False, guard.state, f"this robot is {guard.robot}, not {request.robot}")
         operator, action = request.operator, request.action
+        revoked = revocation(operator, guard.revoked)
+        if revoked is not None and action is not Action.STATUS:
+            return ControlReply(False, guard.state, revoked)
         if action is Action.CLAIM:
             return _claim(guard, operator, now_ns)
         if action is Action.STATUS:

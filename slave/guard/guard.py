@@ -13,7 +13,7 @@ from common.errors import ConfigError
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Command, Mask
-from slave.guard.admit import DEADMAN, GATES, Admission, CommandGate, Gate
+from slave.guard.admit import DEADMAN, GATES, Admission, CommandGate, Gate, revocation
 from slave.guard.align import AlignProgress
 from slave.guard.body import WELL, Body
 from slave.guard.config import GuardConfig
@@ -184,6 +184,19 @@ class Guard:
     def claim(self, operator: str, now_ns: int) -> int:
         """The token of a new lease, or 0 if an operator holds one."""
         return self._commands.claim(operator, now_ns)
+
+    @property
+    def revoked(self) -> frozenset[str]:
+        """Operators whose certificates are revoked: they may do nothing but stop."""
+        return self._commands.revoked
+
+    def revoke(self, operators: frozenset[str], now_ns: int) -> None:
+        """Take the list of revoked operators. A holder on it loses the lease at once, and the robot holds."""
+        self._commands.revoked = operators
+        why = revocation(self.operator, operators)
+        if why is not None:
+            self.counters.losses["revoked"] += 1
+            self.release(now_ns, why)
 
     def release(self, now_ns: int, reason: str) -> None:
         """End the lease; the robot holds."""

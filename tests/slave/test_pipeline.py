@@ -164,11 +164,11 @@ def test_who_may_only_stop_it_may_not_tell_it_of_a_namesake(pipeline: SlavePipel
 
 def test_other_versions_are_counted_and_reported_once_a_second(pipeline: SlavePipeline) -> None:
     said: list[str] = []
-    pipeline.warn = said.append
+    pipeline.unread.warn = said.append
     later = msgpack.packb(["command", VERSION + 1, "robot-1", 0])
     for tick in range(30):
         pipeline.on_command(later, 1, NS_PER_S + tick * NS_PER_S // 10, sender="anna")
-    assert pipeline.undecodable == {"command": 30}
+    assert pipeline.unread.counts == {"command": 30}
     assert len(said) == 3
     assert f"schema version {VERSION + 1}, expected {VERSION}" in said[0]
     assert said[-1].endswith("(21 so far)")

@@ -186,7 +186,7 @@ class Scene:
 
     def refused(self) -> Counter[str]:
         """Commands refused so far, by gate; `codec` for those that could not be read."""
-        return self.guard.counters.dropped + Counter(codec=self.run.slave.undecodable.get("command", 0))
+        return self.guard.counters.dropped + Counter(codec=self.run.slave.unread.counts.get("command", 0))
 
     def state_reached_s(self, state: State) -> float | None:
         """When the guard was in a state to stay, after the fault; None where it is not at the end."""

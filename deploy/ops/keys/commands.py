@@ -1,4 +1,4 @@
-"""`tandem keys authority|make|show`: the files that tls and quic ask for under [link.tls]."""
+"""`tandem keys authority|make|revoke|show`: the files that [link.tls] and `[link] revoked` name."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from common.errors import LinkError
 from common.link.config import NAME
-from common.link.roles import Role, role_of
-from deploy.certificates import AUTHORITY, KeysError
+from common.link.roles import Role, common_name, role_of
+from deploy.certificates import AUTHORITY, REVOKED, KeysError
 from deploy.report.options import AsJson
 
 if TYPE_CHECKING:
@@ -86,6 +87,12 @@ def make(
     from deploy.certificates.make import new_identity
 
     role, name = _role_and_name(who)
+    listed = folder / REVOKED
+    if listed.exists() and common_name(role, name) in _revoked(listed):
+        raise KeysError(
+            f"{who} is revoked in {listed}, and hosts tell certificates only by name: they would refuse the "
+            "new one too. Make it under another name, or take the name from the list on every host first"
+        )
     try:
         made = new_identity(
             read_authority(folder), role, name, host or [], datetime.now(UTC), timedelta(days=days)
@@ -103,6 +110,44 @@ def make(
         console.print(
             Text("\nWithout --host it can connect to others, but others cannot connect to it.", "yellow")
         )
+
+
+@app.command()
+def revoke(
+    folder: Folder,
+    who: Annotated[str, typer.Argument(metavar="ROLE:NAME", help="Role and name in the certificate.")],
+) -> None:
+    """Add a name to the list of revoked certificates. Copy the list to every host; none need restart.
+
+    It takes effect on the hosts whose file names their copy: [link] revoked = "revoked.txt".
+
+    Example: `tandem keys revoke keys operator:nurse-1`
+    """
+    from common.link.revoked import write_revoked
+
+    role, name = _role_and_name(who)
+    listed = folder / REVOKED
+    try:
+        added = write_revoked(listed, common_name(role, name), f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC")
+    except LinkError as error:
+        raise KeysError(str(error)) from None
+    except OSError as error:
+        raise KeysError(f"{listed} cannot be written: {error.strerror}") from None
+    console = Console()
+    console.print(
+        f"{listed}: {who} {'added' if added else 'is on it already'}. Copy the file to every robot, "
+        f'router and master; each reads it within a second if its file has \\[link] revoked = "{REVOKED}"',
+        highlight=False,
+    )
+
+
+def _revoked(listed: Path) -> frozenset[str]:
+    from common.link.revoked import RevocationFile
+
+    try:
+        return RevocationFile(listed).names
+    except LinkError as error:
+        raise KeysError(str(error)) from None
 
 
 @app.command()

@@ -8,8 +8,10 @@ import logging
 
 from common.clock import NS_PER_S, monotonic_ns
 from common.link.audit import Audit
+from common.link.link_session import LinkSession
+from common.link.revoked import RevocationFile
 from common.link.router import RouterConfig
-from common.link.session import LinkSession, open_session
+from common.link.session import open_session
 from common.link.zenoh_config import zenoh_configuration
 from common.metrics.tree import WriteMetrics
 from common.process.notify import Notifier, open_notifier
@@ -22,13 +24,16 @@ log = logging.getLogger(__name__)
 
 def zenohd_configuration(config: RouterConfig) -> dict[str, object]:
     """What `zenohd --config` reads: the same endpoints, keys and rules, without this process around them."""
-    return zenoh_configuration(config.link, "router")
+    listed = config.link.revoked
+    revoked = RevocationFile(listed).names if listed else frozenset()
+    return zenoh_configuration(config.link, "router", revoked)
 
 
 def zenohd_text(config: RouterConfig) -> str:
     """The same as a file."""
     head = (
         f"// Made by `tandem router --zenohd` for {config.name}; change the TOML and make it again.\n"
+        "// zenohd reads no revocation list: after each revocation make this file again and restart zenohd.\n"
         "// Rules are by certificates' common names: see docs/security.md.\n"
     )
     return head + json.dumps(zenohd_configuration(config), indent=2) + "\n"

@@ -151,7 +151,7 @@ def test_a_deadline_that_was_met_does_not_strike_later() -> None:
 def test_a_link_whose_close_hangs_does_not_hold_the_process() -> None:
     done = process(
         """
-        from common.link.session import LinkSession
+        from common.link.link_session import LinkSession
 
         class HangingSession:
             def close(self):

@@ -489,6 +489,31 @@ def second_operator(make_rig: MakeRig) -> None:
     assert rig.guard.operator == "anna"
 
 
+@about("gate revoked")
+def revoked_name_is_counted(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.guard.revoke(frozenset({"ben"}), rig.now_ns)
+    assert rig.send(operator="ben").gate == "revoked"
+    assert rig.send().accepted
+
+
+@about("Guard.revoke")
+def revoked_holder(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.guard.revoke(frozenset({"anna"}), rig.now_ns)
+    assert rig.guard.state is State.HOLD
+    assert rig.guard.reason == "the certificate of anna is revoked"
+    assert rig.guard.operator == ""
+
+
+@about("control.revocation")
+def revoked_asks(make_rig: MakeRig) -> None:
+    rig = make_rig().to_hold()
+    rig.guard.revoke(frozenset({"ben"}), rig.now_ns)
+    assert not rig.ask(Action.CLAIM, "ben").done
+    assert rig.ask(Action.ESTOP, "ben").done
+
+
 @about("gate operator")
 def stolen_token(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()

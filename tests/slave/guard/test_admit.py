@@ -33,6 +33,12 @@ def newest_ns(rig: Any) -> int:
     return int(rig.now_ns + to_ns(rig.config.future_tolerance_s) + rig.offset.bound_ns)
 
 
+def with_revoked(rig: Any, operator: str) -> dict[str, Any]:
+    """The list alone: that the lease ends too is another protection."""
+    rig.guard._commands.revoked = frozenset({operator})
+    return {}
+
+
 @dataclass(frozen=True)
 class Case:
     gate: str
@@ -44,6 +50,7 @@ CASES = [
     Case("robot", lambda r: {"robot": "robot-1"}, lambda r: {"robot": "robot-2"}),
     Case("lease", lambda r: {"lease": r.lease}, lambda r: {"lease": r.lease + 1}),
     Case("lease", lambda r: {"lease": r.lease}, lambda r: {"lease": 0}),
+    Case("revoked", lambda r: with_revoked(r, "ben"), lambda r: with_revoked(r, "anna")),
     Case("operator", lambda r: {"operator": "anna"}, lambda r: {"operator": "ben"}),
     Case("operator", lambda r: {}, lambda r: {"operator": ""}),
     Case("operator", lambda r: {}, lambda r: {"operator": "Anna"}),

@@ -104,6 +104,10 @@ def unbounded_s(self: elapsed.StepTime, now_ns: int) -> float:
     return 0.0 if before_ns is None else (now_ns - before_ns) * 1e-9
 
 
+def forgiving(self: guard.Guard, operators: frozenset[str], now_ns: int) -> None:
+    self._commands.revoked = operators
+
+
 PARTS: tuple[tuple[Any, str, Any], ...] = (
     (admit.Situation, "age_ns", lambda *_: 0),
     (watchdog.EncoderLife, "silence", nothing),
@@ -113,6 +117,8 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
     (body.Body, "also", lambda self, drives: body.Body({**drives, **self.drives}, self.base)),
     (engage, "holder_only", nothing),
     (control, "holder_only", nothing),
+    (control, "revocation", nothing),
+    (guard.Guard, "revoke", forgiving),
     (hmac, "compare_digest", lambda *_: True),
     (challenge.Challenges, "refusal", nothing),
     (lease.Lease, "lapse", lambda *_: False),

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from common.errors import LinkError
 from common.link.certificates import check_tls
 from common.link.config import TlsConfig
+from common.link.revoked import RevocationFile
 from common.link.roles import Role
 from deploy.certificates import KeysError
 from deploy.certificates.folder import read_authority, shown, stem, write_pair
@@ -168,3 +169,26 @@ def test_a_host_s_keys_are_checked_before_anything_is_opened(tmp_path: Path, aut
 
 def test_files_are_named_by_role_and_name() -> None:
     assert stem(Role.OPERATOR, "anna") == "operator-anna"
+
+
+def test_a_name_is_revoked_once_and_gets_no_new_certificate(tmp_path: Path) -> None:
+    keys = tmp_path / "keys"
+    tandem("authority", keys)
+    assert tandem("make", keys, "operator:anna")[1] is None
+    said, error = tandem("revoke", keys, "operator:anna")
+    assert error is None
+    assert "operator:anna added" in said
+    assert '[link] revoked = "revoked.txt"' in said
+    assert "operator:anna is on it already" in tandem("revoke", keys, "operator:anna")[0]
+    assert RevocationFile(keys / "revoked.txt").names == {"operator:anna"}
+    for suffix in ("pem", "key"):
+        (keys / f"operator-anna.{suffix}").unlink()
+    error = tandem("make", keys, "operator:anna")[1]
+    assert isinstance(error, KeysError)
+    assert "operator:anna is revoked in" in str(error)
+    assert tandem("make", keys, "operator:anna-2")[1] is None
+    assert isinstance(tandem("revoke", keys, "anna")[1], KeysError)
+    (keys / "revoked.txt").write_text("nonsense")
+    for command in ("revoke", "make"):
+        error = tandem(command, keys, "operator:carl")[1]
+        assert "line 1: expected role:name" in str(error)

@@ -1,0 +1,166 @@
+"""One Zenoh session on the event loop, shared by the links of many robots; closed in bounded time."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+import threading
+from collections.abc import Awaitable, Callable
+
+import zenoh
+from zenoh.handlers import Callback
+
+from common.errors import LinkError
+from common.link.declared import Declarations
+from common.link.inbox import wake
+from common.link.link import Link
+from common.link.presence import watch_presence
+from common.link.waiting import count_peers
+from common.wire.presence import ProcessPresence
+from common.wire.topics import Topic
+
+CLOSE_TIMEOUT_S = 1.0
+REOPEN_S = 0.5
+"""Between two attempts to open the session anew."""
+OpenAgain = Callable[[frozenset[str]], Awaitable[zenoh.Session]]
+"""Opens a session as the first one, whose rules refuse these common names."""
+_ROBOT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+
+log = logging.getLogger(__name__)
+
+
+def check_robot_name(robot: str) -> None:
+    """Raises LinkError for a name that is no part of a key."""
+    if not _ROBOT_NAME.fullmatch(robot):
+        raise LinkError(f"robot {robot!r}: expected a name of at most 64 letters, digits, '_', '.' and '-'")
+
+
+class LinkSession:
+    """One Zenoh session. `link(robot)` gives the topics of a robot; all links end with the session."""
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        loop: asyncio.AbstractEventLoop,
+        quality: Callable[[Topic], Topic] = lambda topic: topic,
+        revoked: frozenset[str] = frozenset(),
+    ) -> None:
+        """`revoked`: common names that the session's access rules refuse."""
+        self._quality = quality
+        self._declared = Declarations(session)
+        self.refused = revoked
+        """Common names that this session's rules refuse."""
+        self.revoked = revoked
+        """Common names that are revoked now."""
+        self._on_revoked: list[Callable[[frozenset[str]], None]] = []
+        self._loop = loop
+        self._links: dict[str, Link] = {}
+        self._closed = False
+
+    def link(self, robot: str) -> Link:
+        """The link of that robot, the same one each time. Raises LinkError for a name that is none."""
+        check_robot_name(robot)
+        if robot not in self._links:
+            self._links[robot] = Link(self._declared, robot, self._loop, self._quality)
+        return self._links[robot]
+
+    def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None], robot: str = "*") -> None:
+        """Call `on_change(presence, alive)` on the loop as processes come and go, of every robot's name."""
+        watch_presence(self._declared, self._loop, robot, on_change)
+
+    def watch_peers(self, on_change: Callable[[str, str, bool], None]) -> None:
+        """Call `on_change(session_id, name, connected)` on the loop, for those already there at once.
+
+        `name` is the common name of the certificate; empty where the transport has none.
+        """
+        names: dict[str, list[str]] = {}
+        """Of each connected session, once a link: the event of its end does not name it."""
+
+        def on_event(event: zenoh.LinkEvent) -> None:
+            session_id, here = str(event.link.zid), event.kind == zenoh.SampleKind.PUT
+            if here:
+                name = event.link.auth_identifier or ""
+                names.setdefault(session_id, []).append(name)
+            else:
+                links = names.get(session_id, [""])
+                name = links.pop()
+                if not links:
+                    names.pop(session_id, None)
+            wake(self._loop, on_change, session_id, name, here)
+
+        def declare(session: zenoh.Session) -> object:
+            for session_id, of_links in names.items():
+                for name in of_links:
+                    wake(self._loop, on_change, session_id, name, False)
+            names.clear()
+            return session.info.declare_link_events_listener(Callback(on_event, indirect=False), history=True)
+
+        self._declared.add(declare)
+
+    def watch_revoked(self, on_change: Callable[[frozenset[str]], None]) -> None:
+        """Call `on_change(names)` on the loop with the revoked common names, now and whenever they change."""
+        self._on_revoked.append(on_change)
+        on_change(self.revoked)
+
+    def revoke(self, names: frozenset[str]) -> None:
+        """Tell who watches that these names are revoked, and no others."""
+        self.revoked = names
+        for on_change in self._on_revoked:
+            on_change(names)
+
+    async def reopen(self, open_again: OpenAgain) -> None:
+        """Close the session, which cuts all that are connected, and open one whose rules refuse the revoked.
+
+        It ends when the new session is open: what is published until then is lost, questions fail.
+        """
+        refused = self.revoked
+        await self._close_in_time(CLOSE_TIMEOUT_S)
+        while True:
+            try:
+                self._declared.move(await open_again(refused))
+            except (LinkError, zenoh.ZError) as error:
+                log.warning("the link is closed: %s; trying again", error)
+                await asyncio.sleep(REOPEN_S)
+            else:
+                self.refused = refused
+                return
+
+    @property
+    def peers(self) -> int:
+        """How many sessions this one is connected to now."""
+        return 0 if self._closed else count_peers(self._declared.session)
+
+    async def close(self, timeout_s: float = CLOSE_TIMEOUT_S) -> bool:
+        """Close the session; False if it did not close in time, and was left to itself.
+
+        Off the loop, in a daemon thread: on a link that leads nowhere it can take ten seconds.
+        """
+        if self._closed:
+            return True
+        self._closed = True
+        for link in self._links.values():
+            link.close()
+        return await self._close_in_time(timeout_s)
+
+    async def _close_in_time(self, timeout_s: float) -> bool:
+        closed: asyncio.Future[None] = self._loop.create_future()
+        threading.Thread(
+            target=self._close_session, args=(self._declared.session, closed), name="link-close", daemon=True
+        ).start()
+        done, _ = await asyncio.wait({closed}, timeout=timeout_s)
+        if not done:
+            log.warning("the Zenoh session did not close within %g s; it is left to itself", timeout_s)
+        return bool(done)
+
+    def _close_session(self, session: zenoh.Session, closed: asyncio.Future[None]) -> None:
+        try:
+            session.close()
+        except Exception as error:  # a link that leads nowhere: nothing to be done about it now
+            log.debug("error while closing the session: %s", error)
+        wake(self._loop, _settle, closed)
+
+
+def _settle(closed: asyncio.Future[None]) -> None:
+    if not closed.done():
+        closed.set_result(None)
