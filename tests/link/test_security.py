@@ -51,20 +51,23 @@ def some_keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @asynccontextmanager
 async def place(
-    transport: str, routed: bool, keys: Path, folder: Path
+    transport: str, routed: bool, keys: Path, folder: Path, more: str = ""
 ) -> AsyncIterator[tuple[str, Process, Process]]:
-    """The endpoint where everybody connects, the robot, and who refuses: the router, or the robot itself."""
+    """The endpoint where everybody connects, the robot, and who refuses: the router, or the robot itself.
+
+    `more`: further lines of each one's [link].
+    """
     endpoint = f"{transport}/127.0.0.1:{free_port(transport)}"
     robot_file, router_file = folder / "robot.toml", folder / "router.toml"
     child = str(Path(__file__).with_name("robot.py"))
     async with AsyncExitStack() as stack:
         if not routed:
-            head = f'listen = ["{endpoint}"]'
+            head = f'listen = ["{endpoint}"]\n{more}'
         else:
-            router_file.write_text(link_toml(keys, "router-hub", f'listen = ["{endpoint}"]'))
+            router_file.write_text(link_toml(keys, "router-hub", f'listen = ["{endpoint}"]\n{more}'))
             command = ("-m", "deploy", "router", str(router_file), "--metrics", str(folder / "metrics.json"))
             router = await stack.enter_async_context(started(*command, until="routing at"))
-            head = f'mode = "client"\nconnect = ["{endpoint}"]'
+            head = f'mode = "client"\nconnect = ["{endpoint}"]\n{more}'
         robot_file.write_text(f'robot = "{ROBOT}"\n' + link_toml(keys, "robot-robot-1", head))
         robot = await stack.enter_async_context(started(child, str(robot_file), until="here"))
         yield endpoint, robot, router if routed else robot
