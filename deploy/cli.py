@@ -30,6 +30,7 @@ from deploy.ops.record.command import record, recording
 from deploy.ops.router.command import router
 from deploy.ops.servos import servos
 from deploy.ops.sides import master, slave
+from deploy.ops.stops import stops
 from deploy.ops.video import video
 from deploy.report.panels import arrange
 from deploy.sim.drives.process import drives
@@ -51,7 +52,7 @@ for _name, _group in {
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, suit, drives, router, demo, soak, faults, bench,
-    *OPERATORS_ACTS, attitude, video, doctor, servos, record, recording,
+    *OPERATORS_ACTS, attitude, video, doctor, servos, stops, record, recording,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from common.config.section import Section
 from common.errors import NOT_SET, ConfigMistake
+from common.inputs.config import KeyName
 from common.wire.fields import MAX_NAME
 
 Source = Literal["gpio", "device", "drive", "sto"]
@@ -45,7 +46,7 @@ class StopInputConfig(Section):
     """gpio, drive: the line's or bit's level while the contact is closed. gpio: by `bias`; drive: high."""
     device: str = ""
     """device: a Linux input device, by name or path."""
-    key: str = ""
+    key: KeyName | Literal[""] = ""
     """device: the key that is down while the contact is closed."""
     joint: str = ""
     """drive, sto: the joint whose drive tells it."""

@@ -22,7 +22,7 @@ from gpiod.line import Bias, Direction, Edge, Value
 from common.clock import Clock, monotonic_ns
 from common.log.throttle import LogThrottle
 from slave.stop_inputs.config import StopInputConfig
-from slave.stop_inputs.gpio_lines import GpioChip, find_line
+from slave.stop_inputs.gpio_lines import CONSUMER, GpioChip, find_line
 from slave.stop_inputs.source import Level
 
 log = logging.getLogger(__name__)
@@ -96,7 +96,7 @@ class KernelLine:
 
     def _ask(self, path: str, bias: Bias, edge: Edge) -> gpiod.LineRequest:
         settings = gpiod.LineSettings(direction=Direction.INPUT, bias=bias, edge_detection=edge)
-        return gpiod.request_lines(path, {self._number: settings}, consumer="tandem e-stop")
+        return gpiod.request_lines(path, {self._number: settings}, consumer=CONSUMER)
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for an edge, or, where the chip tells none, for so long."""

@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+CONSUMER = "tandem e-stop"
+"""What the kernel says of a line that the slave reads."""
+
 
 @dataclass(frozen=True, slots=True)
 class GpioChip:
@@ -46,5 +49,5 @@ def find_line(
         )
     if not among:
         there = ", ".join(f"{one.label} ({one.path})" for one in chips) or "none"
-        raise LookupError(f"GPIO chip {chip or 'of any kind'}: not there; this host has {there}")
+        raise LookupError(f"no GPIO chip {chip} is there".replace("  ", " ") + f"; this host has {there}")
     raise LookupError(f"no line {line} is there; `gpioinfo` lists them")

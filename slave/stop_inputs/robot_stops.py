@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from common.clock import Clock, monotonic_ns
-from common.errors import RobotError
 from slave.servos import Servos
 from slave.stop_inputs.config import EstopConfig, StopInputConfig
 from slave.stop_inputs.drive import DriveStop, TellingServos
@@ -16,9 +15,9 @@ from slave.stop_inputs.source import StopSource
 class RobotStops:
     """Each input's source, and the rule."""
 
-    def __init__(self, config: EstopConfig, servos: Servos, clock: Clock = monotonic_ns) -> None:
-        """Raises ModuleNotFoundError where a source's library is not installed."""
-        self._sources = [_source(one, servos, clock) for one in config.inputs]
+    def __init__(self, config: EstopConfig, servos: Servos | None, clock: Clock = monotonic_ns) -> None:
+        """`servos`: those whose drives tell inputs. Raises ModuleNotFoundError for a missing library."""
+        self._sources = [source_of(one, servos, clock) for one in config.inputs]
         self._rule = StopInputs(config)
 
     def start(self) -> None:
@@ -36,13 +35,16 @@ class RobotStops:
             source.stop()
 
 
-def _source(config: StopInputConfig, servos: Servos, clock: Clock) -> StopSource:
+def source_of(config: StopInputConfig, servos: Servos | None, clock: Clock = monotonic_ns) -> StopSource:
+    """The source of one input, not started. `servos`: those whose drives tell it."""
     if config.source in ("drive", "sto"):
         assert isinstance(servos, TellingServos), "the file was checked"
         return DriveStop(config, servos.signs)
-    if config.source == "device":
-        raise RobotError('source = "device" cannot be read yet: use "gpio" or a drive')
     # imported here: each needs a library that other robots do not have
+    if config.source == "device":
+        from slave.stop_inputs.device import DeviceStop
+
+        return DeviceStop(config, clock=clock)
     from slave.stop_inputs.gpio import GpioStop
 
     return GpioStop(config, clock)

@@ -26,6 +26,7 @@ from deploy.ops.doctor.judge.needs import GENERAL, Needs
 from deploy.ops.doctor.judge.path import judge_path
 from deploy.ops.doctor.judge.process import judge_memory_lock, judge_networks, judge_realtime
 from deploy.ops.doctor.judge.robots import judge_robot
+from deploy.ops.doctor.judge.stops import judge_stops
 from deploy.ops.doctor.read.can import ask_ip, read_can
 from deploy.ops.doctor.read.clock import clock_is_synchronised
 from deploy.ops.doctor.read.devices import egl_is_there, free_bytes, read_device, v4l2_is_there
@@ -36,6 +37,7 @@ from deploy.ops.doctor.read.path import read_path
 from deploy.ops.doctor.read.process import read_process
 from deploy.ops.doctor.read.robots import read_robots
 from deploy.ops.doctor.read.servos import ping_servos
+from deploy.ops.doctor.read.stops import read_stops
 from deploy.ops.doctor.read.tree import Tree
 from slave.servos.dynamixel.port import Port
 
@@ -57,6 +59,8 @@ async def examine(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
         port = Port if options.reach else None
         pinged = await asyncio.to_thread(ping_servos, needs.servos, tree, port)
         found.append(judge_latency(pinged, needs.servos.reply_timeout_s))
+    if needs.estop is not None:
+        found += judge_stops(read_stops(needs.estop), not needs.simulated, needs.reset_key)
     found += [judge_endpoint(try_to_listen(endpoint)) for endpoint in needs.link.listen]
     if options.reach:
         found += await others(needs)

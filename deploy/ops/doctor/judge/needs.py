@@ -22,6 +22,7 @@ from master.suit.protocol import SuitProtocol
 from slave.config import SlaveConfig
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.dynamixel.config import DynamixelConfig
+from slave.stop_inputs.config import EstopConfig
 
 GENERAL = "host"
 """The role where no file is given."""
@@ -62,6 +63,11 @@ class Needs:
     camera: CameraNeed = CameraNeed.OFF
     camera_device: str = ""
     link: LinkConfig = field(default_factory=LinkConfig)
+    estop: EstopConfig | None = None
+    """A slave's emergency stop inputs."""
+    simulated: bool = False
+    """Whether its robot is simulated."""
+    reset_key: bool = False
     robots: tuple[str, ...] = ()
     """Whom it commands."""
     operator: str = ""
@@ -116,6 +122,9 @@ def _of_slave(config: SlaveConfig) -> Needs:
         servos=servos if isinstance(servos, DynamixelConfig) else None,
         realtime_priority=config.process.realtime_priority,
         serial_ports=tuple(ports),
+        estop=config.estop,
+        simulated=config.servos.backend == "mujoco",
+        reset_key=bool(config.guard.reset_key),
         camera=CameraNeed(config.camera.source),
         camera_device=config.camera.device,
         link=config.link,
