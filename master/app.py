@@ -14,6 +14,7 @@ from common.link import LinkSession, open_session
 from common.link.audit import Audit
 from common.link.certificates import check_keys, check_operator
 from common.link.place import own_endpoints
+from common.log.handler import BELL
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Ticks
 from common.metrics.tree import WriteMetrics
@@ -115,6 +116,8 @@ class Master:
         angles_ns = monotonic_ns()
         for line in self._pipeline.warnings:
             log.warning("%s", line)
+        for line in self._pipeline.said:
+            log.warning("%s", line, extra=BELL)
         held = self._config.operator.deadman == "always_held"
         for robot in self._robots:
             if robot.name in self._given_up:
@@ -159,6 +162,7 @@ class Master:
             beyond_reach=self._pipeline.beyond_reach.metrics(),
             buses={bus.name: bus.metrics() for bus in self._buses},
             robots={},
+            zero_pose_again=self._pipeline.zero_pose.metrics(),
         )
 
     def metrics(self) -> MasterMetrics:

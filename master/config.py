@@ -12,6 +12,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
+from master.comfort.config import ZeroPoseAgainConfig
 from master.orientation.config import EstimationConfig
 from master.orientation.filters import filter_mistakes
 from master.suit.nodes import NodeConfig, wiring_mistakes
@@ -41,6 +42,7 @@ class OperatorConfig(Section):
     name: str = Field(min_length=1, max_length=64)
     deadman: Literal["always_held"]
     """`always_held`: the operator has no pedal. There is no default, so that a person decides it."""
+    zero_pose_again: ZeroPoseAgainConfig = ZeroPoseAgainConfig()
 
 
 class MasterConfig(Section):
@@ -79,6 +81,7 @@ class MasterConfig(Section):
             *self._robot_mistakes(),
             *wiring_mistakes(self.nodes, self.capture.buses, "capture.buses"),
             *node_mistakes(self.nodes, skeleton),
+            *self.operator.zero_pose_again.mistakes_for(skeleton.segment_names, self.estimation.zero_pose_s),
             *self.estimation.mistakes_at(self.capture.rate_hz),
             *self.link.mistakes(),
         ]

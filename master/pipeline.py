@@ -16,10 +16,12 @@ from common.clock import to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Command, CommandStamps, Mask
+from master.comfort.zero_pose_again import ZeroPoseConduct
 from master.config import MasterConfig
 from master.joint_angles.beyond import BeyondReach
 from master.joint_angles.solver import JointSolver
 from master.orientation.estimator import Estimator
+from master.suit.double_tap import DoubleTap, TapLimits
 from master.suit.doubt import Doubts, NodeDoubt, Weight, refusal, together
 from master.suit.nodes import NodeConfig
 from master.suit.plausibility import PlausibilityWatch
@@ -62,6 +64,12 @@ class MasterPipeline:
         self.beyond_reach = BeyondReach(self.skeleton.segment_names)
         self.warnings: list[str] = []
         """Messages to the operator about the last joint angles."""
+        again = config.operator.zero_pose_again
+        self.zero_pose = ZeroPoseConduct(again, self.estimator, self.skeleton.segment_names)
+        self.said: list[str] = []
+        """What to say to the operator with the last joint angles, each line with a sound."""
+        self._tapped = None if again.tap_node is None else self.skeleton.segment_names.index(again.tap_node)
+        self._taps = DoubleTap(TapLimits(blow_m_s2=again.tap_m_s2))
         self._angles_ns: int | None = None
         self.plausibility = PlausibilityWatch(
             config.capture.plausibility, len(nodes), config.capture.rate_hz, protocol.fd.scale,
@@ -110,6 +118,7 @@ class MasterPipeline:
         for each in sweeps:
             self.estimator.update(each, dt_s)
         self._last_sweep = sweep
+        self._watch_taps(sweep)
         # after a missed deciding tick the next one decides, so that no command is missing
         period = sweep.tick // self._decimation
         disbelieved, before = self.plausibility.doubted | clashing, self._disbelieved
@@ -119,6 +128,13 @@ class MasterPipeline:
             return None
         self._decided_period = period
         return self._joint_angles(sweep)
+
+    def _watch_taps(self, sweep: Sweep) -> None:
+        node = self._tapped
+        if node is None or not sweep.fresh[node]:
+            return
+        if self._taps.take(sweep.acc_m_s2[node], sweep.gyr_rad_s[node], sweep.sampled_ns):
+            self.zero_pose.ask(f"two taps on {self.skeleton.segment_names[node]}", sweep.sampled_ns)
 
     def _joint_angles(self, sweep: Sweep) -> JointAngleSample:
         posture = self.estimator.posture()
@@ -135,6 +151,10 @@ class MasterPipeline:
         # a joint is known only if the nodes on both its segments are
         missing = self.skeleton.joint_needs_node @ ~known_nodes
         known = np.isfinite(position) & np.isfinite(velocity) & ~missing
+        self.said = self.zero_pose.step(sweep.sampled_ns)
+        hold = self.zero_pose.hold
+        if hold:
+            known = np.zeros_like(known)
         return JointAngleSample(
             tick=sweep.tick,
             sampled_ns=sweep.sampled_ns,
@@ -142,7 +162,7 @@ class MasterPipeline:
             position_rad=np.where(known, position, 0.0),
             velocity_rad_s=np.where(known, velocity, 0.0),
             valid=known,
-            doubt=refusal(self.doubts) if self.doubts else "",
+            doubt=hold or (refusal(self.doubts) if self.doubts else ""),
         )
 
     def _of_suit(self) -> Doubts:

@@ -23,6 +23,8 @@ MAX_WAITING = 1000
 FLUSH_S = 0.5
 """The longest wait at the end of the process for lines not yet written."""
 _STDERR = 2
+BELL = {"bell": True}
+"""As `extra` of a log call: a terminal sounds its bell with the line."""
 
 log = logging.getLogger(__name__)
 
@@ -64,6 +66,8 @@ class ThreadedLogHandler(logging.Handler):
         """Hand a line to the thread."""
         try:
             line = self.format(record)
+            if getattr(record, "bell", False) and self._raw.isatty():
+                line = "\a" + line
         except Exception as error:
             line = self._own_line(f"a log line could not be formatted ({error}): {record.msg!r}")
         try:

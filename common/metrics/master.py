@@ -21,6 +21,18 @@ class Unreached(Metrics):
 
 
 @dataclass(frozen=True, slots=True)
+class ZeroPoseTaken(Metrics):
+    """The zero pose, taken again while the suit is worn."""
+
+    taken: int
+    refused: int
+    why: str
+    """What was wrong with the newest one, if it was refused."""
+    moved_deg: dict[str, float]
+    """By segment, how far its heading had moved apart from the suit's at the newest; below 1° left out."""
+
+
+@dataclass(frozen=True, slots=True)
 class RobotHeard(Metrics):
     """What the master hears of a robot."""
 
@@ -83,3 +95,4 @@ class MasterMetrics(Metrics):
     robots: dict[str, CommandedMetrics]
     access: AccessMetrics | None = None
     """In the file at the end only."""
+    zero_pose_again: ZeroPoseTaken | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -22,6 +23,7 @@ from master.orientation.joints.online import OnlineHeadings
 from master.orientation.liveness import Liveness
 from master.orientation.lowpass import LowPass
 from master.orientation.zero_pose import ZeroPose, ZeroPoseLimits
+from master.orientation.zero_pose_again import ZeroPoseAgain
 from master.suit.doubt import NodeDoubt, Weight
 
 _GRAVITY_M_S2 = 9.81
@@ -124,16 +126,19 @@ class Estimator:
         if config.constraints == "online" and skeleton is not None:
             self._heading = OnlineHeadings(config.online, skeleton, rate_hz)
             self._q_of_filters = self._bank.q_inertial_from_sensor
-        self._zero_pose = ZeroPose(
-            calibration.q_sensor_from_segment,
-            math.ceil(config.zero_pose_s * rate_hz),
-            math.radians(config.zero_pose_heading_deg),
-            calibration.aligned,
+        self._aligned = calibration.aligned
+        self._pose_of = partial(
+            ZeroPose,
+            ticks=math.ceil(config.zero_pose_s * rate_hz),
+            facing_rad=math.radians(config.zero_pose_heading_deg),
+            aligned=calibration.aligned,
             limits=ZeroPoseLimits(
                 math.radians(config.zero_pose_turn_deg_s), math.radians(config.zero_pose_lean_deg)
             ),
         )
-        self._aligned = calibration.aligned
+        self._zero_pose = self._pose_of(calibration.q_sensor_from_segment)
+        self.standing_again: ZeroPoseAgain | None = None
+        """The zero pose that is being taken again; see `stand_again`."""
         self._gyr_rad_s = np.zeros((count, 3))
         # the filters hold each reading for the period before it, which leads by half of it on average
         self._advance_s = self._lowpass.delays_s[GYR] - 0.5 / rate_hz
@@ -165,6 +170,8 @@ class Estimator:
             self._find(changes.settled, np.isfinite(filtered[MAG, :, 0]))
         if not self._zero_pose.known.all():
             self._stand(filtered[MAG])
+        if self.standing_again is not None and not self.standing_again.taken.any():
+            self._stand_again(self.standing_again, filtered[MAG])
         if self._heading.due():
             usable = self._liveness.settled & self._zero_pose.known
             alignment = self._zero_pose.q_sensor_from_segment
@@ -186,6 +193,37 @@ class Estimator:
         for nodes in (done & self._aligned, done & ~self._aligned):
             if nodes.any():
                 self._heading.stand(nodes, self._zero_pose.correction_rad, self._q_of_filters(), mag_ut)
+
+    @property
+    def has_zero_pose(self) -> bool:
+        """Whether every node that is heard has its zero pose."""
+        settled = self._liveness.settled
+        return bool(settled.any()) and not (settled & ~self._zero_pose.known).any()
+
+    def stand_again(self) -> ZeroPoseAgain:
+        """Take the zero pose again from now on, until `drop_again`. The old one stays until then."""
+        pose = self._pose_of(self._zero_pose.q_sensor_from_segment, posed_before=True)
+        self.standing_again = ZeroPoseAgain(pose)
+        return self.standing_again
+
+    def drop_again(self) -> None:
+        """Take no zero pose any more; what there is stands."""
+        self.standing_again = None
+
+    def _stand_again(self, again: ZeroPoseAgain, mag_ut: Array) -> None:
+        rate = self._rate_of_sensors()
+        # a node without its first pose, or whose gyro is not to be believed yet, takes no part
+        asked = self._liveness.settled & self._zero_pose.known & ~self._bank.undecided()
+        if not again.add(self._oriented(rate), asked, rate):
+            return
+        taken = again.taken[:, None]
+        before, after = self._zero_pose.q_sensor_from_segment, again.q_sensor_from_segment
+        self._zero_pose.q_sensor_from_segment = np.where(taken, after, before)
+        # a new alignment holds its node's heading; that of the others is turned
+        correction = np.where(self._aligned, again.moved_rad, 0.0)
+        for nodes in (again.taken & self._aligned, again.taken & ~self._aligned):
+            if nodes.any():
+                self._heading.stand(nodes, correction, self._q_of_filters(), mag_ut)
 
     def doubts(self) -> dict[int, NodeDoubt]:
         """Doubts about nodes, by their number."""

@@ -47,15 +47,18 @@ class ZeroPose:
         aligned: Mask | None = None,
         *,
         limits: ZeroPoseLimits | None = None,
+        posed_before: bool = False,
     ) -> None:
         """`q_sensor_from_segment` (N, 4) stands until the zero pose is complete, for good if `ticks` is 0.
 
-        For good also that of the nodes `aligned` (N,), by default none.
+        For good also that of the nodes `aligned` (N,), by default none. `posed_before`: that of the others is
+        an earlier zero pose's, so their lean is known too.
         """
         count = len(q_sensor_from_segment)
         self._ticks = ticks
         self._facing = heading_turn(facing_rad)
         self._aligned = np.zeros(count, dtype=np.bool_) if aligned is None else aligned
+        self._upright = np.ones(count, dtype=np.bool_) if posed_before else self._aligned
         self._limits = limits or ZeroPoseLimits()
         self._sum = np.zeros((count, 4))
         self._first = np.zeros((count, 4))
@@ -69,9 +72,9 @@ class ZeroPose:
         self.q_sensor_from_segment = q_sensor_from_segment.copy()
         """(N, 4)."""
         self.correction_rad = np.zeros(count)
-        """(N,) what the headings of aligned nodes lacked when their zero pose was complete; 0 for others."""
+        """(N,) what the headings lacked when the pose was complete; 0 for nodes whose lean is not known."""
         self.lean_rad = np.full(count, np.nan)
-        """(N,) how far aligned nodes leaned from the zero pose in the last pose; NaN for others."""
+        """(N,) how far nodes leaned from the zero pose in the last pose; NaN where that is not known."""
 
     def add(self, q_world_from_sensor: Array, settled: Mask, rate_rad_s: Array | None = None) -> Mask:
         """One tick: orientations (N, 4), which of them count, and their rates (N, 3) without the bias.
@@ -99,7 +102,7 @@ class ZeroPose:
         if not done.any():
             return done
         # nodes that came later count too: if any segment leans, the operator is not in the zero pose
-        leaning = self._lean(taking & self._aligned)
+        leaning = self._lean(taking & self._upright)
         if leaning:
             self._refuse(leaning, taking)
             return np.zeros_like(taking)

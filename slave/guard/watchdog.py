@@ -102,7 +102,8 @@ def _valid(signs: Signs) -> str | None:
     age_ns = abs(signs.now_ns - signs.somebody_ns)
     if age_ns <= signs.command_timeout_ns:
         return None
-    return f"no joint has been valid for {to_s(age_ns):.2f} s: check the operator's suit"
+    why = signs.doubt or "check the operator's suit"
+    return f"no joint has been valid for {to_s(age_ns):.2f} s: {why}"
 
 
 def _clutch(signs: Signs) -> str | None:

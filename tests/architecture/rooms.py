@@ -14,7 +14,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["deploy/measure"],
     ["deploy/report", "deploy/certificates", "deploy/examples"],
     ["master", "slave"],
-    ["master/calibrate"],
+    ["master/calibrate", "master/comfort"],
     ["master/joint_angles"],
     ["master/orientation"],
     ["master/suit"],

@@ -1,10 +1,14 @@
-"""What a person's joints can do."""
+"""What a person's joints can do, and real recordings."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
+import numpy as np
 import pytest
+
+from common.quaternion import Array
 
 Range = tuple[float, float]
 
@@ -46,3 +50,20 @@ def fastest_deg_s() -> Mapping[str, float]:
         + ("hip_flexion", "hip_abduction", "knee_flexion", "ankle_flexion"),
         900.0,
     )
+
+
+LoadRecording = Callable[[str], dict[str, Array]]
+
+
+@pytest.fixture(scope="session")
+def recording(recordings_folder: Path) -> LoadRecording:
+    """Loads one of the recordings by name, as float64."""
+
+    def load(name: str) -> dict[str, Array]:
+        path = recordings_folder / f"{name}.npz"
+        if not path.exists():
+            pytest.skip(f"{path.name} is not in TANDEM_DATA")
+        with np.load(path) as arrays:
+            return {key: np.asarray(arrays[key], np.float64) for key in arrays if key != "version"}
+
+    return load

@@ -10,6 +10,7 @@ from deploy.harness.faults.judge import FaultOutcome
 from deploy.harness.faults.link import LINK
 from deploy.harness.faults.processes import PROCESSES, ProcessFault, try_with_processes
 from deploy.harness.faults.robot import ROBOT
+from deploy.harness.faults.shift import SHIFT
 from deploy.harness.faults.stop_inputs import STOP_INPUTS
 from deploy.harness.faults.strangers import STRANGERS
 from deploy.harness.faults.suit import SUIT
@@ -21,6 +22,7 @@ VIRTUAL: tuple[VirtualFault, ...] = (
     *STRANGERS,
     *VALUES,
     *SUIT,
+    *SHIFT,
     *ROBOT,
     *CLOCKS,
     *ESTOPS,

@@ -94,6 +94,8 @@ class VirtualWorld:
         self.trace = Trace(self.slave_config.skeleton.joint_names)
         self.commands: list[Command] = []
         self.states: list[RobotState] = []
+        self.said: list[str] = []
+        """What the master told the operator with a sound."""
         self._under_way: list[tuple[int, int, Callable[[], None]]] = []
         self._order = itertools.count()
         self._tick = 0
@@ -117,6 +119,10 @@ class VirtualWorld:
     def beyond_reach(self) -> dict[str, Unreached]:
         """What of the operator the robot could not follow, as the master counts it."""
         return self._master.beyond_reach.metrics()
+
+    def take_zero_pose_again(self) -> None:
+        """The operator asks for it, by a key."""
+        self._master.zero_pose.ask("a key", self.master_ns)
 
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
         """Go on for some time of the master's clock, or until a condition holds."""
@@ -204,6 +210,7 @@ class VirtualWorld:
         command = self._writer.write(angles, self._lease.token, True, put_ns, put_ns)
         self.commands.append(command)
         self.trace.add(command)
+        self.said += self._master.said
         self._carry(Traffic.COMMAND, encode(command), self.on_command, ANGLES_NS)
 
     def on_command(self, payload: bytes, sender: str | None = None) -> None:
