@@ -77,6 +77,8 @@ class ServoMetrics(Metrics):
     counters: dict[str, int] = field(default_factory=dict)
     times_ms: dict[str, Summary] = field(default_factory=dict)
     buses: dict[str, BusMetrics] = field(default_factory=dict)
+    no_effort: dict[str, str] = field(default_factory=dict)
+    """Why a joint's effort is not known, by joint: there is no contact detection there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,6 +62,10 @@ class DriveFault(IntEnum):
     """The contact at its first digital input (60FDh, bit 16) is open."""
     INPUTS_SILENT = 26
     """It sends its digital inputs no more."""
+    TORQUE_SILENT = 27
+    """It does not tell its torque any more."""
+    TORQUE_STUCK = 28
+    """The torque that it tells stays what it was."""
 
     @property
     def option(self) -> str:
@@ -78,6 +82,8 @@ STATUS_BITS = {
     DriveFault.STO: (VOLTAGE, 0),
 }
 """Bits of the statusword that a fault clears and sets."""
+WITHHOLDS = {DriveFault.INPUTS_SILENT: "inputs", DriveFault.TORQUE_SILENT: "thousandths"}
+"""What is no longer sent with a fault."""
 IGNORES_TARGETS = (DriveFault.NOT_FOLLOWING, DriveFault.LOCAL, DriveFault.NO_VOLTAGE)
 CODES = {DriveFault.OVER_CURRENT: (0x2310, 0x03), DriveFault.OVER_TEMPERATURE: (0x4310, 0x09)}
 """Emergency code and error register of those that are the drive's own."""

@@ -13,7 +13,7 @@ import canopen
 from canopen.sdo.exceptions import SdoAbortedError
 
 from common.clock import NS_PER_MS
-from deploy.sim.drives.faults import CODES, DEMAND, IGNORES_TARGETS, STATUS_BITS, DriveFault
+from deploy.sim.drives.faults import CODES, DEMAND, IGNORES_TARGETS, STATUS_BITS, WITHHOLDS, DriveFault
 from deploy.sim.drives.machine import after, statusword
 from deploy.sim.drives.mapping import GIVEN, TAKEN, PdoLayout, layout
 from deploy.sim.drives.torque_off import DROPS, STO_EMERGENCY, inputs, without_torque
@@ -26,7 +26,7 @@ from slave.servos.canopen.status_bits import LIMITED
 _RPDO, _TPDO, _TPDOS = 0x1400, 0x1800, range(0x1800, 0x1804)
 """Communication parameters; a PDO's mapping is 200h further on."""
 _INVALID = 0x8000_0000
-_PRESENT_STATE = 0x0800_0022
+_NO_OBJECT, _PRESENT_STATE = 0x0602_0000, 0x0800_0022
 _BOOT, _PRE_OPERATIONAL, _OPERATIONAL = 0x00, 0x7F, 0x05
 _RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
 _PROFILE_POSITION = 1
@@ -42,6 +42,10 @@ class SimulatedDrive:
         """Increments."""
         self.count = 0
         """The output encoder's count."""
+        self.thousandths = 0
+        """Torque and current of the motor, of their ratings."""
+        self.rated_torque_mnm = 0
+        """6076h."""
         self.target = 0
         self.limited = False
         """Whether a limit of its own keeps it from its target."""
@@ -55,6 +59,9 @@ class SimulatedDrive:
         self._pending: bytes | None = None
         self._pdos: dict[int, PdoLayout] = {}
         """Of the PDOs that are on, by the index of their communication parameters."""
+        self._every: dict[int, int] = {}
+        """SYNCs between two of each."""
+        self._syncs = 0
         self._stuck = 0
         self._beaten_ns = 0
         self._heard_ns: int | None = None
@@ -128,12 +135,14 @@ class SimulatedDrive:
             else:
                 self._emergency(0x8210, 0x11)
             self._pending = None
+        self._syncs += 1
+        withheld = WITHHOLDS.get(self.fault, "")
         for index, (form, names) in self._pdos.items():
-            if index not in _TPDOS or (index != _TPDO and self.fault is DriveFault.INPUTS_SILENT):
+            if index not in _TPDOS or withheld in names or self._syncs % self._every[index]:
                 continue
             now = {
                 "statusword": self.statusword, "encoder": self.encoder, "position": self.position,
-                "inputs": inputs(self.fault),
+                "inputs": inputs(self.fault), "thousandths": self.thousandths,
             }  # fmt: skip
             code = pdo.TPDO1 + 0x100 * (index - _TPDO)
             self._send(code + self.id, form.pack(*(now[name] for name in names)))
@@ -189,6 +198,11 @@ class SimulatedDrive:
     def follows(self) -> bool:
         """Whether it goes where its target is."""
         return self.state is Power.ENABLED and self.fault not in IGNORES_TARGETS
+
+    @property
+    def tells_against_position(self) -> bool:
+        """Whether only one of position and torque is turned round (607Eh, bits 7 and 5)."""
+        return bool(self.traits.polarity & 0x80) != bool(self.traits.polarity & 0x20)
 
     @property
     def encoder(self) -> int:
@@ -260,6 +274,7 @@ class SimulatedDrive:
             self._send_frame(frame_id, data)
 
     def _read(self, index: int, subindex: int, **_: object) -> int | None:
+        self._must_have(index)
         match index:
             case 0x6041:
                 return self.statusword
@@ -273,9 +288,20 @@ class SimulatedDrive:
                 return self.encoder
             case pdo.INPUTS:
                 return inputs(self.fault)
+            case pdo.TORQUE | pdo.CURRENT:
+                return self.thousandths
+            case 0x6076:
+                return self.rated_torque_mnm
+            case 0x607E:
+                return self.traits.polarity
         return None
 
+    def _must_have(self, index: int) -> None:
+        if index in self.traits.lacks:
+            raise SdoAbortedError(_NO_OBJECT)
+
     def _write(self, index: int, subindex: int, data: bytes, **_: object) -> None:
+        self._must_have(index)
         if index in (_RPDO, *_TPDOS) and subindex == 1:
             self._activate(index, int.from_bytes(data, "little"))
         elif index - 0x200 in self._pdos:
@@ -299,4 +325,5 @@ class SimulatedDrive:
             return
         entries = index + 0x200
         mapped = [self.value(entries, sub) for sub in range(1, self.value(entries) + 1)]
+        self._every[index] = max(1, self.value(index, 2))
         self._pdos[index] = layout(mapped, TAKEN if index == _RPDO else GIVEN)

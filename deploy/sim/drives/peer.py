@@ -14,6 +14,7 @@ from common.skeleton import Skeleton
 from deploy.sim.drives.faults import DriveFault, PlannedDriveFault
 from deploy.sim.drives.node import SimulatedDrive
 from deploy.sim.drives.plant import Plant
+from deploy.sim.drives.torque import ToldTorque
 from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import Power
@@ -70,6 +71,7 @@ class DrivePeer:
         """What a drive is wrong by: true scale over the configured one, and increments."""
         self._stuck: dict[int, int] = {}
         self._read()
+        self._torque = ToldTorque(config, skeleton, origin_ns)
         senders = [_sender(send, drive.bus) for drive in drives]
         self.drives = [
             SimulatedDrive(drive.id, sender, serial)
@@ -80,6 +82,8 @@ class DrivePeer:
         """Drives without a joint that have the id of a joint's."""
         self._on_bus: dict[str, list[int]] = {bus.name: [] for bus in config.buses}
         self._by_id: dict[tuple[str, int], list[int]] = {}
+        for simulated, rated_mnm in zip(self.drives, self._torque.rated_mnm.tolist(), strict=True):
+            simulated.rated_torque_mnm = rated_mnm
         for i, drive in enumerate(drives):
             self._on_bus[drive.bus].append(i)
             for code in (pdo.RPDO1, pdo.SDO_REQUEST):
@@ -112,6 +116,7 @@ class DrivePeer:
     def advance(self, now_ns: int) -> None:
         """Physics, heartbeats, following errors, and faults that are due. Call every few milliseconds."""
         self.plant.advance(now_ns)
+        self._torque.advance(now_ns, self.plant.effort_nm, self.plant.velocity_rad_s)
         if now_ns - self._looked_ns < _LOOK_NS:
             return
         self._looked_ns = now_ns
@@ -224,8 +229,13 @@ class DrivePeer:
 
     def _show(self) -> None:
         self._read()
-        for drive, position, count in zip(self.drives, self._increments, self._counts, strict=True):
+        told = self._torque.told().tolist()
+        for drive, position, count, torque in zip(
+            self.drives, self._increments, self._counts, told, strict=True
+        ):
             drive.position, drive.count = position, count
+            if drive.fault is not DriveFault.TORQUE_STUCK:
+                drive.thousandths = -torque if drive.tells_against_position else torque
 
 
 def _sender(send: SendOn, bus: str) -> Callable[[int, bytes], None]:

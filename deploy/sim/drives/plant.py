@@ -53,6 +53,16 @@ class Plant:
         return self._encoders.counts(self._robot.position_rad)
 
     @property
+    def effort_nm(self) -> Array:
+        """(J,) torque at the joints."""
+        return self._robot.effort_nm
+
+    @property
+    def velocity_rad_s(self) -> Array:
+        """(J,) of the demand."""
+        return self._velocity
+
+    @property
     def moving(self) -> Mask:
         """(J,) whose demand moves."""
         out: Mask = np.abs(self._velocity) > _AT_REST_RAD_S

@@ -26,7 +26,8 @@ def drives(
             help="Make a drive fail this many seconds after the first SYNC: over-current, over-temperature, "
             "encoder-stuck, magnet-lost, parity, silent, restart, lost-turns, wrong-zero, wrong-gear, "
             "reversed, double-id, encoder-zero, runs-away, not-following, limit-active, local, no-voltage, "
-            "warns, wrong-mode, position-stuck, or none, which ends a lasting fault.",
+            "warns, wrong-mode, position-stuck, torque-silent, torque-stuck, or none, which ends a lasting "
+            "fault.",
         ),
     ] = None,
     metrics: MetricsFile = None,

@@ -29,6 +29,10 @@ class Traits:
     read_form: ReadForm = ReadForm.SIZED
     answers_after_ns: int = 0
     """How long it takes to answer an SDO request."""
+    lacks: frozenset[int] = frozenset()
+    """Objects that it has not, such as 6077h."""
+    polarity: int = 0
+    """607Eh. What the joint's position is already takes bit 7 in; what the torque is, does not."""
 
 
 class Reformed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from enum import StrEnum
 
 from pydantic import Field
 
@@ -15,13 +16,25 @@ from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
 from slave.servos.backend import BackendConfig
 from slave.servos.canopen.emergency import SAFE_TORQUE_OFF
-from slave.servos.canopen.load import bits_per_s, configured_bitrate, too_much
+from slave.servos.canopen.load import BUSIEST, WELL, bits_per_s, configured_bitrate, too_much
 
 INCREMENTS_PER_TURN = 65536
 """The resolution of a motor's own encoder."""
 _LIMIT_MARGIN_RAD = math.radians(2.0)
 """A drive's software limits lie this far beyond the joint's: the guard limits first."""
 _INT32 = 2**31 - 1
+MOST_SYNCS = 20
+"""From one telling of a drive's effort to the next."""
+
+
+class EffortSource(StrEnum):
+    """Where a drive's effort comes from."""
+
+    TORQUE = "torque"
+    """Actual torque, 6077h."""
+    CURRENT = "current"
+    """Actual current, 6078h, of a drive without 6077h: a motor's torque goes with it."""
+    NONE = "none"
 
 
 class DriveConfig(Section):
@@ -42,6 +55,15 @@ class DriveConfig(Section):
     lower_deg: float | None = Field(None, ge=-360.0, le=360.0)
     """Lower software limit; None: 2° beyond the joint's own."""
     upper_deg: float | None = Field(None, ge=-360.0, le=360.0)
+
+    effort: EffortSource = EffortSource.TORQUE
+    """What tells its effort. A drive that lacks the object tells none, which is said."""
+    rated_torque_nm: float | None = Field(None, gt=0.0, le=1000.0)
+    """Of the motor, without gear: what 1000 of 6077h or 6078h is. None: the drive's own 6076h."""
+    gear_efficiency: float = Field(1.0, gt=0.1, le=1.0)
+    """Share of the motor's torque that the gear lets through."""
+    effort_reversed: bool = False
+    """True: the drive tells torque against its own direction of position, though 607Eh does not say so."""
 
     @property
     def increments_per_rad(self) -> float:
@@ -82,6 +104,8 @@ class CanopenConfig(BackendConfig):
     """Between two heartbeats of a drive."""
     drive_dead_ms: int = Field(350, ge=50, le=10_000)
     """A drive that is silent for this time is lost."""
+    effort_every: int | None = Field(None, ge=1, le=MOST_SYNCS)
+    """SYNCs from one telling of a drive's effort to the next. None: as few as the buses carry well."""
     following_error_deg: float = Field(20.0, gt=0.0, le=180.0)
     """At the joint: further than this from its target for `following_error_ms` a drive faults."""
     following_error_ms: int = Field(200, ge=1, le=10_000)
@@ -115,20 +139,35 @@ class CanopenConfig(BackendConfig):
             drives[name] = DriveConfig(id=used[bus], bus=bus)
         return drives
 
+    def effort_syncs(self, skeleton: Skeleton) -> int:
+        """Every how many SYNCs drives tell their effort: it must not crowd out what moves them."""
+        if self.effort_every is not None:
+            return self.effort_every
+        rates = {bus.name: configured_bitrate(bus) for bus in self.buses}
+
+        def fits(every: int, share: float) -> bool:
+            loads = self._load(skeleton, every)
+            return all(bits <= share * rates[name] for name, (_, bits) in loads.items())
+
+        counts = range(1, MOST_SYNCS + 1)
+        fitting = [every for share in (WELL, BUSIEST) for every in counts if fits(every, share)]
+        return next(iter(fitting), MOST_SYNCS)
+
     def load(self, skeleton: Skeleton) -> dict[str, tuple[int, float]]:
         """The number of drives on each bus, and the bits per second that they put on it."""
-        drives = list(self.drives_of(skeleton).values())
-        counts = {bus.name: sum(drive.bus == bus.name for drive in drives) for bus in self.buses}
-        named = self.drives_of(skeleton).items()
-        telling = {
-            bus.name: sum(drive.bus == bus.name and name in self.tell_inputs for name, drive in named)
-            for bus in self.buses
-        }
+        return self._load(skeleton, self.effort_syncs(skeleton))
+
+    def _load(self, skeleton: Skeleton, every: int) -> dict[str, tuple[int, float]]:
+        drives = self.drives_of(skeleton).items()
         beat_ms = max(self.heartbeat_ms, 1000 // self.sync_hz)
-        return {
-            name: (count, bits_per_s(count, self.sync_hz, beat_ms, self.drive_heartbeat_ms, telling[name]))
-            for name, count in counts.items()
-        }
+        loads = {}
+        for bus in self.buses:
+            here = {name: drive for name, drive in drives if drive.bus == bus.name}
+            inputs = sum(name in self.tell_inputs for name in here)
+            efforts = sum(drive.effort is not EffortSource.NONE for drive in here.values()) / every
+            beats = beat_ms, self.drive_heartbeat_ms
+            loads[bus.name] = len(here), bits_per_s(len(here), self.sync_hz, *beats, inputs, efforts)
+        return loads
 
     def mistakes_for(self, skeleton: Skeleton, encoders: EncoderConfig) -> list[ConfigMistake]:
         """Joints without a drive, drives without a joint, ids used twice, times that do not fit."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
 from common.clock import NS_PER_MS
@@ -17,7 +17,7 @@ from slave.servos.canopen.cia402 import (
     towards_enabled,
 )
 from slave.servos.canopen.emergency import HEARTBEAT_MISSED, SAFE_TORQUE_OFF, Emergency
-from slave.servos.canopen.sdo import Exchange, More, Read, Transfer, request
+from slave.servos.canopen.sdo import Exchange, More, Read, SdoAnswer, Transfer, request
 from slave.servos.canopen.status_bits import wrong_bits
 
 SDO_TIMEOUT_NS = 300 * NS_PER_MS
@@ -58,6 +58,10 @@ class DriveState:
     configured: bool = False
     encoder: str = ""
     """The fault of its encoder as text."""
+    lacks: dict[str, str] = field(default_factory=dict)
+    """Parts of its settings that it refused, and why."""
+    held: dict[int, int] = field(default_factory=dict)
+    """What was read of it, by index, unsigned."""
     since_ns: int = 0
     """When the phase began."""
     sto_codes: Sequence[int] = (SAFE_TORQUE_OFF,)
@@ -97,6 +101,7 @@ class DriveState:
             return None
         self.phase, self.configured = Phase.CONFIGURING, False
         self._step = self._tries = self._repeats = 0
+        self.lacks, self.held = {}, {}
         self._again_ns, self._answered = None, b""
         self._patient = configure
         return self._ask(now_ns)
@@ -126,17 +131,26 @@ class DriveState:
                 self._again_ns = now_ns + _AGAIN_NS
                 return None
             answered = replace(answered, done=transfer.optional)
-        if not answered.done:
+        if not answered.done and not transfer.part_of:
             self.fail(f"refuses its configuration: {answered.words}")
             return None
+        self._note(transfer, answered)
         self._answered = data[1:4] if self._tries == 1 and not self._repeats else b""
         self._step += 1
+        while self._step < len(self.setup) and self.setup[self._step].part_of in self.lacks:
+            self._step += 1
         self._tries = self._repeats = 0
         if self._step < len(self.setup):
             return self._ask(now_ns)
         self.configured = True
         self.phase, self.since_ns = Phase.CHECKING, now_ns
         return None
+
+    def _note(self, transfer: Transfer, answered: SdoAnswer) -> None:
+        if not answered.done:
+            self.lacks[transfer.part_of] = answered.words
+        elif isinstance(transfer, Read) and answered.data:
+            self.held[transfer.index] = int.from_bytes(answered.data, "little")
 
     def on_boot(self, now_ns: int) -> bool:
         """It reports its start. False: two did so at once, so two drives have its id, and it has failed."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -20,6 +21,7 @@ from slave.servos.canopen import pdo
 from slave.servos.canopen.answers import SyncAnswers
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drive import DriveState, Phase
+from slave.servos.canopen.effort import DriveEfforts
 from slave.servos.canopen.emergency import emergency
 from slave.servos.canopen.second_master import SecondMaster
 from slave.servos.canopen.setup import transfers
@@ -57,8 +59,9 @@ class Drives:
         self._config = config
         self._wiring = DriveWiring(config, skeleton)
         self._units = DriveUnits.of(config, skeleton)
+        every = config.effort_syncs(skeleton)
         self._drives = [
-            DriveState(transfers(config, drive, joint), sto_codes=config.sto_codes)
+            DriveState(transfers(config, drive, joint, every), sto_codes=config.sto_codes)
             for drive, joint in zip(config.drives_of(skeleton).values(), skeleton.joints, strict=True)
         ]
         count = len(self._drives)
@@ -75,6 +78,8 @@ class Drives:
         self._silence = DriveSilence(config, count)
         self._targets = DriveTargets(config, self._units)
         self._answers = SyncAnswers(count)
+        self.efforts = DriveEfforts(config, skeleton)
+        self._effort_is_newer = False
         self._beat_every = max(1, config.heartbeat_ms * config.sync_hz // 1000)
         self._supervision = Supervision(self._drives, self._watch, self._silence)
         self._inputs = dict.fromkeys(config.tell_inputs, (0, 0))
@@ -86,7 +91,7 @@ class Drives:
         """Whether it has ever sent a drive anything: before, another master may be the rightful one."""
         self._cycles = self._synced_ns = 0
         self._fault_words: dict[str, str] = {}
-        self.reading = EncoderReading(0, np.zeros(count, np.int64), np.zeros(count, np.bool_))
+        self._reading = EncoderReading(0, np.zeros(count, np.int64), np.zeros(count, np.bool_))
         self.faults: Mapping[str, str] = MappingProxyType({})
         """The faults as text, by joint. Replaced, never changed."""
         self.outbox: list[Outgoing] = []
@@ -169,6 +174,8 @@ class Drives:
             case pdo.HEARTBEAT if len(data) == 1:
                 self._silence.heartbeat(i, now_ns)
                 self._on_state(i, data[0] & 0x7F, now_ns)
+            case pdo.TPDO2 if self.efforts.take(i, data):
+                self._effort_is_newer = True
             case pdo.EMERGENCY:
                 message = emergency(data)
                 if message is not None:
@@ -241,10 +248,19 @@ class Drives:
     def sync(self, now_ns: int) -> list[Outgoing]:
         """The SYNCs, to be sent right now."""
         self._answers.begin()
+        self.efforts.asked()
         self._watch.asked()
         self._synced_ns = now_ns
         self.answered_after_ns = None
         return self._wiring.syncs()
+
+    @property
+    def reading(self) -> EncoderReading:
+        """The newest. Efforts come after the positions, by CAN's priorities, and join their reading then."""
+        if self._effort_is_newer:
+            self._effort_is_newer = False
+            self._reading = replace(self._reading, effort_nm=self.efforts.joint_nm)
+        return self._reading
 
     @property
     def warnings(self) -> Mapping[str, str]:
@@ -301,13 +317,16 @@ class Drives:
 
     def _operate(self, i: int, now_ns: int) -> None:
         self._silence.begin(i, now_ns)
+        self.efforts.configured(i, self._drives[i].held, self._drives[i].lacks)
         self._watch.connect(i)
         self.outbox.append(self._wiring.nmt(i, START))
 
     def _publish(self) -> None:
         seen = self._answers.of(self._synced_ns)
         drive_rad = self._units.angle_rad(seen.position)
-        self.reading = EncoderReading(self._synced_ns, seen.encoder_counts, seen.encoder_valid, drive_rad)
+        self._reading = EncoderReading(
+            self._synced_ns, seen.encoder_counts, seen.encoder_valid, drive_rad, self.efforts.joint_nm
+        )
         if (seen.encoder_flags != self._encoder_flags).any():
             self._encoder_flags = seen.encoder_flags
             for drive, flag in zip(self._drives, seen.encoder_flags.tolist(), strict=True):

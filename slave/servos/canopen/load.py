@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from common.can.config import BusConfig
-from slave.servos.canopen.pdo import INPUTS_BYTES, RPDO_BYTES, TPDO_BYTES
+from slave.servos.canopen.pdo import EFFORT_BYTES, INPUTS_BYTES, RPDO_BYTES, TPDO_BYTES
 
 FASTEST_BIT_S = 1_000_000
 """Classic CAN ends here (ISO 11898-2); CANopen's frames are classic ones."""
@@ -22,11 +22,16 @@ def frame_bits(size: int) -> int:
 
 
 def bits_per_s(
-    drives: int, sync_hz: int, heartbeat_ms: int, drive_heartbeat_ms: int, telling: int = 0
+    drives: int,
+    sync_hz: int,
+    heartbeat_ms: int,
+    drive_heartbeat_ms: int,
+    telling: int = 0,
+    efforts_a_sync: float = 0.0,
 ) -> float:
-    """SYNC, targets and answers of every drive, the inputs of those that tell them, and all heartbeats."""
-    a_sync = frame_bits(0) + drives * (frame_bits(RPDO_BYTES) + frame_bits(TPDO_BYTES))
-    a_sync += telling * frame_bits(INPUTS_BYTES)
+    """SYNC, targets and answers of every drive, inputs and efforts of those that tell them, heartbeats."""
+    a_sync: float = frame_bits(0) + drives * (frame_bits(RPDO_BYTES) + frame_bits(TPDO_BYTES))
+    a_sync += telling * frame_bits(INPUTS_BYTES) + efforts_a_sync * frame_bits(EFFORT_BYTES)
     beats = 1000.0 / heartbeat_ms + drives * 1000.0 / drive_heartbeat_ms
     return sync_hz * a_sync + beats * frame_bits(_HEARTBEAT_BYTES)
 

@@ -1,11 +1,11 @@
-"""Identifiers and layout of the frames that SYNC moves: one RPDO to and one TPDO from each drive. Pure."""
+"""Identifiers and layout of the frames that SYNC moves: an RPDO to each drive, and its TPDOs. Pure."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO3 = 0x000, 0x080, 0x080, 0x180, 0x200, 0x380
+NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO3, TPDO2 = 0x000, 0x080, 0x080, 0x180, 0x200, 0x380, 0x280
 SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x580, 0x600, 0x700
 """Function codes of CiA 301's predefined connection set; a node's id is added to all but NMT and SYNC."""
 
@@ -14,11 +14,14 @@ ENCODER = 0x2000
 RPDO_MAPPING = (0x6040_0010, 0x607A_0020)
 """Controlword, target position: as entries of 1600h (index, subindex, bits)."""
 TPDO_MAPPING = (0x6041_0010, ENCODER << 16 | 0x0010, 0x6064_0020)
-"""Statusword, encoder word, actual position."""
+"""Statusword, encoder word, actual position: the eight bytes that a classic frame has."""
 INPUTS = 0x60FD
 """Digital inputs, 32 bits; sent by the drives of `tell_inputs`, as TPDO 3."""
 INPUTS_MAPPING = (INPUTS << 16 | 0x0020,)
 INPUTS_BYTES = 4
+TORQUE, CURRENT = 0x6077, 0x6078
+"""What a drive tells of its effort, in thousandths of its rating, signed 16 bits: in a TPDO of its own."""
+EFFORT_BYTES = 2
 
 COUNT_BITS, MAGNET_LOST, PARITY_ERROR = 0x0FFF, 0x8000, 0x4000
 """Bits of the encoder word: the AS5045's 12-bit count, its magnet flags, and an SSI frame of wrong parity."""

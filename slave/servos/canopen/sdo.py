@@ -67,6 +67,8 @@ class Write:
     """Bytes: 1, 2 or 4."""
     value: int
     """Negative values in two's complement."""
+    part_of: str = ""
+    """Of something that a drive may lack: where one transfer of it is refused, the others are left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,8 @@ class Read:
     """Whether a drive may lack the entry."""
     again: int = 0
     """How often to ask again while it does not hold what is expected: it takes a drive a while."""
+    part_of: str = ""
+    """As of a `Write`."""
 
 
 Transfer = Write | Read

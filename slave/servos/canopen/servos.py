@@ -168,6 +168,7 @@ class CanopenServos:
                 "sync_period": self._period.summary(),
             },
             buses={name: bus.metrics() for name, bus in self._buses.items()},
+            no_effort=self._drives.efforts.missing,
         )
 
     def _check_load(self, bus: BusConfig) -> None:

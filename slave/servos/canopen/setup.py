@@ -6,14 +6,27 @@ import math
 
 from common.skeleton import Joint
 from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION
-from slave.servos.canopen.config import CanopenConfig, DriveConfig, limits_rad
-from slave.servos.canopen.pdo import INPUTS_MAPPING, RPDO1, RPDO_MAPPING, TPDO1, TPDO3, TPDO_MAPPING
+from slave.servos.canopen.config import CanopenConfig, DriveConfig, EffortSource, limits_rad
+from slave.servos.canopen.pdo import (
+    CURRENT,
+    INPUTS_MAPPING,
+    RPDO1,
+    RPDO_MAPPING,
+    TORQUE,
+    TPDO1,
+    TPDO2,
+    TPDO3,
+    TPDO_MAPPING,
+)
 from slave.servos.canopen.sdo import Read, Transfer, Write
 
 _INVALID = 0x8000_0000
 """Bit of a PDO's COB-ID: it does not exist (while its mapping is changed)."""
 _NO_RTR = 0x4000_0000
 _EVERY_SYNC = 1
+RATED_TORQUE, POLARITY = 0x6076, 0x607E
+EFFORT = "effort"
+"""The part of the settings that a drive may lack."""
 _QUICK_STOP_AND_STAY = 6
 """605Ah: slow down on the quick stop ramp, then hold. Never let go."""
 _ON_ABORT_QUICK_STOP = 3
@@ -22,8 +35,8 @@ _MILLISECONDS = -3
 _MODE_TRIES = 25
 
 
-def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint) -> list[Transfer]:
-    """Everything from "are you a drive" to its limits, in this order."""
+def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint, effort_syncs: int) -> list[Transfer]:
+    """Everything from "are you a drive" to its limits, in this order; effort every so many SYNCs."""
     scale = drive.increments_per_rad
     lower, upper = sorted(
         round(drive.zero_increments + scale * limit)
@@ -54,6 +67,7 @@ def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint) -> list[T
         Write(0x6085, 0, 4, ramp),
         Write(0x60C2, 1, 1, 1000 // config.sync_hz),
         Write(0x60C2, 2, 1, _MILLISECONDS),
+        *_effort(drive, effort_syncs),
         # the last: a drive may take a while to change its mode
         Read(
             0x6061,
@@ -66,14 +80,29 @@ def transfers(config: CanopenConfig, drive: DriveConfig, joint: Joint) -> list[T
     ]
 
 
-def _pdo(index: int, cob_id: int, mapping: tuple[int, ...]) -> list[Transfer]:
+def _effort(drive: DriveConfig, every: int) -> list[Transfer]:
+    """What it takes for a drive to tell its effort; nothing where the file wants none of it."""
+    if drive.effort is EffortSource.NONE:
+        return []
+    entry = TORQUE if drive.effort is EffortSource.TORQUE else CURRENT
+    return [
+        Read(entry, 0, 0, 0, "its effort", part_of=EFFORT),
+        Read(RATED_TORQUE, 0, 0, 0, "its rated torque", optional=True, part_of=EFFORT),
+        Read(POLARITY, 0, 0, 0, "its polarity", optional=True, part_of=EFFORT),
+        *_pdo(0x1801, TPDO2 + drive.id | _NO_RTR, (entry << 16 | 0x0010,), every=every, part_of=EFFORT),
+    ]
+
+
+def _pdo(
+    index: int, cob_id: int, mapping: tuple[int, ...], *, every: int = _EVERY_SYNC, part_of: str = ""
+) -> list[Transfer]:
     """CiA 301's order for a new mapping: off, no entries, the entries, their number, on."""
     entries = index + 0x200
     return [
-        Write(index, 1, 4, cob_id | _INVALID),
-        Write(index, 2, 1, _EVERY_SYNC),
-        Write(entries, 0, 1, 0),
-        *(Write(entries, sub, 4, entry) for sub, entry in enumerate(mapping, 1)),
-        Write(entries, 0, 1, len(mapping)),
-        Write(index, 1, 4, cob_id),
+        Write(index, 1, 4, cob_id | _INVALID, part_of),
+        Write(index, 2, 1, every, part_of),
+        Write(entries, 0, 1, 0, part_of),
+        *(Write(entries, sub, 4, entry, part_of) for sub, entry in enumerate(mapping, 1)),
+        Write(entries, 0, 1, len(mapping), part_of),
+        Write(index, 1, 4, cob_id, part_of),
     ]

@@ -88,7 +88,12 @@ class SimulatedRobot:
         if not math.isfinite(position.sum()):
             return EncoderReading(self.now_ns, np.zeros(len(position), np.int64), ~self._all_valid)
         counts = self._encoders.counts(position)
-        return EncoderReading(self.now_ns, counts, self._all_valid, effort_nm=self._torque.joint_nm)
+        return EncoderReading(self.now_ns, counts, self._all_valid, effort_nm=self.effort_nm)
+
+    @property
+    def effort_nm(self) -> Array:
+        """(J,) torque of each motor at its joint in the newest cycle."""
+        return self._torque.joint_nm
 
     @property
     def position_rad(self) -> Array:
