@@ -215,6 +215,7 @@ class Slave:
             servos=self._servos.metrics(),
             video=self._camera.metrics() if self._camera else None,
             link=self._link.counters(),
+            times=guard.times.metrics(),
         )
 
 

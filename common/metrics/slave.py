@@ -32,6 +32,29 @@ class GuardMetrics(Metrics):
 
 
 @dataclass(frozen=True, slots=True)
+class GuardTimes(Metrics):
+    """The guard's times in force, and what they follow from; None where nothing is known of the line yet."""
+
+    max_age_s: float
+    command_timeout_s: float
+    max_age_ceiling_s: float
+    command_timeout_ceiling_s: float
+    needs_age_s: float | None
+    """What this line would need: beyond the ceiling it is refused."""
+    needs_timeout_s: float | None
+    one_way_s: float | None
+    """Median, put to received."""
+    bound_s: float | None
+    """The clock offset's, which is added to every age."""
+    jitter_s: float | None
+    """By how much the age that 85 % of the commands kept exceeds the median."""
+    words: str
+    """In force, and why."""
+    beyond: str
+    """Which ceiling the line exceeds; empty where none."""
+
+
+@dataclass(frozen=True, slots=True)
 class LeaseMetrics(Metrics):
     """The lease that is in force."""
 
@@ -136,5 +159,6 @@ class SlaveMetrics(Metrics):
     """Each one-way time since the message before; in messages only, not in the file at the end."""
     one_way_missing_recent_us: tuple[int, ...] = ()
     """What `one_way_corrected_ms` took for each command that did not come; likewise in messages only."""
+    times: GuardTimes | None = None
     access: AccessMetrics | None = None
     """In the file at the end only."""

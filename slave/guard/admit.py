@@ -16,6 +16,7 @@ from common.wire.messages import Command, Mask
 from slave.guard.config import GuardConfig
 from slave.guard.events import GuardCounters
 from slave.guard.lease import DrawToken, Lease, random_token
+from slave.guard.times import LinkTimes
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,9 @@ class Situation:
     offset: Offset
     """The master's clock against the slave's."""
     max_age_ns: int
+    """In force now."""
+    age_ceiling_ns: int
+    """The most that the site allows it to become."""
     future_tolerance_ns: int
 
     def sampled_ns(self, command: Command) -> int:
@@ -117,7 +121,10 @@ def _age(command: Command, at: Situation) -> str | None:
     oldest_ns = at.age_ns(command) + at.offset.bound_ns
     if oldest_ns <= at.max_age_ns:
         return None
-    return f"may be {to_ms(oldest_ns):.0f} ms old, limit {to_ms(at.max_age_ns):.0f} ms"
+    words = f"may be {to_ms(oldest_ns):.0f} ms old, limit {to_ms(at.max_age_ns):.0f} ms"
+    if oldest_ns <= at.age_ceiling_ns:
+        return words
+    return f"{words}, the site's ceiling (max_age_ceiling_s) {to_ms(at.age_ceiling_ns):.0f} ms"
 
 
 def _future(command: Command, at: Situation) -> str | None:
@@ -132,7 +139,9 @@ def _deadman(command: Command, _: Situation) -> str | None:
     return None if command.deadman_held else "the deadman is released"
 
 
-DEADMAN = "deadman"
+AGE, DEADMAN = "age", "deadman"
+_GENUINE = (AGE, DEADMAN)
+"""What these refuse has passed the gates that tell whose it is, whether it is new, and by which clock."""
 GATES: tuple[Gate, ...] = (
     Gate("robot", "it is for this robot", _robot),
     Gate("revoked", "the certificate of its operator is not revoked", _revoked),
@@ -141,7 +150,7 @@ GATES: tuple[Gate, ...] = (
     Gate("valid", "one finite position and velocity a joint", _valid),
     Gate("sequence", "its number is above that of the last accepted one", _sequence),
     Gate("clock", "the offset between the two clocks is trusted", _clock),
-    Gate("age", "its age plus the offset's bound is at most `max_age_s`", _age),
+    Gate(AGE, "its age plus the offset's bound is at most `max_age_s`", _age),
     Gate("future", "it is ahead by at most the offset's bound plus `future_tolerance_s`", _future),
     Gate(DEADMAN, "the operator holds the deadman; if not, the robot holds at once", _deadman),
 )
@@ -169,6 +178,9 @@ class CommandGate:
         draw_token: DrawToken = random_token,
         gates: Sequence[Gate] = GATES,
     ) -> None:
+        self.times = LinkTimes(config)
+        self._measured = ""
+        """The operator whose line that is."""
         self.lease = Lease(to_ns(config.lease_timeout_s), draw_token)
         self.revoked: frozenset[str] = frozenset()
         """Operators whose certificates are revoked."""
@@ -185,22 +197,27 @@ class CommandGate:
         self._robot = robot
         self._counters = counters
         self._gates = tuple(gates)
-        self._max_age_ns = to_ns(config.max_age_s)
         self._future_tolerance_ns = to_ns(config.future_tolerance_s)
         self._newest_sequence = -1
         self._somebody_ns: int | None = None
 
-    def judge(self, command: Command, received_ns: int, now_ns: int, offset: Offset) -> Admission:
-        """Accept or refuse a command that arrived at `received_ns`. A refused one changes counters only.
+    def judge(
+        self, command: Command, received_ns: int, now_ns: int, offset: Offset, *, moving: bool = False
+    ) -> Admission:
+        """Accept or refuse a command that arrived at `received_ns`; `moving`: whether the robot follows.
 
-        But where the deadman is released, nothing that came before this command may engage any more.
+        A refused one changes counters only, and what is known of the link. But where the deadman is
+        released, nothing that came before this command may engage any more.
         """
         self.lease.lapse(now_ns)
         situation = Situation(
             self._robot, len(self.valid), self.lease.token, self.lease.operator, self.revoked,
-            self._newest_sequence, now_ns, offset, self._max_age_ns, self._future_tolerance_ns,
+            self._newest_sequence, now_ns, offset, self.times.max_age_ns, self.times.ceilings_ns[0],
+            self._future_tolerance_ns,
         )  # fmt: skip
         admission = admit(command, situation, self._gates)
+        if admission.accepted or admission.gate in _GENUINE:
+            self.times.note(command, received_ns, offset, moving=moving)
         if not admission.accepted:
             self._counters.dropped[admission.gate] += 1
             self.refusal = admission.reason
@@ -224,5 +241,9 @@ class CommandGate:
         """The token of a new lease, or 0 if an operator holds one. Its commands are counted from 0."""
         token = self.lease.claim(operator, now_ns)
         if token:
+            self.times.begin()
+            if operator != self._measured:
+                self.times.forget()
+                self._measured = operator
             self._newest_sequence, self.arrived_ns, self.refusal = -1, None, ""
         return token

@@ -34,11 +34,15 @@ class GuardConfig(Section):
     """What the guard asks for before it lets a robot move, and how it lets it move."""
 
     max_age_s: float = Field(0.3, gt=0.0, le=2.0)
-    """A command older than this, the offset's bound added, is refused."""
+    """A command older than this, the offset's bound added, is refused; on a long line somewhat more."""
+    max_age_ceiling_s: float = Field(0.6, gt=0.0, le=2.0)
+    """So much more at most, whatever the line would need (`times.py`)."""
     future_tolerance_s: float = Field(0.02, ge=0.0, le=0.5)
     """A command from further ahead than this plus the offset's bound is refused."""
     command_timeout_s: float = Field(0.2, gt=0.0, le=2.0)
-    """Without an accepted command for longer than this, by arrival, the robot holds."""
+    """Without an accepted command for longer than this the robot holds; somewhat later on a rough line."""
+    command_timeout_ceiling_s: float = Field(0.4, gt=0.0, le=2.0)
+    """So much later at most, whatever the line would need; and never later than `lease_timeout_s`."""
     lease_timeout_s: float = Field(1.0, gt=0.0, le=60.0)
     """Without an accepted command for longer than this, by arrival, the operator's lease lapses."""
     encoder_timeout_s: float = Field(0.1, gt=0.0, le=1.0)
@@ -89,6 +93,16 @@ class GuardConfig(Section):
     events_kept: int = Field(256, ge=1, le=100_000)
     """Newest events that are remembered."""
 
+    @property
+    def age_ceiling_s(self) -> float:
+        """The most that `max_age_s` becomes: a file that sets it above the default ceiling means it."""
+        return max(self.max_age_s, self.max_age_ceiling_s)
+
+    @property
+    def timeout_ceiling_s(self) -> float:
+        """The most that `command_timeout_s` becomes."""
+        return max(self.command_timeout_s, min(self.command_timeout_ceiling_s, self.lease_timeout_s))
+
     def mistakes_for(self, skeleton: Skeleton, section: str = "guard") -> list[ConfigMistake]:
         """Contradictions between keys, joints that do not exist, and limits looser than the skeleton's."""
         return [
@@ -124,6 +138,10 @@ class GuardConfig(Section):
                 self.lease_timeout_s,
                 f"at least command_timeout_s, {self.command_timeout_s}",
             )
+        for key in ("max_age", "command_timeout"):
+            least, ceiling = getattr(self, f"{key}_s"), getattr(self, f"{key}_ceiling_s")
+            if f"{key}_ceiling_s" in self.model_fields_set and ceiling < least:
+                yield f"{key}_ceiling_s", ceiling, f"at least {key}_s, {least}"
         if self.follow_window_rad < self.engage_window_rad:
             yield (
                 "follow_window_rad",

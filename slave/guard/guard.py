@@ -25,6 +25,7 @@ from slave.guard.lease import DrawToken, Lease, random_token
 from slave.guard.permission import Permission
 from slave.guard.resting import RestingJoints
 from slave.guard.states import ENGAGED, MOVING, GuardEvent, State, next_state
+from slave.guard.times import LinkTimes
 from slave.guard.watchdog import ARRIVAL_WATCHES, BODY_WATCHES, LossWatch, Signs, first_loss
 
 
@@ -63,7 +64,6 @@ class Guard:
         self._progress = AlignProgress(skeleton.joint_names, config)
         self._arrival_watches = tuple(arrival_watches)
         self._watches = (*arrival_watches, *body_watches)
-        self._command_timeout_ns = to_ns(config.command_timeout_s)
         self._clutch_max_ns = to_ns(config.clutch_max_s)
         self._clutch_ns = 0
         self._body = WELL
@@ -74,6 +74,11 @@ class Guard:
     def lease(self) -> Lease:
         """The operator that may move the robot."""
         return self._commands.lease
+
+    @property
+    def times(self) -> LinkTimes:
+        """How old a command may be, and how long none may come."""
+        return self._commands.times
 
     @property
     def operator(self) -> str:
@@ -102,7 +107,9 @@ class Guard:
         self.counters.received += 1
         # the gap before this command counts, even if the step that should have seen it came late
         self.watch_arrivals(received_ns)
-        admission = self._commands.judge(command, received_ns, now_ns, master_offset)
+        admission = self._commands.judge(
+            command, received_ns, now_ns, master_offset, moving=self.state in ENGAGED
+        )
         if admission.gate == DEADMAN:
             self.lose(now_ns, DEADMAN, admission.reason)
         elif admission.accepted:
@@ -278,8 +285,9 @@ class Guard:
         commands = self._commands
         return Signs(
             now_ns, self.lease.token != 0, commands.arrived_ns, commands.somebody_ns(now_ns),
-            self._command_timeout_ns, commands.refusal, self._joints.life, self._joints.plausible.too_many(),
-            self._body, self._clutch_ns if self.state is State.CLUTCH else None, self._clutch_max_ns,
+            self.times.command_timeout_ns, commands.refusal, self._joints.life,
+            self._joints.plausible.too_many(), self._body,
+            self._clutch_ns if self.state is State.CLUTCH else None, self._clutch_max_ns,
             commands.operator_doubt,
         )  # fmt: skip
 
