@@ -18,7 +18,7 @@ from common.latency.one_way import master_offset
 from common.link import Link, open_session
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Summary, Ticks
-from common.metrics.slave import DueMetrics, LeaseMetrics, SlaveMetrics
+from common.metrics.slave import DueMetrics, GuardTimes, LeaseMetrics, SlaveMetrics
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.wire.codec import decode
@@ -177,6 +177,8 @@ class RobotStatus:
     offset_ms: OffsetStatus | None
     latency_ms: LatencyStatus
     due: DueMetrics | None
+    times: GuardTimes | None
+    """The guard's times in force, and why."""
     ticks: Ticks | None
     resting: tuple[str, ...] = ()
     """Joint groups that hold until the operator takes them up."""
@@ -211,6 +213,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         if metrics
         else LatencyStatus(),
         due=metrics.due if metrics else None,
+        times=metrics.times if metrics else None,
         ticks=metrics.ticks if metrics else None,
         resting=state.resting if state else (),
     )
@@ -264,6 +267,9 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
         missing = f"{due.missing} of {due.expected} commands were not there when they were due"
         p99, corrected = (_number(_p99(of), 1) for of in (latency.one_way, latency.one_way_corrected))
         words.append((f"{missing} (one way p99 {p99} ms, {corrected} ms with them)", "yellow"))
+    if one.times is not None:
+        words.append((one.times.words, ""))
+        words += [(one.times.beyond, "red")] * bool(one.times.beyond)
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
     if one.encoders_invalid:
         words.append((f"encoders not heard: {one.encoders_invalid}", "red"))

@@ -16,17 +16,16 @@ WANDERS = 4.0
 
 
 def needed_age_s(profile: Profile) -> float:
-    """The guard's age limit: the default where commands can keep it, or what they need.
+    """The guard's age limit: the default, which follows the line up to its ceiling, or what commands need.
 
-    The guard adds the offset's bound, half the least round trip, to a command's age. Over a long line this
-    bound alone exceeds the default, and a robot that accepts no command shows nothing about the line.
+    The guard adds the offset's bound, half the least round trip, to a command's age. Over a very long line
+    this exceeds the ceiling, and a robot that accepts no command shows nothing about the line.
     """
     to_robot, to_operator = profile.ways.to_robot, profile.ways.to_operator
     bound_ms = 0.5 * (to_robot.delay_ms + to_operator.delay_ms)
     needed_s = 1e-3 * (to_robot.delay_ms + bound_ms + WANDERS * to_robot.jitter_ms) + MARGIN_S
-    default_s = GuardConfig().max_age_s
-    if needed_s <= default_s:
-        return default_s
+    if needed_s <= GuardConfig().max_age_ceiling_s:
+        return GuardConfig().max_age_s
     return round(STEP_S * math.ceil(needed_s / STEP_S - 1e-9), 3)
 
 

@@ -34,8 +34,8 @@ LEAST = 12
 SPAN_NS = to_ns(1.0)
 REPEATED = 3
 """A gap is the line's own if as large a one came so often."""
-AGE_SPREADS, GAP_SPREADS = 3.0, 4.0
-"""Deviations added; TCP's retransmission timer adds four (RFC 6298)."""
+SPREADS = 4.0
+"""Deviations added, as TCP's retransmission timer does (RFC 6298)."""
 _SIGMA_OF_MAD = 1.4826
 """Rousseeuw and Croux 1993."""
 AGE_MARGIN_NS, GAP_MARGIN_NS = 40 * NS_PER_MS, 20 * NS_PER_MS
@@ -136,7 +136,7 @@ class LinkTimes:
         if ages_ns is None:
             return None
         middle_ns, spread_ns = ages_ns
-        margin_ns = max(round(AGE_SPREADS * spread_ns), AGE_MARGIN_NS)
+        margin_ns = max(round(SPREADS * spread_ns), AGE_MARGIN_NS)
         return middle_ns + spread_ns + self._bound_ns + margin_ns
 
     def _gaps_ns(self) -> list[int]:
@@ -148,7 +148,7 @@ class LinkTimes:
         return gaps_ns[-REPEATED] if len(gaps_ns) >= LEAST else None
 
     def _gap_spread_ns(self) -> int:
-        return max(round(GAP_SPREADS * _sigma(self._gaps_ns())), GAP_MARGIN_NS)
+        return max(round(SPREADS * _sigma(self._gaps_ns())), GAP_MARGIN_NS)
 
     def _timeout_needed_ns(self) -> int | None:
         gap_ns = self._usual_gap_ns()

@@ -61,7 +61,7 @@ LINK = (
     holds(
         name="link slow",
         done="From one moment to the next every message takes half a second.",
-        robot="Takes no command older than 0.3 s; brakes and stands.",
+        robot="Takes no command older than `max_age_s` allows; brakes and stands.",
         person=ENGAGE,
         act=_late_ms(500),
         reacts_s=NOTICED_S, stands_s=NOTICED_S + BRAKED_S, refused_by={"age"}, held_by={"age", "command"},

@@ -11,7 +11,7 @@ from importlib import resources
 
 import numpy as np
 
-from common.clock import NS_PER_S, to_s
+from common.clock import NS_PER_MS, NS_PER_S, to_s
 from common.errors import TandemError
 from common.skeleton import load_skeleton
 from common.wire.messages import Action, Command
@@ -79,7 +79,12 @@ class Scene:
             }  # fmt: skip
             usual = reach() if setting.motion is None else setting.motion()
             motion: OperatorMotion = Later(usual, setting.lead_s) if setting.lead_s else usual
-            self.run = VirtualWorld(WorldSettings(start_ns=UP_NS, motion=motion, overrides=overrides))
+            self.run = VirtualWorld(
+                WorldSettings(
+                    start_ns=UP_NS, motion=motion, overrides=overrides,
+                    one_way_ns=round(setting.one_way_ms * NS_PER_MS),
+                )
+            )  # fmt: skip
         config = self.run.slave_config
         self.skeleton = config.skeleton
         self.run.slave.guard = Guard(

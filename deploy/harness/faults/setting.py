@@ -33,6 +33,8 @@ class Setting:
     """Overrides of the master's."""
     aligned: bool = False
     """The nodes' alignment is known, so that a lean in the zero pose can be detected."""
+    one_way_ms: float = 2.0
+    """Of the link, until the fault."""
     motion: Callable[[], OperatorMotion] | None = None
     """The operator's motion, None for the usual reach."""
 

@@ -11,6 +11,7 @@ from deploy.harness.faults.link import LINK
 from deploy.harness.faults.processes import PROCESSES, ProcessFault, try_with_processes
 from deploy.harness.faults.robot import ROBOT
 from deploy.harness.faults.shift import SHIFT
+from deploy.harness.faults.slow_link import SLOW_LINK
 from deploy.harness.faults.stop_inputs import STOP_INPUTS
 from deploy.harness.faults.strangers import STRANGERS
 from deploy.harness.faults.suit import SUIT
@@ -19,6 +20,7 @@ from deploy.harness.faults.virtual import VirtualFault, try_on_virtual_clock
 
 VIRTUAL: tuple[VirtualFault, ...] = (
     *LINK,
+    *SLOW_LINK,
     *STRANGERS,
     *VALUES,
     *SUIT,

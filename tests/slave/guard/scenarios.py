@@ -196,6 +196,81 @@ def two_faults_at_once(make_rig: MakeRig) -> None:
     assert not rig.ask(Action.RESET, key=KEY).done
 
 
+# times that follow the link
+
+
+def over_a_line(rig: Any, age_ms: float, count: int, gap_ms: float = 80.0) -> None:
+    """Commands of that age when they arrive, one every so often."""
+    for _ in range(count):
+        for _ in range(round(gap_ms / 5.0)):
+            rig.step()
+        rig.send(sampled_ns=rig.now_ns - round(age_ms * 1e6))
+
+
+@about("times.GROWS")
+def grows_slowly(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    over_a_line(rig, 290.0, 20)
+    assert 0 < rig.guard.times.max_age_ns - 300_000_000 <= 20 * 0.02 * 80_000_000
+
+
+@about("times.REPEATED")
+def one_gap(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    over_a_line(rig, 10.0, 20)
+    over_a_line(rig, 10.0, 1, gap_ms=195.0)
+    over_a_line(rig, 10.0, 30)
+    assert rig.guard.times.command_timeout_ns == 200_000_000
+    assert rig.guard.state is State.TRACK
+
+
+@about("times.USUAL")
+def held_back(make_rig: MakeRig) -> None:
+    """An outage of a second, at whose end all that it held back arrives."""
+    rig = make_rig().to_track()
+    over_a_line(rig, 10.0, 100)
+    rig.run(1.0, commands=False)
+    assert rig.guard.state is State.HOLD
+    rig.claim()
+    for late_ms in range(1000, 0, -80):
+        rig.send(sampled_ns=rig.now_ns - late_ms * 1_000_000)
+    over_a_line(rig, 10.0, 30)
+    assert rig.guard.times.max_age_ns == 300_000_000
+
+
+@about("GuardConfig.age_ceiling_s")
+def stretched_ages(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    for age_ms in range(100, 900, 2):
+        over_a_line(rig, age_ms, 1)
+        if not rig.guard.operator:
+            rig.claim()
+    rig.sequence += 1
+    assert not rig.give(rig.command(sampled_ns=rig.now_ns - 599_000_000)).accepted
+    assert rig.guard.times.max_age_ns == 600_000_000
+
+
+@about("GuardConfig.timeout_ceiling_s")
+def stretched_gaps(make_rig: MakeRig) -> None:
+    rig = make_rig(GuardConfig(lease_timeout_s=5.0, jump_window_rad=4.0)).to_track()
+    for gap_ms in range(80, 700, 5):
+        over_a_line(rig, 10.0, 3, gap_ms)
+        if rig.guard.state is State.HOLD and gap_ms <= 400:
+            rig.engage()
+    assert rig.guard.state is State.HOLD
+    assert rig.guard.times.command_timeout_ns <= 400_000_000
+
+
+@about("LinkTimes.forget")
+def anothers_line(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    over_a_line(rig, 290.0, 40)
+    assert rig.guard.times.max_age_ns > 300_000_000
+    rig.guard.release(rig.now_ns, "gives it back")
+    assert rig.claim("ben").done
+    assert rig.guard.times.max_age_ns == 300_000_000
+
+
 # before it moves
 
 

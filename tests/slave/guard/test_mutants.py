@@ -21,6 +21,7 @@ from slave.guard import (
     align,
     body,
     challenge,
+    config,
     control,
     elapsed,
     engage,
@@ -33,6 +34,7 @@ from slave.guard import (
     resting,
     states,
     tilt,
+    times,
     watchdog,
 )
 from slave.limit import limit, pace
@@ -99,6 +101,14 @@ def free_for_all(self: lease.Lease, operator: str, now_ns: int) -> int:
     return self.token
 
 
+FORGET = times.LinkTimes.forget
+
+
+def begin_only(self: times.LinkTimes) -> None:
+    if not hasattr(self, "_sequence"):
+        FORGET(self)
+
+
 def unbounded_s(self: elapsed.StepTime, now_ns: int) -> float:
     before_ns, self._stepped_ns = self._stepped_ns, now_ns
     return 0.0 if before_ns is None else (now_ns - before_ns) * 1e-9
@@ -110,6 +120,12 @@ def forgiving(self: guard.Guard, operators: frozenset[str], now_ns: int) -> None
 
 PARTS: tuple[tuple[Any, str, Any], ...] = (
     (admit.Situation, "age_ns", lambda *_: 0),
+    (times, "GROWS", 100.0),
+    (times, "REPEATED", 1),
+    (times, "USUAL", 0.99),
+    (times.LinkTimes, "forget", begin_only),
+    (config.GuardConfig, "age_ceiling_s", 10.0),
+    (config.GuardConfig, "timeout_ceiling_s", 10.0),
     (watchdog.EncoderLife, "silence", nothing),
     (tilt, "base_loss", nothing),
     (body.Body, "estop", None),

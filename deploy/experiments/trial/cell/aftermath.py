@@ -7,7 +7,14 @@ from collections.abc import Mapping
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
 from common.metrics.slave import SlaveMetrics
 from common.wire.messages import CommandEcho
-from deploy.experiments.trial.cell.recording import CellMessages, ScriptedOutage, counts, echoes, published
+from deploy.experiments.trial.cell.recording import (
+    CellMessages,
+    ScriptedOutage,
+    counts,
+    echoes,
+    oldest_allowed_s,
+    published,
+)
 
 MOVING = ("align", "track")
 LEFT_S = 0.5
@@ -19,7 +26,7 @@ PUBLISHES_NS = 20 * NS_PER_MS
 
 def aftermath(after: CellMessages, outage: ScriptedOutage, max_age_s: float) -> dict[str, float | None]:
     """The outage's figures; `after` holds the messages from the cut on. None: not known."""
-    states = after.states
+    states, max_age_s = after.states, oldest_allowed_s(after, max_age_s)
     accepted = {n: e for n, e in echoes(states).items() if e.accepted_ns > outage.back_ns}
     until_ns = outage.act_ns if outage.act_ns is not None else max((s.sent_ns for s in states), default=0)
     noticed_ns = outage.cut_ns + to_ns(LEFT_S)

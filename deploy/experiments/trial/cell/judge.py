@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from deploy.experiments.trial.cell.measure import excerpt, measure, one_way_percentiles_ms
 from deploy.experiments.trial.cell.plan import CellKey
-from deploy.experiments.trial.cell.recording import CellCourse, counts, echoes
+from deploy.experiments.trial.cell.recording import CellCourse, counts, echoes, times_in_force
 from deploy.experiments.trial.cell.result import Cell, CellStatus
 from slave.config import SlaveConfig
 
@@ -25,7 +25,7 @@ def judged(
         key=key,
         status=CellStatus.DONE,
         values=measure(course, config),
-        remarks=(*course.remarks, *remarks),
+        remarks=(*course.remarks, *times_in_force(course.judged), *remarks),
         settings=settings,
         counts=counts(course.judged),
         one_way_ms=tuple(one_way_percentiles_ms(course.judged)),

@@ -129,6 +129,18 @@ def counts(heard: CellMessages) -> dict[str, dict[str, int]]:
     return {kind: dict(sorted(count.items())) for kind, count in grown.items() if count}
 
 
+def times_in_force(heard: CellMessages) -> list[str]:
+    """The guard's times at the end of a stretch, and why, in words; [] where the robot did not tell."""
+    told = [one.metrics.times for one in published(heard.statistics, SlaveMetrics) if one.metrics.times]
+    return [text for text in (told[-1].words, told[-1].beyond) if text] if told else []
+
+
+def oldest_allowed_s(heard: CellMessages, otherwise_s: float) -> float:
+    """The highest age limit that was in force; `otherwise_s` where the robot did not tell."""
+    told = [one.metrics.times for one in published(heard.statistics, SlaveMetrics)]
+    return max((times.max_age_s for times in told if times is not None), default=otherwise_s)
+
+
 def _counted(guard: GuardMetrics) -> dict[str, dict[str, int]]:
     return {
         "dropped": guard.dropped,

@@ -10,7 +10,9 @@ from deploy.ops.doctor.read.robots import RobotFacts
 from slave.guard.config import GuardConfig
 
 OLDEST_MS = 1000.0 * GuardConfig().max_age_s
-"""A command older than that is refused by a guard as it is shipped."""
+"""Up to this age a guard as it is shipped takes every command."""
+CEILING_MS = 1000.0 * GuardConfig().max_age_ceiling_s
+"""The most that it allows over a long line."""
 _NAMESAKES = "robots have the name"
 _SCHEMA = "schema version"
 """In the words of the codec, where the two sides' messages differ."""
@@ -26,7 +28,7 @@ def judge_robot(facts: RobotFacts, ours: Software) -> list[Finding]:
             return [fail(f"{name}: names", facts.text, "until then neither can be engaged")]
         return [fail(name, facts.text, "on its host: `tandem doctor` with its own file, and its log")]
     reached = ok(name, f"answers: {facts.guard}: {facts.text}")
-    return [reached, _time(facts), *_clock(facts), _versions(facts, ours)]
+    return [reached, _time(facts), *_times(facts), *_clock(facts), _versions(facts, ours)]
 
 
 def _time(facts: RobotFacts) -> Finding:
@@ -38,12 +40,26 @@ def _time(facts: RobotFacts) -> Finding:
     lost = facts.asked - len(trips)
     words = f"{min(trips):.2f} / {middle:.2f} / {max(trips):.2f} ms (least, median, most of {len(trips)})"
     words += f", {lost} lost" if lost else ""
-    advice = f"a command older than {OLDEST_MS:g} ms is refused: use a shorter way, or a faster network"
-    if middle / 2 > OLDEST_MS:
+    # the guard adds to the way the bound of the clocks' offset, half a round trip
+    ceiling_ms = CEILING_MS if facts.times is None else 1e3 * facts.times.max_age_ceiling_s
+    advice = (
+        f"a command that may be older than {ceiling_ms:g} ms is refused: use a shorter way or a faster "
+        "network, or raise [guard] max_age_ceiling_s at the robot"
+    )
+    if middle > ceiling_ms:
         return fail(check, words, advice)
-    if max(trips) / 2 > OLDEST_MS / 2 or lost:
+    if max(trips) > OLDEST_MS or lost:
         return warn(check, words, f"{advice}; `tandem trial` compares transports")
     return ok(check, words)
+
+
+def _times(facts: RobotFacts) -> list[Finding]:
+    if facts.times is None:
+        return []
+    check = f"{facts.name}: guard's times"
+    if facts.times.beyond:
+        return [fail(check, facts.times.beyond, "a better line, or a higher ceiling in [guard] at the robot")]
+    return [ok(check, facts.times.words)]
 
 
 def _clock(facts: RobotFacts) -> list[Finding]:

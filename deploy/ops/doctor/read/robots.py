@@ -14,6 +14,7 @@ from common.errors import CodecError, LinkError
 from common.link import Link, open_session
 from common.link.config import LinkConfig
 from common.metrics.parts import Software
+from common.metrics.slave import GuardTimes
 from common.wire.codec import decode, encode
 from common.wire.messages import Action, ClockReply
 from common.wire.presence import several_bear
@@ -46,6 +47,8 @@ class RobotFacts:
     bound_ms: float = 0.0
     software: Software | None = None
     """None where it did not tell."""
+    times: GuardTimes | None = None
+    """Its guard's times in force."""
 
 
 async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) -> list[RobotFacts]:
@@ -82,6 +85,7 @@ async def _read(link: Link, where: Destination) -> RobotFacts:
         to_ms(offset.offset_ns) if round_trips else 0.0,
         to_ms(offset.bound_ns) if round_trips else 0.0,
         heard.metrics.software if heard.metrics else None,
+        heard.metrics.times if heard.metrics else None,
     )
 
 

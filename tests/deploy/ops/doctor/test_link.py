@@ -27,10 +27,11 @@ from deploy.ops.doctor.judge.endpoints import judge_endpoint
 from deploy.ops.doctor.judge.finding import Finding, Health
 from deploy.ops.doctor.judge.keys import SOON_DAYS, judge_keys
 from deploy.ops.doctor.judge.needs import Needs
-from deploy.ops.doctor.judge.robots import OLDEST_MS, judge_robot
+from deploy.ops.doctor.judge.robots import CEILING_MS, OLDEST_MS, judge_robot
 from deploy.ops.doctor.read.endpoints import EndpointFacts, EndpointState, knock, try_to_listen
 from deploy.ops.doctor.read.keys import KeyFacts, read_keys
 from deploy.ops.doctor.read.robots import EXCHANGES, RobotFacts, read_robots
+from tests.link_times import times_over
 from tests.published import slave_metrics
 
 OURS = Software("1.2", 3, "1.10.2", "3.11")
@@ -158,13 +159,26 @@ def test_a_robot_that_is_well() -> None:
         ((OLDEST_MS,) * EXCHANGES, Health.OK),
         ((OLDEST_MS,) * (EXCHANGES - 1), Health.WARN),  # one was lost
         ((*(10.0,) * (EXCHANGES - 1), OLDEST_MS * 1.01), Health.WARN),
-        ((2 * OLDEST_MS,) * EXCHANGES, Health.WARN),
-        ((2.01 * OLDEST_MS,) * EXCHANGES, Health.FAIL),
+        ((CEILING_MS,) * EXCHANGES, Health.WARN),
+        ((1.01 * CEILING_MS,) * EXCHANGES, Health.FAIL),
         ((), Health.FAIL),
     ],
 )
 def test_a_way_that_is_too_long_for_the_guard(trips: tuple[float, ...], health: Health) -> None:
     assert by_check(judge_robot(robot(trips), OURS))["robot-1: round trip"] is health
+
+
+@pytest.mark.parametrize(
+    ("one_way_ms", "health", "words"),
+    [(150.0, Health.OK, "one way 0.15 s"), (400.0, Health.FAIL, "ceiling (max_age_ceiling_s) is 0.60 s")],
+)
+def test_the_guards_times_are_told_with_the_ceiling_that_a_line_exceeds(
+    one_way_ms: float, health: Health, words: str
+) -> None:
+    found = judge_robot(robot(times=times_over(one_way_ms).metrics()), OURS)
+    [finding] = [one for one in found if one.check == "robot-1: guard's times"]
+    assert finding.health is health
+    assert words in finding.found
 
 
 @pytest.mark.parametrize(
