@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from pydantic import ConfigDict, ValidationInfo, field_validator, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from common.config.section import Section, make_section, one_of
 from common.errors import NOT_SET, ConfigError, ConfigMistake
@@ -16,6 +16,7 @@ from slave.servos.backend import BackendConfig
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.dynamixel.config import DynamixelConfig
 from slave.servos.mujoco.config import MujocoConfig
+from slave.servos.payload import PayloadConfig, payload_mistakes
 from slave.servos.servos import Servos
 
 Chosen = TypeVar("Chosen", bound=BackendConfig)
@@ -28,6 +29,8 @@ class ServosConfig(Section):
 
     backend: str = "mujoco"
     """A name of the table."""
+    payload: dict[str, PayloadConfig] = Field(default_factory=dict)
+    """What the robot's segments carry, by segment."""
 
     @field_validator("backend")
     @classmethod
@@ -41,7 +44,7 @@ class ServosConfig(Section):
             return table
         kinds = {name: (entry.section | None, None) for name, entry in BACKENDS.items()}
         sections = make_section("ServosConfig", kinds)
-        given = {key: value for key, value in table.items() if key != "backend"}
+        given = {key: value for key, value in table.items() if key not in cls.model_fields}
         return {**table, **dict(sections.model_validate(given, context=info.context))}
 
     @property
@@ -72,9 +75,10 @@ class ServosConfig(Section):
     def mistakes_for(self, skeleton: Skeleton, encoders: EncoderConfig) -> list[ConfigMistake]:
         """What the chosen backend cannot be built from."""
         try:
-            return self.chosen.mistakes_for(skeleton, encoders)
+            chosen = self.chosen.mistakes_for(skeleton, encoders)
         except ConfigError as error:
-            return error.mistakes
+            chosen = error.mistakes
+        return [*payload_mistakes(self.payload, skeleton), *chosen]
 
     def open(
         self, skeleton: Skeleton, encoders: EncoderConfig, last_known_rad: LastKnownAngles | None = None

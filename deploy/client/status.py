@@ -27,6 +27,7 @@ from common.wire.topics import STATE, STATISTICS
 from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask
 from deploy.client.destination import ROUTER_S, Destination
+from deploy.client.efforts import TorquesByJoint, by_joint, largest, without_detection
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 
 LISTEN_S = 1.5
@@ -181,6 +182,12 @@ class RobotStatus:
     """The guard's times in force, and why."""
     ticks: Ticks | None
     resting: tuple[str, ...] = ()
+    effort_nm: TorquesByJoint | None = None
+    """Of each motor at its joint, N m."""
+    external_nm: TorquesByJoint | None = None
+    """From outside."""
+    no_effort: dict[str, str] = field(default_factory=dict)
+    """Why a joint's effort is not known."""
     """Joint groups that hold until the operator takes them up."""
 
 
@@ -216,6 +223,9 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         times=metrics.times if metrics else None,
         ticks=metrics.ticks if metrics else None,
         resting=state.resting if state else (),
+        effort_nm=by_joint(state.effort_nm) if state else None,
+        external_nm=by_joint(state.external_nm) if state else None,
+        no_effort=metrics.servos.no_effort if metrics else {},
     )
 
 
@@ -271,6 +281,9 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
         words.append((one.times.words, ""))
         words += [(one.times.beyond, "red")] * bool(one.times.beyond)
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
+    words += [(line, "yellow") for line in without_detection(one.no_effort)]
+    torques = largest("effort", one.effort_nm), largest("from outside", one.external_nm)
+    words += [(line, "dim") for line in torques if line]
     if one.encoders_invalid:
         words.append((f"encoders not heard: {one.encoders_invalid}", "red"))
     return words

@@ -16,6 +16,10 @@ class BackendConfig(Section):
         """Mean delay of a setpoint on its way to the drives, s; `predict` aims ahead by it."""
         return 0.0
 
+    def no_effort(self, skeleton: Skeleton) -> dict[str, str]:
+        """Joints whose effort nothing will tell, as far as the file says, and why."""
+        return {}
+
     def mistakes_for(self, skeleton: Skeleton, encoders: EncoderConfig) -> list[ConfigMistake]:
         """What does not fit the robot. Asked only where the file chooses this backend."""
         return []

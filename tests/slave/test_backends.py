@@ -130,3 +130,31 @@ class Silent(Ideal):
 def test_the_contract_finds_servos_that_break_it(kind: type[Ideal]) -> None:
     with pytest.raises(AssertionError):
         check(subject(kind(HAND, EncoderConfig())))
+
+
+def payload(**section: object) -> ServosConfig:
+    return ServosConfig.model_validate({"payload": {"left_hand": section}})
+
+
+def test_a_payload_is_of_a_segment_of_the_robot() -> None:
+    servos = payload(mass_kg=0.5, center_m=[0.0, 0.0, -0.08])
+    assert servos.mistakes_for(load_skeleton("nursing"), EncoderConfig()) == []
+    (mistake,) = servos.mistakes_for(HAND, EncoderConfig())
+    assert mistake.key == "servos.payload.left_hand"
+    assert "a segment of the hand profile" in mistake.expected
+    assert ServosConfig().payload == {}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"mass_kg": 0.0, "center_m": [0.0, 0.0, 0.0]},
+        {"mass_kg": 10.1, "center_m": [0.0, 0.0, 0.0]},
+        {"mass_kg": 1.0, "center_m": [0.0, 0.0]},
+        {"mass_kg": 1.0, "center_m": [0.0, 0.0, 1.1]},
+        {"mass_kg": 1.0},
+    ],
+)
+def test_a_payload_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match="payload"):
+        payload(**wrong)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
+from deploy.harness.faults.effort import EFFORT
 from deploy.harness.faults.fault import FaultRow
 from deploy.harness.faults.judge import FaultOutcome
 from deploy.harness.faults.link import LINK
@@ -26,6 +27,7 @@ VIRTUAL: tuple[VirtualFault, ...] = (
     *SUIT,
     *SHIFT,
     *ROBOT,
+    *EFFORT,
     *CLOCKS,
     *ESTOPS,
     *STOP_INPUTS,

@@ -10,10 +10,11 @@ from pathlib import Path
 
 from common.errors import LinkError
 from common.wire.version import software
+from deploy.client.efforts import without_detection
 from deploy.ops.doctor.judge.can import judge_buses, judge_interfaces
 from deploy.ops.doctor.judge.devices import is_url, judge_camera, judge_latency, judge_port
 from deploy.ops.doctor.judge.endpoints import judge_endpoint
-from deploy.ops.doctor.judge.finding import Finding, fail, ok
+from deploy.ops.doctor.judge.finding import Finding, fail, ok, warn
 from deploy.ops.doctor.judge.keys import judge_keys
 from deploy.ops.doctor.judge.machine import (
     judge_clock,
@@ -41,6 +42,8 @@ from deploy.ops.doctor.read.stops import read_stops
 from deploy.ops.doctor.read.tree import Tree
 from slave.servos.dynamixel.port import Port
 
+NOBODY_NEAR = "nobody stands within reach of these joints, or drives that tell their torque"
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -59,6 +62,7 @@ async def examine(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
         port = Port if options.reach else None
         pinged = await asyncio.to_thread(ping_servos, needs.servos, tree, port)
         found.append(judge_latency(pinged, needs.servos.reply_timeout_s))
+    found += [warn("contact", line, NOBODY_NEAR) for line in without_detection(needs.no_effort)]
     if needs.estop is not None:
         found += judge_stops(read_stops(needs.estop), not needs.simulated, needs.reset_key)
     found += [judge_endpoint(try_to_listen(endpoint)) for endpoint in needs.link.listen]

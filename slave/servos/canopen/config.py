@@ -37,6 +37,9 @@ class EffortSource(StrEnum):
     NONE = "none"
 
 
+SAYS_NONE = 'the file says so (effort = "none")'
+
+
 class DriveConfig(Section):
     """`[servos.canopen.drives.<joint>]`: one CiA 402 drive."""
 
@@ -138,6 +141,11 @@ class CanopenConfig(BackendConfig):
             used[bus] = used.get(bus, 0) + 1
             drives[name] = DriveConfig(id=used[bus], bus=bus)
         return drives
+
+    def no_effort(self, skeleton: Skeleton) -> dict[str, str]:
+        """Joints whose drives are not asked."""
+        drives = self.drives_of(skeleton).items()
+        return {name: SAYS_NONE for name, drive in drives if drive.effort is EffortSource.NONE}
 
     def effort_syncs(self, skeleton: Skeleton) -> int:
         """Every how many SYNCs drives tell their effort: it must not crowd out what moves them."""

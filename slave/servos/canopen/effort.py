@@ -11,7 +11,7 @@ import numpy as np
 
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.servos.canopen.config import CanopenConfig, DriveConfig, EffortSource
+from slave.servos.canopen.config import SAYS_NONE, CanopenConfig, DriveConfig, EffortSource
 from slave.servos.canopen.pdo import EFFORT_BYTES
 from slave.servos.canopen.setup import EFFORT, POLARITY, RATED_TORQUE
 
@@ -83,7 +83,7 @@ class DriveEfforts:
 
 def _why_none(config: DriveConfig, lacks: str, rated_nm: float) -> str:
     if config.effort is EffortSource.NONE:
-        return 'the file says so (effort = "none")'
+        return SAYS_NONE
     if lacks:
         return f"its drive tells none ({lacks})"
     return "" if rated_nm else "its drive has no rated torque (6076h): set rated_torque_nm"

@@ -11,13 +11,14 @@ from common.errors import ConfigMistake
 from common.skeleton import Skeleton
 from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT, EncoderConfig
 from slave.servos.backend import BackendConfig
-from slave.servos.dynamixel.registers import GOAL_POSITION, HEALTH, PRESENT_POSITION
+from slave.servos.dynamixel.registers import GOAL_POSITION, HEALTH, PRESENT, PRESENT_POSITION, Register
 
 WATCHDOG_UNIT_S = 0.02
 _INSTRUCTION_BYTES = 14
 _STATUS_BYTES = 11
 _BITS_PER_BYTE = 10
 """Eight, a start and a stop bit."""
+NO_CONSTANT = "its torque constant is not in servos.dynamixel.torque_nm_a"
 _BUSY = 0.8
 """Share of a cycle that the wire may be busy for: the rest is the adapter's and the servos' own delay."""
 
@@ -38,14 +39,26 @@ class DynamixelConfig(BackendConfig):
     """Cycles in a row without an answer after which a servo counts as gone."""
     bus_watchdog_s: float = Field(0.1, ge=WATCHDOG_UNIT_S, le=127 * WATCHDOG_UNIT_S)
     """Servos stop by themselves when nothing came over the bus for this long; in steps of 20 ms."""
+    torque_nm_a: dict[str, Annotated[float, Field(gt=0.0, le=100.0)]] = Field(default_factory=dict)
+    """N m at the horn for each ampere, by joint: the servo's torque constant times its gear. A joint that is
+    not named tells no effort. Makers' stall torque over stall current is a first value."""
     rejoin_velocity_rad_s: float = Field(0.5, gt=0.0, le=2.0)
     """Speed of a servo that was gone, or stopped, on its way to where it should be."""
+
+    @property
+    def present(self) -> Register:
+        """What is read of each servo in each cycle."""
+        return PRESENT if self.torque_nm_a else PRESENT_POSITION
+
+    def no_effort(self, skeleton: Skeleton) -> dict[str, str]:
+        """Joints of which the file tells no torque constant."""
+        return {n: NO_CONSTANT for n in skeleton.joint_names if n not in self.torque_nm_a}
 
     def wire_time_s(self) -> float:
         """Time that one cycle's bytes take on the wire."""
         count = len(self.ids)
         write = _INSTRUCTION_BYTES + count * (1 + GOAL_POSITION.size)
-        read = _INSTRUCTION_BYTES + count * (1 + _STATUS_BYTES + PRESENT_POSITION.size)
+        read = _INSTRUCTION_BYTES + count * (1 + _STATUS_BYTES + self.present.size)
         health = _INSTRUCTION_BYTES + _STATUS_BYTES + HEALTH.size
         return (write + read + health) * _BITS_PER_BYTE / self.baud
 
@@ -59,6 +72,11 @@ class DynamixelConfig(BackendConfig):
         out = [
             ConfigMistake(f"{key}.{name}", i, f"a joint of the {skeleton.name} profile")
             for name, i in self.ids.items()
+            if name not in names
+        ]
+        out += [
+            ConfigMistake("servos.dynamixel.torque_nm_a", name, f"a joint of the {skeleton.name} profile")
+            for name in self.torque_nm_a
             if name not in names
         ]
         missing = [name for name in skeleton.joint_names if name not in self.ids]

@@ -15,6 +15,7 @@ from slave.encoders.counts import COUNTS_PER_TURN, Counts, EncoderConfig, Encode
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.bus import Bus, ServoError
 from slave.servos.dynamixel.config import WATCHDOG_UNIT_S, DynamixelConfig
+from slave.servos.dynamixel.effort import ServoEfforts
 from slave.servos.dynamixel.goals import ServoGoals
 from slave.servos.dynamixel.latency import advice, timer_ms, too_late
 from slave.servos.dynamixel.port import Port, PortLostError
@@ -54,6 +55,8 @@ class Driver:
         self._servos = settings_of(config, skeleton, self._encoders)
         self._joint_of = {servo.id: j for j, servo in enumerate(self._servos)}
         count = len(self._servos)
+        self.efforts = ServoEfforts(config, skeleton, encoders)
+        self._currents: Counts = np.zeros(count, np.int64)
         self._goals = ServoGoals(config, skeleton, self._encoders, self._servos)
         self._watchdog_ns = to_ns(self._servos[0].watchdog * WATCHDOG_UNIT_S)
         self._bus: Bus | None = None
@@ -93,6 +96,8 @@ class Driver:
             if wrong or late:
                 self._drop()
                 raise RobotError(self._refusal(wrong) if wrong else f"{self._config.port}: {late}")
+            with bus.patient(_START_PATIENCE_S):
+                self.efforts.know({servo.joint: bus.ping(servo.id) for servo in self._servos})
             wrong = self._prepare(self._servos, _START_PATIENCE_S)
         except PortLostError:
             self._drop()
@@ -232,11 +237,15 @@ class Driver:
         bus.write_all(x.GOAL_POSITION, {self._servos[j].id: int(self._goals.counts[j]) for j in well})
         present = [j for j in range(len(self._servos)) if self._misses[j] < self._config.silent_after]
         asked_ns = self._clock()
-        answers = bus.read_all(x.PRESENT_POSITION, [self._servos[j].id for j in present])
+        register = self._config.present
+        answers = bus.read_all(register, [self._servos[j].id for j in present])
         valid = np.zeros(len(self._servos), np.bool_)
         for servo, answer in answers.items():
             j = self._joint_of[servo]
-            self._stands[j] = answer.value
+            if register is x.PRESENT:
+                self._currents[j], self._stands[j] = x.current_and_position(answer.value)
+            else:
+                self._stands[j] = answer.value
             self._misses[j] = 0
             valid[j] = True
             if answer.alert:
@@ -245,7 +254,8 @@ class Driver:
             if not valid[j]:
                 self._miss(j)
         # the answers may be as old as the question
-        self.reading = EncoderReading(asked_ns, self._stands % COUNTS_PER_TURN, valid)
+        effort_nm = self.efforts.joint_nm(self._currents, valid)
+        self.reading = EncoderReading(asked_ns, self._stands % COUNTS_PER_TURN, valid, effort_nm=effort_nm)
         self._look_after(bus, self._polled)
         self._polled = (self._polled + 1) % len(self._servos)
         self._sent_ns = self._clock()

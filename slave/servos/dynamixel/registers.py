@@ -45,6 +45,8 @@ PROFILE_ACCELERATION = Register(108, 4)
 PROFILE_VELOCITY = Register(112, 4)
 GOAL_POSITION = Register(116, 4, signed=True)
 PRESENT_POSITION = Register(132, 4, signed=True)
+PRESENT = Register(126, 10)
+"""One stretch from the present current (of some models the load), signed 16 bits, to PRESENT_POSITION."""
 HEALTH = Register(64, 35)
 """One stretch with TORQUE, HARDWARE_ERROR and BUS_WATCHDOG."""
 PLACE = Register(97, 39)
@@ -98,6 +100,12 @@ def health_words(stretch: bytes) -> str:
     if value(BUS_WATCHDOG) == WATCHDOG_TRIPPED:
         return "stopped by itself: nothing came over the bus in time"
     return "" if value(TORQUE) else "its torque is off, as after a loss of power"
+
+
+def current_and_position(stretch: int) -> tuple[int, int]:
+    """The present current, in the model's unit, and PRESENT_POSITION, of PRESENT's value."""
+    data = PRESENT.encode(stretch)
+    return int.from_bytes(data[:2], "little", signed=True), position_at_end(data)
 
 
 def position_at_end(stretch: bytes) -> int:

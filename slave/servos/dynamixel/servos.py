@@ -91,7 +91,8 @@ class DynamixelServos:
                 "broken": driver.broken,
                 "lost": driver.lost,
                 "late_cycles": self.late_cycles,
-            }
+            },
+            no_effort=driver.efforts.missing,
         )
 
     def _run(self) -> None:

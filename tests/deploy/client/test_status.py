@@ -15,7 +15,7 @@ import pytest
 from rich.console import Console
 
 from common.metrics.parts import Summary
-from common.metrics.slave import DueMetrics, LeaseMetrics
+from common.metrics.slave import DueMetrics, LeaseMetrics, ServoMetrics
 from common.metrics.tree import to_tree
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
@@ -23,6 +23,7 @@ from common.wire.codec import encode
 from common.wire.messages import BaseAttitude, RobotState
 from common.wire.topics import Topic
 from deploy.client.answer import RobotAnswer
+from deploy.client.efforts import by_joint
 from deploy.client.status import (
     Heard,
     HeardOfAll,
@@ -182,3 +183,37 @@ def test_what_two_of_a_name_say_is_not_mixed() -> None:
         "other",
         None,
     ]
+
+
+def test_efforts_are_told_by_joint_and_who_tells_none_is_named() -> None:
+    effort_nm = np.zeros(25)
+    effort_nm[[4, 6, 10]] = 12.34, -20.0, math.nan
+    external_nm = np.full(25, math.nan)
+    external_nm[4] = 3.21
+    metrics = slave_metrics(
+        servos=ServoMetrics(
+            no_effort={"left_thumb": "so", "left_index": "so", "neck_yaw": "its drive is old"}
+        )
+    )
+    said = status(Heard(replace(state(), effort_nm=effort_nm, external_nm=external_nm), metrics))
+    names = load_skeleton("nursing").joint_names
+    told = json.loads(json.dumps(to_tree(said)))["effort_nm"]
+    assert (told[names[4]], told[names[6]], told[names[10]]) == (12.34, -20.0, None)
+    shown = " ".join(rendered({"robot-1": said}).split())
+    assert f"effort: {names[6]} -20.0, {names[4]} +12.3, {names[0]} +0.0 N m (the largest)" in shown
+    assert f"from outside: {names[4]} +3.2 N m" in shown
+    assert "no contact detection: left_thumb, left_index tell no effort: so" in shown
+    assert "no contact detection: neck_yaw tells no effort: its drive is old" in shown
+
+
+def test_a_robot_whose_drives_tell_nothing_has_no_efforts() -> None:
+    said = status(heard())
+    assert (said.effort_nm, said.external_nm) == (None, None)
+    assert "effort" not in rendered({"robot-1": said})
+
+
+@pytest.mark.parametrize(("joints", "first"), [(14, "right_thumb_mpj"), (7, "joint 0")])
+def test_torques_bear_the_names_of_the_profile_with_so_many_joints(joints: int, first: str) -> None:
+    told = by_joint(np.zeros(joints))
+    assert told is not None
+    assert next(iter(told)).startswith(first)

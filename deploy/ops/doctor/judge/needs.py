@@ -60,6 +60,8 @@ class Needs:
     serial_ports: tuple[str, ...] = ()
     servos: DynamixelConfig | None = None
     """The servos on a serial bus, which is one of the ports."""
+    no_effort: dict[str, str] = field(default_factory=dict)
+    """Why the file lets no effort be known of a joint."""
     camera: CameraNeed = CameraNeed.OFF
     camera_device: str = ""
     link: LinkConfig = field(default_factory=LinkConfig)
@@ -125,6 +127,7 @@ def _of_slave(config: SlaveConfig) -> Needs:
         estop=config.estop,
         simulated=config.servos.backend == "mujoco",
         reset_key=bool(config.guard.reset_key),
+        no_effort=servos.no_effort(config.skeleton),
         camera=CameraNeed(config.camera.source),
         camera_device=config.camera.device,
         link=config.link,

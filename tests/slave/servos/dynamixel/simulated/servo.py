@@ -8,6 +8,7 @@ from slave.encoders.counts import COUNTS_PER_TURN, RAD_PER_COUNT
 from slave.servos.dynamixel import registers as x
 from slave.servos.dynamixel.registers import Register
 
+_PRESENT_CURRENT = Register(126, 2, signed=True)
 OK, LENGTH, LIMIT, ACCESS = 0, 5, 6, 7
 ALERT = 0x80
 _TABLE_BYTES = 147
@@ -29,6 +30,9 @@ class SimulatedServo:
         """Counts, finer than the encoder shows."""
         self.velocity = 0.0
         """Counts/s."""
+        self.load_nm = 0.0
+        """Torque that it holds, in the direction of rising counts."""
+        self.constant_nm_a = 1.78
         self.silent = False
         """It takes in nothing and gives no answer."""
         self._table = bytearray(_TABLE_BYTES)
@@ -77,7 +81,16 @@ class SimulatedServo:
         if address + size > _TABLE_BYTES:
             return ACCESS, b""
         self.put(x.PRESENT_POSITION, round(self.position) + self.get(x.HOMING_OFFSET))
+        self.put(_PRESENT_CURRENT, self._current() if self.get(x.TORQUE) else 0)
         return OK, bytes(self._table[address : address + size])
+
+    def _current(self) -> int:
+        """As the manual of its model has it: in 2.69 mA, in 1 mA, or no current but a share of its most."""
+        model, amperes = self.get(x.MODEL), self.load_nm / self.constant_nm_a
+        if model in (1060, 1070, 1080, 1090):
+            return max(-1000, min(1000, round(self.load_nm / 1.4 * 1000)))
+        limit, unit_a = (1750, 1e-3) if model >= 1190 else (1193, 2.69e-3)
+        return max(-limit, min(limit, round(amperes / unit_a)))
 
     def write(self, address: int, data: bytes) -> int:
         """Error code."""
