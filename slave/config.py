@@ -12,6 +12,7 @@ from common.skeleton import Skeleton, load_skeleton
 from slave.attitude.config import BaseConfig
 from slave.backends import ServosConfig
 from slave.camera.config import CameraConfig
+from slave.contact.config import ContactConfig
 from slave.encoders.counts import EncoderConfig
 from slave.guard.config import GuardConfig
 from slave.servos.canopen.config import CanopenConfig
@@ -36,6 +37,7 @@ class SlaveConfig(Section):
     loop: LoopConfig = LoopConfig()
     guard: GuardConfig = GuardConfig()
     estop: EstopConfig = EstopConfig()
+    contact: ContactConfig = ContactConfig()
     track: TrackConfig = TrackConfig()
     servos: ServosConfig = ServosConfig()
     encoders: EncoderConfig = EncoderConfig()
@@ -58,6 +60,7 @@ class SlaveConfig(Section):
         return [
             *self.guard.mistakes_for(skeleton),
             *self._wrong_stops(skeleton),
+            *self.contact.mistakes_for(skeleton),
             *self.encoders.mistakes_for(skeleton),
             *self.servos.mistakes_for(skeleton, self.encoders),
             *self.base.mistakes(),

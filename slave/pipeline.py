@@ -27,6 +27,8 @@ from common.wire.messages import (
     RobotState,
 )
 from slave.config import SlaveConfig
+from slave.contact.reflex import ContactReflex
+from slave.contact.watch import ContactWatch
 from slave.encoders.counts import Encoders
 from slave.guard import Admission, Guard, Permission
 from slave.guard.body import WELL, Body
@@ -80,6 +82,8 @@ class SlavePipeline:
         self.tracker = tracker or make_tracker(config.track, config.servos.chosen.bus_lag_s)
         self.pace = Pace(limits, config.guard)
         self.limiter = SetpointLimiter(self.skeleton.joint_names, limits)
+        self.contact = ContactWatch(self.skeleton, config.contact)
+        self.reflex = ContactReflex(config.contact, self.contact, self.skeleton.joint_names)
         self._episode = 0
         """The guard's episode when the tracker was reset last."""
         self.clock = SlaveExchange()
@@ -161,6 +165,8 @@ class SlavePipeline:
         body = body if namesake is None else replace(body, namesake=namesake)
         self._reading, self._body = reading, body
         self._position_rad = self.encoders.position_rad(reading.counts)
+        self.contact.look(now_ns, reading, self._position_rad)
+        self._body = body = replace(body, contact=self.contact.fault(now_ns))
         self.traffic.journeys.read(reading)
         self._setpoint = self.step(
             now_ns, self._position_rad, reading.valid, reading.read_ns, body, drive_rad=reading.drive_rad
@@ -186,9 +192,10 @@ class SlavePipeline:
             return Setpoint(position_rad.copy(), np.zeros_like(position_rad), ready=False)
         target = self._track(now_ns, permission)
         if target is None:
-            self.limiter.stop(permission.dt_s)
+            self._stop(now_ns, permission)
         else:
             self._limit(now_ns, permission, target)
+            self.reflex.followed(now_ns, self.guard.stand_rad)
         setpoint = self.limiter.setpoint
         self.guard.written(now_ns, setpoint.position_rad, setpoint.velocity_rad_s)
         return setpoint
@@ -200,6 +207,16 @@ class SlavePipeline:
             self.guard.lose(now_ns, "target", "the tracker's target is not finite")
             return None
         return target
+
+    def _stop(self, now_ns: int, permission: Permission) -> None:
+        """Brake as hard as the joints may, or yield to who touches the robot."""
+        if permission.state is not State.HOLD:
+            self.reflex.cancel()
+        elif self.reflex.step(
+            now_ns, permission.dt_s, self.guard.stand_rad, self.limiter, self.guard.doubted
+        ):
+            return
+        self.limiter.stop(permission.dt_s)
 
     def _limit(self, now_ns: int, permission: Permission, target: TrackTarget) -> None:
         """Move the setpoint towards the target, as far and as fast as each joint may in this step."""
@@ -246,12 +263,13 @@ class SlavePipeline:
                 echo=self.traffic.journeys.echo,
                 master_offset_ns=offset.offset_ns,
                 offset_bound_ns=offset.bound_ns if offset.trusted else -1,
-                faults=self._faults(),
+                faults=self._faults(now_ns),
                 base=self.base,
                 lease_id=lease_id(self.guard.lease.token),
                 instance=self.instance,
                 resting=self.guard.resting.names,
                 effort_nm=reading.effort_nm if reading else None,
+                external_nm=self.contact.external_nm,
             )
         )
 
@@ -265,8 +283,9 @@ class SlavePipeline:
         """(J,) of the newest encoder reading."""
         return self._position_rad
 
-    def _faults(self) -> dict[str, str]:
+    def _faults(self, now_ns: int) -> dict[str, str]:
         named = {"base": self._body.base, "name": self._body.namesake, "camera": self.camera_fault}
+        named["contact"] = self._body.contact or self.contact.missing(now_ns)
         # a drive's own fault comes before the guard's doubt of its encoder
         others = {**self._body.stops, **self.guard.doubts, **self._body.drives}
         return {**others, **{name: words for name, words in named.items() if words}}

@@ -1,4 +1,4 @@
-"""Faults of the robot besides its encoders: drives, base, a namesake; and its emergency stop inputs."""
+"""Faults of the robot besides its encoders: drives, base, a namesake, contact; and its stop inputs."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ class Body:
     """Where another robot of the same name is, or None. With two it is unknown which one is commanded."""
     stops: Mapping[str, str] = field(default_factory=dict)
     """Emergency stop inputs that are pressed or broken, by name: where each is connected, and why."""
+    contact: str | None = None
+    """Where the robot is pushed, or None."""
 
     def also(self, drives: Mapping[str, str]) -> Body:
         """The same with further drive faults, by joint."""
@@ -26,7 +28,7 @@ class Body:
     @property
     def first_fault(self) -> str | None:
         """The first fault as text, or None."""
-        return self.drive_fault or self.base or self.namesake
+        return self.drive_fault or self.base or self.namesake or self.contact
 
     @property
     def estop(self) -> str | None:

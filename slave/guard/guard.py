@@ -91,6 +91,16 @@ class Guard:
         return self._joints.plausible.words
 
     @property
+    def doubted(self) -> Mask:
+        """(J,) those joints."""
+        return self._joints.plausible.doubted
+
+    @property
+    def stand_rad(self) -> Array:
+        """(J,) where the joints are, by the angles that their drives take setpoints by."""
+        return self._joints.stand_rad
+
+    @property
     def placed(self) -> bool:
         """Whether it is known where every joint stands."""
         return self._joints.seated and not self._joints.placement.differ

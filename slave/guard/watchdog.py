@@ -128,6 +128,10 @@ def _base(signs: Signs) -> str | None:
     return signs.body.base
 
 
+def _contact(signs: Signs) -> str | None:
+    return signs.body.contact
+
+
 def _namesake(signs: Signs) -> str | None:
     return signs.body.namesake
 
@@ -146,6 +150,7 @@ BODY_WATCHES: tuple[LossWatch, ...] = (
     LossWatch("drive", _drive),
     LossWatch("base", _base),
     LossWatch("namesake", _namesake),
+    LossWatch("contact", _contact),
 )
 """Looked at in every step, right after the encoders were read."""
 

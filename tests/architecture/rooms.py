@@ -19,6 +19,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["master/orientation"],
     ["master/suit"],
     ["slave/camera", "slave/stop_inputs"],
+    ["slave/contact"],
     ["slave/servos", "slave/track"],
     ["slave/limit"],
     ["slave/guard", "slave/attitude"],

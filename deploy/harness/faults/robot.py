@@ -14,7 +14,7 @@ from common.quaternion import Array
 from common.wire.messages import BaseAttitude
 from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, ENGAGE, NOTHING
 from deploy.harness.faults.scene import Scene
-from deploy.harness.faults.virtual import goes_on, holds, holds_joints, stops
+from deploy.harness.faults.virtual import goes_on, holds, stops
 from slave.attitude.config import BaseConfig
 from slave.attitude.frame import FrameAngles, FrameParser, encode
 from slave.attitude.port import of_frame
@@ -208,15 +208,14 @@ ROBOT = (
         act=_encoder_silent,
         reacts_s=0.11, stands_s=0.11 + BRAKED_S, held_by={"encoder"},
     ),
-    holds_joints(
+    holds(
         name="encoder stuck",
         done="The encoder of a moving joint shows one angle for ever, and says that it is well.",
-        robot="Holds that joint and names it; the others follow. "
-        "More than three such joints: holds them all.",
-        person="Repair the encoder, then disengage and engage.",
+        robot="Takes it for a joint that is held up from outside: a protective stop. Without contact "
+        "detection it holds that joint alone and names it.",
+        person="Repair the encoder, then engage.",
         act=_encoder_stuck,
-        concerns=_one_joint, strays_deg=1.0, sway_deg=1.0,
-        stands_s=0.1 + 0.1 + 0.1 + BRAKED_S,
+        reacts_s=0.1, stands_s=0.1 + 1.0, yields=True, held_by={"contact"},
     ),
     stops(
         name="drive moves by itself",

@@ -134,6 +134,16 @@ def base(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.HOLD
 
 
+@about("watch contact")
+def contact(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.body = Body(contact="pushed at left_hand")
+    rig.step()
+    assert rig.guard.state is State.HOLD
+    rig.run(0.3)
+    assert "pushed at left_hand" in rig.guard.engage(rig.guard.operator, rig.now_ns)
+
+
 @about("watch namesake")
 def namesake(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()

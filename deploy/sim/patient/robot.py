@@ -1,0 +1,131 @@
+"""The simulated robot with a patient in its way, in fine steps; its masses may differ from the model's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from deploy.sim.patient.patient import SoftPatient
+from slave.model.build import unit_rates
+from slave.servos.mujoco.simulated import CYCLE_NS, SimulatedRobot
+from slave.servos.servos import EncoderReading
+
+STEPS = 8
+"""Physics steps of 0.5 ms in a cycle of the drives: 60 to the contact's period."""
+
+
+@dataclass(frozen=True, slots=True)
+class Imperfect:
+    """How the robot differs from its own model, and its drives' torques from the truth."""
+
+    mass_share: float = 0.0
+    """Standard deviation of each segment's mass and inertia."""
+    payload_kg: float = 0.0
+    """At the right hand, on top."""
+    noise_share: float = 0.005
+    """Standard deviation of the torques told, share of each motor's limit: its current's noise."""
+    step_share: float = 0.001
+    """Their steps: CiA 402 tells per mille."""
+    late_cycles: int = 1
+    """Cycles by which a torque is older than the angle beside it."""
+    drive_bits: int = 0
+    """Of a turn at the joint's output, of the drives' own encoders; 0: they tell no angles."""
+    seed: int = 1
+
+
+PERFECT = Imperfect(noise_share=0.0, step_share=0.0, late_cycles=0)
+
+
+class TouchingRobot(SimulatedRobot):
+    """A robot of which one point, on `segment` at `local_m` (3,) in its frame, may touch a patient."""
+
+    def __init__(self, skeleton: Skeleton, imperfect: Imperfect, position_rad: Array | None = None) -> None:
+        super().__init__(skeleton, position_rad=position_rad)
+        self._imperfect = imperfect
+        self._random = np.random.default_rng(imperfect.seed)
+        self._model.opt.timestep /= STEPS
+        self._spoil()
+        self.patient: SoftPatient | None = None
+        self.segment, self.local_m = "right_hand", np.zeros(3)
+        self._told = [np.zeros(len(skeleton.joints))] * (imperfect.late_cycles + 1)
+        limits = self._model.jnt_actfrcrange[self._model.dof_jntid[self._leaders], 1]
+        self._rates = unit_rates(skeleton, self._model)
+        self._limit_nm = limits / np.abs(self._joint_per_hinge)
+        self.forces_n: list[float] = []
+        """On the patient, one a physics step."""
+
+    def _spoil(self) -> None:
+        model, wrong = self._model, self._imperfect
+        factors = 1.0 + wrong.mass_share * self._random.standard_normal(model.nbody)
+        model.body_mass[:] *= factors
+        model.body_inertia[:] *= factors[:, None]
+        if wrong.payload_kg:
+            hand = model.body("right_hand").id
+            model.body_mass[hand] += wrong.payload_kg
+        mujoco.mj_setConst(model, self._data)
+
+    def advance(self, until_ns: int) -> None:
+        """Run every cycle that ends by `until_ns`; none is ever skipped."""
+        while self.now_ns + CYCLE_NS <= until_ns:
+            given = np.zeros_like(self._limit_nm)
+            for _ in range(STEPS):
+                self._touch()
+                self._torque.before()
+                mujoco.mj_step(self._model, self._data)
+                self._torque.after()
+                given += self._torque.joint_nm
+            self._told = [*self._told[1:], self._measured(given / STEPS)]
+            self._taken_in[:] = self._setpoint
+            self.now_ns += CYCLE_NS
+
+    def read(self) -> EncoderReading:
+        """The counts of the last cycle, and torques as a drive tells them."""
+        reading, drive_rad = super().read(), None
+        if self._imperfect.drive_bits:
+            step = 2.0 * np.pi / (1 << self._imperfect.drive_bits)
+            drive_rad = np.rint(self.position_rad / step) * step
+        return replace(reading, effort_nm=self._told[0], drive_rad=drive_rad)
+
+    def point(self) -> tuple[Array, Array]:
+        """Place and velocity (3,) of the point that may touch, base frame."""
+        model, data = self._model, self._data
+        body = model.body(self.segment).id
+        place = data.xpos[body] + data.xmat[body].reshape(3, 3) @ self.local_m
+        turning, moving = np.split(self._twist(body), 2)
+        velocity: Array = moving + np.cross(turning, place - data.xpos[body])
+        return place, velocity
+
+    def torques_of(self, direction: Array) -> Array:
+        """(J,) joint torques, N m, of a force of 1 N at that point in a direction (3,)."""
+        jacobian = np.empty((3, self._model.nv))
+        body = self._model.body(self.segment).id
+        mujoco.mj_jac(self._model, self._data, jacobian, None, self.point()[0], body)
+        return np.asarray(self._rates @ (jacobian.T @ direction))
+
+    def _twist(self, body: int) -> Array:
+        out = np.empty(6)
+        mujoco.mj_objectVelocity(self._model, self._data, mujoco.mjtObj.mjOBJ_XBODY, body, out, 0)
+        return out
+
+    def _touch(self) -> None:
+        if self.patient is None:
+            return
+        data, body = self._data, self._model.body(self.segment).id
+        place, velocity = self.point()
+        force = self.patient.push(place, velocity, self._model.opt.timestep)
+        data.xfrc_applied[body, :3] = force
+        data.xfrc_applied[body, 3:] = np.cross(place - data.xipos[body], force)
+        self.forces_n.append(self.patient.force_n)
+
+    def _measured(self, given_nm: Array) -> Array:
+        wrong = self._imperfect
+        noise = wrong.noise_share * self._limit_nm * self._random.standard_normal(len(given_nm))
+        step = wrong.step_share * self._limit_nm
+        if not wrong.step_share:
+            return given_nm + noise
+        out: Array = np.rint((given_nm + noise) / step) * step
+        return out

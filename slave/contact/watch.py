@@ -1,0 +1,157 @@
+"""Whether the robot is pushed: each joint's external torque against its threshold, reading by reading."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import mujoco
+import numpy as np
+
+from common.clock import to_s
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from common.wire.messages import Mask
+from slave.contact.config import ContactConfig
+from slave.contact.observer import MomentumObserver
+from slave.contact.thresholds import angles_of, thresholds_nm
+from slave.model.build import build_model, leader
+from slave.servos.servos import EncoderReading
+
+RELEASE = 0.6
+"""Contact has ended once every torque is below this share of its threshold."""
+JUMP_FACTOR, JUMP_SLACK_RAD = 2.0, 0.005
+"""An angle that moves on faster than this times its joint's limit, plus three counts, is no motion."""
+UNSETTLED_S = 0.5
+"""An estimate that has not settled for so long is none."""
+
+
+@cache
+def _model(skeleton: Skeleton) -> mujoco.MjModel:
+    return build_model(skeleton)
+
+
+class ContactWatch:
+    """Watches J joints. Give it each tick's reading; it takes each reading once."""
+
+    def __init__(
+        self, skeleton: Skeleton, config: ContactConfig, model: mujoco.MjModel | None = None
+    ) -> None:
+        """`model`: the robot's own, with its payload; None: that of the skeleton."""
+        self._model = model = _model(skeleton) if model is None else model
+        self._config = config
+        self._skeleton = skeleton
+        self._tune(drives=False)
+        self.finding: str | None = None
+        """Who is pushed and how hard, in words, for as long as it lasts; None: nobody."""
+        self.count = 0
+        """Contacts since the start."""
+        self._watched: Mask = np.isfinite(self.floor_nm)
+        self._fastest_rad_s = JUMP_FACTOR * skeleton.max_velocity_rad_s
+        self._told: Mask = np.zeros(len(self.floor_nm), np.bool_)
+        self._position_rad: Array | None = None
+        self._read_ns = 0
+        self._ready_ns: int | None = None
+        hinges = [model.joint(leader(joint)[0]) for joint in skeleton.joints]
+        self._hinge_ids = np.array([hinge.id for hinge in hinges])
+        self._depth = [_depth(model, int(hinge.bodyid[0])) for hinge in hinges]
+
+    def _tune(self, *, drives: bool) -> None:
+        """To the drives' own angles, or to the output encoders'."""
+        angles = angles_of(self._config, drives=drives)
+        self._by_drives = drives
+        self.observer = MomentumObserver(self._skeleton, angles.time_constant_s, self._model)
+        self.floor_nm = thresholds_nm(self._skeleton, self._model, self._config, angles)
+        """(J,) thresholds of a robot whose motors do nothing."""
+
+    @property
+    def external_nm(self) -> Array | None:
+        """(J,) external torque, NaN where it is not known; None where none is."""
+        if not self.observer.ready or not self._told.any():
+            return None
+        return self.observer.external_nm.copy()
+
+    @property
+    def threshold_nm(self) -> Array:
+        """(J,) thresholds now: the more torque motion takes and the faster it changes, the higher."""
+        seen, config = self.observer, self._config
+        out: Array = (
+            self.floor_nm + config.model_error * seen.model_nm + config.effort_late_s * seen.effort_rate_nm_s
+        )
+        return out
+
+    def missing(self, now_ns: int) -> str:
+        """Which joints' contact is not noticed now, and why; empty where all that matter are watched."""
+        deaf = self._watched & ~self._told
+        if deaf.any():
+            names = ", ".join(self._skeleton.joint_names[j] for j in np.flatnonzero(deaf))
+            where = "" if deaf.sum() == self._watched.sum() else f" at {names}"
+            return f"no contact detection{where}: the drives tell no torque"
+        if self._watched.any() and (self._ready_ns is None or to_s(now_ns - self._ready_ns) > UNSETTLED_S):
+            return "no contact detection: readings come too late or leap"
+        return ""
+
+    def fault(self, now_ns: int) -> str | None:
+        """Why the robot may not move, for `Body.contact`: it is pushed, or contact would not be noticed."""
+        if self.finding is not None:
+            return self.finding
+        return (self.missing(now_ns) or None) if self._config.required else None
+
+    def look(self, now_ns: int, reading: EncoderReading, position_rad: Array) -> None:
+        """Take a reading, and its joint angles (J,)."""
+        if reading.read_ns == self._read_ns:
+            return
+        joints = len(position_rad)
+        effort = np.full(joints, np.nan) if reading.effort_nm is None else reading.effort_nm
+        self._told = ~np.isnan(effort)
+        if not reading.valid.all() or self._leaps(reading.read_ns, position_rad):
+            return  # a reading left out; the observer begins anew when too many are
+        self._read_ns, self._position_rad = reading.read_ns, position_rad
+        if (reading.drive_rad is not None) != self._by_drives:
+            self._tune(drives=reading.drive_rad is not None)
+        angle_rad = position_rad if reading.drive_rad is None else reading.drive_rad
+        self.observer.update(reading.read_ns, angle_rad, effort)
+        if not self.observer.ready:
+            return
+        self._ready_ns = now_ns
+        share = np.where(self._told, np.abs(self.observer.external_nm) / self.threshold_nm, 0.0)
+        pushed = share > 1.0
+        if pushed.any():
+            self.count += self.finding is None
+            self.finding = self._describe(pushed)
+        elif self.finding is not None and (share < RELEASE).all():
+            self.finding = None
+
+    def _leaps(self, read_ns: int, position_rad: Array) -> bool:
+        before = self._position_rad
+        since_s = to_s(read_ns - self._read_ns)
+        # after a while it counts as where the joints are: the observer begins anew there
+        if before is None or not 0.0 < since_s < UNSETTLED_S:
+            return False
+        return bool((np.abs(position_rad - before) > self._fastest_rad_s * since_s + JUMP_SLACK_RAD).any())
+
+    def _describe(self, pushed: Mask) -> str:
+        """The outermost joint that is pushed, its torque, and the least force that makes it."""
+        j = max(np.flatnonzero(pushed).tolist(), key=lambda joint: self._depth[joint])
+        joint = self._skeleton.joints[j]
+        torque_nm = abs(float(self.observer.external_nm[j]))
+        segment = self._skeleton.segment_names[self._skeleton.angle_slots[leader(joint)[0]][0]]
+        force_n = torque_nm / self._lever_m(int(self._hinge_ids[j]))
+        return f"pushed at {segment} or beyond: {torque_nm:.3g} N m at {joint.name}, at least {force_n:.0f} N"
+
+    def _lever_m(self, hinge: int) -> float:
+        """Greatest distance of what a hinge carries from its axis, at least a hand's width."""
+        model, data = self.observer.model, self.observer.data
+        body = model.jnt_bodyid[hinge]
+        carried = [b for b in range(model.nbody) if _carries(model, body, b)]
+        away = data.xipos[carried] - data.xanchor[hinge]
+        return max(0.1, float(np.linalg.norm(np.cross(away, data.xaxis[hinge]), axis=1).max()))
+
+
+def _depth(model: mujoco.MjModel, body: int) -> int:
+    return 0 if body == 0 else 1 + _depth(model, int(model.body_parentid[body]))
+
+
+def _carries(model: mujoco.MjModel, body: int, other: int) -> bool:
+    while other > body:
+        other = int(model.body_parentid[other])
+    return other == body

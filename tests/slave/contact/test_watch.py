@@ -1,0 +1,165 @@
+"""When the robot counts as pushed, when no longer, and when nobody can know."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from common.quaternion import Array
+from common.skeleton import load_skeleton
+from slave.contact.config import ContactConfig, ContactJoint
+from slave.contact.watch import ContactWatch
+from slave.encoders.counts import Encoders
+from slave.servos.servos import EncoderReading
+
+SKELETON = load_skeleton("nursing")
+NAMES = SKELETON.joint_names
+ELBOW = NAMES.index("left_elbow_pitch")
+CYCLE_NS = 5_000_000
+STILL_RAD = np.clip(np.zeros(25), SKELETON.lower_rad, SKELETON.upper_rad)
+
+
+class Standing:
+    """A robot that stands still, held by torques that may be other than what the model asks for."""
+
+    def __init__(self, config: ContactConfig | None = None) -> None:
+        self.watch = ContactWatch(SKELETON, config or ContactConfig())
+        self.encoders = Encoders(SKELETON)
+        self.now_ns = 0
+        self.needed_nm = np.zeros(25)
+        self.run(1)
+        self.run(200)
+        self.needed_nm = -self.watch.observer.external_nm.copy()
+        self.run(100)
+
+    def run(self, ticks: int, pushed_nm: Array | None = None, effort_nm: Array | None = None) -> None:
+        for _ in range(ticks):
+            self.now_ns += CYCLE_NS
+            effort = self.needed_nm - (0.0 if pushed_nm is None else pushed_nm)
+            reading = EncoderReading(
+                self.now_ns,
+                self.encoders.counts(STILL_RAD),
+                np.ones(25, np.bool_),
+                effort_nm=effort if effort_nm is None else effort_nm,
+            )
+            self.watch.look(self.now_ns, reading, self.encoders.position_rad(reading.counts))
+
+
+def push(share: float, watch: ContactWatch) -> Array:
+    out = np.zeros(25)
+    out[ELBOW] = share * watch.threshold_nm[ELBOW]
+    return out
+
+
+def test_at_the_threshold() -> None:
+    robot = Standing()
+    robot.run(200, push(0.97, robot.watch))
+    assert robot.watch.finding is None
+    robot.run(200, push(1.1, robot.watch))
+    assert robot.watch.finding is not None
+    assert "left_forearm" in robot.watch.finding
+    assert "left_elbow_pitch" in robot.watch.finding
+    assert robot.watch.count == 1
+
+
+def test_it_lasts_until_it_is_well_below() -> None:
+    robot = Standing()
+    robot.run(200, push(1.5, robot.watch))
+    robot.run(200, push(0.7, robot.watch))
+    assert robot.watch.finding is not None
+    robot.run(200, push(0.5, robot.watch))
+    assert robot.watch.finding is None
+    robot.run(200, push(1.5, robot.watch))
+    assert robot.watch.count == 2
+
+
+def test_a_written_threshold_counts() -> None:
+    config = ContactConfig(joints={"left_elbow_pitch": ContactJoint(threshold_nm=20.0)}, model_error=0.0)
+    robot = Standing(config)
+    pushed = np.zeros(25)
+    pushed[ELBOW] = 19.0
+    robot.run(200, pushed)
+    assert robot.watch.finding is None
+    pushed[ELBOW] = 21.0
+    robot.run(200, pushed)
+    assert robot.watch.finding is not None
+
+
+def test_fingers_are_meant_to_touch() -> None:
+    robot = Standing()
+    pushed = np.zeros(25)
+    pushed[NAMES.index("left_index")] = 1.0
+    robot.run(200, pushed)
+    assert robot.watch.finding is None
+
+
+@pytest.mark.parametrize("required", [True, False])
+def test_drives_that_tell_no_torque_are_said(required: bool) -> None:
+    robot = Standing(ContactConfig(required=required))
+    assert robot.watch.missing(robot.now_ns) == ""
+    assert robot.watch.fault(robot.now_ns) is None
+    effort = robot.needed_nm.copy()
+    effort[ELBOW] = np.nan
+    robot.run(1, effort_nm=effort)
+    words = robot.watch.missing(robot.now_ns)
+    assert words == "no contact detection at left_elbow_pitch: the drives tell no torque"
+    assert robot.watch.fault(robot.now_ns) == (words if required else None)
+    external = robot.watch.external_nm
+    assert external is not None
+    assert np.isnan(external[ELBOW])
+    assert np.isfinite(np.delete(external, ELBOW)).all()
+
+
+def test_all_drives_without_torque() -> None:
+    robot = Standing()
+    robot.run(1, effort_nm=np.full(25, np.nan))
+    assert robot.watch.missing(robot.now_ns) == "no contact detection: the drives tell no torque"
+    assert robot.watch.external_nm is None
+
+
+def test_a_torque_that_comes_back_is_watched_again() -> None:
+    robot = Standing()
+    robot.run(10, effort_nm=np.full(25, np.nan))
+    robot.run(200)
+    assert robot.watch.missing(robot.now_ns) == ""
+    assert robot.watch.finding is None
+    robot.run(200, push(1.5, robot.watch))
+    assert robot.watch.finding is not None
+
+
+def test_one_angle_that_leaps_is_left_out() -> None:
+    robot = Standing()
+    counts = robot.encoders.counts(STILL_RAD)
+    counts[ELBOW] = (counts[ELBOW] + 300) % 4096
+    robot.now_ns += CYCLE_NS
+    reading = EncoderReading(robot.now_ns, counts, np.ones(25, np.bool_), effort_nm=robot.needed_nm)
+    robot.watch.look(robot.now_ns, reading, robot.encoders.position_rad(counts))
+    robot.run(50)
+    assert robot.watch.count == 0
+    assert robot.watch.observer.ready
+
+
+def test_angles_that_stay_away_are_no_detection() -> None:
+    robot = Standing()
+    for _ in range(150):
+        robot.now_ns += CYCLE_NS
+        reading = EncoderReading(
+            robot.now_ns, robot.encoders.counts(STILL_RAD), np.zeros(25, np.bool_), effort_nm=robot.needed_nm
+        )
+        robot.watch.look(robot.now_ns, reading, STILL_RAD)
+    assert "too late or leap" in robot.watch.missing(robot.now_ns)
+
+
+def test_the_drives_own_angles_are_finer() -> None:
+    robot = Standing()
+    coarse_nm = robot.watch.floor_nm[ELBOW]
+    robot.now_ns += CYCLE_NS
+    reading = EncoderReading(
+        robot.now_ns,
+        robot.encoders.counts(STILL_RAD),
+        np.ones(25, np.bool_),
+        drive_rad=STILL_RAD,
+        effort_nm=robot.needed_nm,
+    )
+    robot.watch.look(robot.now_ns, reading, STILL_RAD)
+    assert robot.watch.floor_nm[ELBOW] < 0.5 * coarse_nm
