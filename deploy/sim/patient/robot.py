@@ -125,7 +125,5 @@ class TouchingRobot(SimulatedRobot):
         wrong = self._imperfect
         noise = wrong.noise_share * self._limit_nm * self._random.standard_normal(len(given_nm))
         step = wrong.step_share * self._limit_nm
-        if not wrong.step_share:
-            return given_nm + noise
-        out: Array = np.rint((given_nm + noise) / step) * step
-        return out
+        told: Array = given_nm + noise
+        return np.rint(told / step) * step if wrong.step_share else told
