@@ -13,6 +13,7 @@ import numpy as np
 
 from common.clock_sync import Offset, SlaveExchange
 from common.errors import CodecError
+from common.link.access import operators_of
 from common.link.namesakes import Namesakes
 from common.link.revoked import revoked_operators
 from common.quaternion import Array
@@ -76,7 +77,7 @@ class SlavePipeline:
             last_known_rad=(last_known_rad or {}) if config.servos.entry.single_reading else None,
             draw_token=draw_token,
         )
-        self.control = Control(config.guard.reset_key)
+        self.control = Control(config.guard.reset_key, operators_of(config.link.access, config.robot))
         limits = config.guard.limits(self.skeleton)
         self.nearest = NearestPosture(self.skeleton, limits)
         self.tracker = tracker or make_tracker(config.track, config.servos.chosen.bus_lag_s)

@@ -121,6 +121,11 @@ def named(access: AccessConfig) -> set[str]:
     return of_people | robots | {common_name(Role.ROUTER, router) for router in access.routers}
 
 
+def operators_of(access: AccessConfig | None, robot: str) -> frozenset[str] | None:
+    """The operators who may command a robot; None: there are no rules, so whoever reaches it."""
+    return None if access is None else frozenset(_names(access.operators, robot))
+
+
 def _robot(table: _AccessRules, access: AccessConfig, robot: str) -> None:
     me = [common_name(Role.ROBOT, robot)]
     operators = _named(Role.OPERATOR, access.operators, robot)

@@ -62,6 +62,9 @@ class LeaseMetrics(Metrics):
     id: int
     held_s: float
     renewed_s: float
+    offered_to: str = ""
+    """The operator who may take it; empty: nobody."""
+    offer_left_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

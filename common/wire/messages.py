@@ -143,6 +143,8 @@ class Action(StrEnum):
     """Another robot of this name answers too: its holder of the lease says so, and the robot holds."""
     HOME = "home"
     """Confirm, with the key, that the robot stands as it says, where nothing else can."""
+    HANDOVER = "handover"
+    """The holder of the lease offers it to another operator; the robot holds."""
     REST = "rest"
     """Joint groups hold where they are; the others follow."""
     TAKE_UP = "take-up"
@@ -158,7 +160,7 @@ class ControlRequest:
     operator: str
     """Who asks; `engage` and `disengage` are for the lease holder's name only."""
     key: str = ""
-    """The reset key, for `reset` and `home`; where the other is, for `namesake`."""
+    """The reset key, for `reset` and `home`; where the other is, for `namesake`; to whom, for `handover`."""
     clock: int = 0
     """For `claim`: the asker of the clock queries that measure the clock of this master's stamps."""
     challenge: int = 0

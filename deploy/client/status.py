@@ -272,6 +272,10 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     if one.resting:
         groups = " ".join(one.resting)
         words.append((f"at rest: {groups}; to follow again: tandem take-up {groups}", "yellow"))
+    lease = one.lease
+    if lease is not None and lease.offered_to:
+        left = f"{lease.offered_to} may take over within {lease.offer_left_s:.0f} s"
+        words.append((f"{left}: a running master does by itself; then {lease.offered_to} engages", "yellow"))
     due, latency = one.due, one.latency_ms
     if due is not None and due.missing:
         missing = f"{due.missing} of {due.expected} commands were not there when they were due"

@@ -181,7 +181,7 @@ class CommandGate:
         self.times = LinkTimes(config)
         self._measured = ""
         """The operator whose line that is."""
-        self.lease = Lease(to_ns(config.lease_timeout_s), draw_token)
+        self.lease = Lease(to_ns(config.lease_timeout_s), draw_token, to_ns(config.offer_timeout_s))
         self.revoked: frozenset[str] = frozenset()
         """Operators whose certificates are revoked."""
         self.valid: Mask = np.zeros(joints, np.bool_)

@@ -45,6 +45,8 @@ class GuardConfig(Section):
     """So much later at most, whatever the line would need; and never later than `lease_timeout_s`."""
     lease_timeout_s: float = Field(1.0, gt=0.0, le=60.0)
     """Without an accepted command for longer than this, by arrival, the operator's lease lapses."""
+    offer_timeout_s: float = Field(60.0, gt=0.0, le=600.0)
+    """An offer of the lease to another operator that is not taken within this lapses."""
     encoder_timeout_s: float = Field(0.1, gt=0.0, le=1.0)
     """Without a valid reading of every joint for longer than this the robot holds."""
 

@@ -17,7 +17,9 @@ class Control:
     What could lead to motion must be of now (`challenge.py`): what the network held back does nothing.
     """
 
-    def __init__(self, reset_key: str) -> None:
+    def __init__(self, reset_key: str, operators: frozenset[str] | None = None) -> None:
+        """`operators`: who may command this robot; None: whoever reaches it."""
+        self._operators = operators
         self._challenges = Challenges()
         self._reset_key = reset_key.encode()
 
@@ -52,6 +54,12 @@ class Control:
                 if why is None:
                     guard.disengage(now_ns, f"disengaged by {operator}")
                 done = guard.reason
+            case Action.HANDOVER:
+                why = holder_only(operator, guard.operator) or self._late(request, now_ns)
+                why = why or self._no_successor(guard, request.key)
+                if why is None:
+                    guard.offer(request.key, now_ns)
+                done = f"holds; {request.key} may take over now, or {operator} engages again"
             case Action.ENGAGE:
                 why = self._late(request, now_ns) or guard.engage(operator, now_ns)
                 done = "moves slowly to the operator's posture" + guard.resting.words
@@ -76,6 +84,17 @@ class Control:
                 why = why or guard.home(now_ns)
                 done = "the joint positions are confirmed"
         return ControlReply(why is None, guard.state, why or done)
+
+    def _no_successor(self, guard: Guard, operator: str) -> str | None:
+        """Why the lease cannot be offered to this operator, or None."""
+        if not operator:
+            return "name the operator to whom the robot is handed over"
+        if operator == guard.operator:
+            return f"{operator} holds the lease already"
+        if self._operators is not None and operator not in self._operators:
+            others = ", ".join(sorted(self._operators - {guard.operator})) or "nobody"
+            return f"{operator} may not command this robot; [link.access] permits, beside you: {others}"
+        return revocation(operator, guard.revoked)
 
     def _late(self, request: ControlRequest, now_ns: int) -> str | None:
         return self._challenges.refusal(request.challenge, now_ns)

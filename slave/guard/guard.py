@@ -199,8 +199,17 @@ class Guard:
         self._change(now_ns, GuardEvent.ESTOP, reason)
 
     def claim(self, operator: str, now_ns: int) -> int:
-        """The token of a new lease, or 0 if an operator holds one."""
-        return self._commands.claim(operator, now_ns)
+        """The token of a new lease, or 0 if an operator holds one and does not offer it to this one."""
+        before = self.operator
+        token = self._commands.claim(operator, now_ns)
+        if token and before:
+            self._hold(now_ns, f"{operator} took over from {before}; waits for {operator} to engage")
+        return token
+
+    def offer(self, operator: str, now_ns: int) -> None:
+        """Offer the lease to another operator. The robot holds until the one or the other engages."""
+        self.lease.offer(operator, now_ns)
+        self._hold(now_ns, f"{self.operator} hands over to {operator}")
 
     @property
     def revoked(self) -> frozenset[str]:
@@ -226,6 +235,7 @@ class Guard:
         if why is None:
             self._joints.plausible.trust()
             self._progress.begin(now_ns)
+            self.lease.withdraw()
             self._change(now_ns, GuardEvent.ENGAGE, f"engaged by {operator}")
         return why
 
@@ -291,6 +301,12 @@ class Guard:
             )
         )  # fmt: skip
 
+    def _hold(self, now_ns: int, reason: str) -> None:
+        """Hold for a reason that is also why it holds on, where it holds already."""
+        self._change(now_ns, GuardEvent.DISENGAGE, reason)
+        if self.state is State.HOLD:
+            self.reason = reason
+
     def _signs(self, now_ns: int) -> Signs:
         commands = self._commands
         return Signs(
@@ -303,6 +319,9 @@ class Guard:
 
     def _watch(self, now_ns: int, watches: Sequence[LossWatch]) -> None:
         self.lease.lapse(now_ns)
+        missed = self.lease.lapse_offer(now_ns)
+        if missed:
+            self._hold(now_ns, f"{missed} did not take over in time; waits for {self.operator} to engage")
         if self.state not in ENGAGED:
             return
         loss = first_loss(watches, self._signs(now_ns))

@@ -1,11 +1,11 @@
-"""One operator at a time: a lease that is granted, renewed by accepted commands, and never stolen."""
+"""One operator at a time: a lease is granted, renewed by accepted commands, handed over, never stolen."""
 
 from __future__ import annotations
 
 import secrets
 from collections.abc import Callable
 
-from common.clock import to_s
+from common.clock import NS_PER_S, to_s
 from common.metrics.slave import LeaseMetrics
 from common.wire.lease import lease_id
 
@@ -21,8 +21,14 @@ def random_token() -> int:
 class Lease:
     """The right to move the robot. All times are the slave's own; a lease that has lapsed never revives."""
 
-    def __init__(self, timeout_ns: int, draw_token: DrawToken = random_token) -> None:
+    def __init__(
+        self, timeout_ns: int, draw_token: DrawToken = random_token, offer_timeout_ns: int = 60 * NS_PER_S
+    ) -> None:
         self._timeout_ns = timeout_ns
+        self._offer_timeout_ns = offer_timeout_ns
+        self._offered_ns = 0
+        self.offered_to = ""
+        """The operator to whom the holder offers it; empty: nobody."""
         self._draw_token = draw_token
         self._granted_ns = self._renewed_ns = 0
         self.operator = ""
@@ -31,13 +37,15 @@ class Lease:
         """The holder's token; 0: none."""
 
     def claim(self, operator: str, now_ns: int) -> int:
-        """The new token, or 0 if any operator holds a current lease, even one of the same name.
+        """The new token, or 0 if an operator, even of the same name, holds a lease and does not offer it.
 
         A master that was restarted waits until its own old lease has lapsed.
         """
         self.lapse(now_ns)
-        if self.token or not operator:
+        self.lapse_offer(now_ns)
+        if not operator or (self.token and operator != self.offered_to):
             return 0
+        self.drop()
         self.operator, self.token = operator, self._draw_token()
         self._granted_ns = self._renewed_ns = now_ns
         return self.token
@@ -58,8 +66,26 @@ class Lease:
         return True
 
     def drop(self) -> None:
-        """End the lease."""
-        self.operator, self.token = "", 0
+        """End the lease, and with it an offer."""
+        self.operator, self.token, self.offered_to = "", 0, ""
+
+    def offer(self, operator: str, now_ns: int) -> None:
+        """Offer it to another operator, in place of an earlier offer. Until it is taken its holder has it."""
+        self.offered_to, self._offered_ns = operator, now_ns
+
+    def withdraw(self) -> None:
+        """Offer it to nobody."""
+        self.offered_to = ""
+
+    def lapse_offer(self, now_ns: int) -> str:
+        """End an offer that was not taken in time; to whom it was made, empty if none has ended now.
+
+        A clock that went back by more than the time-out ends it as well, as it does the lease.
+        """
+        if not self.offered_to or abs(now_ns - self._offered_ns) <= self._offer_timeout_ns:
+            return ""
+        missed, self.offered_to = self.offered_to, ""
+        return missed
 
     def metrics(self, now_ns: int) -> LeaseMetrics | None:
         """Holder, id, age, and time since a command renewed it; None: no holder."""
@@ -70,4 +96,8 @@ class Lease:
             id=lease_id(self.token),
             held_s=round(to_s(now_ns - self._granted_ns), 3),
             renewed_s=round(to_s(now_ns - self._renewed_ns), 3),
+            offered_to=self.offered_to,
+            offer_left_s=round(to_s(self._offered_ns + self._offer_timeout_ns - now_ns), 1)
+            if self.offered_to
+            else 0.0,
         )

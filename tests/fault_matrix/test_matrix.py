@@ -24,6 +24,7 @@ from slave.stop_inputs.rule import StopInput
 TABLE = {fault.name: fault for fault in FAULTS}
 BARED = (
     "link cut", "packets duplicated", "yesterday's recording replayed", "second operator", "wrong robot",
+    "operator of the same robot without the lease", "certificate revoked while tracking",
     "values that are not numbers", "drive fault", "encoder silent", "base tilted",
     "master's clock an hour back",
 )  # fmt: skip

@@ -7,11 +7,14 @@ from dataclasses import dataclass, field
 
 from common.clock import NS_PER_S, to_ns
 from common.config.load import load_config
+from common.link.access import operators_of
+from common.link.config import AccessConfig
 from common.wire.codec import decode, encode
-from common.wire.messages import ControlReply, RobotState
+from common.wire.messages import Action, ControlReply, ControlRequest, RobotState
 from deploy.examples.profiles import example
 from master.lease import GRACE_S, LeaseKeeper
 from slave.config import SlaveConfig
+from slave.guard.control import Control
 from slave.pipeline import SlavePipeline
 
 
@@ -56,3 +59,40 @@ def test_the_loser_notices_and_waits_its_turn() -> None:
     assert "holds the lease" in first.answer or "another master" in first.answer
     robot.hear(second)
     assert second.token == robot.slave.guard.lease.token
+
+
+def test_a_running_master_takes_over_what_is_offered_to_its_operator() -> None:
+    robot = Robot()
+    nurse_1, nurse_2 = LeaseKeeper("robot-1", "nurse-1"), LeaseKeeper("robot-1", "nurse-2")
+    robot.hear(nurse_1)
+    robot.hear(nurse_2)
+    assert nurse_1.token
+    assert nurse_2.answer == "nurse-1 holds the lease"
+
+    def ask(operator: str, action: Action, key: str = "", challenge: int = 0) -> ControlReply:
+        request = encode(ControlRequest("robot-1", action, operator, key, challenge=challenge))
+        return decode(robot.slave.on_control(request, robot.now_ns, sender=operator), ControlReply)
+
+    challenge = ask("nurse-1", Action.STATUS).challenge
+    assert "no valid challenge" in ask("nurse-1", Action.HANDOVER, "nurse-2").text
+    offered = ask("nurse-1", Action.HANDOVER, "nurse-2", challenge)
+    assert offered.text == "holds; nurse-2 may take over now, or nurse-1 engages again"
+    robot.now_ns += to_ns(0.3)
+    robot.slave.guard.lease.renew(robot.now_ns)  # by nurse-1's commands
+    robot.hear(nurse_2)
+    assert nurse_2.token == robot.slave.guard.lease.token != nurse_1.token
+    robot.now_ns += to_ns(GRACE_S)
+    robot.hear(nurse_1)
+    assert nurse_1.answer in ("the lease was lost to nurse-2", "nurse-2 holds the lease")
+    assert not nurse_1.token
+
+
+def test_with_rules_a_robot_is_offered_to_its_operators_alone() -> None:
+    access = AccessConfig(operators={"nurse-1": ["robot-1"], "nurse-2": ["robot-1"], "nurse-3": ["robot-2"]})
+    control = Control("", operators_of(access, "robot-1"))
+    guard = Robot().slave.guard
+    assert guard.claim("nurse-1", 0)
+    assert control._no_successor(guard, "nurse-2") is None
+    refused = control._no_successor(guard, "nurse-3")
+    assert refused == "nurse-3 may not command this robot; [link.access] permits, beside you: nurse-2"
+    assert operators_of(None, "robot-1") is None

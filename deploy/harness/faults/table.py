@@ -9,6 +9,7 @@ from deploy.harness.faults.effort import EFFORT
 from deploy.harness.faults.fault import FaultRow
 from deploy.harness.faults.judge import FaultOutcome
 from deploy.harness.faults.link import LINK
+from deploy.harness.faults.operators import OPERATORS
 from deploy.harness.faults.processes import PROCESSES, ProcessFault, try_with_processes
 from deploy.harness.faults.robot import ROBOT
 from deploy.harness.faults.shift import SHIFT
@@ -23,6 +24,7 @@ VIRTUAL: tuple[VirtualFault, ...] = (
     *LINK,
     *SLOW_LINK,
     *STRANGERS,
+    *OPERATORS,
     *VALUES,
     *SUIT,
     *SHIFT,

@@ -98,6 +98,23 @@ def take_up(
     _act(Action.TAKE_UP, _holder(connect, robot, operator, master, certificate), groups=groups)
 
 
+def handover(
+    to: Annotated[str, typer.Option(help="Name of the operator who shall command the robot from now on.")],
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """Offer a robot that you command to another operator. It holds; the other's master takes over by itself.
+
+    The other operator then engages. Engage yourself to withdraw the offer; it also lapses by itself.
+
+    Example: `tandem handover --to nurse-2 --master master.toml`
+    """
+    _act(Action.HANDOVER, _holder(connect, robot, operator, master, certificate), to)
+
+
 def estop(
     connect: Connect = None,
     robot: Robot = None,
@@ -215,7 +232,17 @@ def status(
     _run(print_status)
 
 
-COMMANDS: Sequence[Callable[..., None]] = (engage, disengage, rest, take_up, estop, reset, home, status)
+COMMANDS: Sequence[Callable[..., None]] = (
+    engage,
+    disengage,
+    handover,
+    rest,
+    take_up,
+    estop,
+    reset,
+    home,
+    status,
+)
 """In the order of the help."""
 
 

@@ -217,3 +217,10 @@ def test_torques_bear_the_names_of_the_profile_with_so_many_joints(joints: int, 
     told = by_joint(np.zeros(joints))
     assert told is not None
     assert next(iter(told)).startswith(first)
+
+
+def test_an_offer_of_the_robot_is_shown_to_both() -> None:
+    offered = LeaseMetrics("anna", 9, 61.2, 0.1, offered_to="ben", offer_left_s=41.4)
+    shown = rendered({"robot-1": status(Heard(state(), slave_metrics(lease=offered)))})
+    assert "ben may take over within 41 s" in shown
+    assert "take over" not in rendered({"robot-1": status(heard())})

@@ -574,6 +574,52 @@ def second_operator(make_rig: MakeRig) -> None:
     assert rig.guard.operator == "anna"
 
 
+@about("Lease.lapse_offer")
+def offer_too_old(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    assert rig.ask(Action.HANDOVER, key="ben").done
+    rig.run(60.1)
+    assert not rig.ask(Action.CLAIM, "ben").done
+    assert rig.guard.reason == "ben did not take over in time; waits for anna to engage"
+
+
+@about("Guard.offer")
+def handed_over(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    assert rig.ask(Action.HANDOVER, key="ben").done
+    assert rig.guard.state is State.HOLD
+    assert rig.guard.reason == "anna hands over to ben"
+    rig.run(0.5)
+    assert rig.claim("ben").done
+    assert rig.guard.reason == "ben took over from anna; waits for ben to engage"
+    rig.run(0.5)
+    assert rig.guard.state is State.HOLD
+    assert not rig.ask(Action.ENGAGE, "anna").done
+    assert rig.ask(Action.ENGAGE, "ben").done
+
+
+@about("Lease.withdraw")
+def offer_withdrawn(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    assert rig.ask(Action.HANDOVER, key="ben").done
+    rig.run(0.5)
+    rig.engage()
+    assert not rig.ask(Action.CLAIM, "ben").done
+    assert rig.guard.state is State.ALIGN
+
+
+@about("Control._no_successor")
+def offered_to_nobody_known(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.guard.revoke(frozenset({"carl"}), rig.now_ns)
+    for to in ("", "anna", "carl"):
+        assert not rig.ask(Action.HANDOVER, key=to).done
+    assert rig.guard.state is State.TRACK
+    for who in ("ben", ""):
+        assert not rig.ask(Action.HANDOVER, who, key="ben").done
+    assert rig.guard.lease.offered_to == ""
+
+
 @about("gate revoked")
 def revoked_name_is_counted(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()

@@ -79,3 +79,55 @@ def test_tokens_cannot_be_guessed_and_are_never_zero() -> None:
     drawn = {random_token() for _ in range(1000)}
     assert len(drawn) == 1000
     assert all(0 < token < 2**63 for token in drawn)
+
+
+def offered(lease: Lease, at_ns: int = 0) -> Lease:
+    lease.claim("anna", at_ns)
+    lease.offer("ben", at_ns)
+    return lease
+
+
+def test_only_the_one_to_whom_it_is_offered_takes_it(lease: Lease) -> None:
+    offered(lease)
+    for who in ("carl", "anna", "", "Ben"):
+        assert lease.claim(who, 1) == 0
+    assert (lease.token, lease.operator, lease.offered_to) == (1, "anna", "ben")
+    assert lease.claim("ben", 1) == 2
+    assert (lease.token, lease.operator, lease.offered_to) == (2, "ben", "")
+    assert lease.claim("ben", 1) == 0, "an offer is taken once"
+
+
+def test_an_offer_lapses_just_after_its_time_out_and_the_lease_does_not() -> None:
+    for late_ns, token in ((0, 2), (1, 0)):
+        lease = offered(Lease(100 * S, count(1).__next__, offer_timeout_ns=60 * S))
+        lease.offer("ben", S)
+        assert lease.lapse_offer(61 * S) == ""
+        assert lease.claim("ben", 61 * S + late_ns) == token
+        assert lease.operator == ("ben" if token else "anna")
+    assert lease.lapse_offer(62 * S) == ""
+    lease.offer("ben", 62 * S)
+    assert lease.lapse_offer(62 * S - 60 * S - 1) == "ben", "a clock that went back ends it too"
+    assert lease.offered_to == ""
+
+
+def test_the_newest_offer_counts_and_ends_with_the_lease_or_by_word(lease: Lease) -> None:
+    offered(lease)
+    lease.offer("carl", 1)
+    assert lease.claim("ben", 1) == 0
+    lease.withdraw()
+    assert lease.claim("carl", 1) == 0
+    lease.offer("carl", 1)
+    assert lease.lapse(S + 1)
+    assert lease.offered_to == ""
+    assert lease.claim("dora", S + 1) == 2
+
+
+def test_an_offer_is_told(lease: Lease) -> None:
+    lease.claim("anna", 0)
+    metrics = lease.metrics(S)
+    assert metrics is not None
+    assert (metrics.offered_to, metrics.offer_left_s) == ("", 0.0)
+    lease.offer("ben", 0)
+    metrics = lease.metrics(S)
+    assert metrics is not None
+    assert (metrics.offered_to, metrics.offer_left_s) == ("ben", 59.0)
