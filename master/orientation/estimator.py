@@ -19,7 +19,8 @@ from master.orientation.affine import ACC, GYR, MAG, Calibration, apply, load_ca
 from master.orientation.config import EstimationConfig
 from master.orientation.filters import FilterBank
 from master.orientation.heading import HeadingMemory
-from master.orientation.joints.online import OnlineHeadings
+from master.orientation.joints.constraints import JointConstraints
+from master.orientation.joints.online import OnlineHeadings, constrains
 from master.orientation.liveness import Liveness
 from master.orientation.lowpass import LowPass
 from master.orientation.zero_pose import ZeroPose, ZeroPoseLimits
@@ -123,8 +124,9 @@ class Estimator:
         self._liveness = Liveness(count, math.ceil(config.settle_s * rate_hz))
         self._heading: _Headings = HeadingMemory(count)
         self._q_of_filters = self._bank.q_world_from_sensor
-        if config.constraints == "online" and skeleton is not None:
-            self._heading = OnlineHeadings(config.online, skeleton, rate_hz)
+        if skeleton is not None and _constrained(config, skeleton, calibration.aligned):
+            aligned = calibration.aligned if config.constraints == "auto" else None
+            self._heading = OnlineHeadings(config.online, skeleton, rate_hz, aligned)
             self._q_of_filters = self._bank.q_inertial_from_sensor
         self._aligned = calibration.aligned
         self._pose_of = partial(
@@ -257,3 +259,10 @@ class Estimator:
         """The filters' orientations brought forward over the delay of the gyro's low-pass, (N, 4)."""
         q = multiply(self._heading.turn, self._q_of_filters())
         return multiply(q, from_rotation_vector(self._advance_s * rate_rad_s))
+
+
+def _constrained(config: EstimationConfig, skeleton: Skeleton, aligned: Mask) -> bool:
+    """Whether joints correct the headings: if wanted, or by default once one of them can be believed."""
+    if config.constraints == "auto":
+        return bool(constrains(JointConstraints(skeleton), aligned).any())
+    return config.constraints == "online"

@@ -54,6 +54,12 @@ class OnlineConfig(Section):
     """Of the heading that a zero pose gives."""
 
 
+def constrains(joints: JointConstraints, nodes: Mask) -> Mask:
+    """(M,) the pairs of axes between two of the nodes, mask (N,)."""
+    out: Mask = nodes[joints.child] & nodes[joints.parent]
+    return out
+
+
 class OnlineHeadings:
     """One heading correction for each of N nodes, on top of their filters without magnetometer.
 
@@ -62,11 +68,15 @@ class OnlineHeadings:
     upright), the gyros carry the heading over a disturbance for as long as they can.
     """
 
-    def __init__(self, config: OnlineConfig, skeleton: Skeleton, rate_hz: float) -> None:
+    def __init__(
+        self, config: OnlineConfig, skeleton: Skeleton, rate_hz: float, aligned: Mask | None = None
+    ) -> None:
+        """Joints between two nodes that are `aligned` (N,) count; None: every joint counts."""
         count = len(skeleton.segments)
         self._config = config
         self._rate_hz = rate_hz
         self._joints = JointConstraints(skeleton)
+        self._counts = constrains(self._joints, np.ones(count, np.bool_) if aligned is None else aligned)
         self._contradicted = ContradictedJoints(len(self._joints))
         self._names = skeleton.segment_names
         self._rows = np.arange(len(self._joints))
@@ -146,7 +156,7 @@ class OnlineHeadings:
         variance = math.radians(config.joint_sd_deg) ** 2
         foretold = variance + slope**2 * self._headings.variance_between(joints.child, joints.parent)
         trust = np.minimum(1.0, _LARGEST * np.sqrt(foretold) / np.maximum(np.abs(error), 1e-12))
-        both = usable[joints.child] & usable[joints.parent]
+        both = constrains(joints, usable) & self._counts
         trust[~both] = 0.0
         self._contradicted.add(error, both, dt_s)
         weight = trust * (dt_s / (2.0 * config.joint_memory_s) / variance)
