@@ -11,6 +11,7 @@ from pathlib import Path
 from common.errors import LinkError
 from common.wire.version import software
 from deploy.client.efforts import without_detection
+from deploy.ops.doctor.judge.access import judge_access
 from deploy.ops.doctor.judge.can import judge_buses, judge_interfaces
 from deploy.ops.doctor.judge.devices import is_url, judge_camera, judge_latency, judge_port
 from deploy.ops.doctor.judge.endpoints import judge_endpoint
@@ -36,6 +37,7 @@ from deploy.ops.doctor.read.keys import read_keys
 from deploy.ops.doctor.read.machine import read_machine
 from deploy.ops.doctor.read.path import read_path
 from deploy.ops.doctor.read.process import read_process
+from deploy.ops.doctor.read.revoked import read_revoked
 from deploy.ops.doctor.read.robots import read_robots
 from deploy.ops.doctor.read.servos import ping_servos
 from deploy.ops.doctor.read.stops import read_stops
@@ -106,8 +108,14 @@ def keys(needs: Needs) -> list[Finding]:
     """Check the link's keys; no finding if no file configures a link."""
     if needs.role in (GENERAL, "suit"):
         return []
-    tls = needs.link.tls
-    return judge_keys(needs, None if tls is None else read_keys(tls, datetime.now(UTC)))
+    tls, listed = needs.link.tls, needs.link.revoked
+    if tls is None:
+        return judge_keys(needs, None)
+    facts = read_keys(tls, datetime.now(UTC))
+    found = judge_keys(needs, facts)
+    if not facts.trouble:
+        found += judge_access(needs, facts.common_name, None if listed is None else read_revoked(listed))
+    return found
 
 
 async def others(needs: Needs) -> Sequence[Finding]:
@@ -121,7 +129,7 @@ async def others(needs: Needs) -> Sequence[Finding]:
     except LinkError as error:
         return [*found, fail("link", str(error), "mend [link] first")]
     found += [finding for facts in robots for finding in judge_robot(facts, software())]
-    reach = needs.link.model_copy(update={"listen": [], "access": None})
+    reach = needs.link.model_copy(update={"listen": [], "access": None, "revoked": None})
     for facts in robots:
         if facts.guard:
             found += judge_path(await read_path(reach, facts.name))

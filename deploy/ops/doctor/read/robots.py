@@ -56,7 +56,9 @@ async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) ->
 
     It only asks: it claims nothing, and listens at no endpoint, so a running master is not disturbed.
     """
-    where = Destination(link.model_copy(update={"listen": [], "access": None}), tuple(robots), operator)
+    where = Destination(
+        link.model_copy(update={"listen": [], "access": None, "revoked": None}), tuple(robots), operator
+    )
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
         return await asyncio.gather(*(_read(session.link(robot), where) for robot in robots))
 
