@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from common.can.bus import CanBus
 from common.clock import monotonic_ns
+from common.inputs.reader import InputReader
 from common.latency.budget import StageTimes
 from common.latency.durations import Durations
 from common.link import LinkSession, open_session
@@ -26,6 +27,8 @@ from common.process.runtime import until_stopped
 from common.process.ticker import ticks
 from common.wire.topics import STATISTICS
 from common.wire.version import software
+from master.comfort.pressed import PressedKey
+from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
 from master.pipeline import JointAngleSample, MasterPipeline
 from master.robot import CommandedRobot
@@ -54,9 +57,15 @@ class Master:
         joints = len(self._pipeline.skeleton.joints)
         endpoints = own_endpoints(config.link)
         self._robots = [
-            CommandedRobot(name, config.operator.name, joints, link=session.link(name), endpoints=endpoints)
+            CommandedRobot(
+                name, config.operator.name, joints, link=session.link(name), endpoints=endpoints,
+                scaling=MotionScaling(config.operator.scaling, self._pipeline.skeleton),
+            )
             for name in config.commanded
-        ]
+        ]  # fmt: skip
+        key = config.operator.zero_pose_again.key
+        self._key = None if key is None else InputReader(key.device, {key.key: None}, grab=key.grab)
+        self._pressed = PressedKey()
         self._given_up: set[str] = set()
         self._silence = SilenceWatch()
         self._doubt_log = DoubtLog()
@@ -64,6 +73,9 @@ class Master:
     async def run(self) -> None:
         """Capture, send, keep each robot's lease and clock until cancelled."""
         try:
+            if self._key is not None:
+                self._key.on_change = self._on_key
+                self._key.start()
             for bus in self._buses:
                 bus.open_or_retry()
             async with asyncio.TaskGroup() as tasks:
@@ -72,6 +84,8 @@ class Master:
                 for robot in self._robots:
                     tasks.create_task(self._serve(robot))
         finally:
+            if self._key is not None:
+                self._key.close()
             for bus in self._buses:
                 await bus.close()
 
@@ -107,6 +121,12 @@ class Master:
             angles = self._pipeline.close(now_ns)
             if angles is not None:
                 self._send(angles)
+
+    def _on_key(self) -> None:
+        assert self._key is not None
+        for name, state in self._key.keys.items():
+            if self._pressed.take(state.down, state.presses):
+                self._pipeline.zero_pose.ask(name, monotonic_ns())
 
     def _on_bus(self, bus: str, up: bool) -> None:
         if not up:

@@ -13,6 +13,7 @@ from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from master.comfort.config import ZeroPoseAgainConfig
+from master.comfort.scaling import scaling_mistakes
 from master.orientation.config import EstimationConfig
 from master.orientation.filters import filter_mistakes
 from master.suit.nodes import NodeConfig, wiring_mistakes
@@ -43,6 +44,8 @@ class OperatorConfig(Section):
     deadman: Literal["always_held"]
     """`always_held`: the operator has no pedal. There is no default, so that a person decides it."""
     zero_pose_again: ZeroPoseAgainConfig = ZeroPoseAgainConfig()
+    scaling: dict[str, Annotated[float, Field(ge=0.1, le=1.0)]] = Field(default_factory=dict)
+    """By joint group, the share of the operator's motion that the robot makes; see comfort/scaling.py."""
 
 
 class MasterConfig(Section):
@@ -82,6 +85,7 @@ class MasterConfig(Section):
             *wiring_mistakes(self.nodes, self.capture.buses, "capture.buses"),
             *node_mistakes(self.nodes, skeleton),
             *self.operator.zero_pose_again.mistakes_for(skeleton.segment_names, self.estimation.zero_pose_s),
+            *scaling_mistakes(self.operator.scaling, skeleton),
             *self.estimation.mistakes_at(self.capture.rate_hz),
             *self.link.mistakes(),
         ]

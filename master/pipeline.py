@@ -16,6 +16,7 @@ from common.clock import to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Command, CommandStamps, Mask
+from master.comfort.scaling import MotionScaling
 from master.comfort.zero_pose_again import ZeroPoseConduct
 from master.config import MasterConfig
 from master.joint_angles.beyond import BeyondReach
@@ -222,8 +223,9 @@ def _between(last: Sweep, now: Sweep, share: float) -> Sweep:
 class CommandWriter:
     """Writes joint angles into the numbered commands of one lease."""
 
-    def __init__(self, robot: str) -> None:
+    def __init__(self, robot: str, scaling: MotionScaling | None = None) -> None:
         self._robot = robot
+        self._scaling = scaling
         self._sequence = 0
         self.sent = 0
 
@@ -243,6 +245,10 @@ class CommandWriter:
         self._sequence += 1
         self.sent += 1
         stamps = CommandStamps(angles.sampled_ns, angles.frames_in_ns, angles_ns, put_ns)
+        posture = angles.position_rad, angles.velocity_rad_s
+        position_rad, velocity_rad_s = (
+            posture if self._scaling is None else self._scaling.scale(*posture, angles.valid)
+        )
         return Command(
             robot=self._robot,
             lease=lease,
@@ -251,8 +257,8 @@ class CommandWriter:
             stamps=stamps,
             deadman_held=deadman_held,
             valid=angles.valid,
-            position_rad=angles.position_rad,
-            velocity_rad_s=angles.velocity_rad_s,
+            position_rad=position_rad,
+            velocity_rad_s=velocity_rad_s,
             seen_frame=seen[0],
             seen_ns=seen[1],
             doubt=angles.doubt,

@@ -22,6 +22,7 @@ from common.wire.instance import draw_instance
 from common.wire.messages import ClockReply, ControlReply, RobotState, Statistics
 from common.wire.presence import ProcessPresence
 from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
+from master.comfort.scaling import MotionScaling
 from master.homonyms import Homonyms
 from master.lease import LeaseKeeper
 from master.picture import VideoWatch
@@ -35,7 +36,14 @@ class CommandedRobot:
     """Sends one robot the operator's postures, keeps its lease and measures its clock."""
 
     def __init__(
-        self, name: str, operator: str, joints: int, *, link: Link, endpoints: Sequence[str] = ()
+        self,
+        name: str,
+        operator: str,
+        joints: int,
+        *,
+        link: Link,
+        endpoints: Sequence[str] = (),
+        scaling: MotionScaling | None = None,
     ) -> None:
         """`endpoints`: where this master is reached; shown where two masters have the same operator."""
         self.name = name
@@ -44,7 +52,8 @@ class CommandedRobot:
         self._joints = joints
         self._link = link
         asker = 1 + secrets.randbelow((1 << 63) - 1)
-        self._writer = CommandWriter(name)
+        self._scaling = scaling
+        self._writer = CommandWriter(name, scaling)
         self._control = CONTROL.of(operator)
         self._clock = MasterExchange(asker)
         self._lease = LeaseKeeper(name, operator, asker)
@@ -92,6 +101,9 @@ class CommandedRobot:
         if two and self._lease.token and state.instance != self._lease.instance:
             return  # from another robot of that name: it says nothing of the robot that this master commands
         self._lease.on_state(state, arrived_ns)
+        if self._scaling is not None:
+            # what the robot follows under another's lease is not this operator
+            self._scaling.on_state(state.guard if self._lease.holds(state) else "", state.resting)
         self._watch.on_state(state, arrived_ns, ours=self._lease.holds(state))
 
     async def _keep_lease(self) -> None:
@@ -158,6 +170,7 @@ class CommandedRobot:
         watch = self._watch
         return CommandedMetrics(
             commands_sent=self._writer.sent,
+            scaling={} if self._scaling is None else self._scaling.factors,
             round_trip_ms=watch.round_trip.summary(),
             robot=RobotHeard(
                 silent=watch.silent(monotonic_ns()),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from common.metrics.bus import BusMetrics
 from common.metrics.link import AccessMetrics, TopicCounters
@@ -71,6 +71,8 @@ class CommandedMetrics(Metrics):
     video: VideoReceived
     link: dict[str, TopicCounters]
     """By topic."""
+    scaling: dict[str, float] = field(default_factory=dict)
+    """By joint group, the share of the operator's motion that the robot makes (`[operator.scaling]`)."""
     round_trip_recent_us: tuple[int, ...] = ()
     """Each round trip since the message before; in messages only, not in the file at the end."""
 

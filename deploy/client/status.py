@@ -181,6 +181,8 @@ class RobotStatus:
     times: GuardTimes | None
     """The guard's times in force, and why."""
     ticks: Ticks | None
+    scaling: dict[str, float] = field(default_factory=dict)
+    """By joint group, the share of the operator's motion that the robot makes."""
     resting: tuple[str, ...] = ()
     effort_nm: TorquesByJoint | None = None
     """Of each motor at its joint, N m."""
@@ -223,10 +225,16 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         times=metrics.times if metrics else None,
         ticks=metrics.ticks if metrics else None,
         resting=state.resting if state else (),
+        scaling=_scaling(heard.master),
         effort_nm=by_joint(state.effort_nm) if state else None,
         external_nm=by_joint(state.external_nm) if state else None,
         no_effort=metrics.servos.no_effort if metrics else {},
     )
+
+
+def _scaling(master: MasterMetrics | None) -> dict[str, float]:
+    """A message to a robot names that robot alone."""
+    return {name: f for one in master.robots.values() for name, f in one.scaling.items()} if master else {}
 
 
 def _degrees(angle_rad: float | None) -> float | None:
@@ -272,6 +280,9 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     if one.resting:
         groups = " ".join(one.resting)
         words.append((f"at rest: {groups}; to follow again: tandem take-up {groups}", "yellow"))
+    if one.scaling:
+        shares = ", ".join(f"{name} × {factor:g}" for name, factor in one.scaling.items())
+        words.append((f"motion scaled about the posture at engage: {shares}", ""))
     lease = one.lease
     if lease is not None and lease.offered_to:
         left = f"{lease.offered_to} may take over within {lease.offer_left_s:.0f} s"

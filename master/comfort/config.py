@@ -8,6 +8,7 @@ from pydantic import Field
 
 from common.config.section import Section
 from common.errors import ConfigMistake
+from common.inputs.config import KeyConfig
 
 
 class ZeroPoseAgainConfig(Section):
@@ -17,6 +18,8 @@ class ZeroPoseAgainConfig(Section):
     """Two taps on this node ask for it, and while it counts down call it off; None: no taps."""
     tap_m_s2: float = Field(default=20.0, ge=10.0, le=100.0)
     """How hard a tap is at least, m/s² beyond gravity."""
+    key: KeyConfig | None = None
+    """A pedal or button that asks for it, as two taps do; `tandem inputs` shows its name. None: no key."""
     countdown_s: float = Field(default=5.0, ge=1.0, le=60.0)
     """From asking until the pose begins."""
     give_up_s: float = Field(default=15.0, ge=1.0, le=120.0)
@@ -25,7 +28,7 @@ class ZeroPoseAgainConfig(Section):
     @property
     def wanted(self) -> bool:
         """Whether there is any way to ask."""
-        return self.tap_node is not None
+        return self.tap_node is not None or self.key is not None
 
     def mistakes_for(self, segments: Sequence[str], zero_pose_s: float) -> list[ConfigMistake]:
         """A node that there is not, and a pose that nobody takes."""

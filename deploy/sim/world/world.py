@@ -29,6 +29,7 @@ from deploy.sim.suit.motion import OperatorMotion
 from deploy.sim.suit.suit import build_suit
 from deploy.sim.world.injection import FaultInjection, Traffic
 from deploy.sim.world.link import VirtualLink
+from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
 from master.lease import LeaseKeeper
 from master.pipeline import CommandWriter, JointAngleSample, MasterPipeline
@@ -83,7 +84,8 @@ class VirtualWorld:
         self._protocol = SuitProtocol.load(self.master_config.capture.dbc)
         self.suit = build_suit(_load(SuitConfig, "suit", world), self._protocol, world.motion)
         self._master = MasterPipeline(self.master_config, self._protocol)
-        self._writer = CommandWriter(self.robot)
+        self._scaling = MotionScaling(self.master_config.operator.scaling, self.master_config.skeleton)
+        self._writer = CommandWriter(self.robot, self._scaling)
         self._lease = LeaseKeeper(self.robot, self.master_config.operator.name)
         self.clock = MasterExchange()
         self.slave = SlavePipeline(self.slave_config, draw_token=itertools.count(1).__next__, instance=1)
@@ -251,6 +253,7 @@ class VirtualWorld:
         self.states.append(state)
         self.trace.add(state)
         self._lease.on_state(state, self.master_ns)
+        self._scaling.on_state(state.guard, state.resting)
         request = self._lease.request(self.master_ns)
         if request is not None:
             reply = self.slave.on_control(encode(request), self.slave_ns, sender=request.operator)
