@@ -51,11 +51,11 @@ async def open_session(
     async def open_again(refused: frozenset[str]) -> zenoh.Session:
         return await open_zenoh(config, mode, math.inf, waits, refused)
 
-    async with heeding(session, revocations, open_again):
-        try:
+    try:
+        async with heeding(session, revocations, open_again):
             yield session
-        finally:
-            await session.close()
+    finally:
+        await session.close()
 
 
 def _choose_congestion(algorithm: str, *_: object) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from contextlib import AsyncExitStack
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import LinkError
+from common.link import open_link, open_session
 from common.link.access import access_control, all_but
 from common.link.config import AccessConfig, LinkConfig
 from common.link.revoked import (
@@ -20,7 +23,13 @@ from common.link.revoked import (
     write_revoked,
 )
 from common.link.revoking import to_cut
+from common.link.roles import Role
+from common.wire.topics import COMMAND, STATE
+from deploy.certificates.folder import read_authority, write_pair
+from deploy.certificates.make import new_identity
+from deploy.harness.keys import MASTER, make_keys, tls_of
 from tests.common.link.test_access import may
+from tests.common.link.test_link import ROBOT, Heard, free_port, run, until
 
 BEN, HUB = "operator:ben", "router:hub"
 
@@ -147,6 +156,45 @@ def test_only_who_is_connected_and_treated_wrongly_is_a_reason_to_open_anew(
     connected: set[str], revoked: set[str], refused: set[str], cut: set[str]
 ) -> None:
     assert to_cut(frozenset(connected), frozenset(revoked), frozenset(refused)) == cut
+
+
+def test_without_rules_the_revoked_alone_are_refused(tmp_path: Path) -> None:
+    keys = make_keys(tmp_path, ["tls/127.0.0.1:1"], [ROBOT])
+    authority, now = read_authority(keys), datetime.now(UTC)
+    write_pair(
+        keys, "operator-carl", new_identity(authority, Role.OPERATOR, "carl", [], now, timedelta(days=1))
+    )
+    listed = tmp_path / "revoked.txt"
+    listed.write_text("operator:carl\n")
+    endpoint = f"tls/127.0.0.1:{free_port()}"
+    config = LinkConfig(listen=[endpoint], tls=tls_of(keys, Role.ROBOT, ROBOT), revoked=listed)
+
+    async def test() -> None:
+        async with open_session(config) as session, AsyncExitStack() as stack:
+            told: list[frozenset[str]] = []
+            session.watch_revoked(told.append)
+            assert told == [frozenset({"operator:carl"})], "who is revoked is known before anybody connects"
+            heard, commands = {"carl": Heard(), MASTER: Heard()}, Heard()
+            robot = session.link(ROBOT)
+            robot.subscribe(COMMAND, commands)
+            put_state, puts = robot.publish(STATE), []
+            for name in ("carl", MASTER):
+                own = LinkConfig(connect=[endpoint], mode="client", tls=tls_of(keys, Role.OPERATOR, name))
+                link = await stack.enter_async_context(open_link(own, ROBOT))
+                await link.connected()
+                link.subscribe(STATE, heard[name])
+                puts.append((link.publish(COMMAND.of(name)), name.encode()))
+
+            def everybody() -> None:
+                put_state(b"state")
+                for put, payload in puts:
+                    put(payload)
+
+            await until(lambda: len(heard[MASTER].payloads) >= 20 and len(commands.payloads) >= 20, everybody)
+            assert heard["carl"].payloads == []
+            assert set(commands.payloads) == {MASTER.encode()}
+
+    run(test)
 
 
 def test_without_certificates_there_is_nothing_to_revoke(tmp_path: Path) -> None:
