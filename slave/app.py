@@ -73,6 +73,7 @@ class Slave:
             config, place=place(endpoints), last_known_rad=last_known.before_rad if last_known else None
         )
         self._last_known = last_known
+        self._pipeline.damper.clock = monotonic_ns
         self._pipeline.unread.warn = log.warning
         self._stopped = False
         self._ticks_expected = 0

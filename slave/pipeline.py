@@ -36,6 +36,7 @@ from slave.guard.body import WELL, Body
 from slave.guard.control import Control
 from slave.guard.lease import DrawToken, random_token
 from slave.guard.states import MOVING, State
+from slave.limit.damper import DistanceDamper
 from slave.limit.limit import Setpoint, SetpointLimiter
 from slave.limit.nearest import NearestPosture
 from slave.limit.pace import Pace
@@ -82,7 +83,8 @@ class SlavePipeline:
         self.nearest = NearestPosture(self.skeleton, limits)
         self.tracker = tracker or make_tracker(config.track, config.servos.chosen.bus_lag_s)
         self.pace = Pace(limits, config.guard)
-        self.limiter = SetpointLimiter(self.skeleton.joint_names, limits)
+        self.damper = DistanceDamper(self.skeleton, config.guard.self_margin_cm, config.guard.zones)
+        self.limiter = SetpointLimiter(self.skeleton.joint_names, limits, self.damper)
         self.contact = ContactWatch(self.skeleton, config.contact)
         self.reflex = ContactReflex(config.contact, self.contact, self.skeleton.joint_names)
         self._episode = 0
@@ -225,12 +227,15 @@ class SlavePipeline:
         if permission.state is State.ALIGN:
             most = self.pace.aligning(now_ns, permission.free)
         else:
-            most = self.pace.tracking(now_ns, error_rad, permission.free)
+            most = self.pace.tracking(now_ns, error_rad, permission.free, self.damper.held_back)
         clamps = self.limiter.step(
             now_ns, permission.dt_s, target.position_rad, target.velocity_rad_s, ~permission.free, *most
         )
         self.guard.clamped(clamps)
-        self.guard.approached(now_ns, error_rad)
+        if self.damper.overdue:
+            self.guard.lose(now_ns, "distance", self.damper.overdue)
+        # a joint that is held back is as near to the operator as it can come
+        self.guard.approached(now_ns, np.where(self.damper.held_back, 0.0, error_rad))
 
     def _begin_anew(self) -> None:
         """After a loss, a stop or an engage: what the operator did before must not move the robot."""
@@ -286,6 +291,7 @@ class SlavePipeline:
 
     def _faults(self, now_ns: int) -> dict[str, str]:
         named = {"base": self._body.base, "name": self._body.namesake, "camera": self.camera_fault}
+        named["distance"] = self.damper.words
         named["contact"] = self._body.contact or self.contact.missing(now_ns)
         # a drive's own fault comes before the guard's doubt of its encoder
         others = {**self._body.stops, **self.guard.doubts, **self._body.drives}

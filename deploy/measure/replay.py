@@ -18,6 +18,7 @@ from common.wire.messages import Command, Mask, RobotState
 from deploy.measure import FollowedMotion, MovedSeries, TruthSeries, motion
 from slave.config import SlaveConfig
 from slave.encoders.counts import Encoders
+from slave.limit.damper import DistanceDamper
 from slave.limit.limit import SetpointLimiter
 from slave.servos.mujoco.simulated import SimulatedRobot
 from slave.track.config import STRATEGIES, make_tracker
@@ -132,7 +133,8 @@ class _VirtualSlave:
             config.track.model_copy(update={"strategy": strategy}), config.servos.chosen.bus_lag_s
         )
         self._limits = config.guard.limits(skeleton)
-        self._limiter = SetpointLimiter(skeleton.joint_names, self._limits)
+        damper = DistanceDamper(skeleton, config.guard.self_margin_cm, config.guard.zones)
+        self._limiter = SetpointLimiter(skeleton.joint_names, self._limits, damper)
         self._limiter.seat(position_rad)
         self._robot = SimulatedRobot(skeleton, config.encoders, now_ns, position_rad)
         self._encoders = Encoders(skeleton, config.encoders)

@@ -13,6 +13,7 @@ from common.config.section import Section
 from common.errors import ConfigMistake
 from common.skeleton import Joint, Skeleton
 from slave.guard.limits import MotionLimits
+from slave.guard.zones import Zone, zone_mistakes
 
 _Limit = Annotated[float | None, Field(allow_inf_nan=False)]
 
@@ -90,6 +91,11 @@ class GuardConfig(Section):
     max_step_s: float = Field(0.025, gt=0.0, le=0.1)
     """A step that comes later than this after the last one moves the setpoint as if it came then."""
 
+    self_margin_cm: float = Field(2.0, ge=0.0, le=20.0)
+    """No part of the robot comes nearer than this to another that does not hang on it, or to its stand."""
+    zones: list[Zone] = Field(default_factory=list)
+    """What stands around the robot."""
+
     reset_key: str = Field("", repr=False, max_length=512)
     """Required to reset an e-stop. Empty: only a restart of the slave resets it."""
     events_kept: int = Field(256, ge=1, le=100_000)
@@ -109,7 +115,11 @@ class GuardConfig(Section):
         """Contradictions between keys, joints that do not exist, and limits looser than the skeleton's."""
         return [
             ConfigMistake(f"{section}.{key}", value, expected)
-            for key, value, expected in (*self._contradictions(), *self._loosened(skeleton))
+            for key, value, expected in (
+                *self._contradictions(),
+                *self._loosened(skeleton),
+                *zone_mistakes(skeleton, self.self_margin_cm, self.zones),
+            )
         ]
 
     def limits(self, skeleton: Skeleton) -> MotionLimits:

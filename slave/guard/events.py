@@ -19,6 +19,8 @@ class Rule(StrEnum):
     """rad/s"""
     ACCELERATION = "acceleration"
     """rad/s²"""
+    DISTANCE = "distance"
+    """rad/s: two parts of the robot, or one and a zone, are near each other."""
 
 
 @dataclass(frozen=True, slots=True)

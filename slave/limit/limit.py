@@ -11,6 +11,7 @@ from common.quaternion import Array
 from common.wire.messages import Mask
 from slave.guard.events import Clamp, Rule
 from slave.guard.limits import MotionLimits
+from slave.limit.damper import DamperStep, DistanceDamper
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +110,11 @@ class SetpointLimiter:
     beyond a limit only ever moves back.
     """
 
-    def __init__(self, joint_names: Sequence[str], limits: MotionLimits) -> None:
+    def __init__(
+        self, joint_names: Sequence[str], limits: MotionLimits, damper: DistanceDamper | None = None
+    ) -> None:
+        """`damper`: keeps parts of the robot apart; None: nothing does."""
+        self.damper = damper
         self._names = tuple(joint_names)
         self._none: Mask = np.zeros(len(self._names), np.bool_)
         self.limits = limits
@@ -136,7 +141,12 @@ class SetpointLimiter:
         return not self.velocity_rad_s.any()
 
     def stop(self, dt_s: float) -> None:
-        """Brake every joint as hard as it may; at standstill the setpoint stays."""
+        """Brake every joint as hard as it may; at standstill the setpoint stays.
+
+        The damper has left room for that: nothing has to be looked at on the way.
+        """
+        if self.damper is not None:
+            self.damper.idle()
         if dt_s <= 0.0 or self.at_rest:
             return
         brake = self.limits.max_acceleration_rad_s2 * dt_s
@@ -169,14 +179,42 @@ class SetpointLimiter:
             self.position_rad, self.velocity_rad_s, dt_s, self.limits,
             max_velocity_rad_s, max_acceleration_rad_s2,
         )  # fmt: skip
-        given = [wish]
+        given, lowest, highest = [wish], np.full_like(wish, -np.inf), np.full_like(wish, np.inf)
         for _, envelope in RULES:
             low, high = envelope(motion)
             given.append(np.minimum(np.maximum(given[-1], low), high))
+            lowest = np.minimum(np.maximum(lowest, low), high)
+            highest = np.minimum(np.maximum(highest, low), high)
+        given.append(self._kept_apart(wish, given[-1], lowest, highest, held, motion))
         self._move(given[-1], dt_s)
         if not (self._clamping or beyond.any() or (given[-1] != wish).any()):
             return []
         return self._clamps(now_ns, target_rad, beyond, ~held, given, motion)
+
+    def _kept_apart(
+        self, aim: Array, wish: Array, lowest: Array, highest: Array, held: Mask, motion: LimiterStep
+    ) -> Array:
+        """The velocity (J,) at which no two parts come too near, within what the rules let."""
+        if self.damper is None:
+            return wish
+        if not (wish.any() or motion.velocity_rad_s.any()):
+            self.damper.idle()
+            return wish
+        brake = self.limits.max_acceleration_rad_s2
+        slower = np.clip(motion.velocity_rad_s, -brake * motion.dt_s, brake * motion.dt_s)
+        most = motion.max_velocity_rad_s
+        step = DamperStep(
+            position_rad=motion.position_rad,
+            aim_rad_s=np.clip(aim, -most, most),
+            wish_rad_s=wish,
+            lowest_rad_s=np.where(held, wish, lowest),
+            highest_rad_s=np.where(held, wish, highest),
+            braking_rad_s=motion.velocity_rad_s - slower,
+            max_velocity_rad_s=self.limits.max_velocity_rad_s,
+            brake_rad_s2=brake,
+            dt_s=motion.dt_s,
+        )
+        return self.damper.limit(step)
 
     def _move(self, velocity_rad_s: Array, dt_s: float) -> None:
         before, limits = self.position_rad, self.limits
@@ -199,8 +237,11 @@ class SetpointLimiter:
         """The clamps that began in this step. A held joint brakes by order, and is not clamped by a rule."""
         clamps: list[Clamp] = []
         self._clamping = False
-        for (rule, _), before, after in zip(RULES, given, given[1:], strict=False):
+        rules = (*(rule for rule, _ in RULES), Rule.DISTANCE)
+        for rule, before, after in zip(rules, given, given[1:], strict=False):
             clamped = (before != after) & free
+            if rule is Rule.DISTANCE and self.damper is not None:
+                clamped &= self.damper.held_back
             if rule is Rule.POSITION:
                 clamped |= beyond & free
             for j in np.flatnonzero(clamped & ~self._clamped[rule]).tolist():
@@ -220,7 +261,7 @@ class SetpointLimiter:
         motion: LimiterStep,
     ) -> tuple[float, float]:
         """What was asked and what was given, in the rule's unit."""
-        if rule is Rule.VELOCITY:
+        if rule in (Rule.VELOCITY, Rule.DISTANCE):
             return asked_rad_s, given_rad_s
         if rule is Rule.ACCELERATION:
             speed = float(motion.velocity_rad_s[joint])

@@ -46,9 +46,14 @@ class Pace:
         self._outside_ns.fill(now_ns)
         return self._slow
 
-    def tracking(self, now_ns: int, error_rad: Array, valid: Mask) -> tuple[Array, Array]:
-        """Velocity and acceleration (J,) for this step of `track`; `error_rad` (J,): setpoint to target."""
+    def tracking(self, now_ns: int, error_rad: Array, valid: Mask, held_back: Mask) -> tuple[Array, Array]:
+        """Velocity and acceleration (J,) for this step of `track`; `error_rad` (J,): setpoint to target.
+
+        `held_back`: joints that may not go to their targets, since something is near. Once far from them they
+        come back slowly, and only they: their targets did not jump.
+        """
         fast = self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2
+        self._away = self._away | (held_back & ~within(error_rad, self._jump_rad))
         jumped = bool((valid & ~self._away & ~within(error_rad, self._jump_rad)).any())
         if not jumped and valid.all() and not self._away.any():
             return fast

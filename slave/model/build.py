@@ -69,15 +69,24 @@ def _compile(skeleton: Skeleton, drives: Sequence[ServoGains], step_s: float) ->
     ET.SubElement(option, "flag", contact="disable", autoreset="disable")
     world = ET.SubElement(root, "worldbody")
     _surroundings(world, skeleton)
-    hinges = _hinges(skeleton, drives)
-    bodies = {WORLD: world}
-    for segment in skeleton.segments:
-        bodies[segment.name] = _body(bodies[segment.parent], segment, skeleton, hinges)
+    add_segments(world, skeleton, _hinges(skeleton, drives))
     equality, actuator = ET.SubElement(root, "equality"), ET.SubElement(root, "actuator")
     for joint, drive in zip(skeleton.joints, drives, strict=True):
         _couplings(equality, joint)
         _servo(actuator, joint, drive)
     return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+
+
+def add_segments(
+    world: ET.Element, skeleton: Skeleton, hinges: dict[str, dict[str, str]] | None = None
+) -> dict[str, ET.Element]:
+    """The segments as bodies, by name; the MJCF attributes of each driven angle's hinge: bare by default."""
+    if hinges is None:
+        hinges = {angle: {"name": angle} for joint in skeleton.joints for angle in joint.drives}
+    bodies = {WORLD: world}
+    for segment in skeleton.segments:
+        bodies[segment.name] = _body(bodies[segment.parent], segment, skeleton, hinges)
+    return bodies
 
 
 def _surroundings(world: ET.Element, skeleton: Skeleton) -> None:

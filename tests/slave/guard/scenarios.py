@@ -7,6 +7,7 @@ story here fails there.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -15,8 +16,11 @@ import numpy as np
 
 from common.clock_sync import Offset
 from common.wire.messages import Action, BaseAttitude
+from deploy.measure.apart import Distances
 from slave.guard import GuardConfig, State, tilt
 from slave.guard.body import Body
+from slave.limit import damper
+from tests.slave.limit.apart import CROSSED
 
 MakeRig = Callable[..., Any]
 Scenario = Callable[[MakeRig], None]
@@ -408,7 +412,7 @@ def brakes(make_rig: MakeRig) -> None:
 @about("StepTime.elapsed_s")
 def late_step(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
-    rig.target = rig.skeleton.lower_rad.copy()
+    rig.target = rig.target + 0.5
     rig.run(0.1)
     before = rig.setpoints[-1].position_rad
     rig.send()
@@ -422,6 +426,29 @@ def broken_tracker(make_rig: MakeRig) -> None:
     rig.tracker.newest = type(rig.tracker.newest)(np.full(rig.joints, np.nan), np.zeros(rig.joints))
     assert np.isfinite(rig.step().position_rad).all()
     assert rig.guard.state is State.HOLD
+
+
+# distance
+
+
+@about("DistanceDamper.limit")
+def arms_crossed(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.target = CROSSED
+    rig.run(1.5)
+    course = np.array([setpoint.position_rad for setpoint in rig.setpoints])
+    assert Distances(rig.skeleton).own_m(course).min() >= 0.018
+    assert rig.guard.state is State.TRACK
+
+
+@about("DistanceDamper.overdue")
+def distances_too_late(make_rig: MakeRig) -> None:
+    rig = make_rig().to_track()
+    rig.pipeline.damper.clock = itertools.count(0, damper.BUDGET_NS + 1).__next__
+    rig.target = rig.target + 0.3
+    rig.run(0.3)
+    assert rig.guard.state is State.HOLD
+    assert "distances were not computed" in rig.guard.reason
 
 
 # align

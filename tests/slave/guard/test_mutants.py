@@ -37,7 +37,7 @@ from slave.guard import (
     times,
     watchdog,
 )
-from slave.limit import limit, pace
+from slave.limit import damper, limit, pace
 from slave.track import tracker
 
 from .scenarios import SCENARIOS
@@ -152,6 +152,8 @@ PARTS: tuple[tuple[Any, str, Any], ...] = (
         "tracking",
         lambda self, *_: (self._limits.max_velocity_rad_s, self._limits.max_acceleration_rad_s2),
     ),
+    (damper.DistanceDamper, "limit", lambda _, step: step.wish_rad_s),
+    (damper.DistanceDamper, "overdue", None),
     (plausible.EncoderPlausibility, "judge", lambda *_: []),
     (plausible.EncoderPlausibility, "_jumps", lambda self, *_: np.zeros(len(self._names), np.bool_)),
     (plausible.EncoderPlausibility, "too_many", nothing),

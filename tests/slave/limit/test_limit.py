@@ -328,7 +328,7 @@ def test_braking_of_held_joints_is_not_a_clamp() -> None:
 # each rule taken out
 
 
-@pytest.fixture(params=Rule)
+@pytest.fixture(params=[rule for rule, _ in limit.RULES])
 def missing(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Rule:
     rule: Rule = request.param
     monkeypatch.setattr(limit, "RULES", tuple(r for r in limit.RULES if r[0] is not rule))

@@ -1,0 +1,116 @@
+"""How near parts of the robot come to each other and to zones, computed apart from the slave's own way.
+
+The slave asks MuJoCo, posture by posture. Here the table's kinematics and closed formulas are used, for a
+whole course at once: so each is a check of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from common.quaternion import Array, rotate
+from common.skeleton import Skeleton
+from common.skeleton.kinematics import orientations, origins
+from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Zone
+from slave.model.capsules import capsules
+from slave.model.pairs import moving, pairs
+
+_HALVINGS = 40
+
+
+class Distances:
+    """Distances of a robot among its zones; postures (T, J) at a time."""
+
+    def __init__(self, skeleton: Skeleton, zones: Sequence[Zone] = ()) -> None:
+        self._skeleton, self._zones = skeleton, zones
+        shape = capsules(skeleton)
+        self._segment = np.array([c.segment for c in shape])
+        self._ends = np.array([[c.from_m, c.to_m] for c in shape])
+        self._radius = np.array([c.radius_m for c in shape])
+        self._pairs = np.array(pairs(skeleton), np.intp).reshape(-1, 2)
+        self._moving = np.array(moving(skeleton), np.intp)
+
+    def own_m(self, position_rad: Array) -> Array:
+        """(T,) the least distance between two parts of the robot, or one and its stand; inf without pairs."""
+        ends, radius = self._placed(position_rad), self._radius
+        a, b = self._pairs.T
+        least = np.full(len(position_rad), np.inf)
+        if len(a):
+            apart = _between(ends[:, a], ends[:, b]) - radius[a] - radius[b]
+            least = apart.min(axis=1)
+        for post in self._skeleton.stand:
+            if len(self._moving):
+                bar = np.broadcast_to([post.from_m, post.to_m], (len(least), len(self._moving), 2, 3))
+                apart = _between(ends[:, self._moving], bar) - radius[self._moving] - post.radius_m
+                least = np.minimum(least, apart.min(axis=1))
+        return least
+
+    def to_zones_m(self, position_rad: Array) -> Array:
+        """(T, zones) the least distance of any part to each."""
+        ends = self._placed(position_rad)
+        out = [(_to_zone(zone, ends) - self._radius).min(axis=1) for zone in self._zones]
+        return np.stack(out, axis=1) if out else np.empty((len(position_rad), 0))
+
+    def _placed(self, position_rad: Array) -> Array:
+        """(T, C, 2, 3) both ends of every capsule's line."""
+        q = orientations(self._skeleton, position_rad)
+        origin_m = origins(self._skeleton, q)
+        turned = rotate(
+            q[:, self._segment, None, :], np.broadcast_to(self._ends, (len(q), *self._ends.shape))
+        )
+        out: Array = origin_m[:, self._segment, None, :] + turned
+        return out
+
+
+def _between(one: Array, other: Array) -> Array:
+    """(...) the least distance between lines (..., 2, 3): Ericson, Real-Time Collision Detection, 5.1.9."""
+    p, q = one[..., 0, :], other[..., 0, :]
+    d, e = one[..., 1, :] - p, other[..., 1, :] - q
+    r = p - q
+    a, b, c = (d * d).sum(-1), (d * e).sum(-1), (d * r).sum(-1)
+    f, g = (e * e).sum(-1), (e * r).sum(-1)
+    parallel = a * f - b * b
+    s = np.where(
+        parallel > 1e-12, np.clip((b * g - c * f) / np.where(parallel > 1e-12, parallel, 1.0), 0, 1), 0.0
+    )
+    t = np.clip((b * s + g) / f, 0.0, 1.0)
+    s = np.clip((b * t - c) / a, 0.0, 1.0)
+    gap = r + s[..., None] * d - t[..., None] * e
+    out: Array = np.sqrt((gap * gap).sum(-1))
+    return out
+
+
+def _to_zone(zone: Zone, ends: Array) -> Array:
+    """(T, C) from the lines (T, C, 2, 3) to a zone."""
+    if isinstance(zone, HalfSpaceZone):
+        free = np.array(zone.free_side) / np.linalg.norm(zone.free_side)
+        return np.asarray(((ends - np.array(zone.point_m)) @ free).min(axis=2))
+    if isinstance(zone, CapsuleZone):
+        return _between(ends, np.broadcast_to([zone.from_m, zone.to_m], ends.shape)) - zone.radius_m
+    if isinstance(zone, SphereZone):
+        point = np.broadcast_to([zone.center_m, zone.center_m], ends.shape) + [[[0, 0, 0], [0, 0, 1e-9]]]
+        return _between(ends, point) - zone.radius_m
+    return _to_box(zone, ends)
+
+
+def _to_box(zone: BoxZone, ends: Array) -> Array:
+    """A box is convex, so the distance along a line has one minimum: halve the interval."""
+    yaw = np.radians(zone.yaw_deg)
+    turn = np.array([[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
+    local = (ends - np.array(zone.center_m)) @ turn
+    half = 0.5 * np.array(zone.size_m)
+
+    def at(share: Array) -> Array:
+        over = np.abs(local[..., 0, :] + share[..., None] * (local[..., 1, :] - local[..., 0, :])) - half
+        outside = np.linalg.norm(np.maximum(over, 0.0), axis=-1)
+        out: Array = outside + np.minimum(over.max(axis=-1), 0.0)
+        return out
+
+    low, high = np.zeros(ends.shape[:2]), np.ones(ends.shape[:2])
+    for _ in range(_HALVINGS):
+        one, two = low + (high - low) / 3.0, high - (high - low) / 3.0
+        left = at(one) < at(two)
+        low, high = np.where(left, low, one), np.where(left, two, high)
+    return at(0.5 * (low + high))

@@ -1,0 +1,270 @@
+"""Keep the robot's parts apart from each other and from zones: a velocity damper with room to brake.
+
+Faverjon and Tournassoud (1987): the speed at which a pair may approach falls with its distance and is zero at
+its margin,  d' ≥ -(d - margin) / τ.  Their damper takes for granted that a joint can do what it is told. Here
+the joints have acceleration limits, so each velocity must also leave room to stop: were every joint to brake
+from it as hard as it may (what `SetpointLimiter.stop` does after any loss), no pair may come nearer than its
+margin on all the way to standstill. The way is looked at posture by posture, by conservative advancement.
+
+Of all velocities that keep both, and the joints' own limits, the one nearest to the wish is taken (a
+quadratic programme). There always is one: to brake, which the last step has left room for. A pair that is
+nearer than its margin already may stay as it is or part, so the operator can always leave.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import daqp
+import numpy as np
+
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from common.wire.messages import Mask
+from slave.guard.zones import Zone, distance_model, speed_limits, zone_margins_m
+from slave.model.distance import REACH_M, NearPairs
+
+TIME_CONSTANT_S = 0.1
+"""τ: at 10 cm beyond the margin a pair may approach at 1 m/s."""
+SKIN_M = 0.001
+"""The damper stops this far before the margin, which rounding and curved ways then do not reach."""
+STRIDE_M = 0.02
+"""On the way to standstill a pair is looked at again at least after this much way towards each other."""
+MOST_ROWS = 32
+MOST_CUTS = 3
+BUDGET_NS = 2_000_000
+"""A tick that has taken longer than this brakes."""
+MOST_LATE = 10
+"""So many late ticks in a row, and the robot holds."""
+_NOTICED_RAD_S = 5e-4
+"""A joint that loses less is not said to be held back. Far less than a gentle start gains in one step."""
+_FREE = 1e30
+_PERIOD_S = 0.006
+"""A step longer than this is late."""
+
+
+@dataclass(frozen=True, slots=True)
+class DamperStep:
+    """What the joints may do in this step, by their own limits; (J,) each."""
+
+    position_rad: Array
+    aim_rad_s: Array
+    """The velocity that would be best for the joint's target, whatever its acceleration."""
+    wish_rad_s: Array
+    """As much of it as the joint can do in this step."""
+    lowest_rad_s: Array
+    highest_rad_s: Array
+    braking_rad_s: Array
+    """The velocity if every joint brakes as hard as it may."""
+    max_velocity_rad_s: Array
+    brake_rad_s2: Array
+    dt_s: float
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Constraints `of @ v ≥ least`."""
+
+    of: Array
+    least: Array
+
+    def violated_by(self, velocity: Array) -> bool:
+        return bool((self.of @ velocity < self.least - 1e-9).any())
+
+    def and_also(self, other: _Rows | None) -> _Rows:
+        if other is None:
+            return self
+        return _Rows(np.vstack([self.of, other.of]), np.append(self.least, other.least))
+
+
+class DistanceDamper:
+    """Limits the velocity (J,) of every setpoint. `self_margin_cm` and `zones` are the guard's."""
+
+    def __init__(self, skeleton: Skeleton, self_margin_cm: float, zones: Sequence[Zone] = ()) -> None:
+        self._model = model = distance_model(skeleton, self_margin_cm, zones)
+        margins_m = np.array(zone_margins_m(self_margin_cm, zones))[1 + model.obstacle]
+        self._margin_m = margins_m
+        # the robot's own parts have place -1
+        self._most_m_s, self._slow_from_m = (
+            np.append(a, b) for a, b in zip(speed_limits(zones), (np.inf, 0.0), strict=True)
+        )
+        self._spare_m = np.full(len(model.levers_m), np.inf)
+        np.minimum.at(self._spare_m, model.kind, np.where(np.isfinite(margins_m), REACH_M, np.inf))
+        self.clock: Callable[[], int] = lambda: 0
+        """Tells how much time a step takes. The default takes none: on a virtual clock nothing is late."""
+        self._late_in_a_row = 0
+        self.held_back: Mask = np.zeros(model.levers_m.shape[1], np.bool_)
+        """(J,) joints that were given less than they wished, in the newest step."""
+        self._nearest: tuple[int, float] | None = None
+        """The pair that is nearest to its margin while joints are held back, and its distance in m."""
+
+    def limit(self, step: DamperStep) -> Array:
+        """The velocity (J,) to go on with; `held_back` and `words` tell about it."""
+        began_ns = self.clock()
+        near = self._model.near(step.position_rad)
+        floor_m = self._margin_m.copy()
+        # what stands inside a margin already may not come nearer than it is
+        np.minimum.at(floor_m, near.pair, near.distance_m)
+        asked = step.wish_rad_s
+        step, slow = self._slowed(near, step)
+        rows = self._damping(near, step).and_also(slow)
+        velocity, late = step.wish_rad_s, False
+        for _ in range(MOST_CUTS + 1):
+            if rows.violated_by(velocity):
+                velocity = self._nearest_to_the_aim(rows, step)
+            late = self.clock() - began_ns > BUDGET_NS
+            cut = None if late else self._cut(near, floor_m, velocity, step)
+            if cut is None:
+                break
+            rows = rows.and_also(cut)
+        else:
+            velocity = step.braking_rad_s
+        if late:
+            velocity = step.braking_rad_s
+        self._late_in_a_row = self._late_in_a_row + 1 if late else 0
+        self._tell(near, np.abs(velocity - asked))
+        return velocity
+
+    def _damping(self, near: NearPairs, step: DamperStep) -> _Rows:
+        """The damper of every pair that the wish could bring together too fast."""
+        spare_m = near.distance_m - self._margin_m[near.pair] - SKIN_M
+        fastest = self._model.levers_m @ np.abs(step.wish_rad_s)
+        rows = np.flatnonzero(spare_m < TIME_CONSTANT_S * fastest[self._model.kind[near.pair]])
+        gradient, spare_m = self._model.gradient(rows), spare_m[rows]
+        # within its skin a pair parts again, gently; one that is inside its margin is only kept from more
+        parting = np.where(spare_m > -SKIN_M, -spare_m, 0.0) / TIME_CONSTANT_S
+        return self._possible(gradient, parting, step)
+
+    def _slowed(self, near: NearPairs, step: DamperStep) -> tuple[DamperStep, _Rows | None]:
+        """Aim and wish within the speed limits of zones, and rows that keep them in these directions."""
+        zone = self._model.obstacle[near.pair]
+        rows = np.flatnonzero(self._most_m_s[zone] < np.inf)
+        if not len(rows):
+            return step, None
+        zone = zone[rows]
+        further_m = np.maximum(near.distance_m[rows] - self._slow_from_m[zone], 0.0)
+        most_m_s = self._most_m_s[zone] + further_m / TIME_CONSTANT_S
+        velocity_m_s = self._model.velocity(rows, step.aim_rad_s)
+        speed_m_s = np.linalg.norm(velocity_m_s, axis=1)
+        over = speed_m_s > most_m_s
+        if not over.any():
+            return step, None
+        # all joints that move the part are slowed alike, so that it goes the same way
+        moves = self._model.levers_m[self._model.kind[near.pair[rows[over]]]] > 0.0
+        share = np.where(moves, (most_m_s[over] / speed_m_s[over])[:, None], 1.0).min(axis=0)
+        aim = share * step.aim_rad_s
+        wish = np.clip(aim, step.lowest_rad_s, step.highest_rad_s)
+        slowed = replace(step, aim_rad_s=aim, wish_rad_s=wish)
+        direction = velocity_m_s[over] / speed_m_s[over, None]
+        return slowed, self._possible(-self._model.towards(rows[over], direction), -most_m_s[over], slowed)
+
+    def _possible(self, of: Array, least: Array, step: DamperStep) -> _Rows:
+        """The rows that matter most, each as far as the joints can keep it in this step."""
+        lack = least - of @ step.wish_rad_s
+        if len(least) > MOST_ROWS:
+            most = np.argpartition(lack, -MOST_ROWS)[-MOST_ROWS:]
+            of, least = of[most], least[most]
+        highest = np.maximum(of * step.lowest_rad_s, of * step.highest_rad_s).sum(axis=1)
+        return _Rows(of, np.minimum(least, highest))
+
+    def _cut(self, near: NearPairs, floor_m: Array, velocity: Array, step: DamperStep) -> _Rows | None:
+        """What this velocity would break on the way to standstill, as rows that forbid it; None: nothing."""
+        model, spare_m, speed = self._model, self._spare(near, floor_m), np.abs(velocity)
+        far_rad = speed * (step.dt_s + speed / (2.0 * step.brake_rad_s2))
+        risky = np.flatnonzero(model.levers_m @ far_rad > spare_m)
+        if not len(risky):
+            return None
+        way_rad, moving_s = _way_to_stop(velocity, step)
+        # no joint turns back on the way: what each adds only grows
+        apart_m, passed_m, k = np.abs(way_rad) @ model.levers_m[risky].T, 0.0, 0
+        while k < len(way_rad):
+            spare_m = spare_m[risky]
+            ahead_m = apart_m[k:] - passed_m
+            if (ahead_m[-1] <= spare_m).all():
+                return None
+            safe = np.all(ahead_m <= np.maximum(spare_m, STRIDE_M), axis=1)
+            k += max(int(np.argmin(safe)) if not safe[-1] else len(safe), 1) - 1
+            then = model.near(step.position_rad + way_rad[k])
+            lack_m = floor_m[then.pair] - then.distance_m
+            if lack_m.max(initial=0.0) > 0.0:
+                worst = np.flatnonzero(lack_m > 0.0)
+                of = model.gradient(worst) * moving_s[k]
+                return self._possible(of, lack_m[worst] + 0.1 * SKIN_M + of @ velocity, step)
+            spare_m, passed_m = self._spare(then, floor_m), apart_m[k]
+            k += 1
+        return None
+
+    def _spare(self, near: NearPairs, floor_m: Array) -> Array:
+        """(R,) how far the pairs of each kind may come towards each other, at least."""
+        spare_m = self._spare_m.copy()
+        np.minimum.at(spare_m, self._model.kind[near.pair], near.distance_m - floor_m[near.pair])
+        return spare_m
+
+    def _nearest_to_the_aim(self, rows: _Rows, step: DamperStep) -> Array:
+        """Solve for the v of min Σ ((v - aim) / v_max)² within bounds and rows.
+
+        Not the wish: that has the last velocity in it, and a posture would swing along what it leans against.
+        """
+        scale, aim = step.max_velocity_rad_s, step.aim_rad_s
+        joints, of = len(aim), rows.of
+        bounds = (step.lowest_rad_s - aim) / scale, (step.highest_rad_s - aim) / scale
+        highest = np.concatenate([bounds[1], np.full(len(of), _FREE)])
+        # not all rows may be possible at once; what braking keeps of them is
+        for least in (rows.least, np.minimum(rows.least, of @ step.braking_rad_s)):
+            lowest = np.concatenate([bounds[0], least - of @ aim])
+            change, _, found, _ = daqp.solve(np.eye(joints), np.zeros(joints), of * scale, highest, lowest)
+            if found == 1:
+                velocity = aim + np.asarray(change) * scale
+                return np.asarray(np.clip(velocity, step.lowest_rad_s, step.highest_rad_s))
+        return step.braking_rad_s
+
+    def _tell(self, near: NearPairs, lost_rad_s: Array) -> None:
+        self.held_back = lost_rad_s > _NOTICED_RAD_S
+        self._nearest = None
+        if self.held_back.any() and len(near.pair):
+            margin_m = self._margin_m[near.pair]
+            k = int(np.argmin(near.distance_m - np.maximum(margin_m, 0.0)))
+            self._nearest = int(near.pair[k]), float(near.distance_m[k])
+
+    def idle(self) -> None:
+        """The robot brakes by order, or stands: nothing is held back."""
+        self.held_back = np.zeros_like(self.held_back)
+        self._nearest = None
+        self._late_in_a_row = 0
+
+    @property
+    def overdue(self) -> str | None:
+        """Why the robot must hold: for a while the distances could not be computed in time."""
+        if self._late_in_a_row < MOST_LATE:
+            return None
+        return f"distances were not computed within {BUDGET_NS * 1e-6:g} ms, {MOST_LATE} times in a row"
+
+    @property
+    def words(self) -> str:
+        """What is held back, and by what; empty: nothing."""
+        if self._nearest is None:
+            return ""
+        pair, distance_m = self._nearest
+        part, other = self._model.names[pair]
+        return f"{part} is held back: {max(100.0 * distance_m, 0.0):.0f} cm from the {other}"
+
+
+def _way_to_stop(velocity: Array, step: DamperStep) -> tuple[Array, Array]:
+    """The joints' way to standstill, (K, J) at each of K moments, and its derivative by the velocity, in s.
+
+    This step first, a late one in parts; then each joint brakes, step by step, until it stands.
+    """
+    parts = math.ceil(step.dt_s / _PERIOD_S)
+    period_s = step.dt_s / parts
+    shed = step.brake_rad_s2 * period_s
+    speed = np.abs(velocity)
+    count = math.ceil(float((speed / shed).max()) - 1e-9)
+    shares = np.arange(1, parts + 1)[:, None] / parts
+    slower = np.maximum(speed - np.arange(1, max(count, 1))[:, None] * shed, 0.0)
+    braking = step.dt_s * speed + period_s * np.cumsum(slower, axis=0)
+    way = np.vstack([shares * step.dt_s * speed, braking])
+    moved_s = step.dt_s + period_s * np.cumsum(slower > 0.0, axis=0)
+    first = np.broadcast_to(shares * step.dt_s, (parts, len(speed)))
+    return np.copysign(way, velocity), np.vstack([first, moved_s])

@@ -1,0 +1,210 @@
+"""How far the robot's parts are from each other and from what stands around it, and what changes that.
+
+One call of MuJoCo's collision pipeline finds every pair nearer than `REACH_M` beyond its margin. README.md
+has what this costs, and what other ways cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from slave.model.build import add_segments, unit_rates
+from slave.model.capsules import capsules
+from slave.model.pairs import groups, moving, pairs
+
+REACH_M = 0.12
+"""A pair further apart than its margin and this is not looked at."""
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """Something that is fixed to the base: a name, and what MuJoCo calls its shape, as attributes."""
+
+    name: str
+    geom: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NearPairs:
+    """The near pairs of one posture: K rows, some pairs twice (where one capsule lies along another)."""
+
+    pair: Indices
+    """(K,) places in `DistanceModel.names`."""
+    distance_m: Array
+    """(K,) between the surfaces; below 0 inside."""
+
+
+class DistanceModel:
+    """Distances at any joint angles. `names` are the pairs: the first is a part of the robot."""
+
+    def __init__(
+        self, skeleton: Skeleton, obstacles: Sequence[Obstacle] = (), margins_m: Sequence[float] = ()
+    ) -> None:
+        """`obstacles` beside the robot's own stand, and the margin of the robot itself, then of each."""
+        margins = tuple(margins_m) or (0.0,) * (1 + len(obstacles))
+        self._model = model = _compiled(skeleton, tuple(obstacles), margins)
+        self._data = mujoco.MjData(model)
+        self._hinges_per_joint = unit_rates(skeleton, model)
+        first, second = model.pair_geom1, model.pair_geom2
+        self._pair_of = np.full((model.ngeom, model.ngeom), -1, np.intp)
+        self._pair_of[first, second] = self._pair_of[second, first] = np.arange(model.npair)
+        part = dict(zip(skeleton.segment_names, groups(skeleton), strict=True))
+        shown = [_shown(model, geom, part) for geom in range(model.ngeom)]
+        # what is further out in the tree comes first, and what is fixed to the base last
+        both = np.sort(np.stack([first, second], axis=1), axis=1)[:, ::-1].tolist()
+        self.names = [(shown[a], shown[b]) for a, b in both]
+        zones = {obstacle.name: i for i, obstacle in enumerate(obstacles)}
+        owner = [zones.get(model.geom(geom).name.removeprefix(_ZONE), -1) for geom in range(model.ngeom)]
+        self.obstacle: Indices = np.maximum(np.array(owner)[first], np.array(owner)[second])
+        """(P,) place in `obstacles` of the one in each pair; -1: the robot's own parts, and its stand."""
+        self._carries = _carries(skeleton, model)
+        levers = _levers_m(skeleton, model, self._hinges_per_joint)
+        one_side = (self._carries[first] != 0.0) ^ (self._carries[second] != 0.0)
+        concerned = (one_side.astype(np.float64) @ (self._hinges_per_joint != 0.0).T) > 0.0
+        joints, kind = np.unique(concerned, axis=0, return_inverse=True)
+        self.kind: Indices = kind
+        """(P,) the row in `levers_m` of each pair: pairs between which the same joints turn share one."""
+        self.levers_m: Array = np.zeros(joints.shape)
+        """(R, J) m a rad: how far each joint moves the two of such a pair relative to each other at most."""
+        np.maximum.at(
+            self.levers_m, kind, np.where(concerned, np.maximum(levers[first], levers[second]), 0.0)
+        )
+
+    def near(self, position_rad: Array) -> NearPairs:
+        """The near pairs at joint angles (J,)."""
+        data = self._data
+        data.qpos[:] = position_rad @ self._hinges_per_joint
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        geom = data.contact.geom
+        return NearPairs(self._pair_of[geom[:, 0], geom[:, 1]], data.contact.dist.copy())
+
+    def gradient(self, rows: Indices) -> Array:
+        """(rows, J): how fast distances of the newest `near` grow by each joint's rad/s.
+
+        For the nearest points p on b and q on a, and the normal n from a to b:  d' = n · (p' - q').
+        """
+        contact = self._data.contact
+        geom = contact.geom[rows]
+        # the point midway between p and q does as well as either: they differ along n
+        return self._along(
+            rows, contact.frame[rows, :3], self._carries[geom[:, 1]] - self._carries[geom[:, 0]]
+        )
+
+    def towards(self, rows: Indices, direction: Array) -> Array:
+        """(rows, J): how fast the robot's points nearest to obstacles go along `direction`, (rows, 3)."""
+        return self._along(rows, direction, self._carries[self._data.contact.geom[rows]].max(axis=1))
+
+    def velocity(self, rows: Indices, rate_rad_s: Array) -> Array:
+        """(rows, 3) m/s: of the robot's points nearest to obstacles, at joint rates (J,)."""
+        every = np.eye(3)
+        ways = [self.towards(rows, np.broadcast_to(axis, (len(rows), 3))) @ rate_rad_s for axis in every]
+        return np.stack(ways, axis=1)
+
+    def _along(self, rows: Indices, direction: Array, carried: Array) -> Array:
+        """A hinge with axis h through o moves p along n by  n · (h x (p - o)) = h · (p x n) - n · (h x o)."""
+        axis, anchor = self._data.xaxis, self._data.xanchor
+        turning = _cross(self._data.contact.pos[rows], direction) @ axis.T
+        turning -= direction @ _cross(axis, anchor).T
+        out: Array = (carried * turning) @ self._hinges_per_joint.T
+        return out
+
+
+_ZONE, _PART = "zone ", "part "
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Of rows of three; numpy's own takes four times as long."""
+    out: Array = a[:, _AFTER] * b[:, _BEFORE] - a[:, _BEFORE] * b[:, _AFTER]
+    return out
+
+
+_AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
+
+
+def _shown(model: mujoco.MjModel, geom: int, part: dict[str, str]) -> str:
+    """What a person calls the part or obstacle of a geom."""
+    name: str = model.geom(geom).name
+    if name.startswith(_PART):
+        body: str = model.body(model.geom_bodyid[geom]).name
+        return part[body].replace("_", " ")
+    return name.removeprefix(_ZONE)
+
+
+@lru_cache(maxsize=16)
+def _compiled(
+    skeleton: Skeleton, obstacles: tuple[Obstacle, ...], margins_m: tuple[float, ...]
+) -> mujoco.MjModel:
+    """The robot as bare capsules, the obstacles, and the pairs as contacts that begin at their reach."""
+    root = ET.Element("mujoco", model=skeleton.name)
+    ET.SubElement(root, "compiler", angle="radian")
+    ET.SubElement(root, "size", memory="4M")
+    # only the pairs below count
+    ET.SubElement(ET.SubElement(root, "default"), "geom", contype="0", conaffinity="0")
+    world = ET.SubElement(root, "worldbody")
+    bodies = add_segments(world, skeleton)
+    geoms = [geom for segment in skeleton.segments for geom in bodies[segment.name].findall("geom")]
+    for i, geom in enumerate(geoms):
+        geom.set("name", f"{_PART}{i}")
+    contact = ET.SubElement(root, "contact")
+
+    def watch(a: str, b: str, margin_m: float) -> None:
+        reach = f"{margin_m + REACH_M!r}"
+        ET.SubElement(contact, "pair", geom1=a, geom2=b, margin=reach, gap=reach)
+
+    own, *others = margins_m
+    for a, b in pairs(skeleton):
+        watch(f"{_PART}{a}", f"{_PART}{b}", own)
+    free = moving(skeleton)
+    for i, post in enumerate(skeleton.stand):
+        # as a bar with round ends: the flat ends of a cylinder would cost far more, and shield nothing
+        name, line = f"stand {i}" if i else "stand", (*post.from_m, *post.to_m)
+        fromto = " ".join(map(repr, line))
+        ET.SubElement(world, "geom", name=name, type="capsule", fromto=fromto, size=f"{post.radius_m!r}")
+        for a in free:
+            watch(f"{_PART}{a}", name, own)
+    for obstacle, margin_m in zip(obstacles, others, strict=True):
+        ET.SubElement(world, "geom", dict(obstacle.geom), name=_ZONE + obstacle.name)
+        for a in range(len(geoms)):
+            watch(f"{_PART}{a}", _ZONE + obstacle.name, margin_m)
+    return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+
+
+def _carries(skeleton: Skeleton, model: mujoco.MjModel) -> Array:
+    """(geoms, H): 1 where the hinge moves the geom."""
+    carries = np.zeros((model.nbody, model.nv))
+    for body in range(1, model.nbody):
+        carries[body] = carries[model.body_parentid[body]]
+        first = model.body_jntadr[body]
+        carries[body, first : first + model.body_jntnum[body]] = 1.0
+    out: Array = carries[model.geom_bodyid]
+    return out
+
+
+def _levers_m(skeleton: Skeleton, model: mujoco.MjModel, hinges_per_joint: Array) -> Array:
+    """(geoms, J): how far a rad of each joint moves any point of a geom at most, whatever the posture."""
+    levers = np.zeros((model.ngeom, model.nv))
+    for i, capsule in enumerate(capsules(skeleton)):
+        geom = model.geom(f"{_PART}{i}").id
+        # the farthest point from the segment's joint, then from each joint above it
+        far = max(float(np.linalg.norm(capsule.from_m)), float(np.linalg.norm(capsule.to_m)))
+        far += capsule.radius_m
+        body = model.geom_bodyid[geom]
+        while body > 0:
+            first = model.body_jntadr[body]
+            levers[geom, first : first + model.body_jntnum[body]] = far
+            far += float(np.linalg.norm(model.body_pos[body]))
+            body = model.body_parentid[body]
+    out: Array = levers @ np.abs(hinges_per_joint).T
+    return out

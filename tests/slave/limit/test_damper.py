@@ -1,0 +1,173 @@
+"""No part of the robot comes too near another or a zone, whatever is asked, and it can always leave."""
+
+import numpy as np
+import pytest
+
+from common.quaternion import Array
+from slave.guard.events import Rule
+from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Zone, distance_model
+from slave.limit import damper
+from tests.slave.limit.apart import (
+    CROSSED,
+    DT_S,
+    LIMITS,
+    MARGIN_M,
+    NAMES,
+    ON_THE_HEAD,
+    SKELETON,
+    SLACK_M,
+    THROUGH_THE_CHEST,
+    J,
+    Robot,
+    posture,
+)
+
+ZERO = np.zeros(J)
+FORWARD = posture(shoulder_pitch=85)
+BED = BoxZone(name="bed", shape="box", center_m=[0.75, 0.0, 0.9], size_m=[0.6, 1.6, 0.3], yaw_deg=10.0)
+HEAD = SphereZone(name="the patient's head", shape="sphere", center_m=[0.5, 0.25, 1.4], radius_m=0.12)
+WALL = HalfSpaceZone(name="wall", shape="half_space", point_m=[0.45, 0.0, 0.0], free_side=[-1.0, 0.0, 0.0])
+RAIL = CapsuleZone(name="rail", shape="capsule", from_m=[0.5, -0.8, 1.3], to_m=[0.5, 0.8, 1.3], radius_m=0.03)
+INTO_ITSELF = pytest.mark.parametrize(
+    "target", [CROSSED, ON_THE_HEAD, THROUGH_THE_CHEST], ids=["crossed", "on the head", "through the chest"]
+)
+
+
+@INTO_ITSELF
+def test_it_keeps_apart_from_itself_and_can_leave(target: Array) -> None:
+    robot = Robot()
+    robot.go(target, 4.0)
+    least_m, _ = robot.least_m()
+    assert MARGIN_M - SLACK_M <= least_m < MARGIN_M + 0.01, "it came near, and not too near"
+    assert np.abs(robot.limiter.velocity_rad_s).max() < 0.02, "it has come to rest"
+    assert Rule.DISTANCE in {clamp.rule for clamp in robot.clamps}
+    assert "is held back" in robot.damper.words
+    robot.go(ZERO, 1.5)
+    assert np.abs(robot.limiter.position_rad).max() < 0.01, "it has left"
+    assert robot.damper.words == ""
+    assert robot.least_m()[0] >= MARGIN_M - SLACK_M
+
+
+@INTO_ITSELF
+def test_without_the_damper_it_would_meet_itself(target: Array) -> None:
+    robot = Robot(damped=False)
+    robot.go(target, 1.0)
+    assert robot.least_m()[0] < 0.0
+
+
+@pytest.mark.parametrize("zone", [BED, HEAD, WALL, RAIL], ids=lambda zone: zone.name)
+def test_it_keeps_apart_from_a_zone_and_can_leave(zone: Zone) -> None:
+    robot, free = Robot([zone]), Robot(damped=False, zones=[zone])
+    for each in (robot, free):
+        each.go(FORWARD, 1.5)
+    assert free.least_m()[1] < 0.0, "without the damper it is inside"
+    _, (least_m,) = robot.least_m()
+    assert 0.03 - SLACK_M <= least_m < 0.05
+    assert robot.damper.words.endswith(f"from the {zone.name}")
+    robot.go(ZERO, 1.5)
+    assert np.abs(robot.limiter.position_rad).max() < 0.01
+
+
+def test_a_stop_at_any_moment_has_room() -> None:
+    """Braking looks at nothing: the damper has left room for it before."""
+    for after in range(4, 60, 4):
+        robot = Robot([WALL])
+        robot.go(CROSSED if after % 8 else FORWARD, after * DT_S)
+        robot.stop()
+        own_m, (wall_m,) = robot.least_m()
+        assert own_m >= MARGIN_M - SLACK_M
+        assert wall_m >= 0.03 - SLACK_M
+
+
+def test_a_held_joint_is_an_obstacle_that_does_not_move() -> None:
+    held = np.array([name.startswith("left") for name in NAMES])
+    robot = Robot(start=0.6 * FORWARD)
+    before = robot.limiter.position_rad[held]
+    robot.go(CROSSED, 1.0, held=held)
+    assert (robot.limiter.position_rad[held] == before).all()
+    assert robot.least_m()[0] >= MARGIN_M - SLACK_M
+
+
+def test_late_steps_keep_apart_too() -> None:
+    robot, rng = Robot(), np.random.default_rng(4)
+    for k in range(6):
+        target = CROSSED if k % 2 else ON_THE_HEAD
+        for _ in range(30):
+            robot.go(target, dt := float(rng.choice([0.002, 0.005, 0.0093, 0.025])), dt_s=dt)
+    assert robot.least_m()[0] >= MARGIN_M - SLACK_M
+
+
+def test_where_nothing_is_near_nothing_changes() -> None:
+    robot, free = Robot(), Robot(damped=False)
+    rng = np.random.default_rng(1)
+    for _ in range(8):
+        share = rng.uniform(0.0, 0.5, J)
+        target = posture(shoulder_roll=25.0) + share * posture(
+            elbow_pitch=90, shoulder_pitch=60, wrist_yaw=40
+        )
+        for each in (robot, free):
+            each.go(target, 0.3)
+        np.testing.assert_array_equal(robot.limiter.position_rad, free.limiter.position_rad)
+
+
+def test_what_stands_inside_a_margin_may_only_leave() -> None:
+    """A zone was put there, or the robot was moved by hand: it may stay, and part, and come no nearer."""
+    robot = Robot()
+    robot.go(ON_THE_HEAD, 1.0)
+    begin = robot.limiter.position_rad + 0.04 * (ON_THE_HEAD - robot.limiter.position_rad)
+    (begin_m,) = robot.distances.own_m(begin[None])
+    assert begin_m < MARGIN_M - 0.003
+    robot = Robot(start=begin)
+    robot.go(begin, 0.5)
+    assert (robot.limiter.position_rad == begin).all(), "it may stay: nothing moves by itself"
+    robot.go(ON_THE_HEAD, 0.5)
+    robot.go(ZERO, 1.5)
+    assert np.abs(robot.limiter.position_rad).max() < 0.01
+    assert robot.least_m()[0] >= begin_m - 1e-4
+
+
+def test_a_zone_limits_the_speed_of_what_is_inside() -> None:
+    slow = SphereZone(
+        name="bedside", shape="sphere", center_m=[0.45, 0.0, 1.3], radius_m=0.4, enter=True, max_speed_m_s=0.2
+    )
+    ticks, fast = 0, 0.0
+    robot = Robot([slow])
+    body = distance_model(SKELETON, 2.0, [slow])
+    for _ in range(1000):
+        robot.go(FORWARD, DT_S)
+        near = body.near(robot.limiter.position_rad)
+        rows = np.flatnonzero((body.obstacle[near.pair] == 0) & (near.distance_m <= 0.0))
+        if len(rows):
+            ticks += 1
+            speed = np.linalg.norm(body.velocity(rows, robot.limiter.velocity_rad_s), axis=1)
+            fast = max(fast, float(speed.max()))
+    assert ticks > 100
+    assert 0.15 < fast <= 0.2 * 1.05
+    assert np.abs(robot.limiter.position_rad - FORWARD).max() < 0.2, "it goes on, slowly"
+
+
+def test_what_cannot_be_computed_in_time_brakes_and_then_holds() -> None:
+    robot = Robot()
+    robot.go(FORWARD, 0.05)
+    now = iter(range(0, 10**12, damper.BUDGET_NS + 1))
+    robot.damper.clock = lambda: next(now)
+    speed = np.abs(robot.limiter.velocity_rad_s)
+    robot.go(FORWARD, DT_S)
+    slower = np.maximum(speed - LIMITS.max_acceleration_rad_s2 * DT_S, 0.0)
+    np.testing.assert_allclose(np.abs(robot.limiter.velocity_rad_s), slower, atol=1e-12)
+    assert robot.damper.overdue is None
+    robot.go(FORWARD, damper.MOST_LATE * DT_S)
+    assert robot.damper.overdue is not None
+
+
+def test_just_in_time_is_in_time() -> None:
+    robot = Robot()
+    now = [0]
+
+    def clock() -> int:
+        now[0] += damper.BUDGET_NS
+        return now[0] if now[0] == damper.BUDGET_NS else 2 * damper.BUDGET_NS
+
+    robot.damper.clock = clock
+    robot.go(FORWARD, DT_S)
+    assert robot.limiter.velocity_rad_s.any()
