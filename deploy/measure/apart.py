@@ -34,6 +34,10 @@ class Distances:
 
     def own_m(self, position_rad: Array) -> Array:
         """(T,) the least distance between two parts of the robot, or one and its stand; inf without pairs."""
+        parts = [self._own_m(rows) for rows in _blocks(position_rad)]
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    def _own_m(self, position_rad: Array) -> Array:
         ends, radius = self._placed(position_rad), self._radius
         a, b = self._pairs.T
         least = np.full(len(position_rad), np.inf)
@@ -49,6 +53,10 @@ class Distances:
 
     def to_zones_m(self, position_rad: Array) -> Array:
         """(T, zones) the least distance of any part to each."""
+        parts = [self._to_zones_m(rows) for rows in _blocks(position_rad)]
+        return np.concatenate(parts) if parts else np.empty((0, len(self._zones)))
+
+    def _to_zones_m(self, position_rad: Array) -> Array:
         ends = self._placed(position_rad)
         out = [(_to_zone(zone, ends) - self._radius).min(axis=1) for zone in self._zones]
         return np.stack(out, axis=1) if out else np.empty((len(position_rad), 0))
@@ -62,6 +70,11 @@ class Distances:
         )
         out: Array = origin_m[:, self._segment, None, :] + turned
         return out
+
+
+def _blocks(position_rad: Array) -> list[Array]:
+    """Rows by the hundred, which fit into a processor's cache."""
+    return [position_rad[k : k + 100] for k in range(0, len(position_rad), 100)]
 
 
 def _between(one: Array, other: Array) -> Array:

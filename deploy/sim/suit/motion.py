@@ -19,6 +19,7 @@ from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, MotionError, Move
 
 MOTIONS = {
     "bottle": "nursing",
+    "crossed": "nursing",
     "grasp": "hand",
     "walk": "lower_limb",
     "calibration_pose": None,
