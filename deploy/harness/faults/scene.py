@@ -75,7 +75,8 @@ class Scene:
         self._begins_s = setting.lead_s
         with files(setting) as master:
             overrides = {
-                "slave": [f'guard.reset_key="{RESET_KEY}"'], "suit": list(setting.suit), "master": master,
+                "slave": [f'guard.reset_key="{RESET_KEY}"', *setting.slave],
+                "suit": list(setting.suit), "master": master,
             }  # fmt: skip
             usual = reach() if setting.motion is None else setting.motion()
             motion: OperatorMotion = Later(usual, setting.lead_s) if setting.lead_s else usual

@@ -31,6 +31,8 @@ class Setting:
     """Overrides of the suit's example file."""
     master: tuple[str, ...] = ()
     """Overrides of the master's."""
+    slave: tuple[str, ...] = ()
+    """Overrides of the slave's."""
     aligned: bool = False
     """The nodes' alignment is known, so that a lean in the zero pose can be detected."""
     one_way_ms: float = 2.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
+from deploy.harness.faults.distance import DISTANCE
 from deploy.harness.faults.effort import EFFORT
 from deploy.harness.faults.fault import FaultRow
 from deploy.harness.faults.judge import FaultOutcome
@@ -28,6 +29,7 @@ VIRTUAL: tuple[VirtualFault, ...] = (
     *VALUES,
     *SUIT,
     *SHIFT,
+    *DISTANCE,
     *ROBOT,
     *EFFORT,
     *CLOCKS,

@@ -39,6 +39,8 @@ class VirtualFault(FaultRow):
     """How far a joint that stands may be shaken by those that go on; None: two counts of its encoder."""
     yields: bool = False
     """The setpoint may be put where the joints stand, in one step; the joints keep their limits."""
+    also: Callable[[Scene], list[str]] | None = None
+    """What else may be wrong at the end of the trial."""
     refused_by: Set[str] = frozenset()
     """The gates that must have refused commands; `codec` is the decoder before them."""
     held_by: Set[str] = frozenset()
@@ -80,6 +82,7 @@ def _judge(fault: VirtualFault, scene: Scene) -> FaultOutcome:
         *moved_beyond(course, skeleton),
         *[f"{scene.foul} foul commands were accepted"] * bool(scene.foul),
         *[f"{what} was granted" for what in scene.granted],
+        *(fault.also(scene) if fault.also else ()),
         *[f"no command was refused by {gate}" for gate in sorted(fault.refused_by - refused.keys())],
     ]
     if strayed is not None and fault.strays_deg is not None and np.degrees(strayed) > fault.strays_deg:
