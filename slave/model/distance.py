@@ -45,41 +45,42 @@ class NearPairs:
     """(K,) between the surfaces; below 0 inside."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """What of a robot among its obstacles is worked out once."""
+
+    model: mujoco.MjModel
+    hinges_per_joint: Array
+    pair_of: Indices
+    """(geoms, geoms): the pair's place, -1: none."""
+    names: Sequence[tuple[str, str]]
+    obstacle: Indices
+    carries: Array
+    kind: Indices
+    levers_m: Array
+
+
 class DistanceModel:
-    """Distances at any joint angles. `names` are the pairs: the first is a part of the robot."""
+    """Distances at any joint angles."""
 
     def __init__(
         self, skeleton: Skeleton, obstacles: Sequence[Obstacle] = (), margins_m: Sequence[float] = ()
     ) -> None:
         """`obstacles` beside the robot's own stand, and the margin of the robot itself, then of each."""
         margins = tuple(margins_m) or (0.0,) * (1 + len(obstacles))
-        self._model = model = _compiled(skeleton, tuple(obstacles), margins)
-        self._data = mujoco.MjData(model)
-        self._hinges_per_joint = unit_rates(skeleton, model)
-        first, second = model.pair_geom1, model.pair_geom2
-        self._pair_of = np.full((model.ngeom, model.ngeom), -1, np.intp)
-        self._pair_of[first, second] = self._pair_of[second, first] = np.arange(model.npair)
-        part = dict(zip(skeleton.segment_names, groups(skeleton), strict=True))
-        shown = [_shown(model, geom, part) for geom in range(model.ngeom)]
-        # what is further out in the tree comes first, and what is fixed to the base last
-        both = np.sort(np.stack([first, second], axis=1), axis=1)[:, ::-1].tolist()
-        self.names = [(shown[a], shown[b]) for a, b in both]
-        zones = {obstacle.name: i for i, obstacle in enumerate(obstacles)}
-        owner = [zones.get(model.geom(geom).name.removeprefix(_ZONE), -1) for geom in range(model.ngeom)]
-        self.obstacle: Indices = np.maximum(np.array(owner)[first], np.array(owner)[second])
+        plan = _plan(skeleton, tuple(obstacles), margins)
+        self._model, self._data = plan.model, mujoco.MjData(plan.model)
+        self._hinges_per_joint, self._pair_of, self._carries = (
+            plan.hinges_per_joint, plan.pair_of, plan.carries,
+        )  # fmt: skip
+        self.names = plan.names
+        """(P,) what people call the two of every pair; the first is a part of the robot."""
+        self.obstacle = plan.obstacle
         """(P,) place in `obstacles` of the one in each pair; -1: the robot's own parts, and its stand."""
-        self._carries = _carries(skeleton, model)
-        levers = _levers_m(skeleton, model, self._hinges_per_joint)
-        one_side = (self._carries[first] != 0.0) ^ (self._carries[second] != 0.0)
-        concerned = (one_side.astype(np.float64) @ (self._hinges_per_joint != 0.0).T) > 0.0
-        joints, kind = np.unique(concerned, axis=0, return_inverse=True)
-        self.kind: Indices = kind
+        self.kind = plan.kind
         """(P,) the row in `levers_m` of each pair: pairs between which the same joints turn share one."""
-        self.levers_m: Array = np.zeros(joints.shape)
+        self.levers_m = plan.levers_m
         """(R, J) m a rad: how far each joint moves the two of such a pair relative to each other at most."""
-        np.maximum.at(
-            self.levers_m, kind, np.where(concerned, np.maximum(levers[first], levers[second]), 0.0)
-        )
 
     def near(self, position_rad: Array) -> NearPairs:
         """The near pairs at joint angles (J,)."""
@@ -143,6 +144,31 @@ def _shown(model: mujoco.MjModel, geom: int, part: dict[str, str]) -> str:
 
 
 @lru_cache(maxsize=16)
+def _plan(skeleton: Skeleton, obstacles: tuple[Obstacle, ...], margins_m: tuple[float, ...]) -> _Plan:
+    model = _compiled(skeleton, obstacles, margins_m)
+    hinges_per_joint = unit_rates(skeleton, model)
+    first, second = model.pair_geom1, model.pair_geom2
+    pair_of = np.full((model.ngeom, model.ngeom), -1, np.intp)
+    pair_of[first, second] = pair_of[second, first] = np.arange(model.npair)
+    part = dict(zip(skeleton.segment_names, groups(skeleton), strict=True))
+    shown = [_shown(model, geom, part) for geom in range(model.ngeom)]
+    # what is further out in the tree comes first, and what is fixed to the base last
+    both = np.sort(np.stack([first, second], axis=1), axis=1)[:, ::-1].tolist()
+    zones = {obstacle.name: i for i, obstacle in enumerate(obstacles)}
+    owner = np.array([zones.get(model.geom(g).name.removeprefix(_ZONE), -1) for g in range(model.ngeom)])
+    carries = _carries(model)
+    one_side = (carries[first] != 0.0) ^ (carries[second] != 0.0)
+    concerned = (one_side.astype(np.float64) @ (hinges_per_joint != 0.0).T) > 0.0
+    joints, kind = np.unique(concerned, axis=0, return_inverse=True)
+    levers = _levers_m(skeleton, model, hinges_per_joint)
+    levers_m = np.zeros(joints.shape)
+    np.maximum.at(levers_m, kind, np.where(concerned, np.maximum(levers[first], levers[second]), 0.0))
+    return _Plan(
+        model, hinges_per_joint, pair_of, names=[(shown[a], shown[b]) for a, b in both],
+        obstacle=np.maximum(owner[first], owner[second]), carries=carries, kind=kind, levers_m=levers_m,
+    )  # fmt: skip
+
+
 def _compiled(
     skeleton: Skeleton, obstacles: tuple[Obstacle, ...], margins_m: tuple[float, ...]
 ) -> mujoco.MjModel:
@@ -181,7 +207,7 @@ def _compiled(
     return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
 
 
-def _carries(skeleton: Skeleton, model: mujoco.MjModel) -> Array:
+def _carries(model: mujoco.MjModel) -> Array:
     """(geoms, H): 1 where the hinge moves the geom."""
     carries = np.zeros((model.nbody, model.nv))
     for body in range(1, model.nbody):

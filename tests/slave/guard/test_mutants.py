@@ -215,6 +215,7 @@ def test_the_guard_as_it_is_passes_every_story(name: str, make_rig: Callable[...
     SCENARIOS[name](make_rig)
 
 
+@pytest.mark.timeout(300)  # every story in one test
 def test_a_new_gate_without_a_story_would_survive(
     make_rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
