@@ -30,6 +30,8 @@ from common.wire.version import software
 from master.comfort.pressed import PressedKey
 from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
+from master.deadman.grip import Grip
+from master.deadman.switches import Switches
 from master.pipeline import JointAngleSample, MasterPipeline
 from master.robot import CommandedRobot
 from master.suit.doubt import DoubtLog, as_figures
@@ -50,6 +52,13 @@ class Master:
         self._frames_in_to_put = Durations()
         self._ticks_expected = 0
         self._ticks_missed = 0
+        self._newest: JointAngleSample | None = None
+        self._switches = Switches(
+            config.operator.deadman,
+            config.operator.clutch,
+            config.capture.dbc,
+            self._pipeline.poll.identifiers,
+        )
         self._buses = [
             CanBus(bus, self._on_frame, self._on_bus, on_second_sender=self._on_frame)
             for bus in config.capture.buses
@@ -78,6 +87,7 @@ class Master:
                 self._key.start()
             for bus in self._buses:
                 bus.open_or_retry()
+            self._switches.start(self._send_at_once)
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._capture())
                 tasks.create_task(self._publish_metrics())
@@ -86,6 +96,7 @@ class Master:
         finally:
             if self._key is not None:
                 self._key.close()
+            self._switches.close()
             for bus in self._buses:
                 await bus.close()
 
@@ -117,6 +128,8 @@ class Master:
             self._notifier.beat(monotonic_ns())
 
     def _on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        if self._switches.frame(bus, frame_id, data, now_ns):
+            return
         if self._pipeline.frame(bus, frame_id, data, now_ns):
             angles = self._pipeline.close(now_ns)
             if angles is not None:
@@ -130,7 +143,18 @@ class Master:
 
     def _on_bus(self, bus: str, up: bool) -> None:
         if not up:
+            self._switches.bus_down(bus)
             self._pipeline.bus_down(bus)
+
+    def _send_at_once(self, grip: Grip) -> None:
+        """The operator let go: no robot waits for the next posture to hear of it."""
+        for robot in self._commanded:
+            if self._newest is not None:
+                robot.send(self._newest, grip, monotonic_ns())
+
+    @property
+    def _commanded(self) -> list[CommandedRobot]:
+        return [robot for robot in self._robots if robot.name not in self._given_up]
 
     def _send(self, angles: JointAngleSample) -> None:
         angles_ns = monotonic_ns()
@@ -138,11 +162,9 @@ class Master:
             log.warning("%s", line)
         for line in self._pipeline.said:
             log.warning("%s", line, extra=BELL)
-        held = self._config.operator.deadman == "always_held"
-        for robot in self._robots:
-            if robot.name in self._given_up:
-                continue
-            robot.send(angles, held, angles_ns)
+        self._newest, grip = angles, self._switches.take()
+        for robot in self._commanded:
+            robot.send(angles, grip, angles_ns)
             done_ns = monotonic_ns()
             self._stages.record(
                 angles.frames_in_ns - angles.sampled_ns, angles_ns - angles.frames_in_ns, done_ns - angles_ns
@@ -159,8 +181,11 @@ class Master:
             for line in self._silence.lines(self._bus_signs(), due.scheduled_ns):
                 log.warning("%s", line)
             away = [bus for bus in self._buses if not bus.up and bus.last_error]
+            let_go = [
+                f"{name}: {words}" for name, words in self._switches.words.items() if "held" not in words
+            ]
             waiting = [f"waiting for bus {bus.name}: {bus.last_error}" for bus in away]
-            self._notifier.status("; ".join([*waiting, *(robot.standing for robot in self._robots)]))
+            self._notifier.status("; ".join([*waiting, *let_go, *(robot.standing for robot in self._robots)]))
 
     def _bus_signs(self) -> dict[str, BusSigns]:
         poll = self._pipeline.poll
@@ -180,6 +205,7 @@ class Master:
             nodes=self._pipeline.node_counts(),
             doubts=as_figures(self._pipeline.doubts),
             beyond_reach=self._pipeline.beyond_reach.metrics(),
+            switches=self._switches.words,
             buses={bus.name: bus.metrics() for bus in self._buses},
             robots={},
             zero_pose_again=self._pipeline.zero_pose.metrics(),

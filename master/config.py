@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
@@ -14,6 +14,7 @@ from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from master.comfort.config import ZeroPoseAgainConfig
 from master.comfort.scaling import scaling_mistakes
+from master.deadman.config import CanButton, ClutchConfig, DeadmanConfig, Pedal
 from master.orientation.config import EstimationConfig
 from master.orientation.filters import filter_mistakes
 from master.suit.nodes import NodeConfig, wiring_mistakes
@@ -41,11 +42,28 @@ class OperatorConfig(Section):
     """`[operator]`: the person who commands."""
 
     name: str = Field(min_length=1, max_length=64)
-    deadman: Literal["always_held"]
-    """`always_held`: the operator has no pedal. There is no default, so that a person decides it."""
+    deadman: DeadmanConfig
+    """What must be held while the robot follows. There is no default, so that a person decides it."""
+    clutch: ClutchConfig | None = None
+    """Released, the robot stands while the operator repositions himself. None: there is none."""
     zero_pose_again: ZeroPoseAgainConfig = ZeroPoseAgainConfig()
     scaling: dict[str, Annotated[float, Field(ge=0.1, le=1.0)]] = Field(default_factory=dict)
     """By joint group, the share of the operator's motion that the robot makes; see comfort/scaling.py."""
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """Deadman and clutch must be two switches."""
+        one, other = self.deadman, self.clutch
+        if (
+            isinstance(one, Pedal)
+            and isinstance(other, Pedal)
+            and (one.device, one.key) == (other.device, other.key)
+        ):
+            return [ConfigMistake("operator.clutch.key", other.key, "another key than the deadman's")]
+        if isinstance(one, CanButton) and isinstance(other, CanButton) and one.signal == other.signal:
+            return [
+                ConfigMistake("operator.clutch.signal", other.signal, "another signal than the deadman's")
+            ]
+        return []
 
 
 class MasterConfig(Section):
@@ -82,12 +100,24 @@ class MasterConfig(Section):
             return error.mistakes
         return [
             *self._robot_mistakes(),
+            *self._switch_mistakes(),
             *wiring_mistakes(self.nodes, self.capture.buses, "capture.buses"),
             *node_mistakes(self.nodes, skeleton),
             *self.operator.zero_pose_again.mistakes_for(skeleton.segment_names, self.estimation.zero_pose_s),
             *scaling_mistakes(self.operator.scaling, skeleton),
             *self.estimation.mistakes_at(self.capture.rate_hz),
             *self.link.mistakes(),
+        ]
+
+    def _switch_mistakes(self) -> list[ConfigMistake]:
+        buses = [bus.name for bus in self.capture.buses]
+        switches = {"deadman": self.operator.deadman, "clutch": self.operator.clutch}
+        return self.operator.mistakes() + [
+            ConfigMistake(
+                f"operator.{name}.bus", switch.bus, f"a bus of [[capture.buses]]: {', '.join(buses)}"
+            )
+            for name, switch in switches.items()
+            if isinstance(switch, CanButton) and switch.bus not in buses
         ]
 
     def _robot_mistakes(self) -> list[ConfigMistake]:

@@ -19,6 +19,7 @@ from common.wire.messages import Command, CommandStamps, Mask
 from master.comfort.scaling import MotionScaling
 from master.comfort.zero_pose_again import ZeroPoseConduct
 from master.config import MasterConfig
+from master.deadman.grip import Grip
 from master.joint_angles.beyond import BeyondReach
 from master.joint_angles.solver import JointSolver
 from master.orientation.estimator import Estimator
@@ -233,7 +234,7 @@ class CommandWriter:
         self,
         angles: JointAngleSample,
         lease: int,
-        deadman_held: bool,
+        grip: Grip,
         angles_ns: int,
         put_ns: int,
         seen: tuple[int, int] = (0, 0),
@@ -255,11 +256,12 @@ class CommandWriter:
             sequence=self._sequence,
             tick=angles.tick,
             stamps=stamps,
-            deadman_held=deadman_held,
+            deadman_held=grip.deadman_held,
             valid=angles.valid,
             position_rad=position_rad,
             velocity_rad_s=velocity_rad_s,
             seen_frame=seen[0],
             seen_ns=seen[1],
             doubt=angles.doubt,
+            clutch_out=grip.clutch_out,
         )

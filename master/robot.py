@@ -23,6 +23,7 @@ from common.wire.messages import ClockReply, ControlReply, RobotState, Statistic
 from common.wire.presence import ProcessPresence
 from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
 from master.comfort.scaling import MotionScaling
+from master.deadman.grip import Grip
 from master.homonyms import Homonyms
 from master.lease import LeaseKeeper
 from master.picture import VideoWatch
@@ -76,10 +77,10 @@ class CommandedRobot:
             tasks.create_task(self._keep_lease())
             tasks.create_task(self._keep_clock())
 
-    def send(self, angles: JointAngleSample, deadman_held: bool, angles_ns: int) -> None:
+    def send(self, angles: JointAngleSample, grip: Grip, angles_ns: int) -> None:
         """Put the posture on this robot's topic. It never blocks."""
         seen = self.video.seen_by(angles.sampled_ns)
-        command = self._writer.write(angles, self._lease.token, deadman_held, angles_ns, monotonic_ns(), seen)
+        command = self._writer.write(angles, self._lease.token, grip, angles_ns, monotonic_ns(), seen)
         self._put_command(encode(command))
 
     def publish_metrics(self, now_ns: int, shared: MasterMetrics) -> None:

@@ -45,6 +45,7 @@ def master_metrics(robot: CommandedMetrics | None = None, **changes: Any) -> Mas
         "nodes": {},
         "doubts": {},
         "beyond_reach": {},
+        "switches": {"deadman": "always held"},
         "buses": {},
         "robots": {"robot-1": robot or commanded()},
     }

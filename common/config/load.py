@@ -25,6 +25,10 @@ RENAMED = {
 """Keys that had another name, old to new: an old one is refused, and the new one named."""
 
 
+CHOOSES = "source"
+"""The key by which a section is one of several kinds."""
+
+
 def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -> Model:
     """Read and check a TOML file before anything is opened.
 
@@ -51,8 +55,8 @@ def check_config(path: Path, table: Mapping[str, object], model: type[Model]) ->
     except ValidationError as error:
         mistakes = [
             ConfigMistake(
-                ".".join(map(str, e["loc"])) or "file",
-                NOT_SET if e["type"] == "missing" else e["input"],
+                ".".join(map(str, _place(table, e["loc"], e["type"]))) or "file",
+                _value(e["type"], e["input"]),
                 _expected(e["type"], e["msg"], e["loc"]),
             )
             for e in error.errors()
@@ -88,6 +92,26 @@ def _override(table: dict[str, object], text: str) -> None:
     place[last] = parsed
 
 
+def _place(table: object, loc: Sequence[int | str], kind: str) -> list[int | str]:
+    """The keys to a mistake, less the names of choices by `source` that pydantic puts between them."""
+    place: list[int | str] = []
+    for part in loc:
+        if isinstance(table, Mapping) and part not in table and part == table.get(CHOOSES):
+            continue
+        place.append(part)
+        if isinstance(table, Mapping):
+            table = table.get(part)
+        elif isinstance(table, list) and isinstance(part, int) and part < len(table):
+            table = table[part]
+    return [*place, CHOOSES] if kind.startswith("union_tag") else place
+
+
+def _value(kind: str, given: object) -> object:
+    if kind == "union_tag_invalid" and isinstance(given, Mapping):
+        return given.get(CHOOSES)
+    return NOT_SET if kind in ("missing", "union_tag_not_found") else given
+
+
 def _mistake(path: Path | str, key: str, value: object, expected: str) -> ConfigError:
     return ConfigError(path, [ConfigMistake(key, value, expected)])
 
@@ -96,7 +120,9 @@ def _expected(kind: str, message: str, place: tuple[int | str, ...]) -> str:
     if kind == "extra_forbidden":
         new = RENAMED.get(str(place[-1]))
         return f"the key {new}, its new name" if new else "no such key (is it misspelt?)"
-    if kind == "missing":
+    if kind == "union_tag_invalid":
+        return message.rpartition("expected tags: ")[2]
+    if kind in ("missing", "union_tag_not_found"):
         return "this key to be set"
     for lead in ("Input should be ", "Value error, expected ", "Value error, "):
         message = message.removeprefix(lead)

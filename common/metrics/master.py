@@ -92,6 +92,8 @@ class MasterMetrics(Metrics):
     """Why a node's readings are not believed, by segment."""
     beyond_reach: dict[str, Unreached]
     """Segments that the robot could not bring to the operator's posture, by segment."""
+    switches: dict[str, str]
+    """What the operator holds, in words: `deadman`, and `clutch` if there is one."""
     buses: dict[str, BusMetrics]
     """By name."""
     robots: dict[str, CommandedMetrics]

@@ -44,7 +44,8 @@ class Poll:
         Raises ConfigError where two frames of a bus would have one identifier.
         """
         count = len(nodes)
-        protocol.check_identifiers(nodes, fd)
+        self.identifiers = protocol.identifiers(nodes, fd)
+        """What each identifier of each bus is, by bus and identifier."""
         self._fd = dict(fd)
         self._protocol = protocol
         self._counters = NodeCounters(count)

@@ -88,7 +88,7 @@ class SuitProtocol:
     @classmethod
     def load(cls, dbc_path: Path | str = SHIPPED_DBC) -> SuitProtocol:
         """Read the DBC. Raises ConfigError naming the message and signal that are not as expected."""
-        messages = _read(dbc_path)
+        messages = read_messages(dbc_path)
         try:
             sync = messages["SYNC"]
             if (sync.length, [(s.name, s.start, s.length) for s in sync.signals]) != (4, [("TICK", 0, 32)]):
@@ -104,8 +104,10 @@ class SuitProtocol:
             raise _mistake(dbc_path, str(error)) from None
         return cls(sync.frame_id, fd, classic, dbc_path)
 
-    def check_identifiers(self, nodes: Sequence[NodeConfig], fd: Mapping[str, bool]) -> None:
-        """Each frame of a bus must have an 11-bit identifier of its own. Raises ConfigError naming both.
+    def identifiers(self, nodes: Sequence[NodeConfig], fd: Mapping[str, bool]) -> dict[tuple[str, int], str]:
+        """What each identifier of each bus is, by bus and identifier.
+
+        Each frame of a bus must have an 11-bit identifier of its own. Raises ConfigError naming both.
 
         A node's identifiers are those of the messages plus its number: with messages that lie close together
         two nodes may get the same, and only one of them would be heard.
@@ -124,6 +126,7 @@ class SuitProtocol:
                     mistakes.append(ConfigMistake("dbc", f"{frame_id:#x}", expected))
         if mistakes:
             raise ConfigError(self._source, mistakes)
+        return taken
 
     def answer_format(self, fd: bool) -> AnswerFormat:
         """How nodes answer on a bus of that kind."""
@@ -151,7 +154,8 @@ class SuitProtocol:
         return frames
 
 
-def _read(path: Path | str) -> dict[str, Message]:
+def read_messages(path: Path | str) -> dict[str, Message]:
+    """The messages of a DBC by name. Raises ConfigError."""
     import cantools  # only here: it is slow to import, and nothing but the layout needs it
 
     database = cantools.database.can.Database()

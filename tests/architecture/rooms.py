@@ -17,6 +17,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["master/calibrate", "master/comfort"],
     ["master/joint_angles"],
     ["master/orientation"],
+    ["master/deadman"],
     ["master/suit"],
     ["slave/camera", "slave/stop_inputs"],
     ["slave/contact"],
@@ -38,7 +39,7 @@ IMPURE = [
     "common/clock.py", "common/can/*", "common/inputs/device.py", "common/inputs/reader.py",
     "common/link/*", "common/log/handler.py", "common/log/streams.py",
     "common/process/*", "common/recording/recorder.py",
-    "master/__main__.py", "master/app.py", "master/robot.py",
+    "master/__main__.py", "master/app.py", "master/deadman/switches.py", "master/robot.py",
     "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
     "slave/stop_inputs/gpio.py",
 ]  # fmt: skip

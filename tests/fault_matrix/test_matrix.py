@@ -9,10 +9,15 @@ import pytest
 
 import slave.limit.limit
 from common.errors import TandemError
+from common.inputs.held import HeldSwitch
+from common.inputs.key_state import KeyState
 from deploy.harness.faults.fault import Reaction
 from deploy.harness.faults.table import FAULTS as EVERY
 from deploy.harness.faults.table import VIRTUAL as FAULTS
 from deploy.harness.faults.virtual import try_on_virtual_clock
+from master.deadman import can_button
+from master.deadman.can_button import CanButtonState
+from master.deadman.grip import OperatorGrip
 from slave.encoders.agreement import EncoderAgreement
 from slave.encoders.uncommanded import UncommandedMotion
 from slave.guard import GATES, Guard, states
@@ -26,7 +31,7 @@ BARED = (
     "link cut", "packets duplicated", "yesterday's recording replayed", "second operator", "wrong robot",
     "operator of the same robot without the lease", "certificate revoked while tracking",
     "values that are not numbers", "drive fault", "encoder silent", "base tilted",
-    "master's clock an hour back",
+    "master's clock an hour back", "pedal released", "link lost while the clutch is released",
 )  # fmt: skip
 """Of the rows with a protection to take away; more would say no more, and each takes a second."""
 RULES = {str(rule) for rule, _ in slave.limit.limit.RULES}
@@ -88,6 +93,25 @@ def test_drives_that_differ_from_encoders_go_on_without_the_comparison(
 )
 def test_a_stop_input_s_row_fails_without_what_holds_it(
     monkeypatch: pytest.MonkeyPatch, name: str, owner: type, part: str, by: object
+) -> None:
+    monkeypatch.setattr(owner, part, by)
+    assert try_on_virtual_clock(TABLE[name]).wrong
+
+
+@pytest.mark.parametrize(
+    ("name", "owner", "part", "by"),
+    [
+        ("pedal released", OperatorGrip, "ended", lambda *_: None),
+        ("pedal released for a moment", HeldSwitch, "take", lambda _, down, *__: bool(down)),
+        ("pedal unplugged", KeyState, "lost", lambda *_: None),
+        ("pedal stuck from the start", HeldSwitch, "take", lambda _, down, *__: bool(down)),
+        ("clutch released", Guard, "_clutch", lambda *_: None),
+        ("bus of the deadman's button off", CanButtonState, "bus_down", lambda *_: None),
+        ("node of the deadman's button frozen", can_button, "COUNTER", "no such signal"),
+    ],
+)
+def test_an_operator_s_row_fails_without_what_holds_it(
+    monkeypatch: pytest.MonkeyPatch, name: str, owner: object, part: str, by: object
 ) -> None:
     monkeypatch.setattr(owner, part, by)
     assert try_on_virtual_clock(TABLE[name]).wrong

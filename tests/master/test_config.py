@@ -81,7 +81,7 @@ def test_a_missing_node_and_a_missing_deadman_are_named() -> None:
     with pytest.raises(ConfigError, match=r"nodes\.head"):
         load_text(text)
     with pytest.raises(ConfigError, match=r"operator\.deadman"):
-        load_text(EXAMPLE.read_text("utf-8").replace("deadman =", "# deadman ="))
+        load_text(EXAMPLE.read_text("utf-8").replace("[operator.deadman]", "[operator.pedal]"))
 
 
 def load_text(text: str) -> MasterConfig:

@@ -17,6 +17,7 @@ from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.motion import load_motion
 from deploy.sim.suit.suit import SimulatedSuit, build_suit
 from master.config import MasterConfig
+from master.deadman.grip import Grip
 from master.pipeline import MOST_BRIDGED, CommandWriter, JointAngleSample, MasterPipeline, bridged
 from master.suit.doubt import NodeDoubt, Weight
 from master.suit.protocol import SuitProtocol
@@ -145,10 +146,11 @@ def test_a_failed_bus_means_no_valid_joint_but_commands_go_on(settled: Bench) ->
 def test_the_sequence_counts_up_and_the_lease_is_carried(settled: Bench) -> None:
     writer = CommandWriter("r")
     angles = settled.run(16)[0]
-    first = writer.write(angles, 5, True, 10, 11)
-    second = writer.write(angles, 6, False, 20, 21)
+    first = writer.write(angles, 5, Grip(True), 10, 11)
+    second = writer.write(angles, 6, Grip(False, clutch_out=True), 20, 21)
     assert (first.sequence, second.sequence) == (1, 2)
     assert (first.lease, second.lease, second.deadman_held) == (5, 6, False)
+    assert (first.clutch_out, second.clutch_out) == (False, True)
     assert (second.stamps.angles_ns, second.stamps.put_ns) == (20, 21)
 
 
@@ -166,7 +168,7 @@ def test_a_doubted_node_invalidates_its_joints_and_refuses_engage(
     assert settled.pipeline.doubts == {"left_forearm": doubts[node]}
     doubts[node] = NodeDoubt("two nodes answer", Weight.REFUSED)
     angles = settled.run(16)[-1]
-    assert CommandWriter("r").write(angles, 1, True, 0, 0).doubt == "left_forearm: two nodes answer"
+    assert CommandWriter("r").write(angles, 1, Grip(True), 0, 0).doubt == "left_forearm: two nodes answer"
     doubts[node] = NodeDoubt("its field is odd", Weight.NOTED)
     angles = settled.run(16)[-1]
     assert angles.valid.all()

@@ -20,6 +20,8 @@ class Reaction(StrEnum):
 
     HOLDS = "holds"
     """Brakes, stands, and moves again only when a person engages it."""
+    WAITS = "holds until the clutch is pressed"
+    """Brakes, stands, and goes on slowly when the operator, still holding the deadman, presses it."""
     HOLDS_JOINTS = "holds the joints concerned"
     """They brake and stand; the others go on."""
     GOES_ON = "goes on"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
+from deploy.harness.faults.deadman import DEADMAN
 from deploy.harness.faults.distance import DISTANCE
 from deploy.harness.faults.effort import EFFORT
 from deploy.harness.faults.fault import FaultRow
@@ -35,6 +36,7 @@ VIRTUAL: tuple[VirtualFault, ...] = (
     *CLOCKS,
     *ESTOPS,
     *STOP_INPUTS,
+    *DEADMAN,
 )
 FAULTS: dict[str, FaultRow] = {fault.name: fault for fault in (*VIRTUAL, *PROCESSES)}
 """Every fault, by name."""

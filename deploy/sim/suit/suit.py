@@ -220,7 +220,7 @@ def build_suit(
     Raises ConfigError; opens nothing but files.
     """
     skeleton = load_skeleton(config.profile)
-    protocol.check_identifiers(list(config.nodes.values()), {bus.name: bus.fd for bus in config.buses})
+    protocol.identifiers(list(config.nodes.values()), {bus.name: bus.fd for bus in config.buses})
     faults = Faults(config.faults, config.seed)
     wearer = _wearer(config, skeleton, motion)
     return SimulatedSuit(skeleton, config.nodes, config.buses, protocol, wearer, faults)

@@ -27,10 +27,12 @@ from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.faults import Outgoing
 from deploy.sim.suit.motion import OperatorMotion
 from deploy.sim.suit.suit import build_suit
+from deploy.sim.world.hands import OperatorHands
 from deploy.sim.world.injection import FaultInjection, Traffic
 from deploy.sim.world.link import VirtualLink
 from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
+from master.deadman.grip import Grip
 from master.lease import LeaseKeeper
 from master.pipeline import CommandWriter, JointAngleSample, MasterPipeline
 from master.suit.protocol import SuitProtocol
@@ -86,6 +88,8 @@ class VirtualWorld:
         self._master = MasterPipeline(self.master_config, self._protocol)
         self._scaling = MotionScaling(self.master_config.operator.scaling, self.master_config.skeleton)
         self._writer = CommandWriter(self.robot, self._scaling)
+        self.hands = OperatorHands(self.master_config)
+        self._newest: JointAngleSample | None = None
         self._lease = LeaseKeeper(self.robot, self.master_config.operator.name)
         self.clock = MasterExchange()
         self.slave = SlavePipeline(self.slave_config, draw_token=itertools.count(1).__next__, instance=1)
@@ -175,6 +179,8 @@ class VirtualWorld:
         begin_ns = self.now_ns
         self._at(begin_ns, self._capture)
         self._at(begin_ns + SLAVE_PHASE_NS, self._drive)
+        if self._tick % 4 == 0:
+            self._at(begin_ns + NODE_NS, self._send_buttons)
         if self._tick % 50 == 0:
             self._at(begin_ns + NODE_NS // 2, self._exchange_clocks)
         self._tick += 1
@@ -193,6 +199,8 @@ class VirtualWorld:
         if not self.inject.suit_heard:
             for bus in self.master_config.capture.buses:
                 self._master.bus_down(bus.name)
+            self.hands.bus_down()
+            self.look()
             return
         answer = self.suit.on_sync(self._protocol.parse_sync(sync.data), self.now_ns)
         if answer.truth is not None:
@@ -207,9 +215,27 @@ class VirtualWorld:
                 if angles is not None:
                     self._put(angles)
 
+    def _send_buttons(self) -> None:
+        if self.inject.suit_heard:
+            self.hands.send_buttons(self.master_ns)
+        self.look()
+        if self._tick == 1:
+            for name in self.hands.buttons:
+                self.hands.press(name, self.master_ns)
+
+    def look(self) -> None:
+        """A switch of the operator has changed: the master looks, and tells at once what he let go."""
+        grip = self.hands.grip.ended(self.master_ns)
+        if grip is not None and self._newest is not None:
+            self._put_with(self._newest, grip, self.master_ns)
+
     def _put(self, angles: JointAngleSample) -> None:
+        self._newest = angles
         put_ns = self.master_ns + ANGLES_NS
-        command = self._writer.write(angles, self._lease.token, True, put_ns, put_ns)
+        self._put_with(angles, self.hands.grip.take(put_ns), put_ns)
+
+    def _put_with(self, angles: JointAngleSample, grip: Grip, put_ns: int) -> None:
+        command = self._writer.write(angles, self._lease.token, grip, put_ns, put_ns)
         self.commands.append(command)
         self.trace.add(command)
         self.said += self._master.said

@@ -176,26 +176,26 @@ def node(number: int, bus: str = "arm") -> NodeConfig:
 
 def test_two_nodes_whose_messages_get_one_identifier_are_named(tmp_path: Path) -> None:
     protocol = crowded(tmp_path, NODE_GYR=0x201)
-    protocol.check_identifiers([node(1), node(3)], {"arm": False})
+    protocol.identifiers([node(1), node(3)], {"arm": False})
     with pytest.raises(ConfigError, match=r"0x203.*NODE_ACC of node 3 and NODE_GYR of node 2 on bus arm"):
-        protocol.check_identifiers([node(1), node(2), node(3)], {"arm": False})
+        protocol.identifiers([node(1), node(2), node(3)], {"arm": False})
 
 
 def test_a_node_must_not_get_the_identifier_of_sync(tmp_path: Path) -> None:
     protocol = crowded(tmp_path, SYNC=0x105)
-    protocol.check_identifiers([node(4)], {"arm": True})
+    protocol.identifiers([node(4)], {"arm": True})
     with pytest.raises(ConfigError, match=r"0x105.*NODE_SAMPLE of node 5 and SYNC"):
-        protocol.check_identifiers([node(5)], {"arm": True})
+        protocol.identifiers([node(5)], {"arm": True})
 
 
 def test_nodes_of_two_buses_may_have_the_same_number(tmp_path: Path) -> None:
-    crowded(tmp_path).check_identifiers([node(1), node(1, "leg")], {"arm": False, "leg": False})
+    crowded(tmp_path).identifiers([node(1), node(1, "leg")], {"arm": False, "leg": False})
 
 
 def test_an_identifier_has_eleven_bits(tmp_path: Path) -> None:
     protocol = crowded(tmp_path, NODE_MAG=0x7F0)
     with pytest.raises(ConfigError, match="11 bits"):
-        protocol.check_identifiers([node(16)], {"arm": False})
+        protocol.identifiers([node(16)], {"arm": False})
 
 
 def test_two_messages_with_one_identifier_are_refused_when_read(tmp_path: Path) -> None:

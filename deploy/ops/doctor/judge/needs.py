@@ -99,7 +99,7 @@ def _keys(path: Path) -> set[str]:
 
 def _of_master(config: MasterConfig) -> Needs:
     fd = {bus.name: bus.fd for bus in config.capture.buses}
-    SuitProtocol.load(config.capture.dbc).check_identifiers(list(config.nodes.values()), fd)
+    SuitProtocol.load(config.capture.dbc).identifiers(list(config.nodes.values()), fd)
     nodes = Counter(node.bus for node in config.nodes.values())
     return Needs(
         role="master",
