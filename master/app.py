@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from common.can.bus import CanBus
 from common.clock import monotonic_ns
-from common.inputs.reader import InputReader
+from common.inputs.key_state import KeyState
 from common.latency.budget import StageTimes
 from common.latency.durations import Durations
 from common.link import LinkSession, open_session
@@ -58,6 +58,7 @@ class Master:
             config.operator.clutch,
             config.capture.dbc,
             self._pipeline.poll.identifiers,
+            config.operator.zero_pose_again.key,
         )
         self._buses = [
             CanBus(bus, self._on_frame, self._on_bus, on_second_sender=self._on_frame)
@@ -72,8 +73,6 @@ class Master:
             )
             for name in config.commanded
         ]  # fmt: skip
-        key = config.operator.zero_pose_again.key
-        self._key = None if key is None else InputReader(key.device, {key.key: None}, grab=key.grab)
         self._pressed = PressedKey()
         self._given_up: set[str] = set()
         self._silence = SilenceWatch()
@@ -82,20 +81,15 @@ class Master:
     async def run(self) -> None:
         """Capture, send, keep each robot's lease and clock until cancelled."""
         try:
-            if self._key is not None:
-                self._key.on_change = self._on_key
-                self._key.start()
             for bus in self._buses:
                 bus.open_or_retry()
-            self._switches.start(self._send_at_once)
+            self._switches.start(self._send_at_once, self._on_zero_pose_key)
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._capture())
                 tasks.create_task(self._publish_metrics())
                 for robot in self._robots:
                     tasks.create_task(self._serve(robot))
         finally:
-            if self._key is not None:
-                self._key.close()
             self._switches.close()
             for bus in self._buses:
                 await bus.close()
@@ -135,11 +129,9 @@ class Master:
             if angles is not None:
                 self._send(angles)
 
-    def _on_key(self) -> None:
-        assert self._key is not None
-        for name, state in self._key.keys.items():
-            if self._pressed.take(state.down, state.presses):
-                self._pipeline.zero_pose.ask(name, monotonic_ns())
+    def _on_zero_pose_key(self, key: KeyState) -> None:
+        if self._pressed.take(key.down, key.presses):
+            self._pipeline.zero_pose.ask(key.name, monotonic_ns())
 
     def _on_bus(self, bus: str, up: bool) -> None:
         if not up:

@@ -7,12 +7,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from common.clock import Clock, monotonic_ns
+from common.inputs.config import KeyConfig
+from common.inputs.key_state import KeyState
 from common.inputs.keys import InputKeys
 from common.log.throttle import LogThrottle
 from master.deadman.can_button import CanButtonState, load_button
 from master.deadman.config import CanButton, Pedal, SwitchConfig
 from master.deadman.grip import Grip, OperatorGrip, SwitchState
 
+ZERO_POSE = "zero pose"
 log = logging.getLogger(__name__)
 
 
@@ -25,12 +28,17 @@ class Switches:
         clutch: SwitchConfig | None,
         dbc: Path,
         taken: Mapping[tuple[str, int], str],
+        zero_pose: KeyConfig | None = None,
         clock: Clock = monotonic_ns,
     ) -> None:
-        """`taken`: what the identifiers of other frames are, by bus and identifier."""
+        """`taken`: what the identifiers of other frames are, by bus and identifier.
+
+        `zero_pose`: a key that the operator presses for another reason, often of the same device.
+        """
         configs = {"deadman": deadman} | ({} if clutch is None else {"clutch": clutch})
         pedals = {name: config for name, config in configs.items() if isinstance(config, Pedal)}
-        self._keys = InputKeys(pedals, clock=clock)
+        others = {} if zero_pose is None else {ZERO_POSE: zero_pose}
+        self._keys = InputKeys({**pedals, **others}, clock=clock)
         self._buttons: dict[str, CanButtonState] = {
             name: load_button(config, dbc, taken, f"operator.{name}")
             for name, config in configs.items()
@@ -39,13 +47,17 @@ class Switches:
         found: dict[str, SwitchState] = {**self._keys.states, **self._buttons}
         self._grip = OperatorGrip(found.get("deadman"), found.get("clutch"))
         self._on_end: Callable[[Grip], None] = lambda _: None
+        self._on_zero_pose: Callable[[KeyState], None] = lambda _: None
         self._clock = clock
         self._said: dict[str, str] = {}
         self._throttle = LogThrottle()
 
-    def start(self, on_end: Callable[[Grip], None]) -> None:
-        """Begin to read. `on_end` is called when the grip ends that the last command told."""
-        self._on_end = on_end
+    def start(self, on_end: Callable[[Grip], None], on_zero_pose: Callable[[KeyState], None]) -> None:
+        """Begin to read. `on_end` is called when the grip ends that the last command told.
+
+        `on_zero_pose` is called with that key whenever something may have changed.
+        """
+        self._on_end, self._on_zero_pose = on_end, on_zero_pose
         self._keys.start(self._changed)
 
     def close(self) -> None:
@@ -69,7 +81,7 @@ class Switches:
         """The grip for the command that is made now, by what has come until now."""
         self._keys.poll()
         grip = self._grip.take(self._clock())
-        self._say()
+        self._look_beside()
         return grip
 
     @property
@@ -79,11 +91,13 @@ class Switches:
 
     def _changed(self) -> None:
         grip = self._grip.ended(self._clock())
-        self._say()
         if grip is not None:
             self._on_end(grip)
+        self._look_beside()
 
-    def _say(self) -> None:
+    def _look_beside(self) -> None:
+        if ZERO_POSE in self._keys.states:
+            self._on_zero_pose(self._keys.states[ZERO_POSE])
         now = self._grip.words
         for name, words in now.items():
             if words != self._said.get(name) and self._throttle.passes(self._clock(), (name, words)):

@@ -78,7 +78,7 @@ def mastering(*overrides: str) -> Iterator[tuple[app.Master, Session]]:
     robots = ["robots=" + str(list(ROBOTS)).replace("'", '"')]
     session: Any = Session()
     master = app.Master(load_config(EXAMPLE, MasterConfig, [*robots, *overrides]), session)
-    master._switches.start(master._send_at_once)
+    master._switches.start(master._send_at_once, master._on_zero_pose_key)
     try:
         yield master, session
     finally:
@@ -159,6 +159,30 @@ def test_the_clutch_is_a_second_key_of_one_device(socket: Socket) -> None:
             pedal.press(CLUTCH)
             master._send(POSTURE)
             assert session.grips() == [(True, False), (True, True), (True, False)]
+
+    asyncio.run(story())
+
+
+def test_a_third_key_of_the_same_pedal_asks_for_the_zero_pose(
+    socket: Socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pedal = socket.plug_in()
+    key = 'operator.zero_pose_again.key={device="/dev/input/by-id/pedal",key="KEY_C"}'
+    asked: list[str] = []
+
+    async def story() -> None:
+        with mastering(WITH_PEDAL, key, "estimation.zero_pose_s=1.0") as (master, session):
+            monkeypatch.setattr(master._pipeline.zero_pose, "ask", lambda by, _: asked.append(by))
+            pedal.press()
+            pedal.press(CLUTCH)  # taken by the look before a command, not by the loop
+            master._send(POSTURE)
+            assert asked == ["KEY_C"]
+            assert session.grips() == [(True, False)]
+            pedal.release(CLUTCH)
+            master._send(POSTURE)
+            pedal.press(CLUTCH)
+            while len(asked) == 1:  # noqa: ASYNC110 (nothing else tells it)
+                await asyncio.sleep(0)
 
     asyncio.run(story())
 
