@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from common.clock import to_s
 from common.clock_sync import Offset, SlaveExchange
 from common.errors import CodecError
 from common.link.access import operators_of
@@ -36,6 +37,7 @@ from slave.guard.body import WELL, Body
 from slave.guard.control import Control
 from slave.guard.lease import DrawToken, random_token
 from slave.guard.states import MOVING, State
+from slave.limit.blind import BlindDistance, Course
 from slave.limit.damper import DistanceDamper
 from slave.limit.limit import Setpoint, SetpointLimiter
 from slave.limit.nearest import NearestPosture
@@ -87,6 +89,10 @@ class SlavePipeline:
         self.limiter = SetpointLimiter(self.skeleton.joint_names, limits, self.damper)
         self.contact = ContactWatch(self.skeleton, config.contact)
         self.reflex = ContactReflex(config.contact, self.contact, self.skeleton.joint_names)
+        self.blind = BlindDistance(
+            self.skeleton, limits, config.guard.max_blind_cm, 1.0 / config.loop.rate_hz
+        )
+        self.limiter.slowed = self.blind.slowed
         self._episode = 0
         """The guard's episode when the tracker was reset last."""
         self.clock = SlaveExchange()
@@ -138,6 +144,7 @@ class SlavePipeline:
                 command.stamps.sampled_ns, asked, command.velocity_rad_s, command.valid
             )
             self.guard.clamped(self.nearest.clamps(now_ns, asked, position_rad))
+            self.blind.heard(received_ns)
             sampled_ns = offset.local_ns(command.stamps.sampled_ns)
             self.tracker.accept(sampled_ns, now_ns, position_rad, velocity_rad_s)
         return admission
@@ -195,6 +202,7 @@ class SlavePipeline:
             return Setpoint(position_rad.copy(), np.zeros_like(position_rad), ready=False)
         target = self._track(now_ns, permission)
         if target is None:
+            self.blind.forget()
             self._stop(now_ns, permission)
         else:
             self._limit(now_ns, permission, target)
@@ -222,20 +230,30 @@ class SlavePipeline:
         self.limiter.stop(permission.dt_s)
 
     def _limit(self, now_ns: int, permission: Permission, target: TrackTarget) -> None:
-        """Move the setpoint towards the target, as far and as fast as each joint may in this step."""
+        """Move the setpoint towards the target, as far and as fast as each joint may in this step.
+
+        After a command, foretell how far that would lead if no more came.
+        """
         error_rad = self.limiter.limits.reachable(target.position_rad) - self.limiter.position_rad
         if permission.state is State.ALIGN:
             most = self.pace.aligning(now_ns, permission.free)
         else:
             most = self.pace.tracking(now_ns, error_rad, permission.free, self.damper.held_back)
+        self.blind.allow(to_s(self.guard.times.command_timeout_ns))
         clamps = self.limiter.step(
             now_ns, permission.dt_s, target.position_rad, target.velocity_rad_s, ~permission.free, *most
         )
         self.guard.clamped(clamps)
+        course = Course(self.limiter.position_rad, self.limiter.velocity_rad_s, ~permission.free, *most)
+        self.blind.look(now_ns, self.guard.stand_rad, course, self._looked_up)
         if self.damper.overdue:
             self.guard.lose(now_ns, "distance", self.damper.overdue)
         # a joint that is held back is as near to the operator as it can come
         self.guard.approached(now_ns, np.where(self.damper.held_back, 0.0, error_rad))
+
+    def _looked_up(self, at_ns: int) -> tuple[Array, Array] | None:
+        target = self.tracker.target(at_ns)
+        return None if target is None else (target.position_rad, target.velocity_rad_s)
 
     def _begin_anew(self) -> None:
         """After a loss, a stop or an engage: what the operator did before must not move the robot."""
@@ -276,6 +294,8 @@ class SlavePipeline:
                 resting=self.guard.resting.names,
                 effort_nm=reading.effort_nm if reading else None,
                 external_nm=self.contact.external_nm,
+                blind_m=self.blind.way_m,
+                blind_s=self.blind.after_s,
             )
         )
 

@@ -39,6 +39,8 @@ CONTROL_BYTES = 1100
 Zenoh a packet stays below 1280 bytes, which every path carries; many VPNs swallow larger ones silently."""
 _STATE_NUMBERS_BYTES = 200
 """Of a state's numbers, kind and lengths."""
+MAX_WAY_M, MAX_WAY_S = 100.0, 100.0
+"""Of a hand after the line has died."""
 MAX_PAYLOAD = 256 * 1024
 ANGLE_LIMIT_RAD = 4 * math.pi
 """No joint turns twice round; a larger angle is a fault, not a posture."""
@@ -132,12 +134,12 @@ def _pack_state(m: RobotState) -> tuple[object, ...]:
     return (
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
         m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
-        _pack_base(m.base), m.lease_id, m.instance, m.resting, *torques,
+        _pack_base(m.base), m.lease_id, m.instance, m.resting, *torques, m.blind_m, m.blind_s,
     )  # fmt: skip
 
 
 def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
-    fields.array(f, 19)
+    fields.array(f, 21)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -161,6 +163,8 @@ def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
         resting=fields.names(f[16], MAX_NAME),
         effort_nm=fields.torques(f[17], joints),
         external_nm=fields.torques(f[18], joints),
+        blind_m=fields.numbers(f[19], 0.0, MAX_WAY_M),
+        blind_s=fields.number(f[20], 0.0, MAX_WAY_S),
     )
 
 

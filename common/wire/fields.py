@@ -125,6 +125,13 @@ def number(value: object, lowest: float, highest: float) -> float:
     return value
 
 
+def numbers(value: object, lowest: float, highest: float) -> tuple[float, ...]:
+    """A list of finite numbers within limits."""
+    if type(value) is not tuple:
+        raise CodecError("not a list of numbers")
+    return tuple(number(one, lowest, highest) for one in value)
+
+
 def texts(value: object, most_key: int, most: int) -> dict[str, str]:
     """A map from names to texts."""
     if type(value) is not dict:

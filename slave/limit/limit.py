@@ -116,6 +116,10 @@ class SetpointLimiter:
         """`damper`: keeps parts of the robot apart; None: nothing does."""
         self.damper = damper
         self._names = tuple(joint_names)
+        self.slowed: Callable[[Array, Array, float], Array] = lambda position_rad, wish_rad_s, step_s: (
+            wish_rad_s
+        )
+        """Slows a wish (J,), given where the setpoint is and the step's length."""
         self._none: Mask = np.zeros(len(self._names), np.bool_)
         self.limits = limits
         self.seat(np.zeros(len(self._names)))
@@ -175,6 +179,7 @@ class SetpointLimiter:
         goal_rad_s = np.where(beyond, 0.0, target_rad_s)
         error = goal - self.position_rad - goal_rad_s * dt_s
         wish = np.where(held, 0.0, goal_rad_s + approach(error, max_acceleration_rad_s2, dt_s))
+        wish = self.slowed(self.position_rad, wish, dt_s)
         motion = LimiterStep(
             self.position_rad, self.velocity_rad_s, dt_s, self.limits,
             max_velocity_rad_s, max_acceleration_rad_s2,

@@ -51,7 +51,6 @@ class Blend:
             return course
         elapsed_s = to_s(now_ns - self._began_ns)
         if elapsed_s >= self._longest_s:
-            self._difference = None
             return course
         total_s, (error, rate) = self._total_s, self._difference
         x = np.minimum(elapsed_s / total_s, 1.0)

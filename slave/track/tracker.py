@@ -43,5 +43,8 @@ class Tracker(Protocol):
         ...
 
     def target(self, now_ns: int) -> TrackTarget | None:
-        """Where to be now, or None before the first sample. `now_ns` never goes back."""
+        """Where to be now, or None before the first sample.
+
+        It changes nothing: the slave also asks where it would be later, if no sample came any more.
+        """
         ...
