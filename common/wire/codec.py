@@ -41,6 +41,7 @@ _STATE_NUMBERS_BYTES = 200
 """Of a state's numbers, kind and lengths."""
 MAX_WAY_M, MAX_WAY_S = 100.0, 100.0
 """Of a hand after the line has died."""
+_NUMBER_BYTES = 9
 MAX_PAYLOAD = 256 * 1024
 ANGLE_LIMIT_RAD = 4 * math.pi
 """No joint turns twice round; a larger angle is a fault, not a posture."""
@@ -130,7 +131,7 @@ def _pack_state(m: RobotState) -> tuple[object, ...]:
     torques = fields.pack_torques(m.effort_nm), fields.pack_torques(m.external_nm)
     named = (m.robot, m.guard, reason, m.operator, *m.resting)
     blocks = (mask, angles, *(block or b"" for block in torques), *(name.encode("utf-8") for name in named))
-    taken = _STATE_NUMBERS_BYTES + sum(map(len, blocks))
+    taken = _STATE_NUMBERS_BYTES + sum(map(len, blocks)) + _NUMBER_BYTES * (2 + len(m.blind_m))
     return (
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
         m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),

@@ -128,8 +128,8 @@ class RobotState:
     external_nm: Array | None = None
     """(J,) torque from outside at the joint, N m, as the slave estimates it; NaN and None as above."""
     blind_m: tuple[float, ...] = ()
-    """How far away each hand (`slave.model.ends`) would be if the line had died at the newest command, once all
-    stand; () while the robot follows nobody."""
+    """How far each hand (`slave.model.ends`) would be once all stand, if the line died at the newest command;
+    () while the robot follows nobody."""
     blind_s: float = 0.0
     """When all would stand, from that command on."""
 

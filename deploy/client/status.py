@@ -29,6 +29,7 @@ from deploy.client.ask import ask
 from deploy.client.destination import ROUTER_S, Destination
 from deploy.client.efforts import TorquesByJoint, by_joint, largest, without_detection
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
+from slave.model.ends import limb_ends
 
 LISTEN_S = 1.5
 """Statistics come once a second."""
@@ -177,6 +178,8 @@ class RobotStatus:
     base: BaseAngles | None
     offset_ms: OffsetStatus | None
     latency_ms: LatencyStatus
+    blind: str | None
+    """How far each hand would go if the line died now; None while the robot follows nobody."""
     due: DueMetrics | None
     times: GuardTimes | None
     """The guard's times in force, and why."""
@@ -221,6 +224,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         latency_ms=LatencyStatus(metrics.one_way_ms, metrics.one_way_corrected_ms, metrics.end_to_end_ms)
         if metrics
         else LatencyStatus(),
+        blind=_blind(state),
         due=metrics.due if metrics else None,
         times=metrics.times if metrics else None,
         ticks=metrics.ticks if metrics else None,
@@ -247,6 +251,16 @@ def _offset(state: RobotState | None) -> OffsetStatus | None:
     offset = master_offset(state)
     bound_ms = to_ms(offset.bound_ns) if offset.trusted else None
     return OffsetStatus(to_ms(offset.offset_ns), bound_ms, offset.trusted)
+
+
+def _blind(state: RobotState | None) -> str | None:
+    if state is None or not state.blind_m:
+        return None
+    skeletons = map(load_skeleton, profile_names())
+    skeleton = next(one for one in skeletons if len(one.joints) == len(state.position_rad))
+    hands = zip(limb_ends(skeleton).names, state.blind_m, strict=False)
+    ways = ", ".join(f"{name.replace('_', ' ')} ≤ {100.0 * way_m:.1f} cm" for name, way_m in hands)
+    return f"if the line died now: {ways} in {state.blind_s:.2f} s"
 
 
 def status_table(robots: Mapping[str, RobotStatus]) -> RenderableType:
@@ -292,6 +306,8 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
         missing = f"{due.missing} of {due.expected} commands were not there when they were due"
         p99, corrected = (_number(_p99(of), 1) for of in (latency.one_way, latency.one_way_corrected))
         words.append((f"{missing} (one way p99 {p99} ms, {corrected} ms with them)", "yellow"))
+    if one.blind is not None:
+        words.append((one.blind, ""))
     if one.times is not None:
         words.append((one.times.words, ""))
         words += [(one.times.beyond, "red")] * bool(one.times.beyond)

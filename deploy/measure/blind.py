@@ -11,7 +11,7 @@ import numpy as np
 from common.clock import to_ns
 from common.skeleton import Skeleton
 from common.wire.messages import RobotState
-from slave.model.ends import LimbEnds
+from slave.model.ends import LimbEnds, limb_ends
 
 MOVING = ("align", "track")
 STANDS_S = 1.5
@@ -41,7 +41,7 @@ class BlindOutage:
 
 def blind_outages(states: Sequence[RobotState], skeleton: Skeleton) -> list[BlindOutage]:
     """Of every hold for want of commands in a robot's states, in their order."""
-    ends = LimbEnds(skeleton)
+    ends = limb_ends(skeleton)
     found = []
     for before, after in itertools.pairwise(states):
         lost = before.guard in MOVING and after.guard == "hold" and after.reason.startswith(_NO_COMMAND)

@@ -20,11 +20,14 @@ from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.guard.limits import MotionLimits
 from slave.limit.limit import approach
+from slave.model.ends import limb_ends
 
 Targets = Callable[[int], tuple[Array, Array] | None]
 """Position and velocity, (J,) each, that the tracker would ask for at a time, ns; None: nowhere."""
-STEP_S = 0.02
+STEP_S = 0.01
 """The limiter's law is followed in steps of about this."""
+POSE_EVERY = 2
+"""And the hands are looked at after so many of them."""
 BRAKING_POSES = 4
 SHARE, PLUS_M = 0.08, 0.003
 """Added for what the servos overshoot and encoders round."""
@@ -104,7 +107,8 @@ class BlindDistance:
             aim = target(now_ns + to_ns(step * step_s))
             if aim is not None:
                 position, velocity = self._follow(position, velocity, aim, course, step_s)
-            poses.append(position)
+            if step % POSE_EVERY == 0:
+                poses.append(position)
         brake = self._limits.max_acceleration_rad_s2
         each_s = np.abs(velocity) / brake
         brake_s = float(each_s.max())

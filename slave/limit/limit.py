@@ -40,6 +40,10 @@ Envelope = Callable[[LimiterStep], tuple[Array, Array]]
 """The lowest and the highest velocity (J,) that keep a rule in this step."""
 
 
+Slowed = Callable[[Array, Array, float], Array]
+"""Slows wished velocities (J,), given where the setpoint is (J,) and how long the step is."""
+
+
 def safe_speed(distance_rad: Array, acceleration_rad_s2: Array, dt_s: float) -> Array:
     """The fastest speed (J,) for one step after which braking at the given rate still fits.
 
@@ -116,10 +120,7 @@ class SetpointLimiter:
         """`damper`: keeps parts of the robot apart; None: nothing does."""
         self.damper = damper
         self._names = tuple(joint_names)
-        self.slowed: Callable[[Array, Array, float], Array] = lambda position_rad, wish_rad_s, step_s: (
-            wish_rad_s
-        )
-        """Slows a wish (J,), given where the setpoint is and the step's length."""
+        self.slowed: Slowed = lambda position_rad, wish_rad_s, step_s: wish_rad_s
         self._none: Mask = np.zeros(len(self._names), np.bool_)
         self.limits = limits
         self.seat(np.zeros(len(self._names)))

@@ -2,37 +2,56 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.model.body import BodyModel
+from slave.model.build import build_model, unit_rates
+from slave.model.capsules import capsules
 
 _ENDS = ("left_hand", "right_hand", "left_foot", "right_foot")
 
 
 class LimbEnds:
-    """The far end of each hand and foot that some joint moves; of a robot without them, of its last segments."""
+    """The far end of each hand and foot that some joint moves; without them, of the last segments."""
 
     def __init__(self, skeleton: Skeleton) -> None:
-        self._body = BodyModel(skeleton)
-        segments = skeleton.segment_names
-        moved = (self._body.carries @ np.abs(self._body.hinges_per_joint).T) > 0.0
+        names = skeleton.segment_names
+        body = BodyModel(skeleton)
+        moved = (body.carries @ np.abs(body.hinges_per_joint).T) > 0.0
         parents = {segment.parent for segment in skeleton.segments}
-        ends = [i for i, name in enumerate(segments) if name in _ENDS and moved[i].any()]
-        self._segments = ends or [i for i, name in enumerate(segments) if name not in parents]
-        self.names = tuple(segments[i] for i in self._segments)
-        self.moved_by: NDArray[np.bool_] = moved[self._segments]
+        ends = [i for i, name in enumerate(names) if name in _ENDS and moved[i].any()]
+        ends = ends or [i for i, name in enumerate(names) if name not in parents]
+        self.names = tuple(names[i] for i in ends)
+        self.moved_by: NDArray[np.bool_] = moved[ends]
         """(E, J): whether a joint moves the end."""
-        self._local_m = [self._farthest_m(i) for i in self._segments]
-
-    def _farthest_m(self, segment: int) -> Array:
-        points = [np.array(c.to_m) for c in self._body.capsules if c.segment == segment]
-        return max(points, key=lambda point: float(point @ point))
+        self._local_m = np.array([_farthest_m(skeleton, i) for i in ends])[:, :, None]
+        self._model = build_model(skeleton)
+        self._data = mujoco.MjData(self._model)
+        self._rates = unit_rates(skeleton, self._model)
+        self._bodies = np.array([self._model.body(name).id for name in self.names])
 
     def at(self, position_rad: Array) -> Array:
         """(E, 3) m, base frame, for joint angles (J,)."""
-        posture = self._body.at(position_rad)
-        pairs = zip(self._segments, self._local_m, strict=True)
-        return np.array([posture.point_m(segment, local_m) for segment, local_m in pairs])
+        data = self._data
+        data.qpos[:] = position_rad @ self._rates
+        mujoco.mj_kinematics(self._model, data)
+        turned = data.xmat[self._bodies].reshape(-1, 3, 3) @ self._local_m
+        out: Array = data.xpos[self._bodies] + turned[:, :, 0]
+        return out
+
+
+def _farthest_m(skeleton: Skeleton, segment: int) -> Array:
+    points = [np.array(capsule.to_m) for capsule in capsules(skeleton) if capsule.segment == segment]
+    return max(points, key=lambda point: float(point @ point))
+
+
+@lru_cache(maxsize=16)
+def limb_ends(skeleton: Skeleton) -> LimbEnds:
+    """The ends of a robot; building them takes some tens of ms."""
+    return LimbEnds(skeleton)

@@ -116,23 +116,20 @@ def test_400_ms_one_way_is_refused_and_the_ceiling_named() -> None:
 
 
 @pytest.mark.timeout(300)
-def test_a_line_that_slows_from_20_to_200_ms_costs_one_hold_and_then_none() -> None:
-    """Seen before its times followed: 20 holds in the third minute, and in the fourth refused for good.
+def test_a_line_that_becomes_slow_costs_one_hold_and_then_none() -> None:
+    """Seen before its times followed, 20 to 200 ms: 20 holds in the third minute, then refused for good.
 
-    The step itself, a silence of 0.26 s, is a loss; then the offset's bound grows as its best exchange ages.
+    The step itself, a silence of 0.33 s, is a loss; then the offset's bound grows as its best exchange ages.
     """
     run = engaged(WorldSettings(network=plain(20.0)))
     run.run(3.0)
-    run.link.set(Profile(both=Way(delay_ms=200.0, jitter_ms=10.0, loss_percent=1.0)), run.now_ns)
+    run.link.set(Profile(both=Way(delay_ms=270.0, jitter_ms=5.0, loss_percent=1.0)), run.now_ns)
     holds = run.slave.guard.counters.losses
-    run.run(2.0)
+    run.run(8.0)
     assert holds == {"command": 1}
-    for _ in range(125):
-        run.run(1.0)
-        if run.slave.guard.state == "hold":
-            assert run.ask(Action.ENGAGE).done
-    assert run.slave.guard.state == "track"
-    assert holds.total() == 1
-    offset = run.slave.clock.estimator.estimate(run.slave_ns)
-    assert offset.bound_ns > 90 * NS_PER_MS
-    assert run.slave.guard.times.max_age_ns > 340 * NS_PER_MS
+    assert run.ask(Action.ENGAGE).done
+    run.run(30.0)
+    assert holds.total() == 1, run.slave.guard.reason
+    assert run.slave.guard.state in ("align", "track")
+    oldest_ns = 240 * NS_PER_MS + run.slave.clock.estimator.estimate(run.slave_ns).bound_ns
+    assert 300 * NS_PER_MS < oldest_ns < run.slave.guard.times.max_age_ns

@@ -113,6 +113,8 @@ def states(draw: st.DrawFn, joints: int = 25) -> RobotState:
         resting=draw(st.lists(brief, max_size=2).map(tuple)),
         effort_nm=draw(torques(joints)),
         external_nm=draw(torques(joints)),
+        blind_m=tuple(draw(st.lists(st.floats(0.0, 100.0), max_size=5))),
+        blind_s=draw(st.floats(0.0, 100.0)),
     )
 
 
@@ -400,7 +402,7 @@ def test_a_state_fits_in_a_packet_of_every_path(faults: dict[str, str], reason: 
     state = RobotState(
         name, most, most, most, "estop", reason, name, mask, zeros, zeros,
         CommandEcho(most, most, most, most, most), -most, most, faults,
-        BaseAttitude(most, 1.0, 1.0, 1.0, 1.0), most, most, effort_nm=zeros, external_nm=zeros,
+        BaseAttitude(most, 1.0, 1.0, 1.0, 1.0), most, most, effort_nm=zeros, external_nm=zeros, blind_m=(1.5,) * 5, blind_s=0.5,
     )  # fmt: skip
     payload = encode(state)
     assert len(payload) <= CONTROL_BYTES

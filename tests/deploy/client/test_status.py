@@ -33,6 +33,7 @@ from deploy.client.status import (
     robot_status,
     status_table,
 )
+from tests.link_times import times_over
 from tests.published import master_metrics, slave_metrics
 
 
@@ -71,6 +72,18 @@ def test_a_status_is_json_and_tells_all() -> None:
     }
     assert said["offset_ms"] == {"offset": 5.0, "bound": 0.04, "trusted": True}
     assert said["lease"]["held_s"] == 61.2
+
+
+def test_what_a_dead_line_would_do_is_told_by_hand_and_so_are_the_times_in_force() -> None:
+    metrics = slave_metrics(times=times_over(400.0).metrics())
+    said = status(Heard(replace(state(), blind_m=(0.061, 0.004), blind_s=0.41), metrics))
+    assert said.blind == "if the line died now: left hand ≤ 6.1 cm, right hand ≤ 0.4 cm in 0.41 s"
+    told = rendered({"robot-1": said})
+    words = " ".join(told.split())
+    assert "if the line died now: left hand" in words
+    assert "commands may be 0.60 s old" in words
+    assert "ceiling (max_age_ceiling_s) is 0.60 s" in words
+    assert status(heard()).blind is None
 
 
 def test_an_offset_that_is_not_trusted_has_no_bound() -> None:
