@@ -402,7 +402,8 @@ def test_a_state_fits_in_a_packet_of_every_path(faults: dict[str, str], reason: 
     state = RobotState(
         name, most, most, most, "estop", reason, name, mask, zeros, zeros,
         CommandEcho(most, most, most, most, most), -most, most, faults,
-        BaseAttitude(most, 1.0, 1.0, 1.0, 1.0), most, most, effort_nm=zeros, external_nm=zeros, blind_m=(1.5,) * 5, blind_s=0.5,
+        BaseAttitude(most, 1.0, 1.0, 1.0, 1.0), most, most, effort_nm=zeros, external_nm=zeros,
+        blind_m=(1.5,) * 5, blind_s=0.5,
     )  # fmt: skip
     payload = encode(state)
     assert len(payload) <= CONTROL_BYTES
