@@ -20,6 +20,7 @@ from deploy.experiments.faults.command import faults
 from deploy.experiments.soak.command import soak
 from deploy.experiments.trial.command import app as trial_app
 from deploy.log_options import Debug, Quiet, add_log_options, debugging, start_chosen_log
+from deploy.ops.alarms import alarms
 from deploy.ops.attitude.command import attitude
 from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.ops.control.printer import acted
@@ -52,7 +53,7 @@ for _name, _group in {
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, suit, drives, router, demo, soak, faults, bench,
-    *OPERATORS_ACTS, attitude, video, doctor, servos, stops, record, recording,
+    *OPERATORS_ACTS, attitude, video, doctor, servos, stops, alarms, record, recording,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
+from contextlib import suppress
 from dataclasses import replace
 
 from common.can.bus import CanBus
-from common.clock import monotonic_ns
+from common.clock import monotonic_ns, to_ns
 from common.inputs.key_state import KeyState
 from common.latency.budget import StageTimes
 from common.latency.durations import Durations
@@ -27,6 +29,8 @@ from common.process.runtime import until_stopped
 from common.process.ticker import ticks
 from common.wire.topics import STATISTICS
 from common.wire.version import software
+from master.alarms.operator import OperatorAlarms
+from master.alarms.player import TonePlayer
 from master.comfort.pressed import PressedKey
 from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
@@ -39,6 +43,8 @@ from master.suit.protocol import SuitProtocol
 from master.suit.silence import BusSigns, SilenceWatch
 
 log = logging.getLogger(__name__)
+
+ALARM_PERIOD_NS = to_ns(0.05)
 
 
 class Master:
@@ -76,6 +82,8 @@ class Master:
         self._pressed = PressedKey()
         self._given_up: set[str] = set()
         self._silence = SilenceWatch()
+        self._alarms = OperatorAlarms(config.commanded)
+        self._player = TonePlayer(config.alarms)
         self._doubt_log = DoubtLog()
 
     async def run(self) -> None:
@@ -87,10 +95,14 @@ class Master:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._capture())
                 tasks.create_task(self._publish_metrics())
+                if not self._config.alarms.off:
+                    self._player.start()
+                    tasks.create_task(self._sound())
                 for robot in self._robots:
                     tasks.create_task(self._serve(robot))
         finally:
             self._switches.close()
+            await asyncio.to_thread(self._player.stop)
             for bus in self._buses:
                 await bus.close()
 
@@ -120,6 +132,20 @@ class Master:
             if late is not None:
                 self._send(late)
             self._notifier.beat(monotonic_ns())
+
+    async def _sound(self) -> None:
+        """Play the tone that is due."""
+        async for _ in ticks(TickGrid(monotonic_ns(), ALARM_PERIOD_NS)):
+            pipeline, signs = self._pipeline, {robot.name: robot.sign for robot in self._robots}
+            far, doubts = pipeline.beyond_reach.far, bool(pipeline.doubts)
+            alarm = self._alarms.step(monotonic_ns(), signs, beyond_reach=far, doubts=doubts)
+            if alarm is not None:
+                self._player.play(alarm)
+
+    def pause_alarms(self) -> None:
+        """Silence what sounds now for a while; what begins meanwhile is heard."""
+        log.info("alarms that are active now are silent for %g s", self._config.alarms.pause_s)
+        self._alarms.pause(monotonic_ns(), self._config.alarms.pause_s)
 
     def _on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
         if self._switches.frame(bus, frame_id, data, now_ns):
@@ -228,6 +254,8 @@ async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
         log.info("%s: %d nodes polled, commands go to %s", robots, len(config.nodes), where)
         freeze_heap()  # now that all is built: a full collection took 80 ms
         reserve_heap()
+        with suppress(ValueError, RuntimeError):  # not the main thread
+            asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, master.pause_alarms)
         try:
             await master.run()
         finally:

@@ -12,6 +12,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
+from master.alarms.config import AlarmsConfig
 from master.comfort.config import ZeroPoseAgainConfig
 from master.comfort.scaling import scaling_mistakes
 from master.deadman.config import CanButton, ClutchConfig, DeadmanConfig, Pedal
@@ -81,6 +82,7 @@ class MasterConfig(Section):
     nodes: dict[str, NodeConfig]
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
+    alarms: AlarmsConfig = AlarmsConfig()
 
     @property
     def commanded(self) -> list[str]:

@@ -22,6 +22,7 @@ from common.wire.instance import draw_instance
 from common.wire.messages import ClockReply, ControlReply, RobotState, Statistics
 from common.wire.presence import ProcessPresence
 from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
+from master.alarms.situation import RobotSign
 from master.comfort.scaling import MotionScaling
 from master.deadman.grip import Grip
 from master.homonyms import Homonyms
@@ -152,6 +153,14 @@ class CommandedRobot:
                     self._clock.on_reply(reply, arrived_ns)
             except (LinkError, CodecError):
                 continue
+
+    @property
+    def sign(self) -> RobotSign:
+        """What the operator's alarms need to know of it."""
+        state = self._watch.state
+        if state is None or self._watch.silent(monotonic_ns()):
+            return RobotSign()
+        return RobotSign(state.guard, state.reason, self._lease.holds(state), bool(state.faults))
 
     @property
     def standing(self) -> str:

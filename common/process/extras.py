@@ -8,6 +8,7 @@ EXTRAS = {
     "gpiod": "gpio",
     "linuxpy": "v4l2",
     "evdev": "input",
+    "sounddevice": "sound",
 }
 """The extra of pyproject.toml that brings each optional module."""
 

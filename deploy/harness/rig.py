@@ -217,6 +217,7 @@ def _local(name: str, slaves: Sequence[str], endpoints: Endpoints) -> list[str]:
             f"robots={[robot_name(1 + i) for i in range(len(slaves))]}",
             *_link(endpoints, Role.OPERATOR, MASTER, [endpoints.master], endpoints.robots),
             f"capture.buses.0.options={bus_options}",
+            "alarms.off=true",
         ]
     return [f'link.connect=["{endpoints.observer}"]', f"buses.0.options={bus_options}"]
 

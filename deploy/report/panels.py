@@ -9,7 +9,7 @@ PANELS = {
     "People": (
         "engage", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude", "video",
     ),
-    "Set up": ("doctor", "servos", "stops", "calibrate", "keys", "record", "recording"),
+    "Set up": ("doctor", "servos", "stops", "alarms", "calibrate", "keys", "record", "recording"),
     "Judge": ("trial", "soak", "faults", "bench", "accuracy", "network"),
 }  # fmt: skip
 """In the order of the help."""

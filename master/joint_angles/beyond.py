@@ -55,6 +55,11 @@ class BeyondReach:
                 )
         return messages
 
+    @property
+    def far(self) -> bool:
+        """Whether a segment is so far beyond reach now that it is worth a word."""
+        return bool((self._now_rad > _REPORTED_RAD).any())
+
     def metrics(self) -> dict[str, Unreached]:
         """The segments that were beyond reach."""
         return {

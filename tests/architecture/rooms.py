@@ -14,7 +14,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["deploy/measure"],
     ["deploy/report", "deploy/certificates", "deploy/examples"],
     ["master", "slave"],
-    ["master/calibrate", "master/comfort"],
+    ["master/calibrate", "master/comfort", "master/alarms"],
     ["master/joint_angles"],
     ["master/orientation"],
     ["master/deadman"],
@@ -40,13 +40,14 @@ IMPURE = [
     "common/link/*", "common/log/handler.py", "common/log/streams.py",
     "common/process/*", "common/recording/recorder.py",
     "master/__main__.py", "master/app.py", "master/deadman/switches.py", "master/robot.py",
+    "master/alarms/player.py",
     "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
     "slave/stop_inputs/gpio.py",
 ]  # fmt: skip
 """The adapters. Nothing else in common, master and slave may touch a bus, link, clock or event loop."""
 RIM = {
     "asyncio", "zenoh", "can", "time", "socket", "uvloop", "serial", "canopen", "dynamixel_sdk", "evdev",
-    "gpiod",
+    "gpiod", "sounddevice",
 }  # fmt: skip
 
 

@@ -11,6 +11,7 @@ ADAPTERS = {
     "deploy/report/group.py": "typer",
     "deploy/sim/drives/node.py": "canopen",
     "deploy/sim/drives/wire.py": "canopen",
+    "master/alarms/player.py": "sounddevice",
     "slave/camera/room.py": "mujoco",
     "slave/camera/v4l2.py": "linuxpy",
     "slave/servos/dynamixel/bus.py": "dynamixel_sdk",

@@ -133,6 +133,7 @@ def test_a_file_of_the_other_side_is_one_line_naming_the_key(tandem: Tandem) -> 
         "operator",
         "capture",
         "estimation",
+        "alarms",
         "nodes",
     ]
     assert all(len(line) < 300 for line in lines)

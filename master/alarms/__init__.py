@@ -1,0 +1,1 @@
+"""Short tones that tell the operator what the robot does: when each is due, its sound, and the sound card."""
