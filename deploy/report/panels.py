@@ -7,7 +7,8 @@ import typer
 PANELS = {
     "Run": ("demo", "master", "slave", "suit", "router", "drives"),
     "People": (
-        "engage", "handover", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude", "video",
+        "engage", "handover", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude",
+        "video",
     ),
     "Set up": ("doctor", "servos", "stops", "alarms", "calibrate", "keys", "record", "recording"),
     "Judge": ("trial", "soak", "faults", "bench", "accuracy", "network"),
