@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from common.config.load import load_config
+from common.errors import LinkError
 from common.link.router import RouterConfig
 from common.process.runtime import SHUTDOWN_S
 from deploy import cli
@@ -62,8 +63,14 @@ def test_a_site_s_three_files_agree() -> None:
     assert {c.link.tls.ca for c in (operator, robot, router) if c.link.tls} == {SITE / "keys" / "ca.pem"}
 
 
-def test_a_zenohd_gets_the_same_keys_and_rules() -> None:
-    written = json.loads(json.dumps(zenohd_configuration(load_config(SITE / "router.toml", RouterConfig))))
+def test_a_zenohd_gets_the_same_keys_and_rules_and_no_revoked_names(tmp_path: Path) -> None:
+    listed = tmp_path / "revoked.txt"
+    config = load_config(SITE / "router.toml", RouterConfig, [f'link.revoked="{listed}"'])
+    with pytest.raises(LinkError, match=r"revoked.txt cannot be read"):
+        zenohd_configuration(config)
+    listed.write_text("operator:nurse-1\n")
+    written = json.loads(json.dumps(zenohd_configuration(config)))
+    assert "operator:nurse-1" not in json.dumps(written)
     assert written["mode"] == "router"
     assert written["listen"]["endpoints"] == ["tls/0.0.0.0:7448"]
     assert written["access_control"]["enabled"] is True

@@ -16,6 +16,7 @@ import pytest
 
 from common.link.roles import Role
 from deploy import cli
+from deploy.certificates import REVOKED
 from deploy.certificates.folder import stem, write_pair
 from deploy.certificates.make import new_authority, new_identity
 from deploy.harness.child import Child
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.live, pytest.mark.timeout(600)]
 
 ALIGN_S, LOOK_S = 30.0, 0.1
+REVOKED_S = 10.0
+"""Far more than the second within which the list is read: the host is busy."""
 
 DEPLOY = Path(cli.__file__).parent
 TANDEM = [sys.executable, "-m", "deploy"]
@@ -46,6 +49,7 @@ def a_site(folder: Path, robot_at: str) -> None:
     keys.mkdir()
     authority = new_authority("test", now, valid)
     write_pair(keys, "ca", authority)
+    (keys / REVOKED).write_text("")
     for role, name, hosts in ((Role.ROBOT, "robot-1", [robot_at]), (Role.OPERATOR, "nurse-1", [])):
         write_pair(keys, stem(role, name), new_identity(authority, role, name, hosts, now, valid))
 
@@ -116,10 +120,22 @@ def test_from_keys_to_a_robot_that_follows_in_two_hosts(tmp_path: Path, on_this_
                 assert status == 0, said
                 checks = {check["check"]: check for check in json.loads(said)["checks"]}
                 for check in ("certificate's name", "certificate's time", "robot-1", "robot-1: versions"):
-                    assert checks[check]["verdict"] == "ok", checks[check]
+                    assert checks[check]["health"] == "ok", checks[check]
                 assert "offset" in checks["robot-1: clock"]["found"]
 
                 await follow(network.operator, operator, at_robot)
+                status, said = await tandem(
+                    network.operator, "keys", "revoke", str(folder / "keys"), "operator:nurse-1"
+                )
+                assert status == 0, said
+                for _look in range(round(REVOKED_S / LOOK_S)):
+                    if ": hold: the certificate of nurse-1 is revoked" in at_robot.log_text():
+                        break
+                    await asyncio.sleep(LOOK_S)
+                else:
+                    raise AssertionError(f"follows a revoked operator: {at_robot.last_lines()}")
+                status, said = await tandem(network.operator, "engage", "--master", str(operator))
+                assert status != 0, said
             finally:
                 statuses = [await child.stop() for child in (master, suit, at_robot)]
         assert statuses == [0, 0, 0], at_robot.last_lines()

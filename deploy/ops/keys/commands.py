@@ -41,11 +41,14 @@ def authority(
         float, typer.Option(help="Number of days until the certificate expires.", min=1.0, max=MOST_DAYS)
     ] = 3650.0,
 ) -> None:
-    """Make a private certificate authority. Copy ca.pem to every host; keep ca.key offline.
+    """Make a private certificate authority, and an empty list of revoked certificates.
+
+    Copy ca.pem and the list to every host; keep ca.key offline.
 
     Example: `tandem keys authority keys --name "Clinic North"`
     """
     # cryptography takes a tenth of a second to load, for which an e-stop must not wait
+    from common.link.revoked import HEAD
     from deploy.certificates.folder import write_pair
     from deploy.certificates.make import new_authority
 
@@ -53,8 +56,11 @@ def authority(
         raise KeysError(f"--name {name!r}: expected 1 to 64 characters")
     made = new_authority(name, datetime.now(UTC), timedelta(days=days))
     certificate, key = write_pair(folder, AUTHORITY, made)
+    listed = folder / REVOKED
+    if not listed.exists():
+        listed.write_text(HEAD, "utf-8")
     console = Console()
-    console.print(f"{certificate}: copy it to every host", highlight=False)
+    console.print(f"{certificate}, {listed}: copy them to every host", highlight=False)
     console.print(f"{key}: anyone who has it can make certificates for everybody; keep it off the network")
 
 

@@ -174,6 +174,7 @@ def test_files_are_named_by_role_and_name() -> None:
 def test_a_name_is_revoked_once_and_gets_no_new_certificate(tmp_path: Path) -> None:
     keys = tmp_path / "keys"
     tandem("authority", keys)
+    assert RevocationFile(keys / "revoked.txt").names == frozenset(), "the list that hosts begin with"
     assert tandem("make", keys, "operator:anna")[1] is None
     said, error = tandem("revoke", keys, "operator:anna")
     assert error is None
