@@ -25,6 +25,7 @@ from deploy.ops.attitude.command import attitude
 from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.ops.control.printer import acted
 from deploy.ops.doctor.command import doctor
+from deploy.ops.inputs import inputs
 from deploy.ops.keys.commands import app as keys_app
 from deploy.ops.network.command import app as network_app
 from deploy.ops.record.command import record, recording
@@ -53,7 +54,7 @@ for _name, _group in {
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, suit, drives, router, demo, soak, faults, bench,
-    *OPERATORS_ACTS, attitude, video, doctor, servos, stops, alarms, record, recording,
+    *OPERATORS_ACTS, attitude, video, doctor, servos, stops, inputs, alarms, record, recording,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

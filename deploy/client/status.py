@@ -174,6 +174,8 @@ class RobotStatus:
     lease: LeaseMetrics | None
     faults: dict[str, str] | None
     node_doubts: dict[str, str] | None
+    switches: dict[str, str] | None
+    """What the operator holds, in words."""
     encoders_invalid: int | None
     base: BaseAngles | None
     offset_ms: OffsetStatus | None
@@ -211,6 +213,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         lease=metrics.lease if metrics else None,
         faults=dict(state.faults) if state else None,
         node_doubts=None if heard.master is None else heard.master.doubts,
+        switches=None if heard.master is None else heard.master.switches,
         encoders_invalid=int((~state.encoder_valid).sum()) if state else None,
         base=None
         if base is None
@@ -311,6 +314,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     if one.times is not None:
         words.append((one.times.words, ""))
         words += [(one.times.beyond, "red")] * bool(one.times.beyond)
+    words += [(f"{name}: {why}", "yellow") for name, why in (one.switches or {}).items() if why != "held"]
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
     words += [(line, "yellow") for line in without_detection(one.no_effort)]
     torques = largest("effort", one.effort_nm), largest("from outside", one.external_nm)

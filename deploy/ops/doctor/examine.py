@@ -29,6 +29,7 @@ from deploy.ops.doctor.judge.path import judge_path
 from deploy.ops.doctor.judge.process import judge_memory_lock, judge_networks, judge_realtime
 from deploy.ops.doctor.judge.robots import judge_robot
 from deploy.ops.doctor.judge.stops import judge_stops
+from deploy.ops.doctor.judge.switches import judge_switch
 from deploy.ops.doctor.read.can import ask_ip, read_can
 from deploy.ops.doctor.read.clock import clock_is_synchronised
 from deploy.ops.doctor.read.devices import egl_is_there, free_bytes, read_device, v4l2_is_there
@@ -41,7 +42,9 @@ from deploy.ops.doctor.read.revoked import read_revoked
 from deploy.ops.doctor.read.robots import read_robots
 from deploy.ops.doctor.read.servos import ping_servos
 from deploy.ops.doctor.read.stops import read_stops
+from deploy.ops.doctor.read.switches import read_pedal
 from deploy.ops.doctor.read.tree import Tree
+from master.deadman.config import Pedal
 from slave.servos.dynamixel.port import Port
 
 NOBODY_NEAR = "nobody stands within reach of these joints, or drives that tell their torque"
@@ -65,6 +68,9 @@ async def examine(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
         pinged = await asyncio.to_thread(ping_servos, needs.servos, tree, port)
         found.append(judge_latency(pinged, needs.servos.reply_timeout_s))
     found += [warn("contact", line, NOBODY_NEAR) for line in without_detection(needs.no_effort)]
+    for name, switch in needs.switches.items():
+        pedal = read_pedal(switch) if isinstance(switch, Pedal) else None
+        found.append(judge_switch(name, switch, pedal))
     if needs.estop is not None:
         found += judge_stops(read_stops(needs.estop), not needs.simulated, needs.reset_key)
     found += [judge_endpoint(try_to_listen(endpoint)) for endpoint in needs.link.listen]

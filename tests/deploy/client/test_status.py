@@ -91,6 +91,16 @@ def test_an_offset_that_is_not_trusted_has_no_bound() -> None:
     assert said.offset_ms == OffsetStatus(5.0, None, False)
 
 
+def test_what_the_operator_does_not_hold_is_said_in_words() -> None:
+    told = heard()
+    told.take(master=master_metrics(switches={"deadman": "released", "clutch": "held"}))
+    said = status(told)
+    assert said.switches == {"deadman": "released", "clutch": "held"}
+    words = rendered({"robot-1": said})
+    assert "robot-1: deadman: released" in words
+    assert "clutch" not in words
+
+
 def test_what_the_operator_s_side_doubts_is_said_by_node() -> None:
     told = heard()
     told.take(master=master_metrics(doubts={"left_forearm": "its gyro is 5°/s off"}))

@@ -18,6 +18,7 @@ from common.link.router import RouterConfig
 from common.skeleton import Skeleton
 from deploy.sim.suit.config import SuitConfig
 from master.config import MasterConfig
+from master.deadman.config import SwitchConfig
 from master.suit.protocol import SuitProtocol
 from slave.config import SlaveConfig
 from slave.servos.canopen.config import CanopenConfig
@@ -73,6 +74,8 @@ class Needs:
     robots: tuple[str, ...] = ()
     """Whom it commands."""
     operator: str = ""
+    switches: dict[str, SwitchConfig] = field(default_factory=dict)
+    """What the operator holds: `deadman`, and `clutch` if there is one."""
     certified_as: str = ""
     """The common name that its certificate should have; empty where none is known."""
 
@@ -108,6 +111,8 @@ def _of_master(config: MasterConfig) -> Needs:
         link=config.link,
         robots=tuple(config.commanded),
         operator=config.operator.name,
+        switches={"deadman": config.operator.deadman}
+        | ({} if config.operator.clutch is None else {"clutch": config.operator.clutch}),
         certified_as=common_name(Role.OPERATOR, config.operator.name),
     )
 
