@@ -87,7 +87,7 @@ class SlavePipeline:
         self.pace = Pace(limits, config.guard)
         self.damper = DistanceDamper(self.skeleton, config.guard.self_margin_cm, config.guard.zones)
         self.limiter = SetpointLimiter(self.skeleton.joint_names, limits, self.damper)
-        self.contact = ContactWatch(self.skeleton, config.contact)
+        self.contact = ContactWatch(self.skeleton, config.contact, config.servos.payload)
         self.reflex = ContactReflex(config.contact, self.contact, self.skeleton.joint_names)
         self.blind = BlindDistance(
             self.skeleton, limits, config.guard.max_blind_cm, 1.0 / config.loop.rate_hz

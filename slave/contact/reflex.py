@@ -16,8 +16,10 @@ from slave.limit.limit import SetpointLimiter
 
 KEPT = 400
 """So many ticks of the way are remembered: 2 s."""
-MOST_M = 0.2
+MOST_M = 0.1
 """`retreat` goes back no farther than this, whatever it feels."""
+REBOUND_NS = NS_PER_S // 2
+"""What pushes again so soon is what the robot has just met, which springs back."""
 AFTER_NS = NS_PER_S
 """A contact that comes so long after the robot was told to stop is still that of its motion."""
 YIELDS_RAD_S = 0.5
@@ -44,6 +46,7 @@ class ContactReflex:
         self._began_ns: int | None = None
         self._apart_m: list[float] = []
         self._back = 0
+        self._free_ns = 0
         self._free_m: float | None = None
         """How far it had gone back when nothing pushed any more; None: something still does."""
 
@@ -102,9 +105,11 @@ class ContactReflex:
         """
         pushed, config = self._watch.finding is not None, self._config
         if self._free_m is None and not pushed:
-            self._free_m = self._apart_m[self._back]
+            self._free_ns, self._free_m = now_ns, self._apart_m[self._back]
         if self._free_m is not None and pushed:
-            return position_rad
+            if now_ns - self._free_ns > REBOUND_NS:
+                return position_rad
+            self._free_m = None
         assert self._began_ns is not None
         most_m = MOST_M if self._free_m is None else min(MOST_M, self._free_m + config.retreat_m)
         allowed_m = min(most_m, config.retreat_m_s * to_s(now_ns - self._began_ns))

@@ -18,6 +18,8 @@ DRIVE_STEP_RAD = 2.0 * np.pi / (1 << 16)
 """At the joint's output, of a drive's own encoder: 13 bits behind a gear of 8; most are finer."""
 COUNTS = 2.25
 """So many counts of every encoder may change at once. Seen in an hour of motions: see README.md."""
+TORQUE_NOISE = 0.02
+"""Of the torque that a drive tells, share of its motor's limit: four times that of its current."""
 FEEBLE_NM = 0.1
 """A joint whose motor has less torque is a finger's: it is meant to touch, and presses with a few newtons."""
 _STEP_RESPONSE = 0.2306
@@ -65,8 +67,10 @@ def thresholds_nm(skeleton: Skeleton, model: mujoco.MjModel, config: ContactConf
     out = noise_nm(skeleton, model, angles).copy()
     for j, joint in enumerate(skeleton.joints):
         angle, ratio = leader(joint)
+        limit_nm = model.jnt_actfrcrange[model.joint(angle).id, 1] * abs(ratio)
+        out[j] += TORQUE_NOISE * limit_nm
         if joint.name in config.joints:
             out[j] = config.joints[joint.name].threshold_nm
-        elif model.jnt_actfrcrange[model.joint(angle).id, 1] * abs(ratio) < FEEBLE_NM:
+        elif limit_nm < FEEBLE_NM:
             out[j] = np.inf
     return out

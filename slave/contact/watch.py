@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
 import mujoco
@@ -13,8 +14,10 @@ from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.contact.config import ContactConfig
 from slave.contact.observer import MomentumObserver
+from slave.contact.payload import loaded_model
 from slave.contact.thresholds import angles_of, thresholds_nm
 from slave.model.build import build_model, leader
+from slave.servos.payload import PayloadConfig
 from slave.servos.servos import EncoderReading
 
 RELEASE = 0.6
@@ -34,10 +37,13 @@ class ContactWatch:
     """Watches J joints. Give it each tick's reading; it takes each reading once."""
 
     def __init__(
-        self, skeleton: Skeleton, config: ContactConfig, model: mujoco.MjModel | None = None
+        self,
+        skeleton: Skeleton,
+        config: ContactConfig,
+        payload: Mapping[str, PayloadConfig] | None = None,
     ) -> None:
-        """`model`: the robot's own, with its payload; None: that of the skeleton."""
-        self._model = model = _model(skeleton) if model is None else model
+        """`payload`: what the robot carries, by segment."""
+        self._model = model = loaded_model(skeleton, payload) if payload else _model(skeleton)
         self._config = config
         self._skeleton = skeleton
         self._tune(drives=False)

@@ -83,7 +83,7 @@ class Scene:
             self.run = VirtualWorld(
                 WorldSettings(
                     start_ns=UP_NS, motion=motion, overrides=overrides,
-                    one_way_ns=round(setting.one_way_ms * NS_PER_MS),
+                    one_way_ns=round(setting.one_way_ms * NS_PER_MS), patient=setting.patient,
                 )
             )  # fmt: skip
         config = self.run.slave_config

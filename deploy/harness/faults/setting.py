@@ -37,6 +37,8 @@ class Setting:
     """The nodes' alignment is known, so that a lean in the zero pose can be detected."""
     one_way_ms: float = 2.0
     """Of the link, until the fault."""
+    patient: bool = False
+    """Whether somebody may stand in the robot's way."""
     motion: Callable[[], OperatorMotion] | None = None
     """The operator's motion, None for the usual reach."""
 

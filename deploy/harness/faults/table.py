@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
+from deploy.harness.faults.contact import CONTACT
 from deploy.harness.faults.deadman import DEADMAN
 from deploy.harness.faults.distance import DISTANCE
 from deploy.harness.faults.effort import EFFORT
@@ -33,6 +34,7 @@ VIRTUAL: tuple[VirtualFault, ...] = (
     *DISTANCE,
     *ROBOT,
     *EFFORT,
+    *CONTACT,
     *CLOCKS,
     *ESTOPS,
     *STOP_INPUTS,

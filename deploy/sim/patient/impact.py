@@ -11,7 +11,7 @@ from common.link.config import LinkConfig
 from common.quaternion import Array
 from common.skeleton import Skeleton, load_skeleton
 from deploy.sim.patient.operator import Moves, OperatedRobot
-from deploy.sim.patient.patient import SoftPatient
+from deploy.sim.patient.patient import in_the_way
 from deploy.sim.patient.robot import STEPS, Imperfect, TouchingRobot
 from slave.config import SlaveConfig
 from slave.contact.config import ContactConfig, ContactJoint, Reflex
@@ -25,7 +25,6 @@ PUSHES_M = 0.25
 WATCHES_S = 1.5
 ALIGNED_S = 1.0
 _SPEEDS_UP_RAD_S2 = 12.0
-_GAP_M = 1e-3
 _STEP_S = CYCLE_NS * 1e-9 / STEPS
 UNSEEN_NM = 10_000.0
 
@@ -90,7 +89,7 @@ def meet(
     point_m, velocity_m_s = robot.point()
     speed = float(np.linalg.norm(velocity_m_s))
     towards = velocity_m_s / speed
-    robot.patient = SoftPatient(point_m + _GAP_M * towards, towards, clamped=clamped)
+    robot.patient = in_the_way(point_m, velocity_m_s, clamped=clamped)
     return _watch(run, speed, towards)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from deploy.sim.patient.patient import SoftPatient
+from slave.encoders.counts import EncoderConfig
 from slave.model.build import unit_rates
 from slave.servos.mujoco.simulated import CYCLE_NS, SimulatedRobot
 from slave.servos.servos import EncoderReading
@@ -43,11 +44,20 @@ PERFECT = Imperfect(noise_share=0.0, step_share=0.0, late_cycles=0)
 class TouchingRobot(SimulatedRobot):
     """A robot of which one point, on `segment` at `local_m` (3,) in its frame, may touch a patient."""
 
-    def __init__(self, skeleton: Skeleton, imperfect: Imperfect, position_rad: Array | None = None) -> None:
-        super().__init__(skeleton, position_rad=position_rad)
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        imperfect: Imperfect,
+        *,
+        steps: int = STEPS,
+        encoders: EncoderConfig | None = None,
+        origin_ns: int = 0,
+    ) -> None:
+        super().__init__(skeleton, encoders, origin_ns)
+        self._steps = steps
         self._imperfect = imperfect
         self._random = np.random.default_rng(imperfect.seed)
-        self._model.opt.timestep /= STEPS
+        self._model.opt.timestep /= steps
         self._spoil()
         self.patient: SoftPatient | None = None
         self.segment, self.local_m = "right_hand", np.zeros(3)
@@ -64,21 +74,23 @@ class TouchingRobot(SimulatedRobot):
         model.body_mass[:] *= factors
         model.body_inertia[:] *= factors[:, None]
         if wrong.payload_kg:
-            hand = model.body("right_hand").id
-            model.body_mass[hand] += wrong.payload_kg
-        mujoco.mj_setConst(model, self._data)
+            self.load("right_hand", wrong.payload_kg)
+
+    def load(self, segment: str, mass_kg: float) -> None:
+        """A segment carries so much more, at its own centre."""
+        self._model.body_mass[self._model.body(segment).id] += mass_kg
 
     def advance(self, until_ns: int) -> None:
         """Run every cycle that ends by `until_ns`; none is ever skipped."""
         while self.now_ns + CYCLE_NS <= until_ns:
             given = np.zeros_like(self._limit_nm)
-            for _ in range(STEPS):
+            for _ in range(self._steps):
                 self._touch()
                 self._torque.before()
                 mujoco.mj_step(self._model, self._data)
                 self._torque.after()
                 given += self._torque.joint_nm
-            self._told = [*self._told[1:], self._measured(given / STEPS)]
+            self._told = [*self._told[1:], self._measured(given / self._steps)]
             self._taken_in[:] = self._setpoint
             self.now_ns += CYCLE_NS
 

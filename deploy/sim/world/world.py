@@ -23,6 +23,7 @@ from common.wire.messages import Action, ClockReply, Command, ControlReply, Cont
 from deploy.examples.profiles import NURSING, example
 from deploy.measure import MovedSeries, Trace
 from deploy.sim.network.profile import Profile, Way
+from deploy.sim.patient.robot import Imperfect, TouchingRobot
 from deploy.sim.suit.config import SuitConfig
 from deploy.sim.suit.faults import Outgoing
 from deploy.sim.suit.motion import OperatorMotion
@@ -68,6 +69,8 @@ class WorldSettings:
     profile: str = NURSING
     motion: OperatorMotion | None = None
     """The operator's; None: the one that the suit's file names."""
+    patient: bool = False
+    """Whether a soft patient may be put in the robot's way (`deploy/sim/patient`)."""
     overrides: dict[str, list[str]] = field(default_factory=dict)
     """Changes to the example files, by role."""
 
@@ -94,9 +97,12 @@ class VirtualWorld:
         self.clock = MasterExchange()
         self.slave = SlavePipeline(self.slave_config, draw_token=itertools.count(1).__next__, instance=1)
         self.now_ns = world.start_ns
-        self._robot = SimulatedRobot(
-            self.slave_config.skeleton, self.slave_config.encoders, origin_ns=self.slave_ns
-        )
+        skeleton, encoders = self.slave_config.skeleton, self.slave_config.encoders
+        self.touching: TouchingRobot | None = None
+        """The robot, where there may be a patient."""
+        if world.patient:
+            self.touching = TouchingRobot(skeleton, Imperfect(), encoders=encoders, origin_ns=self.slave_ns)
+        self._robot = self.touching or SimulatedRobot(skeleton, encoders, origin_ns=self.slave_ns)
         self.trace = Trace(self.slave_config.skeleton.joint_names)
         self.commands: list[Command] = []
         self.states: list[RobotState] = []
