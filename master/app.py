@@ -214,6 +214,7 @@ class Master:
         }
 
     def _shared_metrics(self) -> MasterMetrics:
+        watch = self._pipeline.estimator.heading_watch
         return MasterMetrics(
             software=software(),
             heap=heap_in_use(),
@@ -227,6 +228,7 @@ class Master:
             buses={bus.name: bus.metrics() for bus in self._buses},
             robots={},
             zero_pose_again=self._pipeline.zero_pose.metrics(),
+            headings_deg={} if watch is None else watch.figures_deg(),
         )
 
     def metrics(self) -> MasterMetrics:

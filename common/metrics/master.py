@@ -100,3 +100,5 @@ class MasterMetrics(Metrics):
     access: AccessMetrics | None = None
     """In the file at the end only."""
     zero_pose_again: ZeroPoseTaken | None = None
+    headings_deg: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """By segment, how far its heading is off against its neighbour's, and the standard deviation, °."""

@@ -46,6 +46,9 @@ class EstimationConfig(Section):
     as the field is undisturbed. `off`: each node's heading by its own filter alone. `auto`: `online` once
     the files give the alignment of both nodes of a joint that constrains them; only such joints count."""
     online: OnlineConfig = OnlineConfig()
+    heading_limit_deg: float = Field(default=5.0, ge=0.0, le=90.0)
+    """A node whose heading is off by more against its neighbour's is named, or one that may be off by twice
+    as much. 0: no watch. Without calibrated alignments it needs a zero pose."""
 
     _filter_sections: dict[str, FilterSection] = PrivateAttr(default_factory=dict)
 

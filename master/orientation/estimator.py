@@ -19,8 +19,8 @@ from master.orientation.affine import ACC, GYR, MAG, Calibration, apply, load_ca
 from master.orientation.config import EstimationConfig
 from master.orientation.filters import FilterBank
 from master.orientation.heading import HeadingMemory
-from master.orientation.joints.constraints import JointConstraints
-from master.orientation.joints.online import OnlineHeadings, constrains
+from master.orientation.heading_watch import constrained, watch_of
+from master.orientation.joints.online import EVERY, OnlineHeadings
 from master.orientation.liveness import Liveness
 from master.orientation.lowpass import LowPass
 from master.orientation.zero_pose import ZeroPose, ZeroPoseLimits
@@ -124,10 +124,11 @@ class Estimator:
         self._liveness = Liveness(count, math.ceil(config.settle_s * rate_hz))
         self._heading: _Headings = HeadingMemory(count)
         self._q_of_filters = self._bank.q_world_from_sensor
-        if skeleton is not None and _constrained(config, skeleton, calibration.aligned):
+        if skeleton is not None and constrained(config, skeleton, calibration.aligned):
             aligned = calibration.aligned if config.constraints == "auto" else None
             self._heading = OnlineHeadings(config.online, skeleton, rate_hz, aligned)
             self._q_of_filters = self._bank.q_inertial_from_sensor
+        self.heading_watch = watch_of(config, skeleton, rate_hz, self._heading)
         self._aligned = calibration.aligned
         self._pose_of = partial(
             ZeroPose,
@@ -142,6 +143,7 @@ class Estimator:
         self.standing_again: ZeroPoseAgain | None = None
         """The zero pose that is being taken again; see `stand_again`."""
         self._gyr_rad_s = np.zeros((count, 3))
+        self._rate_hz = rate_hz
         # the filters hold each reading for the period before it, which leads by half of it on average
         self._advance_s = self._lowpass.delays_s[GYR] - 0.5 / rate_hz
 
@@ -153,6 +155,8 @@ class Estimator:
         changes = self._liveness.update(readings.fresh, readings.lost)
         if changes.went.any():
             self._heading.lose(changes.went & was_valid, self._q_of_filters())
+            if self._beside is not None:
+                self._beside.lose(changes.went & was_valid, self._bank.q_inertial_from_sensor())
         if not self._liveness.alive.all():
             self._idle(~self._liveness.alive)
         if changes.came.any():
@@ -175,15 +179,39 @@ class Estimator:
         if self.standing_again is not None and not self.standing_again.taken.any():
             self._stand_again(self.standing_again, filtered[MAG])
         if self._heading.due():
-            usable = self._liveness.settled & self._zero_pose.known
-            alignment = self._zero_pose.q_sensor_from_segment
-            self._heading.correct(self._q_of_filters(), filtered[MAG], alignment, usable)
+            self._correct(self._heading, self._q_of_filters(), filtered[MAG])
+        elif self._beside is not None and self._beside.due():
+            self._correct(self._beside, self._bank.q_inertial_from_sensor(), filtered[MAG])
+
+    @property
+    def _beside(self) -> OnlineHeadings | None:
+        return None if self.heading_watch is None else self.heading_watch.beside
+
+    def _correct(self, headings: _Headings, q: Array, mag_ut: Array) -> None:
+        usable = self._liveness.settled & self._zero_pose.known
+        headings.correct(q, mag_ut, self._zero_pose.q_sensor_from_segment, usable)
+        if self.heading_watch is not None:
+            used = multiply(self._heading.turn, self._q_of_filters())
+            self.heading_watch.look(used, self._bank.q_inertial_from_sensor(), usable, EVERY / self._rate_hz)
+
+    def _take_pose(self, nodes: Mask, correction_rad: Array, mag_ut: Array) -> None:
+        """Turn the headings of some nodes, mask (N,), by what a zero pose found (N,)."""
+        used = multiply(self._heading.turn, self._q_of_filters())
+        if self.heading_watch is not None:
+            inertial = self._bank.q_inertial_from_sensor()
+            # a heading that the pose does not turn stays where the magnetometer has it
+            self.heading_watch.stand(nodes, used, correction_rad, inertial, mag_ut)
+        self._heading.stand(nodes, correction_rad, self._q_of_filters(), mag_ut)
 
     def _find(self, settled: Mask, magnetic: Mask) -> None:
         """Give nodes that have settled their heading."""
         q = self._q_of_filters()
         between = multiply(self._bank.q_world_from_sensor(), conjugate(q))
         self._heading.find(settled, q, np.where(magnetic, heading_rad(between), np.nan))
+        if self._beside is not None:
+            q = self._bank.q_inertial_from_sensor()
+            between = multiply(self._bank.q_world_from_sensor(), conjugate(q))
+            self._beside.find(settled, q, np.where(magnetic, heading_rad(between), np.nan))
 
     def _stand(self, mag_ut: Array) -> None:
         """One tick of the zero pose."""
@@ -194,7 +222,7 @@ class Estimator:
         # apart: the heading of an alignment found now is the magnetometer's own
         for nodes in (done & self._aligned, done & ~self._aligned):
             if nodes.any():
-                self._heading.stand(nodes, self._zero_pose.correction_rad, self._q_of_filters(), mag_ut)
+                self._take_pose(nodes, self._zero_pose.correction_rad, mag_ut)
 
     @property
     def has_zero_pose(self) -> bool:
@@ -225,16 +253,17 @@ class Estimator:
         correction = np.where(self._aligned, again.moved_rad, 0.0)
         for nodes in (again.taken & self._aligned, again.taken & ~self._aligned):
             if nodes.any():
-                self._heading.stand(nodes, correction, self._q_of_filters(), mag_ut)
+                self._take_pose(nodes, correction, mag_ut)
 
     def doubts(self) -> dict[int, NodeDoubt]:
         """Doubts about nodes, by their number."""
         joints = self._heading.doubts() if isinstance(self._heading, OnlineHeadings) else {}
         filters = self._bank.doubts()
+        drifted = {} if self.heading_watch is None else self.heading_watch.doubts()
         asked = self._liveness.settled.copy()
         # a node whose joints are invalid gains nothing from a pose: the others need not wait for it
         asked[[node for node, doubt in filters.items() if doubt.weight >= Weight.INVALID]] = False
-        return {**joints, **filters, **self._zero_pose.doubts(asked)}
+        return {**drifted, **joints, **filters, **self._zero_pose.doubts(asked)}
 
     def posture(self) -> Posture:
         """The segments at the instant the newest tick sampled."""
@@ -259,10 +288,3 @@ class Estimator:
         """The filters' orientations brought forward over the delay of the gyro's low-pass, (N, 4)."""
         q = multiply(self._heading.turn, self._q_of_filters())
         return multiply(q, from_rotation_vector(self._advance_s * rate_rad_s))
-
-
-def _constrained(config: EstimationConfig, skeleton: Skeleton, aligned: Mask) -> bool:
-    """Whether joints correct the headings: if wanted, or by default once one of them can be believed."""
-    if config.constraints == "auto":
-        return bool(constrains(JointConstraints(skeleton), aligned).any())
-    return config.constraints == "online"

@@ -14,10 +14,10 @@ from common.wire.messages import Mask
 from master.orientation.joints.constraints import JointConstraints
 from master.orientation.joints.contradicted import ContradictedJoints
 from master.orientation.joints.field import MagneticHeadings
-from master.orientation.joints.headings import Headings
+from master.orientation.joints.headings import Headings, Indices
 from master.suit.doubt import NodeDoubt, Weight
 
-_EVERY = 16
+EVERY = 16
 """Ticks from one correction to the next."""
 _LARGEST = 3.0
 """Standard deviations beyond which a joint's error counts no more than in proportion (Huber)."""
@@ -117,7 +117,7 @@ class OnlineHeadings:
     def due(self) -> bool:
         """One tick passes; True where it is time to correct."""
         self._ticks += 1
-        return self._ticks % _EVERY == 0
+        return self._ticks % EVERY == 0
 
     def correct(self, q_inertial_from_sensor: Array, mag_ut: Array, alignment: Array, usable: Mask) -> None:
         """Takes the filters' orientations (N, 4), calibrated fields (N, 3), `q_sensor_from_segment` (N, 4).
@@ -125,7 +125,7 @@ class OnlineHeadings:
         Nodes that are not `usable` (N,) neither correct nor are corrected.
         """
         config, headings = self._config, self._headings
-        dt_s = _EVERY / self._rate_hz
+        dt_s = EVERY / self._rate_hz
         headings.drift(
             dt_s,
             math.radians(config.walk_deg_sqrt_s) ** 2,
@@ -178,6 +178,13 @@ class OnlineHeadings:
             )
             for k in np.flatnonzero(found.now).tolist()
         }
+
+    def uncertainty_rad(self, parents: Indices) -> Array:
+        """Standard deviation (N,) of each heading against its parent's, `parents` (N,); a root's own."""
+        nodes = np.arange(len(parents))
+        between = self._headings.variance_between(nodes, parents)
+        out: Array = np.sqrt(np.where(parents >= 0, between, self._headings.variance))
+        return out
 
     def _turn(self) -> None:
         self.turn = heading_turn(self._headings.theta_rad)
