@@ -228,6 +228,7 @@ class Master:
             buses={bus.name: bus.metrics() for bus in self._buses},
             robots={},
             zero_pose_again=self._pipeline.zero_pose.metrics(),
+            arm_load=dict(self._pipeline.arm_load.metrics()),
             headings_deg={} if watch is None else watch.figures_deg(),
         )
 

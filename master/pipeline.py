@@ -16,6 +16,7 @@ from common.clock import to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Command, CommandStamps, Mask
+from master.comfort.arm_load import ArmLoadMeter
 from master.comfort.scaling import MotionScaling
 from master.comfort.zero_pose_again import ZeroPoseConduct
 from master.config import MasterConfig
@@ -68,6 +69,7 @@ class MasterPipeline:
         """Messages to the operator about the last joint angles."""
         again = config.operator.zero_pose_again
         self.zero_pose = ZeroPoseConduct(again, self.estimator, self.skeleton.segment_names)
+        self.arm_load = ArmLoadMeter(self.skeleton)
         self.said: list[str] = []
         """What to say to the operator with the last joint angles, each line with a sound."""
         self._tapped = None if again.tap_node is None else self.skeleton.segment_names.index(again.tap_node)
@@ -154,6 +156,7 @@ class MasterPipeline:
         missing = self.skeleton.joint_needs_node @ ~known_nodes
         known = np.isfinite(position) & np.isfinite(velocity) & ~missing
         self.said = self.zero_pose.step(sweep.sampled_ns)
+        self.said += self.arm_load.take(sweep.sampled_ns, posture.q_world_from_segment, known_nodes)
         hold = self.zero_pose.hold
         if hold:
             known = np.zeros_like(known)

@@ -33,6 +33,18 @@ class ZeroPoseTaken(Metrics):
 
 
 @dataclass(frozen=True, slots=True)
+class ArmLoad(Metrics):
+    """How an operator's arm was loaded."""
+
+    raised_s: float
+    """Of the last 900 s: the upper arm above 60°, or the hand above the shoulder."""
+    held_s: float
+    """For so long the upper arm has stood away from hanging without moving by 10°."""
+    elevation_deg: float
+    """Of the upper arm from hanging, now."""
+
+
+@dataclass(frozen=True, slots=True)
 class RobotHeard(Metrics):
     """What the master hears of a robot."""
 
@@ -100,5 +112,7 @@ class MasterMetrics(Metrics):
     access: AccessMetrics | None = None
     """In the file at the end only."""
     zero_pose_again: ZeroPoseTaken | None = None
+    arm_load: dict[str, ArmLoad] = field(default_factory=dict)
+    """By arm."""
     headings_deg: dict[str, tuple[float, float]] = field(default_factory=dict)
     """By segment, how far its heading is off against its neighbour's, and the standard deviation, °."""

@@ -28,6 +28,7 @@ from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask
 from deploy.client.destination import ROUTER_S, Destination
 from deploy.client.efforts import TorquesByJoint, by_joint, largest, without_detection
+from deploy.client.shift import shift_lines
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 from slave.model.ends import limb_ends
 
@@ -186,8 +187,8 @@ class RobotStatus:
     times: GuardTimes | None
     """The guard's times in force, and why."""
     ticks: Ticks | None
-    scaling: dict[str, float] = field(default_factory=dict)
-    """By joint group, the share of the operator's motion that the robot makes."""
+    shift: tuple[str, ...] = ()
+    """Of the operator's shift, in words: scaled motion, raised arms."""
     resting: tuple[str, ...] = ()
     effort_nm: TorquesByJoint | None = None
     """Of each motor at its joint, N m."""
@@ -232,16 +233,11 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         times=metrics.times if metrics else None,
         ticks=metrics.ticks if metrics else None,
         resting=state.resting if state else (),
-        scaling=_scaling(heard.master),
+        shift=shift_lines(heard.master),
         effort_nm=by_joint(state.effort_nm) if state else None,
         external_nm=by_joint(state.external_nm) if state else None,
         no_effort=metrics.servos.no_effort if metrics else {},
     )
-
-
-def _scaling(master: MasterMetrics | None) -> dict[str, float]:
-    """A message to a robot names that robot alone."""
-    return {name: f for one in master.robots.values() for name, f in one.scaling.items()} if master else {}
 
 
 def _degrees(angle_rad: float | None) -> float | None:
@@ -297,9 +293,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     if one.resting:
         groups = " ".join(one.resting)
         words.append((f"at rest: {groups}; to follow again: tandem take-up {groups}", "yellow"))
-    if one.scaling:
-        shares = ", ".join(f"{name} × {factor:g}" for name, factor in one.scaling.items())
-        words.append((f"motion scaled about the posture at engage: {shares}", ""))
+    words += [(line, "") for line in one.shift]
     lease = one.lease
     if lease is not None and lease.offered_to:
         left = f"{lease.offered_to} may take over within {lease.offer_left_s:.0f} s"
