@@ -57,6 +57,7 @@ class CommandedRobot:
         self._scaling = scaling
         self._writer = CommandWriter(name, scaling)
         self._control = CONTROL.of(operator)
+        self._last_claim = ""
         self._clock = MasterExchange(asker)
         self._lease = LeaseKeeper(name, operator, asker)
         self._watch = RobotWatch()
@@ -121,10 +122,16 @@ class CommandedRobot:
             try:
                 reply = decode(await self._link.ask(self._control, encode(request)), ControlReply)
             except (LinkError, CodecError) as error:
-                log.info("%s: claim: %s", self.name, error)
+                self._log_claim(str(error))
                 continue
             self._lease.on_reply(reply, monotonic_ns())
-            log.info("%s: claim: %s", self.name, reply.text)
+            self._log_claim(reply.text)
+
+    def _log_claim(self, answer: str) -> None:
+        """A master that waits for the lease claims four times a second: only a new answer is logged."""
+        if answer != self._last_claim:
+            log.info("%s: claim: %s", self.name, answer)
+        self._last_claim = answer
 
     async def _two_answer(self, now_ns: int) -> bool:
         """Whether two robots have this name; then both are told so, and neither is claimed."""
