@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all check bench clean
+.PHONY: demo test test-all check bench audit clean
 demo: $(VENV)/.ready
 	$(BIN)/tandem demo $(ARGS)
 
@@ -18,6 +18,10 @@ test-all: $(VENV)/.ready
 
 bench: $(VENV)/.ready
 	$(BIN)/tandem bench $(ARGS)
+
+# the bill of materials, and the known vulnerabilities where the network reaches their database
+audit: $(VENV)/.ready
+	$(BIN)/tandem audit $(ARGS)
 
 check: $(VENV)/.ready
 	$(BIN)/ruff check .

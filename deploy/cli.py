@@ -22,6 +22,7 @@ from deploy.experiments.trial.command import app as trial_app
 from deploy.log_options import Debug, Quiet, add_log_options, debugging, start_chosen_log
 from deploy.ops.alarms import alarms
 from deploy.ops.attitude.command import attitude
+from deploy.ops.audit import audit
 from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.ops.control.printer import acted
 from deploy.ops.doctor.command import doctor
@@ -53,7 +54,7 @@ for _name, _group in {
 }.items():  # fmt: skip
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
-    master, slave, suit, drives, router, demo, soak, faults, bench,
+    master, slave, suit, drives, router, demo, soak, faults, bench, audit,
     *OPERATORS_ACTS, attitude, video, doctor, servos, stops, inputs, alarms, record, recording,
 )  # fmt: skip
 for _command in _COMMANDS:

@@ -6,6 +6,8 @@ EXTRAS = {
     "canopen": "simulation",
     "dynamixel_sdk": "dynamixel",
     "gpiod": "gpio",
+    "cyclonedx_py": "audit",
+    "pip_audit": "audit",
     "linuxpy": "v4l2",
     "evdev": "input",
     "sounddevice": "sound",

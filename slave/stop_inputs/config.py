@@ -15,7 +15,7 @@ from common.wire.fields import MAX_NAME
 Source = Literal["gpio", "device", "drive", "sto"]
 Electric = Literal["low", "high"]
 _KEYS: dict[Source, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "gpio": (("line",), ("chip", "bias", "closed_level")),
+    "gpio": (("line",), ("chip", "bias", "edges", "closed_level")),
     "device": (("device", "key"), ()),
     "drive": (("joint", "bit"), ("closed_level",)),
     "sto": (("joint",), ()),
@@ -42,6 +42,8 @@ class StopInputConfig(Section):
     """gpio: the chip's label or device path; chips' numbers change from start to start."""
     bias: Literal["pull_up", "pull_down", "external"] = "pull_up"
     """gpio: the resistor that the chip is asked for; external: there is one outside."""
+    edges: bool = True
+    """gpio: false: only the level is read, every 4 ms. For chips whose driver fails at interrupts."""
     closed_level: Electric | None = None
     """gpio, drive: the line's or bit's level while the contact is closed. gpio: by `bias`; drive: high."""
     device: str = ""

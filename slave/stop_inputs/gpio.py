@@ -77,9 +77,9 @@ class KernelLine:
         wanted = str(Path(config.chip).resolve()) if config.chip.startswith("/") else config.chip
         path, self._number = find_line(chips, config.line, wanted, unreadable)
         bias = _BIAS[config.bias]
+        self._edges = config.edges
         try:
-            self._request = self._ask(path, bias, Edge.BOTH)
-            self._edges = True
+            self._request = self._ask(path, bias, Edge.BOTH if config.edges else Edge.NONE)
         except PermissionError:
             raise
         except OSError as error:

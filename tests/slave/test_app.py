@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -33,7 +33,11 @@ class FakeLink:
 
     def subscribe(self, *_: object) -> None: ...
 
+    def subscribe_keys(self, *_: object) -> None: ...
+
     def answer(self, *_: object) -> None: ...
+
+    def answer_keys(self, *_: object) -> None: ...
 
     def watch_presence(self, *_: object) -> None: ...
 
@@ -59,6 +63,35 @@ def test_a_loop_that_misses_every_second_tick_still_sends_the_state(
     config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]))
     asyncio.run(app.Slave(config, link, servos)._drive())
     assert link.put == {"state": 40 // config.loop.state_every}
+
+
+def test_a_button_that_is_pressed_at_the_start_stops_the_drives_in_the_first_tick(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def one_tick(grid: TickGrid) -> AsyncIterator[DueTick]:
+        yield DueTick(1, grid.origin_ns, 0)
+
+    class Braking(StillServos):
+        asked: ClassVar[list[bool]] = []
+
+        def quick_stop(self, stop: bool) -> None:
+            self.asked.append(stop)
+
+    class Pressed:
+        def read(self, now_ns: int) -> dict[str, str]:
+            return {"red button": "gpio line STOP: pressed, or its wire is broken"}
+
+    monkeypatch.setattr(app, "ticks", one_tick)
+    link: Any = FakeLink()
+    servos: Any = Braking()
+    stops: Any = Pressed()
+    config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]))
+    slave = app.Slave(config, link, servos, stops=stops)
+    asyncio.run(slave._drive())
+    assert Braking.asked == [True]
+    guard = slave._pipeline.guard
+    assert guard.state == "estop"  # from boot: no encoder has been read yet
+    assert "red button" in guard.reason
 
 
 def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,12 +27,20 @@ def faults(
             exists=True,
         ),
     ] = None,
+    hazards: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the hazard table of a risk file: .csv, .json, or into a .md page between its marks.",
+            dir_okay=False,
+        ),
+    ] = None,
 ) -> None:
     """Inject every known fault into a simulated robot, and measure how it reacts and how soon it stops.
 
     Example: `tandem faults "link" --report faults.json`
     """
     from deploy.experiments.faults.document import matrix, tree, within_page
+    from deploy.experiments.faults.hazard_table import write_hazards
     from deploy.experiments.faults.view import print_matrix
     from deploy.harness.faults.table import FAULTS, try_fault
 
@@ -40,8 +48,8 @@ def faults(
     chosen = [row for name, row in FAULTS.items() if any(word in name.casefold() for word in words)]
     if not chosen:
         raise TandemError(f"no row's name contains that; the rows are: {', '.join(FAULTS)}")
-    if page is not None and len(chosen) < len(FAULTS):
-        raise TandemError("a page holds the whole matrix: name no rows with --page")
+    if (page or hazards) is not None and len(chosen) < len(FAULTS):
+        raise TandemError("a page holds the whole matrix: name no rows with --page or --hazards")
 
     console = Console()
     outcomes = [try_fault(row) for row in track(chosen, "trying", console=console, transient=True)]
@@ -51,6 +59,8 @@ def faults(
             report.write_text(json.dumps([tree(o) for o in outcomes], indent=2) + "\n", "utf-8")
         if page is not None:
             page.write_text(within_page(page.read_text("utf-8"), matrix(outcomes)), "utf-8")
+        if hazards is not None:
+            write_hazards(hazards, outcomes)
     except (OSError, ValueError) as error:
         raise TandemError(f"not written: {error}") from None
     broken = [o.fault.name for o in outcomes if bool(o.wrong) != bool(o.fault.missed)]

@@ -28,14 +28,14 @@ def matrix(outcomes: Sequence[FaultOutcome]) -> str:
     missed = [f"- **{o.fault.name}**: {o.fault.missed}" for o in outcomes if o.fault.missed]
     parts = [
         BEGIN,
-        _table(WORDS_HEAD, (words(outcome.fault) for outcome in outcomes)),
+        table(WORDS_HEAD, (words(outcome.fault) for outcome in outcomes)),
         "## Measured",
         "At the 12-bit encoders of the simulated robot, on a clock that is simulated too, so that everybody "
         "gets the same; where a program is killed, the encoders of simulated CANopen drives in real time. "
         "*reacted*: the guard had come to its decision. *stood*: no joint moved any more. *way*: how far a "
         "joint still turned after the fault. *overshoot*: how far it went beyond where it was to stop. "
         "*strayed*: how far joints that were to go on were from where they would have been.",
-        _table(FIGURES_HEAD, (figures(outcome) for outcome in outcomes)),
+        table(FIGURES_HEAD, (figures(outcome) for outcome in outcomes)),
         *(["## Not kept yet", "\n".join(missed)] if missed else []),
         END,
     ]
@@ -100,7 +100,8 @@ def tree(outcome: FaultOutcome) -> dict[str, object]:
     }
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 

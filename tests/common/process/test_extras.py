@@ -16,6 +16,8 @@ from deploy import cli
 from slave.servos.dynamixel.bus import Bus
 from slave.servos.dynamixel.port import Port
 
+PACKAGES = {"cyclonedx_py": "cyclonedx_bom"}
+"""Packages whose module has another name."""
 PROJECT = tomllib.loads((Path(cli.__file__).parents[1] / "pyproject.toml").read_text("utf-8"))["project"]
 
 
@@ -39,7 +41,7 @@ def test_each_extra_is_one_of_the_project(module: str, extra: str) -> None:
     packages = [
         package.partition(">")[0].replace("-", "_") for package in PROJECT["optional-dependencies"][extra]
     ]
-    assert module in packages
+    assert PACKAGES.get(module, module) in packages
     assert f"tandem[{extra}]" in (missing_extra(ModuleNotFoundError(name=f"{module}.part")) or "")
 
 

@@ -291,6 +291,43 @@ def test_a_second_slave_is_refused_and_the_first_does_not_notice(
         uvloop.run(test())
 
 
+def test_a_start_without_torque_begins_stopped_and_a_reset_enables(
+    config: CanopenConfig, tmp_path: Path
+) -> None:
+    """Safe torque off at the start, as a safety controller has it until it is released, is no failure."""
+
+    def demand(bus: can.BusABC, fault: DriveFault) -> None:
+        data = bytes([0x2F, DEMAND & 0xFF, DEMAND >> 8, 0, fault, 0, 0, 0])
+        bus.send(can.Message(arbitration_id=0x601, is_extended_id=False, data=data))
+
+    async def test() -> None:
+        servos = CanopenServos(config, NURSING)
+        with can_bus(config) as bus:
+            demand(bus, DriveFault.STO)
+            servos.start()
+            try:
+                assert not servos.signs("neck_yaw").voltage
+                assert "cannot be enabled" in servos.faults()["neck_yaw"]
+                demand(bus, DriveFault.NONE)
+                ticking = Ticking(servos)
+
+                def well_after_a_reset() -> bool:
+                    words = " ".join(servos.faults().values())
+                    if "cannot be enabled" in words or "second master" in words:
+                        servos.quick_stop(True)
+                        servos.quick_stop(False)
+                    return not servos.faults()
+
+                await ticking.until(well_after_a_reset)
+                await ticking.until(ticking.near)
+                assert servos.signs("neck_yaw").voltage
+            finally:
+                servos.stop()
+
+    with drives_on(config, tmp_path):
+        uvloop.run(test())
+
+
 def test_without_drives_the_start_says_what_to_do(config: CanopenConfig, tmp_path: Path) -> None:
     async def test() -> None:
         with pytest.raises(RobotError, match=r"25 of 25 drives do not start: .*start `tandem drives`"):
