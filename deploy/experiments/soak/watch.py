@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -18,10 +19,19 @@ from common.wire.codec import decode
 from common.wire.messages import Command, RobotState, Statistics
 from common.wire.topics import COMMAND, STATE, STATISTICS
 from deploy.experiments.soak.counts import Additions
-from deploy.experiments.soak.files.happenings import GuardChanged, Happening, JointsUnknown, LeaseChanged
+from deploy.experiments.soak.files.happenings import (
+    BlindWayMeasured,
+    GuardChanged,
+    Happening,
+    JointsUnknown,
+    LeaseChanged,
+)
 from deploy.experiments.soak.motion import MotionWatch
+from deploy.measure.blind import STANDS_S, blind_outages
 
 FRESH_NS = to_ns(2.0 / COMMAND.rate_hz)
+NEWEST = 110
+"""States of some two seconds: an outage is judged from before its last command until the robot stands."""
 Record = Callable[[Happening], None]
 """Takes what has happened."""
 
@@ -53,6 +63,9 @@ class Watch:
         self._age_max_ms = float("nan")
         self._row: dict[str, float] = {}
         self._invalid = -1
+        self._newest: deque[RobotState] = deque(maxlen=NEWEST)
+        self._blind_ns: int | None = None
+        """When the robot went to hold, until its hands are seen to stand; slave's clock."""
 
     def listen(self, link: Link) -> None:
         """Hear a robot from now on."""
@@ -83,11 +96,22 @@ class Watch:
         if before is not None and state.sequence > before.sequence:
             self._add("states_missed", state.sequence - before.sequence - 1)
         self.motion.see(state)
+        self._see_blind(state)
         if before is None or state.guard != before.guard:
             self._on_guard("" if before is None else before.guard, state, arrived_ns)
         if before is None or state.lease_id != before.lease_id:
             self._record(LeaseChanged(state.operator, state.lease_id))
         self._on_echo(state, arrived_ns)
+
+    def _see_blind(self, state: RobotState) -> None:
+        """Once the hands stand after a hold: how far they went, and what had been foretold."""
+        if self._newest and state.guard == "hold" and self._newest[-1].guard in ("align", "track"):
+            self._blind_ns = state.encoder_ns
+        self._newest.append(state)
+        if self._blind_ns is not None and state.encoder_ns - self._blind_ns > to_ns(STANDS_S):
+            self._blind_ns = None
+            for one in blind_outages(list(self._newest), self._skeleton):
+                self._record(BlindWayMeasured(one.hand, 100.0 * one.foretold_m, 100.0 * one.measured_m))
 
     def _on_guard(self, before: str, state: RobotState, arrived_ns: int) -> None:
         if before in ("align", "track") and state.guard == "hold":

@@ -180,6 +180,17 @@ class FaultRecovered(FaultCourse):
 
 
 @dataclass(frozen=True, slots=True)
+class BlindWayMeasured(Happening):
+    """How far a hand went after the last command before a hold for want of commands."""
+
+    kind = "blind"
+    hand: str = ""
+    foretold_cm: float = 0.0
+    measured_cm: float = 0.0
+    """At the encoders."""
+
+
+@dataclass(frozen=True, slots=True)
 class RobotLeft(Happening):
     """The robot left track without a fault."""
 
@@ -236,8 +247,8 @@ class SoakEnded(Happening):
 
 _KINDS = (
     SoakBegun, RobotFollowed, ProcessStarted, ProcessEnded, GuardChanged, LeaseChanged, JointsUnknown,
-    EngageAnswered, FaultBegun, FaultUndone, FaultRecovered, RobotLeft, HostStalled, RecordingChecked,
-    SoakEnded,
+    EngageAnswered, FaultBegun, FaultUndone, FaultRecovered, RobotLeft, BlindWayMeasured, HostStalled,
+    RecordingChecked, SoakEnded,
 )  # fmt: skip
 _READERS: Mapping[str, TypeAdapter[Happening]] = {each.kind: TypeAdapter(each) for each in _KINDS}
 

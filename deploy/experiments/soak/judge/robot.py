@@ -8,6 +8,7 @@ import numpy as np
 
 from deploy.experiments.soak.files.events import SoakEvent, of_kind
 from deploy.experiments.soak.files.happenings import (
+    BlindWayMeasured,
     EngageAnswered,
     FaultBegun,
     FaultCourse,
@@ -16,6 +17,7 @@ from deploy.experiments.soak.files.happenings import (
 )
 from deploy.experiments.soak.judge.evidence import SoakEvidence, of_enough
 from deploy.experiments.soak.judge.explain import unexplained_lefts
+from deploy.measure.blind import LEAST_M
 from deploy.measure.verdict import Outcome, Verdict, at_most
 
 HOLD_S = 0.2 + 0.08
@@ -28,6 +30,7 @@ TRACK_S = 15.0
 """`guard.align_timeout_s`."""
 MOVES_WITHIN_S, ANSWERED_WITHIN_S = 2.0, 1.0
 """An engaged robot is seen to move so soon; and so late after that comes the answer to its engagement."""
+LEAST_CM = 100.0 * LEAST_M
 MOVING = ("align", "track")
 
 
@@ -51,8 +54,23 @@ def guard(seen: SoakEvidence) -> list[Verdict]:
         ),
         _needless_holds(seen),
         _moves_without_engage(seen),
+        _blind(seen),
         at_most("moved while it held", farthest, STRAYS_DEG, "°", why=stray_why),
     ]
+
+
+def _blind(seen: SoakEvidence) -> Verdict:
+    """No hand went farther without commands than the robot had foretold."""
+    found = [event.what for event in of_kind(seen.events, BlindWayMeasured)]
+    excess = max((one.measured_cm - one.foretold_cm for one in found), default=None)
+    shares = [one.measured_cm / one.foretold_cm for one in found if one.foretold_cm >= LEAST_CM]
+    why = f"hands in outages: {len(found)}"
+    if shares:
+        low, middle, high = np.percentile(shares, (5, 50, 100)).tolist()
+        why += f"; measured over foretold {low:.2f}, {middle:.2f}, {high:.2f} (5 %, median, most)"
+    if excess is None:
+        return Verdict("hands beyond what was foretold", Outcome.NOT_JUDGED, limit=0.0, unit="cm", why=why)
+    return at_most("hands beyond what was foretold", max(excess, 0.0), 0.0, "cm", why=why)
 
 
 def _needless_holds(seen: SoakEvidence) -> Verdict:

@@ -86,6 +86,14 @@ FIGURES = (
            "commands that the guard refused for their age from the cut on"),
     CellMetric("moved_alone", "moved alone", "", 0, OUTAGE,
            "1 where the robot left hold before the operator's act; it must not"),
+    CellMetric("blind_farthest_cm", "blind way", "cm", 1, OUTAGE,
+           "how far a hand still went after the last command before a hold for want of commands, at the "
+           "encoders"),
+    CellMetric("blind_share", "blind way / foretold", "", 2, OUTAGE,
+           "that way over the one that the robot had foretold with that command, median of hands that were "
+           "to go 2 cm or more"),
+    CellMetric("blind_excess_cm", "blind way beyond foretold", "cm", 2, OUTAGE,
+           "that way less the one foretold, of the worst hand; it must not be above 0"),
     CellMetric("ready_s", "ready after outage", "s", 2, OUTAGE,
            "the link returns → the operator holds the lease and may engage"),
     CellMetric("track_again_s", "act → track", "s", 2, OUTAGE,

@@ -14,6 +14,7 @@ import numpy as np
 from common.clock import NS_PER_MS, NS_PER_S, to_ns
 from common.metrics.master import MasterMetrics
 from common.metrics.slave import SlaveMetrics
+from common.wire.messages import RobotState
 from deploy.experiments.trial.cell.aftermath import aftermath
 from deploy.experiments.trial.cell.figures import BY_NAME
 from deploy.experiments.trial.cell.recording import (
@@ -26,6 +27,7 @@ from deploy.experiments.trial.cell.recording import (
 )
 from deploy.experiments.trial.cell.result import Excerpt
 from deploy.measure import MovedSeries, TruthSeries, accuracy, motion
+from deploy.measure.blind import blind_figures, blind_outages
 from deploy.measure.motion import at_shift
 from deploy.measure.replay import arrivals, compare
 from slave.config import SlaveConfig
@@ -42,6 +44,7 @@ def measure(course: CellCourse, config: SlaveConfig) -> dict[str, float | None]:
     figures |= _guard(judged)
     if course.after is not None and course.outage is not None:
         figures |= aftermath(course.after, course.outage, course.max_age_s)
+        figures |= _blind([*judged.states, *course.after.states], config)
     figures |= {
         f"cpu_{name}": value for name, value in course.cpu_percent.items() if f"cpu_{name}" in BY_NAME
     }
@@ -49,6 +52,17 @@ def measure(course: CellCourse, config: SlaveConfig) -> dict[str, float | None]:
     figures["down_kb_s"] = _kilo(course.down_bytes_s)
     figures["ticks_missed"] = _missed_percent(judged)
     return figures
+
+
+def _blind(states: Sequence[RobotState], config: SlaveConfig) -> dict[str, float | None]:
+    """How far hands went without commands, against what was foretold: every hold and the outage."""
+    each = {state.sequence: state for state in states}
+    found = blind_figures(blind_outages([each[n] for n in sorted(each)], config.skeleton))
+    return {
+        "blind_farthest_cm": found.farthest_cm,
+        "blind_share": found.share,
+        "blind_excess_cm": found.excess_cm,
+    }
 
 
 def one_way_percentiles_ms(judged: CellMessages) -> list[float]:

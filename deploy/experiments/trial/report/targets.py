@@ -28,6 +28,9 @@ class SetupLimit:
     each: bool = False
     """Every single repeat must keep it: what endangers a person has no median."""
 
+    where_known: bool = False
+    """A cell without the value is not asked: in it the robot was not moving."""
+
     @property
     def words(self) -> str:
         """What is asked of which setups."""
@@ -49,6 +52,7 @@ LIMITS = (
     SetupLimit("flow_s", 1.5),
     SetupLimit("stale_accepted", 0, each=True),
     SetupLimit("moved_alone", 0, each=True),
+    SetupLimit("blind_excess_cm", 0, each=True, where_known=True),
 )
 
 
@@ -98,6 +102,8 @@ def _judge(limit: SetupLimit, rows: Sequence[SetupResults]) -> Verdict | None:
 
 def _is_asked(limit: SetupLimit, cell: Cell) -> bool:
     """Whether the cell should have the value: those of an outage only where one was made."""
+    if limit.where_known and cell.values.get(limit.figure) is None:
+        return False
     return not limit.of_outage or any(
         cell.values.get(f.name) is not None for f in FIGURES if f.group == OUTAGE
     )

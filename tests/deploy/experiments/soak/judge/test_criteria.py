@@ -377,3 +377,15 @@ def test_an_age_that_was_known_for_less_than_95_percent_is_no_pass(
         events=(), age_max_ms=lambda at_s: np.where(abs(at_s - 300.5) < 0.5 * gone, np.nan, AGE_MS + 1.0)
     )
     assert judged(late)["commands: oldest accepted command"].outcome is Outcome.FAILED
+
+
+@pytest.mark.parametrize(("measured_cm", "outcome"), [(12.0, Outcome.PASSED), (12.01, Outcome.FAILED)])
+def test_a_hand_that_went_farther_than_foretold_fails(
+    make: Make, measured_cm: float, outcome: Outcome
+) -> None:
+    tree = {"hand": "left_hand", "foretold_cm": 12.0, "measured_cm": measured_cm}
+    verdict = judged(make(events=(*STORY, happened(150.0, "blind", tree))))[
+        "guard: hands beyond what was foretold"
+    ]
+    assert verdict.outcome is outcome
+    assert "measured over foretold 1.00" in (verdict.why or "")
