@@ -27,7 +27,8 @@ def state(at_ms: int, foretold_m: float) -> RobotState:
     echo_ns = min(at_ms // 80 * 80 + 40, ACCEPTED_MS) * NS_PER_MS
     return RobotState(
         "robot-1", at_ms, at_ns, at_ns, "track" if moving else "hold",
-        "follows" if moving else "no command for 0.20 s", "anna", np.ones(len(angles), np.bool_), angles, angles,
+        "follows" if moving else "no command for 0.20 s", "anna", np.ones(len(angles), np.bool_),
+        angles, angles,
         CommandEcho(1, 0, echo_ns, echo_ns, echo_ns), 0, 1,
         blind_m=(foretold_m, 0.003) if moving else (), blind_s=0.4,
     )  # fmt: skip
