@@ -27,12 +27,11 @@ def by_joint(torque_nm: Array | None) -> TorquesByJoint | None:
     return dict(zip(keys, values, strict=True))
 
 
-def largest(what: str, torques: TorquesByJoint | None) -> str:
-    """A line with the joints of the largest torques; empty where none is known."""
-    known = {name: nm for name, nm in (torques or {}).items() if nm is not None}
+def largest(torques: Mapping[str, float | None], between: str = ", ") -> str:
+    """The joints of the largest torques, with them; empty where none is known."""
+    known = {name: nm for name, nm in torques.items() if nm is not None}
     first = sorted(known, key=lambda name: -abs(known[name]))[:_LARGEST]
-    listed = ", ".join(f"{name} {known[name]:+.1f}" for name in first)
-    return f"{what}: {listed} N m (the largest)" if listed else ""
+    return between.join(f"{name} {known[name]:+.1f}" for name in first) + " N m" * bool(first)
 
 
 def without_detection(no_effort: Mapping[str, str]) -> list[str]:

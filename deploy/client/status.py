@@ -311,8 +311,9 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     words += [(f"{name}: {why}", "yellow") for name, why in (one.switches or {}).items() if why != "held"]
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
     words += [(line, "yellow") for line in without_detection(one.no_effort)]
-    torques = largest("effort", one.effort_nm), largest("from outside", one.external_nm)
-    words += [(line, "dim") for line in torques if line]
+    for what, torques in (("effort", one.effort_nm), ("from outside", one.external_nm)):
+        if found := largest(torques or {}):
+            words.append((f"{what}: {found} (the largest)", "dim"))
     if one.encoders_invalid:
         words.append((f"encoders not heard: {one.encoders_invalid}", "red"))
     return words

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common.metrics.parts import Summary
+from deploy.client.efforts import largest
 from deploy.experiments.demo.tables import stage_cells
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 
@@ -26,6 +27,8 @@ class Live:
     stages: Mapping[str, Summary] = field(default_factory=dict)
     joint_error_deg: Mapping[str, float] = field(default_factory=dict)
     """Encoder minus truth now, by joint; the worst few are shown."""
+    effort_nm: Mapping[str, float | None] = field(default_factory=dict)
+    """Torque of each motor at its joint; the largest few are shown."""
     drops: Mapping[str, int] = field(default_factory=dict)
     """What was lost or refused, by reason; zeros are not shown."""
 
@@ -43,6 +46,7 @@ def live_view(live: Live, worst: int = 5) -> RenderableType:
     lines = Table.grid(padding=(0, 2))
     lines.add_row(Text("rates", "dim"), Text(rates))
     lines.add_row(Text("worst joints", "dim"), joints)
+    lines.add_row(Text("effort", "dim"), Text(largest(live.effort_nm, "   ") or UNKNOWN))
     lines.add_row(Text("dropped", "dim"), Text(dropped, "yellow") if dropped else Text("nothing", "green"))
     table = plain_table("stage, ms", "mean", "p50", "p99", "max", "count")
     for name, stage in live.stages.items():

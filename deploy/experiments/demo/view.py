@@ -6,6 +6,7 @@ import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
+from deploy.client.efforts import by_joint
 from deploy.experiments.demo.live_view import Live, live_view
 from deploy.experiments.demo.report import DemoReport
 from deploy.experiments.demo.robots import robots_table
@@ -45,6 +46,7 @@ def draw(rig: Rig, host_missed: int, elapsed_s: float) -> RenderableType:
             rates_hz=observer.rates_hz,
             stages=slave.stages_ms if slave else {},
             joint_error_deg=_errors_deg(rig),
+            effort_nm=(by_joint(state.effort_nm) if state else None) or {},
             drops={
                 **({"ticks missed": master.ticks.missed} if master else {}),
                 "by the host": host_missed,

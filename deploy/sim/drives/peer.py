@@ -57,7 +57,8 @@ class DrivePeer:
     ) -> None:
         """`position_rad` (J,): where the joints stand at first; else at 0, or as near as limits let them."""
         self.counters = DriveCounters()
-        self.plant = Plant(skeleton, encoders, origin_ns, position_rad)
+        self._torque = ToldTorque(config, skeleton, origin_ns)
+        self.plant = Plant(skeleton, encoders, origin_ns, position_rad, each_cycle=self._torque.take)
         self._names = skeleton.joint_names
         self._first_sync_ns: int | None = None
         self._looked_ns = 0
@@ -71,7 +72,6 @@ class DrivePeer:
         """What a drive is wrong by: true scale over the configured one, and increments."""
         self._stuck: dict[int, int] = {}
         self._read()
-        self._torque = ToldTorque(config, skeleton, origin_ns)
         senders = [_sender(send, drive.bus) for drive in drives]
         self.drives = [
             SimulatedDrive(drive.id, sender, serial)
@@ -116,7 +116,6 @@ class DrivePeer:
     def advance(self, now_ns: int) -> None:
         """Physics, heartbeats, following errors, and faults that are due. Call every few milliseconds."""
         self.plant.advance(now_ns)
-        self._torque.advance(now_ns, self.plant.effort_nm, self.plant.velocity_rad_s)
         if now_ns - self._looked_ns < _LOOK_NS:
             return
         self._looked_ns = now_ns
@@ -177,6 +176,7 @@ class DrivePeer:
         if self._first_sync_ns is None:
             self._first_sync_ns = now_ns
         self.plant.advance(now_ns)
+        self._torque.latch(now_ns)
         self._show()
         for i in self._on_bus.get(bus, ()):
             drive = self.drives[i]
@@ -229,7 +229,7 @@ class DrivePeer:
 
     def _show(self) -> None:
         self._read()
-        told = self._torque.told().tolist()
+        told = self._torque.thousandths.tolist()
         for drive, position, count, torque in zip(
             self.drives, self._increments, self._counts, told, strict=True
         ):

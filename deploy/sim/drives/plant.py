@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +28,11 @@ class Plant:
         encoders: EncoderConfig,
         origin_ns: int,
         position_rad: Array | None = None,
+        *,
+        each_cycle: Callable[[Array, Array], None] = lambda effort_nm, velocity_rad_s: None,
     ) -> None:
+        """`each_cycle`: gets efforts and velocities of the demand (J,) after every cycle."""
+        self._each_cycle = each_cycle
         self._robot = SimulatedRobot(skeleton, encoders, origin_ns, position_rad)
         self._encoders = Encoders(skeleton, encoders)
         self._demand = self._robot.position_rad
@@ -56,11 +62,6 @@ class Plant:
     def effort_nm(self) -> Array:
         """(J,) torque at the joints."""
         return self._robot.effort_nm
-
-    @property
-    def velocity_rad_s(self) -> Array:
-        """(J,) of the demand."""
-        return self._velocity
 
     @property
     def moving(self) -> Mask:
@@ -95,5 +96,6 @@ class Plant:
             self._demand = demand
             self._robot.write(demand)
             self._robot.advance(at_ns)
+            self._each_cycle(self._robot.effort_nm, self._velocity)
             off = np.abs(self._robot.position_rad - demand) > self.window_rad
             self.beyond_ns = np.where(off, self.beyond_ns + CYCLE_NS, 0)

@@ -1,11 +1,10 @@
-"""The torque that drives tell: what a motor gives, as its current sensor shows it. Pure."""
+"""The torque that drives tell: what a motor gave since the last SYNC, by its current sensor. Pure."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common.clock import to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.model.build import build_model
@@ -15,7 +14,6 @@ _PEAK = 3.0
 """The most that a motor gives, over its rating: usual for a servo motor."""
 _NOISE, _FRICTION = 2.0, 30.0
 """Thousandths of the rating: the current sensor's, and what the gear takes while it turns."""
-_LOW_PASS_S = 0.005
 _SLOW_RAD_S = 0.02
 """Below this, friction grades into none."""
 
@@ -32,18 +30,23 @@ class ToldTorque:
         self.rated_mnm: NDArray[np.int64] = np.ceil(1000.0 * most_nm / _PEAK / self._through).astype(np.int64)
         """(J,) of the motors, whole mN m as in 6076h."""
         self._random = np.random.default_rng(seed)
-        self._smooth = np.zeros(len(drives))
-        self._at_ns = origin_ns
+        self._apart_ns = config.period_ns // 2
+        self._latched_ns = origin_ns
+        self._sum, self._count = np.zeros(len(drives)), 0
+        self.thousandths: NDArray[np.int64] = np.zeros(len(drives), np.int64)
+        """(J,) of the rating, in the direction of its position: the mean between the last two SYNCs."""
 
-    def advance(self, now_ns: int, joint_nm: Array, velocity_rad_s: Array) -> None:
-        """Take in the torque at the joints (J,), as it is now."""
+    def take(self, joint_nm: Array, velocity_rad_s: Array) -> None:
+        """Take in the torque at the joints (J,) of one more cycle."""
         motor = 1e6 * joint_nm / self._through / self.rated_mnm
-        motor += _FRICTION * np.tanh(velocity_rad_s / _SLOW_RAD_S)
-        share = -np.expm1(-max(0.0, to_s(now_ns - self._at_ns)) / _LOW_PASS_S)
-        self._smooth += share * (motor - self._smooth)
-        self._at_ns = now_ns
+        self._sum += motor + _FRICTION * np.tanh(velocity_rad_s / _SLOW_RAD_S)
+        self._count += 1
 
-    def told(self) -> NDArray[np.int64]:
-        """(J,) whole thousandths of the rating, in the direction of the drive's position."""
-        noisy = self._sign * self._smooth + self._random.normal(0.0, _NOISE, len(self._smooth))
-        return np.clip(np.rint(noisy), -32768, 32767).astype(np.int64)
+    def latch(self, now_ns: int) -> None:
+        """A SYNC has come, or the same one on another bus."""
+        if not self._count or now_ns - self._latched_ns < self._apart_ns:
+            return
+        mean = self._sign * self._sum / self._count
+        noisy = mean + self._random.normal(0.0, _NOISE, len(mean))
+        self.thousandths = np.clip(np.rint(noisy), -32768, 32767).astype(np.int64)
+        self._latched_ns, self._sum, self._count = now_ns, np.zeros(len(mean)), 0

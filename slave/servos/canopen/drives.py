@@ -149,7 +149,8 @@ class Drives:
             if self._answers.complete:
                 if self.answered_after_ns is None:
                     self.answered_after_ns = now_ns - self._synced_ns
-                self._publish()
+                if self.efforts.complete:
+                    self._publish()
         else:
             self.unknown += 1
 
@@ -176,6 +177,9 @@ class Drives:
                 self._on_state(i, data[0] & 0x7F, now_ns)
             case pdo.TPDO2 if self.efforts.take(i, data):
                 self._effort_is_newer = True
+                # by CAN's priorities efforts come after the positions, and belong to the same reading
+                if self._answers.complete and self.efforts.complete:
+                    self._publish()
             case pdo.EMERGENCY:
                 message = emergency(data)
                 if message is not None:
@@ -225,6 +229,7 @@ class Drives:
         """The frames before a SYNC: heartbeats, and every drive's controlword and target (RPDOs)."""
         if not self._answers.complete:
             self.unanswered += self._cycles > 0
+        if not self._answers.complete or not self.efforts.complete:
             self._publish()
         seen = self._answers.of(self._synced_ns)
         self._silence.cycle(now_ns, seen.fresh, self._synced_ns)
@@ -256,8 +261,8 @@ class Drives:
 
     @property
     def reading(self) -> EncoderReading:
-        """The newest. Efforts come after the positions, by CAN's priorities, and join their reading then."""
-        if self._effort_is_newer:
+        """The newest; efforts that are told more seldom than positions join it when they come."""
+        if self._effort_is_newer and self.efforts.complete:
             self._effort_is_newer = False
             self._reading = replace(self._reading, effort_nm=self.efforts.joint_nm)
         return self._reading
@@ -322,6 +327,7 @@ class Drives:
         self.outbox.append(self._wiring.nmt(i, START))
 
     def _publish(self) -> None:
+        self._effort_is_newer = False
         seen = self._answers.of(self._synced_ns)
         drive_rad = self._units.angle_rad(seen.position)
         self._reading = EncoderReading(

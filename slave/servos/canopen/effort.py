@@ -36,6 +36,8 @@ class DriveEfforts:
         self._age = np.full(count, self._patience + 1)
         """SYNCs since it was told."""
         self._tells_none: dict[int, str] = {}
+        self._at_every_sync = config.effort_syncs(skeleton) == 1
+        self._awaited: set[int] = set()
 
     def configured(self, drive: int, held: Mapping[int, int], lacks: Mapping[str, str]) -> None:
         """A drive is ready to tell: what was read of it, by index, and what it lacks."""
@@ -57,6 +59,7 @@ class DriveEfforts:
         """One drive's telling. False where it is not of the right length."""
         if len(data) != EFFORT_BYTES:
             return False
+        self._awaited.discard(drive)
         self._thousandths[drive] = int.from_bytes(data, "little", signed=True)
         self._age[drive] = 0
         return True
@@ -64,6 +67,14 @@ class DriveEfforts:
     def asked(self) -> None:
         """A SYNC is sent."""
         self._age += 1
+        if self._at_every_sync:
+            telling = ~np.isnan(self._scale_nm) & (self._age <= self._patience)
+            self._awaited = set(np.flatnonzero(telling).tolist())
+
+    @property
+    def complete(self) -> bool:
+        """Whether every effort of this SYNC is here, so that a reading may hold those of its own moment."""
+        return not self._awaited
 
     @property
     def joint_nm(self) -> Array | None:

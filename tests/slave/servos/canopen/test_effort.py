@@ -153,6 +153,42 @@ def test_a_drive_that_stops_telling_is_known_after_three_misses(every: int) -> N
     assert agrees(wired, newest(wired))
 
 
+def test_a_reading_waits_for_the_efforts_of_its_own_sync() -> None:
+    wired = Wired(geared())
+    outstretched(wired)
+    kept: list[tuple[str, int, bytes]] = []
+    on_frame = wired.drives.on_frame
+    bus, node = wired.where(ROLL)
+
+    def late(name: str, frame_id: int, data: bytes, now_ns: int) -> None:
+        if (name, frame_id) == (bus, 0x280 + node):
+            kept.append((name, frame_id, data))
+        else:
+            on_frame(name, frame_id, data, now_ns)
+
+    wired.drives.on_frame = late  # type: ignore[method-assign]
+    before_ns = wired.drives.reading.read_ns
+    while not kept:
+        wired.run(0.004)
+    assert wired.drives.reading.read_ns == before_ns
+    on_frame(bus, 0x280 + node, (1234).to_bytes(2, "little"), wired.now_ns)
+    assert wired.drives.reading.read_ns > before_ns
+    assert newest(wired)[wired.index(ROLL)] == pytest.approx(
+        1.234 * 1e-3 * wired.peer.drives[wired.index(ROLL)].rated_torque_mnm * 100.0
+    )
+
+
+def test_positions_do_not_wait_longer_than_to_the_next_sync_for_an_effort_that_never_comes() -> None:
+    wired = Wired(geared())
+    outstretched(wired)
+    wired.happen(ROLL, DriveFault.TORQUE_SILENT)
+    for _ in range(10):
+        wired.run(wired.config.period_ns / 1e9)
+        assert wired.now_ns - wired.drives.reading.read_ns <= 2 * wired.config.period_ns
+    # once it counts as lost nobody waits for it
+    assert wired.now_ns - wired.drives.reading.read_ns < wired.config.period_ns
+
+
 def test_a_drive_that_restarts_tells_again_after_a_reset() -> None:
     wired = Wired(geared())
     outstretched(wired)
