@@ -177,7 +177,7 @@ class DrivePeer:
             self._first_sync_ns = now_ns
         self.plant.advance(now_ns)
         self._torque.latch(now_ns)
-        self._show()
+        self._show(now_ns)
         for i in self._on_bus.get(bus, ()):
             drive = self.drives[i]
             drive.on_sync()
@@ -219,16 +219,17 @@ class DrivePeer:
         ends = [(drive.value(0x607D, sub) - self._zero[i]) / self._scale[i] for sub in (1, 2)]
         self._lower[i], self._upper[i] = min(ends), max(ends)
 
-    def _read(self) -> None:
-        position = self.plant.position_rad * self._gear
+    def _read(self, now_ns: int = 0) -> None:
+        seen_rad = self.plant.seen_rad(now_ns)
+        position = seen_rad * self._gear
         shown = np.rint(self._zero + self._scale * position + self._shift)
         self._increments = shown.astype(np.int64).tolist()
         for i, increments in self._stuck.items():
             self._increments[i] = increments
-        self._counts = self.plant.counts.tolist()
+        self._counts = self.plant.counts(seen_rad).tolist()
 
-    def _show(self) -> None:
-        self._read()
+    def _show(self, now_ns: int = 0) -> None:
+        self._read(now_ns)
         told = self._torque.thousandths.tolist()
         for drive, position, count, torque in zip(
             self.drives, self._increments, self._counts, told, strict=True

@@ -53,10 +53,15 @@ class Plant:
         """Where the joints are, (J,)."""
         return self._robot.position_rad
 
-    @property
-    def counts(self) -> NDArray[np.int64]:
+    def seen_rad(self, now_ns: int) -> Array:
+        """(J,) where the joints are at a moment within a cycle: drives sample on SYNC."""
+        since_ns = min(max(0, now_ns - self._robot.now_ns), CYCLE_NS)
+        out: Array = self._robot.position_rad + self._robot.velocity_rad_s * (since_ns / NS_PER_S)
+        return out
+
+    def counts(self, position_rad: Array) -> NDArray[np.int64]:
         """What the encoders show, (J,)."""
-        return self._encoders.counts(self._robot.position_rad)
+        return self._encoders.counts(position_rad)
 
     @property
     def effort_nm(self) -> Array:

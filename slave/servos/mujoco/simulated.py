@@ -91,6 +91,12 @@ class SimulatedRobot:
         return EncoderReading(self.now_ns, counts, self._all_valid, effort_nm=self.effort_nm)
 
     @property
+    def velocity_rad_s(self) -> Array:
+        """(J,) at the end of the newest cycle."""
+        out: Array = self._data.qvel[self._leaders] * self._joint_per_hinge
+        return out
+
+    @property
     def effort_nm(self) -> Array:
         """(J,) torque of each motor at its joint in the newest cycle."""
         return self._torque.joint_nm

@@ -166,7 +166,7 @@ def test_a_reading_waits_for_the_efforts_of_its_own_sync() -> None:
         else:
             on_frame(name, frame_id, data, now_ns)
 
-    wired.drives.on_frame = late  # type: ignore[method-assign]
+    wired.drives.on_frame = late  # type: ignore[method-assign, assignment]
     before_ns = wired.drives.reading.read_ns
     while not kept:
         wired.run(0.004)
