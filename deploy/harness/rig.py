@@ -97,7 +97,8 @@ class Rig:
         given = [override for each in theirs for override in self._overrides.get(each, ())]
         overrides = [*_local(name, self.slaves, self._endpoints), *given]
         if DRIVES in self.children and role in ("slave", DRIVES):
-            overrides += drive_buses(self._endpoints.can_port)
+            # between processes SYNC may come late by milliseconds, which contact detection takes for a push
+            overrides += [*drive_buses(self._endpoints.can_port), "servos.canopen.tell_effort=false"]
         file = example("slave" if role == DRIVES else role, NURSING if role == ROUTER else self.skeleton.name)
         await self.children[name].start(file, overrides, [*self._host(role), *through])
 

@@ -107,6 +107,8 @@ class CanopenConfig(BackendConfig):
     """Between two heartbeats of a drive."""
     drive_dead_ms: int = Field(350, ge=50, le=10_000)
     """A drive that is silent for this time is lost."""
+    tell_effort: bool = True
+    """False: no drive is asked for its effort."""
     effort_every: int | None = Field(None, ge=1, le=MOST_SYNCS)
     """SYNCs from one telling of a drive's effort to the next. None: as few as the buses carry well."""
     following_error_deg: float = Field(20.0, gt=0.0, le=180.0)
@@ -131,6 +133,13 @@ class CanopenConfig(BackendConfig):
 
     def drives_of(self, skeleton: Skeleton) -> dict[str, DriveConfig]:
         """One drive a joint, in the order of the joints."""
+        drives = self._wired(skeleton)
+        if self.tell_effort:
+            return drives
+        silent = {"effort": EffortSource.NONE}
+        return {name: drive.model_copy(update=silent) for name, drive in drives.items()}
+
+    def _wired(self, skeleton: Skeleton) -> dict[str, DriveConfig]:
         if self.drives:
             return {name: self.drives[name] for name in skeleton.joint_names}
         last = self.buses[-1].name

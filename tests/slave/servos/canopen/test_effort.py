@@ -133,6 +133,17 @@ def test_a_file_may_want_none_and_then_nothing_is_sent_for_it() -> None:
     assert wired.peer.drives[wired.index(ROLL)].value(0x1801, 1) & 0x8000_0000
 
 
+def test_one_key_asks_no_drive_at_all() -> None:
+    quiet = geared().model_copy(update={"tell_effort": False})
+    wired = Wired(quiet)
+    wired.up()
+    wired.run(0.2)
+    assert wired.drives.reading.effort_nm is None
+    assert quiet.no_effort(NURSING) == dict.fromkeys(
+        NURSING.joint_names, 'the file says so (effort = "none")'
+    )
+
+
 @pytest.mark.parametrize("every", [1, 4])
 def test_a_drive_that_stops_telling_is_known_after_three_misses(every: int) -> None:
     wired = Wired(geared().model_copy(update={"effort_every": every}))
