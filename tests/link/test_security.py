@@ -143,7 +143,7 @@ def test_nobody_does_what_he_may_not(transport: str, routed: bool, keys: Path, t
             counted = (json.loads(file.read_text()) if routed else guard.figures)["refused"]
             put, look = f"Put {OF_ANNA}", "Declare Subscriber tandem/robot-1/video/head"
             puts = {who: kinds.get(put, 0) for who, kinds in counted["messages"].items()}
-            assert puts["operator:anna"] == 0, "anna only asked on a key that is not hers"
+            assert puts.get("operator:anna", 0) == 0, "anna asked on a key that is not hers, at most"
             assert (
                 min(puts[who] for who in ("operator:ben", "operator:carl", "robot:robot-2", "observer:chief"))
                 >= COMMANDS
