@@ -221,10 +221,11 @@ class SlavePipeline:
 
     def _stop(self, now_ns: int, permission: Permission) -> None:
         """Brake as hard as the joints may, or yield to who touches the robot."""
-        if permission.state is not State.HOLD:
+        guard = self.guard
+        if permission.state is State.ESTOP:
             self.reflex.cancel()
-        elif self.reflex.step(
-            now_ns, permission.dt_s, self.guard.stand_rad, self.limiter, self.guard.doubted
+        elif permission.state is State.HOLD and self.reflex.step(
+            now_ns, permission.dt_s, guard.stand_rad, self.limiter, guard.doubted
         ):
             return
         self.limiter.stop(permission.dt_s)

@@ -20,6 +20,8 @@ COUNTS = 2.25
 """So many counts of every encoder may change at once. Seen in an hour of motions: see README.md."""
 TORQUE_NOISE = 0.02
 """Of the torque that a drive tells, share of its motor's limit: four times that of its current."""
+LEAST_NM = 0.4
+"""Four newtons at a hand's width: less is no push, and what an open hand carries may be wrong by so much."""
 FEEBLE_NM = 0.1
 """A joint whose motor has less torque is a finger's: it is meant to touch, and presses with a few newtons."""
 _STEP_RESPONSE = 0.2306
@@ -68,7 +70,7 @@ def thresholds_nm(skeleton: Skeleton, model: mujoco.MjModel, config: ContactConf
     for j, joint in enumerate(skeleton.joints):
         angle, ratio = leader(joint)
         limit_nm = model.jnt_actfrcrange[model.joint(angle).id, 1] * abs(ratio)
-        out[j] += TORQUE_NOISE * limit_nm
+        out[j] = max(LEAST_NM, out[j] + TORQUE_NOISE * limit_nm)
         if joint.name in config.joints:
             out[j] = config.joints[joint.name].threshold_nm
         elif limit_nm < FEEBLE_NM:

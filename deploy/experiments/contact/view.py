@@ -1,0 +1,79 @@
+"""The meetings and the motions on a terminal, and what they are judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from rich.table import Table
+
+from deploy.experiments.contact.trials import Pair
+from deploy.measure.verdict import Verdict, at_most
+from deploy.report.tables import number, plain_table
+from deploy.sim.patient.free_run import FreeRun
+
+JUDGED_M_S = 0.5
+MOST_RATIO = 0.35
+"""Of the peak force: what is asked where the patient is clamped and where he is free."""
+MOST_DETECTION_MS = 50.0
+NEVER_MS = float("inf")
+
+
+def pairs_table(pairs: Sequence[Pair]) -> Table:
+    """One row a meeting: forces and times without and with detection."""
+    heads = ("m/s", "peak N", "with", "share", "ms", "touching", "with", "pressing", "with")
+    table = plain_table("who meets whom", *heads)
+    for one in pairs:
+        met, without, seen = one.meeting, one.without, one.with_detection
+        table.add_row(
+            f"{met.place}, {'clamped' if met.clamped else 'free'}",
+            f"{met.speed_m_s:g}",
+            number(without.peak_n, 0),
+            number(seen.peak_n, 0),
+            number(one.ratio, 2),
+            "–" if one.detection_s is None else number(1e3 * one.detection_s, 0),
+            number(without.touching_s, 2),
+            number(seen.touching_s, 2),
+            number(without.pressing_n, 0),
+            number(seen.pressing_n, 0),
+        )
+    table.caption = "ms: from threshold to stop; touching: s of 1.5; pressing: N at the end"
+    return table
+
+
+def flights_table(flights: Mapping[str, FreeRun]) -> Table:
+    """One row a motion."""
+    table = plain_table("through the air", "followed s", "false stops", "other holds", "nearest", "at")
+    for name, one in flights.items():
+        table.add_row(
+            name,
+            number(one.followed_s, 0),
+            str(len(one.false_stops)),
+            str(one.other_holds),
+            number(one.nearest, 2),
+            one.joint,
+        )
+    table.caption = "nearest: largest torque from outside, as a share of its threshold"
+    return table
+
+
+def judge(pairs: Sequence[Pair], flights: Mapping[str, FreeRun]) -> list[Verdict]:
+    """Peak forces at 0.5 m/s, free and clamped; the slowest detection; what goes on pressing; false stops."""
+    verdicts = []
+    for clamped, who in ((False, "free"), (True, "clamped")):
+        ratios = [
+            one.ratio
+            for one in pairs
+            if one.meeting.clamped is clamped and one.meeting.speed_m_s == JUDGED_M_S
+        ]
+        verdicts.append(
+            at_most(f"peak force with / without, {who}, 0.5 m/s", max(ratios, default=None), MOST_RATIO)
+        )
+    times = [NEVER_MS if one.detection_s is None else 1e3 * one.detection_s for one in pairs]
+    verdicts.append(at_most("from threshold to stop", max(times, default=None), MOST_DETECTION_MS, "ms"))
+    pressing = [one.with_detection.pressing_n for one in pairs]
+    verdicts.append(at_most("goes on pressing", max(pressing, default=None), 0.0, "N"))
+    false_stops = [len(one.false_stops) for one in flights.values()]
+    verdicts.append(
+        at_most("false stops", float(sum(false_stops)) if flights else None, 0.0, why="--minutes")
+    )
+    return verdicts
