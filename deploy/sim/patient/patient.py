@@ -9,7 +9,7 @@ import numpy as np
 from common.quaternion import Array
 
 STIFFNESS_N_M = 10_000.0
-"""ISO/TS 15066 names 10 kN/m for the back, 75 for hands and face, 150 for the skull."""
+"""ISO/TS 15066 names 10 kN/m for the abdomen, 75 for hands and face, 150 for the skull."""
 MASS_KG = 4.0
 DAMPING_RATIO = 0.2
 
