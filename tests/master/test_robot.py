@@ -30,6 +30,7 @@ from common.wire.messages import (
 )
 from common.wire.presence import ProcessPresence
 from common.wire.topics import CLOCK, CONTROL, STATE, Topic
+from master.alarms.situation import RobotSign
 from master.app import Master
 from master.config import MasterConfig
 from master.pipeline import JointAngleSample
@@ -234,3 +235,11 @@ def test_a_robot_of_another_version_is_named() -> None:
     robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
     link.hear["state"](msgpack.packb(["state", VERSION + 1, "whatever"]), monotonic_ns())
     assert f"schema version {VERSION + 1}, expected {VERSION}" in robot.standing
+
+
+def test_the_operator_s_alarms_know_a_robot_only_while_it_is_heard() -> None:
+    link: Any = FakeLink()
+    robot = CommandedRobot("a", "nurse-1", JOINTS, link=link)
+    assert robot.sign == RobotSign()
+    link.state(monotonic_ns())
+    assert robot.sign == RobotSign("hold", "", ours=False)

@@ -129,6 +129,11 @@ def test_the_live_view_shows_the_worst_joints_and_what_was_dropped() -> None:
     assert "nothing" in text(live_view(Live(0.0, "", "")))
 
 
+def test_the_live_view_shows_the_largest_efforts() -> None:
+    live = Live(1.0, "track", "", effort_nm={"neck_yaw": 0.2, "waist_pitch": -31.04, "left_thumb": None})
+    assert "effort        waist_pitch -31.0   neck_yaw +0.2 N m" in text(live_view(live))
+
+
 @pytest.mark.parametrize("width", [60, 80, 200])
 def test_nothing_is_wider_than_the_terminal_or_cut(width: int) -> None:
     truth, solved, moved = series()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import json
 import sys
@@ -12,8 +13,10 @@ from rich.console import Console
 
 from common.errors import ConfigError, TandemError
 from deploy import cli
+from deploy.ops.doctor.examine import Options, examine
 from deploy.ops.doctor.judge.finding import Health, fail, ok, warn, worst
-from deploy.ops.doctor.judge.needs import CameraNeed, needs_of
+from deploy.ops.doctor.judge.needs import CameraNeed, Needs, needs_of
+from deploy.ops.doctor.read.tree import Tree
 from deploy.ops.doctor.view import as_table, as_tree, in_words
 from master.suit.protocol import SHIPPED_DBC, SuitProtocol
 
@@ -109,3 +112,16 @@ def test_a_router_s_file_is_known_by_having_nothing_else() -> None:
     needs = needs_of(EXAMPLES / "router.toml")
     assert (needs.role, needs.certified_as) == ("router", "router:router-1")
     assert needs.link.listen == ["tcp/0.0.0.0:7448"]
+
+
+def test_drives_that_the_file_lets_tell_no_effort_are_named(tmp_path: Path) -> None:
+    needs = needs_of(
+        EXAMPLES / "slave.toml", ['servos.backend="canopen"', "servos.canopen.tell_effort=false"]
+    )
+    assert len(needs.no_effort) == 25
+    assert needs_of(EXAMPLES / "slave.toml", ['servos.backend="canopen"']).no_effort == {}
+    assert len(needs_of(EXAMPLES / "dynamixel.toml").no_effort) == 25
+    found = asyncio.run(examine(Needs(no_effort={"left_thumb": "so"}), Options(reach=False), Tree(tmp_path)))
+    (finding,) = [one for one in found if one.check == "contact"]
+    assert finding.health is Health.WARN
+    assert finding.found == "no contact detection: left_thumb tells no effort: so"
