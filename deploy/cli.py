@@ -15,6 +15,7 @@ from deploy.calibrate.commands import app as calibrate_app
 from deploy.calibrate.live.command import live
 from deploy.experiments.accuracy.commands import app as accuracy_app
 from deploy.experiments.bench.command import bench
+from deploy.experiments.collisions.command import collisions
 from deploy.experiments.contact.command import contact
 from deploy.experiments.demo.command import demo
 from deploy.experiments.faults.command import faults
@@ -55,7 +56,7 @@ for _name, _group in {
 }.items():  # fmt: skip
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
-    master, slave, suit, drives, router, demo, soak, faults, contact, bench, audit,
+    master, slave, suit, drives, router, demo, soak, faults, collisions, contact, bench, audit,
     *OPERATORS_ACTS, attitude, video, doctor, servos, stops, inputs, alarms, record, recording,
 )  # fmt: skip
 for _command in _COMMANDS:
