@@ -24,14 +24,15 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.guard.zones import Zone, distance_model, speed_limits, zone_margins_m
-from slave.model.distance import REACH_M, NearPairs
+from slave.model.distance import CLOSE_M, REACH_M, NearPairs
 
 TIME_CONSTANT_S = 0.1
 """τ: at 10 cm beyond the margin a pair may approach at 1 m/s."""
 SKIN_M = 0.001
 """The damper stops this far before the margin, which rounding and curved ways then do not reach."""
-STRIDE_M = 0.02
-"""On the way to standstill a pair is looked at again at least after this much way towards each other."""
+STRIDE_M = CLOSE_M
+"""On the way to standstill a pair is looked at again after this much way towards each other, at most. That is
+the sum of what each joint could add; convex parts that are apart at both ends then meet by 1 mm at most."""
 MOST_ROWS = 32
 MOST_CUTS = 3
 BUDGET_NS = 2_000_000
@@ -90,8 +91,11 @@ class DistanceDamper:
         self._most_m_s, self._slow_from_m = (
             np.append(a, b) for a, b in zip(speed_limits(zones), (np.inf, 0.0), strict=True)
         )
-        self._spare_m = np.full(len(model.levers_m), np.inf)
-        np.minimum.at(self._spare_m, model.kind, np.where(np.isfinite(margins_m), REACH_M, np.inf))
+        self._kept = np.zeros(len(model.levers_m), np.bool_)
+        """(R,) whether there are pairs of this kind that must not meet."""
+        np.logical_or.at(self._kept, model.kind, np.isfinite(margins_m))
+        joints = model.levers_m.shape[1]
+        self._cost = np.eye(joints), np.zeros(joints)
         self.clock: Callable[[], int] = lambda: 0
         """Tells how much time a step takes. The default takes none: on a virtual clock nothing is late."""
         self._late_in_a_row = 0
@@ -132,6 +136,8 @@ class DistanceDamper:
         spare_m = near.distance_m - self._margin_m[near.pair] - SKIN_M
         fastest = self._model.levers_m @ np.abs(step.wish_rad_s)
         rows = np.flatnonzero(spare_m < TIME_CONSTANT_S * fastest[self._model.kind[near.pair]])
+        if len(rows) > 2 * MOST_ROWS:
+            rows = rows[np.argpartition(spare_m[rows], 2 * MOST_ROWS)[: 2 * MOST_ROWS]]
         gradient, spare_m = self._model.gradient(rows), spare_m[rows]
         # within its skin a pair parts again, gently; one that is inside its margin is only kept from more
         parting = np.where(spare_m > -SKIN_M, -spare_m, 0.0) / TIME_CONSTANT_S
@@ -171,12 +177,12 @@ class DistanceDamper:
 
     def _cut(self, near: NearPairs, floor_m: Array, velocity: Array, step: DamperStep) -> _Rows | None:
         """What this velocity would break on the way to standstill, as rows that forbid it; None: nothing."""
-        model, spare_m, speed = self._model, self._spare(near, floor_m), np.abs(velocity)
+        model, spare_m, speed = self._model, self._spare(near, floor_m, REACH_M), np.abs(velocity)
         far_rad = speed * (step.dt_s + speed / (2.0 * step.brake_rad_s2))
         risky = np.flatnonzero(model.levers_m @ far_rad > spare_m)
         if not len(risky):
             return None
-        way_rad, moving_s = _way_to_stop(velocity, step)
+        way_rad, parts, period_s = _way_to_stop(velocity, step)
         # no joint turns back on the way: what each adds only grows
         apart_m, passed_m, k = np.abs(way_rad) @ model.levers_m[risky].T, 0.0, 0
         while k < len(way_rad):
@@ -185,20 +191,23 @@ class DistanceDamper:
             if (ahead_m[-1] <= spare_m).all():
                 return None
             safe = np.all(ahead_m <= np.maximum(spare_m, STRIDE_M), axis=1)
-            k += max(int(np.argmin(safe)) if not safe[-1] else len(safe), 1) - 1
-            then = model.near(step.position_rad + way_rad[k])
+            ahead = max(int(np.argmin(safe)) if not safe[-1] else len(safe), 1)
+            if k < parts <= k + ahead and (ahead_m[parts - 1 - k] > spare_m).any():
+                ahead = parts - k  # the next setpoint itself is never passed over
+            k += ahead - 1
+            then = model.near(step.position_rad + way_rad[k], close=True)
             lack_m = floor_m[then.pair] - then.distance_m
             if lack_m.max(initial=0.0) > 0.0:
-                worst = np.flatnonzero(lack_m > 0.0)
-                of = model.gradient(worst) * moving_s[k]
+                worst = np.argsort(-lack_m)[: min(np.count_nonzero(lack_m > 0.0), MOST_ROWS)]
+                of = model.gradient(worst) * _moving_s(velocity, step, k, parts, period_s)
                 return self._possible(of, lack_m[worst] + 0.1 * SKIN_M + of @ velocity, step)
-            spare_m, passed_m = self._spare(then, floor_m), apart_m[k]
+            spare_m, passed_m = self._spare(then, floor_m, CLOSE_M), apart_m[k]
             k += 1
         return None
 
-    def _spare(self, near: NearPairs, floor_m: Array) -> Array:
+    def _spare(self, near: NearPairs, floor_m: Array, reach_m: float) -> Array:
         """(R,) how far the pairs of each kind may come towards each other, at least."""
-        spare_m = self._spare_m.copy()
+        spare_m = np.where(self._kept, reach_m, np.inf)
         np.minimum.at(spare_m, self._model.kind[near.pair], near.distance_m - floor_m[near.pair])
         return spare_m
 
@@ -208,13 +217,13 @@ class DistanceDamper:
         Not the wish: that has the last velocity in it, and a posture would swing along what it leans against.
         """
         scale, aim = step.max_velocity_rad_s, step.aim_rad_s
-        joints, of = len(aim), rows.of
+        of, scaled = rows.of, rows.of * scale
         bounds = (step.lowest_rad_s - aim) / scale, (step.highest_rad_s - aim) / scale
         highest = np.concatenate([bounds[1], np.full(len(of), _FREE)])
         # not all rows may be possible at once; what braking keeps of them is
         for least in (rows.least, np.minimum(rows.least, of @ step.braking_rad_s)):
             lowest = np.concatenate([bounds[0], least - of @ aim])
-            change, _, found, _ = daqp.solve(np.eye(joints), np.zeros(joints), of * scale, highest, lowest)
+            change, _, found, _ = daqp.solve(*self._cost, scaled, highest, lowest)
             if found == 1:
                 velocity = aim + np.asarray(change) * scale
                 return np.asarray(np.clip(velocity, step.lowest_rad_s, step.highest_rad_s))
@@ -251,20 +260,28 @@ class DistanceDamper:
         return f"{part} is held back: {max(100.0 * distance_m, 0.0):.0f} cm from the {other}"
 
 
-def _way_to_stop(velocity: Array, step: DamperStep) -> tuple[Array, Array]:
-    """The joints' way to standstill, (K, J) at each of K moments, and its derivative by the velocity, in s.
+def _way_to_stop(velocity: Array, step: DamperStep) -> tuple[Array, int, float]:
+    """The joints' way to standstill, (K, J) at each of K moments; how many of them are parts of this step.
 
-    This step first, a late one in parts; then each joint brakes, step by step, until it stands.
+    This step first, a late one in parts; then each joint brakes, step by step, until it stands. Also the time
+    of one of these steps. After n of them a joint of speed s, which sheds a in each, has gone
+    (n s - a n (n + 1) / 2) of it further, n at most s / a.
     """
     parts = math.ceil(step.dt_s / _PERIOD_S)
     period_s = step.dt_s / parts
     shed = step.brake_rad_s2 * period_s
     speed = np.abs(velocity)
-    count = math.ceil(float((speed / shed).max()) - 1e-9)
-    shares = np.arange(1, parts + 1)[:, None] / parts
-    slower = np.maximum(speed - np.arange(1, max(count, 1))[:, None] * shed, 0.0)
-    braking = step.dt_s * speed + period_s * np.cumsum(slower, axis=0)
-    way = np.vstack([shares * step.dt_s * speed, braking])
-    moved_s = step.dt_s + period_s * np.cumsum(slower > 0.0, axis=0)
-    first = np.broadcast_to(shares * step.dt_s, (parts, len(speed)))
-    return np.copysign(way, velocity), np.vstack([first, moved_s])
+    moves = np.floor(speed / shed)
+    braked = np.minimum(np.arange(max(int(moves.max()), 0) + 1)[:, None], moves)
+    way = step.dt_s * speed + period_s * braked * (speed - (0.5 * shed) * (braked + 1.0))
+    if parts > 1:
+        way = np.vstack([np.arange(1, parts)[:, None] * (period_s * speed), way])
+    return np.copysign(way, velocity), parts, period_s
+
+
+def _moving_s(velocity: Array, step: DamperStep, k: int, parts: int, period_s: float) -> Array:
+    """(J,) for how long each joint has moved by moment k: the derivative of its way by its velocity."""
+    if k < parts:
+        return np.full_like(velocity, (k + 1) * period_s)
+    moves = np.floor(np.abs(velocity) / (step.brake_rad_s2 * period_s))
+    return np.asarray(step.dt_s + period_s * np.minimum(k + 1 - parts, moves))

@@ -6,6 +6,7 @@ has what this costs, and what other ways cost.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -23,6 +24,9 @@ from slave.model.pairs import groups, moving, pairs
 
 REACH_M = 0.12
 """A pair further apart than its margin and this is not looked at."""
+
+CLOSE_M = 0.05
+"""The same, for a quicker look."""
 
 Indices = NDArray[np.intp]
 
@@ -69,7 +73,11 @@ class DistanceModel:
         """`obstacles` beside the robot's own stand, and the margin of the robot itself, then of each."""
         margins = tuple(margins_m) or (0.0,) * (1 + len(obstacles))
         plan = _plan(skeleton, tuple(obstacles), margins)
-        self._model, self._data = plan.model, mujoco.MjData(plan.model)
+        close = copy.copy(plan.model)
+        close.pair_margin += CLOSE_M - REACH_M
+        close.pair_gap += CLOSE_M - REACH_M
+        self._far, self._close = (plan.model, mujoco.MjData(plan.model)), (close, mujoco.MjData(close))
+        self._data = self._far[1]
         self._hinges_per_joint, self._pair_of, self._carries = (
             plan.hinges_per_joint, plan.pair_of, plan.carries,
         )  # fmt: skip
@@ -82,12 +90,13 @@ class DistanceModel:
         self.levers_m = plan.levers_m
         """(R, J) m a rad: how far each joint moves the two of such a pair relative to each other at most."""
 
-    def near(self, position_rad: Array) -> NearPairs:
-        """The near pairs at joint angles (J,)."""
-        data = self._data
+    def near(self, position_rad: Array, close: bool = False) -> NearPairs:
+        """Pairs nearer than `REACH_M` beyond their margins at joint angles (J,); `close`: than `CLOSE_M`."""
+        model, data = self._close if close else self._far
+        self._data = data
         data.qpos[:] = position_rad @ self._hinges_per_joint
-        mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_collision(self._model, data)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
         geom = data.contact.geom
         return NearPairs(self._pair_of[geom[:, 0], geom[:, 1]], data.contact.dist.copy())
 
