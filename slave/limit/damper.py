@@ -34,8 +34,8 @@ STRIDE_M = CLOSE_M
 """On the way to standstill a pair is looked at again after this much way towards each other, at most. That is
 the sum of what each joint could add; convex parts that are apart at both ends then meet by 1 mm at most."""
 MOST_ROWS = 32
-MOST_CUTS = 3
-BUDGET_NS = 2_000_000
+MOST_CUTS = 2
+BUDGET_NS = 3_000_000
 """A tick that has taken longer than this brakes."""
 MOST_LATE = 10
 """So many late ticks in a row, and the robot holds."""
