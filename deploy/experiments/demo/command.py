@@ -29,8 +29,8 @@ RobotProfile = Annotated[str, typer.Option(help="Robot profile: nursing, hand or
 Motion = Annotated[
     str | None,
     typer.Option(
-        help="Motion of the simulated operator: sweep, calibration_pose, or the "
-        "profile's own (bottle, grasp or walk), which is the default.",
+        help="Motion of the simulated operator: sweep, calibration_pose, crossed (the operator reaches into "
+        "herself), or the profile's own (bottle, grasp or walk), which is the default.",
         show_default=False,
     ),
 ]

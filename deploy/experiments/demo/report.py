@@ -15,6 +15,7 @@ from common.skeleton.synergy import synergy_positions
 from common.wire.messages import Mask
 from deploy.examples.profiles import example
 from deploy.experiments.demo.curves import Curves, curves
+from deploy.experiments.demo.nearness import Nearness, nearness
 from deploy.experiments.demo.options import DemoOptions
 from deploy.experiments.demo.robots import RobotRow, robot_problems, robot_row
 from deploy.harness.host import HostMetrics
@@ -61,6 +62,7 @@ class DemoReport:
     motion: FollowedMotion | None
     comparison: Comparison | None
     """With the other strategies, on the same commands; None where there is nothing to judge."""
+    nearness: Nearness | None
     curves: Curves | None
     """What to draw; None where the robot never tracked."""
     robots: Mapping[str, RobotRow]
@@ -98,6 +100,7 @@ def make_report(
         synergies=_synergies(truth, solved, skeleton),
         motion=followed,
         comparison=compare(truth, moved, accepted, slave_config) if followed else None,
+        nearness=nearness(truth, observer.states, skeleton, slave_config.guard.self_margin_cm / 100.0),
         curves=curves(truth, moved, skeleton),
         robots=robots,
         problems=_problems(statuses, master, observer, robots, notes.problem),

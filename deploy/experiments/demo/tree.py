@@ -37,6 +37,7 @@ def report_tree(report: DemoReport) -> Tree:
         **_motion_tree(moved, report.comparison),
         **_accuracy_tree(report.accuracy),
         "synergies": _joint_rows(report.synergies),
+        "nearness": _tree_or_none(report.nearness),
         "one_way_plus_lag_ms": _answers_within(report.slave, moved),
         "encoders_read": dict(moved.read) if moved else {},
         "video": _tree_or_none(report.video),

@@ -8,6 +8,7 @@ from rich.text import Text
 
 from deploy.client.efforts import by_joint
 from deploy.experiments.demo.live_view import Live, live_view
+from deploy.experiments.demo.nearness import nearness_text
 from deploy.experiments.demo.report import DemoReport
 from deploy.experiments.demo.robots import robots_table
 from deploy.experiments.demo.tables import (
@@ -85,6 +86,8 @@ def _print_tables(report: DemoReport, console: Console) -> None:
         console.print(strategies_table(report.comparison.as_run, report.comparison.replayed))
     if report.synergies:
         console.print(synergy_table(report.synergies))
+    if report.nearness is not None:
+        console.print(nearness_text(report.nearness))
     console.print(Group(_loops(report), holds_text(report.notes.holds)))
     targets = of_demo(report.options.profile, report.options.servos)
     console.print(verdict_table("targets", judge_targets(report_tree(report), targets)))
