@@ -25,8 +25,8 @@ RENAMED = {
 """Keys that had another name, old to new: an old one is refused, and the new one named."""
 
 
-CHOOSES = "source"
-"""The key by which a section is one of several kinds."""
+CHOOSE = ("source", "shape")
+"""The keys by which a section is one of several kinds."""
 
 
 def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -> Model:
@@ -55,8 +55,8 @@ def check_config(path: Path, table: Mapping[str, object], model: type[Model]) ->
     except ValidationError as error:
         mistakes = [
             ConfigMistake(
-                ".".join(map(str, _place(table, e["loc"], e["type"]))) or "file",
-                _value(e["type"], e["input"]),
+                ".".join(map(str, _place(table, e["loc"], e["type"], e["msg"]))) or "file",
+                _value(e["type"], e["input"], e["msg"]),
                 _expected(e["type"], e["msg"], e["loc"]),
             )
             for e in error.errors()
@@ -92,23 +92,28 @@ def _override(table: dict[str, object], text: str) -> None:
     place[last] = parsed
 
 
-def _place(table: object, loc: Sequence[int | str], kind: str) -> list[int | str]:
-    """The keys to a mistake, less the names of choices by `source` that pydantic puts between them."""
+def _place(table: object, loc: Sequence[int | str], kind: str, message: str) -> list[int | str]:
+    """The keys to a mistake, less the names of choices by `CHOOSE` that pydantic puts between them."""
     place: list[int | str] = []
     for part in loc:
-        if isinstance(table, Mapping) and part not in table and part == table.get(CHOOSES):
+        if isinstance(table, Mapping) and part not in table and part in map(table.get, CHOOSE):
             continue
         place.append(part)
         if isinstance(table, Mapping):
             table = table.get(part)
         elif isinstance(table, list) and isinstance(part, int) and part < len(table):
             table = table[part]
-    return [*place, CHOOSES] if kind.startswith("union_tag") else place
+    return [*place, _chooser(message)] if kind.startswith("union_tag") else place
 
 
-def _value(kind: str, given: object) -> object:
+def _chooser(message: str) -> str:
+    """The key that pydantic names in its message about a choice."""
+    return next((key for key in CHOOSE if f"'{key}'" in message), CHOOSE[0])
+
+
+def _value(kind: str, given: object, message: str) -> object:
     if kind == "union_tag_invalid" and isinstance(given, Mapping):
-        return given.get(CHOOSES)
+        return given.get(_chooser(message))
     return NOT_SET if kind in ("missing", "union_tag_not_found") else given
 
 

@@ -41,12 +41,12 @@ def test_sound_zones_are_accepted() -> None:
 @pytest.mark.parametrize(
     ("zones", "keys", "key", "expected"),
     [
-        ([{**BED, "size_m": [1.0, 2.0]}], {}, "zones.0.box.size_m", "at least 3 items"),
-        ([{**BED, "size_m": [1.0, 2.0, 0.0]}], {}, "zones.0.box.size_m.2", "greater than 0"),
-        ([{**HEAD, "radius_m": "big"}], {}, "zones.0.sphere.radius_m", "valid number"),
-        ([{**HEAD, "radius": 1.0}], {}, "zones.0.sphere.radius", "no such key"),
-        ([{**HEAD, "max_speed_m_s": 0.0}], {}, "zones.0.sphere.max_speed_m_s", "greater than 0"),
-        ([{**BED, "shape": "ball"}], {}, "zones.0", "'box', 'capsule', 'sphere', 'half_space'"),
+        ([{**BED, "size_m": [1.0, 2.0]}], {}, "zones.0.size_m", "at least 3 items"),
+        ([{**BED, "size_m": [1.0, 2.0, 0.0]}], {}, "zones.0.size_m.2", "greater than 0"),
+        ([{**HEAD, "radius_m": "big"}], {}, "zones.0.radius_m", "valid number"),
+        ([{**HEAD, "radius": 1.0}], {}, "zones.0.radius", "no such key"),
+        ([{**HEAD, "max_speed_m_s": 0.0}], {}, "zones.0.max_speed_m_s", "greater than 0"),
+        ([{**BED, "shape": "ball"}], {}, "zones.0.shape", "'box', 'capsule', 'sphere', 'half_space'"),
         ([{**WALL, "free_side": [0.0, 0.0, 0.0]}], {}, "zones.0.free_side", "not all three 0"),
         ([{**RAIL, "to_m": [0.6, 0, 1]}], {}, "zones.0.to_m", "another point"),
         ([BED, {**WALL, "name": "bed"}], {}, "zones.1.name", "another name"),

@@ -23,6 +23,7 @@ from tests.slave.limit.apart import (
 )
 
 ZERO = np.zeros(J)
+NO_ROWS = damper._Rows(np.empty((0, J)), np.empty(0))
 FORWARD = posture(shoulder_pitch=85)
 BED = BoxZone(name="bed", shape="box", center_m=[0.75, 0.0, 0.9], size_m=[0.6, 1.6, 0.3], yaw_deg=10.0)
 HEAD = SphereZone(name="the patient's head", shape="sphere", center_m=[0.5, 0.25, 1.4], radius_m=0.12)
@@ -171,3 +172,40 @@ def test_just_in_time_is_in_time() -> None:
     robot.damper.clock = clock
     robot.go(FORWARD, DT_S)
     assert robot.limiter.velocity_rad_s.any()
+
+
+# each part taken out
+
+
+def test_without_room_to_brake_a_twist_at_full_speed_collides(monkeypatch: pytest.MonkeyPatch) -> None:
+    out, across = (posture(shoulder_pitch=60, shoulder_yaw=yaw, elbow_pitch=90) for yaw in (80, -80))
+    spare_m = []
+    for taken in (False, True):
+        if taken:
+            monkeypatch.setattr(damper.DistanceDamper, "_cut", lambda *_: None)
+        robot = Robot([WALL], start=out)
+        robot.go(across, 1.0)
+        own_m, (wall_m,) = robot.least_m()
+        spare_m.append(min(own_m - MARGIN_M, wall_m - 0.03))
+    assert spare_m[0] >= -SLACK_M
+    assert spare_m[1] < -0.02
+
+
+def test_without_the_damping_a_hand_comes_fast_to_the_margin(monkeypatch: pytest.MonkeyPatch) -> None:
+    fastest_m_s = []
+    for taken in (False, True):
+        if taken:
+            monkeypatch.setattr(damper.DistanceDamper, "_damping", lambda *_: NO_ROWS)
+        robot = Robot([WALL])
+        robot.go(FORWARD, 1.0)
+        spare_m = robot.distances.to_zones_m(np.array(robot.course[::4]))[:, 0] - 0.03
+        closing_m_s = -np.diff(spare_m) / DT_S
+        fastest_m_s.append(closing_m_s[spare_m[:-1] < 0.05].max())
+    assert fastest_m_s[0] <= 0.05 / damper.TIME_CONSTANT_S
+    assert fastest_m_s[1] > 1.3 * fastest_m_s[0]
+
+
+def test_without_its_part_a_zone_does_not_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(damper.DistanceDamper, "_slowed", lambda _, near, step: (step, None))
+    with pytest.raises(AssertionError):
+        test_a_zone_limits_the_speed_of_what_is_inside()

@@ -1,4 +1,4 @@
-"""Least distances of a run: of the operator's angles, of setpoints and of encoders, each from its own series."""
+"""Least distances of a run: of the operator, of setpoints and of encoders, each from its own series."""
 
 from __future__ import annotations
 
