@@ -37,8 +37,8 @@ def test_all_passes_at_the_limits() -> None:
     ("changes", "name"),
     [
         ({"peak_n": 35.1}, "peak force with / without, clamped, 0.5 m/s"),
-        ({"noticed_s": 0.0521}, "from threshold to stop"),
-        ({"noticed_s": None}, "from threshold to stop"),
+        ({"noticed_s": 0.0521}, "from threshold to stop, clamped"),
+        ({"noticed_s": None}, "from threshold to stop, clamped"),
         ({"pressing_n": 0.1}, "goes on pressing"),
     ],
 )
