@@ -56,6 +56,6 @@ def collisions(
     console.print(f"limits exceeded in {found.beyond_limits} ticks; stuck {found.stuck} times")
     console.print("a step, CPU time: " + ", ".join(f"{k} {us:.0f} µs" for k, us in found.tick_us.items()))
     if report is not None:
-        write_json(report, {**asdict(found), "seed": seed, "wrong": found.wrong})
+        write_json(report, {**asdict(found), "kinds": dict(found.kinds), "seed": seed, "wrong": found.wrong})
     if found.wrong:
         raise TandemError("; ".join(found.wrong))
