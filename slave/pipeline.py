@@ -222,7 +222,7 @@ class SlavePipeline:
     def _stop(self, now_ns: int, permission: Permission) -> None:
         """Brake as hard as the joints may, or yield to who touches the robot."""
         guard = self.guard
-        if permission.state is State.ESTOP:
+        if permission.state is State.ESTOP or not guard.may_yield(now_ns):
             self.reflex.cancel()
         elif permission.state is State.HOLD and self.reflex.step(
             now_ns, permission.dt_s, guard.stand_rad, self.limiter, guard.doubted

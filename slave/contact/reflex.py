@@ -27,6 +27,9 @@ YIELDS_RAD_S = 0.5
 GIVES_WAY = 0.5
 """It begins to at this share of the threshold: what the model may be wrong by must not move it."""
 SLOW_RAD_S, SLOW_RAD_S2 = 0.5, 4.0
+LEAD_S = 0.1
+"""Setpoints lead the joints by the drives' 30 ms and what comes until a contact is noticed. A joint that seems
+further from its setpoint than it turns in this time is not where it says: nothing yields by it."""
 
 
 class ContactReflex:
@@ -89,6 +92,9 @@ class ContactReflex:
     def _begins(self, now_ns: int, stand_rad: Array, limiter: SetpointLimiter, doubted: Mask) -> bool:
         late = now_ns - self._moved_ns > AFTER_NS
         if self._config.reflex is Reflex.HOLD or self._watch.finding is None or late or not self._way:
+            return False
+        lead_rad = np.where(doubted, 0.0, np.abs(limiter.position_rad - stand_rad))
+        if (lead_rad > LEAD_S * limiter.limits.max_velocity_rad_s).any():
             return False
         self._began_ns, self._back, self._free_m = now_ns, 0, None
         limiter.seat(np.where(doubted, limiter.position_rad, stand_rad))

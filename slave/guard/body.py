@@ -28,7 +28,12 @@ class Body:
     @property
     def first_fault(self) -> str | None:
         """The first fault as text, or None."""
-        return self.drive_fault or self.base or self.namesake or self.contact
+        return self.first_besides_contact or self.contact
+
+    @property
+    def first_besides_contact(self) -> str | None:
+        """The first fault other than that the robot is pushed, as text, or None."""
+        return self.drive_fault or self.base or self.namesake
 
     @property
     def estop(self) -> str | None:

@@ -95,6 +95,10 @@ class Guard:
         """(J,) those joints."""
         return self._joints.plausible.doubted
 
+    def may_yield(self, now_ns: int) -> bool:
+        """Whether nothing but contact is wrong: who yields goes by the drives' and encoders' angles."""
+        return self._body.first_besides_contact is None and self._joints.life.silence(now_ns) is None
+
     @property
     def stand_rad(self) -> Array:
         """(J,) where the joints are, by the angles that their drives take setpoints by."""

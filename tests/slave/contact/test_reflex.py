@@ -8,7 +8,7 @@ import pytest
 from common.skeleton import load_skeleton
 from common.wire.messages import Mask
 from slave.contact.config import ContactConfig, Reflex
-from slave.contact.reflex import AFTER_NS, MOST_M, REBOUND_NS, SLOW_RAD_S, ContactReflex
+from slave.contact.reflex import AFTER_NS, LEAD_S, MOST_M, REBOUND_NS, SLOW_RAD_S, ContactReflex
 from slave.contact.watch import ContactWatch
 from slave.guard.config import GuardConfig
 from slave.limit.limit import SetpointLimiter
@@ -130,3 +130,14 @@ def test_floating_gives_way_to_a_push_and_stands_without_one() -> None:
     pushed[2, 0, SHOULDER] = -0.4 * robot.watch.threshold_nm[SHOULDER]
     rest = robot.step(200)
     assert rest[-1] == rest[-50]
+
+
+@pytest.mark.parametrize(("lead", "yields"), [(0.99, True), (1.01, False)])
+def test_a_joint_that_seems_further_from_its_setpoint_than_any_drive_lags_is_not_followed(
+    lead: float, yields: bool
+) -> None:
+    """A drive whose own angle is wrong: to seat the setpoint there would fling the joint."""
+    arm = Raised(ContactConfig())
+    most_rad = LEAD_S * arm.limiter.limits.max_velocity_rad_s[SHOULDER]
+    arm.limiter.seat(arm.stand + np.eye(25)[SHOULDER] * lead * most_rad)
+    assert bool(arm.step(3)) is yields
