@@ -28,7 +28,7 @@ GIVES_WAY = 0.5
 """It begins to at this share of the threshold: what the model may be wrong by must not move it."""
 SLOW_RAD_S, SLOW_RAD_S2 = 0.5, 4.0
 LEAD_S = 0.1
-"""Setpoints lead the joints by the drives' 30 ms and what comes until a contact is noticed. A joint that seems
+"""Setpoints lead the joints by the drives' 30 ms and what comes until contact is noticed. A joint that seems
 further from its setpoint than it turns in this time is not where it says: nothing yields by it."""
 
 
