@@ -10,7 +10,7 @@ PANELS = {
         "engage", "handover", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude",
         "video",
     ),
-    "Set up": ("doctor", "servos", "stops", "alarms", "calibrate", "keys", "record", "recording"),
+    "Set up": ("doctor", "servos", "inputs", "stops", "alarms", "calibrate", "keys", "record", "recording"),
     "Judge": ("trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit"),
 }  # fmt: skip
 """In the order of the help."""

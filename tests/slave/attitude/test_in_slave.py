@@ -30,9 +30,11 @@ class FakeLink:
     def publish(self, topic: Topic) -> Callable[[bytes], None]:
         return self.states.append if topic.name == "state" else lambda _: None
 
-    def subscribe(self, *_: object) -> None: ...
+    def subscribe_keys(self, *_: object) -> None: ...
 
     def answer(self, *_: object) -> None: ...
+
+    def answer_keys(self, *_: object) -> None: ...
 
     def watch_presence(self, *_: object) -> None: ...
 
@@ -93,7 +95,8 @@ def test_without_a_sensor_nothing_is_told_and_nothing_amiss(monkeypatch: pytest.
 def test_a_level_base_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     state, metrics = state_with(FakeBase(attitude(1.0)), monkeypatch)
     assert state.base == attitude(1.0)
-    assert state.faults == {"neck_yaw": "over-current"}
+    assert state.faults["neck_yaw"] == "over-current"
+    assert "base" not in state.faults
     assert metrics.base == {"frames": 7}
 
 

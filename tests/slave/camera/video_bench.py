@@ -126,7 +126,7 @@ async def measure(options: SlowLinkOptions, seconds: float, video: str = "contro
 
 
 async def _command(link: Link, watch: VideoWatch, until_ns: int) -> None:
-    put = link.publish(COMMAND)
+    put = link.publish(COMMAND.of("nurse-1"))
     command = Command(ROBOT, 1, 0, 0, CommandStamps(0, 0, 0, 0), True, _ALL, _ZERO, _ZERO)
     async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / COMMAND.rate_hz))):
         now_ns = monotonic_ns()

@@ -42,6 +42,7 @@ def site(tmp_path: Path) -> Path:
     shutil.copy(SHIPPED_DBC, tmp_path)
     now, valid = datetime.now(UTC), timedelta(days=365)
     (tmp_path / "keys").mkdir()
+    (tmp_path / "keys" / "revoked.txt").write_text("", "utf-8")
     authority = new_authority("test", now, valid)
     write_pair(tmp_path / "keys", "ca", authority)
     for role, name, hosts in ((Role.ROBOT, "robot-1", ["127.0.0.1"]), (Role.OPERATOR, "nurse-1", [])):

@@ -55,7 +55,7 @@ def test_all_keys(path: Path) -> None:
 @pytest.mark.parametrize(
     ("override", "said"),
     [
-        ('motion = "dance"', "motion = 'dance': expected one of bottle, calibration_pose, sweep"),
+        ('motion = "dance"', "motion = 'dance': expected one of bottle, crossed, calibration_pose, sweep"),
         ('grade = "good"', "grade = 'good': expected 'ideal', 'calibrated' or 'raw'"),
         ("seed = -1", "seed = -1: expected greater than or equal to 0"),
         ("sead = 1", "sead = 1: expected no such key"),
