@@ -209,3 +209,14 @@ def test_without_its_part_a_zone_does_not_slow(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(damper.DistanceDamper, "_slowed", lambda _, near, step: (step, None))
     with pytest.raises(AssertionError):
         test_a_zone_limits_the_speed_of_what_is_inside()
+
+
+def test_a_step_right_after_the_last_one_costs_no_more_than_any_other() -> None:
+    """A late tick and the next one may be a nanosecond apart: the way to standstill is as long as ever."""
+    speed = LIMITS.max_velocity_rad_s
+    brake = LIMITS.max_acceleration_rad_s2
+    step = damper.DamperStep(ZERO, speed, speed, -speed, speed, speed, speed, brake, 1e-9)
+    way_rad = damper._way_to_stop(speed, step)[0]
+    assert len(way_rad) <= 1.0 + float((speed / brake).max()) / 0.001
+    continuous = speed**2 / (2.0 * brake)
+    assert np.abs(way_rad[-1] - continuous).max() <= 0.5 * 0.001 * float(speed.max()) + 1e-6
