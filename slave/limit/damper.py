@@ -285,6 +285,6 @@ def _way_to_stop(velocity: Array, step: DamperStep) -> tuple[Array, int, float]:
 def _moving_s(velocity: Array, step: DamperStep, k: int, parts: int, period_s: float) -> Array:
     """(J,) for how long each joint has moved by moment k: the derivative of its way by its velocity."""
     if k < parts:
-        return np.full_like(velocity, (k + 1) * period_s)
+        return np.full_like(velocity, min((k + 1) * period_s, step.dt_s))
     moves = np.floor(np.abs(velocity) / (step.brake_rad_s2 * period_s))
     return np.asarray(step.dt_s + period_s * np.minimum(k + 1 - parts, moves))
