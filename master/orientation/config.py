@@ -41,7 +41,7 @@ class EstimationConfig(Section):
     zero_pose_lean_deg: float = Field(default=15.0, gt=0.0, le=90.0)
     """A segment that leans farther from upright, degrees, is not in the zero pose: it is asked for again.
     Noticed only where the node's file gives its alignment."""
-    constraints: Literal["auto", "online", "off"] = "auto"
+    constraints: Literal["auto", "online", "off"] = "off"
     """`online`: headings by the gyros, corrected by what the joints cannot do and by the magnetometers as far
     as the field is undisturbed. `off`: each node's heading by its own filter alone. `auto`: `online` once
     the files give the alignment of both nodes of a joint that constrains them; only such joints count."""

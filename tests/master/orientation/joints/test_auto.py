@@ -1,4 +1,4 @@
-"""By default joints correct headings as soon as alignments are known: no worse in a quiet field, cheap."""
+"""With `auto` joints correct headings as soon as alignments are known: no worse in a quiet field, cheap."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ ASKEW = from_axis_angle([0.0, 0.0, 1.0], np.radians(1.0))
 """One degree, so that the alignment counts as known."""
 
 
-def estimator(constraints: str | None, aligned: Mask, skeleton: Skeleton) -> Estimator:
-    """`constraints` None: the default."""
-    config = {} if constraints is None else {"constraints": constraints}
+def estimator(constraints: str, aligned: Mask, skeleton: Skeleton) -> Estimator:
+    config = {"constraints": constraints}
     calibration = replace(identity(len(aligned)), alignment_made=aligned)
     nodes = [Node()] * len(aligned)
     return Estimator(EstimationConfig.model_validate(config), nodes, RATE_HZ, calibration, skeleton)
@@ -38,15 +37,15 @@ def estimator(constraints: str | None, aligned: Mask, skeleton: Skeleton) -> Est
 @pytest.mark.parametrize(
     ("constraints", "aligned", "online"),
     [
-        (None, ["left_upper_arm", "left_forearm"], True),
-        (None, ["left_upper_arm", "right_forearm", "chest"], False),
-        (None, [], False),
+        ("auto", ["left_upper_arm", "left_forearm"], True),
+        ("auto", ["left_upper_arm", "right_forearm", "chest"], False),
+        ("auto", [], False),
         ("off", ["left_upper_arm", "left_forearm"], False),
         ("online", [], True),
     ],
 )
 def test_it_is_on_where_both_nodes_of_a_joint_are_aligned(
-    arms: Skeleton, constraints: str | None, aligned: list[str], online: bool
+    arms: Skeleton, constraints: str, aligned: list[str], online: bool
 ) -> None:
     subject = estimator(constraints, of_all(aligned, arms), arms)
     assert isinstance(subject._heading, OnlineHeadings if online else HeadingMemory)
@@ -54,26 +53,24 @@ def test_it_is_on_where_both_nodes_of_a_joint_are_aligned(
 
 def test_only_joints_between_aligned_nodes_count(arms: Skeleton) -> None:
     aligned = of_all(["left_upper_arm", "left_forearm"], arms)
-    heading = estimator(None, aligned, arms)._heading
+    heading = estimator("auto", aligned, arms)._heading
     assert isinstance(heading, OnlineHeadings)
     child = heading._joints.child[heading._counts]
     assert {arms.segment_names[k] for k in child} == {"left_forearm"}
 
 
 @pytest.mark.parametrize("profile", ["arms", "lower_limb"])
-def test_the_default_is_no_worse_in_a_quiet_field_and_much_better_beside_iron(
+def test_auto_is_no_worse_in_a_quiet_field_and_much_better_beside_iron(
     wear: Any, arms: Skeleton, profile: str
 ) -> None:
     skeleton = arms if profile == "arms" else load_skeleton(profile)
     motion = Sway(arms) if profile == "arms" else load_motion("walk", skeleton)
     keys = {"q_sensor_from_segment": np.tile(ASKEW, (len(skeleton.segments), 1))}
-    quiet, alone = (wear(skeleton, motion, 16.5, **keys, **more) for more in ({}, {"constraints": "off"}))
+    settings = ({"constraints": "auto"}, {"constraints": "off"})
+    quiet, alone = (wear(skeleton, motion, 16.5, **keys, **more) for more in settings)
     assert quiet.rmse_deg("") < 1.1 * alone.rmse_deg("")
     assert set(LIMBS) & set(skeleton.segment_names), "the iron is at some node"
-    beside, without = (
-        wear(skeleton, motion, 16.5, disturbance=TOOL, **keys, **more)
-        for more in ({}, {"constraints": "off"})
-    )
+    beside, without = (wear(skeleton, motion, 16.5, disturbance=TOOL, **keys, **more) for more in settings)
     assert beside.rmse_deg("") < 0.8 * without.rmse_deg("")
 
 
@@ -84,7 +81,7 @@ def test_it_costs_little_of_a_tick() -> None:
     count = len(skeleton.segments)
     all_: Mask = np.ones(count, np.bool_)
     readings = seen_by(attitudes(count), np.zeros((count, 3)))
-    online, off = (estimator(constraints, all_, skeleton) for constraints in (None, "off"))
+    online, off = (estimator(constraints, all_, skeleton) for constraints in ("auto", "off"))
 
     def seconds(subject: Estimator, ticks: int = 1600) -> float:
         before = time.process_time()
