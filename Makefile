@@ -8,12 +8,13 @@ BIN := $(VENV)/bin
 demo: $(VENV)/.ready
 	$(BIN)/tandem demo $(ARGS)
 
+PARALLEL := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
 test: $(VENV)/.ready
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m "not live and not bench" -n auto --dist worksteal $(ARGS)
+	$(PARALLEL) -m "not long and not live and not bench" $(ARGS)
 
 # the live tests run one after the other: two at a time would take each other's cores
 test-all: $(VENV)/.ready
-	failed=0; $(MAKE) test || failed=1; \
+	failed=0; $(PARALLEL) -m "not live and not bench" $(ARGS) || failed=1; \
 	$(BIN)/python -m pytest -m "live and not bench" $(ARGS) || failed=1; exit $$failed
 
 bench: $(VENV)/.ready

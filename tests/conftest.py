@@ -92,6 +92,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if any(item.get_closest_marker(name) for name in ("net", "kernel_can")):
             item.add_marker("live")
+        if "whole_way" in item.path.parts:
+            item.add_marker("long")
         if "recordings_folder" in getattr(item, "fixturenames", ()):
             item.add_marker("recordings")
 
