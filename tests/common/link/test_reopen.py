@@ -15,6 +15,9 @@ from common.wire.presence import ProcessPresence
 from common.wire.topics import CLOCK, COMMAND, STATE
 from tests.common.link.test_link import ROBOT, Heard, free_endpoint, heard_through, run, until
 
+# another test beside it may take the port between two sessions
+pytestmark = pytest.mark.live
+
 
 def test_everything_is_declared_again_in_the_new_session(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link_session, "REOPEN_S", 0.0)

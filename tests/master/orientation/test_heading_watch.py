@@ -94,7 +94,7 @@ def test_a_hip_of_which_nothing_tells_is_named_once_it_may_be_far_off() -> None:
 
 
 def test_where_joints_correct_headings_only_their_uncertainty_is_left() -> None:
-    subject, watch = worn(aligned=True)
+    subject, watch = worn(aligned=True, constraints="auto")
     assert watch.beside is None
     stand(subject, 60.0, one(SHANK, 0.2))
     assert watch.off_rad[SHANK] == 0.0
