@@ -70,7 +70,7 @@ class TonePlayer:
             mixer.play(burst(alarm, self._rate_hz))
 
     def stop(self) -> None:
-        """Close the card. A card that hangs is left behind with its thread."""
+        """Close the card. A card that hangs keeps its thread; nothing waits for it."""
         self._ended.set()
         if self._thread is not None:
             self._thread.join(_JOIN_S)

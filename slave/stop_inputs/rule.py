@@ -68,7 +68,7 @@ class StopInputs:
         before_ns, self._stepped_ns = self._stepped_ns, now_ns
         late = before_ns is None or abs(now_ns - before_ns) > self._silent_ns // 2
         if late and not self._late:
-            # this process itself stood still: the sources get time to read before one counts as silent
+            # this process itself stalled: the sources get time to read before one counts as silent
             self._awake_ns = now_ns
         self._late = late
         found = {}

@@ -109,7 +109,7 @@ def test_what_is_not_seen_does_not_count(shift: Shift) -> None:
     shift.run(60.0, up, lost)
     assert shift.run(100.0, up) == []
     before = shift.raised_s("left_arm")
-    shift.now_s += 500.0  # the process stood still
+    shift.now_s += 500.0  # the process stalled
     shift.run(PERIOD_S, posture(left_shoulder_pitch=80.0))
     assert shift.raised_s("left_arm") == before
 
