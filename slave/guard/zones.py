@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -21,6 +22,9 @@ _ONE_CM = 0.01
 class _Zone(Section):
     """What all zones have. Coordinates are in the robot's base frame, m: x ahead, y left, z up."""
 
+    geom: ClassVar[str]
+    """MuJoCo's word for its shape."""
+
     name: str = Field(min_length=1, max_length=40)
     margin_cm: float = Field(3.0, ge=0.0, le=50.0)
     """No part of the robot comes nearer than this."""
@@ -35,21 +39,20 @@ class _Zone(Section):
         """-inf where the robot may enter."""
         return -np.inf if self.enter else _ONE_CM * self.margin_cm
 
+    @abstractmethod
     def _attributes(self) -> dict[str, Sequence[float]]:
-        raise NotImplementedError
+        """Where it is and how large, as attributes of MuJoCo's geom."""
 
     def obstacle(self) -> Obstacle:
         """The same for the model."""
         numbers = {key: " ".join(map(repr, values)) for key, values in self._attributes().items()}
-        kind = (
-            "plane" if isinstance(self, HalfSpaceZone) else type(self).__name__.removesuffix("Zone").lower()
-        )
-        return Obstacle(self.name, (("type", kind), *numbers.items()))
+        return Obstacle(self.name, (("type", self.geom), *numbers.items()))
 
 
 class BoxZone(_Zone):
     """A box that stands upright, such as a bed or a table."""
 
+    geom = "box"
     shape: Literal["box"]
     center_m: _Point
     size_m: Annotated[list[_Size], Field(min_length=3, max_length=3)]
@@ -66,6 +69,7 @@ class BoxZone(_Zone):
 class CapsuleZone(_Zone):
     """All within a radius of a line, such as an arm rest or a lying person."""
 
+    geom = "capsule"
     shape: Literal["capsule"]
     from_m: _Point
     to_m: _Point
@@ -78,6 +82,7 @@ class CapsuleZone(_Zone):
 class SphereZone(_Zone):
     """All within a radius of a point, such as the place of the patient's head."""
 
+    geom = "sphere"
     shape: Literal["sphere"]
     center_m: _Point
     radius_m: _Size
@@ -89,6 +94,7 @@ class SphereZone(_Zone):
 class HalfSpaceZone(_Zone):
     """All behind a plane, such as a wall or the floor."""
 
+    geom = "plane"
     shape: Literal["half_space"]
     point_m: _Point
     """Any point of the plane."""
