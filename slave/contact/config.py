@@ -34,7 +34,8 @@ class ContactConfig(Section):
 
     required: bool = False
     """Whether the robot refuses to engage, and holds, while any watched joint has no contact detection."""
-    reflex: Reflex = Reflex.RETREAT
+    # from a file it comes as text, which strict sections would refuse
+    reflex: Reflex = Field(Reflex.RETREAT, strict=False)
     """What follows the protective stop."""
     time_constant_s: float | None = Field(None, ge=0.002, le=0.1)
     """1/K of the observer: shorter is sooner, and raises the thresholds with its inverse square. Not set:
