@@ -27,6 +27,7 @@ from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
 from common.process.runtime import until_stopped
 from common.process.ticker import ticks
+from common.tap.sender import TapSender, open_tap
 from common.wire.topics import STATISTICS
 from common.wire.version import software
 from master.alarms.operator import OperatorAlarms
@@ -37,6 +38,9 @@ from master.config import MasterConfig
 from master.deadman.grip import Grip
 from master.deadman.switches import Switches
 from master.pipeline import JointAngleSample, MasterPipeline
+from master.replay.context import describe
+from master.replay.journal import Pipeline
+from master.replay.tap import MasterTap
 from master.robot import CommandedRobot
 from master.suit.doubt import DoubtLog, as_figures
 from master.suit.protocol import SuitProtocol
@@ -50,10 +54,24 @@ ALARM_PERIOD_NS = to_ns(0.05)
 class Master:
     """One operator's capture loop: joint angles are computed once a posture and sent to every robot."""
 
-    def __init__(self, config: MasterConfig, session: LinkSession, notifier: Notifier | None = None) -> None:
+    def __init__(
+        self,
+        config: MasterConfig,
+        session: LinkSession,
+        notifier: Notifier | None = None,
+        tap: TapSender | None = None,
+    ) -> None:
+        """`tap`: hands what this process hears, decides and sends to local readers; None: there is none."""
         self._config = config
         self._notifier = notifier or Notifier()
         self._pipeline = MasterPipeline(config, SuitProtocol.load(config.capture.dbc))
+        self._calls: Pipeline = self._pipeline
+        """What is called while the suit is polled."""
+        self._tap: MasterTap | None = None
+        if tap is not None:
+            self._tap = MasterTap(self._pipeline, tap)
+            self._calls = self._tap.pipeline
+            session.overheard = self._tap.overhear
         self._stages = StageTimes("sampled→frames in", "frames in→joint angles", "joint angles→put")
         self._frames_in_to_put = Durations()
         self._ticks_expected = 0
@@ -126,7 +144,7 @@ class Master:
             self._ticks_missed += due.missed
             for bus in self._buses:
                 bus.read()  # answers that have arrived are not late, even if this tick runs late
-            sync, late = self._pipeline.tick(due.tick, monotonic_ns())
+            sync, late = self._calls.tick(due.tick, monotonic_ns())
             for bus in self._buses:
                 bus.send(sync)
             if late is not None:
@@ -150,19 +168,21 @@ class Master:
     def _on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
         if self._switches.frame(bus, frame_id, data, now_ns):
             return
-        if self._pipeline.frame(bus, frame_id, data, now_ns):
-            angles = self._pipeline.close(now_ns)
+        if self._calls.frame(bus, frame_id, data, now_ns):
+            angles = self._calls.close(now_ns)
             if angles is not None:
                 self._send(angles)
+            if self._tap is not None:
+                self._tap.rest(now_ns)
 
     def _on_zero_pose_key(self, key: KeyState) -> None:
         if self._pressed.take(key.down, key.presses):
-            self._pipeline.zero_pose.ask(key.name, monotonic_ns())
+            self._calls.ask_zero_pose(key.name, monotonic_ns())
 
     def _on_bus(self, bus: str, up: bool) -> None:
         if not up:
             self._switches.bus_down(bus)
-            self._pipeline.bus_down(bus)
+            self._calls.bus_down(bus)
 
     def _send_at_once(self, grip: Grip) -> None:
         """The operator let go: no robot waits for the next posture to hear of it."""
@@ -251,7 +271,8 @@ async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
     audit = Audit(config.link)
     async with open_session(config.link, waits=notifier.waits) as session:
         audit.attach(session)
-        master = Master(config, session, notifier)
+        tap = open_tap(config.tap, describe(config))
+        master = Master(config, session, notifier, tap)
         where = ", ".join(config.link.connect or config.link.listen)
         robots = ", ".join(config.commanded)
         log.info("%s: %d nodes polled, commands go to %s", robots, len(config.nodes), where)
@@ -263,4 +284,6 @@ async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
             await master.run()
         finally:
             notifier.stopping()
+            if tap is not None:
+                tap.close()
             write_metrics(replace(master.metrics(), access=audit.metrics()))

@@ -12,6 +12,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
+from common.tap.config import TapConfig
 from master.alarms.config import AlarmsConfig
 from master.comfort.config import ZeroPoseAgainConfig
 from master.comfort.scaling import scaling_mistakes
@@ -83,6 +84,7 @@ class MasterConfig(Section):
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
     alarms: AlarmsConfig = AlarmsConfig()
+    tap: TapConfig = TapConfig()
 
     @property
     def commanded(self) -> list[str]:
@@ -109,6 +111,7 @@ class MasterConfig(Section):
             *scaling_mistakes(self.operator.scaling, skeleton),
             *self.estimation.mistakes_at(self.capture.rate_hz),
             *self.link.mistakes(),
+            *self.tap.mistakes(),
         ]
 
     def _switch_mistakes(self) -> list[ConfigMistake]:

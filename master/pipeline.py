@@ -102,6 +102,10 @@ class MasterPipeline:
         """Count the nodes of a failed bus as lost: their joints are invalid until they answer again."""
         self.poll.bus_down(bus)
 
+    def ask_zero_pose(self, by: str, now_ns: int) -> None:
+        """The operator asks for the zero pose to be taken again; `by` says how, in words."""
+        self.zero_pose.ask(by, now_ns)
+
     def node_counts(self) -> dict[str, dict[str, int]]:
         """The counters of each node that are not zero, by segment."""
         return {

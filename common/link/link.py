@@ -23,6 +23,9 @@ from common.wire.topics import ALIVE, Topic
 
 CONNECT_TIMEOUT_S = 3.0
 
+Overheard = Callable[[str, bytes, int], None]
+"""Takes the key, the bytes and the time, on this host's monotonic clock, of a message sent or received."""
+
 log = logging.getLogger(__name__)
 
 
@@ -39,8 +42,13 @@ class Link:
         robot: str,
         loop: asyncio.AbstractEventLoop,
         quality: Callable[[Topic], Topic] = lambda topic: topic,
+        overheard: Overheard | None = None,
     ) -> None:
-        """`declared`: the session and what it holds. `quality`: the topic as it shall travel on this link."""
+        """`declared`: the session and what it holds. `quality`: the topic as it shall travel on this link.
+
+        `overheard` is told of each message on topics, on the loop: those put, and those handed over.
+        """
+        self._overheard = overheard
         self.robot = robot
         self._quality = quality
         self._declared = declared
@@ -57,7 +65,7 @@ class Link:
         topic = self._quality(topic)
         counters = self._count(topic)
         throttle = LogThrottle()
-        key = self._own_key(topic)
+        key, overheard = self._own_key(topic), self._overheard
         put: Callable[[bytes], None]
 
         def declare(session: zenoh.Session) -> object:
@@ -82,6 +90,8 @@ class Link:
                     log.warning("%s: message not sent: %s", topic.name, error)
             else:
                 counters.sent += 1
+                if overheard is not None:
+                    overheard(key, payload, monotonic_ns())
 
         self._declared.add(declare)
         return publish
@@ -95,8 +105,14 @@ class Link:
 
     def subscribe_keys(self, topic: Topic, on_payload: Callable[[str, bytes, int], None]) -> None:
         """As `subscribe`, with the key on which each payload came: the newest of each key is handed over."""
-        key = topic.key_for(self.robot)
-        inbox = Inbox(key, on_payload, self._loop, self._count(topic))
+        key, overheard = topic.key_for(self.robot), self._overheard
+
+        def overhear(own_key: str, payload: bytes, arrived_ns: int) -> None:
+            on_payload(own_key, payload, arrived_ns)
+            if overheard is not None:
+                overheard(own_key, payload, arrived_ns)
+
+        inbox = Inbox(key, on_payload if overheard is None else overhear, self._loop, self._count(topic))
         self._receivers.append(inbox)
         self._declared.add(lambda s: s.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
 

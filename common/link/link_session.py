@@ -14,7 +14,7 @@ from zenoh.handlers import Callback
 from common.errors import LinkError
 from common.link.declared import Declarations
 from common.link.inbox import wake
-from common.link.link import Link
+from common.link.link import Link, Overheard
 from common.link.presence import watch_presence
 from common.link.waiting import count_peers
 from common.wire.presence import ProcessPresence
@@ -57,12 +57,14 @@ class LinkSession:
         self._loop = loop
         self._links: dict[str, Link] = {}
         self._closed = False
+        self.overheard: Overheard | None = None
+        """Told of each message of the links that are made from now on."""
 
     def link(self, robot: str) -> Link:
         """The link of that robot, the same one each time. Raises LinkError for a name that is none."""
         check_robot_name(robot)
         if robot not in self._links:
-            self._links[robot] = Link(self._declared, robot, self._loop, self._quality)
+            self._links[robot] = Link(self._declared, robot, self._loop, self._quality, self.overheard)
         return self._links[robot]
 
     def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None], robot: str = "*") -> None:

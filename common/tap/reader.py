@@ -1,0 +1,61 @@
+"""The reader's side of the tap."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from common.errors import CodecError, TandemError
+from common.tap.message import LONGEST, TapMessage, decode
+
+
+class TapReader:
+    """A connection to one process's tap; a context manager. Its messages are read in any thread, by one."""
+
+    def __init__(self, path: Path) -> None:
+        """Connect. Raises TandemError where nobody listens or this user may not read."""
+        self.path = path
+        self.missed = 0
+        """Messages that this reader was too slow for."""
+        self._next = 1
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            self._socket.connect(str(path))
+        except OSError as error:
+            self._socket.close()
+            raise TandemError(
+                f"{path}: no tap there ({error.strerror}); is this the path in the process's [tap] socket?"
+            ) from None
+
+    def read(self, timeout_s: float) -> TapMessage | None:
+        """The next message; None after so long without one. Raises TandemError once the process has gone."""
+        self._socket.settimeout(timeout_s)
+        try:
+            datagram = self._socket.recv(LONGEST)
+        except TimeoutError:
+            return None
+        except OSError as error:
+            raise TandemError(f"{self.path}: the tap has failed ({error.strerror})") from None
+        if not datagram:
+            raise TandemError(f"{self.path}: the process has ended, or did not let this one in")
+        try:
+            message = decode(datagram)
+        except CodecError as error:
+            raise TandemError(f"{self.path}: {error}; is it a tap of this version?") from None
+        self.missed += message.number - self._next
+        self._next = message.number + 1
+        return message
+
+    def close(self) -> None:
+        """End the connection."""
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

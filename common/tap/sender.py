@@ -1,0 +1,171 @@
+"""The sender's side of the tap, in the event loop of a real-time process."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import socket
+import struct
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgpack
+
+from common.clock import monotonic_ns
+from common.errors import TandemError
+from common.tap.config import TapConfig
+from common.tap.message import LONGEST, TapMessage, encode
+
+log = logging.getLogger(__name__)
+
+READERS = 4
+"""At once; each costs some 9 µs a message."""
+_CREDENTIALS = struct.Struct("3i")
+
+
+@dataclass(slots=True, eq=False)
+class _Reader:
+    """One process that reads."""
+
+    socket: socket.socket
+    pid: int
+    number: int = 0
+    refused: int = 0
+    behind: bool = True
+    """Lacks something that came before: owed a snapshot."""
+
+
+class TapSender:
+    """Hands messages to whoever reads the socket. Never blocks, never raises on a reader's account."""
+
+    def __init__(self, path: Path, greeting: Callable[[], bytes]) -> None:
+        """`greeting`: the first message of each reader, on the topic `GREETING`."""
+        self.path = path
+        self._greeting = greeting
+        self._readers: list[_Reader] = []
+        self._listener: socket.socket | None = None
+        self.refused = 0
+        """Messages that a reader was too slow for, over all readers since the start."""
+        self.turned_away = 0
+        """Processes that were one too many. Those of other users the socket's mode (0660) keeps out."""
+
+    def open(self) -> None:
+        """Begin to listen, in the running loop. Raises TandemError."""
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+        try:
+            _remove_stale(self.path)
+            before = os.umask(0o117)  # 0660: the owner and its group
+            try:
+                listener.bind(str(self.path))
+            finally:
+                os.umask(before)
+            listener.listen(READERS)
+        except OSError as error:
+            listener.close()
+            raise TandemError(f"{self.path}: [tap] cannot listen there ({error.strerror or error})") from None
+        self._listener = listener
+        asyncio.get_running_loop().add_reader(listener, self._accept)
+
+    def close(self) -> None:
+        """End all readers and remove the socket."""
+        if self._listener is None:
+            return
+        asyncio.get_running_loop().remove_reader(self._listener)
+        for reader in list(self._readers):
+            self._drop(reader, "")
+        self._listener.close()
+        self._listener = None
+        with suppress(OSError):
+            self.path.unlink()
+
+    @property
+    def read(self) -> bool:
+        """Whether anybody reads: without readers nothing need be encoded."""
+        return bool(self._readers)
+
+    @property
+    def behind(self) -> bool:
+        """Whether a reader lacks messages, so that it cannot go on without a snapshot."""
+        return any(reader.behind for reader in self._readers)
+
+    def put(self, topic: str, payload: bytes, stamp_ns: int | None = None) -> None:
+        """Hand one message to all readers."""
+        stamp_ns = monotonic_ns() if stamp_ns is None else stamp_ns
+        for reader in tuple(self._readers):
+            self._send(reader, topic, payload, stamp_ns)
+
+    def put_snapshot(self, topic: str, payload: bytes) -> None:
+        """Hand a snapshot to all readers: from it on, those that were behind can go on."""
+        stamp_ns = monotonic_ns()
+        for reader in tuple(self._readers):
+            if self._send(reader, topic, payload, stamp_ns):
+                reader.behind = False
+
+    def _send(self, reader: _Reader, topic: str, payload: bytes, stamp_ns: int) -> bool:
+        reader.number += 1
+        try:
+            reader.socket.send(encode(TapMessage(reader.number, topic, stamp_ns, payload)))
+        except BlockingIOError:
+            reader.refused += 1
+            self.refused += 1
+            reader.behind = True
+            return False
+        except OSError as error:
+            self._drop(reader, "" if isinstance(error, BrokenPipeError) else f": {error.strerror}")
+            return False
+        return True
+
+    def _accept(self) -> None:
+        if self._listener is None:
+            return
+        try:
+            connection, _ = self._listener.accept()
+        except OSError:
+            return
+        connection.setblocking(False)
+        with suppress(OSError):
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, LONGEST)
+        packed = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+        pid, user, _ = _CREDENTIALS.unpack(packed)
+        if len(self._readers) >= READERS:
+            self.turned_away += 1
+            log.warning("%s: process %d of user %d is turned away: %d read", self.path, pid, user, READERS)
+            connection.close()
+            return
+        reader = _Reader(connection, pid)
+        self._readers.append(reader)
+        log.info("%s: process %d reads", self.path, pid)
+        self._send(reader, "tap/greeting", self._greeting(), monotonic_ns())
+
+    def _drop(self, reader: _Reader, why: str) -> None:
+        self._readers.remove(reader)
+        reader.socket.close()
+        log.info("%s: process %d has gone%s; %d messages refused", self.path, reader.pid, why, reader.refused)
+
+
+def _remove_stale(path: Path) -> None:
+    """Remove the socket of a process that was killed; one that is listened at is left, and refused."""
+    if not path.is_socket():
+        return
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as trial:
+        try:
+            trial.connect(str(path))
+        except ConnectionRefusedError:
+            path.unlink()
+        except OSError:
+            return
+        else:
+            raise TandemError(f"{path}: another process listens there; name another [tap] socket")
+
+
+def open_tap(config: TapConfig, greeting: Mapping[str, str]) -> TapSender | None:
+    """The tap that a file asks for, listening; None where it asks for none. Raises TandemError."""
+    if config.socket is None:
+        return None
+    packed: bytes = msgpack.packb(dict(greeting))
+    sender = TapSender(config.socket, lambda: packed)
+    sender.open()
+    return sender
