@@ -32,6 +32,7 @@ from deploy.ops.inputs import inputs
 from deploy.ops.keys.commands import app as keys_app
 from deploy.ops.network.command import app as network_app
 from deploy.ops.record.command import record, recording
+from deploy.ops.replay.command import replay
 from deploy.ops.router.command import router
 from deploy.ops.servos import servos
 from deploy.ops.sides import master, slave
@@ -57,7 +58,7 @@ for _name, _group in {
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, suit, drives, router, demo, soak, faults, collisions, contact, bench, audit,
-    *OPERATORS_ACTS, attitude, video, doctor, servos, stops, inputs, alarms, record, recording,
+    *OPERATORS_ACTS, attitude, video, doctor, servos, stops, inputs, alarms, record, recording, replay,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

@@ -43,8 +43,8 @@ def load_config(path: Path, model: type[Model], overrides: Sequence[str] = ()) -
         raise _mistake(path, "file", path.name, f"UTF-8 text ({error.reason})") from None
     except tomllib.TOMLDecodeError as error:
         raise _mistake(path, "file", path.name, f"valid TOML ({error})") from None
-    for override in overrides:
-        _override(table, override)
+    for change in overrides:
+        override(table, change)
     return check_config(path, table, model)
 
 
@@ -68,7 +68,8 @@ def check_config(path: Path, table: Mapping[str, object], model: type[Model]) ->
     return checked
 
 
-def _override(table: dict[str, object], text: str) -> None:
+def override(table: dict[str, object], text: str) -> None:
+    """Replace one key of a table by `section.key=value`. Raises ConfigError."""
     key, equals, value = text.partition("=")
     if not equals:
         raise _mistake("--set", "--set", text, "section.key=value")

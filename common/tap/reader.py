@@ -1,7 +1,8 @@
-"""The reader's side of the tap."""
+"""The reader's side of the tap, in the event loop of a process that may fall behind."""
 
 from __future__ import annotations
 
+import asyncio
 import socket
 from pathlib import Path
 from types import TracebackType
@@ -12,7 +13,7 @@ from common.tap.message import LONGEST, TapMessage, decode
 
 
 class TapReader:
-    """A connection to one process's tap; a context manager. Its messages are read in any thread, by one."""
+    """A connection to one process's tap; a context manager."""
 
     def __init__(self, path: Path) -> None:
         """Connect. Raises TandemError where nobody listens or this user may not read."""
@@ -20,7 +21,8 @@ class TapReader:
         self.missed = 0
         """Messages that this reader was too slow for."""
         self._next = 1
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._buffer = bytearray(LONGEST)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
         try:
             self._socket.connect(str(path))
         except OSError as error:
@@ -29,19 +31,16 @@ class TapReader:
                 f"{path}: no tap there ({error.strerror}); is this the path in the process's [tap] socket?"
             ) from None
 
-    def read(self, timeout_s: float) -> TapMessage | None:
-        """The next message; None after so long without one. Raises TandemError once the process has gone."""
-        self._socket.settimeout(timeout_s)
+    async def read(self) -> TapMessage:
+        """The next message. Raises TandemError once the process has gone, or speaks another version."""
         try:
-            datagram = self._socket.recv(LONGEST)
-        except TimeoutError:
-            return None
+            size = await asyncio.get_running_loop().sock_recv_into(self._socket, self._buffer)
         except OSError as error:
             raise TandemError(f"{self.path}: the tap has failed ({error.strerror})") from None
-        if not datagram:
-            raise TandemError(f"{self.path}: the process has ended, or did not let this one in")
+        if not size:
+            raise TandemError(f"{self.path}: the process has ended, or too many read it")
         try:
-            message = decode(datagram)
+            message = decode(bytes(self._buffer[:size]))
         except CodecError as error:
             raise TandemError(f"{self.path}: {error}; is it a tap of this version?") from None
         self.missed += message.number - self._next

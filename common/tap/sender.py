@@ -54,9 +54,9 @@ class TapSender:
 
     def open(self) -> None:
         """Begin to listen, in the running loop. Raises TandemError."""
+        _remove_stale(self.path)
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
         try:
-            _remove_stale(self.path)
             before = os.umask(0o117)  # 0660: the owner and its group
             try:
                 listener.bind(str(self.path))
@@ -85,6 +85,11 @@ class TapSender:
     def read(self) -> bool:
         """Whether anybody reads: without readers nothing need be encoded."""
         return bool(self._readers)
+
+    @property
+    def count(self) -> int:
+        """How many read."""
+        return len(self._readers)
 
     @property
     def behind(self) -> bool:

@@ -11,7 +11,9 @@ PANELS = {
         "video",
     ),
     "Set up": ("doctor", "servos", "inputs", "stops", "alarms", "calibrate", "keys", "record", "recording"),
-    "Judge": ("trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit"),
+    "Judge": (
+        "replay", "trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit",
+    ),
 }  # fmt: skip
 """In the order of the help."""
 _PANEL = {name: panel for panel, names in PANELS.items() for name in names}

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,11 +15,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from pydantic import ValidationError
 
+from common.config.load import override
 from common.errors import RecordingError
 from common.wire.version import software
 from master.config import MasterConfig
 
 CONFIG, FILES = "master_config", "master_files"
+_NOT_READ = {"link", "tap", "process", "alarms"}
+"""Sections that the pipeline does not read."""
 _LATIN = "latin-1"
 """Each byte is one character: a DBC file may be in any encoding."""
 
@@ -27,7 +30,7 @@ _LATIN = "latin-1"
 def describe(config: MasterConfig) -> dict[str, str]:
     """The metadata of a recording of this master. Raises OSError where a file that it names has gone."""
     files: dict[str, str] = {}
-    table = _embedded(config.model_dump(exclude={"link"}), files)
+    table = _embedded(config.model_dump(exclude=_NOT_READ), files)
     return {
         "role": "master",
         "robots": " ".join(config.commanded),
@@ -53,10 +56,12 @@ def _embedded(value: object, files: dict[str, str]) -> object:
 
 
 @contextmanager
-def recorded_config(metadata: Mapping[str, str], name: str) -> Iterator[MasterConfig]:
+def recorded_config(
+    metadata: Mapping[str, str], name: str, overrides: Sequence[str] = ()
+) -> Iterator[MasterConfig]:
     """The configuration of a recording; its files lie in a temporary folder meanwhile.
 
-    `name`: of the recording, for errors. Raises RecordingError.
+    `name`: of the recording, for errors. `overrides`: as of a file. Raises RecordingError, ConfigError.
     """
     try:
         table, files = json.loads(metadata[CONFIG]), json.loads(metadata[FILES])
@@ -69,6 +74,8 @@ def recorded_config(metadata: Mapping[str, str], name: str) -> Iterator[MasterCo
         try:
             for file, content in files.items():
                 (Path(folder) / Path(file).name).write_bytes(str(content).encode(_LATIN))
+            for change in overrides:
+                override(table, change)
             text = json.dumps({**table, "link": {}})
             config = MasterConfig.model_validate_json(text, context={"folder": Path(folder)})
         except (ValidationError, TypeError, AttributeError) as error:

@@ -16,6 +16,8 @@ import numpy as np
 
 from common.can.frame import CanFrame
 from common.errors import RecordingError
+from common.quaternion import Array
+from common.wire.messages import Mask
 from master.pipeline import JointAngleSample
 
 FRAMES = "suit/frames"
@@ -104,7 +106,9 @@ class Angles:
 
     tick: int
     sampled_ns: int
-    position_rad: np.ndarray[tuple[int], np.dtype[np.float64]]
+    position_rad: Array
+    """(J,)."""
+    valid: Mask
     """(J,)."""
     payload: bytes
     """As recorded: two answers are the same where these bytes are."""
@@ -130,12 +134,13 @@ def encode_angles(angles: JointAngleSample) -> bytes:
 def decode_angles(payload: bytes) -> Angles:
     """Read one back. Raises RecordingError."""
     version, *rest = _unpack(ANGLES, payload)
-    if version != VERSION or len(rest) != 7:
+    if version != VERSION:
         raise RecordingError(f"a message of {ANGLES} is of version {version}, not {VERSION}")
-    tick, sampled_ns, _, position, *_ = rest
-    if not (isinstance(tick, int) and isinstance(sampled_ns, int) and isinstance(position, bytes)):
-        raise RecordingError(f"a message of {ANGLES} is not of version {VERSION}")
-    return Angles(tick, sampled_ns, np.frombuffer(position, "<f8"), payload)
+    match rest:
+        case [int(tick), int(sampled_ns), int(), bytes(position), bytes(), bytes(valid), str()]:
+            position_rad = np.frombuffer(position, "<f8")
+            return Angles(tick, sampled_ns, position_rad, np.frombuffer(valid, np.bool_), payload)
+    raise RecordingError(f"a message of {ANGLES} is not of version {VERSION}")
 
 
 def decode_calls(payload: bytes) -> Sequence[Call]:

@@ -15,10 +15,20 @@ from common.process.runtime import run as run_until_stopped
 from deploy.report.options import AsJson, MetricsFile
 from deploy.report.output import in_a_folder, metrics_writer
 
+LONGEST_SHOWN = 300
+"""Characters of a file's head: a whole configuration is for programs, by --json."""
+
 
 def record(
-    robot: Annotated[str, typer.Option(help="Name of the robot.")],
     out: Annotated[Path, typer.Option(help="New .mcap file to write.", dir_okay=False, callback=in_a_folder)],
+    robot: Annotated[str | None, typer.Option(help="Name of the robot.")] = None,
+    tap: Annotated[
+        Path | None,
+        typer.Option(
+            help="Record at a process of this host instead: the path of its `[tap] socket`. It holds what "
+            "the sensors said, so that `tandem replay` can compute it again.",
+        ),
+    ] = None,
     connect: Annotated[
         list[str] | None,
         typer.Option(help="Endpoint to connect to, such as tcp/192.168.7.2:7447; repeat for more."),
@@ -49,20 +59,37 @@ def record(
 ) -> None:
     """Record a live robot's commands, states and statistics until Ctrl-C. It changes nothing.
 
+    With --tap it records at the master itself: every sensor frame, command and state, and what the
+    computation needs to be repeated.
+
     The robot's endpoint gives states. Commands come from an endpoint where the master listens (`[link]
     listen` in its file), or from a router. It ends with status 1 if the disk failed or messages are missing.
 
-    Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
+    Examples: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`,
+    `tandem record --tap /run/tandem/master.sock --out morning.mcap`
     """
+    from deploy.ops.record.from_tap import record_tap
     from deploy.ops.record.record import RecordOptions, link_of
     from deploy.ops.record.record import record as record_until
 
     if out.suffix.lower() != ".mcap":
         raise TandemError(f"{out}: expected a name that ends in .mcap")
     each_s = 60.0 * minutes_per_file if minutes_per_file else None
+    console = Console(stderr=True)
+    if tap is not None:
+
+        async def take(stop: asyncio.Event) -> None:
+            with console.status("waiting for the process") as status:
+                console.print(
+                    await record_tap(tap, out, stop, status.update, seconds, each_s), highlight=False
+                )
+
+        run_until_stopped(take)
+        return
+    if robot is None:
+        raise TandemError("record: name the robot by --robot, or a process's socket by --tap")
     where = link_of(connect or (), link)
     options = RecordOptions(where, robot, out, tuple(video or ()), seconds, each_s, may_miss=may_miss)
-    console = Console(stderr=True)
 
     async def work(stop: asyncio.Event) -> None:
         with console.status("waiting for the robot") as status:
@@ -100,6 +127,7 @@ def recording(
         )
     console.print(table)
     for key, value in contents.metadata.items():
-        console.print(f"{key}: {value}", highlight=False)
+        shown = value if len(value) <= LONGEST_SHOWN else f"{len(value)} characters"
+        console.print(f"{key}: {shown}", highlight=False)
     if contents.cut:
         console.print(f"[yellow]{contents.cut}: only the part before it is shown", highlight=False)

@@ -1,0 +1,119 @@
+"""Puts all that a process hands to its tap into a recording: sensors' frames, what it sends and hears."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+import msgpack
+
+from common.clock import monotonic_ns, to_s
+from common.errors import TandemError
+from common.process.runtime import until_stopped
+from common.tap.message import GREETING, TapMessage
+from common.tap.reader import TapReader
+from deploy.ops.record.tape import Tape
+from master.replay.replay import MISSING
+
+GREETED_S = 5.0
+PROGRESS_S = 0.5
+
+
+async def record_tap(
+    path: Path,
+    out: Path,
+    stop: asyncio.Event,
+    report: Callable[[str], None],
+    seconds: float | None = None,
+    each_s: float | None = None,
+) -> str:
+    """Record until `stop` is set, the time is over or the process ends. Returns a summary for people.
+
+    Raises TandemError where there is no tap, the disk failed, or this process was too slow for the tap.
+    """
+    with TapReader(path) as reader:
+        try:
+            first = await asyncio.wait_for(reader.read(), GREETED_S)
+        except TimeoutError:
+            raise TandemError(f"{path}: it says nothing; is it a tap of tandem?") from None
+        taking = _Taking(reader, Tape(out, _greeting(path, first), each_s), report)
+        try:
+            await until_stopped(stop, taking.run(seconds))
+        finally:
+            await taking.tape.close()
+    return taking.end(out)
+
+
+def _greeting(path: Path, message: TapMessage) -> dict[str, str]:
+    try:
+        table = msgpack.unpackb(message.payload)
+        if message.topic != GREETING or not all(isinstance(text, str) for text in table.values()):
+            raise ValueError
+    except Exception:  # msgpack raises its own family
+        raise TandemError(f"{path}: it does not say who sends; is it a tap of this version?") from None
+    return dict(table)
+
+
+class _Taking:
+    """One recording under way."""
+
+    def __init__(self, reader: TapReader, tape: Tape, report: Callable[[str], None]) -> None:
+        self.tape = tape
+        self._reader = reader
+        self._report = report
+        self._since_ns = monotonic_ns()
+        self._counts: dict[str, int] = {}
+        self._missed = 0
+        self._ended = ""
+
+    async def run(self, seconds: float | None) -> None:
+        """Until the time is over, the process has gone, or the task is cancelled."""
+        progress = asyncio.create_task(self._progress())
+        try:
+            async with asyncio.timeout(seconds):
+                while True:
+                    self._take(await self._reader.read())
+        except TimeoutError:
+            pass
+        except TandemError as error:
+            self._ended = str(error)
+        finally:
+            progress.cancel()
+
+    def _take(self, message: TapMessage) -> None:
+        if self._reader.missed > self._missed:
+            self._missed = self._reader.missed
+            self.tape.put(MISSING, b"", message.stamp_ns)
+        self._counts[message.topic] = self._counts.get(message.topic, 0) + 1
+        self.tape.put(message.topic, message.payload, message.stamp_ns)
+
+    async def _progress(self) -> None:
+        while True:
+            self._report(f"recording, {self._words()} (Ctrl-C ends it)")
+            await self.tape.turn()
+            await asyncio.sleep(PROGRESS_S)
+
+    def _words(self) -> str:
+        elapsed_s = max(1e-3, to_s(monotonic_ns() - self._since_ns))
+        rates = ", ".join(f"{name} {count / elapsed_s:.1f} Hz" for name, count in self._counts.items())
+        missed = f"; MISSING: {self._missed}" if self._missed else ""
+        failed = f"; NOT WRITTEN: {self.tape.failed}" if self.tape.failed else ""
+        return f"{elapsed_s:.1f} s: {rates or 'nothing is heard yet'}{missed}{failed}"
+
+    def end(self, out: Path) -> str:
+        """The summary. Raises TandemError where the recording is not whole."""
+        counters = self.tape.counters()
+        if counters.failed or counters.refused + counters.lost:
+            why = counters.failed or "the disk was too slow"
+            raise TandemError(
+                f"{out}: {why}: {counters.written} messages are in it and can be read, "
+                f"{counters.refused + counters.lost} are not. Make room and record again"
+            )
+        if self._missed:
+            raise TandemError(
+                f"{out}: this recorder was too slow for {self._missed} messages; what came is in it, and can "
+                "be computed again from the next snapshot on. Record on a host with less to do"
+            )
+        ended = f"; {self._ended}" if self._ended else ""
+        return f"{out}: {self._words()}{ended}"

@@ -1,0 +1,142 @@
+"""`tandem replay`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from common.clock import to_ns
+from common.config.load import load_config
+from common.errors import TandemError
+from common.recording.reader import RecordingStream
+from common.wire.version import software
+from deploy.ops.replay.comparison import Comparison, compare
+from deploy.report.options import AsJson, Overrides
+from deploy.report.tables import plain_table
+from master.config import MasterConfig
+from master.replay.context import recorded_config
+from master.replay.replay import SNAPSHOT, Recorded, Replay
+
+MOST_JOINTS = 8
+"""Rows of the table; --json has all."""
+
+
+def replay(
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="A recording of `tandem record --tap`, its files in order.", dir_okay=False),
+    ],
+    config: Annotated[
+        Path | None,
+        typer.Option(help="Compute with this master's file instead of the recorded one.", dir_okay=False),
+    ] = None,
+    filter_name: Annotated[
+        str | None, typer.Option("--filter", help="Compute with this orientation filter.")
+    ] = None,
+    overrides: Overrides = None,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="End with status 1 unless every posture is identical to the last bit."),
+    ] = False,
+    from_s: Annotated[
+        float, typer.Option("--from", help="Begin this many seconds after the recording did.", min=0.0)
+    ] = 0.0,
+    as_json: AsJson = False,
+) -> None:
+    """Compute a recording again from the sensors' frames, and compare the joint angles with those recorded.
+
+    With the recorded configuration they are identical to the last bit, whatever second it begins at. With
+    --config, --filter or --set the filters learn anew, and the differences are shown by joint.
+
+    Examples: `tandem replay morning.mcap --check`, `tandem replay morning.mcap --filter ekf`
+    """
+    changes = [*(overrides or ()), *([f'estimation.filter="{filter_name}"'] if filter_name else ())]
+    with ExitStack() as kept:
+        metadata = _metadata(files[0])
+        if config is not None:
+            used = load_config(config, MasterConfig, changes)
+        else:
+            used = kept.enter_context(recorded_config(metadata, files[0].name, changes))
+        other = config is not None or bool(changes)
+        run = Replay(used, from_snapshots=not other)
+        with Console(stderr=True).status("computing"):
+            begin_ns = _begun_ns(files[0]) + to_ns(from_s)
+            pairs = run.pairs(_entries(files, _snapshot_ns(files, begin_ns)))
+            result = compare(run, (pair for pair in pairs if pair.recorded.sampled_ns >= begin_ns))
+    if not result.postures:
+        raise TandemError(
+            f"{files[0]}: nothing could be computed: {result.skipped} postures are recorded, and no snapshot "
+            "stands before them; was it recorded by --tap, and for longer than a moment?"
+        )
+    if as_json:
+        typer.echo(json.dumps({**asdict(result), **_versions(metadata), "other": other}, indent=2))
+    else:
+        _print(result, metadata)
+    if check and not result.whole:
+        raise TandemError(f"{files[0]}: {result.postures - result.identical} postures differ")
+
+
+def _metadata(path: Path) -> Mapping[str, str]:
+    stream = RecordingStream(path)
+    for _ in stream:
+        break
+    return stream.metadata or {}
+
+
+def _begun_ns(path: Path) -> int:
+    return next((entry.monotonic_ns for entry in RecordingStream(path)), 0)
+
+
+def _snapshot_ns(files: Sequence[Path], before_ns: int) -> int:
+    """When the last snapshot before that time was taken; 0 where there is none."""
+    found_ns = 0
+    for path in files:
+        for entry in RecordingStream(path):
+            if entry.monotonic_ns > before_ns:
+                return found_ns
+            if entry.topic == SNAPSHOT:
+                found_ns = entry.monotonic_ns
+    return found_ns
+
+
+def _entries(files: Sequence[Path], from_ns: int) -> Iterator[Recorded]:
+    for path in files:
+        for entry in RecordingStream(path):
+            if entry.monotonic_ns >= from_ns:
+                yield Recorded(entry.topic, entry.payload)
+
+
+def _versions(metadata: Mapping[str, str]) -> dict[str, str]:
+    recorded, now = metadata.get("tandem", "?"), software().tandem
+    return {"recorded_by": f"tandem {recorded}", "computed_by": f"tandem {now}"}
+
+
+def _print(result: Comparison, metadata: Mapping[str, str]) -> None:
+    console = Console()
+    versions = _versions(metadata)
+    console.print(
+        f"{result.ticks} ticks, {result.postures} postures: {result.identical} identical to the last bit"
+        + (f"; {result.skipped} could not be computed" if result.skipped else "")
+        + f" (recorded by {versions['recorded_by']} on {metadata.get('machine', 'an unknown machine')}, "
+        f"computed by {versions['computed_by']})",
+        highlight=False,
+    )
+    if result.first is None:
+        return
+    first = result.first
+    console.print(
+        f"the first that differs: tick {first.tick}, {first.at_s:.2f} s after the first, "
+        f"{first.joint} by {first.apart_deg:.3g}°",
+        highlight=False,
+    )
+    table = plain_table("joint", "RMS °", "most °")
+    for name in sorted(result.worst_deg, key=result.worst_deg.__getitem__, reverse=True)[:MOST_JOINTS]:
+        table.add_row(name, f"{result.rms_deg[name]:.3g}", f"{result.worst_deg[name]:.3g}")
+    console.print(table)

@@ -1,0 +1,179 @@
+"""The tap over real sockets: a reader that stalls, dies or comes late never holds the sender up."""
+
+from __future__ import annotations
+
+import asyncio
+import stat
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import msgpack
+import pytest
+
+from common.config.load import load_config
+from common.config.section import Section
+from common.errors import CodecError, ConfigError, ConfigMistake, TandemError
+from common.tap.config import TapConfig
+from common.tap.message import GREETING, TapMessage, decode, encode
+from common.tap.reader import TapReader
+from common.tap.sender import READERS, TapSender, open_tap
+
+Story = Callable[[TapSender], Awaitable[None]]
+
+
+def run(path: Path, story: Story) -> None:
+    async def whole() -> None:
+        sender = TapSender(path, lambda: msgpack.packb({"role": "test"}))
+        sender.open()
+        try:
+            await story(sender)
+        finally:
+            sender.close()
+
+    asyncio.run(whole())
+
+
+async def accepted(sender: TapSender, readers: int) -> None:
+    """Let the loop take in those who connect."""
+    for _ in range(10_000):
+        if sender.count + sender.turned_away == readers:
+            return
+        await asyncio.sleep(0)
+    raise AssertionError(f"{sender.count} of {readers} were let in")
+
+
+def test_a_reader_hears_who_sends_and_then_each_message(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        with TapReader(sender.path) as reader:
+            await accepted(sender, 1)
+            sender.put("a/topic", b"bytes", 17)
+            first, second = await reader.read(), await reader.read()
+            assert (first.topic, msgpack.unpackb(first.payload)) == (GREETING, {"role": "test"})
+            assert second[1:] == ("a/topic", 17, b"bytes")
+            assert reader.missed == 0
+
+    run(tmp_path / "tap", story)
+
+
+def test_a_reader_that_stalls_is_refused_at_once_and_knows_what_it_missed(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        with TapReader(sender.path) as slow, TapReader(sender.path) as quick:
+            await accepted(sender, 2)
+            await quick.read()
+            for number in range(3000):
+                sender.put("t", number.to_bytes(1200, "big"))
+                assert int.from_bytes((await quick.read()).payload, "big") == number
+            assert sender.refused > 1000, "nothing was queued without end"
+            assert quick.missed == 0
+            await slow.read()
+            heard = 0
+            while heard + slow.missed < 3000 - sender.refused:
+                await slow.read()
+                heard += 1
+            sender.put("t", b"last")
+            assert (await slow.read()).payload == b"last"
+            assert slow.missed == sender.refused
+
+    run(tmp_path / "tap", story)
+
+
+def test_a_reader_is_owed_a_snapshot_at_its_start_and_after_a_refusal(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        assert not sender.behind
+        with TapReader(sender.path) as reader:
+            await accepted(sender, 1)
+            assert sender.behind
+            sender.put_snapshot("snapshot", bytes(300_000))
+            assert not sender.behind
+            await reader.read()
+            assert len((await reader.read()).payload) == 300_000, "a whole suit's snapshot fits"
+            while not sender.refused:
+                sender.put("t", bytes(1200))
+            assert sender.behind
+            sender.put_snapshot("snapshot", b"")
+            assert sender.behind, "it was refused too"
+
+    run(tmp_path / "tap", story)
+
+
+def test_a_reader_that_dies_is_let_go(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        with TapReader(sender.path):
+            await accepted(sender, 1)
+        assert sender.read
+        sender.put("t", b"")
+        assert not sender.read
+
+    run(tmp_path / "tap", story)
+
+
+def test_one_reader_too_many_is_turned_away(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        readers = [TapReader(sender.path) for _ in range(READERS)]
+        await accepted(sender, READERS)
+        with TapReader(sender.path) as late:
+            await accepted(sender, READERS + 1)
+            with pytest.raises(TandemError, match="too many"):
+                await late.read()
+        assert (sender.count, sender.turned_away) == (READERS, 1)
+        for reader in readers:
+            reader.close()
+
+    run(tmp_path / "tap", story)
+
+
+def test_only_the_owner_and_the_group_may_read_and_the_socket_goes_with_the_process(tmp_path: Path) -> None:
+    path = tmp_path / "tap"
+
+    async def story(sender: TapSender) -> None:
+        assert stat.S_IMODE(sender.path.stat().st_mode) == 0o660
+
+    run(path, story)
+    assert not path.exists()
+    with pytest.raises(TandemError, match=r"\[tap\] socket"):
+        TapReader(path)
+
+
+def test_the_socket_of_a_killed_process_is_taken_over_and_that_of_a_living_one_is_not(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        with pytest.raises(TandemError, match="another process listens"):
+            TapSender(sender.path, bytes).open()
+        left = sender.path.rename(tmp_path / "left")
+        sender.close()
+        assert left.is_socket()
+        again = TapSender(left, bytes)
+        again.open()
+        again.close()
+
+    run(tmp_path / "tap", story)
+
+
+def test_no_tap_is_opened_unless_it_is_named() -> None:
+    assert open_tap(TapConfig(), {}) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("no/such/folder/tap.sock", "folder that exists"), ("x" * 120, "at most 100 bytes")],
+)
+def test_a_path_that_no_socket_can_have_is_a_mistake_of_the_file(
+    tmp_path: Path, text: str, expected: str
+) -> None:
+    class File(Section):
+        tap: TapConfig
+
+        def mistakes(self) -> list[ConfigMistake]:
+            return self.tap.mistakes()
+
+    file = tmp_path / "x.toml"
+    file.write_text(f'[tap]\nsocket = "{text}"\n')
+    with pytest.raises(ConfigError, match=expected):
+        load_config(file, File)
+
+
+def test_a_message_comes_back_and_nonsense_is_refused() -> None:
+    message = TapMessage(3, "topic", 5, b"payload")
+    assert decode(encode(message)) == message
+    for nonsense in (b"", b"\xff", msgpack.packb([1, "t", 2]), msgpack.packb([1, b"t", 2, b""])):
+        with pytest.raises(CodecError):
+            decode(nonsense)
