@@ -101,7 +101,7 @@ class JournaledPipeline:
 
 
 @dataclass(frozen=True, slots=True)
-class Angles:
+class RecordedAngles:
     """A recorded answer of the pipeline."""
 
     tick: int
@@ -131,7 +131,7 @@ def encode_angles(angles: JointAngleSample) -> bytes:
     return out
 
 
-def decode_angles(payload: bytes) -> Angles:
+def decode_angles(payload: bytes) -> RecordedAngles:
     """Read one back. Raises RecordingError."""
     version, *rest = _unpack(ANGLES, payload)
     if version != VERSION:
@@ -139,7 +139,7 @@ def decode_angles(payload: bytes) -> Angles:
     match rest:
         case [int(tick), int(sampled_ns), int(), bytes(position), bytes(), bytes(valid), str()]:
             position_rad = np.frombuffer(position, "<f8")
-            return Angles(tick, sampled_ns, position_rad, np.frombuffer(valid, np.bool_), payload)
+            return RecordedAngles(tick, sampled_ns, position_rad, np.frombuffer(valid, np.bool_), payload)
     raise RecordingError(f"a message of {ANGLES} is not of version {VERSION}")
 
 

@@ -15,7 +15,15 @@ from common.errors import RecordingError
 from common.quaternion import Array
 from master.config import MasterConfig
 from master.pipeline import JointAngleSample, MasterPipeline
-from master.replay.journal import ANGLES, FRAMES, Angles, apply, decode_angles, decode_calls, encode_angles
+from master.replay.journal import (
+    ANGLES,
+    FRAMES,
+    RecordedAngles,
+    apply,
+    decode_angles,
+    decode_calls,
+    encode_angles,
+)
 from master.replay.memory import restore
 from master.suit.protocol import SuitProtocol
 
@@ -32,10 +40,10 @@ class Recorded(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class Recomputed:
     """The joint angles of one deciding tick: as recorded, and as computed now."""
 
-    recorded: Angles
+    recorded: RecordedAngles
     computed: JointAngleSample
 
     @property
@@ -62,7 +70,7 @@ class Replay:
         self._protocol = SuitProtocol.load(config.capture.dbc)
         self._from_snapshots = from_snapshots
         self._pipeline: MasterPipeline | None = None
-        self._recorded: dict[int, Angles] = {}
+        self._recorded: dict[int, RecordedAngles] = {}
         self.skipped = 0
         """Recorded joint angles that could not be computed: before a snapshot, or after missing messages."""
         self.unrecorded = 0
@@ -74,7 +82,7 @@ class Replay:
         """The names of the J joints."""
         return tuple(self._config.skeleton.joint_names)
 
-    def pairs(self, entries: Iterable[Recorded]) -> Iterator[Pair]:
+    def pairs(self, entries: Iterable[Recorded]) -> Iterator[Recomputed]:
         """The joint angles, in order. Raises RecordingError."""
         for topic, payload in entries:
             if topic == SNAPSHOT:
@@ -105,7 +113,7 @@ class Replay:
         self.skipped += len(self._recorded)
         self._recorded.clear()
 
-    def _make_calls(self, payload: bytes, pipeline: MasterPipeline) -> Iterator[Pair]:
+    def _make_calls(self, payload: bytes, pipeline: MasterPipeline) -> Iterator[Recomputed]:
         """A tick's calls come after its joint angles in the file."""
         for call in decode_calls(payload):
             computed = apply(call, pipeline)
@@ -115,4 +123,4 @@ class Replay:
             if recorded is None:
                 self.unrecorded += 1
             else:
-                yield Pair(recorded, computed)
+                yield Recomputed(recorded, computed)

@@ -17,7 +17,7 @@ from common.config.load import load_config
 from common.errors import TandemError
 from common.recording.reader import RecordingStream
 from common.wire.version import software
-from deploy.ops.replay.comparison import Comparison, compare
+from deploy.ops.replay.comparison import ReplayFindings, compare
 from deploy.report.options import AsJson, Overrides
 from deploy.report.tables import plain_table
 from master.config import MasterConfig
@@ -118,7 +118,7 @@ def _versions(metadata: Mapping[str, str]) -> dict[str, str]:
     return {"recorded_by": f"tandem {recorded}", "computed_by": f"tandem {now}"}
 
 
-def _print(result: Comparison, metadata: Mapping[str, str]) -> None:
+def _print(result: ReplayFindings, metadata: Mapping[str, str]) -> None:
     console = Console()
     versions = _versions(metadata)
     console.print(

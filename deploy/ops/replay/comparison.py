@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from master.replay.replay import Pair, Replay
+from master.replay.replay import Recomputed, Replay
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class FirstDifference:
 
 
 @dataclass(slots=True)
-class Comparison:
+class ReplayFindings:
     """All postures of one replay."""
 
     joints: tuple[str, ...]
@@ -44,9 +44,9 @@ class Comparison:
         return 0 < self.postures == self.identical and not self.unrecorded
 
 
-def compare(replay: Replay, pairs: Iterable[Pair]) -> Comparison:
+def compare(replay: Replay, pairs: Iterable[Recomputed]) -> ReplayFindings:
     """Go through a replay. Joints that were invalid then or are now count in no angle."""
-    result = Comparison(replay.joint_names)
+    result = ReplayFindings(replay.joint_names)
     count = len(result.joints)
     squares, seen, worst = np.zeros(count), np.zeros(count), np.zeros(count)
     first_ns: int | None = None

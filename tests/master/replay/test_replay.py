@@ -16,7 +16,7 @@ from master.pipeline import MasterPipeline
 from master.replay.context import describe, recorded_config
 from master.replay.journal import FRAMES, JournaledPipeline, decode_calls
 from master.replay.memory import recall, restore
-from master.replay.replay import MISSING, SNAPSHOT, Pair, Recorded, Replay
+from master.replay.replay import MISSING, SNAPSHOT, Recomputed, Recorded, Replay
 from master.suit.protocol import SuitProtocol
 from tests.master.test_pipeline import EXAMPLES, Bench
 
@@ -45,7 +45,7 @@ class RecordedBench(Bench):
         self.entries.append(Recorded(SNAPSHOT, msgpack.packb(recall(self.raw))))
 
 
-def replayed(bench: RecordedBench, since: int = 0, config: MasterConfig | None = None) -> list[Pair]:
+def replayed(bench: RecordedBench, since: int = 0, config: MasterConfig | None = None) -> list[Recomputed]:
     bench.calls.flush()
     replay = Replay(config or bench.config, from_snapshots=config is None)
     return list(replay.pairs(bench.entries[since:]))
