@@ -37,10 +37,11 @@ from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
 from master.deadman.grip import Grip
 from master.deadman.switches import Switches
-from master.pipeline import JointAngleSample, MasterPipeline
-from master.replay.context import describe
-from master.replay.journal import Pipeline
-from master.replay.tap import MasterTap
+from master.joint_angles.sample import JointAngleSample
+from master.journal.calls import Pipeline
+from master.journal.context import describe
+from master.journal.tap import MasterTap
+from master.pipeline import MasterPipeline
 from master.robot import CommandedRobot
 from master.suit.doubt import DoubtLog, as_figures
 from master.suit.protocol import SuitProtocol
@@ -271,7 +272,7 @@ async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
     audit = Audit(config.link)
     async with open_session(config.link, waits=notifier.waits) as session:
         audit.attach(session)
-        tap = open_tap(config.tap, describe(config))
+        tap = open_tap(config.tap, describe(config, config.commanded))
         master = Master(config, session, notifier, tap)
         where = ", ".join(config.link.connect or config.link.listen)
         robots = ", ".join(config.commanded)

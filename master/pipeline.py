@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from common.can.frame import CanFrame
 from common.clock import to_s
-from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Command, CommandStamps, Mask
 from master.comfort.arm_load import ArmLoadMeter
@@ -22,6 +21,7 @@ from master.comfort.zero_pose_again import ZeroPoseConduct
 from master.config import MasterConfig
 from master.deadman.grip import Grip
 from master.joint_angles.beyond import BeyondReach
+from master.joint_angles.sample import JointAngleSample
 from master.joint_angles.solver import JointSolver
 from master.orientation.estimator import Estimator
 from master.suit.double_tap import DoubleTap, TapLimits
@@ -34,20 +34,6 @@ from master.suit.sweep import Sweep
 
 MOST_BRIDGED = 20
 """Ticks (0.1 s). After a longer stall the motion in between is unknown."""
-
-
-@dataclass(frozen=True, slots=True)
-class JointAngleSample:
-    """The operator's joint angles at one deciding tick."""
-
-    tick: int
-    sampled_ns: int
-    frames_in_ns: int
-    position_rad: Array
-    velocity_rad_s: Array
-    valid: Mask
-    doubt: str = ""
-    """Why the robot must not be engaged on this sample, in words; empty where it may."""
 
 
 class MasterPipeline:

@@ -26,9 +26,10 @@ from master.alarms.situation import RobotSign
 from master.comfort.scaling import MotionScaling
 from master.deadman.grip import Grip
 from master.homonyms import Homonyms
+from master.joint_angles.sample import JointAngleSample
 from master.lease import LeaseKeeper
 from master.picture import VideoWatch
-from master.pipeline import CommandWriter, JointAngleSample
+from master.pipeline import CommandWriter
 from master.robot_watch import RobotWatch
 
 log = logging.getLogger(__name__)

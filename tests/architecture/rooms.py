@@ -14,7 +14,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["deploy/measure"],
     ["deploy/report", "deploy/certificates", "deploy/examples"],
     ["master", "slave"],
-    ["master/calibrate", "master/comfort", "master/alarms"],
+    ["master/calibrate", "master/comfort", "master/alarms", "master/journal"],
     ["master/joint_angles"],
     ["master/orientation"],
     ["master/deadman"],
@@ -25,7 +25,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["slave/limit"],
     ["slave/guard", "slave/attitude"],
     ["slave/encoders", "slave/model"],
-    ["common/link"],
+    ["common/link", "common/tap"],
     ["common/latency", "common/reach"],
     ["common/clock_sync", "common/recording"],
     ["common/wire", "common/process", "common/can", "common/skeleton", "common/inputs"],
@@ -37,10 +37,10 @@ Rooms on one line do not import each other."""
 
 IMPURE = [
     "common/clock.py", "common/can/*", "common/inputs/device.py", "common/inputs/reader.py",
-    "common/link/*", "common/log/handler.py", "common/log/streams.py",
+    "common/link/*", "common/tap/*", "common/log/handler.py", "common/log/streams.py",
     "common/process/*", "common/recording/recorder.py",
     "master/__main__.py", "master/app.py", "master/deadman/switches.py", "master/robot.py",
-    "master/alarms/player.py",
+    "master/alarms/player.py", "master/journal/tap.py",
     "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
     "slave/stop_inputs/gpio.py",
 ]  # fmt: skip

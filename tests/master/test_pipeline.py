@@ -18,7 +18,8 @@ from deploy.sim.suit.motion import load_motion
 from deploy.sim.suit.suit import SimulatedSuit, build_suit
 from master.config import MasterConfig
 from master.deadman.grip import Grip
-from master.pipeline import MOST_BRIDGED, CommandWriter, JointAngleSample, MasterPipeline, bridged
+from master.joint_angles.sample import JointAngleSample
+from master.pipeline import MOST_BRIDGED, CommandWriter, MasterPipeline, bridged
 from master.suit.doubt import NodeDoubt, Weight
 from master.suit.protocol import SuitProtocol
 

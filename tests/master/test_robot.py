@@ -33,7 +33,7 @@ from common.wire.topics import CLOCK, CONTROL, STATE, Topic
 from master.alarms.situation import RobotSign
 from master.app import Master
 from master.config import MasterConfig
-from master.pipeline import JointAngleSample
+from master.joint_angles.sample import JointAngleSample
 from master.robot import CommandedRobot
 from tests.published import master_metrics
 

@@ -14,7 +14,7 @@ from common.process.runtime import until_stopped
 from common.tap.message import GREETING, TapMessage
 from common.tap.reader import TapReader
 from deploy.ops.record.tape import Tape
-from master.replay.replay import MISSING
+from master.journal.calls import MISSING
 
 GREETED_S = 5.0
 PROGRESS_S = 0.5

@@ -34,8 +34,9 @@ from deploy.sim.world.link import VirtualLink
 from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
 from master.deadman.grip import Grip
+from master.joint_angles.sample import JointAngleSample
 from master.lease import LeaseKeeper
-from master.pipeline import CommandWriter, JointAngleSample, MasterPipeline
+from master.pipeline import CommandWriter, MasterPipeline
 from master.suit.protocol import SuitProtocol
 from slave.config import SlaveConfig
 from slave.pipeline import SlavePipeline

@@ -18,7 +18,7 @@ from common.wire.topics import COMMAND, Topic
 from deploy.sim.suit.buttons import DEADMAN, Buttons
 from master import app
 from master.config import MasterConfig
-from master.pipeline import JointAngleSample
+from master.joint_angles.sample import JointAngleSample
 from master.suit.protocol import SHIPPED_DBC
 from tests.common.inputs.pseudo import CLUTCH, PEDAL, Socket, socket
 

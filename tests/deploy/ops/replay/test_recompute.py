@@ -11,12 +11,13 @@ import pytest
 
 from common.config.load import load_config
 from common.errors import RecordingError
+from deploy.ops.replay.recompute import Recomputed, Recorded, Replay
+from deploy.ops.replay.recorded_config import recorded_config
 from master.config import MasterConfig
+from master.journal.calls import FRAMES, MISSING, SNAPSHOT, JournaledPipeline, decode_calls
+from master.journal.context import describe
+from master.journal.memory import recall, restore
 from master.pipeline import MasterPipeline
-from master.replay.context import describe, recorded_config
-from master.replay.journal import FRAMES, JournaledPipeline, decode_calls
-from master.replay.memory import recall, restore
-from master.replay.replay import MISSING, SNAPSHOT, Recomputed, Recorded, Replay
 from master.suit.protocol import SuitProtocol
 from tests.master.test_pipeline import EXAMPLES, Bench
 
@@ -147,7 +148,7 @@ def test_after_missing_messages_it_goes_on_at_the_next_snapshot() -> None:
 
 def test_the_configuration_and_its_files_come_back_without_the_link(tmp_path: Path) -> None:
     config = load_config(EXAMPLES / "master.toml", MasterConfig)
-    metadata = describe(config)
+    metadata = describe(config, ["robot-1"])
     assert "tcp/" not in json.dumps(metadata)
     with recorded_config(metadata, "x.mcap") as back:
         assert back.capture.dbc.read_bytes() == config.capture.dbc.read_bytes()

@@ -18,10 +18,13 @@ from common.can.frame import CanFrame
 from common.errors import RecordingError
 from common.quaternion import Array
 from common.wire.messages import Mask
-from master.pipeline import JointAngleSample
+from master.joint_angles.sample import JointAngleSample
 
 FRAMES = "suit/frames"
 ANGLES = "suit/angles"
+SNAPSHOT = "suit/snapshot"
+MISSING = "suit/missing"
+"""Stands where a recorder missed messages: what follows cannot be computed before the next snapshot."""
 VERSION = 1
 TICK, FRAME, CLOSE, BUS_DOWN, ZERO_POSE = range(5)
 """The calls, by the number that begins each: [TICK, tick, now_ns], [FRAME, bus, identifier, data, now_ns],

@@ -14,22 +14,21 @@ import msgpack
 from common.errors import RecordingError
 from common.quaternion import Array
 from master.config import MasterConfig
-from master.pipeline import JointAngleSample, MasterPipeline
-from master.replay.journal import (
+from master.joint_angles.sample import JointAngleSample
+from master.journal.calls import (
     ANGLES,
     FRAMES,
+    MISSING,
+    SNAPSHOT,
     RecordedAngles,
     apply,
     decode_angles,
     decode_calls,
     encode_angles,
 )
-from master.replay.memory import restore
+from master.journal.memory import restore
+from master.pipeline import MasterPipeline
 from master.suit.protocol import SuitProtocol
-
-SNAPSHOT = "suit/snapshot"
-MISSING = "suit/missing"
-"""Stands where a recorder missed messages: what follows cannot be computed before the next snapshot."""
 
 
 class Recorded(NamedTuple):

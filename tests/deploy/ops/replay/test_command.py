@@ -11,10 +11,10 @@ import pytest
 from common.errors import TandemError
 from common.recording import McapRecorder
 from deploy.ops.replay.command import replay
-from master.replay.context import describe
-from master.replay.journal import FRAMES, decode_calls
-from master.replay.replay import Recorded
-from tests.master.replay.test_replay import RecordedBench
+from deploy.ops.replay.recompute import Recorded
+from master.journal.calls import FRAMES, decode_calls
+from master.journal.context import describe
+from tests.deploy.ops.replay.test_recompute import RecordedBench
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def bench() -> RecordedBench:
 def write(path: Path, bench: RecordedBench, entries: list[Recorded]) -> Path:
     """One entry each 5 ms of the bench's clock, which its ticks are too."""
     stamp_ns = first_ns = 1_000_000_000
-    with McapRecorder(path, describe(bench.config)) as recorder:
+    with McapRecorder(path, describe(bench.config, ["robot-1"])) as recorder:
         for topic, payload in entries:
             recorder.put(topic, payload, stamp_ns)
             stamp_ns += 5_000_000 if topic == FRAMES else 0

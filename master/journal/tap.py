@@ -6,10 +6,8 @@ import msgpack
 
 from common.clock import to_ns
 from common.tap.sender import TapSender
-from master.pipeline import MasterPipeline
-from master.replay.journal import JournaledPipeline
-from master.replay.memory import recall
-from master.replay.replay import SNAPSHOT
+from master.journal.calls import SNAPSHOT, JournaledPipeline, Pipeline
+from master.journal.memory import recall
 
 SNAPSHOT_NS = to_ns(60.0)
 SOONEST_NS = to_ns(2.0)
@@ -19,7 +17,7 @@ SOONEST_NS = to_ns(2.0)
 class MasterTap:
     """Everything that a recording needs to compute the joint angles again. Costs little without readers."""
 
-    def __init__(self, pipeline: MasterPipeline, sender: TapSender) -> None:
+    def __init__(self, pipeline: Pipeline, sender: TapSender) -> None:
         self._raw = pipeline
         self._sender = sender
         self._snapshot_ns = 0
