@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,8 +13,9 @@ from common.clock import monotonic_ns
 from common.config.load import load_config
 from common.errors import TandemError
 from deploy.report.options import Overrides
-from slave.config import SlaveConfig
-from slave.stop_inputs.config import EstopConfig
+
+if TYPE_CHECKING:
+    from slave.stop_inputs.config import EstopConfig
 
 PERIOD_S = 0.005
 """Of the servo loop, as configured by default."""
@@ -33,6 +34,8 @@ def stops(
 
     Example: `tandem stops /etc/tandem/robot.toml`
     """
+    from slave.config import SlaveConfig
+
     estop = load_config(config, SlaveConfig, list(set_ or ())).estop
     own = [one for one in estop.inputs if one.source in ("gpio", "device")]
     for one in estop.inputs:
