@@ -22,6 +22,7 @@ from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
 from common.process.runtime import until_stopped
 from common.process.ticker import ticks
+from common.tap.sender import open_tap
 from common.wire.codec import encode
 from common.wire.messages import Statistics
 from common.wire.path_probe import answer_probe
@@ -37,9 +38,12 @@ from slave.guard.body import Body
 from slave.guard.states import State
 from slave.guard.tilt import base_loss
 from slave.last_known import EVERY_S, LastKnown, state_file
+from slave.limit.limit import Setpoint
 from slave.pipeline import SlavePipeline
 from slave.servos import Servos
+from slave.servos.servos import EncoderReading
 from slave.stop_inputs.robot_stops import RobotStops
+from slave.tap import RobotTick, SlaveTap, describe
 
 log = logging.getLogger(__name__)
 
@@ -57,12 +61,15 @@ class Slave:
         *,
         last_known: LastKnown | None = None,
         stops: RobotStops | None = None,
+        tap: SlaveTap | None = None,
     ) -> None:
         """`last_known`: the file that keeps the joints' last angles; None: none does.
 
-        `stops`: the emergency stop inputs, started; None: there are none.
+        `stops`: the emergency stop inputs, started; None: there are none. `tap`: hands each tick to local
+        readers; None: there is none.
         """
         self._stops = stops
+        self._tap = tap
         self._config = config
         self._link = link
         self._servos = servos
@@ -133,6 +140,8 @@ class Slave:
             if setpoint.ready:
                 self._servos.write(setpoint.position_rad)
                 self._pipeline.written(monotonic_ns())
+            if self._tap is not None:
+                self._hand_on(self._tap, reading, setpoint)
             if self._camera is not None:
                 self._camera.look(self._pipeline.position_rad, reading.read_ns)
                 self._pipeline.camera_fault = self._camera.fault
@@ -149,6 +158,18 @@ class Slave:
                 log.info("%s: %s: %s", self._config.robot, guard.state, guard.reason)
                 self._notifier.status(f"{guard.state}: {guard.reason}")
             self._notifier.beat(monotonic_ns())  # last, so that a servo or sensor that hangs is noticed too
+
+    def _hand_on(self, tap: SlaveTap, reading: EncoderReading, setpoint: Setpoint) -> None:
+        position_rad, guard = self._pipeline.position_rad, self._pipeline.guard
+        tick = RobotTick(
+            monotonic_ns(),
+            reading.read_ns,
+            setpoint.ready,
+            setpoint.position_rad,
+            position_rad,
+            reading.valid,
+        )
+        tap.tick(tick, str(guard.state), guard.reason)
 
     def _body(self) -> Body:
         attitude = self._pipeline.base = None if self._base is None else self._base.read()
@@ -245,9 +266,13 @@ async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
         audit = Audit(config.link)
         async with open_session(config.link, waits=notifier.waits) as session:
             audit.attach(session)
+            sender = open_tap(config.tap, describe(config.robot, config.skeleton))
+            tap = None if sender is None else SlaveTap(sender)
+            session.overheard = None if tap is None else tap.overhear
             slave = Slave(
-                config, session.link(config.robot), servos, base, notifier, last_known=last_known, stops=stops
-            )
+                config, session.link(config.robot), servos, base, notifier, last_known=last_known, stops=stops,
+                tap=tap,
+            )  # fmt: skip
             session.watch_revoked(slave.on_revoked)
             where = ", ".join(config.link.listen or config.link.connect)
             log.info("%s: waiting for a master at %s", config.robot, where)
@@ -261,6 +286,8 @@ async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
             finally:
                 notifier.stopping()
                 slave.remember_last()
+                if sender is not None:
+                    sender.close()
                 write_metrics(replace(slave.metrics(), access=audit.metrics()))
     finally:
         servos.stop()

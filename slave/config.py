@@ -9,6 +9,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
+from common.tap.config import TapConfig
 from slave.attitude.config import BaseConfig
 from slave.backends import ServosConfig
 from slave.camera.config import CameraConfig
@@ -45,6 +46,7 @@ class SlaveConfig(Section):
     camera: CameraConfig = CameraConfig()
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
+    tap: TapConfig = TapConfig()
 
     @property
     def skeleton(self) -> Skeleton:
@@ -65,6 +67,7 @@ class SlaveConfig(Section):
             *self.servos.mistakes_for(skeleton, self.encoders),
             *self.base.mistakes(),
             *self.link.mistakes(),
+            *self.tap.mistakes(),
         ]
 
     def _wrong_stops(self, skeleton: Skeleton) -> list[ConfigMistake]:

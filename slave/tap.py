@@ -1,0 +1,132 @@
+"""The slave's side of the tap: what was written to the servos and read from the encoders, tick by tick.
+
+Topics: `robot/tick`, one message a tick; `robot/guard`, one a change of the guard's state or reason.
+Commands, states and all else of the link stand under their own keys.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import msgpack
+import numpy as np
+
+from common.errors import RecordingError
+from common.quaternion import Array
+from common.skeleton import Skeleton
+from common.wire.messages import Mask
+from common.wire.version import software
+
+TICK, GUARD = "robot/tick", "robot/guard"
+VERSION = 1
+
+_pack = msgpack.Packer(autoreset=True).pack
+
+
+class Readers(Protocol):
+    """The part of a `TapSender` that is needed here."""
+
+    @property
+    def read(self) -> bool:
+        """Whether anybody reads."""
+
+    @property
+    def behind(self) -> bool:
+        """Whether a reader lacks messages."""
+
+    def put(self, topic: str, payload: bytes, stamp_ns: int | None = None) -> None:
+        """Hand one message to all readers."""
+
+    def put_snapshot(self, topic: str, payload: bytes) -> None:
+        """Hand on what a reader that lacks messages must know."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotTick:
+    """One turn of the servo loop."""
+
+    now_ns: int
+    read_ns: int
+    """When the encoders were read."""
+    ready: bool
+    """Whether the setpoint was written."""
+    setpoint_rad: Array
+    """(J,)."""
+    position_rad: Array
+    """(J,) by the encoders."""
+    valid: Mask
+    """(J,) encoders that could be read."""
+
+
+class SlaveTap:
+    """Hands on the robot's ticks. Without readers it costs a comparison."""
+
+    def __init__(self, readers: Readers) -> None:
+        self._readers = readers
+        self._guard: tuple[str, str] = "", ""
+
+    @property
+    def overhear(self) -> Callable[[str, bytes, int], None]:
+        """Takes each message that was sent or heard on the link."""
+        return self._readers.put
+
+    def tick(self, tick: RobotTick, state: str, reason: str) -> None:
+        """One tick is done. A reader that has just come, or lacks messages, is told the guard's state anew."""
+        if not self._readers.read:
+            return
+        guard = _pack((VERSION, tick.now_ns, state, reason))
+        if self._readers.behind:
+            self._readers.put_snapshot(GUARD, guard)
+        elif (state, reason) != self._guard:
+            self._readers.put(GUARD, guard, tick.now_ns)
+        self._guard = state, reason
+        self._readers.put(TICK, encode_tick(tick), tick.now_ns)
+
+
+def describe(robot: str, skeleton: Skeleton) -> Mapping[str, str]:
+    """The metadata of a recording of this slave."""
+    return {
+        "role": "slave",
+        "robot": robot,
+        "profile": skeleton.name,
+        "joints": json.dumps(list(skeleton.joint_names)),
+        "tandem": software().tandem,
+    }
+
+
+def encode_tick(tick: RobotTick) -> bytes:
+    """As a message: version, times, whether it was written, float64 setpoints and positions, valid."""
+    out: bytes = _pack(
+        (
+            VERSION,
+            tick.now_ns,
+            tick.read_ns,
+            tick.ready,
+            tick.setpoint_rad.astype("<f8").tobytes(),
+            tick.position_rad.astype("<f8").tobytes(),
+            tick.valid.tobytes(),
+        )
+    )
+    return out
+
+
+def decode_tick(payload: bytes) -> RobotTick:
+    """Read one back. Raises RecordingError."""
+    try:
+        version, now_ns, read_ns, ready, setpoint, position, valid = msgpack.unpackb(payload)
+        if version == VERSION:
+            setpoint_rad, position_rad = np.frombuffer(setpoint, "<f8"), np.frombuffer(position, "<f8")
+            return RobotTick(
+                int(now_ns),
+                int(read_ns),
+                bool(ready),
+                setpoint_rad,
+                position_rad,
+                np.frombuffer(valid, np.bool_),
+            )
+    except Exception:  # msgpack raises its own family, and a buffer may be of any length
+        pass
+    raise RecordingError(f"a message of {TICK} is not of version {VERSION}")
