@@ -160,15 +160,9 @@ class Slave:
             self._notifier.beat(monotonic_ns())  # last, so that a servo or sensor that hangs is noticed too
 
     def _hand_on(self, tap: SlaveTap, reading: EncoderReading, setpoint: Setpoint) -> None:
-        position_rad, guard = self._pipeline.position_rad, self._pipeline.guard
-        tick = RobotTick(
-            monotonic_ns(),
-            reading.read_ns,
-            setpoint.ready,
-            setpoint.position_rad,
-            position_rad,
-            reading.valid,
-        )
+        guard = self._pipeline.guard
+        written, read = setpoint.position_rad, self._pipeline.position_rad
+        tick = RobotTick(monotonic_ns(), reading.read_ns, setpoint.ready, written, read, reading.valid)
         tap.tick(tick, str(guard.state), guard.reason)
 
     def _body(self) -> Body:
@@ -269,10 +263,8 @@ async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
             sender = open_tap(config.tap, describe(config.robot, config.skeleton))
             tap = None if sender is None else SlaveTap(sender)
             session.overheard = None if tap is None else tap.overhear
-            slave = Slave(
-                config, session.link(config.robot), servos, base, notifier, last_known=last_known, stops=stops,
-                tap=tap,
-            )  # fmt: skip
+            link = session.link(config.robot)
+            slave = Slave(config, link, servos, base, notifier, last_known=last_known, stops=stops, tap=tap)
             session.watch_revoked(slave.on_revoked)
             where = ", ".join(config.link.listen or config.link.connect)
             log.info("%s: waiting for a master at %s", config.robot, where)

@@ -74,7 +74,7 @@ class SlaveTap:
         return self._readers.put
 
     def tick(self, tick: RobotTick, state: str, reason: str) -> None:
-        """One tick is done. A reader that has just come, or lacks messages, is told the guard's state anew."""
+        """One tick is done. A reader that has just come, or lacks messages, is told the guard's state."""
         if not self._readers.read:
             return
         guard = _pack((VERSION, tick.now_ns, state, reason))
