@@ -12,6 +12,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
+from common.skeleton.load import ProfileName
 from common.tap.config import TapConfig
 from master.alarms.config import AlarmsConfig
 from master.comfort.config import ZeroPoseAgainConfig
@@ -75,7 +76,7 @@ class MasterConfig(Section):
     """Robots to command, by the names in the slaves' files. Each has its own lease and guard."""
     robot: RobotName | None = None
     """Short for `robots` with one name."""
-    profile: str = "nursing"
+    profile: ProfileName = "nursing"
     """The skeleton profile of all robots: they are commanded the same joint angles."""
     operator: OperatorConfig
     capture: CaptureConfig

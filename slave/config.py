@@ -9,6 +9,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
+from common.skeleton.load import ProfileName
 from common.tap.config import TapConfig
 from slave.attitude.config import BaseConfig
 from slave.backends import ServosConfig
@@ -34,7 +35,7 @@ class SlaveConfig(Section):
     """The whole file."""
 
     robot: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")
-    profile: str = "nursing"
+    profile: ProfileName = "nursing"
     loop: LoopConfig = LoopConfig()
     guard: GuardConfig = GuardConfig()
     estop: EstopConfig = EstopConfig()

@@ -101,7 +101,7 @@ class PostureFollower:
         position = np.minimum(np.maximum(free, self._lower), self._upper)
         # of each segment: how far it may turn, and how fast its joints may be told to; |q'| is half its speed
         bounds = np.empty((2, len(q)))
-        bounds[0] = most = farthest_turn(_turned(self._last_q, q), elapsed_s)
+        bounds[0] = most = farthest_turn(turned(self._last_q, q), elapsed_s)
         bounds[1] = (2.0 * MOST_GAIN) * np.sqrt(np.einsum("ij,ij->i", q_rate, q_rate))
         most_of_joint, fastest = bounds.take(self._chart.segment_of_joint, axis=1).max(axis=-1)
         beyond = np.abs(position - free) > _ROUNDING_RAD
@@ -222,7 +222,7 @@ def _signed_order(frame: Array) -> tuple[list[int], list[float]]:
     return order.tolist(), frame[order, np.arange(3)].tolist()
 
 
-def _turned(before: Array, after: Array) -> Array:
+def turned(before: Array, after: Array) -> Array:
     """By how much each rotation (N, 4) turned, rad; a little less where it is much. NaN where not known."""
     product = np.abs(np.einsum("ij,ij->i", before, after))
     # twice the chord between the two quaternions, which is 2 sin(t / 4)

@@ -16,8 +16,13 @@ from common.skeleton.table import Skeleton
 class _Chain:
     """What of a skeleton the formulas need, worked out once."""
 
+    zero_rad: Array
+    turn_axes: Array
+    """(N, K, 3)"""
+    plain: bool
     half_angles: Array
-    """(J, 3 N): joint positions to halves of the segment angles, the third made right-handed."""
+    """(J, K N): joint positions to halves of the segment angles; of a plain skeleton, the third made
+    right-handed."""
     order: NDArray[np.intp]
     """(3 N,): where each component of a segment's own frame stands among the axis-frame components."""
     sign: Array
@@ -35,8 +40,9 @@ class _Chain:
 def _chain(skeleton: Skeleton) -> _Chain:
     count = len(skeleton.segments)
     parents = skeleton.parents
-    scale = np.full((count, 3), 0.5)
-    scale[:, 2] *= skeleton.axis_handedness
+    scale = np.full(skeleton.turn_axes.shape[:2], 0.5)
+    if skeleton.plain:
+        scale[:, 2] *= skeleton.axis_handedness
     order = np.argmax(np.abs(skeleton.axis_frames), axis=-1)
     sign = np.take_along_axis(skeleton.axis_frames, order[..., None], axis=-1)[..., 0]
     jumps = []
@@ -49,6 +55,9 @@ def _chain(skeleton: Skeleton) -> _Chain:
         if parent >= 0:
             above[i] += above[parent]
     return _Chain(
+        zero_rad=skeleton.zero_rad,
+        turn_axes=skeleton.turn_axes,
+        plain=skeleton.plain,
         half_angles=(skeleton.angles_from_joints * scale.reshape(-1, 1)).T.copy(),
         order=(order + 3 * np.arange(count)[:, None]).ravel(),
         sign=sign.ravel(),
@@ -84,6 +93,8 @@ def relative_orientations(skeleton: Skeleton, position_rad: Array) -> Array:
 
 def _local(chain: _Chain, position_rad: Array) -> Array:
     """Each segment's rotation from its parent, and the world's identity, (..., N + 1, 4)."""
+    if not chain.plain:
+        return _turn_by_turn(chain, position_rad)
     half = position_rad @ chain.half_angles
     half = half.reshape(*half.shape[:-1], -1, 3)
     c, s = np.cos(half), np.sin(half)
@@ -100,6 +111,17 @@ def _local(chain: _Chain, position_rad: Array) -> Array:
     flat = vector.reshape(*vector.shape[:-2], -1)
     q[..., :-1, 1:] = (flat.take(chain.order, axis=-1) * chain.sign).reshape(vector.shape)
     q[..., -1, :] = IDENTITY
+    return q
+
+
+def _turn_by_turn(chain: _Chain, position_rad: Array) -> Array:
+    """The same for any number of turns about any axes."""
+    half = (position_rad - chain.zero_rad) @ chain.half_angles
+    half = half.reshape(*half.shape[:-1], *chain.turn_axes.shape[:2])
+    c, s = np.cos(half), np.sin(half)[..., None] * chain.turn_axes
+    q = np.tile(IDENTITY, (*half.shape[:-2], half.shape[-2] + 1, 1))
+    for k in range(half.shape[-1]):
+        q[..., :-1, :] = multiply(q[..., :-1, :], np.concatenate([c[..., k, None], s[..., k, :]], axis=-1))
     return q
 
 

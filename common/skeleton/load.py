@@ -2,51 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import tomllib
 from functools import cache
 from importlib import resources
-from typing import NotRequired, TypedDict
+from pathlib import Path
+from typing import Annotated
 
+from pydantic import AfterValidator, ValidationInfo
+
+from common.config.load import check_config, load_config
 from common.errors import ConfigError, ConfigMistake
-from common.skeleton.table import WORLD, Joint, Post, Segment, Shape, Skeleton, Synergy
+from common.skeleton.entries import JointEntry, ProfileFile
+from common.skeleton.links import chain_of, link_mistakes
+from common.skeleton.table import WORLD, Joint, Segment, Skeleton
 
-_UNIT = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
-
-_Point = tuple[float, float, float]
-
-
-class _ShapeEntry(TypedDict):
-    radius_m: NotRequired[float]
-    fan: NotRequired[bool]
-    tip_m: NotRequired[list[float]]
-
-
-class _SegmentEntry(TypedDict):
-    name: str
-    parent: str
-    axes: str
-    angles: str
-    human: NotRequired[str]
-    group: NotRequired[str]
-    origin_m: list[float]
-    node_m: list[float]
-    shape: NotRequired[_ShapeEntry]
-
-
-class _PostEntry(TypedDict):
-    from_m: list[float]
-    to_m: list[float]
-    radius_m: float
-
-
-class _JointEntry(TypedDict):
-    name: str
-    lower_deg: float
-    upper_deg: float
-    max_velocity_deg_s: float
-    max_acceleration_deg_s2: float
-    drives: NotRequired[dict[str, float]]
+OWN_FILE = "robot.toml"
+"""The profile within a robot's own folder."""
 
 
 def profile_names() -> list[str]:
@@ -55,81 +28,96 @@ def profile_names() -> list[str]:
     return sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml"))
 
 
+def own_profile(name: str, folder: Path = Path()) -> Path | None:
+    """The file of a profile that is named by its path, or by its folder; None for one that ships."""
+    if name in profile_names():
+        return None
+    path = folder / name
+    if path.is_dir():
+        return path / OWN_FILE
+    return path if name.endswith(".toml") or "/" in name else None
+
+
+def _beside_the_file(name: str, info: ValidationInfo) -> str:
+    path = own_profile(name, (info.context or {}).get("folder", Path()))
+    return name if path is None else str(path.resolve())
+
+
+ProfileName = Annotated[str, AfterValidator(_beside_the_file)]
+"""A profile that ships, by its name; or one's own, by its path relative to the file that names it."""
+
+
 @cache
 def load_skeleton(name: str) -> Skeleton:
-    """The named profile that ships with tandem, such as `nursing`.
+    """A profile: `nursing` or another that ships with tandem, or a path to one's own file or its folder.
 
     Raises ConfigError naming the profiles there are, or the entry that is wrong.
     """
-    folder = resources.files(__package__)
+    path = own_profile(name)
+    if path is not None:
+        return _skeleton(load_config(path, ProfileFile), str(path))
     names = profile_names()
     if name not in names:
-        raise ConfigError("skeleton", [ConfigMistake("profile", name, f"one of {', '.join(names)}")])
+        expected = f"one of {', '.join(names)}, or a path to a .toml file or to a folder with {OWN_FILE}"
+        raise ConfigError("skeleton", [ConfigMistake("profile", name, expected)])
+    folder = resources.files(__package__)
     return parse_skeleton(folder.joinpath(f"{name}.toml").read_text("utf-8"), source=f"{name}.toml")
 
 
 def parse_skeleton(text: str, source: str) -> Skeleton:
     """A skeleton from TOML text (its form is described at the head of nursing.toml)."""
-    table = tomllib.loads(text)
+    return _skeleton(check_config(Path(source), tomllib.loads(text), ProfileFile), source)
+
+
+def _skeleton(file: ProfileFile, source: str) -> Skeleton:
     skeleton = Skeleton(
-        name=table["name"],
-        segments=tuple(_segment(entry) for entry in table["segment"]),
-        joints=tuple(_joint(entry) for entry in table["joint"]),
-        synergies=tuple(Synergy(**entry) for entry in table.get("synergy", ())),
-        stand=tuple(_post(entry) for entry in table.get("stand", ())),
+        name=file.name,
+        segments=tuple(entry.made() for entry in file.segment),
+        joints=tuple(_joint(entry, own=bool(file.link)) for entry in file.joint),
+        synergies=tuple(entry.made() for entry in file.synergy),
+        stand=tuple(entry.made() for entry in file.stand),
+        own_links=tuple(entry.made() for entry in file.link),
+        model=file.model,
+        unconfirmed=tuple(file.unconfirmed),
     )
-    mistakes = _mistakes(skeleton)
+    mistakes = []
+    if file.link or file.model:
+        mistakes = link_mistakes(skeleton)
+        if not mistakes:
+            skeleton = _with_chains(skeleton)
+    mistakes = mistakes or _mistakes(skeleton)
     if mistakes:
         raise ConfigError(source, mistakes)
     return skeleton
 
 
-def _segment(entry: _SegmentEntry) -> Segment:
-    first, second, third = (_axis(a) for a in entry["axes"].split())
-    one, two, three = (None if a == "_" else a for a in entry["angles"].split())
-    flexes, tilts, twists = (m != "_" for m in entry.get("human", "1 2 3").split())
-    return Segment(
-        name=entry["name"],
-        parent=entry["parent"],
-        axes=(first, second, third),
-        angles=(one, two, three),
-        origin_m=_point(entry["origin_m"]),
-        node_m=_point(entry["node_m"]),
-        human=(flexes, tilts, twists),
-        shape=_shape(entry.get("shape", {})),
-        group=entry.get("group"),
-    )
-
-
-def _shape(entry: _ShapeEntry) -> Shape:
-    tip_m = entry.get("tip_m")
-    return Shape(entry.get("radius_m"), entry.get("fan", False), None if tip_m is None else _point(tip_m))
-
-
-def _post(entry: _PostEntry) -> Post:
-    return Post(_point(entry["from_m"]), _point(entry["to_m"]), entry["radius_m"])
-
-
-def _point(values: list[float]) -> _Point:
-    x, y, z = values
-    return (x, y, z)
-
-
-def _axis(text: str) -> tuple[int, int, int]:
-    sign = -1 if text.startswith("-") else 1
-    x, y, z = _UNIT[text.lstrip("-")]
-    return (sign * x, sign * y, sign * z)
-
-
-def _joint(entry: _JointEntry) -> Joint:
+def _joint(entry: JointEntry, own: bool) -> Joint:
+    hinges = (entry.hinges or {entry.name: 1.0}) if own else None
     return Joint(
-        name=entry["name"],
-        lower_rad=math.radians(entry["lower_deg"]),
-        upper_rad=math.radians(entry["upper_deg"]),
-        max_velocity_rad_s=math.radians(entry["max_velocity_deg_s"]),
-        max_acceleration_rad_s2=math.radians(entry["max_acceleration_deg_s2"]),
-        drives=entry.get("drives", {entry["name"]: 1.0}),
+        name=entry.name,
+        lower_rad=math.radians(entry.lower_deg),
+        upper_rad=math.radians(entry.upper_deg),
+        max_velocity_rad_s=math.radians(entry.max_velocity_deg_s),
+        max_acceleration_rad_s2=math.radians(entry.max_acceleration_deg_s2),
+        drives=entry.drives or hinges or {entry.name: 1.0},
+        zero_rad=math.radians(entry.zero_deg),
+        hinges=hinges,
     )
+
+
+def _with_chains(skeleton: Skeleton) -> Skeleton:
+    """The same, each segment that a link follows with its turns; a joint drives those of its hinges."""
+    by_name: dict[str, Segment] = {}
+    for segment in skeleton.segments:
+        chain = chain_of(segment, by_name.get(segment.parent), skeleton.own_links, skeleton.joints)
+        by_name[segment.name] = dataclasses.replace(segment, chain=chain)
+    segments = tuple(by_name.values())
+    turned = {turn.angle for segment in segments for turn in segment.turns}
+    joints = []
+    for joint in skeleton.joints:
+        drives = {angle: ratio for angle, ratio in joint.drives.items() if angle in turned}
+        joints.append(dataclasses.replace(joint, drives=drives))
+    return dataclasses.replace(skeleton, segments=segments, joints=tuple(joints))
 
 
 def _mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
@@ -155,7 +143,10 @@ def _mistakes(skeleton: Skeleton) -> list[ConfigMistake]:
         if not joint.lower_rad < joint.upper_rad:
             wrong(f"{joint.name}.lower_deg", joint.lower_rad, "a limit below upper_deg")
         if not joint.drives or not all(joint.drives.values()):
-            wrong(f"{joint.name}.drives", joint.drives, "at least one angle, no ratio of 0")
+            expected = "at least one angle, no ratio of 0"
+            if skeleton.own_links:
+                expected += "; leave the joint out if nothing that the operator wears moves it"
+            wrong(f"{joint.name}.drives", joint.drives, expected)
         for angle in joint.drives:
             if angle not in skeleton.angle_slots or angle in driven:
                 wrong(f"{joint.name}.drives", angle, "a segment's angle that no other joint drives")

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.quaternion import Array
+
+Point = tuple[float, float, float]
 
 WORLD = "world"
 """The parent of a root segment: the ground, of which only the vertical is known."""
@@ -36,6 +39,51 @@ class Post:
 
 
 @dataclass(frozen=True, slots=True)
+class RobotHinge:
+    """One joint of a robot's own model, between a link and its parent."""
+
+    name: str
+    axis: Point
+    """Unit vector, the link's frame."""
+    anchor_m: Point = (0.0, 0.0, 0.0)
+    """A point on the axis, the link's frame."""
+    slides: bool = False
+    """Moves along the axis, m; otherwise turns about it, rad."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A capsule: all points within `radius_m` of the line between two points of a link's own frame."""
+
+    from_m: Point
+    to_m: Point
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class RobotLink:
+    """One rigid body of a robot's own model: where it hangs on its parent, and its shape."""
+
+    name: str
+    parent: str
+    origin_m: Point
+    q_parent_from_link: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    """With all its hinges at 0."""
+    hinges: tuple[RobotHinge, ...] = ()
+    bars: tuple[Bar, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One of the rotations that take a segment's parent into the segment, in their order."""
+
+    angle: str | None
+    """None: a residual that no robot joint follows."""
+    axis: Point
+    """Unit vector, the parent's frame in the zero pose."""
+
+
+@dataclass(frozen=True, slots=True)
 class Segment:
     """A body segment, which carries one node, and its joint with the neighbour it hangs on.
 
@@ -55,6 +103,17 @@ class Segment:
     shape: Shape = Shape()
     group: str | None = None
     """Name of the joint group that begins here (`groups.py`); None: if one begins, the segment's name."""
+    link: str | None = None
+    """The link of the robot's own model that follows the segment; None: the segment is its own."""
+    chain: tuple[Turn, ...] | None = None
+    """How that link turns relative to the parent's: all hinges between the two; None: `axes`, `angles`."""
+
+    @property
+    def turns(self) -> tuple[Turn, ...]:
+        """The robot's rotations that take the parent into the segment."""
+        if self.chain is not None:
+            return self.chain
+        return tuple(Turn(angle, axis) for angle, axis in zip(self.angles, self.axes, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +126,15 @@ class Joint:
     max_velocity_rad_s: float
     max_acceleration_rad_s2: float
     drives: dict[str, float]
+    zero_rad: float = 0.0
+    """Its position in the operator's zero pose."""
+    hinges: dict[str, float] | None = None
+    """The hinges of the robot's own model that it moves, each with its ratio; None: as in `drives`."""
+
+    @property
+    def moves(self) -> dict[str, float]:
+        """The hinges of the slave's model that it moves, each with its ratio."""
+        return self.drives if self.hinges is None else self.hinges
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +157,12 @@ class Skeleton:
     joints: tuple[Joint, ...]
     synergies: tuple[Synergy, ...] = ()
     stand: tuple[Post, ...] = ()
+    own_links: tuple[RobotLink, ...] = ()
+    """The bodies of the robot's own model; none: the segments are its bodies."""
+    model: Path | None = None
+    """The file of that model (MJCF), which the slave simulates."""
+    unconfirmed: tuple[str, ...] = ()
+    """What an import guessed and nobody has confirmed yet."""
 
     @cached_property
     def segment_names(self) -> tuple[str, ...]:
@@ -124,9 +198,31 @@ class Skeleton:
         return out
 
     @cached_property
+    def plain(self) -> bool:
+        """Whether every segment turns about its `axes` and stands at 0 in the zero pose."""
+        return all(s.chain is None for s in self.segments) and not self.zero_rad.any()
+
+    @cached_property
+    def turn_axes(self) -> Array:
+        """(N, K, 3) unit axes of each segment's `turns`; where it has fewer than K, zeros follow."""
+        most = max(len(s.turns) for s in self.segments)
+        out = np.zeros((len(self.segments), most, 3))
+        for i, segment in enumerate(self.segments):
+            for k, turn in enumerate(segment.turns):
+                out[i, k] = turn.axis
+        return out
+
+    @cached_property
     def angle_slots(self) -> dict[str, tuple[int, int]]:
-        """Where each named angle lives: (segment index, place 0..2 in its rotation order)."""
-        return {a: (i, k) for i, s in enumerate(self.segments) for k, a in enumerate(s.angles) if a}
+        """Where each named angle lives: (segment index, place in its `turns`)."""
+        return {
+            t.angle: (i, k) for i, s in enumerate(self.segments) for k, t in enumerate(s.turns) if t.angle
+        }
+
+    @cached_property
+    def zero_rad(self) -> Array:
+        """Positions in the operator's zero pose, (J,)."""
+        return np.array([j.zero_rad for j in self.joints])
 
     @cached_property
     def lower_rad(self) -> Array:
@@ -150,17 +246,18 @@ class Skeleton:
 
     @cached_property
     def angles_from_joints(self) -> Array:
-        """Ratios (3 N, J): angle `3 * segment + place` of every segment for given joint positions."""
-        ratios = np.zeros((3 * len(self.segments), len(self.joints)))
+        """Ratios (K N, J): angle `K * segment + place` of every segment, for positions less `zero_rad`."""
+        most = self.turn_axes.shape[1]
+        ratios = np.zeros((most * len(self.segments), len(self.joints)))
         for j, joint in enumerate(self.joints):
             for angle, ratio in joint.drives.items():
                 segment, place = self.angle_slots[angle]
-                ratios[3 * segment + place, j] = ratio
+                ratios[most * segment + place, j] = ratio
         return ratios
 
     @cached_property
     def joints_from_angles(self) -> Array:
-        """Weights (J, 3 N), the least-squares inverse of `angles_from_joints`: θ = Σ c α / Σ c²."""
+        """Weights (J, K N), the least-squares inverse of `angles_from_joints`: θ = Σ c α / Σ c²."""
         ratios = self.angles_from_joints
         out: Array = (ratios / np.sum(ratios**2, axis=0)).T
         return out

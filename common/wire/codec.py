@@ -90,6 +90,16 @@ def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
     return message
 
 
+def state_joints(payload: bytes) -> int:
+    """How many joints the robot of an encoded state has, for `decode`; 0 where the bytes are no state."""
+    try:
+        array = _unpack(payload, use_list=False, max_array_len=MAX_ITEMS, max_map_len=MAX_ITEMS)
+        # the block of position_rad and setpoint_rad, float32 each (see _unpack_state)
+        return len(array[2 + 8]) // 8
+    except Exception:  # as in decode, which then says what is wrong
+        return 0
+
+
 # one pair of functions a message, in the order of messages.py
 
 

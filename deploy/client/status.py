@@ -21,7 +21,7 @@ from common.metrics.parts import Summary, Ticks
 from common.metrics.slave import DueMetrics, GuardTimes, LeaseMetrics, SlaveMetrics
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
-from common.wire.codec import decode
+from common.wire.codec import decode, state_joints
 from common.wire.messages import Action, RobotState, Statistics
 from common.wire.topics import STATE, STATISTICS
 from deploy.client.answer import RobotAnswer
@@ -124,12 +124,10 @@ class HeardOfAll:
 
 def decode_state(payload: bytes) -> RobotState | None:
     """A state of a robot of any profile; None where it is none."""
-    for joints in sorted({len(load_skeleton(name).joints) for name in profile_names()}):
-        try:
-            return decode(payload, RobotState, joints)
-        except CodecError:
-            continue
-    return None
+    try:
+        return decode(payload, RobotState, state_joints(payload))
+    except CodecError:
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,8 +254,11 @@ def _blind(state: RobotState | None) -> str | None:
     if state is None or not state.blind_m:
         return None
     skeletons = map(load_skeleton, profile_names())
-    skeleton = next(one for one in skeletons if len(one.joints) == len(state.position_rad))
-    hands = zip(limb_ends(skeleton).names, state.blind_m, strict=False)
+    skeleton = next((one for one in skeletons if len(one.joints) == len(state.position_rad)), None)
+    # a robot of one's own: the state does not tell what its hands are called
+    names = [f"limb {i + 1}" for i in range(len(state.blind_m))]
+    names = list(limb_ends(skeleton).names) if skeleton is not None else names
+    hands = zip(names, state.blind_m, strict=False)
     ways = ", ".join(f"{name.replace('_', ' ')} ≤ {100.0 * way_m:.1f} cm" for name, way_m in hands)
     return f"if the line died now: {ways} in {state.blind_s:.2f} s"
 

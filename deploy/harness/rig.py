@@ -55,6 +55,7 @@ class Rig:
     ) -> None:
         self.network = network
         """The hosts on which the processes run; None: this machine itself."""
+        self._profile = profile
         self.skeleton = load_skeleton(profile)
         self.folder = folder
         """Where the processes' logs lie; it is deleted with the rig."""
@@ -99,7 +100,7 @@ class Rig:
         if DRIVES in self.children and role in ("slave", DRIVES):
             # between processes SYNC may come late by milliseconds, which contact detection takes for a push
             overrides += [*drive_buses(self._endpoints.can_port), "servos.canopen.tell_effort=false"]
-        file = example("slave" if role == DRIVES else role, NURSING if role == ROUTER else self.skeleton.name)
+        file = example("slave" if role == DRIVES else role, NURSING if role == ROUTER else self._profile)
         await self.children[name].start(file, overrides, [*self._host(role), *through])
 
     def _host(self, role: str) -> list[str]:

@@ -13,6 +13,7 @@ import numpy as np
 from common.quaternion import Array, rotate
 from common.skeleton import Skeleton
 from common.skeleton.kinematics import orientations, origins
+from common.skeleton.links import hinge_values, place_links
 from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Zone
 from slave.model.capsules import capsules
 from slave.model.pairs import moving, pairs
@@ -63,8 +64,13 @@ class Distances:
 
     def _placed(self, position_rad: Array) -> Array:
         """(T, C, 2, 3) both ends of every capsule's line."""
-        q = orientations(self._skeleton, position_rad)
-        origin_m = origins(self._skeleton, q)
+        own = self._skeleton.own_links
+        if own:
+            placed = place_links(own, hinge_values(self._skeleton.joints, position_rad))
+            origin_m, q = (np.stack([placed[link.name][k] for link in own], axis=1) for k in (0, 1))
+        else:
+            q = orientations(self._skeleton, position_rad)
+            origin_m = origins(self._skeleton, q)
         turned = rotate(
             q[:, self._segment, None, :], np.broadcast_to(self._ends, (len(q), *self._ends.shape))
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from common.quaternion import IDENTITY, Array, conjugate, multiply
-from common.reach import NOMINAL_S, PostureFollower
+from common.reach import NOMINAL_S, make_follower
 from common.skeleton import Skeleton
 
 
@@ -24,7 +24,7 @@ class JointSolver:
         self._rate = np.zeros((count + 1, 3))
         self._parents = np.where(skeleton.parents < 0, count, skeleton.parents)
         self._rates = np.empty((count, 6))
-        self._reach = PostureFollower(skeleton, skeleton.lower_rad, skeleton.upper_rad)
+        self._reach = make_follower(skeleton, skeleton.lower_rad, skeleton.upper_rad)
 
     @property
     def short_rad(self) -> Array:

@@ -140,7 +140,8 @@ class ContactWatch:
         j = max(np.flatnonzero(pushed).tolist(), key=lambda joint: self._depth[joint])
         joint = self._skeleton.joints[j]
         torque_nm = abs(float(self.observer.external_nm[j]))
-        segment = self._skeleton.segment_names[self._skeleton.angle_slots[leader(joint)[0]][0]]
+        model = self.observer.model
+        segment = model.body(model.jnt_bodyid[self._hinge_ids[j]]).name
         force_n = torque_nm / self._lever_m(int(self._hinge_ids[j]))
         return f"pushed at {segment} or beyond: {torque_nm:.3g} N m at {joint.name}, at least {force_n:.0f} N"
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from common.clock import to_s
 from common.quaternion import Array
-from common.reach import PostureFollower
+from common.reach import make_follower
 from common.skeleton import Skeleton
 from common.skeleton.kinematics import relative_orientations
 from common.wire.messages import Mask
@@ -33,7 +33,7 @@ class NearestPosture:
     def __init__(self, skeleton: Skeleton, limits: MotionLimits) -> None:
         self._skeleton = skeleton
         self._names: Sequence[str] = skeleton.joint_names
-        self._reach = PostureFollower(skeleton, limits.lower_rad, limits.upper_rad)
+        self._reach = make_follower(skeleton, limits.lower_rad, limits.upper_rad)
         tighter = (limits.lower_rad > skeleton.lower_rad) | (limits.upper_rad < skeleton.upper_rad)
         self._concerned: Mask = self._reach.joints_beside(tighter)
         self._any = bool(self._concerned.any())

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.model.build import build_model, unit_rates
-from slave.model.capsules import Capsule, capsules
+from slave.model.capsules import Capsule, capsules, links
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +56,15 @@ class BodyModel:
         self.capsules = capsules(skeleton)
         self._model = model = build_model(skeleton)
         self._data = mujoco.MjData(model)
-        self._bodies = np.array([model.body(name).id for name in skeleton.segment_names])
+        own = links(skeleton)
+        self._bodies = np.array([model.body(link.name).id for link in own])
         self.hinges_per_joint: Array = unit_rates(skeleton, model)
         """(J, H): how every hinge turns for one unit of each joint."""
-        above = np.eye(len(skeleton.segments), dtype=np.bool_)
-        for i, parent in enumerate(skeleton.parents.tolist()):
-            if parent >= 0:
-                above[i] |= above[parent]
+        place = {link.name: i for i, link in enumerate(own)}
+        above = np.eye(len(own), dtype=np.bool_)
+        for i, link in enumerate(own):
+            if link.parent in place:
+                above[i] |= above[place[link.parent]]
         on_segment = model.jnt_bodyid[:, None] == self._bodies
         self.carries: NDArray[np.bool_] = above @ on_segment.T
         """(N, H): whether the hinge moves the segment."""

@@ -1,23 +1,24 @@
 """A MuJoCo robot built from the skeleton table, so that the model and the table cannot disagree.
 
-Segments become capsules of one density, angles become hinges. Each robot joint is a geared position
-servo on the first angle that it drives; further angles follow by joint equality couplings. Servo
-gains are worked out from the model's own inertia, as one tunes a drive to its load.
+Segments become capsules of one density, angles become hinges; a robot that has a model of its own is that
+model (`own.py`). Each robot joint is a geared position servo on the first hinge that it moves; further hinges
+follow by joint equality couplings. Servo gains are worked out from the model's own inertia, as one tunes a
+drive to its load.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 
 from common.quaternion import Array
-from common.skeleton import WORLD, Joint, Segment, Skeleton
-from slave.model.capsules import capsules
+from common.skeleton import WORLD, Joint, RobotLink, Skeleton
+from slave.model.capsules import capsules, links
+from slave.model.own import COMPENSATED, ServoGains, compile_own, leader
 
 STEP_S = 0.004
 """Physics step: 31 to a period of the servos' 8 Hz. README.md has what a finer one would change."""
@@ -30,22 +31,10 @@ _DENSITY_KG_M3 = 900.0
 _ROTOR_TO_LOAD = 1.0
 """Rotor inertia seen through the gear, over the heaviest load's: matched, as gears are chosen."""
 _LEAST_ARMATURE_KG_M2 = 2e-4
-_COMPENSATED = 0.9
-"""Share of gravity that the drives feed forward; their idea of the arm is never exact."""
 _STOP_RAD = math.radians(3.0)
 """The mechanical stops stand this far outside the table's limits, so that a limit can be reached."""
 _HEADROOM = 1.5
 """Torque limit over what worst gravity and the table's greatest acceleration need together."""
-
-
-@dataclass(frozen=True, slots=True)
-class ServoGains:
-    """A joint's servo: torque = stiffness (setpoint - angle) - damping · rate, within the limit."""
-
-    armature_kg_m2: float
-    stiffness_nm_rad: float
-    damping_nm_s_rad: float
-    torque_limit_nm: float
 
 
 def build_model(skeleton: Skeleton, step_s: float = STEP_S) -> mujoco.MjModel:
@@ -57,12 +46,9 @@ def build_model(skeleton: Skeleton, step_s: float = STEP_S) -> mujoco.MjModel:
     return _compile(skeleton, _drives(skeleton, bare), step_s)
 
 
-def leader(joint: Joint) -> tuple[str, float]:
-    """The angle that a joint's servo sits on, and its ratio to the joint."""
-    return next(iter(joint.drives.items()))
-
-
 def _compile(skeleton: Skeleton, drives: Sequence[ServoGains], step_s: float) -> mujoco.MjModel:
+    if skeleton.model is not None:
+        return compile_own(skeleton, drives, step_s)
     root = ET.Element("mujoco", model=skeleton.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     option = ET.SubElement(root, "option", timestep=f"{step_s!r}", integrator="implicitfast")
@@ -82,10 +68,11 @@ def add_segments(
 ) -> dict[str, ET.Element]:
     """The segments as bodies, by name; the MJCF attributes of each driven angle's hinge: bare by default."""
     if hinges is None:
-        hinges = {angle: {"name": angle} for joint in skeleton.joints for angle in joint.drives}
+        hinges = {angle: {"name": angle} for joint in skeleton.joints for angle in joint.moves}
     bodies = {WORLD: world}
-    for segment in skeleton.segments:
-        bodies[segment.name] = _body(bodies[segment.parent], segment, skeleton, hinges)
+    for i, link in enumerate(links(skeleton)):
+        bodies[link.name] = body = _body(bodies[link.parent], link, hinges)
+        _add_capsules(body, skeleton, i)
     return bodies
 
 
@@ -119,20 +106,32 @@ def _hinges(skeleton: Skeleton, drives: Sequence[ServoGains]) -> dict[str, dict[
     return hinges
 
 
-def _body(
-    parent: ET.Element, segment: Segment, skeleton: Skeleton, hinges: dict[str, dict[str, str]]
-) -> ET.Element:
-    """A segment as a body that hangs on its parent by as many hinges as it has named angles."""
+def _body(parent: ET.Element, link: RobotLink, hinges: dict[str, dict[str, str]]) -> ET.Element:
+    """A body that hangs on its parent by those of its hinges that a joint moves."""
     body = ET.SubElement(
-        parent, "body", name=segment.name, pos=_text(segment.origin_m), gravcomp=f"{_COMPENSATED}"
+        parent,
+        "body",
+        name=link.name,
+        pos=_text(link.origin_m),
+        quat=_text(link.q_parent_from_link),
+        gravcomp=f"{COMPENSATED}",
     )
-    for axis, angle in zip(segment.axes, segment.angles, strict=True):
-        # MuJoCo turns a body by its hinges in their order: the table's intrinsic sequence
-        if angle in hinges:
-            ET.SubElement(body, "joint", hinges[angle], type="hinge", axis=_text(axis))
-    for capsule in capsules(skeleton):
-        if skeleton.segments[capsule.segment] is not segment:
-            continue
+    for hinge in link.hinges:
+        if hinge.name in hinges:
+            kind, place = "slide" if hinge.slides else "hinge", _text(hinge.anchor_m)
+            ET.SubElement(body, "joint", hinges[hinge.name], type=kind, axis=_text(hinge.axis), pos=place)
+    if link.name == "head":
+        ET.SubElement(body, "site", name="head", pos="0.09 0 0.1")
+        # at the eyes, looking ahead: image right is -y, image up is z
+        ET.SubElement(body, "camera", name="head", pos="0.09 0 0.1", xyaxes="0 -1 0 0 0 1", fovy="70")
+    return body
+
+
+def _add_capsules(body: ET.Element, skeleton: Skeleton, index: int) -> None:
+    own = [capsule for capsule in capsules(skeleton) if capsule.segment == index]
+    if not own:  # MuJoCo moves no body without mass
+        ET.SubElement(body, "inertial", pos="0 0 0", mass="0.001", diaginertia="1e-6 1e-6 1e-6")
+    for capsule in own:
         ET.SubElement(
             body,
             "geom",
@@ -142,11 +141,6 @@ def _body(
             density=f"{_DENSITY_KG_M3}",
             rgba="0.85 0.85 0.9 1",
         )
-    if segment.name == "head":
-        ET.SubElement(body, "site", name="head", pos="0.09 0 0.1")
-        # at the eyes, looking ahead: image right is -y, image up is z
-        ET.SubElement(body, "camera", name="head", pos="0.09 0 0.1", xyaxes="0 -1 0 0 0 1", fovy="70")
-    return body
 
 
 def _couplings(equality: ET.Element, joint: Joint) -> None:
@@ -226,7 +220,7 @@ def unit_rates(skeleton: Skeleton, model: mujoco.MjModel) -> Array:
     """(J, hinges): how every hinge turns for one unit of each joint; `joints @ it` gives qpos."""
     rates = np.zeros((len(skeleton.joints), model.nv))
     for j, joint in enumerate(skeleton.joints):
-        for angle, ratio in joint.drives.items():
+        for angle, ratio in joint.moves.items():
             rates[j, model.joint(angle).dofadr[0]] = ratio
     return rates
 

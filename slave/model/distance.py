@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.model.build import add_segments, unit_rates
-from slave.model.capsules import capsules
+from slave.model.capsules import capsules, links
 from slave.model.pairs import groups, moving, pairs
 
 REACH_M = 0.12
@@ -159,7 +159,7 @@ def _plan(skeleton: Skeleton, obstacles: tuple[Obstacle, ...], margins_m: tuple[
     first, second = model.pair_geom1, model.pair_geom2
     pair_of = np.full((model.ngeom, model.ngeom), -1, np.intp)
     pair_of[first, second] = pair_of[second, first] = np.arange(model.npair)
-    part = dict(zip(skeleton.segment_names, groups(skeleton), strict=True))
+    part = {link.name: group for link, group in zip(links(skeleton), groups(skeleton), strict=True)}
     shown = [_shown(model, geom, part) for geom in range(model.ngeom)]
     # what is further out in the tree comes first, and what is fixed to the base last
     both = np.sort(np.stack([first, second], axis=1), axis=1)[:, ::-1].tolist()
@@ -189,7 +189,7 @@ def _compiled(
     ET.SubElement(ET.SubElement(root, "default"), "geom", contype="0", conaffinity="0")
     world = ET.SubElement(root, "worldbody")
     bodies = add_segments(world, skeleton)
-    geoms = [geom for segment in skeleton.segments for geom in bodies[segment.name].findall("geom")]
+    geoms = [geom for link in links(skeleton) for geom in bodies[link.name].findall("geom")]
     for i, geom in enumerate(geoms):
         geom.set("name", f"{_PART}{i}")
     contact = ET.SubElement(root, "contact")

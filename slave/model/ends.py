@@ -12,7 +12,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.model.body import BodyModel
 from slave.model.build import build_model, unit_rates
-from slave.model.capsules import capsules
+from slave.model.capsules import capsules, links
 
 _ENDS = ("left_hand", "right_hand", "left_foot", "right_foot")
 
@@ -21,20 +21,21 @@ class LimbEnds:
     """The far end of each hand and foot that some joint moves; without them, of the last segments."""
 
     def __init__(self, skeleton: Skeleton) -> None:
-        names = skeleton.segment_names
+        names = [link.name for link in links(skeleton)]
+        followed = {segment.link or segment.name: segment.name for segment in skeleton.segments}
         body = BodyModel(skeleton)
         moved = (body.carries @ np.abs(body.hinges_per_joint).T) > 0.0
-        parents = {segment.parent for segment in skeleton.segments}
-        ends = [i for i, name in enumerate(names) if name in _ENDS and moved[i].any()]
+        parents = {link.parent for link in links(skeleton)}
+        ends = [i for i, name in enumerate(names) if followed.get(name) in _ENDS and moved[i].any()]
         ends = ends or [i for i, name in enumerate(names) if name not in parents]
-        self.names = tuple(names[i] for i in ends)
+        self.names = tuple(followed.get(names[i], names[i]) for i in ends)
         self.moved_by: NDArray[np.bool_] = moved[ends]
         """(E, J): whether a joint moves the end."""
         self._local_m = np.array([_farthest_m(skeleton, i) for i in ends])[:, :, None]
         self._model = build_model(skeleton)
         self._data = mujoco.MjData(self._model)
         self._rates = unit_rates(skeleton, self._model)
-        self._bodies = np.array([self._model.body(name).id for name in self.names])
+        self._bodies = np.array([self._model.body(names[i]).id for i in ends])
 
     def at(self, position_rad: Array) -> Array:
         """(E, 3) m, base frame, for joint angles (J,)."""
@@ -48,7 +49,7 @@ class LimbEnds:
 
 def _farthest_m(skeleton: Skeleton, segment: int) -> Array:
     points = [np.array(capsule.to_m) for capsule in capsules(skeleton) if capsule.segment == segment]
-    return max(points, key=lambda point: float(point @ point))
+    return max(points, key=lambda point: float(point @ point), default=np.zeros(3))
 
 
 @lru_cache(maxsize=16)

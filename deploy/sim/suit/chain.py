@@ -30,9 +30,10 @@ class ChainMotion:
 class Chain:
     """A skeleton's kinematics with its derivatives, over all segments at once.
 
-    A segment turns about three axes in sequence, so a skeleton of N segments is a tree of 3 N single
-    rotations, here called turns. Angular velocities and accelerations add up along the way from the root,
-    which makes each of them one product with a constant matrix of zeros and ones:
+    A segment turns about K axes in sequence (three, unless the robot has more joints there), so a skeleton of
+    N segments is a tree of K N single rotations, here called turns. Angular velocities and accelerations add
+    up along the way from the root, which makes each of them one product with a constant matrix of zeros and
+    ones:
 
         ω = Σ a α̇                        over the turns up to and including the segment's own
         ω̇ = Σ a α̈ + ω_before × a α̇       the axis a is itself carried round by the turns before it
@@ -45,7 +46,8 @@ class Chain:
     def __init__(self, skeleton: Skeleton) -> None:
         count = len(skeleton.segments)
         self._angles_from_joints = skeleton.angles_from_joints
-        self._axes = np.array([s.axes for s in skeleton.segments], dtype=np.float64)[..., None]
+        self._zero_rad = skeleton.zero_rad
+        self._axes = skeleton.turn_axes[..., None]
         self._cross = _cross_matrices(self._axes[..., 0])
         self._cross_squared = self._cross @ self._cross
         self._along = np.eye(3) + self._cross_squared
@@ -58,7 +60,7 @@ class Chain:
         for i, parent in enumerate(self._parents):
             self._links[i] = self._links[parent]
             self._links[i, i] = 1.0
-        self._turns = np.repeat(self._links, 3, axis=1)
+        self._turns = np.repeat(self._links, self._axes.shape[1], axis=1)
 
         # two levers a segment: the link from the parent's joint to its own, and from that to the node
         self._foot = np.append(self._parents, np.arange(count))
@@ -67,9 +69,9 @@ class Chain:
 
     def motion(self, position_rad: Array, velocity_rad_s: Array, acceleration_rad_s2: Array) -> ChainMotion:
         """Every segment's motion for joint positions, velocities and accelerations, (J,) each."""
-        count = len(self._parents)
-        joints = np.array([position_rad, velocity_rad_s, acceleration_rad_s2])
-        angles, speeds, pushes = (self._angles_from_joints @ joints.T).T.reshape(3, count, 3, 1)
+        count, most = self._axes.shape[:2]
+        joints = np.array([position_rad - self._zero_rad, velocity_rad_s, acceleration_rad_s2])
+        angles, speeds, pushes = (self._angles_from_joints @ joints.T).T.reshape(3, count, most, 1)
         world, axes = self._rotations(angles)
 
         spin = axes * speeds
@@ -86,19 +88,18 @@ class Chain:
         return ChainMotion(world[:-1], rate[:-1], node_acceleration, node_position)
 
     def _rotations(self, angles_rad: Array) -> tuple[Array, Array]:
-        """World rotations (N + 1, 3, 3) and the turns' axes in the world (N, 3, 3), for angles (N, 3, 1)."""
+        """World rotations (N + 1, 3, 3) and the turns' axes in the world (N, K, 3), for angles (N, K, 1)."""
         angles = angles_rad[..., None]
         # Rodrigues: I + sin K + (1 - cos) K²
         turns = np.sin(angles) * self._cross - np.cos(angles) * self._cross_squared + self._along
-        first, third = turns[:, 0], turns[:, 2]
-        two = first @ turns[:, 1]
-        axes = np.empty((len(turns), 3, 3))
-        axes[:, 0] = self._axes[:, 0, :, 0]
-        axes[:, 1] = (first @ self._axes[:, 1])[..., 0]
-        axes[:, 2] = (two @ self._axes[:, 2])[..., 0]
+        axes = self._axes[..., 0].copy()
+        turned = turns[:, 0]
+        for k in range(1, axes.shape[1]):
+            axes[:, k] = (turned @ self._axes[:, k])[..., 0]
+            turned = turned @ turns[:, k]
 
         world = np.empty((len(turns) + 1, 3, 3))
-        world[:-1] = two @ third
+        world[:-1] = turned
         world[-1] = np.eye(3)
         for ancestors in self._jumps:
             world = world.take(ancestors, axis=0) @ world

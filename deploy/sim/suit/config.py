@@ -13,6 +13,7 @@ from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import load_skeleton
+from common.skeleton.load import ProfileName
 from deploy.sim.suit.disturbance import DisturbanceConfig
 from deploy.sim.suit.faults import FaultsConfig
 from deploy.sim.suit.imperfections import GradeName
@@ -38,7 +39,7 @@ class SuitConfig(Section):
 
     robot: str = Field(default="robot-1", pattern=r"^[A-Za-z0-9_.-]{1,64}$")
     """Under whose name the truth is published."""
-    profile: str = "nursing"
+    profile: ProfileName = "nursing"
     """The skeleton that wears it."""
     dbc: RelativePath = SHIPPED_DBC
     """Description of the frames."""
@@ -73,19 +74,21 @@ class SuitConfig(Section):
                 mistakes.append(ConfigMistake(f"alignment.{name}", q, "a quaternion (wxyz) of length 1"))
         mistakes += self.faults.unknown_nodes(list(self.nodes))
         try:
-            segments = load_skeleton(self.profile).segment_names
+            skeleton = load_skeleton(self.profile)
         except ConfigError as error:
             return mistakes + error.mistakes
         if self.replay is None:
-            mistakes += motion_mistakes(self.motion, self.profile)
+            mistakes += motion_mistakes(self.motion, skeleton.name)
         mistakes += [
-            ConfigMistake("disturbance.local.nodes", name, f"a segment of the profile {self.profile}, or all")
-            for name in self.disturbance.unknown_nodes(list(segments))
+            ConfigMistake(
+                "disturbance.local.nodes", name, f"a segment of the profile {skeleton.name}, or all"
+            )
+            for name in self.disturbance.unknown_nodes(list(skeleton.segment_names))
         ]
         for key, names in (("nodes", self.nodes), ("alignment", self.alignment)):
             mistakes += [
-                ConfigMistake(f"{key}.{name}", name, f"a segment of the profile {self.profile}")
+                ConfigMistake(f"{key}.{name}", name, f"a segment of the profile {skeleton.name}")
                 for name in names
-                if name not in segments
+                if name not in skeleton.segment_names
             ]
         return mistakes

@@ -35,14 +35,14 @@ class JointMoves:
         self.zero_pose_from_s = PUT_ON_S
         self.zero_pose_until_s = PUT_ON_S + ZERO_POSE_S
         self.period_s = self.zero_pose_until_s + moving_s
-        self._rest = np.clip(0.0, skeleton.lower_rad, skeleton.upper_rad)
+        self._rest = np.clip(skeleton.zero_rad, skeleton.lower_rad, skeleton.upper_rad)
         self._bursts = ((0.0, PUT_ON_S), (self.zero_pose_until_s, self.period_s))
         # rhythms that are no simple multiples of each other, so that no two joints keep in step
         place = np.mod(_GOLDEN * np.arange(1, len(lower) + 1), 1.0)
         omega = 2.0 * math.pi * (_SLOWEST_HZ + (_FASTEST_HZ - _SLOWEST_HZ) * place)
         reach = np.minimum(0.5 * (upper - lower), _LARGEST_RAD)
         self._swing = np.minimum(reach, _SHARE * skeleton.max_velocity_rad_s / omega)
-        self._middle = np.clip(0.0, lower + self._swing, upper - self._swing) - self._rest
+        self._middle = np.clip(skeleton.zero_rad, lower + self._swing, upper - self._swing) - self._rest
         self._omega = omega
         self._phase = 2.0 * math.pi * np.mod(_GOLDEN * place * 97.0, 1.0)
 

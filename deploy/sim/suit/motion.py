@@ -175,7 +175,7 @@ def sweep(skeleton: Skeleton) -> OperatorMotion:
 
 
 def _nearest_to_zero(skeleton: Skeleton, margin_rad: float) -> Array:
-    out: Array = np.clip(0.0, skeleton.lower_rad + margin_rad, skeleton.upper_rad - margin_rad)
+    out: Array = np.clip(skeleton.zero_rad, skeleton.lower_rad + margin_rad, skeleton.upper_rad - margin_rad)
     return out
 
 

@@ -36,13 +36,13 @@ class SimulatedRobot:
         origin_ns: int = 0,
         position_rad: Array | None = None,
     ) -> None:
-        """At rest at `origin_ns` in `position_rad` (J,), or with all joints as near 0 as limits let them."""
+        """At rest at `origin_ns` in `position_rad` (J,), or as near the zero pose as limits let it be."""
         self._skeleton = skeleton
         self._encoders = Encoders(skeleton, encoders)
         self._model = build_model(skeleton)
         self._data = mujoco.MjData(self._model)
         if position_rad is None:
-            position_rad = np.zeros(len(skeleton.joints))
+            position_rad = skeleton.zero_rad
         self._setpoint = np.clip(position_rad, skeleton.lower_rad, skeleton.upper_rad)
         # views of the simulation's own state: fetched once, as every access builds a new one
         self._hinge_rad, self._taken_in = self._data.qpos, self._data.ctrl

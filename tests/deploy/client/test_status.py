@@ -158,7 +158,13 @@ def test_states_of_any_profile_are_understood(profile: str) -> None:
 
 def test_what_is_no_state_is_none() -> None:
     assert decode_state(b"garbage") is None
-    assert decode_state(encode(state(joints=7))) is None
+    assert decode_state(encode(state(joints=7))[:-20]) is None
+
+
+def test_the_state_of_a_robot_of_ones_own_is_read_too() -> None:
+    decoded = decode_state(encode(state(joints=7)))
+    assert decoded is not None
+    assert len(decoded.position_rad) == 7
 
 
 def test_it_waits_until_both_have_come() -> None:
