@@ -80,7 +80,7 @@ class ChainFollower:
             self.forget()
             elapsed_s = NOMINAL_S
         known = np.isfinite(q).all(axis=1) & np.isfinite(q_rate).all(axis=1)
-        lost = self._turns[~known].any(axis=0)
+        lost: Mask = np.asarray(self._turns[~known].any(axis=0))
         weight = (known & self._follows).astype(np.float64)
         wanted = np.where(known[:, None], q, IDENTITY)
         self._search(wanted, weight, lost)

@@ -142,7 +142,8 @@ class LinkEntry(Section):
         """The table's, the quaternion made one of length 1."""
         length = sum(a * a for a in self.q_parent_from_link) ** 0.5 or 1.0
         w, x, y, z = (a / length for a in self.q_parent_from_link)
-        hinges, bars = (tuple(e.made() for e in entries) for entries in (self.hinges, self.bars))
+        hinges = tuple(entry.made() for entry in self.hinges)
+        bars = tuple(entry.made() for entry in self.bars)
         return RobotLink(self.name, self.parent, point(self.origin_m), (w, x, y, z), hinges, bars)
 
 

@@ -12,7 +12,8 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.contact.config import ContactConfig
 from slave.encoders.counts import RAD_PER_COUNT
-from slave.model.build import leader, unit_rates
+from slave.model.build import unit_rates
+from slave.model.own import leader
 
 DRIVE_STEP_RAD = 2.0 * np.pi / (1 << 16)
 """At the joint's output, of a drive's own encoder: 13 bits behind a gear of 8; most are finer."""

@@ -16,7 +16,8 @@ from slave.contact.config import ContactConfig
 from slave.contact.observer import MomentumObserver
 from slave.contact.payload import loaded_model
 from slave.contact.thresholds import angles_of, thresholds_nm
-from slave.model.build import build_model, leader
+from slave.model.build import build_model
+from slave.model.own import leader
 from slave.servos.payload import PayloadConfig
 from slave.servos.servos import EncoderReading
 

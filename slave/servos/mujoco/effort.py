@@ -7,7 +7,8 @@ import numpy as np
 
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.model.build import leader, unit_rates
+from slave.model.build import unit_rates
+from slave.model.own import leader
 
 
 class MotorTorque:

@@ -11,7 +11,8 @@ from common.clock import to_ns
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig, Encoders
-from slave.model.build import STEP_S, build_model, leader, unit_rates
+from slave.model.build import STEP_S, build_model, unit_rates
+from slave.model.own import leader
 from slave.servos.mujoco.effort import MotorTorque
 from slave.servos.servos import EncoderReading, check_setpoint
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from common.quaternion import Array, angle_between
 from common.skeleton import load_skeleton
 from common.skeleton.kinematics import orientations, origins
-from slave.model.build import STEP_S, build_model, leader, unit_rates
+from slave.model.build import STEP_S, build_model, unit_rates
+from slave.model.own import leader
 
 SKELETON = load_skeleton("nursing")
 MODEL = build_model(SKELETON)

@@ -9,7 +9,8 @@ import pytest
 from common.quaternion import Array, angle_between
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.kinematics import orientations, origins
-from slave.model.build import STEP_S, build_model, leader, unit_rates
+from slave.model.build import STEP_S, build_model, unit_rates
+from slave.model.own import leader
 
 
 class Robot:
