@@ -79,7 +79,7 @@ class ChainFollower:
         if not 0.0 < elapsed_s <= FORGOTTEN_S:
             self.forget()
             elapsed_s = NOMINAL_S
-        known = np.isfinite(q).all(axis=1) & np.isfinite(q_rate).all(axis=1)
+        known: Mask = np.isfinite(np.concatenate([q, q_rate], axis=1)).all(axis=1)
         lost: Mask = np.asarray(self._turns[~known].any(axis=0))
         weight = (known & self._follows).astype(np.float64)
         wanted = np.where(known[:, None], q, IDENTITY)
