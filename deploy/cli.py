@@ -31,6 +31,7 @@ from deploy.ops.doctor.command import doctor
 from deploy.ops.inputs import inputs
 from deploy.ops.keys.commands import app as keys_app
 from deploy.ops.network.command import app as network_app
+from deploy.ops.profile.command import app as profile_app
 from deploy.ops.record.command import record, recording
 from deploy.ops.replay.command import replay
 from deploy.ops.router.command import router
@@ -53,7 +54,7 @@ app = typer.Typer(
 calibrate_app.command("live")(live)
 for _name, _group in {
     "calibrate": calibrate_app, "accuracy": accuracy_app, "keys": keys_app,
-    "network": network_app, "trial": trial_app,
+    "network": network_app, "profile": profile_app, "trial": trial_app,
 }.items():  # fmt: skip
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (

@@ -63,6 +63,7 @@ class SlaveConfig(Section):
         return [
             *self.guard.mistakes_for(skeleton),
             *self._wrong_stops(skeleton),
+            *self._unconfirmed(skeleton),
             *self.contact.mistakes_for(skeleton),
             *self.encoders.mistakes_for(skeleton),
             *self.servos.mistakes_for(skeleton, self.encoders),
@@ -70,6 +71,16 @@ class SlaveConfig(Section):
             *self.link.mistakes(),
             *self.tap.mistakes(),
         ]
+
+    def _unconfirmed(self, skeleton: Skeleton) -> list[ConfigMistake]:
+        """A profile that an import guessed moves no real drive before a person has looked at it."""
+        if not skeleton.unconfirmed or self.servos.backend == "mujoco":
+            return []
+        expected = (
+            f"mujoco while {len(skeleton.unconfirmed)} entries of the profile are guesses "
+            f"({skeleton.unconfirmed[0]}, …): look at `tandem profile check`, then empty its list unconfirmed"
+        )
+        return [ConfigMistake("servos.backend", self.servos.backend, expected)]
 
     def _wrong_stops(self, skeleton: Skeleton) -> list[ConfigMistake]:
         try:

@@ -10,7 +10,9 @@ PANELS = {
         "engage", "handover", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude",
         "video",
     ),
-    "Set up": ("doctor", "servos", "inputs", "stops", "alarms", "calibrate", "keys", "record", "recording"),
+    "Set up": (
+        "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record", "recording",
+    ),
     "Judge": (
         "replay", "trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit",
     ),

@@ -53,7 +53,7 @@ def noise_nm(skeleton: Skeleton, model: mujoco.MjModel, angles: Angles) -> Array
     data, rates = mujoco.MjData(model), unit_rates(skeleton, model)
     middle = 0.5 * (skeleton.lower_rad + skeleton.upper_rad)
     product, most = np.empty(model.nv), np.zeros(len(rates))
-    for posture in (np.zeros_like(middle), middle, skeleton.lower_rad, skeleton.upper_rad):
+    for posture in (skeleton.zero_rad, middle, skeleton.lower_rad, skeleton.upper_rad):
         data.qpos[:] = posture @ rates
         mujoco.mj_fwdPosition(model, data)
         feigned = np.zeros(len(rates))

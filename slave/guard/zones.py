@@ -137,7 +137,7 @@ def zone_mistakes(
         return
     model = distance_model(skeleton, self_margin_cm, zones)
     margin_m = np.array(zone_margins_m(self_margin_cm, zones))
-    near = model.near(np.clip(np.zeros(len(skeleton.joints)), skeleton.lower_rad, skeleton.upper_rad))
+    near = model.near(np.clip(skeleton.zero_rad, skeleton.lower_rad, skeleton.upper_rad))
     for owner in range(-1, len(zones)):
         rows = np.flatnonzero(model.obstacle[near.pair] == owner)
         if not len(rows):

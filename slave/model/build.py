@@ -197,7 +197,7 @@ def _loads(skeleton: Skeleton, model: mujoco.MjModel) -> tuple[Array, Array]:
     data = mujoco.MjData(model)
     rates = unit_rates(skeleton, model)
     middle = 0.5 * (skeleton.lower_rad + skeleton.upper_rad)
-    postures = (np.zeros_like(middle), middle, skeleton.lower_rad, skeleton.upper_rad)
+    postures = (skeleton.zero_rad, middle, skeleton.lower_rad, skeleton.upper_rad)
     inertia = np.empty((len(postures), len(middle)))
     torque = np.empty((len(postures), 3, len(middle)))
     product = np.empty(model.nv)

@@ -81,7 +81,7 @@ def _drive(spec: mujoco.MjSpec, joint: Joint, drive: ServoGains, step_s: float) 
                 objtype=mujoco.mjtObj.mjOBJ_JOINT,
                 name1=name,
                 name2=first,
-                data=[0.0, ratio / first_ratio, *[0.0] * 9],
+                data=[0.0, ratio / first_ratio, *[0.0] * (mujoco.mjNEQDATA - 2)],
                 solref=[2.5 * step_s, 1.0],
                 solimp=[0.99, 0.99, 0.01, 0.5, 2.0],
             )

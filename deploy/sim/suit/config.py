@@ -47,7 +47,8 @@ class SuitConfig(Section):
     nodes: dict[str, NodeConfig]
     """The nodes by segment; segments without a node stay silent."""
     motion: str = "bottle"
-    """What the operator does: `bottle`, `grasp`, `walk` (each of one profile), `calibration_pose`, `sweep`;
+    """What the operator does: `bottle`, `grasp`, `walk` (each of one profile), `calibration_pose`, `sweep`,
+    `postures` (a person's, from one to the next);
     to calibrate: `tray` (all units in it are turned about), `move_joints` (the zero pose, then every joint
     moves), `calibration` (the tray once, then move_joints). Not used with `replay`."""
     tray: TrayConfig = TrayConfig()

@@ -16,6 +16,7 @@ from common.skeleton import Skeleton
 from deploy.sim.suit.gait import Curve, Gait, GaitError, Strides
 from deploy.sim.suit.joint_moves import JointMoves
 from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, MotionError, Move
+from deploy.sim.suit.postures import posture_motion
 
 MOTIONS = {
     "bottle": "nursing",
@@ -24,6 +25,7 @@ MOTIONS = {
     "walk": "lower_limb",
     "calibration_pose": None,
     "sweep": None,
+    "postures": None,
     "move_joints": None,
     "tray": None,
     "calibration": None,
@@ -102,6 +104,8 @@ def load_motion(name: str, skeleton: Skeleton) -> OperatorMotion:
         return sweep(skeleton)
     if name in ("move_joints", "tray", "calibration"):  # off the tray the operator always does this
         return JointMoves(skeleton)
+    if name == "postures":
+        return posture_motion(skeleton)
     if name == "calibration_pose":
         return stand_still(skeleton)
     text = resources.files(__package__).joinpath(f"{name}.toml").read_text("utf-8")

@@ -1,0 +1,223 @@
+"""From a URDF or MJCF to a profile: what is found, what is guessed, and what is refused in one line."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from common.errors import ConfigError, TandemError
+from common.skeleton import Skeleton, load_skeleton
+from common.skeleton.links import hinge_values, place_links
+from deploy.cli import app
+from deploy.ops.profile.check import checked, worn
+from deploy.ops.profile.compiled import compiled
+from slave.model.build import build_model, unit_rates
+
+ROBOTS = Path(__file__).parents[3] / "robots"
+FILES = ("arm_pair.xml", "upper_body.urdf")
+
+
+@pytest.fixture(scope="session", params=FILES)
+def imported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of one of the robots that are not ours."""
+    out: Path = tmp_path_factory.mktemp("own") / Path(request.param).stem
+    done = CliRunner().invoke(app, ["profile", "import", str(ROBOTS / request.param), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    return out
+
+
+@pytest.fixture
+def skeleton(imported: Path) -> Skeleton:
+    return load_skeleton(str(imported))
+
+
+def test_both_arms_are_found_with_their_hands(skeleton: Skeleton) -> None:
+    arms = {
+        f"{side}_{part}" for side in ("left", "right") for part in ("upper_arm", "forearm", "hand", "fingers")
+    }
+    assert arms <= set(skeleton.segment_names)
+    assert {"left_grip", "right_grip"} <= set(skeleton.joint_names)
+    turns = {s.name: len(s.turns) for s in skeleton.segments}
+    assert [turns[f"left_{part}"] for part in ("upper_arm", "forearm", "hand")] == [3, 2, 2]
+
+
+def test_every_guess_is_named_until_it_is_confirmed(skeleton: Skeleton) -> None:
+    followed = {s.name for s in skeleton.segments if s.link}
+    assert followed | set(skeleton.joint_names) <= set(skeleton.unconfirmed) | {"chest"}
+
+
+def test_the_links_stand_where_the_model_has_them(skeleton: Skeleton) -> None:
+    """Two ways to the same places: the table's formulas, and the model that the slave simulates."""
+    model = build_model(skeleton)
+    data, rates = mujoco.MjData(model), unit_rates(skeleton, model)
+    random = np.random.default_rng(3)
+    for position in random.uniform(skeleton.lower_rad, skeleton.upper_rad, (10, len(skeleton.joints))):
+        data.qpos[:] = position @ rates
+        mujoco.mj_kinematics(model, data)
+        placed = place_links(skeleton.own_links, hinge_values(skeleton.joints, position))
+        for link in skeleton.own_links:
+            np.testing.assert_allclose(placed[link.name][0], data.body(link.name).xpos, atol=1e-6)
+            same = abs(placed[link.name][1] @ data.body(link.name).xquat)
+            assert same == pytest.approx(1.0, abs=1e-9)
+
+
+def test_the_slave_simulates_the_model_itself(imported: Path, skeleton: Skeleton) -> None:
+    own, simulated = mujoco.MjModel.from_xml_path(str(imported / "robot.xml")), build_model(skeleton)
+    np.testing.assert_allclose(simulated.body_mass, own.body_mass)
+    np.testing.assert_allclose(simulated.body_inertia, own.body_inertia)
+    assert simulated.ngeom == own.ngeom
+
+
+def test_the_bars_hold_the_shapes(skeleton: Skeleton) -> None:
+    """Every corner of a box is within its link's capsules."""
+    model = build_model(skeleton)
+    bars = {link.name: link.bars for link in skeleton.own_links}
+    boxes = [g for g in range(model.ngeom) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_BOX]
+    assert boxes
+    for g in boxes:
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, model.geom_quat[g])
+        for sign in np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T:
+            corner = model.geom_pos[g] + turn.reshape(3, 3) @ (sign * model.geom_size[g])
+            apart = []
+            for bar in bars[model.body(model.geom_bodyid[g]).name]:
+                begin, along = np.array(bar.from_m), np.subtract(bar.to_m, bar.from_m)
+                share = np.clip((corner - begin) @ along / (along @ along), 0.0, 1.0)
+                apart.append(np.linalg.norm(corner - begin - share * along) - bar.radius_m)
+            assert min(apart) < 1e-4
+
+
+@pytest.mark.parametrize("posture", ["elbow_pitch", "shoulder_pitch", "shoulder_roll"])
+def test_the_robot_takes_the_operators_posture(skeleton: Skeleton, posture: str) -> None:
+    """What both arms reach is reached, by the right joints and in the right direction."""
+    found = worn(skeleton, posture, {posture: 60.0, "elbow_pitch": 60.0})
+    assert max(found.left_deg.values()) < 0.01
+    model = build_model(skeleton)
+    data = mujoco.MjData(model)
+    data.qpos[:] = found.position_rad @ unit_rates(skeleton, model)
+    mujoco.mj_kinematics(model, data)
+    link = {s.name: s.link for s in skeleton.segments}
+    for side in (1.0, -1.0):
+        name = "left" if side > 0 else "right"
+        hand = data.body(link[f"{name}_hand"]).xpos - data.body(link[f"{name}_upper_arm"]).xpos
+        if posture == "shoulder_roll":
+            assert side * hand[1] > 0.0
+        else:
+            assert hand[0] > 0.1
+
+
+def test_no_parts_touch_in_the_zero_pose(skeleton: Skeleton) -> None:
+    assert checked(skeleton).touching == []
+
+
+def test_what_is_there_is_not_replaced_without_a_word(imported: Path) -> None:
+    command = ["profile", "import", str(ROBOTS / FILES[0]), "--out", str(imported)]
+    before = (imported / "robot.toml").read_text("utf-8")
+    done = CliRunner().invoke(app, command)
+    assert isinstance(done.exception, TandemError)
+    assert "--overwrite" in str(done.exception)
+    assert (imported / "robot.toml").read_text("utf-8") == before
+
+
+URDF = (ROBOTS / "upper_body.urdf").read_text("utf-8")
+MJCF = (ROBOTS / "arm_pair.xml").read_text("utf-8")
+ELBOW = '<limit lower="-1.0472" upper="2.0944" effort="25" velocity="37"/>'
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new", "message"),
+    [
+        (
+            URDF,
+            '<box size="0.1 0.1 0.1"/>',
+            '<mesh filename="package://lost/hip.stl"/>',
+            r"hip\.stl'.*copy the meshes",
+        ),
+        (
+            URDF,
+            '<box size="0.1 0.1 0.1"/>',
+            '<mesh filename="{here}/hip.dae"/>',
+            r"hip\.dae'.*STL or OBJ: convert",
+        ),
+        (
+            URDF,
+            'name="left_elbow_joint" type="revolute"',
+            'name="left_elbow_joint" type="continuous"',
+            r"left_elbow_joint\.limit = .*give it a range",
+        ),
+        (
+            URDF,
+            'name="waist_yaw_joint" type="revolute"',
+            'name="waist_yaw_joint" type="floating"',
+            r"waist_yaw_joint\.type = 'floating'.*fix the base",
+        ),
+        (
+            URDF,
+            ELBOW,
+            ELBOW + '<mimic joint="waist_yaw_joint" offset="0.2"/>',
+            r"mimic\.offset = '0\.2'.*shift the zero",
+        ),
+        (
+            URDF,
+            '<parent link="left_elbow_link"/><child link="left_wrist_roll_link"/>',
+            '<parent link="left_elbow_link"/><child link="right_wrist_roll_link"/>',
+            r"closed loop",
+        ),
+        (URDF, "</robot>", "", r"well-formed XML"),
+        (MJCF, 'range="-3.0718 -0.0698"', 'limited="false"', r"left_joint4\.limit.*give it a range"),
+        (
+            MJCF,
+            '<body name="left_arm0"',
+            '<body name="b"><freejoint name="fly"/><geom size="0.1"/></body><body name="left_arm0"',
+            r"fly of b.*--fix-base",
+        ),
+        (
+            MJCF,
+            "</equality>",
+            '<connect body1="left_arm7" body2="right_arm7" anchor="0 0 0"/></equality>',
+            r"closed loop",
+        ),
+        (
+            MJCF,
+            'joint2="left_jaw_joint1"',
+            'joint2="left_jaw_joint1" polycoef="0.01 1 0 0 0"',
+            r"by a ratio alone",
+        ),
+        (MJCF, 'mass="0.05"', 'mass="0"', r"body\.left_jaw1 = .*<inertial>"),
+        ("<sdf/>", "", "", r"a URDF .* or an MJCF"),
+    ],
+)
+def test_a_robot_that_cannot_be_read_is_refused_in_words(
+    tmp_path: Path, text: str, old: str, new: str, message: str
+) -> None:
+    (tmp_path / "hip.dae").write_text("", "utf-8")
+    assert old in text
+    file = tmp_path / ("robot.urdf" if "<robot" in text else "robot.xml")
+    file.write_text(text.replace(old, new.format(here=tmp_path) if "{here}" in new else new, 1), "utf-8")
+    with pytest.raises(ConfigError) as caught:
+        compiled(file)
+    lines = str(caught.value).splitlines()
+    assert any(re.search(message, line) for line in lines), lines
+    assert all(line.startswith(str(file)) for line in lines), lines
+
+
+def test_a_base_that_floats_is_held_on_demand(tmp_path: Path) -> None:
+    text = MJCF.replace("<worldbody>", '<worldbody><body name="all"><freejoint/>', 1)
+    (tmp_path / "robot.xml").write_text(text.replace("</worldbody>", "</body></worldbody>", 1), "utf-8")
+    with pytest.raises(ConfigError, match="--fix-base"):
+        compiled(tmp_path / "robot.xml")
+    read = compiled(tmp_path / "robot.xml", fix_base=True)
+    assert "held where it stands" in read.notes[0]
+    assert read.model.nv == 18
+
+
+def test_a_mimic_joint_is_moved_with_the_one_it_follows(tmp_path: Path) -> None:
+    shutil.copy(ROBOTS / "arm_pair.xml", tmp_path / "robot.xml")
+    read = compiled(tmp_path / "robot.xml")
+    assert read.follows["left_jaw_joint2"] == ("left_jaw_joint1", 1.0)
