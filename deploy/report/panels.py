@@ -11,7 +11,8 @@ PANELS = {
         "video",
     ),
     "Set up": (
-        "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record", "recording",
+        "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record",
+        "recording",
     ),
     "Judge": (
         "replay", "trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit",

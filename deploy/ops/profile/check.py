@@ -35,7 +35,7 @@ class JointCourse:
 
 
 @dataclass(frozen=True, slots=True)
-class Wearing:
+class TakenPosture:
     """One posture of the operator, as the robot takes it."""
 
     posture: str
@@ -50,7 +50,7 @@ class Checked:
 
     skeleton: Skeleton
     courses: Sequence[JointCourse]
-    wearings: Sequence[Wearing]
+    taken: Sequence[TakenPosture]
     touching: Sequence[str]
     """Parts that are nearer than the guard's margin in the zero pose."""
 
@@ -67,15 +67,15 @@ def checked(skeleton: Skeleton) -> Checked:
         if d < margin_m
     ]
     courses = [_course(skeleton, distances, zero, j) for j in range(len(skeleton.joints))]
-    wearings = [worn(skeleton, name, posture) for name, posture in POSTURES.items()]
-    return Checked(skeleton, courses, wearings, list(dict.fromkeys(touching)))
+    taken = [worn(skeleton, name, posture) for name, posture in POSTURES.items()]
+    return Checked(skeleton, courses, taken, list(dict.fromkeys(touching)))
 
 
-def worn(skeleton: Skeleton, name: str, posture_deg: Mapping[str, float]) -> Wearing:
+def worn(skeleton: Skeleton, name: str, posture_deg: Mapping[str, float]) -> TakenPosture:
     """What the robot's joints become for a posture of the operator."""
     position, left_rad = robot_posture(skeleton, posture_deg)
     left = dict(zip(skeleton.segment_names, np.degrees(left_rad).tolist(), strict=True))
-    return Wearing(name, position, left)
+    return TakenPosture(name, position, left)
 
 
 def _course(skeleton: Skeleton, distances: DistanceModel, zero: Array, j: int) -> JointCourse:
@@ -103,10 +103,10 @@ def range_table(found: Checked) -> Table:
     return table
 
 
-def wearing_table(found: Checked) -> Table:
+def posture_table(found: Checked) -> Table:
     """A row a posture: what is left of each segment, and the joints."""
     table = plain_table("operator", "left over", "the robot's joints, ° from its zero pose")
-    for one in found.wearings:
+    for one in found.taken:
         left = ", ".join(f"{name} {angle:.0f}°" for name, angle in one.left_deg.items() if angle > 1.0)
         away = np.degrees(one.position_rad - found.skeleton.zero_rad)
         moved = (

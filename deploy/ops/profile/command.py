@@ -82,14 +82,14 @@ def check(
     Example: `tandem profile check my_robot --picture my_robot.png`
     """
     from common.skeleton import load_skeleton
-    from deploy.ops.profile.check import checked, range_table, troubles, wearing_table
+    from deploy.ops.profile.check import checked, posture_table, range_table, troubles
     from deploy.ops.profile.draw import draw
 
     skeleton = load_skeleton(profile)
     found = checked(skeleton)
     console = Console(soft_wrap=True, highlight=False)
     console.print(range_table(found))
-    console.print(wearing_table(found))
+    console.print(posture_table(found))
     for what in skeleton.unconfirmed:
         console.print(f"[yellow]not confirmed[/]: {what}")
     if picture is not None:

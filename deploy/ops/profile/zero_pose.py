@@ -36,14 +36,14 @@ def zero_pose(model: mujoco.MjModel, guessed: Guess) -> tuple[Array, dict[str, f
         groups = [guessed.groups[f"{side}_{p}"] for p in parts]
         if not groups:
             continue
-        arm = _Arm(model, place, groups, guessed.grips.get(side, []))
+        arm = _HangingArm(model, place, groups, guessed.grips.get(side, []))
         place = arm.solved()
         for part, down in zip(parts, arm.limbs(place), strict=True):
             off[f"{side}_{part}"] = float(np.arccos(np.clip(down @ _DOWN, -1.0, 1.0)))
     return place, off
 
 
-class _Arm:
+class _HangingArm:
     """One arm, in some posture of the rest of the robot."""
 
     def __init__(
