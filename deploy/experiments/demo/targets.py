@@ -46,6 +46,9 @@ LOWER_LIMB = (
 )
 """For the legs."""
 
+OWN = _WHOLE_WAY
+"""For a robot of one's own."""
+
 BY_PROFILE = {"nursing": DEMO, "hand": HAND, "lower_limb": LOWER_LIMB}
 
 CANOPEN = (
@@ -57,4 +60,4 @@ CANOPEN = (
 
 def of_demo(profile: str, servos: str) -> tuple[ReportTarget, ...]:
     """The limits for a profile and its servo backend."""
-    return BY_PROFILE[profile] + (CANOPEN if servos == "canopen" else ())
+    return BY_PROFILE.get(profile, OWN) + (CANOPEN if servos == "canopen" else ())

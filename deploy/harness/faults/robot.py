@@ -52,12 +52,24 @@ class _Frozen(Generic[T]):
         return self._first[0]
 
 
+def _name(scene: Scene) -> str:
+    """The nursing robot's, or the first joint of another robot's right upper arm."""
+    skeleton = scene.skeleton
+    if JOINT in skeleton.joint_names:
+        return JOINT
+    arm = skeleton.segment_names.index("right_upper_arm")
+    turns = (
+        joint.name for joint in skeleton.joints for a in joint.drives if skeleton.angle_slots[a][0] == arm
+    )
+    return next(turns)
+
+
 def _joint(scene: Scene) -> int:
-    return scene.skeleton.joint_names.index(JOINT)
+    return scene.skeleton.joint_names.index(_name(scene))
 
 
-def _one_joint(_: Scene) -> set[str]:
-    return {JOINT}
+def _one_joint(scene: Scene) -> set[str]:
+    return {_name(scene)}
 
 
 def _with(values: Array, joint: int, value: float) -> Array:
@@ -74,11 +86,11 @@ def _bus_off(scene: Scene) -> None:
 def _drive_fault(scene: Scene) -> None:
     joint, held = _joint(scene), _Frozen[float]()
     scene.inject.write = lambda position_rad: _with(position_rad, joint, held(position_rad[joint]))
-    scene.inject.body = lambda: Body(drives={JOINT: "over-current"})
+    scene.inject.body = lambda: Body(drives={_name(scene): "over-current"})
 
 
 def _encoder_silent(scene: Scene) -> None:
-    valid = np.array([name != JOINT for name in scene.skeleton.joint_names])
+    valid = np.array([name != _name(scene) for name in scene.skeleton.joint_names])
     scene.inject.read = lambda reading: replace(reading, valid=reading.valid & valid)
 
 

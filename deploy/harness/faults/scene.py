@@ -13,13 +13,15 @@ import numpy as np
 
 from common.clock import NS_PER_MS, NS_PER_S, to_s
 from common.errors import TandemError
-from common.skeleton import load_skeleton
+from common.skeleton import Skeleton, load_skeleton
 from common.wire.messages import Action, Command
 from deploy.examples.profiles import NURSING
 from deploy.harness.faults.judge import Asked
 from deploy.harness.faults.setting import USUAL, Later, Setting, files
 from deploy.measure.stillness import StoppingMotion
+from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, Move
 from deploy.sim.suit.motion import OperatorMotion, parse_motion
+from deploy.sim.suit.postures import POSTURES, robot_posture
 from deploy.sim.world.injection import FaultInjection
 from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.encoders.counts import Encoders
@@ -44,10 +46,27 @@ JOINT_TURN_RAD = 0.5
 
 
 @cache
-def reach() -> OperatorMotion:
-    """Both arms and the head at once, joints of the right arm twice as fast as those of paper A's nurse."""
+def reach(profile: str = NURSING) -> OperatorMotion:
+    """Both arms and the head at once, joints of the right arm twice as fast as those of paper A's nurse.
+
+    Of another robot than the nursing one: as its joints take a person's postures, at the same times.
+    """
+    if profile != NURSING:
+        return _reach_of(load_skeleton(profile))
     text = resources.files(__package__).joinpath("reach.toml").read_text("utf-8")
     return parse_motion(text, load_skeleton(NURSING), source="reach.toml")
+
+
+def _reach_of(skeleton: Skeleton) -> OperatorMotion:
+    rest, there, elsewhere = (
+        robot_posture(skeleton, POSTURES[name])[0] for name in ("zero pose", "reaching", "elbows bent")
+    )
+    moves = [
+        Move(name, start_s, duration_s, float(to[j]))
+        for to, start_s, duration_s in ((there, 1.6, 1.0), (elsewhere, 2.9, 1.0), (rest, 6.0, 3.0))
+        for j, name in enumerate(skeleton.joint_names)
+    ]
+    return MinimumJerkMotion(skeleton.joint_names, rest, moves, period_s=60.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +97,13 @@ class Scene:
                 "slave": [f'guard.reset_key="{RESET_KEY}"', *setting.slave],
                 "suit": list(setting.suit), "master": master,
             }  # fmt: skip
-            usual = reach() if setting.motion is None else setting.motion()
+            usual = reach(setting.profile) if setting.motion is None else setting.motion()
             motion: OperatorMotion = Later(usual, setting.lead_s) if setting.lead_s else usual
             self.run = VirtualWorld(
                 WorldSettings(
                     start_ns=UP_NS, motion=motion, overrides=overrides,
                     one_way_ns=round(setting.one_way_ms * NS_PER_MS), patient=setting.patient,
+                    profile=setting.profile,
                 )
             )  # fmt: skip
         config = self.run.slave_config

@@ -39,6 +39,8 @@ class Setting:
     """Of the link, until the fault."""
     patient: bool = False
     """Whether somebody may stand in the robot's way."""
+    profile: str = NURSING
+    """The robot's, the suit's and the master's."""
     motion: Callable[[], OperatorMotion] | None = None
     """The operator's motion, None for the usual reach."""
 
@@ -68,5 +70,5 @@ def files(setting: Setting) -> Iterator[list[str]]:
         file = Path(folder) / "straight.toml"
         made = Made(date=date.today(), recording="none: straight by construction", unit="rad")
         write_calibration(file, {"alignment": (IDENTITY, made)})
-        names = load_skeleton(NURSING).segment_names
+        names = load_skeleton(setting.profile).segment_names
         yield [*setting.master, *(f"nodes.{name}.calibration={json.dumps(str(file))}" for name in names)]

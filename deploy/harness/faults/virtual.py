@@ -10,6 +10,7 @@ from functools import cache, partial
 import numpy as np
 
 from common.wire.messages import Mask
+from deploy.examples.profiles import NURSING
 from deploy.harness.faults.fault import FaultRow, Reaction
 from deploy.harness.faults.judge import FaultOutcome, asked_beyond, moved_beyond, standing_amiss
 from deploy.harness.faults.scene import Scene
@@ -114,14 +115,14 @@ def _strayed_rad(fault: VirtualFault, course: StoppingMotion, concerned: Mask) -
     others = np.ones_like(concerned) if fault.reaction is Reaction.GOES_ON else ~concerned
     if fault.strays_deg is None or not others.any():
         return None
-    gap = np.abs(course.encoder_rad - undisturbed().encoder_rad)[course.at_s >= 0.0]
+    gap = np.abs(course.encoder_rad - undisturbed(fault.setting.profile).encoder_rad)[course.at_s >= 0.0]
     return float(gap[:, others].max())
 
 
 @cache
-def undisturbed() -> StoppingMotion:
-    """The course without any fault, from `track`."""
-    scene = Scene()
+def undisturbed(profile: str = NURSING) -> StoppingMotion:
+    """The course of a robot without any fault, from `track`."""
+    scene = Scene(Setting(profile=profile))
     scene.to(State.TRACK)
     scene.begin()
     scene.run.run(TRIAL_S)

@@ -103,19 +103,21 @@ def range_table(found: Checked) -> Table:
     return table
 
 
-def posture_table(found: Checked) -> Table:
-    """A row a posture: what is left of each segment, and the joints."""
-    table = plain_table("operator", "left over", "the robot's joints, ° from its zero pose")
+def posture_lines(found: Checked) -> list[str]:
+    """One a posture: what is left of each segment, and the joints."""
+    lines = []
     for one in found.taken:
         left = ", ".join(f"{name} {angle:.0f}°" for name, angle in one.left_deg.items() if angle > 1.0)
         away = np.degrees(one.position_rad - found.skeleton.zero_rad)
-        moved = (
+        moved = ", ".join(
             f"{name} {angle:+.0f}"
             for name, angle in zip(found.skeleton.joint_names, away.tolist(), strict=True)
             if abs(angle) > 2.0
         )
-        table.add_row(one.posture, left or "nothing", ", ".join(moved))
-    return table
+        lines.append(
+            f"{one.posture}: {left or 'nothing'} left over; from its zero pose, °: {moved or 'none'}"
+        )
+    return lines
 
 
 def troubles(found: Checked) -> list[str]:

@@ -10,6 +10,9 @@ from rich.console import Console
 
 from common.errors import TandemError
 
+_WIDTH = 120
+"""Of the table of joints, which a narrower terminal wraps."""
+
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
@@ -82,14 +85,15 @@ def check(
     Example: `tandem profile check my_robot --picture my_robot.png`
     """
     from common.skeleton import load_skeleton
-    from deploy.ops.profile.check import checked, posture_table, range_table, troubles
+    from deploy.ops.profile.check import checked, posture_lines, range_table, troubles
     from deploy.ops.profile.draw import draw
 
     skeleton = load_skeleton(profile)
     found = checked(skeleton)
-    console = Console(soft_wrap=True, highlight=False)
+    console = Console(soft_wrap=True, highlight=False, width=max(Console().width, _WIDTH))
     console.print(range_table(found))
-    console.print(posture_table(found))
+    for line in posture_lines(found):
+        console.print(f"[bold]operator[/], {line}")
     for what in skeleton.unconfirmed:
         console.print(f"[yellow]not confirmed[/]: {what}")
     if picture is not None:

@@ -18,23 +18,18 @@ from deploy.cli import app
 from deploy.ops.profile.check import checked, worn
 from deploy.ops.profile.compiled import compiled
 from slave.model.build import build_model, unit_rates
-
-ROBOTS = Path(__file__).parents[3] / "robots"
-FILES = ("arm_pair.xml", "upper_body.urdf")
+from tests.robots.imported import FILES, ROBOTS, imported
 
 
-@pytest.fixture(scope="session", params=FILES)
-def imported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(params=FILES)
+def folder(request: pytest.FixtureRequest) -> Path:
     """The folder of one of the robots that are not ours."""
-    out: Path = tmp_path_factory.mktemp("own") / Path(request.param).stem
-    done = CliRunner().invoke(app, ["profile", "import", str(ROBOTS / request.param), "--out", str(out)])
-    assert done.exit_code == 0, done.output
-    return out
+    return imported(str(request.param))
 
 
 @pytest.fixture
-def skeleton(imported: Path) -> Skeleton:
-    return load_skeleton(str(imported))
+def skeleton(folder: Path) -> Skeleton:
+    return load_skeleton(str(folder))
 
 
 def test_both_arms_are_found_with_their_hands(skeleton: Skeleton) -> None:
@@ -67,8 +62,8 @@ def test_the_links_stand_where_the_model_has_them(skeleton: Skeleton) -> None:
             assert same == pytest.approx(1.0, abs=1e-9)
 
 
-def test_the_slave_simulates_the_model_itself(imported: Path, skeleton: Skeleton) -> None:
-    own, simulated = mujoco.MjModel.from_xml_path(str(imported / "robot.xml")), build_model(skeleton)
+def test_the_slave_simulates_the_model_itself(folder: Path, skeleton: Skeleton) -> None:
+    own, simulated = mujoco.MjModel.from_xml_path(str(folder / "robot.xml")), build_model(skeleton)
     np.testing.assert_allclose(simulated.body_mass, own.body_mass)
     np.testing.assert_allclose(simulated.body_inertia, own.body_inertia)
     assert simulated.ngeom == own.ngeom
@@ -116,13 +111,13 @@ def test_no_parts_touch_in_the_zero_pose(skeleton: Skeleton) -> None:
     assert checked(skeleton).touching == []
 
 
-def test_what_is_there_is_not_replaced_without_a_word(imported: Path) -> None:
-    command = ["profile", "import", str(ROBOTS / FILES[0]), "--out", str(imported)]
-    before = (imported / "robot.toml").read_text("utf-8")
+def test_what_is_there_is_not_replaced_without_a_word(folder: Path) -> None:
+    command = ["profile", "import", str(ROBOTS / FILES[0]), "--out", str(folder)]
+    before = (folder / "robot.toml").read_text("utf-8")
     done = CliRunner().invoke(app, command)
     assert isinstance(done.exception, TandemError)
     assert "--overwrite" in str(done.exception)
-    assert (imported / "robot.toml").read_text("utf-8") == before
+    assert (folder / "robot.toml").read_text("utf-8") == before
 
 
 URDF = (ROBOTS / "upper_body.urdf").read_text("utf-8")

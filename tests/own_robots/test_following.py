@@ -1,0 +1,61 @@
+"""Two robots that are not ours, imported as a stranger would, from the suit to the encoders."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from common.skeleton import load_skeleton
+from deploy.harness.faults.table import VIRTUAL
+from deploy.harness.faults.virtual import try_on_virtual_clock
+from deploy.measure import accuracy, motion
+from deploy.sim.suit.postures import posture_motion
+from deploy.sim.world.world import VirtualWorld, WorldSettings
+from tests.robots.imported import FILES, imported
+
+TABLE = {fault.name: fault for fault in VIRTUAL}
+ROWS = (
+    "link cut", "packets duplicated", "second operator", "values that are not numbers", "drive fault",
+    "encoder silent", "valid but impossible jump", "pedal released",
+)  # fmt: skip
+"""Those that say something about a robot's joints; the others are about hosts and operators."""
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_the_robot_follows_the_operators_postures(file: str) -> None:
+    """With calibrated sensors: as well as the nursing robot follows its own motions."""
+    profile = str(imported(file))
+    run = VirtualWorld(
+        WorldSettings(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile)
+    )
+    run.engage()
+    run.run(posture_motion(load_skeleton(profile)).period_s * 0.6)
+    assert run.slave.guard.state == "track", run.slave.guard.reason
+    truth, names = run.trace.truth(), run.trace.joint_names
+    moved = motion(truth, run.trace.moved(), names)
+    assert moved is not None
+    assert moved.lag_ms is not None
+    assert abs(moved.lag_ms) <= 25.0
+    assert len(moved.joints) >= 8
+    assert max(joint.rmse_deg for joint in moved.joints.values()) <= 1.0
+    solved = accuracy(truth, run.trace.solved(), names).joints
+    assert max(joint.rmse_deg for joint in solved.values() if joint is not None) <= 1.0
+    assert run.beyond_reach() == {}
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("row", ROWS)
+def test_a_fault_does_to_it_what_the_table_says(file: str, row: str) -> None:
+    fault = TABLE[row]
+    setting = replace(fault.setting, profile=str(imported(file)))
+    outcome = try_on_virtual_clock(replace(fault, setting=setting))
+    assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("row", ["link cut", "encoder silent"])
+def test_the_row_fails_without_its_protection(file: str, row: str) -> None:
+    fault = TABLE[row]
+    setting = replace(fault.setting, profile=str(imported(file)))
+    assert try_on_virtual_clock(replace(fault, setting=setting), fault.held_by).wrong
