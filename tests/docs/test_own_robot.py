@@ -72,6 +72,7 @@ def test_from_the_urdf_to_tracking(here: Path) -> None:
 
 
 @pytest.mark.live
+@pytest.mark.timeout(400)
 def test_the_demo_itself(here: Path) -> None:
     """With the picture, and the processes of the demo."""
     for command in COMMANDS:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -15,8 +16,10 @@ from common.errors import ConfigError, TandemError
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.links import hinge_values, place_links
 from deploy.cli import app
+from deploy.measure import motion
 from deploy.ops.profile.check import checked, worn
 from deploy.ops.profile.compiled import compiled
+from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.model.build import build_model, unit_rates
 from tests.robots.imported import FILES, ROBOTS, imported
 
@@ -216,3 +219,77 @@ def test_a_mimic_joint_is_moved_with_the_one_it_follows(tmp_path: Path) -> None:
     shutil.copy(ROBOTS / "arm_pair.xml", tmp_path / "robot.xml")
     read = compiled(tmp_path / "robot.xml")
     assert read.follows["left_jaw_joint2"] == ("left_jaw_joint1", 1.0)
+
+
+def one_arm(file: Path, hand: bool) -> Path:
+    """The right arm alone, with its gripper or without."""
+    robot = ET.fromstring(MJCF)
+    world, mimics = robot.find("worldbody"), robot.find("equality")
+    assert world is not None
+    assert mimics is not None
+    world.remove(world.findall("body")[0])
+    mimics.remove(mimics[0])
+    if not hand:
+        robot.remove(mimics)
+        (holder,) = (
+            body for body in world.iter("body") if body.find("body[@name='right_gripper']") is not None
+        )
+        holder.remove(holder.findall("body")[0])
+    file.write_text(ET.tostring(robot, encoding="unicode"), "utf-8")
+    return file
+
+
+@pytest.mark.parametrize("hand", [True, False])
+def test_a_single_arm_follows_too(tmp_path: Path, hand: bool) -> None:
+    file, out = one_arm(tmp_path / "arm.xml", hand), tmp_path / "own"
+    done = CliRunner().invoke(app, ["profile", "import", str(file), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    skeleton = load_skeleton(str(out))
+    assert len(skeleton.joints) == 7 + hand
+    assert not any(name.startswith("left") for name in skeleton.segment_names)
+    run = VirtualWorld(WorldSettings(one_way_ns=500_000, profile=str(out)))
+    run.engage()
+    run.run(8.0)
+    assert run.slave.guard.state == "track", run.slave.guard.reason
+    moved = motion(run.trace.truth(), run.moved(), run.trace.joint_names)
+    assert moved is not None
+    assert max(joint.rmse_deg for joint in moved.joints.values()) < 1.0
+
+
+def test_a_robot_without_an_arm_is_refused_in_words(tmp_path: Path) -> None:
+    (tmp_path / "cart.xml").write_text(
+        "<mujoco><worldbody><body name='cart'><geom size='0.1'/></body></worldbody></mujoco>", "utf-8"
+    )
+    done = CliRunner().invoke(
+        app, ["profile", "import", str(tmp_path / "cart.xml"), "--out", str(tmp_path / "o")]
+    )
+    assert isinstance(done.exception, TandemError)
+    assert "no arm found" in str(done.exception)
+    assert not (tmp_path / "o").exists()
+
+
+def test_meshes_are_gathered_and_their_shape_is_held(tmp_path: Path) -> None:
+    """A mesh named by its package, in a folder above; one to look at, of a format that is not read."""
+    package = tmp_path / "tall_robot"
+    (package / "meshes").mkdir(parents=True)
+    (package / "urdf").mkdir()
+    corners = [(x, y, z) for x in (-0.05, 0.05) for y in (-0.03, 0.03) for z in (-0.1, 0.1)]
+    faces = ["1 2 4 3", "5 6 8 7", "1 2 6 5", "3 4 8 7", "1 3 7 5", "2 4 8 6"]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {face}" for face in faces]
+    (package / "meshes/hip.obj").write_text("\n".join(lines), "utf-8")
+    mesh = '<mesh filename="package://tall_robot/meshes/hip.obj"/>'
+    picture = (
+        '</collision><visual><geometry><mesh filename="package://tall_robot/hip.dae"/></geometry></visual>'
+    )
+    text = URDF.replace('<box size="0.1 0.1 0.1"/>', mesh, 1).replace("</collision>", picture, 1)
+    (package / "urdf/robot.urdf").write_text(text, "utf-8")
+    read = compiled(package / "urdf/robot.urdf")
+    assert set(read.assets) == {"hip.obj"}
+    assert "1 shapes to look at" in read.notes[0]
+    out = tmp_path / "own"
+    done = CliRunner().invoke(app, ["profile", "import", str(package / "urdf/robot.urdf"), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    assert (out / "meshes/hip.obj").is_file()
+    (hip,) = load_skeleton(str(out)).own_links[0].bars
+    assert hip.radius_m == pytest.approx(np.hypot(0.05, 0.03), abs=0.01)
+    assert build_model(load_skeleton(str(out))).nmesh == 1
