@@ -11,6 +11,7 @@ EXTRAS = {
     "linuxpy": "v4l2",
     "evdev": "input",
     "sounddevice": "sound",
+    "rosbags": "ros",
 }
 """The extra of pyproject.toml that brings each optional module."""
 

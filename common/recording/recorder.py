@@ -80,7 +80,7 @@ class McapRecorder:
         self._wall = wall
         self._flush_ns = to_ns(flush_s)
         self._queue: queue.Queue[_Item | None] = queue.Queue(capacity)
-        self._stream = _create(path) if stream is None else stream
+        self._stream = create(path) if stream is None else stream
         self._whole = 0
         self._unflushed = 0
         self._channels: dict[str, int] = {}
@@ -190,7 +190,8 @@ class McapRecorder:
             log.info("%s: the incomplete chunk at its end could not be cut off: %s", self.path, second)
 
 
-def _create(path: Path) -> BinaryIO:
+def create(path: Path) -> BinaryIO:
+    """Open a new file for writing. Raises RecordingError where it is there already: none is written over."""
     try:
         return path.open("xb")
     except FileExistsError:

@@ -10,10 +10,11 @@ import numpy as np
 from common.errors import TandemError
 from common.quaternion import Array
 from common.recording import McapRecorder
+from common.recording.sweeps import TOPIC, describe
 from master.config import MasterConfig
 from master.suit.capture import OnSweep, SuitCapture
 from master.suit.protocol import SuitProtocol
-from master.suit.recorded import TOPIC, describe, encode_sweep
+from master.suit.recorded import encode_sweep
 from master.suit.sweep import Sweep
 
 

@@ -10,7 +10,8 @@ import typer
 RecordingFile = Annotated[
     Path,
     typer.Argument(
-        metavar="RECORDING", help="Recording (.npz or .mcap) of one node or of a whole suit.", dir_okay=False
+        metavar="RECORDING",
+        help="Recording of one node or of a whole suit: .npz, .mcap, or any format of docs/recordings.md.",
     ),
 ]
 OutFolder = Annotated[

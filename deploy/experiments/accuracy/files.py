@@ -16,8 +16,8 @@ def files(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Recordings (.npz) of one node each, with gyr, acc and rate_hz, and if "
-            "known mag, quat and movement.",
+            help="Recordings of one node each: .npz with gyr, acc and rate_hz, and if "
+            "known mag, quat and movement; or any format of docs/recordings.md.",
         ),
     ],
     filter_: Annotated[

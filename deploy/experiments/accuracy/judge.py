@@ -115,6 +115,8 @@ def judge(
     each core, unless there is little to do. Raises TandemError for a bad recording.
     """
     trials = {path: load_trial(path) for path in paths}
+    for note in dict.fromkeys(note for trial in trials.values() for note in trial.notes):
+        console.print(note, style="dim", highlight=False, markup=False)
     samples = sum(len(trial.movement) for trial in trials.values()) * len(filters)
     if jobs is None:
         jobs = 1 if samples < _LITTLE else jobs_here()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from common.errors import TandemError
 from common.quaternion import Array
+from common.recording.formats.registry import read_nodes
 from common.recording.npz import Arrays, read_arrays
 from common.wire.messages import Mask
 
@@ -37,6 +38,8 @@ class Trial:
     """(T, 4) optical truth, NaN where it was hidden; None without `quat`."""
     movement: Mask
     """(T,) the phase that counts; all of it without `movement`."""
+    notes: tuple[str, ...] = ()
+    """What was assumed about the file or repaired, for a person."""
 
     @property
     def dropped(self) -> Mask:
@@ -65,10 +68,12 @@ class Trial:
 
 
 def load_trial(path: Path) -> Trial:
-    """Read an npz with `gyr acc rate_hz` and, where present, `mag quat movement`.
+    """Read an npz with `gyr acc rate_hz` and, where present, `mag quat movement`; or any other known format.
 
     Raises TandemError for what cannot be scored, telling what to change.
     """
+    if path.suffix.lower() != ".npz" and path.exists():
+        return _of_other_format(path)
     arrays = _arrays(path)
     missing = [key for key in _NEEDED if key not in arrays]
     if missing:
@@ -91,6 +96,28 @@ def load_trial(path: Path) -> Trial:
         if not movement.any():
             raise _refusal(path, "movement is false all along: leave it out to score the whole recording")
     trial = Trial(path.stem, rate_hz, gyr, acc, mag, truth, movement)
+    _check_units(path, trial)
+    _check_truth(path, trial)
+    return trial
+
+
+def _of_other_format(path: Path) -> Trial:
+    read = read_nodes([path])
+    if len(read.nodes) != 1:
+        raise _refusal(
+            path,
+            f"holds the nodes {', '.join(read.nodes)}: take one (tandem import {path.name} --node NAME)",
+        )
+    (node,) = read.nodes.values()
+    count = len(node.gyr_rad_s)
+    if count < _LEAST_SAMPLES:
+        raise _refusal(path, f"has {count} samples: record at least {_LEAST_SAMPLES}")
+    mag = np.full((count, 3), np.nan) if node.mag_ut is None else node.mag_ut
+    movement = np.ones(count, dtype=np.bool_) if node.movement is None else node.movement
+    trial = Trial(
+        path.stem, node.rate_hz, node.gyr_rad_s, node.acc_m_s2, mag, node.q_world_from_sensor, movement,
+        read.notes,
+    )  # fmt: skip
     _check_units(path, trial)
     _check_truth(path, trial)
     return trial

@@ -23,7 +23,7 @@ Transport = Annotated[
 ]
 ReplayFile = Annotated[
     Path | None,
-    typer.Option(help="Play this recording of a person (.npz) instead of a simulated motion.", exists=True),
+    typer.Option(help="Play this recording of a person instead of a simulated motion.", exists=True),
 ]
 RobotProfile = Annotated[
     str, typer.Option(help="Robot profile: nursing, hand or lower_limb, or the folder of your own.")

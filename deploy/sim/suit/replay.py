@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection
 from pathlib import Path
 
@@ -10,10 +11,16 @@ from numpy.typing import NDArray
 
 from common.errors import ConfigError, ConfigMistake, RecordingError
 from common.quaternion import Array
+from common.recording.formats.registry import read_nodes
+from common.recording.node import NodeRecording
 from common.recording.npz import Arrays, read_arrays
+from common.recording.together import bridged, together
 from common.skeleton import Skeleton
 from common.skeleton.full_body import RECORDED_AS
 from deploy.sim.suit.sensors import CHANNELS
+
+log = logging.getLogger(__name__)
+_LONGEST_BRIDGED_S = 0.25
 
 
 class Replay:
@@ -49,7 +56,9 @@ class Replay:
 
 
 def load_replay(path: Path, skeleton: Skeleton, nodes: Collection[str]) -> Replay:
-    """Read a recording (npz): `t_s` (T,), and `{name}_acc` m/s² and `{name}_gyr` rad/s (T, 3) a segment.
+    """Read a recording: an npz with `t_s` (T,), `{name}_acc` m/s², `{name}_gyr` rad/s (T, 3) a segment.
+
+    Or a file of any other format that tandem reads, its nodes named as segments are.
 
     A segment that was not recorded takes its nearest recorded ancestor's readings: a phalanx reads what its
     hand reads, as on a flat, stiff hand.
@@ -58,7 +67,8 @@ def load_replay(path: Path, skeleton: Skeleton, nodes: Collection[str]) -> Repla
     what it should be.
     """
     try:
-        arrays = read_arrays(path)
+        of_numpy = path.suffix.lower() in (".npz", ".npy") or not path.exists()
+        arrays = read_arrays(path) if of_numpy else _nodes(path)
     except RecordingError as error:
         raise _mistake(path, "replay", path.name, f"a readable npz file of plain arrays ({error})") from None
     t_s = _array(path, arrays, "t_s", None)
@@ -69,7 +79,7 @@ def load_replay(path: Path, skeleton: Skeleton, nodes: Collection[str]) -> Repla
     for i, segment in enumerate(skeleton.segment_names):
         if segment not in nodes:
             continue
-        name = _recorded_name(skeleton, i)
+        name = _recorded_name(skeleton, i, arrays)
         if name is None:
             raise _mistake(path, "nodes", segment, f"a segment on or beyond one of {', '.join(RECORDED_AS)}")
         acc[:, i] = _array(path, arrays, f"{name}_acc", len(t_s))
@@ -77,10 +87,35 @@ def load_replay(path: Path, skeleton: Skeleton, nodes: Collection[str]) -> Repla
     return Replay(t_s, acc, gyr)
 
 
-def _recorded_name(skeleton: Skeleton, segment: int) -> str | None:
+def _nodes(path: Path) -> Arrays:
+    """The nodes of another format as such arrays; gaps of a quarter of a second are drawn straight."""
+    read = read_nodes([path])
+    grid = together(read.nodes)
+    arrays: Arrays = {"t_s": grid.time_s}
+    for name, node in read.nodes.items():
+        longest = round(_LONGEST_BRIDGED_S * node.rate_hz)
+        for key, of in (("acc", _acc), ("gyr", _gyr)):
+            values = grid.values(name, of)
+            if values is not None:
+                arrays[f"{name}_{key}"] = bridged(values, longest)
+    for note in (*read.notes, *grid.notes):
+        log.info("%s", note)
+    return arrays
+
+
+def _acc(node: NodeRecording) -> Array:
+    return node.acc_m_s2
+
+
+def _gyr(node: NodeRecording) -> Array:
+    return node.gyr_rad_s
+
+
+def _recorded_name(skeleton: Skeleton, segment: int, arrays: Arrays) -> str | None:
     """What the recording calls the segment, or else its nearest recorded ancestor."""
     while segment >= 0:
-        name = RECORDED_AS.get(skeleton.segment_names[segment])
+        own = skeleton.segment_names[segment]
+        name = own if f"{own}_gyr" in arrays else RECORDED_AS.get(own)
         if name is not None:
             return name
         segment = int(skeleton.parents[segment])

@@ -79,7 +79,7 @@ EVEN: Array = np.arange(100, dtype=np.float64) * 0.01
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": EVEN[::-1]}, "does not rise"),
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": EVEN * 1e5}, "are the times in seconds"),
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": EVEN**1.5}, "not evenly spaced"),
-        ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": np.append(EVEN[:-1], 9.0)}, "more than half"),
+        ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": EVEN + np.arange(100) // 5 * 0.1}, "more than half"),
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": EVEN * np.nan}, "finite times"),
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": np.float64(3.0)}, "a row of times"),
         ({"n_acc": ROWS, "n_gyr": ROWS, "t_s": np.full(len(ROWS), "now")}, "a row of times"),
@@ -98,8 +98,8 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path, arrays: dict[str, object
 def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="no such file"):
         load_recordings(tmp_path / "none.npz")
-    with pytest.raises(RecordingError, match=r"cannot read a \.csv file; expected .*\.npz"):
-        load_recordings(tmp_path / "none.csv")
+    with pytest.raises(RecordingError, match=r"cannot read a \.xyz file; expected .*\.npz"):
+        load_recordings(tmp_path / "none.xyz")
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"nonsense")
     with pytest.raises(RecordingError, match="not an npz file"):

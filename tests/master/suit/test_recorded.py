@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from common.errors import RecordingError
 from common.recording import McapRecorder
+from common.recording.sweeps import TOPIC, describe, read_sweeps
 from master.calibrate.recording import load_recordings
-from master.suit.recorded import TOPIC, describe, encode_sweep, read_sweeps
+from master.suit.recorded import encode_sweep
 from master.suit.sweep import Sweep
 
 NODES = ("hand", "thumb", "index")

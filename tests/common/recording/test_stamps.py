@@ -3,7 +3,7 @@ import pytest
 
 from common.errors import RecordingError
 from common.quaternion import Array
-from master.calibrate.stamps import Grid, lay_out
+from common.recording.stamps import Grid, lay_out
 
 COUNT = 12_000
 EVEN: Array = 100.0 + np.arange(COUNT, dtype=np.float64) * 0.01
@@ -40,12 +40,28 @@ def test_even_stamps_need_no_repair() -> None:
         (spoilt(5000, np.nan), "1 without a number"),
         (EVEN[np.minimum(np.arange(COUNT) // 8 * 8 + 7, COUNT - 1)], "1499 bursts, 10500 repeated"),
         (EVEN + np.where(np.arange(COUNT) >= 7000, -40.0, 0.0), "the clock set back 1 times"),
+        (spoilt(5000, 1e9), "1 going back"),
     ],
 )
 def test_what_is_wrong_with_stamps_moves_no_sample_and_is_said(time: Array, said: str) -> None:
     (note,) = only(time).notes
     assert "a.npz: t: stamps repaired" in note
     assert said in note
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        np.append(EVEN[:-1], EVEN[-1] + 500.0),
+        np.append(0.0, 1.7e9 + EVEN[1:]),
+        EVEN + np.where(np.arange(COUNT) >= 7000, 3600.0, 0.0),
+        EVEN + np.where(np.arange(COUNT) >= 7000, 7e4, 0.0) + np.where(np.arange(COUNT) >= 8000, 9e4, 0.0),
+    ],
+    ids=["last stamp", "first stamp before the clock was set", "clock set", "clock set twice"],
+)
+def test_a_clock_set_forward_loses_no_session_and_is_said(time: Array) -> None:
+    """As a gap it would cost the recording: more than half of its samples would be missing."""
+    assert "taken as a clock that was set" in only(time).notes[0]
 
 
 @pytest.mark.parametrize("share", [0.15, 0.3])
@@ -74,7 +90,7 @@ def test_single_samples_that_are_missing_are_found_beside_jitter() -> None:
         ((np.arange(3000) * 0.01) ** 1.5, "not evenly spaced|more than half"),
         (EVEN + 0.2 * RNG.normal(size=COUNT), "does not rise|not evenly spaced"),
         (np.where(RNG.random(COUNT) < 0.2, np.nan, EVEN), "finite times"),
-        (np.append(EVEN[:-1], EVEN[-1] + 500.0), "more than half"),
+        (EVEN + np.arange(COUNT) // 5 * 0.1, "more than half"),
     ],
 )
 def test_what_cannot_be_repaired_is_refused(time: Array, message: str) -> None:

@@ -30,6 +30,8 @@ _BESIDE = 32
 """So many stamps either side of a step tell whether samples are missing there."""
 _LOST = 0.7
 _MOST_SET_BACK = 3
+_MOST_SET_FORWARD = 3
+_SHORTEST_JUMP_S = 1.0
 _FEW = 8
 _LENGTHS = (8, 64, 400)
 """Samples over which the period is guessed; each guess is tried."""
@@ -46,6 +48,8 @@ class Grid:
     """(T,) whole numbers from 0, rising."""
     notes: tuple[str, ...]
     """What was repaired, for a person."""
+    start_s: float = 0.0
+    """The time of slot 0, by the stamps' own clock."""
 
 
 def lay_out(where: str, time_s: Array) -> Grid:
@@ -55,6 +59,7 @@ def lay_out(where: str, time_s: Array) -> Grid:
         raise RecordingError(f"{where} must be a row of finite times, one a sample")
     place = np.arange(len(time_s), dtype=np.float64)
     time = np.interp(place, place[known], time_s[known])
+    time, jumps = _clock_set_forward(time)
     steps = np.diff(time)
     notes: tuple[str, ...]
     exact = _even(steps)
@@ -66,7 +71,7 @@ def lay_out(where: str, time_s: Array) -> Grid:
         if np.mean(steps < 0.0) > 2.0 * _MOST_WRONG:
             raise RecordingError(f"{where} does not rise from sample to sample; record again")
         time, set_back = _clock_set_back(time)
-        slots = _best_places(time)
+        slots = _best_places(where, time)
         _check_loss(where, slots)
         rate, off = _line(slots, time)
         _check_even(where, slots, time, off)
@@ -74,7 +79,31 @@ def lay_out(where: str, time_s: Array) -> Grid:
     missing = int(slots[-1]) + 1 - len(slots)
     if missing:
         notes = (*notes, f"{where}: {missing} samples are missing by the times; their places stay empty")
-    return Grid(rate, slots, notes)
+    notes = (*(f"{where}: {jump}" for jump in jumps), *notes)
+    return Grid(rate, slots, notes, float(np.median(time - slots / rate)))
+
+
+def _clock_set_forward(time: Array) -> tuple[Array, list[str]]:
+    """The stamps as if a clock that was set forward for good had gone on, and what was done, in words.
+
+    Only a step as long as all the rest is taken so: as a gap, it would cost the whole recording.
+    """
+    out, said = time.copy(), []
+    period = float(np.median(np.abs(np.diff(time))))
+    for _ in range(_MOST_SET_FORWARD):
+        steps = np.diff(out)
+        k = int(np.argmax(steps))
+        step = float(steps[k])
+        near = min(_BESIDE, k + 1, len(out) - k - 1)
+        lasting = float(np.median(out[k + 1 : k + 1 + near]) - np.median(out[k + 1 - near : k + 1]))
+        if step < _SHORTEST_JUMP_S or min(step, lasting) < 0.5 * float(out[-1] - out[0]):
+            break
+        out[k + 1 :] -= step - period
+        said.append(
+            f"the time jumps by {step:.6g} s after sample {k + 1}: taken as a clock that was set; if it was "
+            "a pause, cut the file there"
+        )
+    return out, said
 
 
 def _even(steps: Array) -> Array | None:
@@ -100,7 +129,7 @@ def _clock_set_back(time: Array) -> tuple[Array, int]:
     return out, times
 
 
-def _best_places(time: Array) -> Array:
+def _best_places(where: str, time: Array) -> Array:
     """Slots (T,), of several guesses of the period those on which the stamps lie best."""
     guesses = [float(time[-1] - time[0]) / (len(time) - 1)]
     for length in _LENGTHS:
@@ -116,6 +145,8 @@ def _best_places(time: Array) -> Array:
         rate, off = _line(slots, time)
         missing = (slots[-1] + 1.0 - len(slots)) / len(slots)
         found.append((float(np.median(np.abs(off))) * rate + float(missing), slots))
+    if not found:
+        raise RecordingError(f"{where} does not rise from sample to sample; record again")
     return min(found, key=lambda one: one[0])[1]
 
 

@@ -1,0 +1,1 @@
+"""Recordings of others in, joint angles for others out."""
