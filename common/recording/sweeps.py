@@ -58,7 +58,6 @@ def write_sweeps(path: Path, profile: str, nodes: Sequence[str], rate_hz: float,
     Raises RecordingError where the file is there already or cannot be written.
     """
     fresh: Mask = np.all(np.isfinite(readings[..., 3:6]), axis=-1)
-    values = np.nan_to_num(readings)
     with create(path) as stream:
         writer = Writer(stream)
         writer.start(library="tandem")
@@ -66,7 +65,7 @@ def write_sweeps(path: Path, profile: str, nodes: Sequence[str], rate_hz: float,
         channel = writer.register_channel(TOPIC, ENCODING, 0)
         for tick in range(len(readings)):
             at_ns = to_ns(tick / rate_hz)
-            payload = encode_readings(tick, fresh[tick], values[tick])
+            payload = encode_readings(tick, fresh[tick], readings[tick])
             writer.add_message(channel, at_ns, payload, at_ns, tick)
         writer.finish()
 
