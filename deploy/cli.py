@@ -33,6 +33,7 @@ from deploy.ops.keys.commands import app as keys_app
 from deploy.ops.network.command import app as network_app
 from deploy.ops.profile.command import app as profile_app
 from deploy.ops.record.command import record, recording
+from deploy.ops.recordings.export_command import export_joints
 from deploy.ops.recordings.import_command import import_recording
 from deploy.ops.replay.command import replay
 from deploy.ops.router.command import router
@@ -65,6 +66,7 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
 for _command in _COMMANDS:
     app.command()(_command)
 app.command("import")(import_recording)
+app.command("export")(export_joints)
 EXIT_FAULT = 70
 """Status after a fault that no person caused (`EX_SOFTWARE`)."""
 EXIT_OUTPUT = 74

@@ -12,7 +12,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["deploy/client"],
     ["deploy/sim"],
     ["deploy/measure"],
-    ["deploy/report", "deploy/certificates", "deploy/examples"],
+    ["deploy/report", "deploy/certificates", "deploy/examples", "deploy/ros"],
     ["master", "slave"],
     ["master/calibrate", "master/comfort", "master/alarms", "master/journal"],
     ["master/joint_angles"],

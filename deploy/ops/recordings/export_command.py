@@ -1,0 +1,70 @@
+"""`tandem export`: joint angles of a recording, for other programs."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from common.errors import TandemError
+from deploy.ops.recordings.joints import Source
+from deploy.report.output import in_a_folder
+
+
+class ExportFormat(StrEnum):
+    """What is written."""
+
+    CSV = "csv"
+    BVH = "bvh"
+    MOT = "mot"
+    BAG = "bag"
+    MCAP = "mcap"
+
+
+def export_joints(
+    file: Annotated[Path, typer.Argument(help="An .mcap file that `tandem record` wrote.", dir_okay=False)],
+    to: Annotated[
+        ExportFormat,
+        typer.Option(help="csv; bvh; mot (OpenSim); bag or mcap (ROS 2 bag of JointState, sqlite3 or mcap)."),
+    ] = ExportFormat.CSV,
+    out: Annotated[
+        Path | None, typer.Option(help="New file or folder; by default FILE's name.", callback=in_a_folder)
+    ] = None,
+    of: Annotated[Source, typer.Option(help="Whose angles to write.")] = Source.ENCODERS,
+    profile: Annotated[str, typer.Option(help="Profile of the robot that was recorded.")] = "nursing",
+    rate: Annotated[
+        float | None, typer.Option(help="Frames per second of a bvh; by default the recording's.", min=1.0)
+    ] = None,
+) -> None:
+    """Write the joint angles of a recording as CSV, BVH, OpenSim .mot or a ROS 2 bag.
+
+    Example: `tandem export morning.mcap --to bvh --of encoders --out morning.bvh`
+    """
+    from common.skeleton import load_skeleton
+    from deploy.ops.recordings.bvh import write_bvh
+    from deploy.ops.recordings.joint_files import write_bag, write_csv, write_mot
+    from deploy.ops.recordings.joints import read_joints
+
+    bag = to in (ExportFormat.BAG, ExportFormat.MCAP)
+    path = out or file.with_name(f"{file.stem}_ros2" if bag else f"{file.stem}.{to}")
+    if not bag and path.suffix.lower() != f".{to}":
+        raise TandemError(f"--out {path}: expected a name that ends in .{to}")
+    skeleton = load_skeleton(profile)
+    series = read_joints(file, skeleton, of)
+    if to is ExportFormat.CSV:
+        note = write_csv(path, series)
+    elif to is ExportFormat.MOT:
+        note = write_mot(path, series)
+    elif to is ExportFormat.BVH:
+        note = write_bvh(path, series, skeleton, rate or round(series.rate_hz, 3))
+    else:
+        note = write_bag(path, series, mcap=to is ExportFormat.MCAP)
+    console = Console()
+    for one in (*series.notes, note):
+        if one:
+            console.print(one, style="yellow", highlight=False, markup=False)
+    rows = f"{len(series.time_ns)} rows of {len(series.names)} joints, {series.time_s[-1]:.1f} s"
+    console.print(f"{path}: {rows} ({of})", highlight=False, markup=False, soft_wrap=True)
