@@ -36,6 +36,7 @@ from deploy.ops.record.command import record, recording
 from deploy.ops.recordings.export_command import export_joints
 from deploy.ops.recordings.import_command import import_recording
 from deploy.ops.replay.command import replay
+from deploy.ops.ros.command import ros
 from deploy.ops.router.command import router
 from deploy.ops.servos import servos
 from deploy.ops.sides import master, slave
@@ -61,7 +62,8 @@ for _name, _group in {
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, suit, drives, router, demo, soak, faults, collisions, contact, bench, audit,
-    *OPERATORS_ACTS, attitude, video, doctor, servos, stops, inputs, alarms, record, recording, replay,
+    *OPERATORS_ACTS, attitude, video, ros, doctor, servos, stops, inputs, alarms, record, recording,
+    replay,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

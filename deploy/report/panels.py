@@ -8,7 +8,7 @@ PANELS = {
     "Run": ("demo", "master", "slave", "suit", "router", "drives"),
     "People": (
         "engage", "handover", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude",
-        "video",
+        "video", "ros",
     ),
     "Set up": (
         "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record",
