@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from common.errors import TandemError
-from deploy.ops.recordings.joints import Source
+from deploy.ops.recordings.joints import AngleSource
 from deploy.report.output import in_a_folder
 
 
@@ -33,7 +33,7 @@ def export_joints(
     out: Annotated[
         Path | None, typer.Option(help="New file or folder; by default FILE's name.", callback=in_a_folder)
     ] = None,
-    of: Annotated[Source, typer.Option(help="Whose angles to write.")] = Source.ENCODERS,
+    of: Annotated[AngleSource, typer.Option(help="Whose angles to write.")] = AngleSource.ENCODERS,
     profile: Annotated[str, typer.Option(help="Profile of the robot that was recorded.")] = "nursing",
     rate: Annotated[
         float | None, typer.Option(help="Frames per second of a bvh; by default the recording's.", min=1.0)

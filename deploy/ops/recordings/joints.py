@@ -19,7 +19,7 @@ from common.wire.messages import Command, RobotState
 from common.wire.topics import COMMAND, STATE
 
 
-class Source(StrEnum):
+class AngleSource(StrEnum):
     """Whose angles."""
 
     ENCODERS = "encoders"
@@ -36,7 +36,7 @@ class JointSeries:
 
     names: tuple[str, ...]
     time_ns: NDArray[np.int64]
-    """(T,) rising, ns of the robot's clock (of the operator's for Source.OPERATOR)."""
+    """(T,) rising, ns of the robot's clock (of the operator's for AngleSource.OPERATOR)."""
     wall_ns: int
     """When the first was recorded, ns since 1970."""
     position_rad: Array
@@ -61,10 +61,10 @@ class JointSeries:
         return np.nan_to_num(last), int(missing.sum())
 
 
-def read_joints(path: Path, skeleton: Skeleton, source: Source) -> JointSeries:
+def read_joints(path: Path, skeleton: Skeleton, source: AngleSource) -> JointSeries:
     """The angles of a recording. Raises RecordingError where it holds none for this profile."""
-    topic = COMMAND if source is Source.OPERATOR else STATE
-    kind: type[Command] | type[RobotState] = Command if source is Source.OPERATOR else RobotState
+    topic = COMMAND if source is AngleSource.OPERATOR else STATE
+    kind: type[Command] | type[RobotState] = Command if source is AngleSource.OPERATOR else RobotState
     stream = RecordingStream(path)
     rows: list[tuple[int, Array]] = []
     wall_ns, unreadable, keys = 0, 0, set()
@@ -103,9 +103,9 @@ def read_joints(path: Path, skeleton: Skeleton, source: Source) -> JointSeries:
     return JointSeries(skeleton.joint_names, time_ns[new], wall_ns, positions[new], tuple(notes))
 
 
-def _row(message: Command | RobotState, source: Source) -> tuple[int, Array]:
+def _row(message: Command | RobotState, source: AngleSource) -> tuple[int, Array]:
     if isinstance(message, Command):
         return message.stamps.sampled_ns, np.where(message.valid, message.position_rad, np.nan)
-    if source is Source.TARGETS:
+    if source is AngleSource.TARGETS:
         return message.encoder_ns, message.setpoint_rad
     return message.encoder_ns, np.where(message.encoder_valid, message.position_rad, np.nan)
