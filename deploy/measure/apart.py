@@ -18,7 +18,10 @@ from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Z
 from slave.model.capsules import capsules
 from slave.model.pairs import moving, pairs
 
-_HALVINGS = 40
+_HALVINGS = 25
+_TOGETHER = 16
+_NEAR_M = 0.12
+"""Only what comes nearer than this is computed posture by posture."""
 
 
 class Distances:
@@ -61,6 +64,49 @@ class Distances:
         ends = self._placed(position_rad)
         out = [(_to_zone(zone, ends) - self._radius).min(axis=1) for zone in self._zones]
         return np.stack(out, axis=1) if out else np.empty((len(position_rad), 0))
+
+    def on_the_way_m(self, course_rad: Array) -> tuple[float, list[float]]:
+        """The least distance on the way through postures (T, J): of the robot's own parts, and to each zone.
+
+        Midway between two postures counts too. What stays further apart than 12 cm counts as that: a
+        distance shrinks by no more than both capsules' ends have moved. So only few have to be computed.
+        """
+        ends = self._placed(course_rad)
+        least, zones = _NEAR_M, [_NEAR_M] * len(self._zones)
+        for k in range(0, len(ends) - 1, _TOGETHER):
+            some = ends[k : k + _TOGETHER + 1]
+            # of a line, not of the arc: 0.03 mm less at 4 rad/s, half a metre out, and 200 Hz
+            some = np.concatenate([some, 0.5 * (some[1:] + some[:-1])])
+            moved_m = np.linalg.norm(some - some[:1], axis=-1).max(axis=(0, 2))
+            least = min(least, self._least_own_m(some, moved_m))
+            for i, zone in enumerate(self._zones):
+                first_m = _to_zone(zone, some[:1])[0] - self._radius - moved_m
+                near = np.flatnonzero(first_m < _NEAR_M)
+                if len(near):
+                    apart = _to_zone(zone, some[:, near]) - self._radius[near]
+                    zones[i] = min(zones[i], float(apart.min()))
+        return least, zones
+
+    def _least_own_m(self, ends: Array, moved_m: Array) -> float:
+        bars = [([*post.from_m], [*post.to_m], post.radius_m) for post in self._skeleton.stand]
+        a, b = self._pairs.T
+        moving = self._moving
+        fixed = np.array([bar[:2] for bar in bars]).reshape(-1, 2, 3)
+        place = np.concatenate([ends, np.broadcast_to(fixed, (len(ends), *fixed.shape))], axis=1)
+        radius = np.append(self._radius, [bar[2] for bar in bars])
+        moved_m = np.append(moved_m, np.zeros(len(bars)))
+        posts = np.arange(len(self._radius), len(radius))
+        a = np.append(a, np.tile(moving, len(posts)))
+        b = np.append(b, np.repeat(posts, len(moving)))
+        if not len(a):
+            return _NEAR_M
+        close_m = _between(place[:1, a], place[:1, b])[0] - radius[a] - radius[b]
+        near = close_m - moved_m[a] - moved_m[b] < _NEAR_M
+        if not near.any():
+            return _NEAR_M
+        a, b = a[near], b[near]
+        apart = _between(place[:, a], place[:, b]) - radius[a] - radius[b]
+        return min(_NEAR_M, float(apart.min()))
 
     def _placed(self, position_rad: Array) -> Array:
         """(T, C, 2, 3) both ends of every capsule's line."""

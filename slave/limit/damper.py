@@ -13,7 +13,6 @@ nearer than its margin already may stay as it is or part, so the operator can al
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,6 +23,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.guard.zones import Zone, distance_model, speed_limits, zone_margins_m
+from slave.limit.braking import BrakingWay, moments, way_to_stop
 from slave.model.distance import CLOSE_M, REACH_M, NearPairs
 
 TIME_CONSTANT_S = 0.1
@@ -34,6 +34,7 @@ STRIDE_M = CLOSE_M
 """On the way to standstill a pair is looked at again after this much way towards each other, at most. That is
 the sum of what each joint could add; convex parts that are apart at both ends then meet by 1 mm at most."""
 MOST_ROWS = 32
+"""Of one kind in one programme: those that matter most. What is left out the look at the way still sees."""
 MOST_CUTS = 2
 BUDGET_NS = 3_000_000
 """A tick that has taken longer than this brakes."""
@@ -42,11 +43,6 @@ MOST_LATE = 10
 _NOTICED_RAD_S = 5e-4
 """A joint that loses less is not said to be held back. Far less than a gentle start gains in one step."""
 _FREE = 1e30
-_PERIOD_S = 0.006
-"""A step longer than this is late."""
-_SHORTEST_S = 0.001
-"""The way to standstill is looked at in steps no shorter than this, however soon after the last one this
-one comes: half of it, at 2 m/s, is as far as the skin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +98,8 @@ class DistanceDamper:
         self.clock: Callable[[], int] = lambda: 0
         """Tells how much time a step takes. The default takes none: on a virtual clock nothing is late."""
         self._late_in_a_row = 0
+        self._suspect: int | None = None
+        """The moment at which the way to standstill was not free, the last time."""
         self.held_back: Mask = np.zeros(model.levers_m.shape[1], np.bool_)
         """(J,) joints that were given less than they wished, in the newest step."""
         self._nearest: tuple[int, float] | None = None
@@ -139,8 +137,8 @@ class DistanceDamper:
         spare_m = near.distance_m - self._margin_m[near.pair] - SKIN_M
         fastest = self._model.levers_m @ np.abs(step.wish_rad_s)
         rows = np.flatnonzero(spare_m < TIME_CONSTANT_S * fastest[self._model.kind[near.pair]])
-        if len(rows) > 2 * MOST_ROWS:
-            rows = rows[np.argpartition(spare_m[rows], 2 * MOST_ROWS)[: 2 * MOST_ROWS]]
+        if len(rows) > MOST_ROWS:
+            rows = rows[np.argpartition(spare_m[rows], MOST_ROWS)[:MOST_ROWS]]
         gradient, spare_m = self._model.gradient(rows), spare_m[rows]
         # within its skin a pair parts again, gently; one that is inside its margin is only kept from more
         parting = np.where(spare_m > -SKIN_M, -spare_m, 0.0) / TIME_CONSTANT_S
@@ -149,16 +147,17 @@ class DistanceDamper:
     def _slowed(self, near: NearPairs, step: DamperStep) -> tuple[DamperStep, _Rows | None]:
         """Aim and wish within the speed limits of zones, and rows that keep them in these directions."""
         zone = self._model.obstacle[near.pair]
-        rows = np.flatnonzero(self._most_m_s[zone] < np.inf)
+        further_m = np.maximum(near.distance_m - self._slow_from_m[zone], 0.0)
+        most_m_s = self._most_m_s[zone] + further_m / TIME_CONSTANT_S
+        fastest_m_s = self._model.levers_m @ np.abs(step.aim_rad_s)
+        rows = np.flatnonzero(most_m_s < fastest_m_s[self._model.kind[near.pair]])
         if not len(rows):
             return step, None
-        zone = zone[rows]
-        further_m = np.maximum(near.distance_m[rows] - self._slow_from_m[zone], 0.0)
-        most_m_s = self._most_m_s[zone] + further_m / TIME_CONSTANT_S
+        most_m_s = most_m_s[rows]
         velocity_m_s = self._model.velocity(rows, step.aim_rad_s)
         speed_m_s = np.linalg.norm(velocity_m_s, axis=1)
-        over = speed_m_s > most_m_s
-        if not over.any():
+        over = np.flatnonzero(speed_m_s > most_m_s)
+        if not len(over):
             return step, None
         # all joints that move the part are slowed alike, so that it goes the same way
         moves = self._model.levers_m[self._model.kind[near.pair[rows[over]]]] > 0.0
@@ -166,6 +165,7 @@ class DistanceDamper:
         aim = share * step.aim_rad_s
         wish = np.clip(aim, step.lowest_rad_s, step.highest_rad_s)
         slowed = replace(step, aim_rad_s=aim, wish_rad_s=wish)
+        over = over[np.argsort(most_m_s[over] / speed_m_s[over])[: MOST_ROWS // 2]]
         direction = velocity_m_s[over] / speed_m_s[over, None]
         return slowed, self._possible(-self._model.towards(rows[over], direction), -most_m_s[over], slowed)
 
@@ -180,37 +180,47 @@ class DistanceDamper:
 
     def _cut(self, near: NearPairs, floor_m: Array, velocity: Array, step: DamperStep) -> _Rows | None:
         """What this velocity would break on the way to standstill, as rows that forbid it; None: nothing."""
-        model, spare_m, speed = self._model, self._spare(near, floor_m, REACH_M), np.abs(velocity)
+        model, spare_m, speed = self._model, self._spare(near, floor_m), np.abs(velocity)
         far_rad = speed * (step.dt_s + speed / (2.0 * step.brake_rad_s2))
-        risky = np.flatnonzero(model.levers_m @ far_rad > spare_m)
-        if not len(risky):
+        risky = model.levers_m @ far_rad > spare_m
+        if not risky.any():
             return None
-        way_rad, parts, period_s = _way_to_stop(velocity, step)
+        way = way_to_stop(velocity, step.brake_rad_s2, step.dt_s)
         # no joint turns back on the way: what each adds only grows
-        apart_m, passed_m, k = np.abs(way_rad) @ model.levers_m[risky].T, 0.0, 0
-        while k < len(way_rad):
-            spare_m = spare_m[risky]
-            ahead_m = apart_m[k:] - passed_m
-            if (ahead_m[-1] <= spare_m).all():
-                return None
-            safe = np.all(ahead_m <= np.maximum(spare_m, STRIDE_M), axis=1)
-            ahead = max(int(np.argmin(safe)) if not safe[-1] else len(safe), 1)
-            if k < parts <= k + ahead and (ahead_m[parts - 1 - k] > spare_m).any():
-                ahead = parts - k  # the next setpoint itself is never passed over
-            k += ahead - 1
-            then = model.near(step.position_rad + way_rad[k], close=True)
-            lack_m = floor_m[then.pair] - then.distance_m
-            if lack_m.max(initial=0.0) > 0.0:
-                worst = np.argsort(-lack_m)[: min(np.count_nonzero(lack_m > 0.0), MOST_ROWS)]
-                of = model.gradient(worst) * _moving_s(velocity, step, k, parts, period_s)
-                return self._possible(of, lack_m[worst] + 0.1 * SKIN_M + of @ velocity, step)
-            spare_m, passed_m = self._spare(then, floor_m, CLOSE_M), apart_m[k]
-            k += 1
+        apart_m, last = np.abs(way.gone_rad) @ (model.levers_m * risky[:, None]).T, len(way.gone_rad) - 1
+        if (apart_m[last] <= spare_m).all():
+            return None
+        if self._suspect is not None:
+            cut = self._broken_at(min(self._suspect, last), way, floor_m, step)[1]
+            if cut is not None:
+                return cut
+        for k in moments(apart_m, np.maximum(spare_m, STRIDE_M), STRIDE_M, way.parts):
+            then, cut = self._broken_at(k, way, floor_m, step)
+            if cut is not None:
+                self._suspect = k
+                return cut
+            ahead_m = apart_m[last] - apart_m[k]
+            spare_m = then.distance_m - floor_m[then.pair]
+            if ahead_m.max() <= CLOSE_M and (ahead_m[model.kind[then.pair]] <= spare_m).all():
+                break
+        self._suspect = None
         return None
 
-    def _spare(self, near: NearPairs, floor_m: Array, reach_m: float) -> Array:
+    def _broken_at(
+        self, k: int, way: BrakingWay, floor_m: Array, step: DamperStep
+    ) -> tuple[NearPairs, _Rows | None]:
+        """A look at moment k of a way, and rows that forbid what is too near then; None: nothing is."""
+        then = self._model.near(step.position_rad + way.gone_rad[k], close=True)
+        lack_m = floor_m[then.pair] - then.distance_m
+        if lack_m.max(initial=0.0) <= 0.0:
+            return then, None
+        worst = np.argsort(-lack_m)[: min(np.count_nonzero(lack_m > 0.0), MOST_ROWS)]
+        of = self._model.gradient(worst) * way.moving_s(k)
+        return then, self._possible(of, lack_m[worst] + 0.1 * SKIN_M + of @ way.velocity_rad_s, step)
+
+    def _spare(self, near: NearPairs, floor_m: Array) -> Array:
         """(R,) how far the pairs of each kind may come towards each other, at least."""
-        spare_m = np.where(self._kept, reach_m, np.inf)
+        spare_m = np.where(self._kept, REACH_M, np.inf)
         np.minimum.at(spare_m, self._model.kind[near.pair], near.distance_m - floor_m[near.pair])
         return spare_m
 
@@ -261,30 +271,3 @@ class DistanceDamper:
         pair, distance_m = self._nearest
         part, other = self._model.names[pair]
         return f"{part} is held back: {max(100.0 * distance_m, 0.0):.0f} cm from the {other}"
-
-
-def _way_to_stop(velocity: Array, step: DamperStep) -> tuple[Array, int, float]:
-    """The joints' way to standstill, (K, J) at each of K moments; how many of them are parts of this step.
-
-    This step first, a late one in parts; then each joint brakes, step by step, until it stands. Also the time
-    of one of these steps. After n of them a joint of speed s, which sheds a in each, has gone
-    (n s - a n (n + 1) / 2) of it further, n at most s / a.
-    """
-    parts = math.ceil(step.dt_s / _PERIOD_S)
-    period_s = max(step.dt_s / parts, _SHORTEST_S)
-    shed = step.brake_rad_s2 * period_s
-    speed = np.abs(velocity)
-    moves = np.floor(speed / shed)
-    braked = np.minimum(np.arange(max(int(moves.max()), 0) + 1)[:, None], moves)
-    way = step.dt_s * speed + period_s * braked * (speed - (0.5 * shed) * (braked + 1.0))
-    if parts > 1:
-        way = np.vstack([np.arange(1, parts)[:, None] * (period_s * speed), way])
-    return np.copysign(way, velocity), parts, period_s
-
-
-def _moving_s(velocity: Array, step: DamperStep, k: int, parts: int, period_s: float) -> Array:
-    """(J,) for how long each joint has moved by moment k: the derivative of its way by its velocity."""
-    if k < parts:
-        return np.full_like(velocity, min((k + 1) * period_s, step.dt_s))
-    moves = np.floor(np.abs(velocity) / (step.brake_rad_s2 * period_s))
-    return np.asarray(step.dt_s + period_s * np.minimum(k + 1 - parts, moves))

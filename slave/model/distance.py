@@ -118,9 +118,13 @@ class DistanceModel:
 
     def velocity(self, rows: Indices, rate_rad_s: Array) -> Array:
         """(rows, 3) m/s: of the robot's points nearest to obstacles, at joint rates (J,)."""
-        every = np.eye(3)
-        ways = [self.towards(rows, np.broadcast_to(axis, (len(rows), 3))) @ rate_rad_s for axis in every]
-        return np.stack(ways, axis=1)
+        carried = self._carries[self._data.contact.geom[rows]].max(axis=1)
+        axis, anchor = self._data.xaxis, self._data.xanchor
+        turning = (rate_rad_s @ self._hinges_per_joint)[:, None] * axis
+        # hinges with axes h through o that turn at w:  Σ w h x (p - o) = (Σ w h) x p - Σ w h x o
+        out: Array = _cross(carried @ turning, self._data.contact.pos[rows])
+        out -= carried @ _cross(turning, anchor)
+        return out
 
     def _along(self, rows: Indices, direction: Array, carried: Array) -> Array:
         """A hinge with axis h through o moves p along n by  n · (h x (p - o)) = h · (p x n) - n · (h x o)."""

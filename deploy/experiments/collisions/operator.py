@@ -1,4 +1,4 @@
-"""A random operator: reaches anywhere, often into the robot itself, and now and then goes home."""
+"""A random operator: asks for a new posture with every command, often into the robot itself."""
 
 from __future__ import annotations
 
@@ -10,8 +10,13 @@ import numpy as np
 from common.quaternion import Array
 from slave.guard.limits import MotionLimits
 
+COMMANDS_PER_S = 12.5
+MOST_IN_A_ROW = 25
+"""Motions around one place: up to 2 s, in which the robot gets there."""
 HOME_EVERY = 10
-WAITS_S = 4.0
+"""Places until he goes home."""
+LINE_DIES = 0.1
+"""Share of places after which no more commands come until the robot stands."""
 INTO_ITSELF = {
     "arms crossed": {"shoulder_pitch": 45, "shoulder_roll": -10, "shoulder_yaw": -75, "elbow_pitch": 90},
     "hands on the head": {"shoulder_pitch": 135, "shoulder_yaw": -50, "elbow_pitch": 122},
@@ -20,42 +25,45 @@ INTO_ITSELF = {
     },
 }  # fmt: skip
 """Degrees of both arms alike, for a robot that has such joints."""
+HOME = "home"
 _SPREAD_RAD = 0.25
+_SPEED_RAD_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class OperatorMove:
-    """One motion, tick by tick."""
+class OperatorMotion:
+    """One fresh random goal: a posture and joint rates, (J,) each, that hold for one command's period."""
 
     kind: str
     position_rad: Array
-    """(T, J)"""
     velocity_rad_s: Array
-    home: bool = False
-    """Whether it ends at home, where the robot must be able to follow it."""
+    line_dies: bool = False
+    """Whether the robot then hears nothing, and brakes."""
 
 
-def moves(
-    seed: int, joint_names: tuple[str, ...], limits: MotionLimits, home_rad: Array, dt_s: float
-) -> Iterator[OperatorMove]:
-    """Endless minimum-jerk motions from posture to posture, 0.2 to 1.5 s each; every tenth goes home."""
-    rng, at = np.random.default_rng(seed), home_rad
+def motions(
+    rng: np.random.Generator, joint_names: tuple[str, ...], limits: MotionLimits, home_rad: Array
+) -> Iterator[OperatorMotion]:
+    """Endless motions: some around one place, then around another; each tenth place is home, and exact.
+
+    Half of the goals stand still, the others move on at random rates: harsher than any person, whose goals
+    follow one another.
+    """
     known = {kind: _posture(degrees, joint_names, limits) for kind, degrees in INTO_ITSELF.items()}
     kinds = ["anywhere", *(kind for kind, posture in known.items() if posture.any())]
-    for count in range(1, 2**62):
-        duration_s = float(rng.uniform(0.2, 1.5))
+    still = np.zeros_like(home_rad)
+    for place in range(1, 2**62):
+        if place % HOME_EVERY == 0:
+            yield OperatorMotion(HOME, home_rad, still)
+            continue
         kind = kinds[int(rng.integers(len(kinds)))]
-        home = count % HOME_EVERY == 0
-        if home:
-            to = home_rad
-        elif kind == "anywhere":
-            to = rng.uniform(limits.lower_rad, limits.upper_rad)
-        else:
-            to = limits.reachable(known[kind] + rng.normal(0.0, _SPREAD_RAD, len(at)))
-        u = np.minimum(np.arange(1, round(duration_s / dt_s) + 1) * dt_s / duration_s, 1.0)[:, None]
-        share, rate = u**3 * (10.0 - 15.0 * u + 6.0 * u**2), 30.0 * u**2 * (1.0 - u) ** 2 / duration_s
-        yield OperatorMove("home" if home else kind, at + share * (to - at), rate * (to - at), home)
-        at = to
+        center = known.get(kind, rng.uniform(limits.lower_rad, limits.upper_rad))
+        in_a_row = int(rng.integers(1, MOST_IN_A_ROW + 1))
+        dies = rng.random() < LINE_DIES
+        for nth in range(1, in_a_row + 1):
+            goal = limits.reachable(center + rng.normal(0.0, _SPREAD_RAD, len(center)))
+            rate = rng.normal(0.0, _SPEED_RAD_S, len(center)) if rng.random() < 0.5 else still
+            yield OperatorMotion(kind, goal, rate, dies and nth == in_a_row)
 
 
 def _posture(degrees: dict[str, int], joint_names: tuple[str, ...], limits: MotionLimits) -> Array:

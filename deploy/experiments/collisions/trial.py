@@ -4,123 +4,140 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from common.quaternion import Array
-from deploy.experiments.collisions.operator import WAITS_S, OperatorMove, moves
+from deploy.experiments.collisions.operator import COMMANDS_PER_S, HOME, OperatorMotion, motions
+from deploy.experiments.collisions.report import CollisionReport
 from deploy.measure.apart import Distances
 from slave.config import SlaveConfig
 from slave.limit.damper import DistanceDamper
 from slave.limit.limit import SetpointLimiter
 
-SLACK_M = 0.002
+WAITS_S = 4.0
 HOME_RAD = 0.01
+FOLLOWS_RAD = 0.05
+"""An operator who leads the robot back waits until it is this near."""
+JUDGED_TOGETHER = 64
+"""Ticks."""
 _EPS = 1e-9
-
-
-@dataclass(slots=True)
-class CollisionReport:
-    """What a run found."""
-
-    kinds: Counter[str] = field(default_factory=Counter)
-    """Motions made, by kind."""
-    ticks: int = 0
-    held_back: int = 0
-    """Ticks in which a joint was held back."""
-    spare_m: dict[str, float] = field(default_factory=dict)
-    """The least distance less its margin, of the robot itself and of each zone that keeps one."""
-    beyond_limits: int = 0
-    stuck: int = 0
-    """Times that the robot did not come home within 4 s of the operator."""
-    tick_us: dict[str, float] = field(default_factory=dict)
-    """CPU time of a whole step of the limiter: p50, p99, max."""
-
-    @property
-    def wrong(self) -> list[str]:
-        """What should not have been."""
-        wrong = [
-            f"{what} came {-1000.0 * spare_m:.1f} mm nearer than its margin"
-            for what, spare_m in self.spare_m.items()
-            if spare_m < -SLACK_M
-        ]
-        wrong += [f"limits were exceeded in {self.beyond_limits} ticks"] * bool(self.beyond_limits)
-        return wrong + [f"the robot was stuck {self.stuck} times"] * bool(self.stuck)
 
 
 class CollisionTrial:
     """A robot as a file describes it; `damped` False takes the damper away, which must turn out badly."""
 
-    def __init__(self, config: SlaveConfig, seed: int, damped: bool = True) -> None:
+    def __init__(self, config: SlaveConfig, damped: bool = True) -> None:
         guard, skeleton = config.guard, config.skeleton
-        self.report = CollisionReport()
-        self._guard, self._dt_s = guard, 1.0 / config.loop.rate_hz
+        self._names, self._guard, self._dt_s = skeleton.joint_names, guard, 1.0 / config.loop.rate_hz
         self._limits = guard.limits(skeleton)
         self._home = self._limits.reachable(np.zeros(len(skeleton.joints)))
+        self._held = np.zeros(len(self._home), np.bool_)
         self._damper = DistanceDamper(skeleton, guard.self_margin_cm, guard.zones) if damped else None
         self._limiter = SetpointLimiter(skeleton.joint_names, self._limits, self._damper)
-        self._limiter.seat(self._home)
         self._distances = Distances(skeleton, guard.zones)
-        self._moves = moves(seed, skeleton.joint_names, self._limits, self._home, self._dt_s)
-        self._spent_ns: list[int] = []
+        self._begin_at_home()
 
-    def run(self, motions: int, going_on: Callable[[], bool] = lambda: True) -> CollisionReport:
-        """So many more motions, or as long as `going_on` says."""
-        for move in itertools.islice(self._moves, motions):
+    def run(
+        self, seed: int, part: int, count: int, going_on: Callable[[], bool] = lambda: True
+    ) -> CollisionReport:
+        """So many motions from home, or as long as `going_on` says; every part of a seed is another."""
+        self._begin_at_home()
+        rng = np.random.default_rng((seed, part))
+        for motion in itertools.islice(motions(rng, self._names, self._limits, self._home), count):
             if not going_on():
                 break
-            self._follow(move)
-            self.report.kinds[move.kind] += 1
-        if self._spent_ns:
-            p50, p99, most = np.percentile(self._spent_ns, [50, 99, 100]) / 1000.0
-            self.report.tick_us = {"p50": float(p50), "p99": float(p99), "max": float(most)}
+            self._follow(motion)
+            self.report.kinds[motion.kind] += 1
+        self._judge()
         return self.report
 
-    def _follow(self, move: OperatorMove) -> None:
-        course = [self._limiter.position_rad]
-        for target, rate in zip(move.position_rad, move.velocity_rad_s, strict=True):
-            course.append(self._step(target, rate))
-        if move.home:
-            still = np.zeros_like(self._home)
-            for _ in range(round(WAITS_S / self._dt_s)):
-                if np.abs(course[-1] - self._home).max() < HOME_RAD:
+    def _begin_at_home(self) -> None:
+        self.report = CollisionReport()
+        self._limiter.seat(self._home)
+        self._way: list[Array] = [self._home]
+        """Setpoints since the robot was at home."""
+        self._course = [(self._home, np.zeros_like(self._home))]
+        """Setpoints and their velocities that are not judged yet."""
+
+    def _follow(self, motion: OperatorMotion) -> None:
+        if motion.kind == HOME:
+            self._go_home()
+            return
+        for tick in range(round(1.0 / (COMMANDS_PER_S * self._dt_s))):
+            ahead = tick * self._dt_s * motion.velocity_rad_s
+            self._step(motion.position_rad + ahead, motion.velocity_rad_s)
+        if motion.line_dies:
+            self.report.stops += 1
+            while not self._limiter.at_rest:
+                self._limiter.stop(self._dt_s)
+                self._took_step()
+
+    def _go_home(self) -> None:
+        if not self._came_to(itertools.repeat(self._home, round(WAITS_S / self._dt_s))):
+            self.report.stuck += 1
+            self.report.trapped += not self._led_back()
+        if np.abs(self._limiter.position_rad - self._home).max() >= HOME_RAD:
+            self._judge()
+            self._limiter.seat(self._home)
+            self._course = [(self._home, np.zeros_like(self._home))]
+        self._way = [self._limiter.position_rad]
+
+    def _came_to(self, goals: Iterator[Array]) -> bool:
+        still = np.zeros_like(self._home)
+        for goal in goals:
+            self._step(goal, still)
+            if np.abs(self._limiter.position_rad - self._home).max() < HOME_RAD:
+                return True
+        return False
+
+    def _led_back(self) -> bool:
+        """Whether the robot follows, when its own way is shown to it backwards."""
+        return self._came_to(self._backwards(self._way[::-1]))
+
+    def _backwards(self, way: list[Array]) -> Iterator[Array]:
+        waits = round(WAITS_S / self._dt_s)
+        for goal in (*way, self._home):
+            for _ in range(waits):
+                yield goal
+                if np.abs(self._limiter.position_rad - goal).max() < FOLLOWS_RAD:
                     break
-                course.append(self._step(self._home, still))
             else:
-                self.report.stuck += 1
-                self._limiter.seat(self._home)
-        self._judge(np.array(course))
+                return
+        yield from itertools.repeat(self._home, waits)
 
-    def _step(self, target: Array, rate: Array) -> Array:
-        limiter, limits, report = self._limiter, self._limits, self.report
-        before, speed = limiter.position_rad, limiter.velocity_rad_s
-        held = np.zeros(len(target), np.bool_)
+    def _step(self, target: Array, rate: Array) -> None:
+        limits = self._limits
         began_ns = time.thread_time_ns()
-        limiter.step(
-            0, self._dt_s, target, rate, held, limits.max_velocity_rad_s, limits.max_acceleration_rad_s2
+        self._limiter.step(
+            0, self._dt_s, target, rate, self._held, limits.max_velocity_rad_s, limits.max_acceleration_rad_s2
         )
-        self._spent_ns.append(time.thread_time_ns() - began_ns)
-        q, v = limiter.position_rad, limiter.velocity_rad_s
-        report.ticks += 1
-        report.held_back += self._damper is not None and bool(self._damper.held_back.any())
-        report.beyond_limits += not (
-            (np.abs(v) <= limits.max_velocity_rad_s + _EPS).all()
-            and (np.abs(v - speed) <= limits.max_acceleration_rad_s2 * self._dt_s + _EPS).all()
-            and (limits.reachable(q) == q).all()
-            and np.allclose(q - before, v * self._dt_s, rtol=0.0, atol=_EPS)
-        )
-        return q
+        self.report.took([(time.thread_time_ns() - began_ns) / 1000.0])
+        self.report.held_back += self._damper is not None and bool(self._damper.held_back.any())
+        self._took_step()
 
-    def _judge(self, course: Array) -> None:
-        """The setpoints, and midway between each two."""
-        whole = np.vstack([course, 0.5 * (course[1:] + course[:-1])])
-        spare = {"the robot": self._distances.own_m(whole).min() - self._guard.self_margin_cm / 100.0}
-        to_zones = self._distances.to_zones_m(whole).min(axis=0)
-        for zone, least_m in zip(self._guard.zones, to_zones.tolist(), strict=True):
+    def _took_step(self) -> None:
+        self.report.ticks += 1
+        self._way.append(self._limiter.position_rad)
+        self._course.append((self._limiter.position_rad, self._limiter.velocity_rad_s))
+        if len(self._course) > JUDGED_TOGETHER:
+            self._judge()
+
+    def _judge(self) -> None:
+        """All setpoints since the last time, and the way between each two."""
+        q, v = (np.array(part) for part in zip(*self._course, strict=True))
+        self._course = self._course[-1:]
+        if len(q) < 2:
+            return
+        limits, report = self._limits, self.report
+        most = limits.max_velocity_rad_s + _EPS, limits.max_acceleration_rad_s2 * self._dt_s + _EPS
+        kept = (np.abs(v[1:]) <= most[0]) & (np.abs(np.diff(v, axis=0)) <= most[1])
+        kept &= (q[1:] >= limits.lower_rad) & (q[1:] <= limits.upper_rad)
+        kept &= np.abs(np.diff(q, axis=0) - v[1:] * self._dt_s) <= _EPS
+        report.beyond_limits += int((~kept.all(axis=1)).sum())
+        own_m, zones_m = self._distances.on_the_way_m(q)
+        report.came("the robot", own_m - self._guard.self_margin_cm / 100.0)
+        for zone, least_m in zip(self._guard.zones, zones_m, strict=True):
             if not zone.enter:
-                spare[zone.name] = least_m - zone.margin_m
-        for what, spare_m in spare.items():
-            self.report.spare_m[what] = min(self.report.spare_m.get(what, np.inf), float(spare_m))
+                report.came(zone.name, least_m - zone.margin_m)

@@ -7,6 +7,7 @@ from common.quaternion import Array
 from slave.guard.events import Rule
 from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Zone, distance_model
 from slave.limit import damper
+from slave.limit.braking import moments, way_to_stop
 from tests.slave.limit.apart import (
     CROSSED,
     DT_S,
@@ -215,8 +216,22 @@ def test_a_step_right_after_the_last_one_costs_no_more_than_any_other() -> None:
     """A late tick and the next one may be a nanosecond apart: the way to standstill is as long as ever."""
     speed = LIMITS.max_velocity_rad_s
     brake = LIMITS.max_acceleration_rad_s2
-    step = damper.DamperStep(ZERO, speed, speed, -speed, speed, speed, speed, brake, 1e-9)
-    way_rad = damper._way_to_stop(speed, step)[0]
+    way_rad = way_to_stop(speed, brake, 1e-9).gone_rad
     assert len(way_rad) <= 1.0 + float((speed / brake).max()) / 0.001
     continuous = speed**2 / (2.0 * brake)
     assert np.abs(way_rad[-1] - continuous).max() <= 0.5 * 0.001 * float(speed.max()) + 1e-6
+
+
+def test_no_two_looks_at_the_way_are_more_than_a_stride_apart() -> None:
+    """Whichever kind of pair it is that comes nearer, and the next setpoint is always looked at."""
+    growth = np.random.default_rng(3).uniform(0.0, 0.02, (60, 4))
+    growth[:30, 1:] *= 0.1
+    growth[30:, 0] = 0.0  # another kind than at first goes on
+    apart_m = np.cumsum(growth, axis=0)
+    looks = moments(apart_m, np.full(4, 0.12), 0.05, 2)
+    assert 1 in looks
+    assert looks[-1] == 59
+    later = [k for k in looks if k > 1]
+    assert apart_m[later[0]].max() <= 0.12
+    assert np.diff(apart_m[later], axis=0).max() <= 0.05
+    assert len(later) < 20
