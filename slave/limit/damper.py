@@ -42,6 +42,7 @@ MOST_LATE = 10
 """So many late ticks in a row, and the robot holds."""
 _NOTICED_RAD_S = 5e-4
 """A joint that loses less is not said to be held back. Far less than a gentle start gains in one step."""
+_STANDS_RAD_S = 0.02
 _FREE = 1e30
 
 
@@ -102,6 +103,8 @@ class DistanceDamper:
         """The moment at which the way to standstill was not free, the last time."""
         self.held_back: Mask = np.zeros(model.levers_m.shape[1], np.bool_)
         """(J,) joints that were given less than they wished, in the newest step."""
+        self._stands = False
+        """Whether the robot does not slide along what holds it off either."""
         self._nearest: tuple[int, float] | None = None
         """The pair that is nearest to its margin while joints are held back, and its distance in m."""
 
@@ -129,6 +132,7 @@ class DistanceDamper:
         if late:
             velocity = step.braking_rad_s
         self._late_in_a_row = self._late_in_a_row + 1 if late else 0
+        self._stands = bool(np.abs(velocity).max() < _STANDS_RAD_S)
         self._tell(near, np.abs(velocity - asked))
         return velocity
 
@@ -137,8 +141,8 @@ class DistanceDamper:
         spare_m = near.distance_m - self._margin_m[near.pair] - SKIN_M
         fastest = self._model.levers_m @ np.abs(step.wish_rad_s)
         rows = np.flatnonzero(spare_m < TIME_CONSTANT_S * fastest[self._model.kind[near.pair]])
-        if len(rows) > MOST_ROWS:
-            rows = rows[np.argpartition(spare_m[rows], MOST_ROWS)[:MOST_ROWS]]
+        if len(rows) > 2 * MOST_ROWS:
+            rows = rows[np.argpartition(spare_m[rows], 2 * MOST_ROWS)[: 2 * MOST_ROWS]]
         gradient, spare_m = self._model.gradient(rows), spare_m[rows]
         # within its skin a pair parts again, gently; one that is inside its margin is only kept from more
         parting = np.where(spare_m > -SKIN_M, -spare_m, 0.0) / TIME_CONSTANT_S
@@ -270,4 +274,5 @@ class DistanceDamper:
             return ""
         pair, distance_m = self._nearest
         part, other = self._model.names[pair]
-        return f"{part} is held back: {max(100.0 * distance_m, 0.0):.0f} cm from the {other}"
+        off = f"{part} is held off by the {other}, {max(100.0 * distance_m, 0.0):.0f} cm from it"
+        return f"{off}: go back the way you came" if self._stands else off

@@ -43,7 +43,8 @@ def test_it_keeps_apart_from_itself_and_can_leave(target: Array) -> None:
     assert MARGIN_M - SLACK_M <= least_m < MARGIN_M + 0.01, "it came near, and not too near"
     assert np.abs(robot.limiter.velocity_rad_s).max() < 0.02, "it has come to rest"
     assert Rule.DISTANCE in {clamp.rule for clamp in robot.clamps}
-    assert "is held back" in robot.damper.words
+    assert "is held off by the " in robot.damper.words
+    assert robot.damper.words.endswith("cm from it: go back the way you came")
     robot.go(ZERO, 1.5)
     assert np.abs(robot.limiter.position_rad).max() < 0.01, "it has left"
     assert robot.damper.words == ""
@@ -65,9 +66,39 @@ def test_it_keeps_apart_from_a_zone_and_can_leave(zone: Zone) -> None:
     assert free.least_m()[1] < 0.0, "without the damper it is inside"
     _, (least_m,) = robot.least_m()
     assert 0.03 - SLACK_M <= least_m < 0.05
-    assert robot.damper.words.endswith(f"from the {zone.name}")
+    assert f"is held off by the {zone.name}, 3 cm from it" in robot.damper.words
     robot.go(ZERO, 1.5)
     assert np.abs(robot.limiter.position_rad).max() < 0.01
+
+
+def test_who_still_slides_is_not_sent_back() -> None:
+    robot = Robot([WALL])
+    robot.go(FORWARD, 0.3)
+    assert "is held off by the wall" in robot.damper.words
+    assert np.abs(robot.limiter.velocity_rad_s).max() > 0.1
+    assert "go back" not in robot.damper.words
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_wherever_the_robot_got_to_it_can_be_led_back_the_way_it_came(seed: int) -> None:
+    """Among four tight zones the straight way home may be barred; its own way never is."""
+    robot, draw = Robot([BED, HEAD, WALL, RAIL]), np.random.default_rng(seed)
+    way = [robot.limiter.position_rad]
+    for place in (FORWARD, CROSSED, ON_THE_HEAD, FORWARD):
+        goal = LIMITS.reachable(place + draw.normal(0.0, 0.3, J))
+        for _ in range(80):
+            robot.go(goal, DT_S)
+            way.append(robot.limiter.position_rad)
+    waited = 0
+    for shown in (*way[::-1], *[ZERO] * 400):
+        while np.abs(robot.limiter.position_rad - shown).max() > 0.1 and waited < 800:
+            robot.go(shown, DT_S)
+            waited += 1
+        robot.go(shown, DT_S)
+    assert np.abs(robot.limiter.position_rad).max() < 0.01
+    own_m, zones_m = robot.least_m()
+    assert own_m >= MARGIN_M - SLACK_M
+    assert (zones_m >= 0.03 - SLACK_M).all()
 
 
 def test_a_stop_at_any_moment_has_room() -> None:
