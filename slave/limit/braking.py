@@ -64,7 +64,7 @@ def moments(apart_m: Array, first_m: Array, stride_m: float, parts: int) -> list
     The first as late as `first_m` (R,) lets, the others a stride further each, and always the next setpoint.
     """
     last = len(apart_m) - 1
-    free = (apart_m <= first_m).all(axis=1)
+    free = np.all(apart_m <= first_m, axis=1)
     first = last if free[last] else max(int(np.argmin(free)) - 1, 0)
     # not the growth of the greatest: what grows may be another kind each time
     passed_m = np.append(0.0, np.cumsum(np.diff(apart_m, axis=0).max(axis=1)))

@@ -31,7 +31,7 @@ _SPEED_RAD_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class OperatorMotion:
+class RandomGoal:
     """One fresh random goal: a posture and joint rates, (J,) each, that hold for one command's period."""
 
     kind: str
@@ -43,7 +43,7 @@ class OperatorMotion:
 
 def motions(
     rng: np.random.Generator, joint_names: tuple[str, ...], limits: MotionLimits, home_rad: Array
-) -> Iterator[OperatorMotion]:
+) -> Iterator[RandomGoal]:
     """Endless motions: some around one place, then around another; each tenth place is home, and exact.
 
     Half of the goals stand still, the others move on at random rates: harsher than any person, whose goals
@@ -54,7 +54,7 @@ def motions(
     still = np.zeros_like(home_rad)
     for place in range(1, 2**62):
         if place % HOME_EVERY == 0:
-            yield OperatorMotion(HOME, home_rad, still)
+            yield RandomGoal(HOME, home_rad, still)
             continue
         kind = kinds[int(rng.integers(len(kinds)))]
         center = known.get(kind, rng.uniform(limits.lower_rad, limits.upper_rad))
@@ -63,7 +63,7 @@ def motions(
         for nth in range(1, in_a_row + 1):
             goal = limits.reachable(center + rng.normal(0.0, _SPREAD_RAD, len(center)))
             rate = rng.normal(0.0, _SPEED_RAD_S, len(center)) if rng.random() < 0.5 else still
-            yield OperatorMotion(kind, goal, rate, dies and nth == in_a_row)
+            yield RandomGoal(kind, goal, rate, dies and nth == in_a_row)
 
 
 def _posture(degrees: dict[str, int], joint_names: tuple[str, ...], limits: MotionLimits) -> Array:

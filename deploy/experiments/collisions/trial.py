@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from common.quaternion import Array
-from deploy.experiments.collisions.operator import COMMANDS_PER_S, HOME, OperatorMotion, motions
+from deploy.experiments.collisions.operator import COMMANDS_PER_S, HOME, RandomGoal, motions
 from deploy.experiments.collisions.report import CollisionReport
 from deploy.measure.apart import Distances
 from slave.config import SlaveConfig
@@ -61,7 +61,7 @@ class CollisionTrial:
         self._course = [(self._home, np.zeros_like(self._home))]
         """Setpoints and their velocities that are not judged yet."""
 
-    def _follow(self, motion: OperatorMotion) -> None:
+    def _follow(self, motion: RandomGoal) -> None:
         if motion.kind == HOME:
             self._go_home()
             return
