@@ -40,7 +40,7 @@ from slave.guard.tilt import base_loss
 from slave.last_known import EVERY_S, LastKnown, state_file
 from slave.limit.limit import Setpoint
 from slave.pipeline import SlavePipeline
-from slave.servos import Servos
+from slave.servos import LimitsTorque, Servos
 from slave.servos.servos import EncoderReading
 from slave.stop_inputs.robot_stops import RobotStops
 from slave.tap import RobotTick, SlaveTap, describe
@@ -73,6 +73,7 @@ class Slave:
         self._config = config
         self._link = link
         self._servos = servos
+        self._limit_torque = servos.limit_torque if isinstance(servos, LimitsTorque) else None
         self._base = base
         self._notifier = notifier or Notifier()
         endpoints = own_endpoints(config.link)
@@ -138,6 +139,8 @@ class Slave:
             setpoint = self._pipeline.tick(monotonic_ns(), reading, body)
             self._brake_drives(self._pipeline.guard.state is State.ESTOP)
             if setpoint.ready:
+                if self._limit_torque is not None:
+                    self._limit_torque(setpoint.torque_nm)
                 self._servos.write(setpoint.position_rad)
                 self._pipeline.written(monotonic_ns())
             if self._tap is not None:
@@ -228,11 +231,18 @@ class Slave:
             offset=OffsetMetrics(to_ms(offset.offset_ns), to_ms(offset.bound_ns), offset.trusted),
             undecodable=dict(pipeline.unread.counts),
             base=self._base.counters() if self._base else {},
-            servos=self._servos.metrics(),
+            servos=replace(self._servos.metrics(), unlimited=self._unlimited()),
             video=self._camera.metrics() if self._camera else None,
             link=self._link.counters(),
             times=guard.times.metrics(),
         )
+
+    def _unlimited(self) -> str:
+        """Why the drives may push harder than moving needs; empty where they may not."""
+        if not self._config.contact.torque_limit:
+            return "contact.torque_limit is switched off"
+        backend = self._config.servos.backend
+        return "" if self._limit_torque is not None else f"tandem cannot limit the torque of {backend} servos"
 
 
 async def run(config: SlaveConfig, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:

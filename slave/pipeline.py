@@ -30,6 +30,7 @@ from common.wire.messages import (
 )
 from slave.config import SlaveConfig
 from slave.contact.reflex import ContactReflex
+from slave.contact.torque_limit import TorqueLimit
 from slave.contact.watch import ContactWatch
 from slave.encoders.counts import Encoders
 from slave.guard import Admission, Guard, Permission
@@ -89,6 +90,7 @@ class SlavePipeline:
         self.limiter = SetpointLimiter(self.skeleton.joint_names, limits, self.damper)
         self.contact = ContactWatch(self.skeleton, config.contact, config.servos.payload)
         self.reflex = ContactReflex(config.contact, self.contact, self.skeleton.joint_names)
+        self.torque_limit = TorqueLimit(self.skeleton, config.contact, self.contact.observer.model)
         self.blind = BlindDistance(
             self.skeleton, limits, config.guard.max_blind_cm, 1.0 / config.loop.rate_hz
         )
@@ -203,11 +205,18 @@ class SlavePipeline:
         target = self._track(now_ns, permission)
         if target is None:
             self.blind.forget()
+            # to stop and to hold takes what it takes
+            self.torque_limit.forget()
             self._stop(now_ns, permission)
         else:
             self._limit(now_ns, permission, target)
             self.reflex.followed(now_ns, self.guard.stand_rad)
         setpoint = self.limiter.setpoint
+        if target is not None:
+            torque_nm = self.torque_limit.step(
+                permission.dt_s, self.guard.stand_rad, setpoint.position_rad, self.contact.floor_nm
+            )
+            setpoint = replace(setpoint, torque_nm=torque_nm)
         self.guard.written(now_ns, setpoint.position_rad, setpoint.velocity_rad_s)
         return setpoint
 

@@ -105,6 +105,8 @@ class ServoMetrics(Metrics):
     buses: dict[str, BusMetrics] = field(default_factory=dict)
     no_effort: dict[str, str] = field(default_factory=dict)
     """Why a joint's effort is not known, by joint: there is no contact detection there."""
+    unlimited: str = ""
+    """Why the drives may push harder than moving needs; empty where they may not."""
 
 
 @dataclass(frozen=True, slots=True)

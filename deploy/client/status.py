@@ -188,13 +188,15 @@ class RobotStatus:
     shift: tuple[str, ...] = ()
     """Of the operator's shift, in words: scaled motion, raised arms."""
     resting: tuple[str, ...] = ()
+    """Joint groups that hold until the operator takes them up."""
     effort_nm: TorquesByJoint | None = None
     """Of each motor at its joint, N m."""
     external_nm: TorquesByJoint | None = None
     """From outside."""
     no_effort: dict[str, str] = field(default_factory=dict)
     """Why a joint's effort is not known."""
-    """Joint groups that hold until the operator takes them up."""
+    unlimited: str = ""
+    """Why the drives may push harder than moving needs; empty where they may not, or nothing is known."""
 
 
 def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> RobotStatus:
@@ -235,6 +237,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         effort_nm=by_joint(state.effort_nm) if state else None,
         external_nm=by_joint(state.external_nm) if state else None,
         no_effort=metrics.servos.no_effort if metrics else {},
+        unlimited=metrics.servos.unlimited if metrics else "",
     )
 
 
@@ -312,6 +315,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     words += [(f"{name}: {why}", "yellow") for name, why in (one.switches or {}).items() if why != "held"]
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
     words += [(line, "yellow") for line in without_detection(one.no_effort)]
+    words += [(f"drives push as hard as they can: {one.unlimited}", "yellow")] * bool(one.unlimited)
     for what, torques in (("effort", one.effort_nm), ("from outside", one.external_nm)):
         if found := largest(torques or {}):
             words.append((f"{what}: {found} (the largest)", "dim"))

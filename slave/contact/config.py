@@ -48,6 +48,12 @@ class ContactConfig(Section):
     """How far `retreat` goes on once nothing pushes any more: no part of the robot moves farther."""
     retreat_m_s: float = Field(0.1, gt=0.0, le=0.25)
     """How fast."""
+    torque_limit: bool = True
+    """While the robot follows, its drives may push no harder than moving needs and 1.25 thresholds more: no
+    contact has to be noticed for that. Backends that cannot limit torque say so."""
+    drive_hz: float = Field(8.0, ge=1.0, le=100.0)
+    """Bandwidth of the drives' position control, by which the torque is foretold: they lag by 0.23 s /
+    `drive_hz` behind their setpoints. With less than the true one the robot follows more softly."""
     joints: dict[str, ContactJoint] = Field(default_factory=dict)
     """Single joints, by name. Fingers are watched only where they are named: they are meant to touch."""
 

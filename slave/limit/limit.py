@@ -20,6 +20,8 @@ class Setpoint:
 
     position_rad: Array
     velocity_rad_s: Array
+    torque_nm: Array | None = None
+    """(2, J) least and greatest torque that the drives may give, N m at the joint; None: what they have."""
     ready: bool = True
     """False until the guard knows where every joint stands: write it to no servo."""
 

@@ -1,5 +1,5 @@
 """What moves the joints and reads them back: one Protocol, one folder a backend (slave/backends.py)."""
 
-from slave.servos.servos import EncoderReading, Servos
+from slave.servos.servos import EncoderReading, LimitsTorque, Servos
 
-__all__ = ["EncoderReading", "Servos"]
+__all__ = ["EncoderReading", "LimitsTorque", "Servos"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,27 @@ def check_setpoint(position_rad: Array, joints: int) -> None:
     """Raises ValueError where setpoints are not one finite angle a joint."""
     if position_rad.shape != (joints,) or not np.isfinite(position_rad).all():
         raise ValueError(f"setpoints must be {joints} finite angles, not {position_rad}")
+
+
+def check_torque_limit(torque_nm: Array | None, joints: int) -> None:
+    """Raises ValueError where torque limits are not a range a joint. Infinite: the drive's own limit."""
+    if torque_nm is not None and not (
+        torque_nm.shape == (2, joints) and (torque_nm[0] <= torque_nm[1]).all()
+    ):
+        raise ValueError(f"torque limits must be {joints} ranges, not {torque_nm}")
+
+
+@runtime_checkable
+class LimitsTorque(Protocol):
+    """What servos can do besides, whose drives take a torque limit at every setpoint."""
+
+    def limit_torque(self, torque_nm: Array | None) -> None:
+        """Least and greatest torque (2, J) of each drive from the next setpoint on, N m at the joint.
+
+        It never widens what the drive may do by itself. None: as much as it has. Never blocks. Raises
+        ValueError where it is not a range a joint.
+        """
+        ...
 
 
 class Servos(Protocol):

@@ -13,12 +13,17 @@ from common.link.config import LinkConfig
 from common.metrics.slave import ServoMetrics, SlaveMetrics
 from common.process.notify import Notifier
 from common.process.pacing import DueTick, TickGrid
+from common.quaternion import Array
 from common.wire.codec import decode
 from common.wire.messages import Statistics
 from common.wire.topics import Topic
 from slave import app
 from slave.config import SlaveConfig
+from slave.contact.config import ContactConfig
+from slave.limit.limit import Setpoint
 from slave.servos import EncoderReading
+
+LIMIT_NM = np.stack([np.full(25, -1.0), np.full(25, 1.0)])
 
 
 class FakeLink:
@@ -126,6 +131,53 @@ def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
     slave._pipeline.traffic.one_way.record(3_000_000)
     asyncio.run(slave._publish_statistics())
     assert words == [(3000,), ()]
+
+
+@pytest.mark.parametrize(
+    ("limits", "on", "said"),
+    [
+        (True, True, ""),
+        (True, False, "contact.torque_limit is switched off"),
+        (False, True, "tandem cannot limit the torque of mujoco servos"),
+    ],
+)
+def test_torque_limits_reach_drives_that_take_them_and_others_are_named(
+    monkeypatch: pytest.MonkeyPatch, limits: bool, on: bool, said: str
+) -> None:
+    written: list[str] = []
+
+    class Plain(StillServos):
+        def metrics(self) -> ServoMetrics:
+            return ServoMetrics()
+
+        def quick_stop(self, stop: bool) -> None: ...
+
+        def write(self, position_rad: Array) -> None:
+            written.append("setpoint")
+
+    class Limiting(Plain):
+        def limit_torque(self, torque_nm: Array | None) -> None:
+            assert torque_nm is LIMIT_NM
+            written.append("limit")
+
+    class Pipeline:
+        def tick(self, *_: object) -> Setpoint:
+            return Setpoint(np.zeros(25), np.zeros(25), LIMIT_NM)
+
+    async def one_tick(grid: TickGrid) -> AsyncIterator[DueTick]:
+        yield DueTick(1, grid.origin_ns, 0)
+
+    monkeypatch.setattr(app, "ticks", one_tick)
+    link: Any = FakeLink()
+    link.counters = dict
+    servos: Any = Limiting() if limits else Plain()
+    contact = ContactConfig(torque_limit=on)
+    config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]), contact=contact)
+    slave = app.Slave(config, link, servos)
+    monkeypatch.setattr(slave._pipeline, "tick", Pipeline().tick)
+    asyncio.run(slave._drive())
+    assert written == (["limit", "setpoint"] if limits else ["setpoint"])
+    assert slave.metrics().servos.unlimited == said
 
 
 class StuckServos(StillServos):

@@ -65,10 +65,11 @@ class Impact:
 
 
 def contact_config(skeleton: Skeleton, reflex: Reflex | None) -> ContactConfig:
-    """The usual one with a reflex; None: no joint's threshold can be reached."""
+    """The usual one with a reflex; None: no joint's threshold can be reached, and drives push as they can."""
     if reflex is not None:
         return ContactConfig(reflex=reflex)
-    return ContactConfig(joints=dict.fromkeys(skeleton.joint_names, ContactJoint(threshold_nm=UNSEEN_NM)))
+    unseen = dict.fromkeys(skeleton.joint_names, ContactJoint(threshold_nm=UNSEEN_NM))
+    return ContactConfig(joints=unseen, torque_limit=False)
 
 
 def meet(

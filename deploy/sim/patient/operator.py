@@ -68,6 +68,7 @@ class OperatedRobot:
         self.robot.advance(self.now_ns)
         self.setpoint = self.pipeline.tick(self.now_ns, self.robot.read())
         if self.setpoint.ready:
+            self.robot.limit_torque(self.setpoint.torque_nm)
             self.robot.write(self.setpoint.position_rad)
         self._ticks += 1
         self.now_ns += TICK_NS

@@ -91,7 +91,7 @@ class TouchingRobot(SimulatedRobot):
                 self._torque.after()
                 given += self._torque.joint_nm
             self._told = [*self._told[1:], self._measured(given / self._steps)]
-            self._taken_in[:] = self._setpoint
+            self._take_in()
             self.now_ns += CYCLE_NS
 
     def read(self) -> EncoderReading:

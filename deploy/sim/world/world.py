@@ -276,6 +276,7 @@ class VirtualWorld:
         setpoint = self.slave.tick(now_ns, self.inject.read(reading), self.inject.body())
         self.inject.watch(true, setpoint)
         if setpoint.ready:
+            self._robot.limit_torque(setpoint.torque_nm)
             self._robot.write(self.inject.write(setpoint.position_rad))
             self.slave.written(now_ns)
         if self._tick % self.slave_config.loop.state_every == 0:

@@ -53,6 +53,10 @@ class MujocoServos:
         """Hand over setpoints (J,), taken in at the drives' next cycle. Raises ValueError if not finite."""
         self._robot.write(position_rad)
 
+    def limit_torque(self, torque_nm: Array | None) -> None:
+        """Limit the motors from their next cycle on. See `slave.servos.LimitsTorque`."""
+        self._robot.limit_torque(torque_nm)
+
     def read(self) -> EncoderReading:
         """The reading of the newest cycle."""
         return self._reading

@@ -14,7 +14,7 @@ from slave.encoders.counts import EncoderConfig, Encoders
 from slave.model.build import STEP_S, build_model, unit_rates
 from slave.model.own import leader
 from slave.servos.mujoco.effort import MotorTorque
-from slave.servos.servos import EncoderReading, check_setpoint
+from slave.servos.servos import EncoderReading, check_setpoint, check_torque_limit
 
 STEPS_PER_CYCLE = 1
 CYCLE_NS = STEPS_PER_CYCLE * to_ns(STEP_S)
@@ -53,6 +53,7 @@ class SimulatedRobot:
         self._leaders = np.array([self._model.joint(angle).qposadr[0] for angle, _ in leaders])
         self._joint_per_hinge = np.array([1.0 / ratio for _, ratio in leaders])
         self._torque = MotorTorque(skeleton, self._model, self._data)
+        self._torque_nm: Array | None = None
         self._all_valid = np.ones(len(leaders), dtype=np.bool_)
         self.now_ns = origin_ns
         """Time that the physics has reached."""
@@ -63,6 +64,11 @@ class SimulatedRobot:
         """New setpoints (J,), kept within the drives' limits. Raises ValueError if not finite or not J."""
         check_setpoint(position_rad, len(self._setpoint))
         self._setpoint = np.clip(position_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
+
+    def limit_torque(self, torque_nm: Array | None) -> None:
+        """See `LimitsTorque`; taken in at the cycle's end, with the setpoint."""
+        check_torque_limit(torque_nm, len(self._setpoint))
+        self._torque_nm = torque_nm
 
     def resume(self, now_ns: int) -> None:
         """Go on from `now_ns` after a pause that the robot's physics skips."""
@@ -79,8 +85,13 @@ class SimulatedRobot:
             self._torque.before()
             mujoco.mj_step(self._model, self._data, nstep=STEPS_PER_CYCLE)
             self._torque.after()
-            self._taken_in[:] = self._setpoint
+            self._take_in()
             self.now_ns += CYCLE_NS
+
+    def _take_in(self) -> None:
+        """At a cycle's end the drives take in what was written last."""
+        self._taken_in[:] = self._setpoint
+        self._torque.limit(self._torque_nm)
 
     def read(self) -> EncoderReading:
         """The counts latched at the end of the last cycle; none valid where the physics has diverged."""

@@ -235,6 +235,13 @@ def test_efforts_are_told_by_joint_and_who_tells_none_is_named() -> None:
     assert "no contact detection: neck_yaw tells no effort: its drive is old" in shown
 
 
+@pytest.mark.parametrize("why", ["", "contact.torque_limit is switched off"])
+def test_drives_that_push_as_hard_as_they_can_are_said(why: str) -> None:
+    said = status(Heard(state(), slave_metrics(servos=ServoMetrics(unlimited=why))))
+    shown = " ".join(rendered({"robot-1": said}).split())
+    assert (f"drives push as hard as they can: {why}" in shown) is bool(why)
+
+
 def test_a_robot_whose_drives_tell_nothing_has_no_efforts() -> None:
     said = status(heard())
     assert (said.effort_nm, said.external_nm) == (None, None)

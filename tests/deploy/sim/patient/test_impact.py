@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from common.link.config import LinkConfig
 from common.skeleton import load_skeleton
+from deploy.sim.patient import impact
 from deploy.sim.patient.free_run import free_run, of_motion
 from deploy.sim.patient.impact import PLACES, Impact, meet
-from deploy.sim.patient.robot import Imperfect
+from deploy.sim.patient.operator import OperatedRobot
+from deploy.sim.patient.robot import Imperfect, TouchingRobot
+from slave.config import SlaveConfig
 from slave.contact.config import ContactConfig, Reflex
 
 FINE = Imperfect(drive_bits=16)
@@ -48,7 +52,35 @@ def test_finer_angles_notice_sooner(place: str) -> None:
     assert coarse.noticed_s is not None
     assert fine.noticed_s is not None
     assert fine.noticed_s < 0.02 < coarse.noticed_s < 0.05
-    assert fine.peak_n < 0.8 * coarse.peak_n
+    assert fine.peak_n < 0.9 * coarse.peak_n
+
+
+def test_the_torque_limit_lowers_the_peak_before_anything_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    limited = clamped("elbow", Reflex.RETREAT)
+    off = ContactConfig(torque_limit=False)
+    monkeypatch.setattr(impact, "contact_config", lambda *_: off)
+    as_hard_as_it_can = clamped("elbow", Reflex.RETREAT)
+    assert limited.peak_n < 0.75 * as_hard_as_it_can.peak_n
+
+
+def test_drives_are_limited_while_the_robot_follows_and_only_then() -> None:
+    skeleton = load_skeleton("nursing")
+    run = OperatedRobot(
+        SlaveConfig(robot="robot-1", link=LinkConfig()),
+        TouchingRobot(skeleton, Imperfect()),
+        of_motion("bottle", skeleton),
+    )
+    run.run(0.5)
+    assert run.setpoint is not None
+    assert run.setpoint.torque_nm is None
+    assert run.engage() is None
+    run.run(1.0)
+    limit_nm = run.setpoint.torque_nm
+    assert limit_nm is not None
+    assert (limit_nm[0] < limit_nm[1]).all()
+    run.pipeline.guard.lose(run.now_ns, "target", "for the test")
+    run.tick()
+    assert run.setpoint.torque_nm is None
 
 
 @pytest.mark.parametrize("imperfect", [Imperfect(mass_share=0.05), Imperfect(mass_share=0.05, drive_bits=16)])

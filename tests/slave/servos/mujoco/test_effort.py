@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from common.quaternion import Array
 from common.skeleton import load_skeleton
 from slave.model.build import build_model, unit_rates
 from slave.servos.mujoco.effort import MotorTorque
@@ -59,3 +60,54 @@ def test_a_simulation_that_has_diverged_tells_no_effort() -> None:
     robot = SimulatedRobot(load_skeleton("hand"))
     robot._hinge_rad[3] = np.nan
     assert robot.read().effort_nm is None
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_motor_gives_no_more_than_it_is_allowed(sign: float) -> None:
+    skeleton = load_skeleton("nursing")
+    rest = np.clip(np.zeros(25), skeleton.lower_rad, skeleton.upper_rad)
+    for joint in (name for name in skeleton.joint_names if "thumb" not in name):
+        j = skeleton.joint_names.index(joint)
+        robot = SimulatedRobot(skeleton, position_rad=rest)
+        robot.write(rest + sign * 0.3 * np.eye(25)[j])
+        own = np.abs(_steps(robot, 3)[:, j]).max()
+        allowed = np.stack([np.full(25, -np.inf), np.full(25, np.inf)])
+        allowed[int(sign > 0), j] = sign * 0.5 * own
+        robot = SimulatedRobot(skeleton, position_rad=rest)
+        robot.write(rest + sign * 0.3 * np.eye(25)[j])
+        robot.limit_torque(allowed)
+        told = sign * _steps(robot, 3)[1:, j]
+        room = sign * (skeleton.upper_rad[j] if sign > 0 else skeleton.lower_rad[j])
+        if room < 0.05:
+            continue  # it cannot go that way
+        assert told.max() == pytest.approx(0.5 * own, rel=1e-3), joint
+        robot.limit_torque(None)
+        assert sign * _steps(robot, 2)[1:, j].max() > 0.0
+
+
+def test_a_limit_that_is_wider_than_the_motor_changes_nothing() -> None:
+    skeleton = load_skeleton("nursing")
+    rest = np.clip(np.zeros(25), skeleton.lower_rad, skeleton.upper_rad)
+    efforts = []
+    for wide in (None, np.array([[-1e4] * 25, [1e4] * 25])):
+        robot = SimulatedRobot(skeleton, position_rad=rest)
+        robot.limit_torque(wide)
+        robot.write(rest + 0.5)
+        efforts.append(_steps(robot, 40))
+    assert efforts[0] == pytest.approx(efforts[1])
+
+
+@pytest.mark.parametrize(
+    "torque", [np.zeros((2, 3)), np.stack([np.ones(25), np.zeros(25)]), np.full((2, 25), np.nan)]
+)
+def test_torque_limits_that_are_no_ranges_are_refused(torque: Array) -> None:
+    with pytest.raises(ValueError, match="torque limits must be 25 ranges"):
+        SimulatedRobot(load_skeleton("nursing")).limit_torque(torque)
+
+
+def _steps(robot: SimulatedRobot, cycles: int) -> Array:
+    out = []
+    for _ in range(cycles):
+        robot.advance(robot.now_ns + CYCLE_NS)
+        out.append(robot.effort_nm.copy())
+    return np.array(out)
