@@ -64,6 +64,7 @@ class SlaveConfig(Section):
             *self.guard.mistakes_for(skeleton),
             *self._wrong_stops(skeleton),
             *self._unconfirmed(skeleton),
+            *self._unfelt_zones(skeleton),
             *self.contact.mistakes_for(skeleton),
             *self.encoders.mistakes_for(skeleton),
             *self.servos.mistakes_for(skeleton, self.encoders),
@@ -81,6 +82,23 @@ class SlaveConfig(Section):
             f"({skeleton.unconfirmed[0]}, …): look at `tandem profile check`, then empty its list unconfirmed"
         )
         return [ConfigMistake("servos.backend", self.servos.backend, expected)]
+
+    def _unfelt_zones(self, skeleton: Skeleton) -> list[ConfigMistake]:
+        """Force limits of zones that no drive could tell of."""
+        try:
+            unknown = self.servos.chosen.no_effort(skeleton)
+        except ConfigError:  # told by the servos
+            return []
+        if len(unknown) < len(skeleton.joints):
+            return []
+        why = next(iter(unknown.values()))
+        return [
+            ConfigMistake(
+                f"guard.zones.{i}.max_force_n", zone.max_force_n, f"drives that tell their effort: {why}"
+            )
+            for i, zone in enumerate(self.guard.zones)
+            if zone.max_force_n is not None
+        ]
 
     def _wrong_stops(self, skeleton: Skeleton) -> list[ConfigMistake]:
         try:

@@ -32,6 +32,7 @@ from slave.config import SlaveConfig
 from slave.contact.reflex import ContactReflex
 from slave.contact.torque_limit import TorqueLimit
 from slave.contact.watch import ContactWatch
+from slave.contact.zone_force import ZoneForces
 from slave.encoders.counts import Encoders
 from slave.guard import Admission, Guard, Permission
 from slave.guard.body import WELL, Body
@@ -89,6 +90,7 @@ class SlavePipeline:
         self.damper = DistanceDamper(self.skeleton, config.guard.self_margin_cm, config.guard.zones)
         self.limiter = SetpointLimiter(self.skeleton.joint_names, limits, self.damper)
         self.contact = ContactWatch(self.skeleton, config.contact, config.servos.payload)
+        self.zone_forces = ZoneForces(self.skeleton, config.guard.zones)
         self.reflex = ContactReflex(config.contact, self.contact, self.skeleton.joint_names)
         self.torque_limit = TorqueLimit(self.skeleton, config.contact, self.contact.observer.model)
         self.blind = BlindDistance(
@@ -178,6 +180,8 @@ class SlavePipeline:
         self._reading, self._body = reading, body
         self._position_rad = self.encoders.position_rad(reading.counts)
         self.contact.look(now_ns, reading, self._position_rad)
+        self.zone_forces.look(self._position_rad, self.contact.external_nm, self.contact.threshold_nm)
+        self.contact.also(self.zone_forces.finding)
         self._body = body = replace(body, contact=self.contact.fault(now_ns))
         self.traffic.journeys.read(reading)
         self._setpoint = self.step(

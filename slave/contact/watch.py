@@ -50,6 +50,7 @@ class ContactWatch:
         self._tune(drives=False)
         self.finding: str | None = None
         """Who is pushed and how hard, in words, for as long as it lasts; None: nobody."""
+        self._also: str | None = None
         self.count = 0
         """Contacts since the start."""
         self._watched: Mask = np.isfinite(self.floor_nm)
@@ -127,6 +128,13 @@ class ContactWatch:
             self.finding = self._describe(pushed)
         elif self.finding is not None and (share < RELEASE).all():
             self.finding = None
+
+    def also(self, finding: str | None) -> None:
+        """Something else says that the robot is pushed, after a look: a zone's force limit."""
+        if finding is not None and self.finding is None:
+            self.count += self._also is None
+            self.finding = finding
+        self._also = finding
 
     def _leaps(self, read_ns: int, position_rad: Array) -> bool:
         before = self._position_rad

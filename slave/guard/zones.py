@@ -34,6 +34,10 @@ class _Zone(Section):
     """The greatest speed of a part at its point nearest to the zone, inside the margin (or inside of the zone
     itself, where the robot may enter); further out the limit grows by 1 m/s each 10 cm."""
 
+    max_force_n: float | None = Field(None, ge=10.0, le=10_000.0)
+    """The greatest force of a part that presses there, as the motors' torques tell it: beyond it, a
+    protective stop. Counts within the margin, or inside of the zone itself where the robot may enter."""
+
     @property
     def margin_m(self) -> float:
         """-inf where the robot may enter."""
@@ -157,8 +161,8 @@ def zone_mistakes(
 def _own_mistakes(zone: Zone, earlier: Sequence[str]) -> Iterator[tuple[str, object, str]]:
     if zone.name in earlier:
         yield "name", zone.name, "another name: an earlier zone has it"
-    if zone.enter and zone.max_speed_m_s is None:
-        yield "enter", True, "max_speed_m_s with it, or the zone would do nothing"
+    if zone.enter and zone.max_speed_m_s is None and zone.max_force_n is None:
+        yield "enter", True, "max_speed_m_s with it, or max_force_n, or the zone would do nothing"
     if isinstance(zone, HalfSpaceZone) and not any(zone.free_side):
         yield "free_side", zone.free_side, "a direction: not all three 0"
     if isinstance(zone, CapsuleZone) and zone.from_m == zone.to_m:
