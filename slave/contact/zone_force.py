@@ -16,10 +16,6 @@ TOUCHES_M = 0.01
 damper keeps 1 mm, and a capsule is not exactly the part."""
 RELEASE = 0.6
 """The contact has ended once the force is below this share of the limit."""
-WEAK = 0.1
-"""A direction in which a force turns the joints less than this share of the one in which it turns them most
-tells nothing: what torques there are, are noise."""
-
 ABOUT = 0.5
 """Thresholds: torques that differ by less are the same."""
 
@@ -29,7 +25,8 @@ class ZoneForces:
 
     The contact is taken to be where a part is nearest to the zone. Its force F is the least that explains the
     torques τ best, each as exactly as its threshold says:  min |W (Jᵀ F - τ)|,  W = 1 / threshold. Of several
-    parts in one zone, the deepest of those that explain them about as well as the best counts.
+    parts in one zone, the deepest of those that explain them about as well as the best counts. A direction in
+    which the limit itself would not turn the joints by one threshold says nothing, and is left out.
     """
 
     def __init__(self, skeleton: Skeleton, zones: Sequence[Zone]) -> None:
@@ -52,10 +49,10 @@ class ZoneForces:
         near = self._model.near(position_rad, close=True)
         owner = self._model.obstacle[near.pair]
         for place, zone in enumerate(self._zones):
+            assert zone.max_force_n is not None
             rows = np.flatnonzero((owner == place) & (near.distance_m <= self._near_m[place]))
             rows = rows[np.argsort(near.distance_m[rows])]
-            found = self._contact(rows, np.nan_to_num(external_nm), weight)
-            assert zone.max_force_n is not None
+            found = self._contact(rows, np.nan_to_num(external_nm), weight, zone.max_force_n)
             limit_n = zone.max_force_n * (RELEASE if place in self._beyond else 1.0)
             if found is None or found[1] <= limit_n:
                 self._beyond.discard(place)
@@ -65,7 +62,9 @@ class ZoneForces:
             words = f"{pressed} in the zone {zone.name}: more than {zone.max_force_n:g} N"
             self.finding = self.finding or words
 
-    def _contact(self, rows: Indices, external_nm: Array, weight: Array) -> tuple[int, float] | None:
+    def _contact(
+        self, rows: Indices, external_nm: Array, weight: Array, limit_n: float
+    ) -> tuple[int, float] | None:
         """The row of the contact, deepest first, and its force in N; None: nothing is there."""
         assert self._model is not None
         if not len(rows):
@@ -77,7 +76,9 @@ class ZoneForces:
         forces_n, unexplained = [], []
         for k in range(len(rows)):
             turns = (moves[:, k] * weight).T
-            force, *_ = np.linalg.lstsq(turns, wanted, rcond=WEAK)
+            into, per_n, across = np.linalg.svd(turns, full_matrices=False)
+            tells = per_n * limit_n >= 1.0
+            force = (into.T @ wanted)[tells] / per_n[tells] @ across[tells]
             unexplained.append(float(np.linalg.norm(turns @ force - wanted)))
             forces_n.append(float(np.linalg.norm(force)))
         first = int(np.argmax(np.array(unexplained) <= min(unexplained) + ABOUT))

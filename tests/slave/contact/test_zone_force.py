@@ -128,35 +128,46 @@ def test_a_joint_whose_torque_is_unknown_is_left_out() -> None:
 def test_of_two_parts_in_a_zone_the_one_that_explains_the_torques_counts() -> None:
     """The hand is deeper in it, but a force there would turn the joints otherwise."""
     zone = forces(center_m=side_of("right_hand").tolist(), radius_m=0.4)
-    zone.look(POSTURE, push("right_forearm", np.array([0.0, 0.0, 80.0])), THRESHOLD_NM)
+    zone.look(POSTURE, push("right_forearm", np.array([0.0, 80.0, 0.0])), THRESHOLD_NM)
     assert zone.finding is not None
     assert "right forearm" in zone.finding
 
 
-def test_the_pipeline_stops_and_counts_one_contact() -> None:
-    guard = GuardConfig.model_validate({"zones": [HER_SHOULDER]})
-    config = SlaveConfig(robot="robot-1", link=LinkConfig(), guard=guard)
-    pipeline = SlavePipeline(config)
-    pipeline.contact.floor_nm[:] = np.where(np.isinf(pipeline.contact.floor_nm), np.inf, 1000.0)
-    counts, now_ns = Encoders(SKELETON).counts(POSTURE), 0
-    needed = np.zeros(25)
+@pytest.mark.parametrize(("thresholds", "tells"), [(0.95, False), (1.05, True)])
+def test_a_direction_in_which_the_limit_is_within_the_noise_says_nothing(
+    thresholds: float, tells: bool
+) -> None:
+    torque_nm = push("right_hand", np.array([0.0, 0.0, LIMIT_N]))
+    only = np.full(25, np.nan)
+    shoulder = NAMES.index("right_shoulder_pitch")
+    only[shoulder] = 1.5 * torque_nm[shoulder]
+    jacobian = BODY.at(POSTURE).jacobian(SEGMENTS.index("right_hand"), side_of("right_hand"))
+    most_nm = LIMIT_N * float(np.linalg.norm(jacobian[:, shoulder]))
+    zone = forces()
+    zone.look(POSTURE, only, np.full(25, most_nm / thresholds))
+    assert (zone.finding is not None) is tells
 
-    def run(ticks: int, external_nm: Array) -> None:
+
+def test_the_pipeline_stops_and_counts_one_contact(monkeypatch: pytest.MonkeyPatch) -> None:
+    guard = GuardConfig.model_validate({"zones": [HER_SHOULDER]})
+    pipeline = SlavePipeline(SlaveConfig(robot="robot-1", link=LinkConfig(), guard=guard))
+    seen: list[Array] = []
+    monkeypatch.setattr(pipeline.zone_forces, "look", lambda at, *_: seen.append(at))
+    counts, now_ns = Encoders(SKELETON).counts(SKELETON.lower_rad * 0.0), 0
+
+    def run(ticks: int) -> str | None:
         nonlocal now_ns
         for _ in range(ticks):
             now_ns += 5_000_000
-            reading = EncoderReading(now_ns, counts, np.ones(25, np.bool_), effort_nm=needed - external_nm)
+            reading = EncoderReading(now_ns, counts, np.ones(25, np.bool_), effort_nm=np.full(25, np.nan))
             pipeline.tick(now_ns, reading)
+        return pipeline._body.contact
 
-    run(100, np.zeros(25))
-    needed = pipeline.contact.observer.external_nm.copy()
-    run(100, push("right_hand", np.array([0.0, 0.0, 0.9 * RELEASE * LIMIT_N])))
-    before = pipeline.contact.count
-    run(100, push("right_hand", np.array([0.0, 0.0, 0.9 * LIMIT_N])))
-    assert pipeline._body.contact is None
-    run(100, push("right_hand", np.array([0.0, 0.0, 1.2 * LIMIT_N])))
-    assert "her shoulder" in (pipeline._body.contact or "")
-    assert pipeline.contact.count == before + 1
+    assert run(10) is None
+    assert len(seen) == 10
+    pipeline.zone_forces.finding = "presses too hard"
+    assert run(10) == "presses too hard"
+    assert pipeline.contact.count == 1
 
 
 @pytest.mark.parametrize(
