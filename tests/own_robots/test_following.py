@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from common.skeleton import load_skeleton
-from deploy.harness.faults.table import VIRTUAL
-from deploy.harness.faults.virtual import try_on_virtual_clock
+from deploy.harness.faults.table import faults_of
+from deploy.harness.faults.virtual import VirtualFault, try_on_virtual_clock
 from deploy.measure import accuracy, motion
 from deploy.sim.suit.postures import posture_motion
 from deploy.sim.world.world import VirtualWorld, WorldSettings
 from tests.robots.imported import FILES, imported
 
-TABLE = {fault.name: fault for fault in VIRTUAL}
 ROWS = (
     "link cut", "packets duplicated", "second operator", "values that are not numbers", "drive fault",
-    "encoder silent", "valid but impossible jump", "pedal released",
+    "encoder silent", "valid but impossible jump", "yesterday's recording replayed", "stop button",
 )  # fmt: skip
-"""Those that say something about a robot's joints; the others are about hosts and operators."""
+"""Some of those that suit any robot; `tandem faults --profile` tries them all."""
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -47,15 +44,15 @@ def test_the_robot_follows_the_operators_postures(file: str) -> None:
 @pytest.mark.parametrize("file", FILES)
 @pytest.mark.parametrize("row", ROWS)
 def test_a_fault_does_to_it_what_the_table_says(file: str, row: str) -> None:
-    fault = TABLE[row]
-    setting = replace(fault.setting, profile=str(imported(file)))
-    outcome = try_on_virtual_clock(replace(fault, setting=setting))
+    fault = faults_of(str(imported(file)))[row]
+    assert isinstance(fault, VirtualFault)
+    outcome = try_on_virtual_clock(fault)
     assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"
 
 
 @pytest.mark.parametrize("file", FILES)
 @pytest.mark.parametrize("row", ["link cut", "encoder silent"])
 def test_the_row_fails_without_its_protection(file: str, row: str) -> None:
-    fault = TABLE[row]
-    setting = replace(fault.setting, profile=str(imported(file)))
-    assert try_on_virtual_clock(replace(fault, setting=setting), fault.held_by).wrong
+    fault = faults_of(str(imported(file)))[row]
+    assert isinstance(fault, VirtualFault)
+    assert try_on_virtual_clock(fault, fault.held_by).wrong

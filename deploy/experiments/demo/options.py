@@ -8,6 +8,7 @@ from typing import Literal
 
 from common.config.load import load_config
 from common.errors import TandemError
+from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING, example
 from deploy.sim.suit.config import SuitConfig
 from master.config import MasterConfig
@@ -39,8 +40,10 @@ class DemoOptions:
         suit = [f"seed={self.seed}"]
         if self.motion is not None:
             suit.append(f'motion="{self.motion}"')
-        # simulated and recorded operators begin in the zero pose: zeroed there, as the paper's reference was
-        master = [f'estimation.filter="{self.filter}"', "estimation.zero_pose_s=1.0"]
+        master = [f'estimation.filter="{self.filter}"']
+        if self.replay is not None or self._begins_in_the_zero_pose():
+            # zeroed there, as the paper's reference was
+            master.append("estimation.zero_pose_s=1.0")
         if self.replay is not None:
             suit.append(f'replay="{self.replay.resolve()}"')
         camera = "robot" if self.camera and self.robots == 1 else "off"
@@ -53,6 +56,11 @@ class DemoOptions:
             slave.append('servos.backend="canopen"')
             overrides["drives"] = []
         return overrides
+
+    def _begins_in_the_zero_pose(self) -> bool:
+        """A simulated operator moves as the robot can: where its elbow is never straight, hers is not."""
+        robot = load_skeleton(self.profile)
+        return bool(((robot.lower_rad <= robot.zero_rad) & (robot.zero_rad <= robot.upper_rad)).all())
 
     def check(self) -> None:
         """Read the files as the processes will. Raises TandemError for what cannot be run."""

@@ -19,6 +19,9 @@ def faults(
         list[str] | None, typer.Argument(help="Try only the faults whose names contain this text.")
     ] = None,
     report: ReportFile = None,
+    profile: Annotated[
+        str, typer.Option(help="Robot profile; of another than nursing, the rows that suit any robot.")
+    ] = "nursing",
     page: Annotated[
         Path | None,
         typer.Option(
@@ -39,15 +42,17 @@ def faults(
 
     Example: `tandem faults "link" --report faults.json`
     """
+    from deploy.examples.profiles import NURSING
     from deploy.experiments.faults.document import matrix, tree, within_page
     from deploy.experiments.faults.hazard_table import write_hazards
     from deploy.experiments.faults.view import print_matrix
-    from deploy.harness.faults.table import FAULTS, try_fault
+    from deploy.harness.faults.table import FAULTS, faults_of, try_fault
 
+    table = FAULTS if profile == NURSING else faults_of(profile)
     words = [word.casefold() for word in only or [""]]
-    chosen = [row for name, row in FAULTS.items() if any(word in name.casefold() for word in words)]
+    chosen = [row for name, row in table.items() if any(word in name.casefold() for word in words)]
     if not chosen:
-        raise TandemError(f"no row's name contains that; the rows are: {', '.join(FAULTS)}")
+        raise TandemError(f"no row's name contains that; the rows are: {', '.join(table)}")
     if (page or hazards) is not None and len(chosen) < len(FAULTS):
         raise TandemError("a page holds the whole matrix: name no rows with --page or --hazards")
 

@@ -92,6 +92,7 @@ class Scene:
 
     def __init__(self, setting: Setting = USUAL, without: Set[str] = frozenset()) -> None:
         self._begins_s = setting.lead_s
+        self.profile = setting.profile
         with files(setting) as master:
             overrides = {
                 "slave": [f'guard.reset_key="{RESET_KEY}"', *setting.slave],

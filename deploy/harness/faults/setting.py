@@ -44,6 +44,12 @@ class Setting:
     motion: Callable[[], OperatorMotion] | None = None
     """The operator's motion, None for the usual reach."""
 
+    @property
+    def any_robot(self) -> bool:
+        """Whether the scene is the usual one but for its link: nothing in it names a joint or a segment."""
+        own = (self.suit, self.master, self.slave, self.aligned, self.patient, self.motion)
+        return not any(own)
+
 
 USUAL = Setting()
 

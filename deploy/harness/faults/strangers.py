@@ -16,7 +16,7 @@ from deploy.sim.world.world import VirtualWorld, WorldSettings
 
 
 def _replayed_yesterday(scene: Scene) -> None:
-    requests, commands = _yesterday()
+    requests, commands = _yesterday(scene.profile)
     for request in requests:
         own = scene.run.master_config.operator.name
         if decode(scene.run.slave.on_control(request, scene.run.slave_ns, sender=own), ControlReply).done:
@@ -25,9 +25,9 @@ def _replayed_yesterday(scene: Scene) -> None:
 
 
 @cache
-def _yesterday() -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
+def _yesterday(profile: str) -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
     """Requests and commands of a run on another day: other clocks, other lease."""
-    run = VirtualWorld(WorldSettings(slave_ahead_ns=86_400 * 10**9, motion=reach()))
+    run = VirtualWorld(WorldSettings(slave_ahead_ns=86_400 * 10**9, motion=reach(profile), profile=profile))
     run.run(ENGAGED_S)
     challenge = run.ask(Action.STATUS).challenge
     operator, robot = run.master_config.operator.name, run.robot

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
 from deploy.harness.faults.contact import CONTACT
@@ -42,6 +43,19 @@ VIRTUAL: tuple[VirtualFault, ...] = (
 )
 FAULTS: dict[str, FaultRow] = {fault.name: fault for fault in (*VIRTUAL, *PROCESSES)}
 """Every fault, by name."""
+
+
+NURSING_ONLY = frozenset(fault.name for fault in (*EFFORT, *DISTANCE))
+"""Rows that name joints of the nursing robot."""
+
+
+def faults_of(profile: str) -> dict[str, FaultRow]:
+    """The rows that can be tried with any robot, by name, with the robot of a profile."""
+    return {
+        fault.name: replace(fault, setting=replace(fault.setting, profile=profile))
+        for fault in VIRTUAL
+        if fault.setting.any_robot and fault.name not in NURSING_ONLY
+    }
 
 
 def try_fault(fault: FaultRow) -> FaultOutcome:
