@@ -72,11 +72,24 @@ def pairs(skeleton: Skeleton) -> list[tuple[int, int]]:
     group = groups(skeleton)
     carrier = dict(zip(group, _carriers(skeleton, group), strict=True))
     shapes = [group[capsule.segment] for capsule in capsules(skeleton)]
+    moved = _moved(skeleton)
+    free = [moved[capsule.segment] for capsule in capsules(skeleton)]
     return [
         (a, b)
         for a, b in itertools.combinations(range(len(shapes)), 2)
         if shapes[a] != shapes[b] and carrier[shapes[a]] != shapes[b] and carrier[shapes[b]] != shapes[a]
+        # two that no joint moves stay as far apart as they are
+        if free[a] or free[b]
     ]
+
+
+def _moved(skeleton: Skeleton) -> Sequence[bool]:
+    """For every body, whether a joint moves it."""
+    driven = {hinge for joint in skeleton.joints for hinge in joint.moves}
+    moved = {WORLD: False}
+    for body in links(skeleton):
+        moved[body.name] = moved[body.parent] or any(hinge.name in driven for hinge in body.hinges)
+    return [moved[body.name] for body in links(skeleton)]
 
 
 def moving(skeleton: Skeleton) -> list[int]:

@@ -21,6 +21,8 @@ from deploy.ops.profile.check import checked, worn
 from deploy.ops.profile.compiled import compiled
 from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.model.build import build_model, unit_rates
+from slave.model.capsules import capsules
+from slave.model.pairs import pairs
 from tests.robots.imported import FILES, ROBOTS, imported
 
 
@@ -293,3 +295,12 @@ def test_meshes_are_gathered_and_their_shape_is_held(tmp_path: Path) -> None:
     (hip,) = load_skeleton(str(out)).own_links[0].bars
     assert hip.radius_m == pytest.approx(np.hypot(0.05, 0.03), abs=0.01)
     assert build_model(load_skeleton(str(out))).nmesh == 1
+
+
+def test_parts_that_no_joint_moves_are_not_kept_apart() -> None:
+    """The two bases stand where they stand, however near."""
+    skeleton = load_skeleton(str(imported("arm_pair.xml")))
+    of_bar = [capsule.segment for capsule in capsules(skeleton)]
+    kept = {frozenset(skeleton.own_links[of_bar[bar]].name for bar in pair) for pair in pairs(skeleton)}
+    assert frozenset({"left_arm0", "right_arm0"}) not in kept
+    assert frozenset({"left_arm7", "right_arm0"}) in kept
