@@ -41,10 +41,11 @@ from deploy.ops.router.command import router
 from deploy.ops.servos import servos
 from deploy.ops.sides import master, slave
 from deploy.ops.stops import stops
+from deploy.ops.suit.command import check
 from deploy.ops.video import video
 from deploy.report.panels import arrange
 from deploy.sim.drives.process import drives
-from deploy.sim.suit.command import suit
+from deploy.sim.suit.command import app as suit_app
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -55,13 +56,14 @@ app = typer.Typer(
     "the slave checks them and drives the robot.\n\nStart with `tandem demo`: it needs no hardware.",
 )
 calibrate_app.command("live")(live)
+suit_app.command("check")(check)
 for _name, _group in {
     "calibrate": calibrate_app, "accuracy": accuracy_app, "keys": keys_app,
-    "network": network_app, "profile": profile_app, "trial": trial_app,
+    "network": network_app, "profile": profile_app, "trial": trial_app, "suit": suit_app,
 }.items():  # fmt: skip
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
-    master, slave, suit, drives, router, demo, soak, faults, collisions, contact, bench, audit,
+    master, slave, drives, router, demo, soak, faults, collisions, contact, bench, audit,
     *OPERATORS_ACTS, attitude, video, ros, doctor, servos, stops, inputs, alarms, record, recording,
     replay,
 )  # fmt: skip

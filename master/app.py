@@ -32,6 +32,7 @@ from common.wire.topics import STATISTICS
 from common.wire.version import software
 from master.alarms.operator import OperatorAlarms
 from master.alarms.player import TonePlayer
+from master.capture.source import with_extended
 from master.comfort.pressed import PressedKey
 from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
@@ -86,7 +87,13 @@ class Master:
             config.operator.zero_pose_again.key,
         )
         self._buses = [
-            CanBus(bus, self._on_frame, self._on_bus, on_second_sender=self._on_frame)
+            CanBus(
+                bus,
+                self._on_frame,
+                self._on_bus,
+                on_second_sender=self._on_frame,
+                take_extended=bus.name in with_extended(self._pipeline.poll.identifiers),
+            )
             for bus in config.capture.buses
         ]
         joints = len(self._pipeline.skeleton.joints)
@@ -140,6 +147,7 @@ class Master:
 
     async def _capture(self) -> None:
         period_ns = round(1e9 / self._config.capture.rate_hz)
+        sync_buses = self._pipeline.poll.sync_buses
         async for due in ticks(TickGrid(monotonic_ns() + period_ns, period_ns)):
             self._ticks_expected += 1 + due.missed
             self._ticks_missed += due.missed
@@ -147,7 +155,8 @@ class Master:
                 bus.read()  # answers that have arrived are not late, even if this tick runs late
             sync, late = self._calls.tick(due.tick, monotonic_ns())
             for bus in self._buses:
-                bus.send(sync)
+                if bus.name in sync_buses:
+                    bus.send(sync)
             if late is not None:
                 self._send(late)
             self._notifier.beat(monotonic_ns())

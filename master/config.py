@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
@@ -15,6 +16,8 @@ from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.load import ProfileName
 from common.tap.config import TapConfig
 from master.alarms.config import AlarmsConfig
+from master.capture.config import SuitSection
+from master.capture.source import suit_mistakes
 from master.comfort.config import ZeroPoseAgainConfig
 from master.comfort.scaling import scaling_mistakes
 from master.deadman.config import CanButton, ClutchConfig, DeadmanConfig, Pedal
@@ -22,6 +25,7 @@ from master.orientation.config import EstimationConfig
 from master.orientation.filters import filter_mistakes
 from master.suit.nodes import NodeConfig, wiring_mistakes
 from master.suit.plausibility_config import PlausibilityConfig
+from master.suit.protocol import SHIPPED_DBC
 
 RobotName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
 
@@ -35,8 +39,8 @@ class CaptureConfig(Section):
     """One tick in this many yields a command: 200 / 16 = 12.5 Hz."""
     lost_after: int = Field(20, ge=1, le=10_000)
     """Missed ticks in a row after which a node counts as lost."""
-    dbc: RelativePath
-    """The DBC file that describes the frames."""
+    dbc: RelativePath = SHIPPED_DBC
+    """The DBC file that describes the frames of nodes that answer SYNC, and the buttons'."""
     plausibility: PlausibilityConfig = PlausibilityConfig()
     buses: list[BusConfig] = Field(min_length=1)
 
@@ -82,6 +86,7 @@ class MasterConfig(Section):
     capture: CaptureConfig
     estimation: EstimationConfig = EstimationConfig()
     nodes: dict[str, NodeConfig]
+    suit: SuitSection = SuitSection()
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
     alarms: AlarmsConfig = AlarmsConfig()
@@ -107,7 +112,8 @@ class MasterConfig(Section):
             *self._robot_mistakes(),
             *self._switch_mistakes(),
             *wiring_mistakes(self.nodes, self.capture.buses, "capture.buses"),
-            *node_mistakes(self.nodes, skeleton),
+            *node_mistakes(self.nodes, skeleton, self.suit.without_node),
+            *suit_mistakes(self.nodes, self.suit, self.capture.buses, skeleton.segment_names),
             *self.operator.zero_pose_again.mistakes_for(skeleton.segment_names, self.estimation.zero_pose_s),
             *scaling_mistakes(self.operator.scaling, skeleton),
             *self.estimation.mistakes_at(self.capture.rate_hz),
@@ -135,13 +141,22 @@ class MasterConfig(Section):
         return [ConfigMistake("robots", name, "each robot once") for name in twice]
 
 
-def node_mistakes(nodes: dict[str, NodeConfig], skeleton: Skeleton) -> list[ConfigMistake]:
-    """Segments without a node, nodes without a segment, and filters that do not exist."""
-    missing = [name for name in skeleton.segment_names if name not in nodes]
+def node_mistakes(
+    nodes: dict[str, NodeConfig], skeleton: Skeleton, without: Mapping[str, str]
+) -> list[ConfigMistake]:
+    """Segments without a node and without a word about it, nodes without a segment, unknown filters."""
+    missing = [name for name in skeleton.segment_names if name not in nodes and name not in without]
     foreign = [name for name in nodes if name not in skeleton.segment_names]
     named = [(name, node.filter) for name, node in nodes.items() if node.filter is not None]
     return [
         *(mistake for n, own in named for mistake in filter_mistakes(f"nodes.{n}.filter", own)),
-        *(ConfigMistake(f"nodes.{n}", None, f"a node, as {skeleton.name} has one there") for n in missing),
+        *(
+            ConfigMistake(
+                f"nodes.{n}",
+                None,
+                f"a node, as {skeleton.name} has one there, or a word in suit.without_node",
+            )
+            for n in missing
+        ),
         *(ConfigMistake(f"nodes.{n}", n, f"a segment of the profile {skeleton.name}") for n in foreign),
     ]

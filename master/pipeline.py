@@ -15,6 +15,7 @@ from common.can.frame import CanFrame
 from common.clock import to_s
 from common.skeleton import Skeleton
 from common.wire.messages import Command, CommandStamps, Mask
+from master.capture.source import SuitSource, counts_of, suit_source
 from master.comfort.arm_load import ArmLoadMeter
 from master.comfort.scaling import MotionScaling
 from master.comfort.zero_pose_again import ZeroPoseConduct
@@ -23,15 +24,17 @@ from master.deadman.grip import Grip
 from master.joint_angles.beyond import BeyondReach
 from master.joint_angles.sample import JointAngleSample
 from master.joint_angles.solver import JointSolver
+from master.joint_angles.without_node import SegmentsWithoutNode
 from master.orientation.estimator import Estimator
 from master.suit.double_tap import DoubleTap, TapLimits
 from master.suit.doubt import Doubts, NodeDoubt, Weight, refusal, together
 from master.suit.nodes import NodeConfig
 from master.suit.plausibility import PlausibilityWatch
-from master.suit.poll import Poll
 from master.suit.protocol import SuitProtocol
 from master.suit.sweep import Sweep
 
+NO_NODE = NodeConfig(id=1, bus="none")
+"""Stands for the node of a segment that has none; nothing ever comes from it."""
 MOST_BRIDGED = 20
 """Ticks (0.1 s). After a longer stall the motion in between is unknown."""
 
@@ -41,14 +44,16 @@ class MasterPipeline:
 
     def __init__(self, config: MasterConfig, protocol: SuitProtocol) -> None:
         self.skeleton: Skeleton = config.skeleton
-        nodes: Sequence[NodeConfig] = [config.nodes[name] for name in self.skeleton.segment_names]
-        self.poll = Poll(
-            nodes,
-            protocol,
-            lost_after=config.capture.lost_after,
-            fd={bus.name: bus.fd for bus in config.capture.buses},
+        names, fd = self.skeleton.segment_names, {bus.name: bus.fd for bus in config.capture.buses}
+        nodes: Sequence[NodeConfig] = [config.nodes.get(name, NO_NODE) for name in names]
+        self.poll: SuitSource = suit_source(
+            names, config.nodes, config.suit, protocol, config.capture.lost_after, fd
         )
-        self.estimator = Estimator(config.estimation, nodes, config.capture.rate_hz, skeleton=self.skeleton)
+        self.estimator = Estimator(
+            config.estimation, nodes, config.capture.rate_hz, skeleton=self.skeleton, fused=self.poll.fused
+        )
+        facing_rad = math.radians(config.estimation.zero_pose_heading_deg)
+        self._without_node = SegmentsWithoutNode(self.skeleton, config.suit.without_node, facing_rad)
         self.solver = JointSolver(self.skeleton)
         self.beyond_reach = BeyondReach(self.skeleton.segment_names)
         self.warnings: list[str] = []
@@ -61,9 +66,10 @@ class MasterPipeline:
         self._tapped = None if again.tap_node is None else self.skeleton.segment_names.index(again.tap_node)
         self._taps = DoubleTap(TapLimits(blow_m_s2=again.tap_m_s2))
         self._angles_ns: int | None = None
+        scale, top, derived = counts_of(self.poll, protocol)
         self.plausibility = PlausibilityWatch(
-            config.capture.plausibility, len(nodes), config.capture.rate_hz, protocol.fd.scale,
-            self.estimator.affine,
+            config.capture.plausibility, len(nodes), config.capture.rate_hz, scale, self.estimator.affine,
+            top, derived,
         )  # fmt: skip
         self._disbelieved: Mask = np.zeros(len(nodes), np.bool_)
         self._decimation = config.capture.decimation
@@ -75,10 +81,14 @@ class MasterPipeline:
         """Nodes whose readings were doubted when joint angles were last computed."""
 
     def tick(self, tick: int, now_ns: int) -> tuple[CanFrame, JointAngleSample | None]:
-        """Open a tick: the SYNC frame for every bus, and what the last window gave if it was still open."""
-        late = self.close(now_ns) if self._window_open else None
+        """Open a tick: the SYNC frame for `poll.sync_buses`, and joint angles if a window closed with it.
+
+        That is the last window if it was still open; or this one, if no node is asked and all run free.
+        """
+        angles = self.close(now_ns) if self._window_open else None
         self._window_open = True
-        return self.poll.open_window(tick, now_ns), late
+        sync = self.poll.open_window(tick, now_ns)
+        return sync, angles if self.poll.waits else self.close(now_ns)
 
     def frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Take one frame; True when every node that is not lost has answered this tick."""
@@ -94,9 +104,13 @@ class MasterPipeline:
 
     def node_counts(self) -> dict[str, dict[str, int]]:
         """The counters of each node that are not zero, by segment."""
+        figures = self.poll.figures()
         return {
             name: {counter: count for counter, count in asdict(health).items() if count}
-            for name, health in zip(self.skeleton.segment_names, self.poll.health, strict=True)
+            | figures.get(row, {})
+            for row, (name, health) in enumerate(
+                zip(self.skeleton.segment_names, self.poll.health, strict=True)
+            )
         }
 
     def close(self, now_ns: int) -> JointAngleSample | None:
@@ -104,13 +118,13 @@ class MasterPipeline:
         self._window_open = False
         sweep = self.poll.close_window(now_ns)
         sweep = self.plausibility.take(sweep, self.poll.readings, self.poll.saturated)
-        clashing = self.poll.clashes.doubted
+        clashing = self.poll.doubted
         if clashing.any():
             sweep = replace(sweep, lost=sweep.lost | clashing)
         sweeps = [*bridged(self._last_sweep, sweep), sweep]
         dt_s = _spacing_s(self._last_sweep, sweep, len(sweeps))
         for each in sweeps:
-            self.estimator.update(each, dt_s)
+            self.estimator.update(each, dt_s, each.q_world_from_sensor)
         self._last_sweep = sweep
         self._watch_taps(sweep)
         # after a missed deciding tick the next one decides, so that no command is missing
@@ -133,20 +147,23 @@ class MasterPipeline:
     def _joint_angles(self, sweep: Sweep) -> JointAngleSample:
         posture = self.estimator.posture()
         self.doubts = together(*(part() for part in self._parts))
-        known_nodes = posture.valid & self._believed()
-        q = posture.q_world_from_segment
+        filled, rate_rad_s, known_nodes = self._without_node.fill(
+            posture.q_world_from_segment, posture.rate_rad_s, posture.valid & self._believed()
+        )
+        q = filled
         if not known_nodes.all():
             # the solver must not remember a node that is lost or doubted
             q = np.where(known_nodes[:, None], q, np.nan)
         before_ns, self._angles_ns = self._angles_ns, sweep.sampled_ns
         elapsed_s = math.inf if before_ns is None else to_s(sweep.sampled_ns - before_ns)
-        position, velocity = self.solver.solve(q, posture.rate_rad_s, elapsed_s)
+        position, velocity = self.solver.solve(q, rate_rad_s, elapsed_s)
+        position, velocity = self._without_node.settle(position, velocity)
         self.warnings = self.beyond_reach.note(sweep.sampled_ns, self.solver.short_rad)
         # a joint is known only if the nodes on both its segments are
         missing = self.skeleton.joint_needs_node @ ~known_nodes
-        known = np.isfinite(position) & np.isfinite(velocity) & ~missing
+        known = np.isfinite(position) & np.isfinite(velocity) & (~missing | self._without_node.still)
         self.said = self.zero_pose.step(sweep.sampled_ns)
-        self.said += self.arm_load.take(sweep.sampled_ns, posture.q_world_from_segment, known_nodes)
+        self.said += self.arm_load.take(sweep.sampled_ns, filled, known_nodes)
         hold = self.zero_pose.hold
         if hold:
             known = np.zeros_like(known)
@@ -161,7 +178,7 @@ class MasterPipeline:
         )
 
     def _of_suit(self) -> Doubts:
-        clashes, implausible = self.poll.clashes.doubts(), self.plausibility.doubts()
+        clashes, implausible = self.poll.doubts(), self.plausibility.doubts()
         if not (clashes or implausible):
             return {}
         return together(self._named(clashes), self._named(implausible))

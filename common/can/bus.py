@@ -14,7 +14,7 @@ import can
 from common.can.config import BusConfig
 from common.can.controller import RESTARTED, Controller, error_words, of_error_frame
 from common.can.echo import SentFrames
-from common.can.frame import CanFrame
+from common.can.frame import EXTENDED, CanFrame
 from common.can.interface import error_number, open_bus
 from common.can.kept_open import KeptOpenBus, OnChange, Opener, StateOf
 from common.can.netlink import state_of
@@ -40,9 +40,14 @@ class CanBus(KeptOpenBus):
         opener: Opener = open_bus,
         *,
         on_second_sender: OnFrame | None = None,
+        take_extended: bool = False,
         state_of: StateOf = state_of,
     ) -> None:
-        """`on_second_sender` takes frames with an identifier that this side sends, but did not send."""
+        """`on_second_sender` takes frames with an identifier that this side sends, but did not send.
+
+        `take_extended`: frames with 29 bits are handed on too; else they are counted as foreign.
+        """
+        self._take_extended = take_extended
         super().__init__(config, on_change, opener, state_of)
         self._on_frame = on_frame
         self._on_second_sender = on_second_sender
@@ -65,8 +70,8 @@ class CanBus(KeptOpenBus):
             self.counters.send_errors += 1
             return
         message = can.Message(
-            arbitration_id=frame.id,
-            is_extended_id=False,
+            arbitration_id=frame.id & ~EXTENDED,
+            is_extended_id=bool(frame.id & EXTENDED),
             data=frame.data,
             is_fd=frame.fd,
             bitrate_switch=frame.fd,
@@ -88,8 +93,13 @@ class CanBus(KeptOpenBus):
             counters.undecodable += 1
         elif message.is_error_frame:
             self._on_error_frame(frame_id, bytes(message.data))
-        elif message.is_extended_id or message.is_remote_frame:
+        elif message.is_remote_frame or (message.is_extended_id and not self._take_extended):
             counters.foreign += 1
+        elif message.is_extended_id:
+            counters.received += 1
+            self._attempt = 0
+            self._on_the_bus()
+            self._on_frame(self.name, frame_id | EXTENDED, bytes(message.data), monotonic_ns())
         elif frame_id in self._sent_ids:
             counters.own_heard += 1
             self._on_own_id(frame_id, bytes(message.data))

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+EXTENDED = 0x8000_0000
+"""Added to an identifier of 29 bits, as in a DBC: so that it differs from the same number in 11 bits."""
+
 
 @dataclass(frozen=True, slots=True)
 class CanFrame:
-    """One data frame with an 11-bit identifier; up to 8 bytes on classic CAN, up to 64 where `fd`."""
+    """One data frame; up to 8 bytes on classic CAN, up to 64 where `fd`.
+
+    An identifier has 11 bits, or 29 and `EXTENDED`.
+    """
 
     id: int
     data: bytes

@@ -11,8 +11,9 @@ from common.errors import TandemError
 from common.quaternion import Array
 from common.recording import McapRecorder
 from common.recording.sweeps import TOPIC, describe
+from master.capture.polling import OnSweep, SuitCapture
+from master.capture.source import suit_source
 from master.config import MasterConfig
-from master.suit.capture import OnSweep, SuitCapture
 from master.suit.protocol import SuitProtocol
 from master.suit.recorded import encode_sweep
 from master.suit.sweep import Sweep
@@ -26,9 +27,10 @@ def names(config: MasterConfig) -> tuple[str, ...]:
 def open_capture(config: MasterConfig, on_sweep: OnSweep) -> SuitCapture:
     """The suit of a master's file, to be polled as the master does. Opens no bus yet."""
     capture = config.capture
-    nodes = [config.nodes[name] for name in names(config)]
+    fd = {bus.name: bus.fd for bus in capture.buses}
     protocol = SuitProtocol.load(capture.dbc)
-    return SuitCapture(nodes, capture.buses, protocol, capture.rate_hz, capture.lost_after, on_sweep)
+    source = suit_source(names(config), config.nodes, config.suit, protocol, capture.lost_after, fd)
+    return SuitCapture(source, capture.buses, capture.rate_hz, on_sweep)
 
 
 def open_recorder(config: MasterConfig, path: Path) -> McapRecorder:

@@ -10,9 +10,17 @@ from typer.core import TyperGroup
 class FilesByDefault(TyperGroup):
     """Runs the command `files` where the first argument is neither a command nor `--help`."""
 
+    default = "files"
+
     # Any: typer keeps the type of its context in a private module
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Insert the default command's name."""
         if args and args[0] != "--help" and args[0] not in self.commands:
-            args = ["files", *args]
+            args = [self.default, *args]
         return super().parse_args(ctx, args)
+
+
+class SimulateByDefault(FilesByDefault):
+    """Runs the command `simulate` there."""
+
+    default = "simulate"

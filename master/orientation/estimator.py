@@ -18,6 +18,7 @@ from common.wire.messages import Mask
 from master.orientation.affine import ACC, GYR, MAG, Calibration, apply, load_calibration
 from master.orientation.config import EstimationConfig
 from master.orientation.filters import FilterBank
+from master.orientation.fused import FUSED
 from master.orientation.heading import HeadingMemory
 from master.orientation.heading_watch import constrained, watch_of
 from master.orientation.joints.online import EVERY, OnlineHeadings
@@ -104,10 +105,11 @@ class Estimator:
         rate_hz: float,
         calibration: Calibration | None = None,
         skeleton: Skeleton | None = None,
+        fused: Mask | None = None,
     ) -> None:
         """Without a `calibration` the files that the nodes name are read. Raises ConfigError.
 
-        Without a `skeleton`, whose segments the nodes are, there are no constraints.
+        Without a `skeleton` of the nodes there are no constraints. `fused` (N,): they give orientations.
         """
         mistakes = config.mistakes_at(rate_hz)
         if mistakes:
@@ -120,6 +122,8 @@ class Estimator:
         self._samples = np.empty((3, count, 3))
         self._lowpass = LowPass(config.cutoffs_hz, config.order, rate_hz, count)
         names = [node.filter or config.filter for node in nodes]
+        if fused is not None:
+            names = [FUSED if given else name for name, given in zip(names, fused, strict=True)]
         self._bank = FilterBank(names, config.filter_sections, rate_hz)
         self._liveness = Liveness(count, math.ceil(config.settle_s * rate_hz))
         self._heading: _Headings = HeadingMemory(count)
@@ -145,10 +149,16 @@ class Estimator:
         self._gyr_rad_s = np.zeros((count, 3))
         self._rate_hz = rate_hz
         # the filters hold each reading for the period before it, which leads by half of it on average
-        self._advance_s = self._lowpass.delays_s[GYR] - 0.5 / rate_hz
+        self._advance_s: Array = np.full((count, 1), self._lowpass.delays_s[GYR] - 0.5 / rate_hz)
+        if fused is not None:
+            self._advance_s[fused] = 0.0  # an orientation that is given is not low-passed
 
-    def update(self, readings: Readings, dt_s: float | None = None) -> None:
-        """Take one tick; `dt_s` is the time since the one before, None for the nominal period."""
+    def update(
+        self, readings: Readings, dt_s: float | None = None, q_world_from_sensor: Array | None = None
+    ) -> None:
+        """Take one tick, `dt_s` after the one before, None: the nominal period; (N, 4) of `fused` nodes."""
+        if q_world_from_sensor is not None:
+            self._bank.give(q_world_from_sensor)
         samples = self._samples
         samples[ACC], samples[GYR], samples[MAG] = readings.acc_m_s2, readings.gyr_rad_s, readings.mag_ut
         was_valid = self._liveness.settled

@@ -17,6 +17,7 @@ from common.quaternion import Array
 from common.wire.messages import Mask
 from master.orientation.ekf import EkfConfig
 from master.orientation.filter import FilterSection, OrientationFilter
+from master.orientation.fused import FUSED, FusedConfig, GivenOrientation
 from master.orientation.mahony import MahonyConfig
 from master.orientation.vqf import VqfConfig
 from master.suit.doubt import NodeDoubt
@@ -47,7 +48,8 @@ class FilterBank:
         self._parts: list[tuple[NDArray[np.intp] | slice, OrientationFilter]] = []
         for name in dict.fromkeys(names):
             rows = np.flatnonzero([n == name for n in names])
-            filter_ = sections[name].make(rate_hz, len(rows))
+            section = FusedConfig() if name == FUSED else sections[name]
+            filter_ = section.make(rate_hz, len(rows))
             # a slice where all share one filter: nothing is then copied
             self._parts.append((slice(None) if len(rows) == self._count else rows, filter_))
 
@@ -55,6 +57,12 @@ class FilterBank:
         """One tick's readings, (N, 3) each."""
         for rows, part in self._parts:
             part.update(gyr_rad_s[rows], acc_m_s2[rows], mag_ut[rows], dt_s)
+
+    def give(self, q_world_from_sensor: Array) -> None:
+        """Orientations (N, 4) of this tick that units have fused themselves; NaN for the others."""
+        for rows, part in self._parts:
+            if isinstance(part, GivenOrientation):
+                part.give(q_world_from_sensor[rows])
 
     def _gathered(self, read: Callable[[OrientationFilter], NDArray[Number]]) -> NDArray[Number]:
         """What every filter says of its nodes, (N, ...)."""

@@ -64,7 +64,7 @@ class RepeatChance:
     """The noise of N nodes' accelerometers and gyros at rest, (N, 6), and how long each axis may repeat."""
 
     def __init__(self, count: int, rate_hz: float, scale: Array, longest_samples: float) -> None:
-        """`scale` (6,): SI per count. An axis that needs more than `longest_samples` is not judged."""
+        """`scale` (6,) or (N, 6): SI per count. An axis that needs over `longest_samples` is not judged."""
         self._two_counts = 1.5 * scale
         self._starts_a_year = 6.0 * count * rate_hz * _YEAR_S
         self._longest = longest_samples

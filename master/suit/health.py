@@ -32,6 +32,14 @@ class NodeHealth:
     """Windows in which it said that its sensor is faulty: it counts as missed."""
     saturated: int
     """Windows in which it said that a reading is at the end of its range; the readings are used."""
+    held: int = 0
+    """Of a free-running node: ticks without a sample after their instant; the last one was held over."""
+    missing: int = 0
+    """Samples that never came, by its own count or time, or by its rate."""
+    incomplete: int = 0
+    """Samples of which a frame was missing."""
+    resets: int = 0
+    """How often its own time or count began anew."""
 
 
 @dataclass(slots=True)
@@ -59,6 +67,10 @@ class NodeCounters:
         self.duplicates: Counts = np.zeros(count, dtype=np.int64)
         self.faults: Counts = np.zeros(count, dtype=np.int64)
         self.saturated: Counts = np.zeros(count, dtype=np.int64)
+        self.held: Counts = np.zeros(count, dtype=np.int64)
+        self.missing: Counts = np.zeros(count, dtype=np.int64)
+        self.incomplete: Counts = np.zeros(count, dtype=np.int64)
+        self.resets: Counts = np.zeros(count, dtype=np.int64)
 
     def node(self, index: int) -> NodeHealth:
         """The counters of one node."""

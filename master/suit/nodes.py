@@ -18,6 +18,8 @@ class NodeConfig(Section):
     """Its number on the bus: added to the identifiers of the DBC."""
     bus: str = Field(min_length=1)
     """Name of the bus it hangs on."""
+    layout: str | None = None
+    """Name of its `[suit.layout.NAME]`; None takes `suit.default`, or else tandem's own protocol."""
     magnetometer: bool = True
     """False: it has none, and its filter runs on gyro and accelerometer."""
     filter: str | None = None
@@ -32,11 +34,11 @@ def wiring_mistakes(
     """Bus names used twice, nodes on a bus that there is not, and two nodes with one id on one bus."""
     names = [bus.name for bus in buses]
     mistakes = names_used_twice(buses, buses_key)
-    taken: dict[tuple[str, int], str] = {}
+    taken: dict[tuple[str, str | None, int], str] = {}
     for segment, node in nodes.items():
         if node.bus not in names:
             mistakes.append(ConfigMistake(f"nodes.{segment}.bus", node.bus, f"one of {', '.join(names)}"))
-        other = taken.setdefault((node.bus, node.id), segment)
+        other = taken.setdefault((node.bus, node.layout, node.id), segment)
         if other != segment:
             expected = f"an id that nodes.{other} does not have"
             mistakes.append(ConfigMistake(f"nodes.{segment}.id", node.id, expected))

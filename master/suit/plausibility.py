@@ -11,7 +11,6 @@ gravity while a node is still, and at gravity against the gyro's turn (`gravity`
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +23,7 @@ from master.suit.chance import RepeatChance
 from master.suit.doubt import NodeDoubt, Weight
 from master.suit.gravity import GravityWatch
 from master.suit.plausibility_config import PlausibilityConfig
+from master.suit.plausibility_words import axes_of, frozen_words, letters_of, values_of
 from master.suit.sweep import Sweep
 
 BLOCK = 4
@@ -60,18 +60,24 @@ class PlausibilityWatch:
         rate_hz: float,
         scale: Array,
         affine: Array | None = None,
+        top: Array | None = None,
+        derived: Mask | None = None,
     ) -> None:
-        """`scale` (9,): SI per count. `affine` (3, N, 3, 4): the calibration, None where there is none."""
+        """SI per count (9,) or (N, 9); calibration (3, N, 3, 4); largest readings (6,) or (N, 6).
+
+        `derived` (N,): nodes whose readings follow from an orientation, which prove nothing.
+        """
         self._config = config
         self._scale = scale
         self._rows = BLOCK * max(3, round(config.repeats_s * rate_hz / BLOCK))
         self._ring = np.full((self._rows, count, 9), np.nan)
         self._fresh = np.zeros((self._rows, count), np.bool_)
         self._row = 0
-        self._blank_sum = _BLANK_COUNTS * float(scale[0])
-        self._top = 32767.0 * scale[:6] * (1.0 - 1e-9)
+        self._judged = None if derived is None else ~derived
+        self._blank_sum = _BLANK_COUNTS * scale[..., 0]
+        self._top = (32767.0 * scale[..., :6] if top is None else top) * (1.0 - 1e-9)
         self._axis_blocks = self._blocks(config.axis_s, rate_hz)
-        self._chance = RepeatChance(count, rate_hz, scale[:6], config.still_axis_s * rate_hz)
+        self._chance = RepeatChance(count, rate_hz, scale[..., :6], config.still_axis_s * rate_hz)
         self._chance_blocks = self._blocks_of(self._chance.samples, self._axis_blocks)
         self._frozen_blocks = self._blocks_of(self._chance.all_three, 1)
         self._judgements = 0
@@ -114,7 +120,7 @@ class PlausibilityWatch:
         row = self._row
         self._ring[row] = readings
         blank = np.abs(readings[:, _ACC]).sum(axis=1) < self._blank_sum
-        self._fresh[row] = sweep.fresh
+        self._fresh[row] = sweep.fresh if self._judged is None else sweep.fresh & self._judged
         self._saturated[row] = False if saturated is None else saturated
         self._row = (row + 1) % self._rows
         if self._row % BLOCK == 0:
@@ -175,16 +181,17 @@ class PlausibilityWatch:
         repeats: Mask = (stood > 0) & (stood >= self._frozen_blocks)
         newest = self._ring[self._row - 1]
         for node in np.flatnonzero(repeats.any(axis=1)):
-            found[int(node)] = _frozen_words(newest[node] / self._scale, repeats[node])
+            scale = self._scale if self._scale.ndim == 1 else self._scale[node]
+            found[int(node)] = frozen_words(newest[node] / scale, repeats[node])
         needed = np.where(self._lively(span), self._axis_blocks, self._chance_blocks)
         stuck = self._stood[:, :6] >= needed
         for node in np.flatnonzero(stuck.any(axis=1)):
             axes = np.flatnonzero(stuck[node])
-            found.setdefault(int(node), f"{_axes(axes)} stuck at {_values(newest[node], axes)}")
+            found.setdefault(int(node), f"{axes_of(axes)} stuck at {values_of(newest[node], axes)}")
 
     def _lively(self, span: Array) -> Mask:
         """(N, 6) axes whose sensor moves or has much noise."""
-        wide = span[:, :6] > _LIVELY_COUNTS * self._scale[:6]
+        wide = span[:, :6] > _LIVELY_COUNTS * self._scale[..., :6]
         lively = wide.copy()
         lively[:, :3] |= (wide[:, 0] | wide[:, 1] | wide[:, 2])[:, None]
         # a gyro turns about one axis alone at times; then gravity moves through the accelerometer
@@ -198,7 +205,9 @@ class PlausibilityWatch:
             # noise spreads far, but goes nowhere
             half = self._rows // 2
             drift = np.abs(self._ring[half:, :, :6].mean(axis=0) - self._ring[:half, :, :6].mean(axis=0))
-            rests = (span[:, :6] < _NOISE_COUNTS * self._scale[:6]) & (drift < 2.0 * self._scale[:6])
+            rests = (span[:, :6] < _NOISE_COUNTS * self._scale[..., :6]) & (
+                drift < 2.0 * self._scale[..., :6]
+            )
             rests &= (_widest(span[:, _ACC]) < _MOVES_M_S2)[:, None]
             self._chance.learn(self._ring[..., :6], rests & ~same[:, :6])
         if self._judgements % _CONCLUDED == 0:
@@ -215,7 +224,7 @@ class PlausibilityWatch:
         clipped = share >= np.repeat([_CLIPPED_ACC, _CLIPPED_GYR], 3)
         for node in np.flatnonzero(clipped.any(axis=1) | reported):
             axes = np.flatnonzero(clipped[node])
-            which = _axes(axes) if len(axes) else "a reading is"
+            which = axes_of(axes) if len(axes) else "a reading is"
             found[int(node)] = f"{which} saturated: at the end of its range"
 
     def _weigh(self, low: Array, high: Array, span: Array, heard: Mask) -> None:
@@ -245,7 +254,7 @@ class PlausibilityWatch:
         # once stuck, until it moves again
         self.mag_doubted = np.logical_or.reduce(stuck, axis=1)
         self._mag_words = {
-            int(node): f"its magnetometer's {_letters(np.flatnonzero(stuck[node]))} stuck: it is not used"
+            int(node): f"its magnetometer's {letters_of(np.flatnonzero(stuck[node]))} stuck: it is not used"
             for node in np.flatnonzero(self.mag_doubted)
         }
 
@@ -262,39 +271,7 @@ class PlausibilityWatch:
         self.doubted = doubted
 
 
-def _frozen_words(counts: Array, repeats: Mask) -> str:
-    which = {(True, True): "", (True, False): "its accelerometer ", (False, True): "its gyroscope "}
-    part = which[bool(repeats[0]), bool(repeats[1])]
-    reported = np.rint(np.concatenate([counts[3 * k : 3 * k + 3] for k in range(2) if repeats[k]]))
-    if (reported == 0.0).all():
-        return f"{part}reads zero on every axis: no power, asleep or just reset"
-    if (reported == -1.0).all():
-        return f"{part}reads all ones (-1 on every axis): nothing drives its sensor's bus"
-    if (np.abs(reported) >= 32767.0).all():
-        return f"{part}is saturated on every axis"
-    return f"{part}is frozen: repeats one reading; its sensor or the bus to it hangs"
-
-
 def _widest(span: Array) -> Array:
     # a reduction over three columns costs twice as much
     out: Array = np.maximum(np.maximum(span[:, 0], span[:, 1]), span[:, 2])
     return out
-
-
-_LETTERS = "xyz"
-
-
-def _letters(axes: NDArray[np.intp]) -> str:
-    return " and ".join(_LETTERS[axis] for axis in axes) + (" is" if len(axes) == 1 else " are")
-
-
-def _axes(axes: NDArray[np.intp]) -> str:
-    names = [f"{'gyroscope' if axis > 2 else 'accelerometer'} {_LETTERS[axis % 3]}" for axis in axes]
-    return " and ".join(names) + (" is" if len(axes) == 1 else " are")
-
-
-def _values(readings: Array, axes: Sequence[int] | NDArray[np.intp]) -> str:
-    return " and ".join(
-        f"{math.degrees(readings[axis]):.1f} °/s" if axis > 2 else f"{readings[axis]:.2f} m/s²"
-        for axis in axes
-    )

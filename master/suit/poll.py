@@ -11,19 +11,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.can.frame import CanFrame
 from common.metrics.bus import BusCounters
 from common.quaternion import Array
 from common.wire.messages import Mask
 from master.suit.clash import Clashes
+from master.suit.doubt import NodeDoubt
 from master.suit.health import BusHealth, NodeCounters, NodeHealth
 from master.suit.intake import AnswerSlot, Intake
 from master.suit.layout import Raw
 from master.suit.nodes import NodeConfig
 from master.suit.number import number_of
 from master.suit.presence import NodePresence
-from master.suit.protocol import MAG_OVERFLOW, NO_VALUE, READINGS, SuitProtocol
+from master.suit.protocol import READINGS, SuitProtocol, si_readings
 from master.suit.silence import BusSigns
 from master.suit.sweep import Sweep
 
@@ -60,7 +62,7 @@ class Poll:
         self._some_without_mag = bool(self._without_mag.any())
         self._scale = protocol.fd.scale
         self._values = np.zeros((count, len(READINGS)))
-        """Last good readings in SI units. Replaced, never written to: sweeps hold views of it."""
+        """Last good readings in SI. Replaced, never written to: sweeps hold views of it."""
         self._values[:, 6:] = np.nan
 
         self._first_key = {bus: place * _IDS for place, bus in enumerate(fd)}
@@ -171,10 +173,33 @@ class Poll:
         self._frames = [frame for frame in self._frames if not first_key <= frame[0] < first_key + _IDS]
         self._presence.lose(np.array([name == bus for name in self._bus_of_node]))
 
+    fused: Mask | None = None
+    """No node gives its orientation itself."""
+
+    @property
+    def waits(self) -> bool:
+        """Whether an open window waits for answers."""
+        return bool(self._slots)
+
+    @property
+    def doubted(self) -> Mask:
+        """(N,) nodes whose answers clash."""
+        return self.clashes.doubted
+
+    def doubts(self) -> dict[int, NodeDoubt]:
+        """What is wrong with which node's answers, by its index."""
+        return self.clashes.doubts()
+
+    def figures(self) -> dict[int, dict[str, int]]:
+        """Those of free-running nodes: there is none."""
+        return {}
+
     @property
     def buses_with_nodes(self) -> frozenset[str]:
         """Names of the buses on which nodes hang."""
         return frozenset(self._bus_of_node)
+
+    sync_buses = buses_with_nodes
 
     def signs(self, bus: str, up: bool, counters: BusCounters) -> BusSigns:
         """What shows why no node on a bus answers, together with the bus's own counters."""
@@ -222,7 +247,7 @@ class Poll:
         for intake, raw in zip(self._intakes, wholes, strict=True):
             if raw is None:
                 return False
-            values[intake.rows] = self._si(raw, intake)
+            values[intake.rows] = self._si(raw, intake.rows)
         self._values = values
         if self.saturated.any():
             self.saturated = np.zeros(len(values), np.bool_)
@@ -233,7 +258,9 @@ class Poll:
         for key, data in frames:
             place = self._slots.get(key)
             if place is None and key % _IDS == self._protocol.sync_id:
-                self._foreign_sync(self._bus_names[key // _IDS])
+                bus = self._bus_names[key // _IDS]
+                self.bus_health[bus].foreign_sync += 1
+                self._foreign[bus] = self._foreign.get(bus, 0) + 1
                 continue
             if place is None:
                 self.bus_health[self._bus_names[key // _IDS]].unknown_id += 1
@@ -243,10 +270,6 @@ class Poll:
                 intake.add(slot, data)
             else:
                 self._counters.bad_length[intake.rows[slot // intake.parts]] += 1
-
-    def _foreign_sync(self, bus: str) -> None:
-        self.bus_health[bus].foreign_sync += 1
-        self._foreign[bus] = self._foreign.get(bus, 0) + 1
 
     def _take(self) -> tuple[Mask, Mask]:
         """Judge the sorted frames, node by node; returns which nodes are fresh and which were heard."""
@@ -261,7 +284,7 @@ class Poll:
             self.saturated[intake.rows] = answers.saturated
             fresh[intake.rows] = answers.usable
             heard[intake.rows] = answers.heard
-            values[intake.rows[answers.usable]] = self._si(answers.raw, intake)[answers.usable]
+            values[intake.rows[answers.usable]] = self._si(answers.raw, intake.rows)[answers.usable]
         self._values = values
         foreign = np.array([self._foreign.get(bus, 0) for bus in self._bus_names]) if self._foreign else None
         self._foreign = {}
@@ -273,14 +296,5 @@ class Poll:
         """(N, 9) of the last window, in SI units, as the sweep has them. Not to be written to."""
         return self._values
 
-    def _si(self, raw: Raw, intake: Intake) -> Array:
-        """Counts (n, 9) of an intake's nodes in SI units; NaN where there is no magnetic reading."""
-        values: Array = raw * self._scale
-        mag = raw[:, 6:]
-        blank = (mag == NO_VALUE) | (mag == MAG_OVERFLOW)
-        # no power or an open bus: a field of exactly nothing on three axes
-        blank |= ((mag == 0) | (mag == -1)).all(axis=1)[:, None]
-        if self._some_without_mag or blank.any():
-            # two thirds of a field are no direction: one blank axis blanks all three
-            values[blank.any(axis=1) | self._without_mag[intake.rows], 6:] = np.nan
-        return values
+    def _si(self, raw: Raw, rows: NDArray[np.intp]) -> Array:
+        return si_readings(raw, self._scale, self._without_mag[rows] if self._some_without_mag else None)

@@ -17,6 +17,7 @@ import numpy as np
 from common.can.frame import CanFrame
 from common.errors import ConfigError, ConfigMistake
 from common.quaternion import Array
+from common.wire.messages import Mask
 from master.suit.layout import AnswerLayout, LayoutError, Raw
 from master.suit.nodes import NodeConfig
 
@@ -152,6 +153,23 @@ class SuitProtocol:
             readings = raw[step * place : step * (place + 1)]
             frames.append(CanFrame(frame_id, part.encode(frame_id, readings, tick, status), fd))
         return frames
+
+
+def si_readings(raw: Raw, scale: Array, without_mag: Mask | None) -> Array:
+    """Counts (n, 9) in SI units, `scale` (9,); NaN where there is no magnetic reading.
+
+    `without_mag` (n,): nodes that have no magnetometer; None: each has one.
+    """
+    values: Array = raw * scale
+    mag = raw[:, 6:]
+    blank = (mag == NO_VALUE) | (mag == MAG_OVERFLOW)
+    # no power or an open bus: a field of exactly nothing on three axes
+    blank |= ((mag == 0) | (mag == -1)).all(axis=1)[:, None]
+    if without_mag is not None or blank.any():
+        # two thirds of a field are no direction: one blank axis blanks all three
+        blanked = blank.any(axis=1)
+        values[blanked if without_mag is None else blanked | without_mag, 6:] = np.nan
+    return values
 
 
 def read_messages(path: Path | str) -> dict[str, Message]:

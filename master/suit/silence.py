@@ -16,7 +16,8 @@ class BusSigns:
 
     up: bool
     fd: bool
-    sync_id: int
+    sync_id: int | None
+    """None: its nodes run free."""
     received: int
     """Frames of any kind."""
     fresh: int
@@ -52,9 +53,10 @@ def advice(before: BusSigns, now: BusSigns) -> str:
     if more("send_errors"):
         causes.append("SYNC is not acknowledged: no power, no other device on the bus, or another bit rate")
     if not causes:
+        asked = "" if now.sync_id is None else f", and whether the nodes wait for SYNC {now.sync_id:#x}"
         causes.append(
             f"nothing is heard: the nodes' power and plug, the bit rate, 120 Ω at both ends, "
-            f"fd (here {kind}), and whether the nodes wait for SYNC {now.sync_id:#x}"
+            f"fd (here {kind}){asked}"
         )
     return "no node answers; " + "; ".join(causes)
 

@@ -14,7 +14,7 @@ class Sweep:
 
     tick: int
     sampled_ns: int
-    """SYNC sent."""
+    """SYNC sent; of a suit with free-running nodes the instant on which all are resampled."""
     frames_in_ns: int
     """The last awaited node answered, or the window closed without it."""
     acc_m_s2: Array
@@ -27,3 +27,5 @@ class Sweep:
     """(N,) answered this tick soundly."""
     lost: Mask
     """(N,) missing for `lost_after` ticks or more, or never heard yet."""
+    q_world_from_sensor: Array | None = None
+    """(N, 4) orientations that units have fused themselves, NaN for others; None: no unit has."""

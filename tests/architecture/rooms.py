@@ -18,6 +18,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["master/joint_angles"],
     ["master/orientation"],
     ["master/deadman"],
+    ["master/capture"],
     ["master/suit"],
     ["slave/camera", "slave/stop_inputs"],
     ["slave/contact"],

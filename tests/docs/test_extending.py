@@ -12,20 +12,30 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import common.skeleton.load
 import deploy.examples.profiles
 import slave.backends
 import slave.track.config
-from common.config.load import check_config
+from common.clock import to_ns
+from common.config.load import check_config, load_config
+from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.messages import Action
 from deploy.measure import motion
+from deploy.sim.suit.free_running import FreeNode, NodeClock, Reading, sent_by
+from deploy.sim.suit.motion import load_motion
+from deploy.sim.suit.sensors import IdealSensors, earth_field_ut
 from deploy.sim.world.world import VirtualWorld, WorldSettings
+from master.capture.source import load_layouts
+from master.config import MasterConfig
 from master.orientation.config import EstimationConfig
 from master.orientation.filter import FilterSection
 from master.orientation.filters import FILTERS
+from master.pipeline import MasterPipeline
+from master.suit.protocol import SuitProtocol
 from slave.backends import BACKENDS, ServosConfig
 from slave.encoders.counts import EncoderConfig
 from slave.track.config import STRATEGIES, TrackConfig, make_tracker
@@ -36,7 +46,7 @@ from tests.slave.track.contract import check as check_tracker
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/extending.md").read_text("utf-8")
-BLOCK = re.compile(r"^```(?:python|toml)\n# ([^\n]+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```(?:python|toml|dbc)\n# ([^\n]+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCKS = [(name, text) for name, text in BLOCK.findall(PAGE)]
 
 
@@ -120,11 +130,12 @@ def files_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
     (tmp_path / "master/suit").mkdir(parents=True)
     shutil.copy(ROOT / "master/suit/suit.dbc", tmp_path / "master/suit")
     for name, text in BLOCKS:
-        if "/" in name and name.endswith(".toml"):
+        if "/" in name and name.endswith((".toml", ".dbc")):
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).write_text(text, "utf-8")
     monkeypatch.setattr(common.skeleton.load, "resources", SimpleNamespace(files=lambda _: skeletons))
     monkeypatch.setattr(deploy.examples.profiles, "EXAMPLES", examples)
+    monkeypatch.chdir(tmp_path)
     yield
     load_skeleton.cache_clear()
 
@@ -145,3 +156,46 @@ def test_a_robot_of_the_profile_follows_the_operator() -> None:
     assert set(moved.joints) == {"raise", "bend"}
     assert moved.lag_ms is not None
     assert abs(moved.lag_ms) <= 25.0
+
+
+@pytest.mark.usefixtures("files_of_the_page")
+def test_joint_angles_follow_the_nodes_of_the_own_suit() -> None:
+    config = load_config(Path("own_suit/master.toml"), MasterConfig)
+    motion, sensors = (
+        load_motion("sweep", config.skeleton),
+        IdealSensors(config.skeleton, earth_field_ut(50.0, 60.0)),
+    )
+    layout = load_layouts(config.nodes, config.suit)["imu"]
+    random, noise = np.random.default_rng(2), np.repeat([0.04, 0.002, 0.3], 3)
+
+    def reading(row: int) -> Reading:
+        def read(time_s: float) -> tuple[Array, Array]:
+            true = sensors.read(*motion.state(time_s))[row]
+            return true + noise * random.normal(size=9), np.array([1.0, 0.0, 0.0, 0.0])
+
+        return read
+
+    nodes = [
+        FreeNode(layout, node.id, reading(row), NodeClock(100.0, 0.003 * row, 80.0 - 60.0 * row, 5.0))
+        for row, node in enumerate(config.nodes.values())
+    ]
+    pipeline = MasterPipeline(config, SuitProtocol.load())
+    frames = list(sent_by({"suit": nodes}, 12.0, np.random.default_rng(1), lost_share=0.005))
+    found = []
+    for tick in range(1, 2400):
+        while frames and frames[0].at_s <= 0.005 * tick:
+            sent = frames.pop(0)
+            pipeline.frame(sent.bus, sent.frame.id, sent.frame.data, to_ns(sent.at_s))
+        _, angles = pipeline.tick(tick, to_ns(0.005 * tick))
+        if angles is not None and tick > 600:
+            found.append(angles)
+    assert len(found) >= 100
+    assert all(angles.valid.all() for angles in found)
+    off = [np.abs(angles.position_rad - motion.state(1e-9 * angles.sampled_ns)[0]).max() for angles in found]
+    assert np.degrees(max(off)) <= 2.0
+    # the newest sample of a node at 100 Hz, brought to the instants between
+    age_ms = [1e-6 * (angles.frames_in_ns - angles.sampled_ns) for angles in found]
+    assert 10.0 <= min(age_ms) <= max(age_ms) <= 15.0
+    counts = pipeline.node_counts()["forearm"]
+    assert counts["rate_hz"] == 100
+    assert counts["missing"] > 0

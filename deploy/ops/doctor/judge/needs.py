@@ -17,6 +17,7 @@ from common.link.roles import Role, common_name
 from common.link.router import RouterConfig
 from common.skeleton import Skeleton
 from deploy.sim.suit.config import SuitConfig
+from master.capture.source import suit_source
 from master.config import MasterConfig
 from master.deadman.config import SwitchConfig
 from master.suit.protocol import SuitProtocol
@@ -102,7 +103,8 @@ def _keys(path: Path) -> set[str]:
 
 def _of_master(config: MasterConfig) -> Needs:
     fd = {bus.name: bus.fd for bus in config.capture.buses}
-    SuitProtocol.load(config.capture.dbc).identifiers(list(config.nodes.values()), fd)
+    names, protocol = config.skeleton.segment_names, SuitProtocol.load(config.capture.dbc)
+    suit_source(names, config.nodes, config.suit, protocol, config.capture.lost_after, fd)
     nodes = Counter(node.bus for node in config.nodes.values())
     return Needs(
         role="master",

@@ -11,9 +11,7 @@ from common.clock import monotonic_ns
 from common.metrics.tree import to_tree
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
-from master.suit.nodes import NodeConfig
-from master.suit.poll import Poll
-from master.suit.protocol import SuitProtocol
+from master.capture.source import SuitSource, with_extended
 from master.suit.sweep import Sweep
 
 OnSweep = Callable[[Sweep], None]
@@ -32,19 +30,20 @@ class SuitCapture:
 
     def __init__(
         self,
-        nodes: Sequence[NodeConfig],
+        source: SuitSource,
         buses: Sequence[BusConfig],
-        protocol: SuitProtocol,
         rate_hz: float,
-        lost_after: int,
         on_sweep: OnSweep,
     ) -> None:
-        """`nodes` in the order of the sweeps' rows; `lost_after` in ticks."""
+        """`source`: the suit, whose rows are those of the sweeps."""
         self.counters = CaptureCounters()
-        self._poll = Poll(nodes, protocol, lost_after, {bus.name: bus.fd for bus in buses})
+        self.source = self._poll = source
         self._period_ns = round(1e9 / rate_hz)
         self._on_sweep = on_sweep
-        self._buses = [CanBus(bus, self._on_frame, self._on_bus) for bus in buses]
+        extended = with_extended(source.identifiers)
+        self._buses = [
+            CanBus(bus, self._on_frame, self._on_bus, take_extended=bus.name in extended) for bus in buses
+        ]
         self._open = False
 
     async def run(self) -> None:
@@ -62,7 +61,10 @@ class SuitCapture:
                 sync = self._poll.open_window(due.tick, monotonic_ns())
                 self._open = True
                 for bus in self._buses:
-                    bus.send(sync)
+                    if bus.name in self._poll.sync_buses:
+                        bus.send(sync)
+                if not self._poll.waits:
+                    self._close()
         finally:
             for bus in self._buses:
                 await bus.close()

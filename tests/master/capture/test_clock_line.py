@@ -1,0 +1,104 @@
+"""Sample times from arrivals that vary, and from own times and counts that wrap and begin anew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from common.quaternion import Array
+from master.capture.clock_line import ClockLines
+
+NONE, STAMP, COUNT = "none", "stamp", "count"
+
+
+class Node:
+    """One node at 100 Hz whose clock runs fast; each arrival is late by 0.2 ms and some more."""
+
+    def __init__(self, kind: str, wrap: float = 0.0, rate_hz: float = np.nan, ppm: float = 100.0) -> None:
+        self.kind, self.wrap, self.ppm = kind, wrap, ppm
+        zero, ours = np.zeros(1), np.array([wrap])
+        self.lines = ClockLines(
+            ours if kind == STAMP else zero, ours if kind == COUNT else zero, np.array([1.0 / rate_hz])
+        )
+        self.random = np.random.default_rng(1)
+        self.own = 0
+
+    def true_s(self, index: Array) -> Array:
+        out: Array = 5.0 + 0.01 * index * (1.0 - 1e-6 * self.ppm)
+        return out
+
+    def arrive(self, index: int, at_s: float | None = None, own: int | None = None) -> float:
+        """The time that is found for the sample of that index."""
+        own = index if own is None else own
+        true_s = float(self.true_s(np.array(index)))
+        at_s = true_s + 2e-4 + self.random.exponential(3e-4) if at_s is None else at_s
+        stamp, count = (
+            np.array([0.01 * own % self.wrap if self.wrap else 0.0]),
+            np.array([own % (self.wrap or 1)]),
+        )
+        return float(self.lines.take(np.array([0]), np.array([at_s]), stamp, count)[0])
+
+    def run(self, first: int, last: int, lose: float = 0.0) -> Array:
+        """Errors of the times of many samples, s."""
+        out = []
+        for index in range(first, last):
+            if self.random.random() >= lose:
+                out.append(self.arrive(index) - float(self.true_s(np.array(index))))
+        return np.array(out)
+
+
+@pytest.mark.parametrize(("kind", "wrap"), [(NONE, 0.0), (STAMP, 0.64), (COUNT, 256.0)])
+def test_times_are_right_to_half_a_millisecond_with_drift_jitter_and_loss(kind: str, wrap: float) -> None:
+    node = Node(kind, wrap)
+    error = node.run(0, 2000, lose=0.01)[300:]
+    # 0.2 ms of it is the least delay, which nobody can know
+    assert error.min() >= 0.0
+    assert error.max() <= 8e-4
+    assert node.lines.period_s[0] == pytest.approx(0.01, rel=0.01)
+    assert 5 <= node.lines.missing[0] <= 40
+
+
+@pytest.mark.parametrize(("kind", "wrap"), [(NONE, 0.0), (STAMP, 6.4), (COUNT, 256.0)])
+def test_what_a_stall_held_back_keeps_its_times(kind: str, wrap: float) -> None:
+    node = Node(kind, wrap)
+    node.run(0, 400)
+    last = float(node.true_s(np.array(405)))
+    rows, zero = np.zeros(6, np.intp), np.arange(400.0, 406.0)
+    stamps: Array = 0.01 * zero % (node.wrap or 1.0)
+    counts: Array = zero % (node.wrap or 1.0)
+    times = node.lines.take(rows, np.full(6, last + 2e-4), stamps, counts)
+    assert np.abs(times - node.true_s(zero)).max() <= 1.5e-3
+
+
+def test_a_repeated_frame_is_no_second_sample() -> None:
+    node = Node(COUNT, 256.0, rate_hz=100.0)
+    node.run(0, 50)
+    assert np.isnan(node.arrive(49))
+    assert node.lines.duplicates[0] == 1
+
+
+@pytest.mark.parametrize(("kind", "wrap"), [(STAMP, 4.2e9), (COUNT, 65536.0)])
+def test_a_node_that_begins_anew_is_followed_at_once(kind: str, wrap: float) -> None:
+    node = Node(kind, wrap)
+    node.run(0, 300)
+    found = [
+        node.arrive(index, own=index - 300) - float(node.true_s(np.array(index))) for index in range(300, 350)
+    ]
+    assert np.abs(found).max() <= 4e-3
+    assert node.lines.resets[0] == 1
+
+
+def test_a_wrap_is_no_reset() -> None:
+    node = Node(COUNT, 16.0)
+    node.run(0, 500)
+    assert node.lines.resets[0] == 0
+    assert node.lines.missing[0] == 0
+
+
+def test_the_line_comes_down_to_an_earlier_arrival_at_once() -> None:
+    """Without it a node whose first frames were late would stay late for seconds."""
+    node = Node(COUNT, 256.0, rate_hz=100.0, ppm=0.0)
+    for index in range(20):
+        node.arrive(index, at_s=float(node.true_s(np.array(index))) + 0.008)
+    true_s = float(node.true_s(np.array(20)))
+    assert node.arrive(20, at_s=true_s + 2e-4) == pytest.approx(true_s + 2e-4, abs=1e-9)
