@@ -26,7 +26,7 @@ _NORM = (0.9, 1.1)
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
+class NodeSamples:
     """F samples in the order of arrival."""
 
     rows: NDArray[np.intp]
@@ -103,7 +103,7 @@ class LayoutDecoder:
         for node in np.flatnonzero(nodes):
             self._gathering[node].waits_for, self._gathering[node].aside = 0, None
 
-    def take(self) -> Samples | None:
+    def take(self) -> NodeSamples | None:
         """The samples that have become whole since the last call; None where there is none."""
         whole, self._whole = self._whole, []
         if not whole:
@@ -119,7 +119,7 @@ class LayoutDecoder:
                 values[there[:, None], channels] = reader.read(heard) * self._factors[part]
         self._turn(values)
         rows = self.nodes[[node for node, _, _ in whole]]
-        return Samples(rows, np.array([arrival for _, arrival, _ in whole], np.int64), values)
+        return NodeSamples(rows, np.array([arrival for _, arrival, _ in whole], np.int64), values)
 
     def _turn(self, values: Array) -> None:
         """From the unit's axes and world into the sensor's and tandem's, in place."""

@@ -7,7 +7,7 @@ import asyncio
 from common.can.bus import CanBus
 from common.clock import monotonic_ns, to_s
 from common.errors import TandemError
-from deploy.ops.suit.conformance import PERIOD_NS, Conformance, Verdict
+from deploy.ops.suit.conformance import PERIOD_NS, Conformance, RuleVerdict
 from master.capture.source import with_layouts
 from master.config import MasterConfig
 from master.suit.protocol import SuitProtocol
@@ -15,7 +15,7 @@ from master.suit.protocol import SuitProtocol
 _LEAST_S = 0.05
 
 
-async def ask(config: MasterConfig) -> list[Verdict]:
+async def ask(config: MasterConfig) -> list[RuleVerdict]:
     """Test all nodes that speak tandem's own protocol. Raises BusError, and TandemError where none does."""
     nodes = {name: n for name, n in with_layouts(config.nodes, config.suit).items() if n.layout is None}
     if not nodes:

@@ -16,7 +16,7 @@ from common.errors import TandemError
 from deploy.report.options import AsJson, ConfigFile, Overrides
 
 if TYPE_CHECKING:
-    from deploy.ops.suit.conformance import Verdict
+    from deploy.ops.suit.conformance import RuleVerdict
     from deploy.ops.suit.examine import NodeFinding
     from master.config import MasterConfig
 
@@ -80,7 +80,7 @@ def as_table(findings: list[NodeFinding], config: MasterConfig) -> Table:
     return table
 
 
-def _report_conformance(verdicts: list[Verdict], as_json: bool) -> None:
+def _report_conformance(verdicts: list[RuleVerdict], as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps([asdict(verdict) for verdict in verdicts], indent=2))
     else:

@@ -37,7 +37,7 @@ RULES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class AskedPeriod:
     """One period: what is sent, and the number that answers must bear; None: there must be none."""
 
     frame: CanFrame | None
@@ -46,7 +46,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class RuleVerdict:
     """Whether one node keeps one rule."""
 
     node: str
@@ -56,7 +56,7 @@ class Verdict:
 
 
 @dataclass(slots=True)
-class _Node:
+class _Tested:
     identifiers: tuple[int, ...]
     broken: dict[str, list[str]] = field(default_factory=dict)
     raw: dict[int, set[bytes]] = field(default_factory=dict)
@@ -74,19 +74,19 @@ class Conformance:
         """`fd` says of each bus whether it is CAN FD."""
         self._protocol = protocol
         self._fd = dict(fd)
-        self._nodes: dict[str, _Node] = {}
+        self._nodes: dict[str, _Tested] = {}
         self._of: dict[tuple[str, int], str] = {}
         for name, node in nodes.items():
             form = protocol.answer_format(fd[node.bus])
             identifiers = tuple(part.base_id + node.id for part in form.parts)
-            self._nodes[name] = _Node(identifiers)
+            self._nodes[name] = _Tested(identifiers)
             self._of.update({(node.bus, identifier): name for identifier in identifiers})
-        self.steps: Sequence[Step] = _steps(protocol)
-        self._step: Step | None = None
+        self.steps: Sequence[AskedPeriod] = _steps(protocol)
+        self._step: AskedPeriod | None = None
         self._asked_ns = 0
         self._asked = 0
 
-    def begin(self, step: Step, now_ns: int) -> CanFrame | None:
+    def begin(self, step: AskedPeriod, now_ns: int) -> CanFrame | None:
         """Begin a period; returns what to send."""
         self._conclude()
         self._step, self._asked_ns = step, now_ns
@@ -118,7 +118,7 @@ class Conformance:
         node.got[frame_id] = node.got.get(frame_id, 0) + 1
         node.raw.setdefault(frame_id, set()).add(np.asarray(decoded.raw).tobytes())
 
-    def verdicts(self) -> list[Verdict]:
+    def verdicts(self) -> list[RuleVerdict]:
         """One for each node and rule."""
         self._conclude()
         self._step = None
@@ -131,7 +131,7 @@ class Conformance:
                 broken = node.broken.get(rule, [])
                 judged = node.answered > 0 or rule == "R1"
                 seen = f"{len(broken)}×: {broken[0]}" if broken else f"{node.answered} answers"
-                out.append(Verdict(name, f"{rule}: {words}", judged and not broken, seen))
+                out.append(RuleVerdict(name, f"{rule}: {words}", judged and not broken, seen))
         return out
 
     def _conclude(self) -> None:
@@ -150,10 +150,17 @@ class Conformance:
         self._nodes[name].broken.setdefault(rule, []).append(seen)
 
 
-def _steps(protocol: SuitProtocol) -> list[Step]:
+def _steps(protocol: SuitProtocol) -> list[AskedPeriod]:
     numbers = [*range(_PLAIN), *_NUMBERS]
-    asked = [Step(protocol.sync(number), number, "R1") for number in numbers]
+    asked = [AskedPeriod(protocol.sync(number), number, "R1") for number in numbers]
     short, long = (CanFrame(protocol.sync_id, bytes(length), fd=False) for length in (3, 8))
     # the answer to the last SYNC may still be under way
-    pause = Step(None, None, "R5")
-    return [*asked, *[pause] * _QUIET, Step(short, None, "R6"), Step(long, None, "R6"), pause, pause]
+    pause = AskedPeriod(None, None, "R5")
+    return [
+        *asked,
+        *[pause] * _QUIET,
+        AskedPeriod(short, None, "R6"),
+        AskedPeriod(long, None, "R6"),
+        pause,
+        pause,
+    ]

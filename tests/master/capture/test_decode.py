@@ -9,7 +9,7 @@ import pytest
 
 from common.quaternion import angle_between
 from deploy.sim.suit.free_running import FreeNode, NodeClock, Reading
-from master.capture.decode import LayoutDecoder, Samples
+from master.capture.decode import LayoutDecoder, NodeSamples
 from master.capture.layout import MappedLayout
 from master.capture.parts import ACC, COUNTER, GYR, MAG, STAMP, TURN
 
@@ -31,7 +31,7 @@ class Wire:
             if place not in without:
                 self.decoder.frame(0, self.ids.index(frame.id), frame.data, now_ns)
 
-    def take(self) -> Samples:
+    def take(self) -> NodeSamples:
         samples = self.decoder.take()
         assert samples is not None
         return samples
