@@ -288,7 +288,8 @@ async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
         log.info("%s: %d nodes polled, commands go to %s", robots, len(config.nodes), where)
         freeze_heap()  # now that all is built: a full collection took 80 ms
         reserve_heap()
-        with suppress(ValueError, RuntimeError):  # not the main thread
+        # not the main thread; or Windows, which has no such signal
+        with suppress(ValueError, RuntimeError, AttributeError):
             asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, master.pause_alarms)
         try:
             await master.run()

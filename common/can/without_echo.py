@@ -11,6 +11,7 @@ import ctypes
 import os
 import socket
 import struct
+import sys
 
 import can
 from can.interfaces.udp_multicast.utils import pack_message
@@ -59,7 +60,8 @@ def open_without_longer_than(config: BusConfig, longest: CanFrame) -> can.BusABC
 def _open_filtered(config: BusConfig, *instructions: _Instruction) -> can.BusABC:
     bus = open_bus(config)
     number = descriptor(bus)
-    if config.interface == "udp_multicast" and number is not None:
+    # a filter of the kernel's is Linux's; elsewhere the echo is heard and dropped by its identifier
+    if config.interface == "udp_multicast" and number is not None and sys.platform.startswith("linux"):
         code = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *i) for i in instructions))
         program = struct.pack("HL", len(instructions), ctypes.addressof(code))
         with socket.socket(fileno=os.dup(number)) as wire:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 
-from hdrh.histogram import HdrHistogram
-
 from common.clock import NS_PER_MS
+from common.latency.histogram import Histogram
 from common.metrics.parts import Summary
 
 _LONGEST_US = 60_000_000
-_DIGITS = 3
 MOST_STEPS = 128
 MOST_RECENT = 256
 """A second brings a dozen durations, and more only when a link delivers what it held back."""
@@ -20,7 +18,7 @@ class Durations:
     """A histogram of durations, 1 µs to 60 s to three digits, beside their exact sum."""
 
     def __init__(self) -> None:
-        self._histogram = HdrHistogram(1, _LONGEST_US, _DIGITS)
+        self._histogram = Histogram(_LONGEST_US)
         self._sum_ns = 0
         self._max_ns = 0
         self.count = 0
@@ -51,7 +49,7 @@ class Durations:
         self.count += count
         self._sum_ns += count * duration_ns
         self._max_ns = max(self._max_ns, duration_ns)
-        self._histogram.record_value(min(round(duration_ns / 1000), _LONGEST_US), count)
+        self._histogram.record(min(round(duration_ns / 1000), _LONGEST_US), count)
 
     def summary(self) -> Summary:
         """Mean and maximum exact, percentiles to three digits."""
@@ -60,8 +58,8 @@ class Durations:
         return Summary(
             count=self.count,
             mean=self._sum_ns / self.count / NS_PER_MS,
-            p50=self._histogram.get_value_at_percentile(50) / 1000,
-            p99=self._histogram.get_value_at_percentile(99) / 1000,
+            p50=self._histogram.at_percentile(50) / 1000,
+            p99=self._histogram.at_percentile(99) / 1000,
             max=self._max_ns / NS_PER_MS,
         )
 

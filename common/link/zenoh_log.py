@@ -6,7 +6,6 @@ not fit is lost, and so is its count.
 
 from __future__ import annotations
 
-import fcntl
 import logging
 import os
 import re
@@ -47,12 +46,22 @@ def _divert_standard_output() -> int:
     sys.stdout.flush()
     own = lossy(os.dup(1), sys.stdout, buffered=False)
     reading, writing = os.pipe()
-    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
+    _widen(writing)
     os.set_blocking(writing, False)
     os.dup2(writing, 1)
     os.close(writing)
     sys.stdout = own
     return reading
+
+
+def _widen(writing: int) -> None:
+    """Room for a burst of lines, where the system lets a pipe have it (Linux)."""
+    try:
+        import fcntl
+
+        fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
+    except (ImportError, AttributeError, OSError) as error:
+        log.debug("the pipe of Zenoh's log keeps its size: %s", error)
 
 
 def _listen(reading: int, refusals: Refusals) -> None:

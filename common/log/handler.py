@@ -88,7 +88,7 @@ class ThreadedLogHandler(logging.Handler):
         return self.format(log.makeRecord(log.name, logging.WARNING, __file__, 0, text, (), None))
 
     def _write(self) -> None:
-        with suppress(OSError):  # the real-time priority of the loop's thread is not for its log
+        with suppress(OSError, AttributeError):  # the loop's real-time priority is not for its log
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         while True:
             line = self._lines.get()

@@ -69,7 +69,7 @@ def heap_in_use() -> HeapMetrics:
     """What this process holds on to now, whatever was touched before: a leak shows from its first byte."""
     try:
         mallinfo2 = ctypes.CDLL(None).mallinfo2
-    except AttributeError:  # not glibc, or one before 2.33
+    except (AttributeError, OSError, TypeError):  # not glibc, or one before 2.33; Windows has no such library
         return HeapMetrics(None, sys.getallocatedblocks(), threading.active_count())
     mallinfo2.restype = _MallInfo2
     info = mallinfo2()
@@ -81,5 +81,5 @@ def _mallopt(parameter: int, value: int) -> bool:
     """False where the C library has no such thing."""
     try:
         return bool(ctypes.CDLL(None).mallopt(parameter, value))
-    except AttributeError:
+    except (AttributeError, OSError, TypeError):
         return False

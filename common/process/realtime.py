@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import logging
 import os
-import resource
 
 from pydantic import Field
 
@@ -34,6 +33,9 @@ def enter_real_time(priority: int) -> bool:
     """
     if not priority:
         return False
+    if not hasattr(os, "sched_setscheduler"):
+        log.warning("no real-time priority: this system has no SCHED_FIFO; set process.realtime_priority = 0")
+        return False
     _lock_memory()
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
@@ -48,6 +50,8 @@ def enter_real_time(priority: int) -> bool:
 
 
 def _lock_memory() -> None:
+    import resource  # Linux and macOS
+
     # a finite limit might be reached later, and then a mere allocation would fail: all or nothing
     unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
     refused = "a limit is set"

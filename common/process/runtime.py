@@ -12,8 +12,6 @@ from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import suppress
 from types import FrameType
 
-import uvloop
-
 from common.log.handler import in_journal, with_priority
 from common.process.heap import freeze_heap, use_one_arena
 
@@ -22,6 +20,16 @@ EXIT_HUNG = 70
 """Status of a process that did not end in time (`EX_SOFTWARE`)."""
 SWITCH_INTERVAL_S = 0.0005
 """How long a Python thread may keep the interpreter: 5 ms, the default, delays the loop by as much."""
+
+
+def new_event_loop() -> asyncio.AbstractEventLoop:
+    """uvloop's; where there is none (Windows), the one of asyncio that can watch a CAN bus's socket."""
+    try:
+        import uvloop
+    except ModuleNotFoundError:
+        return asyncio.SelectorEventLoop()
+    loop: asyncio.AbstractEventLoop = uvloop.new_event_loop()
+    return loop
 
 
 def run(
@@ -44,11 +52,13 @@ def run(
     freeze_heap()
     on_hangup = shutdown.on_hangup if hangup_stops else signal.SIG_IGN
     handlers = {signal.SIGTERM: signal.signal(signal.SIGTERM, shutdown.on_signal)}
-    for number, handler in ((signal.SIGINT, shutdown.on_signal), (signal.SIGHUP, on_hangup)):
+    hangup = getattr(signal, "SIGHUP", None)  # Windows has none
+    others = [(signal.SIGINT, shutdown.on_signal), *([] if hangup is None else [(hangup, on_hangup)])]
+    for number, handler in others:
         if signal.getsignal(number) is not signal.SIG_IGN:
             handlers[number] = signal.signal(number, handler)
     try:
-        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        with asyncio.Runner(loop_factory=new_event_loop) as runner:
             shutdown.loop = runner.get_loop()
             runner.run(_main(main, shutdown))
         # leaving the runner waits for its tasks and threads: within the deadline too

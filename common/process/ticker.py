@@ -29,7 +29,12 @@ async def ticks(grid: TickGrid, clock: Clock = monotonic_ns) -> AsyncGenerator[D
     clock, or one that runs with it. The timer is closed when the iteration ends or is cancelled.
     """
     loop = asyncio.get_running_loop()
-    timer = _Timer()
+    try:
+        timer = _Timer()
+    except (AttributeError, TypeError):  # no timerfd in this system's C library: not Linux
+        async for tick in _ticks_by_the_loop(grid, clock):
+            yield tick
+        return
     waiter: asyncio.Future[None] = loop.create_future()
 
     def on_expired() -> None:
@@ -53,6 +58,16 @@ async def ticks(grid: TickGrid, clock: Clock = monotonic_ns) -> AsyncGenerator[D
     finally:
         loop.remove_reader(timer.fd)
         timer.close()
+
+
+async def _ticks_by_the_loop(grid: TickGrid, clock: Clock) -> AsyncGenerator[DueTick, None]:
+    """The same by the loop's own timer, where there is no timerfd: later by up to its resolution."""
+    while True:
+        wait_ns = grid.next_ns - clock()
+        await asyncio.sleep(max(0, wait_ns) / NS_PER_S)
+        due = grid.due(clock())
+        if due is not None:
+            yield due
 
 
 class _Timer:

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from vqf import offlineVQF
 
 from common.quaternion import Array, normalise, to_matrix
 from master.calibrate.hinge import PoorMotionError
@@ -49,6 +48,8 @@ def orient(recordings: Mapping[str, NodeRecording], names: Sequence[str]) -> Ori
 
     Short gaps are bridged. Raises PoorMotionError for long ones, and for a recording of a moment.
     """
+    from vqf import offlineVQF  # no wheels for aarch64: only who calibrates needs it
+
     rates = {recordings[name].rate_hz for name in names}
     if max(rates) - min(rates) > 0.01 * max(rates):
         raise PoorMotionError(f"the nodes were recorded at different rates ({sorted(rates)} Hz)")

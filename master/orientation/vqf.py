@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from pydantic import Field
-from vqf import VQF
 
 from common.quaternion import Array
 from common.wire.messages import Mask
@@ -42,6 +41,9 @@ class VqfFilter(BehindFront):
     """
 
     def __init__(self, config: VqfConfig, rate_hz: float, count: int) -> None:
+        """Raises ModuleNotFoundError without the package, which has no wheels for aarch64."""
+        from vqf import VQF
+
         self._period_s = 1.0 / rate_hz
         limit_deg_s = config.rest_bias_limit_deg_s if config.rest_bias else 0.0
         field_change = config.field_change if config.reject_disturbed_field else 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import socket
@@ -96,6 +95,8 @@ def _open_tun(name: str) -> int:
     except OSError as error:
         raise NetworkError(f"{DEVICE}: {error.strerror}; the forwarder needs it: modprobe tun") from None
     try:
+        import fcntl  # Linux alone has tun devices
+
         fcntl.ioctl(device, _TUNSETIFF, struct.pack("16sH22x", name.encode(), _IFF_TUN | _IFF_NO_PI))
     except OSError as error:
         os.close(device)
