@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import sys
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TypeVar
+from typing import Protocol, TypeGuard, TypeVar
 
 import numpy as np
 from pydantic import BaseModel
-from vqf import VQF
 
 from common.errors import RecordingError
 from common.skeleton import Skeleton
@@ -63,6 +62,12 @@ def restore(root: object, memory: Plain) -> None:
         raise RecordingError(f"a snapshot does not fit this version's pipeline ({error})") from None
 
 
+class _Filter(Protocol):
+    """A filter of the package `vqf`."""
+
+    state: Mapping[str, Plain]
+
+
 class _Recall:
     """One walk. What is met twice is written once, so that shared arrays stay shared."""
 
@@ -85,8 +90,9 @@ class _Recall:
         self._seen[id(value)] = number, value  # held, so that no other object gets its id
         if isinstance(value, np.ndarray):
             return ["array", number, value.dtype.str, list(value.shape), value.tobytes()]
-        if isinstance(value, VQF):
-            return ["vqf", number, list(value.state.items())]
+        if _is_vqf(value):
+            parts: list[Plain] = [[key, part] for key, part in value.state.items()]
+            return ["vqf", number, parts]
         if isinstance(value, deque):
             return ["deque", number, value.maxlen, [self.of(part) for part in value]]
         if isinstance(value, dict):
@@ -126,9 +132,9 @@ class _Restore:
             shape = [_int(size) for size in _list(rest[1])]
             return np.frombuffer(_bytes(rest[2]), _dtype(rest[0])).reshape(shape).copy()
         if kind == "vqf":
-            if not isinstance(there, VQF):
+            if not _is_vqf(there):
                 raise RecordingError("a snapshot has a filter where this configuration has none")
-            there.state = dict(map(_pair, _list(rest[0])))
+            there.state = {str(key): part for key, part in map(_pair, _list(rest[0]))}
             return there
         if kind == "object":
             return self._object(str(rest[0]), _list(rest[1]), there, number)
@@ -195,9 +201,18 @@ def _remembered(kind: type[object]) -> bool:
     return known
 
 
+def _is_vqf(value: object) -> TypeGuard[_Filter]:
+    return _of_vqf(type(value))
+
+
+def _of_vqf(kind: type[object]) -> bool:
+    """By its name: a host whose nodes all have other filters may lack the package."""
+    return kind.__module__.partition(".")[0] == "vqf"
+
+
 def _can_change(kind: type[object]) -> bool:
-    """Whether something of this type can change: data, and objects of the project's own classes."""
-    if issubclass(kind, np.ndarray | VQF | deque | dict | list | tuple | set | frozenset):
+    """Whether something of this type can change: data, filters, and objects of the project's own classes."""
+    if _of_vqf(kind) or issubclass(kind, np.ndarray | deque | dict | list | tuple | set | frozenset):
         return True
     called = any("__call__" in vars(base) for base in kind.__mro__)
     return kind.__module__.startswith(_OWN) and not issubclass(kind, _SETTLED) and not called
