@@ -254,7 +254,7 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_metrics: WriteMetr
 async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
     notifier = open_notifier()
     last_known = None
-    if config.servos.entry.remembers:
+    if config.servos.remembers:
         last_known = LastKnown(state_file(config.robot, os.environ), config.skeleton.joint_names)
     before_rad = last_known.before_rad if last_known else None
     servos = config.servos.open(config.skeleton, config.encoders, before_rad)

@@ -1,64 +1,99 @@
-"""The table of servo backends, and `[servos]`, which chooses one. To add a backend, add its line here."""
+"""`[servos]`: one backend that drives the whole robot, or several and which joints each drives."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TypeVar
 
+import numpy as np
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from common.config.section import Section, make_section, one_of
-from common.errors import NOT_SET, ConfigError, ConfigMistake
+from common.errors import NOT_SET, ConfigError, ConfigMistake, TandemError
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
-from slave.servos.backend import BackendConfig
-from slave.servos.canopen.config import CanopenConfig
-from slave.servos.dynamixel.config import DynamixelConfig
-from slave.servos.mujoco.config import MujocoConfig
+from slave.servos.backend import Backend, BackendConfig, Chosen, LastKnownAngles
+from slave.servos.entry_points import BACKENDS
+from slave.servos.mixed import MixedServos, Part
 from slave.servos.payload import PayloadConfig, payload_mistakes
 from slave.servos.servos import Servos
+from slave.servos.shares import part_of, share_mistakes, shares
 
-Chosen = TypeVar("Chosen", bound=BackendConfig)
+_SIMULATED = "mujoco"
+
+
+@dataclass(frozen=True, slots=True)
+class BackendShare:
+    """One backend that the file uses, and the robot as it sees it."""
+
+    name: str
+    section: BackendConfig
+    skeleton: Skeleton
+    """With the joints that it drives alone."""
+    encoders: EncoderConfig
 
 
 class ServosConfig(Section):
-    """`[servos]` of the slave's TOML, with a section `[servos.<name>]` for each backend of the table."""
+    """`[servos]` of the slave's TOML, with a section `[servos.<name>]` for each backend that it uses."""
 
     model_config = ConfigDict(extra="allow")
 
-    backend: str = "mujoco"
-    """A name of the table."""
+    backend: str = _SIMULATED
+    """An installed backend, which drives the whole robot."""
+    joints: dict[str, list[str]] = Field(default_factory=dict)
+    """`[servos.joints]`, in place of `backend`: the joints of each backend, by name or pattern (`left_*`)."""
     payload: dict[str, PayloadConfig] = Field(default_factory=dict)
     """What the robot's segments carry, by segment."""
 
     @field_validator("backend")
     @classmethod
     def _known(cls, name: str) -> str:
-        return one_of(name, BACKENDS)
+        return one_of(name, _installed())
+
+    @field_validator("joints")
+    @classmethod
+    def _all_known(cls, joints: dict[str, list[str]]) -> dict[str, list[str]]:
+        for name in joints:
+            one_of(name, _installed())
+        return joints
 
     @model_validator(mode="before")
     @classmethod
     def _check_sections(cls, table: object, info: ValidationInfo) -> object:
         if not isinstance(table, dict):
             return table
-        kinds = {name: (entry.section | None, None) for name, entry in BACKENDS.items()}
-        sections = make_section("ServosConfig", kinds)
         given = {key: value for key, value in table.items() if key not in cls.model_fields}
+        kinds = {name: (_backend(name).section | None, None) for name in given if name in _installed()}
+        sections = make_section("ServosConfig", kinds)
         return {**table, **dict(sections.model_validate(given, context=info.context))}
 
     @property
-    def entry(self) -> Backend:
-        """The table's entry of the backend that is chosen."""
-        return BACKENDS[self.backend]
+    def names(self) -> tuple[str, ...]:
+        """The backends that the file uses."""
+        return tuple(self.joints) or (self.backend,)
 
     @property
-    def chosen(self) -> BackendConfig:
-        """The section of the backend that is chosen."""
-        return self.section(self.entry.section)
+    def remembers(self) -> bool:
+        """Whether the slave keeps the joints' last angles on disk."""
+        return any(_backend(name).remembers for name in self.names)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether no joint of a real robot moves."""
+        return not self.remembers
+
+    @property
+    def sections(self) -> dict[str, BackendConfig]:
+        """The section of each backend that the file uses. Raises ConfigError where one is missing."""
+        return {name: self._section(name) for name in self.names}
+
+    @property
+    def bus_lag_s(self) -> float:
+        """Mean delay of a setpoint on its way to the drives, s; of several backends the longest."""
+        return max(section.bus_lag_s for section in self.sections.values())
 
     def section(self, kind: type[Chosen]) -> Chosen:
-        """One backend's section; its defaults where the file has none.
+        """One backend's section, used or not; its defaults where the file has none.
 
         Raises ConfigError where the section has keys without a default and is not in the file.
         """
@@ -67,75 +102,87 @@ class ServosConfig(Section):
                 return section
         required = [key for key, field in kind.model_fields.items() if field.is_required()]
         if required:
-            (name,) = (name for name, entry in BACKENDS.items() if entry.section is kind)
+            name = next((name for name in self.names if _backend(name).section is kind), kind.__name__)
             expected = f"a section with {' and '.join(required)}"
             raise ConfigError("servos", [ConfigMistake(f"servos.{name}", NOT_SET, expected)])
         return kind()
 
+    def used(self, kind: type[Chosen]) -> Chosen | None:
+        """One backend's section; None where the file does not use that backend."""
+        found = (section for section in self.sections.values() if isinstance(section, kind))
+        return next(found, None)
+
+    def share(self, kind: type[BackendConfig], skeleton: Skeleton, encoders: EncoderConfig) -> BackendShare:
+        """The robot as the one backend of a kind sees it; all of it where the file does not use that kind."""
+        for share in self.shares(skeleton, encoders):
+            if isinstance(share.section, kind):
+                return share
+        return BackendShare("", self.section(kind), skeleton, encoders)
+
+    def shares(self, skeleton: Skeleton, encoders: EncoderConfig | None = None) -> Iterator[BackendShare]:
+        """Each backend that the file uses, and its part of the robot."""
+        encoders = encoders or EncoderConfig()
+        joints = shares(self.joints, skeleton) if self.joints else {self.backend: skeleton.joint_names}
+        for name, own in joints.items():
+            yield BackendShare(name, self._section(name), *part_of(skeleton, encoders, own))
+
+    def no_effort(self, skeleton: Skeleton) -> dict[str, str]:
+        """Joints whose effort nothing will tell, as far as the file says, and why."""
+        return _together(share.section.no_effort(share.skeleton) for share in self.shares(skeleton))
+
+    def not_driven(self, skeleton: Skeleton) -> dict[str, str]:
+        """Joints that no servo moves, and what their angle is, in words."""
+        return _together(share.section.not_driven(share.skeleton) for share in self.shares(skeleton))
+
+    def single_reading(self, skeleton: Skeleton) -> Collection[str]:
+        """Joints whose angle one encoder alone tells, so that no second one can contradict it."""
+        each = (share.section.single_reading(share.skeleton) for share in self.shares(skeleton))
+        return {name for names in each for name in names}
+
     def mistakes_for(self, skeleton: Skeleton, encoders: EncoderConfig) -> list[ConfigMistake]:
-        """What the chosen backend cannot be built from."""
+        """What the chosen backends cannot be built from."""
+        mistakes = payload_mistakes(self.payload, skeleton)
+        if self.joints and "backend" in self.model_fields_set:
+            expected = "either one backend for the whole robot, or [servos.joints] for several"
+            mistakes.append(ConfigMistake("servos.backend", self.backend, expected))
+        if wrong := share_mistakes(self.joints, skeleton) if self.joints else []:
+            return [*mistakes, *wrong]
         try:
-            chosen = self.chosen.mistakes_for(skeleton, encoders)
+            for share in self.shares(skeleton, encoders):
+                mistakes += share.section.mistakes_for(share.skeleton, share.encoders)
         except ConfigError as error:
-            chosen = error.mistakes
-        return [*payload_mistakes(self.payload, skeleton), *chosen]
+            mistakes += error.mistakes
+        return mistakes
 
     def open(
         self, skeleton: Skeleton, encoders: EncoderConfig, last_known_rad: LastKnownAngles | None = None
     ) -> Servos:
-        """The chosen backend's servos, not started yet. Raises RobotError where they cannot be had."""
-        return self.entry.open(self, skeleton, encoders, last_known_rad or {})
+        """The servos of the chosen backends, not started yet. Raises RobotError where they cannot be had."""
+        opened = []
+        for share in self.shares(skeleton, encoders):
+            backend = _backend(share.name)
+            servos = backend.open(share.section, share.skeleton, share.encoders, last_known_rad or {})
+            own = [skeleton.joint_names.index(name) for name in share.skeleton.joint_names]
+            opened.append((backend.ticked, Part(share.name, servos, np.array(own, np.intp))))
+        if not self.joints:
+            return opened[0][1].servos
+        opened.sort(key=lambda each: each[0])
+        return MixedServos(skeleton.joint_names, [part for _, part in opened])
+
+    def _section(self, name: str) -> BackendConfig:
+        return self.section(_backend(name).section)
 
 
-LastKnownAngles = Mapping[str, float]
-"""The joints' last known angles, rad, by joint."""
+def _installed() -> Collection[str]:
+    try:
+        return list(BACKENDS)
+    except TandemError as error:
+        raise ValueError(str(error)) from error
 
 
-@dataclass(frozen=True, slots=True)
-class Backend:
-    """One kind of servo."""
-
-    section: type[BackendConfig]
-    """Its section `[servos.<name>]`."""
-    open: Callable[[ServosConfig, Skeleton, EncoderConfig, LastKnownAngles], Servos]
-    """Makes the servos. Import the adapter in this function: other robots do not need its library."""
-    single_reading: bool = False
-    """Whether the servo alone reads a joint's angle, so that no second encoder can contradict it."""
-    remembers: bool = True
-    """Whether the slave keeps the joints' last angles on disk; not for a simulated robot."""
+def _backend(name: str) -> Backend[BackendConfig]:
+    return BACKENDS[name]
 
 
-def _open_mujoco(
-    config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfig, last_known_rad: LastKnownAngles
-) -> Servos:
-    from slave.servos.mujoco.servos import MujocoServos
-
-    return MujocoServos(skeleton, encoders)
-
-
-def _open_canopen(
-    config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfig, last_known_rad: LastKnownAngles
-) -> Servos:
-    from slave.servos.canopen.servos import CanopenServos
-
-    return CanopenServos(
-        config.section(CanopenConfig), skeleton, encoders=encoders, last_known_rad=last_known_rad
-    )
-
-
-def _open_dynamixel(
-    config: ServosConfig, skeleton: Skeleton, encoders: EncoderConfig, last_known_rad: LastKnownAngles
-) -> Servos:
-    from slave.servos.dynamixel.servos import DynamixelServos
-
-    return DynamixelServos(config.section(DynamixelConfig), skeleton, encoders)
-
-
-BACKENDS: dict[str, Backend] = {
-    # the simulated robot, inside the slave's process
-    "mujoco": Backend(MujocoConfig, _open_mujoco, remembers=False),
-    # CiA 402 drives on CAN buses
-    "canopen": Backend(CanopenConfig, _open_canopen),
-    # X series servos on a serial bus
-    "dynamixel": Backend(DynamixelConfig, _open_dynamixel, single_reading=True),
-}
+def _together(each: Iterator[Mapping[str, str]]) -> dict[str, str]:
+    return {joint: words for found in each for joint, words in found.items()}

@@ -102,8 +102,8 @@ class SlaveConfig(Section):
 
     def _wrong_stops(self, skeleton: Skeleton) -> list[ConfigMistake]:
         try:
-            servos = self.servos.chosen
+            canopen = self.servos.used(CanopenConfig)
+            drives = self.servos.share(CanopenConfig, skeleton, self.encoders).skeleton
         except ConfigError:  # told by the servos
             return []
-        telling = servos.tell_inputs if isinstance(servos, CanopenConfig) else None
-        return self.estop.mistakes_for(skeleton.joint_names, telling)
+        return self.estop.mistakes_for(drives.joint_names, None if canopen is None else canopen.tell_inputs)

@@ -75,17 +75,20 @@ class SlavePipeline:
         self.namesakes = Namesakes(self.instance)
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
+        single = config.servos.single_reading(self.skeleton)
+        undriven = config.servos.not_driven(self.skeleton)
+        self._driven = np.array([name not in undriven for name in self.skeleton.joint_names])
         self.guard = guard or Guard(
             config.robot,
             self.skeleton,
             config.guard,
-            last_known_rad=(last_known_rad or {}) if config.servos.entry.single_reading else None,
+            last_known_rad={name: (last_known_rad or {}).get(name, np.nan) for name in single},
             draw_token=draw_token,
         )
         self.control = Control(config.guard.reset_key, operators_of(config.link.access, config.robot))
         limits = config.guard.limits(self.skeleton)
         self.nearest = NearestPosture(self.skeleton, limits)
-        self.tracker = tracker or make_tracker(config.track, config.servos.chosen.bus_lag_s)
+        self.tracker = tracker or make_tracker(config.track, config.servos.bus_lag_s)
         self.pace = Pace(limits, config.guard)
         self.damper = DistanceDamper(self.skeleton, config.guard.self_margin_cm, config.guard.zones)
         self.limiter = SetpointLimiter(self.skeleton.joint_names, limits, self.damper)
@@ -138,7 +141,12 @@ class SlavePipeline:
                 self.on_accepted(command, now_ns, offset)
 
     def take(self, command: Command, received_ns: int, now_ns: int, offset: Offset) -> Admission:
-        """Take a command: gate ▸ nearest posture within the site's limits ▸ tracker."""
+        """Take a command: gate ▸ nearest posture within the site's limits ▸ tracker.
+
+        A joint without a servo stays where it stands, as one of which the operator's angle is not known.
+        """
+        if command.valid.shape == self._driven.shape:
+            command = replace(command, valid=command.valid & self._driven)
         admission = self.guard.admit(command, received_ns, now_ns, offset)
         if admission.accepted:
             self._begin_anew()
@@ -295,7 +303,7 @@ class SlavePipeline:
                 guard=self.guard.state,
                 reason=self.guard.reason,
                 operator=self.guard.operator,
-                encoder_valid=reading.valid if reading else np.zeros(len(self.skeleton.joints), np.bool_),
+                encoder_valid=self._driven & reading.valid if reading else np.zeros_like(self._driven),
                 position_rad=self._position_rad,
                 setpoint_rad=self._setpoint.position_rad,
                 echo=self.traffic.journeys.echo,

@@ -197,6 +197,9 @@ class RobotStatus:
     """Why a joint's effort is not known."""
     unlimited: str = ""
     """Why the drives may push harder than moving needs; empty where they may not, or nothing is known."""
+    not_driven: dict[str, str] = field(default_factory=dict)
+    """Joints without a servo, in words."""
+    """Joint groups that hold until the operator takes them up."""
 
 
 def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> RobotStatus:
@@ -215,7 +218,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         faults=dict(state.faults) if state else None,
         node_doubts=None if heard.master is None else heard.master.doubts,
         switches=None if heard.master is None else heard.master.switches,
-        encoders_invalid=int((~state.encoder_valid).sum()) if state else None,
+        encoders_invalid=_not_heard(heard),
         base=None
         if base is None
         else BaseAngles(
@@ -238,7 +241,16 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         external_nm=by_joint(state.external_nm) if state else None,
         no_effort=metrics.servos.no_effort if metrics else {},
         unlimited=metrics.servos.unlimited if metrics else "",
+        not_driven=metrics.servos.not_driven if metrics else {},
     )
+
+
+def _not_heard(heard: Heard) -> int | None:
+    """Encoders without a valid reading; joints without a servo have none."""
+    if heard.state is None:
+        return None
+    absent = len(heard.metrics.servos.not_driven) if heard.metrics else 0
+    return max(0, int((~heard.state.encoder_valid).sum()) - absent)
 
 
 def _degrees(angle_rad: float | None) -> float | None:
@@ -316,6 +328,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
     words += [(line, "yellow") for line in without_detection(one.no_effort)]
     words += [(f"drives push as hard as they can: {one.unlimited}", "yellow")] * bool(one.unlimited)
+    words += [(f"{joint} {why}", "yellow") for joint, why in one.not_driven.items()]
     for what, torques in (("effort", one.effort_nm), ("from outside", one.external_nm)):
         if found := largest(torques or {}):
             words.append((f"{what}: {found} (the largest)", "dim"))

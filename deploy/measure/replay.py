@@ -130,7 +130,7 @@ class _VirtualSlave:
     def __init__(self, strategy: str, config: SlaveConfig, now_ns: int, position_rad: Array) -> None:
         skeleton = config.skeleton
         self._tracker = make_tracker(
-            config.track.model_copy(update={"strategy": strategy}), config.servos.chosen.bus_lag_s
+            config.track.model_copy(update={"strategy": strategy}), config.servos.bus_lag_s
         )
         self._limits = config.guard.limits(skeleton)
         damper = DistanceDamper(skeleton, config.guard.self_margin_cm, config.guard.zones)

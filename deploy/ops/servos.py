@@ -41,10 +41,12 @@ def servos(
     from slave.servos.dynamixel.setup import set_up
 
     checked = load_config(config, SlaveConfig, list(set_ or ()))
-    bus = checked.servos.chosen
-    if not isinstance(bus, DynamixelConfig):
-        raise TandemError(f'{config}: servos.backend is "{checked.servos.backend}": expected "dynamixel"')
-    found = set_up(bus, checked.skeleton, checked.encoders, write)
+    bus = checked.servos.used(DynamixelConfig)
+    if bus is None:
+        used = ", ".join(checked.servos.names)
+        raise TandemError(f'{config}: its servo backend is "{used}": expected "dynamixel"')
+    share = checked.servos.share(DynamixelConfig, checked.skeleton, checked.encoders)
+    found = set_up(bus, share.skeleton, share.encoders, write)
     Console().print(as_table(found))
     late = too_late(bus.port, found.quickest_s, bus.reply_timeout_s)
     trouble = [in_words(looked) for looked in found.servos if looked.wrong]

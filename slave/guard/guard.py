@@ -6,6 +6,7 @@ It is the first stage of the slave's pipeline and knows nothing of the stages be
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 from common.clock import to_ns
 from common.clock_sync import Offset
@@ -41,7 +42,7 @@ class Guard:
         skeleton: Skeleton,
         config: GuardConfig,
         *,
-        last_known_rad: Mapping[str, float] | None = None,
+        last_known_rad: Mapping[str, float] = MappingProxyType({}),
         draw_token: DrawToken = random_token,
         gates: Sequence[Gate] = GATES,
         arrival_watches: Sequence[LossWatch] = ARRIVAL_WATCHES,

@@ -19,9 +19,7 @@ from slave.guard.watchdog import EncoderLife
 class JointReadings:
     """What the guard knows of the J joints by their encoders, their drives and the written setpoint."""
 
-    def __init__(
-        self, skeleton: Skeleton, config: GuardConfig, last_known_rad: Mapping[str, float] | None
-    ) -> None:
+    def __init__(self, skeleton: Skeleton, config: GuardConfig, last_known_rad: Mapping[str, float]) -> None:
         names = skeleton.joint_names
         self.life = EncoderLife(names, to_ns(config.encoder_timeout_s))
         self.plausible = EncoderPlausibility(names, skeleton.max_velocity_rad_s, config)
@@ -60,7 +58,8 @@ class JointReadings:
             read_ns,
             position_rad,
             valid & np.isfinite(position_rad),
-            drive_rad=drive_rad,
+            # a joint whose drive tells no angle has its encoder's alone
+            drive_rad=None if drive_rad is None else np.where(np.isnan(drive_rad), position_rad, drive_rad),
             span=self.plausible.span,
             under_way=moving,
         )
@@ -89,7 +88,7 @@ class JointReadings:
 
         Drives take setpoints by their own angles. Held at the encoders' they would walk by the difference.
         """
-        return self.life.position_rad if self._drive_rad is None else self._drive_rad
+        return self._by_drive(self.life.position_rad)
 
     def after_estop_rad(self) -> Array | None:
         """(J,) where to hold joints that may have been moved by hand; None: where they are held already.
@@ -97,11 +96,16 @@ class JointReadings:
         A drive that is switched on stays where it stands, by its own angle. Without such angles, a joint
         whose encoder is not believed stays where it was held.
         """
-        if self._drive_rad is not None:
-            return self._drive_rad
-        if self.strayed() is None:
-            return None
-        return np.where(self.plausible.doubted, self.held_rad, self.life.position_rad)
+        if self.strayed() is not None:
+            stay = np.where(self.plausible.doubted, self.held_rad, self.life.position_rad)
+            return self._by_drive(stay)
+        return None if self._drive_rad is None else self._by_drive(self.held_rad)
+
+    def _by_drive(self, otherwise_rad: Array) -> Array:
+        """(J,) by the drives' own angles, and of joints whose drives tell none, these."""
+        if self._drive_rad is None:
+            return otherwise_rad
+        return np.where(np.isnan(self._drive_rad), otherwise_rad, self._drive_rad)
 
     def strayed(self) -> str | None:
         """The joint that is farthest from where it is held, if that is too far."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -33,7 +34,8 @@ PATIENCE = MotionPatience(plain_ns=20 * NS_PER_MS, shaken_ns=80 * NS_PER_MS)
 class Placement:
     """Whether J joints stand where their readings say.
 
-    `last_known_rad` None: every joint has a second reading, or is simulated.
+    `last_known_rad`: of joints whose angle one reading alone tells, the last known one, or NaN. All other
+    joints have a second reading, or are simulated.
     """
 
     def __init__(
@@ -42,12 +44,12 @@ class Placement:
         lower_rad: Array,
         upper_rad: Array,
         *,
-        last_known_rad: Mapping[str, float] | None = None,
+        last_known_rad: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self._names = tuple(joint_names)
         self._lower_rad, self._upper_rad = lower_rad, upper_rad
-        known = last_known_rad
-        self._known_rad = None if known is None else np.array([known.get(n, np.nan) for n in joint_names])
+        self._known_rad = np.array([last_known_rad.get(name, np.nan) for name in joint_names])
+        self._asked: Mask = np.array([name in last_known_rad for name in joint_names])
         self._agreement = EncoderAgreement(joint_names)
         self._motion = UncommandedMotion(joint_names, STILL_RAD, readings=READINGS, patience=PATIENCE)
         self._first_rad: Array = np.full(len(self._names), np.nan)
@@ -109,13 +111,10 @@ class Placement:
 
     def confirm(self, position_rad: Array) -> None:
         """A person has confirmed that the joints (J,) stand here."""
-        if self._known_rad is not None:
-            self._known_rad = position_rad.copy()
+        self._known_rad = position_rad.copy()
 
     def _unknown(self, position_rad: Array) -> str | None:
-        if self._known_rad is None:
-            return None
-        far = ~(np.abs(position_rad - self._known_rad) <= NEAR_RAD)
+        far = self._asked & ~(np.abs(position_rad - self._known_rad) <= NEAR_RAD)
         if not far.any():
             return None
         unconfirmed = []

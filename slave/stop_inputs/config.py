@@ -140,7 +140,7 @@ def _wrong_drive(
         yield (
             "source",
             one.source,
-            '"gpio" or "device": only servos.backend = "canopen" tells drives\' inputs',
+            '"gpio" or "device": only drives on CANopen tell their inputs',
         )
     elif one.joint and one.joint not in joints:
         yield "joint", one.joint, "a joint of the profile"

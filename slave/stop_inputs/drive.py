@@ -3,20 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
 
 from slave.servos.canopen.signs import DriveSigns
 from slave.stop_inputs.config import StopInputConfig
 from slave.stop_inputs.source import Level
-
-
-@runtime_checkable
-class TellingServos(Protocol):
-    """Servos whose drives tell of their torque and inputs."""
-
-    def signs(self, joint: str) -> DriveSigns:
-        """What the drive of a joint tells."""
-        ...
 
 
 class DriveStop:

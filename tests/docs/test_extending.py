@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
+import importlib
+import os
 import re
 import shutil
+import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -17,8 +19,6 @@ import pytest
 
 import common.skeleton.load
 import deploy.examples.profiles
-import slave.backends
-import slave.track.config
 from common.clock import to_ns
 from common.config.load import check_config, load_config
 from common.quaternion import Array
@@ -36,12 +36,10 @@ from master.orientation.filter import FilterSection
 from master.orientation.filters import FILTERS
 from master.pipeline import MasterPipeline
 from master.suit.protocol import SuitProtocol
-from slave.backends import BACKENDS, ServosConfig
+from slave.backends import ServosConfig
 from slave.encoders.counts import EncoderConfig
 from slave.track.config import STRATEGIES, TrackConfig, make_tracker
 from tests.master.orientation.filter_contract import FilterContract
-from tests.slave.servos.contract import Subject
-from tests.slave.servos.contract import check as check_servos
 from tests.slave.track.contract import check as check_tracker
 
 ROOT = Path(__file__).parents[2]
@@ -66,8 +64,6 @@ def module(name: str) -> ModuleType:
 
 COMPLEMENTARY = module("master/orientation/complementary.py")
 RAMP = module("slave/track/ramp.py")
-IDEAL_CONFIG = module("slave/servos/ideal/config.py")
-IDEAL = module("slave/servos/ideal/servos.py")
 
 
 def add_line(patch: pytest.MonkeyPatch, table: dict[str, Any], block: str, **names: object) -> None:
@@ -89,7 +85,7 @@ def toml(section: str) -> dict[str, object]:
     (found,) = (
         tomllib.loads(text)[section]
         for name, text in BLOCKS
-        if name in {"master.toml", "slave.toml"} and f"[{section}]" in text
+        if name in {"master.toml", "slave.toml"} and f"[{section}" in text
     )
     assert isinstance(found, dict)
     return found
@@ -103,17 +99,58 @@ def test_a_file_chooses_the_filter(monkeypatch: pytest.MonkeyPatch) -> None:
     assert config.filter_sections["complementary"] == COMPLEMENTARY.ComplementaryConfig(tau_acc_s=2.0)
 
 
-def test_the_servo_backend_keeps_the_contract(monkeypatch: pytest.MonkeyPatch) -> None:
-    (function,) = blocks("slave/backends.py")
-    scope = {"IdealConfig": IDEAL_CONFIG.IdealConfig, "Backend": slave.backends.Backend}
-    exec(function, scope)
-    add_line(monkeypatch, BACKENDS, "slave/backends.py, in BACKENDS", **scope)
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The page's own package, as pip would install it: its modules, and the entry points of its pyproject."""
+    for name, text in BLOCKS:
+        if name.startswith(("acme_ideal/", "tests/")):
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name).write_text(text, "utf-8")
+    (project,) = (tomllib.loads(text)["project"] for text in blocks("pyproject.toml"))
+    info = tmp_path / f"acme_ideal-{project['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: 1.0\n", "utf-8")
+    lines = [
+        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in points.items())
+        for group, points in project["entry-points"].items()
+    ]
+    (info / "entry_points.txt").write_text("\n".join(lines), "utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    yield tmp_path
+    for name in [name for name in sys.modules if name.partition(".")[0] == "acme_ideal"]:
+        del sys.modules[name]
+
+
+def test_a_package_adds_a_servo_backend_beside_others(package: Path) -> None:
+    skeleton = load_skeleton("nursing")
     config = check_config(Path("slave.toml"), toml("servos"), ServosConfig)
-    skeleton = load_skeleton("hand")
-    assert isinstance(config.open(skeleton, EncoderConfig()), IDEAL.IdealServos)
-    ticks = itertools.count(step=5_000_000)
-    servos = IDEAL.IdealServos(config.chosen, skeleton, EncoderConfig(), clock=lambda: next(ticks))
-    check_servos(Subject(servos, skeleton, EncoderConfig(), pass_time=lambda: None))
+    assert config.mistakes_for(skeleton, EncoderConfig()) == []
+    (ideal, simulated, absent) = config.shares(skeleton)
+    assert ideal.section == importlib.import_module("acme_ideal.config").IdealConfig(cycle_ms=5.0)
+    assert len(ideal.skeleton.joints) == 22
+    assert simulated.skeleton.joint_names == ("neck_yaw", "neck_pitch")
+    assert absent.skeleton.joint_names == ("waist_pitch",)
+    assert "waist_pitch" in config.not_driven(skeleton)
+    servos = config.open(skeleton, EncoderConfig())
+    servos.start()
+    try:
+        reading = servos.read()
+        servos.write(np.clip(np.full(25, 0.2), skeleton.lower_rad, skeleton.upper_rad))
+        left = skeleton.joint_names.index("left_elbow_pitch")
+        waist = skeleton.joint_names.index("waist_pitch")
+        assert servos.read().counts[left] != reading.counts[left]
+        assert servos.read().counts[waist] == reading.counts[waist] == round(5.0 / 360.0 * 4096)
+    finally:
+        servos.stop()
+    assert "no torque" in servos.metrics().no_effort["left_elbow_pitch"]
+
+
+def test_the_package_runs_the_contract_by_its_own_test(package: Path) -> None:
+    paths = {"PYTHONPATH": f"{package}:{ROOT}"}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(package / "tests")]
+    ran = subprocess.run(command, env={**os.environ, **paths}, capture_output=True, text=True, cwd=package)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "1 passed" in ran.stdout
 
 
 def test_the_strategy_keeps_the_contract(monkeypatch: pytest.MonkeyPatch) -> None:

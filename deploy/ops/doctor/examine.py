@@ -49,6 +49,8 @@ from slave.servos.dynamixel.port import Port
 
 NOBODY_NEAR = "nobody stands within reach of these joints, or drives that tell their torque"
 
+HELD_THERE = "the joint is held there mechanically; the guard counts on that angle"
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -68,6 +70,7 @@ async def examine(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
         pinged = await asyncio.to_thread(ping_servos, needs.servos, tree, port)
         found.append(judge_latency(pinged, needs.servos.reply_timeout_s))
     found += [warn("contact", line, NOBODY_NEAR) for line in without_detection(needs.no_effort)]
+    found += [warn("servos", f"{joint} {why}", HELD_THERE) for joint, why in needs.not_driven.items()]
     for name, switch in needs.switches.items():
         pedal = read_pedal(switch) if isinstance(switch, Pedal) else None
         found.append(judge_switch(name, switch, pedal))

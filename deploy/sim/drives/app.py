@@ -42,13 +42,14 @@ async def run(
     Raises BusError where a bus cannot be opened.
     """
     canopen = config.servos.section(CanopenConfig)
+    share = config.servos.share(CanopenConfig, config.skeleton, config.encoders)
     buses: dict[str, CanBus] = {}
 
     def send(bus: str, frame_id: int, data: bytes) -> None:
         if bus in buses:
             buses[bus].send(CanFrame(frame_id, data, False))
 
-    peer = DrivePeer(canopen, config.skeleton, config.encoders, send, monotonic_ns(), faults)
+    peer = DrivePeer(canopen, share.skeleton, share.encoders, send, monotonic_ns(), faults)
     enter_real_time(config.process.realtime_priority)
 
     async def move() -> None:

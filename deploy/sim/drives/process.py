@@ -43,7 +43,9 @@ def drives(
     from deploy.sim.drives.faults import planned
     from slave.config import SlaveConfig
 
-    checked = load_config(config, SlaveConfig, ['servos.backend="canopen"', *(set_ or ())])
+    checked = load_config(config, SlaveConfig, set_ or ())
+    if not checked.servos.joints:
+        checked = load_config(config, SlaveConfig, ['servos.backend="canopen"', *(set_ or ())])
     faults = [planned(text, checked.skeleton) for text in fault or ()]
 
     async def main(stop: asyncio.Event) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,3 +22,12 @@ class DriveSigns:
     """When its digital inputs came last; only a drive of `tell_inputs` sends them."""
     inputs: int
     """60FDh."""
+
+
+@runtime_checkable
+class TellingServos(Protocol):
+    """Servos whose drives tell of their torque and inputs."""
+
+    def signs(self, joint: str) -> DriveSigns:
+        """What the drive of a joint tells."""
+        ...

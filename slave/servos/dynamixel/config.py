@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Annotated
 
 import numpy as np
@@ -53,6 +54,10 @@ class DynamixelConfig(BackendConfig):
     def no_effort(self, skeleton: Skeleton) -> dict[str, str]:
         """Joints of which the file tells no torque constant."""
         return {n: NO_CONSTANT for n in skeleton.joint_names if n not in self.torque_nm_a}
+
+    def single_reading(self, skeleton: Skeleton) -> Collection[str]:
+        """All joints: the servo alone reads its angle."""
+        return skeleton.joint_names
 
     def wire_time_s(self) -> float:
         """Time that one cycle's bytes take on the wire."""

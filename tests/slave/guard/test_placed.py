@@ -253,7 +253,7 @@ def test_a_joint_that_lags_within_the_span_is_not_against() -> None:
 
 
 def test_without_a_last_known_position_a_person_confirms(make_rig: MakeRig) -> None:
-    rig = make_rig(None, last_known_rad={})
+    rig = make_rig(None, last_known_rad=dict.fromkeys(make_rig().skeleton.joint_names, np.nan))
     for _ in range(10):
         assert not rig.step().ready
     assert rig.guard.state is State.BOOT

@@ -36,8 +36,8 @@ GPIO = 'name = "red button"\nsource = "gpio"\nline = "STOP"\n'
         ('name = "a"\nsource = "gpio"\nline = "17"', "estop.inputs.0.chip = (not set): expected the chip's"),
         ('name = "a"\nsource = "usb"', "estop.inputs.0.source = 'usb': expected 'gpio'"),
         (GPIO.replace("red button", "ü" * 40), "at most 64 bytes"),
-        ('name = "a"\nsource = "sto"\njoint = "neck_yaw"', "only servos.backend"),
-        ('name = "a"\nsource = "drive"\nbit = 16\njoint = "neck_yaw"', "only servos.backend"),
+        ('name = "a"\nsource = "sto"\njoint = "neck_yaw"', "only drives on CANopen"),
+        ('name = "a"\nsource = "drive"\nbit = 16\njoint = "neck_yaw"', "only drives on CANopen"),
     ],
 )
 def test_a_mistake_names_key_value_and_what_was_expected(tmp_path: Path, text: str, said: str) -> None:

@@ -68,9 +68,9 @@ def test_a_run_is_the_same_every_time() -> None:
 
 def test_predict_aims_ahead_by_the_bus_of_the_drives_too() -> None:
     servos = ServosConfig.model_validate({"backend": "canopen", "canopen": {"sync_hz": 50}})
-    assert servos.chosen.bus_lag_s == pytest.approx(0.03)
-    assert ServosConfig().chosen.bus_lag_s == 0.0
-    still, early = (make_tracker(TrackConfig(), lag_s) for lag_s in (0.0, servos.chosen.bus_lag_s))
+    assert servos.bus_lag_s == pytest.approx(0.03)
+    assert ServosConfig().bus_lag_s == 0.0
+    still, early = (make_tracker(TrackConfig(), lag_s) for lag_s in (0.0, servos.bus_lag_s))
     rate = np.array([1.0, -0.5])
     for k in range(20):
         now_ns = k * 80_000_000

@@ -22,6 +22,7 @@ from master.config import MasterConfig
 from master.deadman.config import SwitchConfig
 from master.suit.protocol import SuitProtocol
 from slave.config import SlaveConfig
+from slave.servos.backend import BackendConfig
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.dynamixel.config import DynamixelConfig
 from slave.stop_inputs.config import EstopConfig
@@ -64,6 +65,8 @@ class Needs:
     """The servos on a serial bus, which is one of the ports."""
     no_effort: dict[str, str] = field(default_factory=dict)
     """Why the file lets no effort be known of a joint."""
+    not_driven: dict[str, str] = field(default_factory=dict)
+    """Joints without a servo, in words."""
     camera: CameraNeed = CameraNeed.OFF
     camera_device: str = ""
     link: LinkConfig = field(default_factory=LinkConfig)
@@ -120,26 +123,33 @@ def _of_master(config: MasterConfig) -> Needs:
 
 
 def _of_slave(config: SlaveConfig) -> Needs:
-    servos, ports = config.servos.chosen, []
-    if isinstance(servos, DynamixelConfig):
-        ports.append(servos.port)
+    skeleton, ports = config.skeleton, []
+    dynamixel = config.servos.used(DynamixelConfig)
+    if dynamixel is not None:
+        ports.append(dynamixel.port)
+    canopen = config.servos.used(CanopenConfig)
     if config.base.source == "serial":
         ports.append(config.base.port)
     return Needs(
         role="slave",
-        buses=_of_drives(servos, config.skeleton) if isinstance(servos, CanopenConfig) else (),
-        servos=servos if isinstance(servos, DynamixelConfig) else None,
+        buses=() if canopen is None else _of_drives(canopen, _share(config, CanopenConfig)),
+        servos=dynamixel,
         realtime_priority=config.process.realtime_priority,
         serial_ports=tuple(ports),
         estop=config.estop,
-        simulated=config.servos.backend == "mujoco",
+        simulated=config.servos.simulated,
         reset_key=bool(config.guard.reset_key),
-        no_effort=servos.no_effort(config.skeleton),
+        no_effort=config.servos.no_effort(skeleton),
+        not_driven=config.servos.not_driven(skeleton),
         camera=CameraNeed(config.camera.source),
         camera_device=config.camera.device,
         link=config.link,
         certified_as=common_name(Role.ROBOT, config.robot),
     )
+
+
+def _share(config: SlaveConfig, kind: type[BackendConfig]) -> Skeleton:
+    return config.servos.share(kind, config.skeleton, config.encoders).skeleton
 
 
 def _of_drives(canopen: CanopenConfig, skeleton: Skeleton) -> tuple[BusNeed, ...]:

@@ -12,6 +12,7 @@ import pytest
 
 from common.link import open_link
 from common.link.config import LinkConfig
+from common.skeleton import load_skeleton
 from common.wire.codec import decode, encode
 from common.wire.messages import Action, ControlRequest
 from common.wire.topics import CONTROL, STOP
@@ -19,6 +20,9 @@ from slave.guard import State
 from tests.slave.guard.conftest import KEY, ROBOT, Rig
 
 pytestmark = [pytest.mark.live, pytest.mark.usefixtures("default_signals")]
+
+
+UNKNOWN = dict.fromkeys(load_skeleton("nursing").joint_names, float("nan"))
 
 
 def endpoint() -> str:
@@ -46,7 +50,7 @@ class Dialogue:
 
 def home(typed: str, *options: str, key: str = KEY, known: dict[str, float] | None = None) -> Dialogue:
     """Of a robot whose joints have one reading only, and were last known to stand there."""
-    said = Dialogue(Rig(last_known_rad=known or {}))
+    said = Dialogue(Rig(last_known_rad=UNKNOWN | (known or {})))
     said.rig.step()
 
     async def story() -> None:

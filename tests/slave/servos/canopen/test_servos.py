@@ -35,7 +35,7 @@ from slave.config import SlaveConfig
 from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.servos import CanopenServos
-from tests.slave.servos.contract import Subject, check
+from slave.servos.contract import Subject, check
 
 pytestmark = pytest.mark.live
 NURSING = load_skeleton("nursing")

@@ -27,9 +27,9 @@ from slave.guard.body import Body
 from slave.guard.states import State
 from slave.last_known import LastKnown, save
 from slave.pipeline import SlavePipeline
+from slave.servos.contract import Subject, check
 from slave.servos.dynamixel.registers import TORQUE
 from slave.servos.dynamixel.servos import DynamixelServos
-from tests.slave.servos.contract import Subject, check
 
 if TYPE_CHECKING:
     from tests.slave.servos.dynamixel.conftest import Rig

@@ -9,10 +9,10 @@ from common.errors import RobotError
 from common.skeleton import load_skeleton
 from slave.backends import ServosConfig
 from slave.encoders.counts import EncoderConfig
+from slave.servos.contract import Subject, check
 from slave.servos.mujoco.servos import MujocoServos
 from slave.servos.mujoco.simulated import CYCLE_NS
 from slave.servos.servos import EncoderReading
-from tests.slave.servos.contract import Subject, check
 
 SKELETON = load_skeleton("nursing")
 J = len(SKELETON.joints)

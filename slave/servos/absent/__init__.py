@@ -1,0 +1,1 @@
+"""Joints without a servo."""
