@@ -12,14 +12,22 @@ from common.config.section import Section, make_section, one_of
 from common.errors import NOT_SET, ConfigError, ConfigMistake, TandemError
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
+from slave.servos.absent.backend import BACKEND as ABSENT
 from slave.servos.backend import Backend, BackendConfig, Chosen, LastKnownAngles
-from slave.servos.entry_points import BACKENDS
+from slave.servos.canopen.backend import BACKEND as CANOPEN
+from slave.servos.dynamixel.backend import BACKEND as DYNAMIXEL
+from slave.servos.entry_points import InstalledBackends
 from slave.servos.mixed import MixedServos, Part
+from slave.servos.mujoco.backend import BACKEND as MUJOCO
 from slave.servos.payload import PayloadConfig, payload_mistakes
 from slave.servos.servos import Servos
 from slave.servos.shares import part_of, share_mistakes, shares
 
 _SIMULATED = "mujoco"
+BACKENDS = InstalledBackends(
+    {_SIMULATED: MUJOCO, "canopen": CANOPEN, "dynamixel": DYNAMIXEL, "absent": ABSENT}
+)
+"""Tandem's own, and those of other packages."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,8 @@ _QUEUE_FULL = frozenset({errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM})
 
 OnFrame = Callable[[str, int, bytes, int], object]
 """(bus name, identifier, data, arrival in monotonic ns)."""
+OnRemote = Callable[[str, int, int], object]
+"""(bus name, identifier, arrival in monotonic ns)."""
 
 
 class CanBus(KeptOpenBus):
@@ -41,16 +43,19 @@ class CanBus(KeptOpenBus):
         *,
         on_second_sender: OnFrame | None = None,
         take_extended: bool = False,
+        on_remote: OnRemote | None = None,
         state_of: StateOf = state_of,
     ) -> None:
         """`on_second_sender` takes frames with an identifier that this side sends, but did not send.
 
-        `take_extended`: frames with 29 bits are handed on too; else they are counted as foreign.
+        `take_extended`: frames with 29 bits are handed on too; else they are counted as foreign. `on_remote`
+        takes the identifiers of others' remote requests, of 11 bits.
         """
         self._take_extended = take_extended
         super().__init__(config, on_change, opener, state_of)
         self._on_frame = on_frame
         self._on_second_sender = on_second_sender
+        self._on_remote = on_remote
         echoes = config.interface == "udp_multicast" or bool(config.options.get("receive_own_messages"))
         self._sent = SentFrames(echoes)
         self._sent_ids: set[int] = set()
@@ -62,8 +67,9 @@ class CanBus(KeptOpenBus):
 
     def send(self, frame: CanFrame) -> None:
         """Send without waiting. Never raises: what cannot be sent is counted, and brings the bus down."""
-        self._sent_ids.add(frame.id)
-        if self._on_second_sender is not None:
+        if not frame.remote:  # its identifier is that of another's frame
+            self._sent_ids.add(frame.id)
+        if self._on_second_sender is not None and not frame.remote:
             self._sent.sent(frame.id, frame.data, monotonic_ns())
         bus = self._bus
         if bus is None:
@@ -72,6 +78,7 @@ class CanBus(KeptOpenBus):
         message = can.Message(
             arbitration_id=frame.id & ~EXTENDED,
             is_extended_id=bool(frame.id & EXTENDED),
+            is_remote_frame=frame.remote,
             data=frame.data,
             is_fd=frame.fd,
             bitrate_switch=frame.fd,
@@ -93,6 +100,8 @@ class CanBus(KeptOpenBus):
             counters.undecodable += 1
         elif message.is_error_frame:
             self._on_error_frame(frame_id, bytes(message.data))
+        elif message.is_remote_frame and not message.is_extended_id and self._on_remote is not None:
+            self._on_remote(self.name, frame_id, monotonic_ns())
         elif message.is_remote_frame or (message.is_extended_id and not self._take_extended):
             counters.foreign += 1
         elif message.is_extended_id:

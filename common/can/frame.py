@@ -10,7 +10,7 @@ EXTENDED = 0x8000_0000
 
 @dataclass(frozen=True, slots=True)
 class CanFrame:
-    """One data frame; up to 8 bytes on classic CAN, up to 64 where `fd`.
+    """One frame; up to 8 bytes on classic CAN, up to 64 where `fd`.
 
     An identifier has 11 bits, or 29 and `EXTENDED`.
     """
@@ -18,3 +18,5 @@ class CanFrame:
     id: int
     data: bytes
     fd: bool
+    remote: bool = False
+    """True: a request for the frame of this identifier, without data."""

@@ -197,6 +197,8 @@ class RobotStatus:
     """Why a joint's effort is not known."""
     unlimited: str = ""
     """Why the drives may push harder than moving needs; empty where they may not, or nothing is known."""
+    left_out: dict[str, str] = field(default_factory=dict)
+    """What a joint's drive lacks that it may lack, in words."""
     not_driven: dict[str, str] = field(default_factory=dict)
     """Joints without a servo, in words."""
     """Joint groups that hold until the operator takes them up."""
@@ -241,6 +243,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         external_nm=by_joint(state.external_nm) if state else None,
         no_effort=metrics.servos.no_effort if metrics else {},
         unlimited=metrics.servos.unlimited if metrics else "",
+        left_out=metrics.servos.left_out if metrics else {},
         not_driven=metrics.servos.not_driven if metrics else {},
     )
 
@@ -329,6 +332,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     words += [(line, "yellow") for line in without_detection(one.no_effort)]
     words += [(f"drives push as hard as they can: {one.unlimited}", "yellow")] * bool(one.unlimited)
     words += [(f"{joint} {why}", "yellow") for joint, why in one.not_driven.items()]
+    words += [(f"{joint}: its drive lacks {what}", "dim") for joint, what in one.left_out.items()]
     for what, torques in (("effort", one.effort_nm), ("from outside", one.external_nm)):
         if found := largest(torques or {}):
             words.append((f"{what}: {found} (the largest)", "dim"))

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from common.errors import RobotError
 from common.metrics.slave import ServoMetrics
 from common.quaternion import Array
-from slave.servos.canopen.signs import DriveSigns, TellingServos
 from slave.servos.servos import EncoderReading, Servos, check_setpoint
+from slave.servos.signs import DriveSigns, TellingServos
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +105,7 @@ class MixedServos:
             out.times_ms.update({f"{part.name}.{key}": value for key, value in one.times_ms.items()})
             out.buses.update(one.buses)
             out.no_effort.update(one.no_effort)
+            out.left_out.update(one.left_out)
             out.not_driven.update(one.not_driven)
         return out
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from slave.servos.canopen.signs import DriveSigns
+from slave.servos.signs import DriveSigns
 from slave.stop_inputs.config import StopInputConfig
 from slave.stop_inputs.source import Level
 

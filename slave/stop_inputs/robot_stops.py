@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from common.clock import Clock, monotonic_ns
 from slave.servos import Servos
-from slave.servos.canopen.signs import TellingServos
+from slave.servos.signs import TellingServos
 from slave.stop_inputs.config import EstopConfig, StopInputConfig
 from slave.stop_inputs.drive import DriveStop
 from slave.stop_inputs.rule import StopInputs

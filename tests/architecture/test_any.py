@@ -9,7 +9,7 @@ from tests.architecture.imports import SourceTree
 
 ADAPTERS = {
     "deploy/report/group.py": "typer",
-    "deploy/sim/drives/node.py": "canopen",
+    "deploy/sim/drives/server.py": "canopen",
     "deploy/sim/drives/wire.py": "canopen",
     "master/alarms/player.py": "sounddevice",
     "slave/camera/room.py": "mujoco",

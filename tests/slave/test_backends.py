@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import sys
 import tomllib
@@ -20,7 +21,7 @@ from common.errors import ConfigError, RobotError, TandemError
 from common.metrics.slave import ServoMetrics
 from common.quaternion import Array
 from common.skeleton import Skeleton, load_skeleton
-from slave.backends import ServosConfig
+from slave.backends import BACKENDS, ServosConfig
 from slave.config import SlaveConfig
 from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos import EncoderReading, Servos
@@ -29,7 +30,7 @@ from slave.servos.absent.servos import AbsentServos
 from slave.servos.backend import Backend, BackendConfig
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.contract import Subject, check
-from slave.servos.entry_points import BACKENDS, GROUP, OWN
+from slave.servos.entry_points import GROUP, own_place
 from slave.servos.mixed import MixedServos, Part
 from slave.servos.shares import part_of
 
@@ -199,9 +200,11 @@ def test_a_payload_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
 
 def test_pyproject_names_the_backends_that_tandem_knows_without_being_installed() -> None:
     text = (Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8")
-    assert tomllib.loads(text)["project"]["entry-points"][GROUP] == OWN
-    for name in OWN:
-        assert isinstance(BACKENDS[name], Backend)
+    points = tomllib.loads(text)["project"]["entry-points"][GROUP]
+    assert points == {name: own_place(name) for name in BACKENDS}
+    for point in points.values():
+        module, _, attribute = point.partition(":")
+        assert getattr(importlib.import_module(module), attribute) in BACKENDS.values()
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from types import MappingProxyType
 
 import can
 
@@ -21,6 +22,7 @@ from common.process.realtime import enter_real_time
 from common.process.runtime import until_stopped
 from common.process.ticker import ticks
 from deploy.sim.drives.faults import PlannedDriveFault
+from deploy.sim.drives.makers import Maker
 from deploy.sim.drives.peer import DrivePeer
 from slave.config import SlaveConfig
 from slave.servos.canopen.config import CanopenConfig
@@ -35,9 +37,14 @@ def _open(config: BusConfig) -> can.BusABC:
 
 
 async def run(
-    config: SlaveConfig, stop: asyncio.Event, faults: Sequence[PlannedDriveFault] = ()
+    config: SlaveConfig,
+    stop: asyncio.Event,
+    faults: Sequence[PlannedDriveFault] = (),
+    makers: Mapping[str, Maker] = MappingProxyType({}),
 ) -> DrivesMetrics:
     """Be the drives that a slave's file names, until `stop` is set; returns what was counted.
+
+    `makers`: joints whose drives another maker has built.
 
     Raises BusError where a bus cannot be opened.
     """
@@ -50,6 +57,8 @@ async def run(
             buses[bus].send(CanFrame(frame_id, data, False))
 
     peer = DrivePeer(canopen, share.skeleton, share.encoders, send, monotonic_ns(), faults)
+    for joint, maker in makers.items():
+        peer.build(joint, maker)
     enter_real_time(config.process.realtime_priority)
 
     async def move() -> None:
@@ -58,7 +67,7 @@ async def run(
 
     try:
         for bus in canopen.buses:
-            buses[bus.name] = CanBus(bus, peer.on_frame, opener=_open)
+            buses[bus.name] = CanBus(bus, peer.on_frame, opener=_open, on_remote=peer.on_remote)
             buses[bus.name].open()
         freeze_heap()
         where = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in canopen.buses)

@@ -12,6 +12,7 @@ from common.clock import NS_PER_MS, NS_PER_S
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from deploy.sim.drives.faults import DriveFault, PlannedDriveFault
+from deploy.sim.drives.makers import Maker
 from deploy.sim.drives.node import SimulatedDrive
 from deploy.sim.drives.plant import Plant
 from deploy.sim.drives.torque import ToldTorque
@@ -86,7 +87,7 @@ class DrivePeer:
             simulated.rated_torque_mnm = rated_mnm
         for i, drive in enumerate(drives):
             self._on_bus[drive.bus].append(i)
-            for code in (pdo.RPDO1, pdo.SDO_REQUEST):
+            for code in (*pdo.RPDOS, pdo.SDO_REQUEST):
                 self._by_id.setdefault((drive.bus, code + drive.id), []).append(i)
         self._states = [drive.state for drive in self.drives]
         self._show()
@@ -97,9 +98,9 @@ class DrivePeer:
         if addressed is not None:
             for i in addressed:
                 self._pass_frame(i, frame_id, data, now_ns)
-                if frame_id != pdo.RPDO1 + self.drives[i].id:
+                if frame_id & 0x780 == pdo.SDO_REQUEST:
                     self._take_in_settings(i)
-            if frame_id & 0x780 == pdo.RPDO1:
+            if frame_id & 0x780 in pdo.RPDOS:
                 return  # it waits for SYNC
         elif frame_id == pdo.SYNC:
             self._on_sync(bus, now_ns)
@@ -107,6 +108,16 @@ class DrivePeer:
             for i in self._on_bus.get(bus, ()):
                 self._pass_frame(i, frame_id, data, now_ns)
         self._follow_states()
+
+    def build(self, joint: str, maker: Maker) -> None:
+        """Let another maker have built a joint's drive."""
+        drive = self.drives[self._names.index(joint)]
+        drive.become(maker(drive.id))
+
+    def on_remote(self, bus: str, frame_id: int, now_ns: int) -> None:
+        """Handle one remote request."""
+        for i in self._on_bus.get(bus, ()):
+            self.drives[i].on_remote(frame_id, now_ns)
 
     def _pass_frame(self, i: int, frame_id: int, data: bytes, now_ns: int) -> None:
         self.drives[i].on_frame(frame_id, data, now_ns)
@@ -130,7 +141,7 @@ class DrivePeer:
             twin.beat(now_ns)
         for i, drive in enumerate(self.drives):
             drive.beat(now_ns)
-            if late[i] and drive.state is Power.ENABLED and late[i] >= drive.value(0x6066) * NS_PER_MS:
+            if late[i] and drive.state is Power.ENABLED and late[i] >= _patience_ns(drive):
                 drive.fail(*_FOLLOWING_ERROR)
             if not moving[i]:
                 drive.at_rest()
@@ -212,10 +223,13 @@ class DrivePeer:
         """What the plant needs to know of the dictionary, in the joint's own units."""
         drive = self.drives[i]
         scale = abs(self._scale[i])
-        window = drive.value(0x6065)
+        lacks = drive.traits.lacks
+        window = _UNBOUNDED if 0x6065 in lacks else drive.value(0x6065)
         self.plant.window_rad[i] = np.inf if window == _UNBOUNDED else window / scale
-        if ramp := drive.value(0x6085):
+        if ramp := 0 if 0x6085 in lacks else drive.value(0x6085):
             self.plant.ramp_rad_s2[i] = ramp / scale
+        if 0x607D in lacks:
+            return
         ends = [(drive.value(0x607D, sub) - self._zero[i]) / self._scale[i] for sub in (1, 2)]
         self._lower[i], self._upper[i] = min(ends), max(ends)
 
@@ -241,3 +255,8 @@ class DrivePeer:
 
 def _sender(send: SendOn, bus: str) -> Callable[[int, bytes], None]:
     return lambda frame_id, data: send(bus, frame_id, data)
+
+
+def _patience_ns(drive: SimulatedDrive) -> int:
+    """For how long a drive may be beyond its window of following error."""
+    return 0 if 0x6066 in drive.traits.lacks else drive.value(0x6066) * NS_PER_MS

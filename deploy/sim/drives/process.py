@@ -30,6 +30,14 @@ def drives(
             "fault.",
         ),
     ] = None,
+    maker: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="JOINT=KIND",
+            help="Build a joint's drive as a maker would, with his objects and habits: epos, interpolating, "
+            "fixed, segmented or reserved-bits. The joint then needs its own section in the file.",
+        ),
+    ] = None,
     metrics: MetricsFile = None,
 ) -> None:
     """Simulate the robot's drives: CiA 402 drives on CANopen buses, which move the simulated robot.
@@ -41,14 +49,16 @@ def drives(
     """
     from deploy.sim.drives.app import run
     from deploy.sim.drives.faults import planned
+    from deploy.sim.drives.makers import maker_of
     from slave.config import SlaveConfig
 
     checked = load_config(config, SlaveConfig, set_ or ())
     if not checked.servos.joints:
         checked = load_config(config, SlaveConfig, ['servos.backend="canopen"', *(set_ or ())])
     faults = [planned(text, checked.skeleton) for text in fault or ()]
+    makers = dict(maker_of(text, checked.skeleton) for text in maker or ())
 
     async def main(stop: asyncio.Event) -> None:
-        metrics_writer(metrics)(await run(checked, stop, faults))
+        metrics_writer(metrics)(await run(checked, stop, faults, makers))
 
     run_until_stopped(main)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 
 _UNSIZED, _SEGMENTED, _LENGTH_INDICATED = 0x42, 0x40, 0x01
 _UPLOAD_BITS, _UPLOADED, _EXPEDITED = 0xE0, 0x40, 0x02
 _ASK_SEGMENT, _TOGGLE, _ABORT, _TOGGLE_ERROR = 0x60, 0x10, 0x80, 0x0503_0000
 _SEGMENT_BYTES = 7
+
+GUARDING = frozenset({0x100C, 0x100D})
+INTERPOLATED = frozenset({0x60C0, 0x60C1})
+MORE_PDOS = frozenset({0x1401, 0x1402, 0x1403, 0x1601, 0x1602, 0x1603, 0x1803, 0x1A03})
+NOT_TANDEMS = frozenset({0x1006, *GUARDING, *INTERPOLATED, *MORE_PDOS, 0x606C, 0x60FF})
+"""Objects of `drive.eds` that makers' drives have, and tandem's own does not."""
 
 
 class ReadForm(Enum):
@@ -29,8 +36,24 @@ class Traits:
     read_form: ReadForm = ReadForm.SIZED
     answers_after_ns: int = 0
     """How long it takes to answer an SDO request."""
-    lacks: frozenset[int] = frozenset()
+    lacks: frozenset[int] = NOT_TANDEMS
     """Objects that it has not, such as 6077h."""
+    read_only: frozenset[int] = frozenset()
+    """Objects that it has, but lets nobody write."""
+    fixed_ids: frozenset[int] = frozenset()
+    """Communication parameters (1400h, …) of PDOs whose entries may be changed, but not their identifier."""
+    presets: Mapping[tuple[int, int], int] = field(default_factory=dict)
+    """What entries hold after a start, by index and subindex."""
+    never_set: int = 0
+    """Bits of the statusword that it does not have."""
+    wide_period: bool = False
+    """Whether 60C2h:1 has 16 bits."""
+    boots_after_ns: int = 0
+    """How long it is dead after power comes."""
+    mode_after_syncs: int = 0
+    """How many SYNCs it takes until it is in the mode asked for."""
+    homed: bool = True
+    """Whether its zero is known; with an encoder that is not absolute only after homing."""
     polarity: int = 0
     """607Eh. What the joint's position is already takes bit 7 in; what the torque is, does not."""
 

@@ -14,10 +14,16 @@ Send = Callable[[int, bytes], None]
 """(identifier, data)."""
 
 
-@lru_cache(maxsize=1)
-def dictionary() -> canopen.ObjectDictionary:
-    """The entries of `drive.eds`, shared by all drives. Their values are kept in each drive's node."""
-    return canopen.import_od(str(EDS), node_id=1)
+@lru_cache(maxsize=2)
+def dictionary(wide_period: bool = False) -> canopen.ObjectDictionary:
+    """The entries of `drive.eds`, shared by all drives. Their values are kept in each drive's node.
+
+    `wide_period`: with 16 bits in 60C2h:1.
+    """
+    entries = canopen.import_od(str(EDS), node_id=1)
+    if wide_period:
+        entries[0x60C2][1].data_type = canopen.objectdictionary.datatypes.UNSIGNED16
+    return entries
 
 
 class Wire(canopen.Network):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from common.wire.messages import Mask
 from slave.servos.canopen import pdo
+from slave.servos.canopen.status_bits import GOOD
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,10 @@ class DriveAnswers:
 class SyncAnswers:
     """The TPDOs of one SYNC as they come in, and as arrays once they are read."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, unused_bits: Sequence[Sequence[int]] = ()) -> None:
+        """`unused_bits`: of each drive, bits of its statusword that are taken for good whatever they are."""
+        self._good = np.array([_good_bits(bits) for bits in unused_bits] or [(0, 0xFFFF)] * count, np.uint16)
+        """(J, 2) which bits are set, and which kept, in each statusword."""
         self._block = bytearray(pdo.TPDO_BYTES * count)
         self._table = np.frombuffer(self._block, pdo.TPDO)
         self._fresh = bytearray(count)
@@ -53,7 +58,8 @@ class SyncAnswers:
 
     def statusword(self, drive: int) -> int:
         """The newest of one drive."""
-        return int(self._table["statusword"][drive])
+        set_, kept = self._good[drive].tolist()
+        return (int(self._table["statusword"][drive]) | set_) & kept
 
     def begin(self) -> None:
         """A new SYNC: nobody has answered it yet. Values stay until they are overwritten."""
@@ -67,9 +73,14 @@ class SyncAnswers:
         return DriveAnswers(
             synced_ns,
             fresh,
-            self._table["statusword"].copy(),
+            (self._table["statusword"] | self._good[:, 0]) & self._good[:, 1],
             fresh & (words & pdo.ENCODER_FLAGS == 0),
             (words & pdo.COUNT_BITS).astype(np.int64),
             words & pdo.ENCODER_FLAGS,
             self._table["position"].copy(),
         )
+
+
+def _good_bits(bits: Sequence[int]) -> tuple[int, int]:
+    mask = sum(1 << bit for bit in set(bits))
+    return mask & GOOD, 0xFFFF & ~(mask & ~GOOD)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-CYCLIC_SYNCHRONOUS_POSITION = 8
-"""Mode of operation (6060h)."""
+CYCLIC_SYNCHRONOUS_POSITION, INTERPOLATED_POSITION = 8, 7
+"""Modes of operation (6060h)."""
 
 
 class Power(StrEnum):
@@ -24,6 +24,8 @@ class Power(StrEnum):
 DISABLE_VOLTAGE = 0x00
 SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, FAULT_RESET = 0x06, 0x07, 0x0F, 0x02, 0x80
 """Controlwords (6040h). A drive takes FAULT_RESET at the rising edge of its bit only."""
+ENABLE_WORDS = {CYCLIC_SYNCHRONOUS_POSITION: ENABLE, INTERPOLATED_POSITION: ENABLE | 1 << 4}
+"""What keeps an enabled drive going, by mode. In interpolated position mode bit 4 lets it follow."""
 
 _PATTERNS = (
     # mask and value of the statusword (6041h), CiA 402-2
@@ -50,7 +52,12 @@ def power(statusword: int) -> Power | None:
 
 
 def towards_enabled(
-    state: Power | None, last_controlword: int, reset_fault: bool, *, knows_16: bool = True
+    state: Power | None,
+    last_controlword: int,
+    reset_fault: bool,
+    *,
+    knows_16: bool = True,
+    mode: int = CYCLIC_SYNCHRONOUS_POSITION,
 ) -> int:
     """The controlword that leads one step nearer to ENABLED.
 
@@ -65,7 +72,9 @@ def towards_enabled(
             return SWITCH_ON
         case Power.QUICK_STOP if not knows_16:
             return DISABLE_VOLTAGE
-        case Power.SWITCHED_ON | Power.ENABLED | Power.QUICK_STOP:
+        case Power.ENABLED:
+            return ENABLE_WORDS[mode]
+        case Power.SWITCHED_ON | Power.QUICK_STOP:
             return ENABLE
         case Power.FAULT if reset_fault and last_controlword != FAULT_RESET:
             return FAULT_RESET

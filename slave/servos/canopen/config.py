@@ -2,77 +2,32 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from enum import StrEnum
+from collections.abc import Collection, Mapping
 
 from pydantic import Field
 
 from common.can.config import BusConfig, names_used_twice
 from common.clock import NS_PER_S
-from common.config.section import Section
 from common.errors import NOT_SET, ConfigMistake
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig
 from slave.servos.backend import BackendConfig
+from slave.servos.canopen.drive_config import (
+    SAYS_NONE,
+    DriveConfig,
+    DriveSettings,
+    EffortSource,
+    NetworkTimes,
+    limits_rad,
+)
+from slave.servos.canopen.eds_check import eds_mistakes
 from slave.servos.canopen.emergency import SAFE_TORQUE_OFF
 from slave.servos.canopen.load import BUSIEST, WELL, bits_per_s, configured_bitrate, too_much
+from slave.servos.canopen.pdo import ENCODER
 
-INCREMENTS_PER_TURN = 65536
-"""The resolution of a motor's own encoder."""
-_LIMIT_MARGIN_RAD = math.radians(2.0)
-"""A drive's software limits lie this far beyond the joint's: the guard limits first."""
 _INT32 = 2**31 - 1
 MOST_SYNCS = 20
 """From one telling of a drive's effort to the next."""
-
-
-class EffortSource(StrEnum):
-    """Where a drive's effort comes from."""
-
-    TORQUE = "torque"
-    """Actual torque, 6077h."""
-    CURRENT = "current"
-    """Actual current, 6078h, of a drive without 6077h: a motor's torque goes with it."""
-    NONE = "none"
-
-
-SAYS_NONE = 'the file says so (effort = "none")'
-
-
-class DriveConfig(Section):
-    """`[servos.canopen.drives.<joint>]`: one CiA 402 drive."""
-
-    id: int = Field(ge=1, le=126)
-    """Its CANopen node id."""
-    bus: str = Field(min_length=1)
-    """Name of the bus it hangs on."""
-    gear_ratio: float = Field(1.0, gt=0.0, le=10_000.0)
-    """Turns of the motor for one turn of the joint."""
-    increments_per_turn: int = Field(INCREMENTS_PER_TURN, ge=256, le=2**24)
-    """The resolution of the motor's encoder."""
-    reversed: bool = False
-    """True: the drive's position falls as the joint's angle rises."""
-    zero_increments: int = Field(0, ge=-(2**30), le=2**30)
-    """The drive's position where the joint's angle is 0."""
-    lower_deg: float | None = Field(None, ge=-360.0, le=360.0)
-    """Lower software limit; None: 2° beyond the joint's own."""
-    upper_deg: float | None = Field(None, ge=-360.0, le=360.0)
-
-    effort: EffortSource = EffortSource.TORQUE
-    """What tells its effort. A drive that lacks the object tells none, which is said."""
-    rated_torque_nm: float | None = Field(None, gt=0.0, le=1000.0)
-    """Of the motor, without gear: what 1000 of 6077h or 6078h is. None: the drive's own 6076h."""
-    gear_efficiency: float = Field(1.0, gt=0.1, le=1.0)
-    """Share of the motor's torque that the gear lets through."""
-    effort_reversed: bool = False
-    """True: the drive tells torque against its own direction of position, though 607Eh does not say so."""
-
-    @property
-    def increments_per_rad(self) -> float:
-        """Signed: below 0 where reversed."""
-        scale = self.gear_ratio * self.increments_per_turn / (2.0 * math.pi)
-        return -scale if self.reversed else scale
 
 
 def _two_groups() -> list[BusConfig]:
@@ -89,8 +44,8 @@ class CanopenConfig(BackendConfig):
     buses: list[BusConfig] = Field(default_factory=_two_groups, min_length=1)
     """`[[servos.canopen.buses]]`; without any: two multicast groups of this host, for `tandem drives`."""
     drives: dict[str, DriveConfig] = Field(default_factory=dict)
-    """The drives by joint: all of them or none. Without any: ids from 1 upwards in the order of the joints,
-    the right side on the second bus if there is one, all else on the first."""
+    """The drives by joint: all of them or none. Without any, those of `tandem drives`: ids from 1 upwards in
+    the order of the joints, the right side on the second bus if there is one, all else on the first."""
     tell_inputs: list[str] = Field(default_factory=list)
     """Joints whose drives also send their digital inputs (60FDh) at every SYNC, for `[[estop.inputs]]`."""
     sto_codes: list[int] = Field(default_factory=lambda: [SAFE_TORQUE_OFF])
@@ -148,8 +103,30 @@ class CanopenConfig(BackendConfig):
         for name in skeleton.joint_names:
             bus = last if name.startswith("right_") else self.buses[0].name
             used[bus] = used.get(bus, 0) + 1
-            drives[name] = DriveConfig(id=used[bus], bus=bus)
+            drives[name] = DriveConfig(id=used[bus], bus=bus, encoder=ENCODER)
         return drives
+
+    def settings(self, skeleton: Skeleton) -> list[DriveSettings]:
+        """What each drive is told, in the order of the joints."""
+        times = NetworkTimes(
+            node_id=self.node_id,
+            dead_ms=self.dead_ms,
+            heartbeat_ms=max(self.heartbeat_ms, 1000 // self.sync_hz),
+            drive_heartbeat_ms=self.drive_heartbeat_ms,
+            period_ms=1000 // self.sync_hz,
+            effort_syncs=self.effort_syncs(skeleton),
+            following_error_deg=self.following_error_deg,
+            following_error_ms=self.following_error_ms,
+        )
+        drives = self.drives_of(skeleton).values()
+        return [
+            DriveSettings.of(drive, joint, times, joint.name in self.tell_inputs)
+            for drive, joint in zip(drives, skeleton.joints, strict=True)
+        ]
+
+    def single_reading(self, skeleton: Skeleton) -> Collection[str]:
+        """Joints without an encoder at the output."""
+        return [name for name, drive in self.drives_of(skeleton).items() if drive.encoder is None]
 
     def no_effort(self, skeleton: Skeleton) -> dict[str, str]:
         """Joints whose drives are not asked."""
@@ -214,6 +191,8 @@ class CanopenConfig(BackendConfig):
         if not missing and not mistakes:
             mistakes += self._wiring(self.drives_of(skeleton), skeleton)
             mistakes += self._busy(skeleton)
+            names = skeleton.joint_names
+            mistakes += eds_mistakes(zip(names, self.settings(skeleton), strict=True))
         return mistakes
 
     def _busy(self, skeleton: Skeleton) -> list[ConfigMistake]:
@@ -247,13 +226,9 @@ class CanopenConfig(BackendConfig):
                 drive.zero_increments
             )
             if furthest > _INT32:
-                expected = "the joint's whole range within 32 bits of increments"
+                expected = (
+                    "the joint's whole range within the drive's 32 bits of increments: beyond them a target "
+                    "leads the long way round; set its home offset (607Ch), or fewer increments a turn"
+                )
                 mistakes.append(ConfigMistake(f"{key}.gear_ratio", drive.gear_ratio, expected))
         return mistakes
-
-
-def limits_rad(drive: DriveConfig, lower_rad: float, upper_rad: float) -> tuple[float, float]:
-    """The software limits of a drive at a joint of these limits, rad."""
-    lower = lower_rad - _LIMIT_MARGIN_RAD if drive.lower_deg is None else math.radians(drive.lower_deg)
-    upper = upper_rad + _LIMIT_MARGIN_RAD if drive.upper_deg is None else math.radians(drive.upper_deg)
-    return lower, upper

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from enum import Enum, auto
 
 from common.clock import NS_PER_MS
 from slave.servos.canopen.cia402 import (
-    ENABLE,
+    ENABLE_WORDS,
     FAULT_RESET,
     QUICK_STOP,
     SHUTDOWN,
@@ -17,19 +17,13 @@ from slave.servos.canopen.cia402 import (
     towards_enabled,
 )
 from slave.servos.canopen.emergency import HEARTBEAT_MISSED, SAFE_TORQUE_OFF, Emergency
-from slave.servos.canopen.sdo import Exchange, More, Read, SdoAnswer, Transfer, request
+from slave.servos.canopen.setup_run import SetupRun
 from slave.servos.canopen.status_bits import wrong_bits
 
-SDO_TIMEOUT_NS = 300 * NS_PER_MS
-SDO_TRIES = 3
 ENABLE_TIMEOUT_NS = 2000 * NS_PER_MS
 TRANSITION_16_NS = 500 * NS_PER_MS
 """A drive that stays in quick stop active for this long after "enable" does not know transition 16.
 Until then it has also braked: "disable voltage" lets the joint go for some SYNCs."""
-_AGAIN_NS = 20 * NS_PER_MS
-"""Before an entry that must change is read again."""
-_UPLOADED = 0x40
-"""The least command specifier of an answer that names its entry."""
 _WITHOUT_FAULT = (Power.SWITCH_ON_DISABLED, Power.READY, Power.SWITCHED_ON)
 _BOOTS_APART_NS = 1000 * NS_PER_MS
 """Two boot-ups of one id closer together are of two drives."""
@@ -51,17 +45,13 @@ class Phase(Enum):
 class DriveState:
     """One drive. Its frames come in by `on_sdo`, what it shall do goes out by `controlword`."""
 
-    setup: list[Transfer]
+    setup: SetupRun
     phase: Phase = Phase.FAILED
     failure: str = "not started"
     emergency: Emergency | None = None
     configured: bool = False
     encoder: str = ""
     """The fault of its encoder as text."""
-    lacks: dict[str, str] = field(default_factory=dict)
-    """Parts of its settings that it refused, and why."""
-    held: dict[int, int] = field(default_factory=dict)
-    """What was read of it, by index, unsigned."""
     since_ns: int = 0
     """When the phase began."""
     sto_codes: Sequence[int] = (SAFE_TORQUE_OFF,)
@@ -75,15 +65,6 @@ class DriveState:
     _controlword: int = SHUTDOWN
     _may_reset: bool = False
     _told_sto: bool = False
-    _asked_ns: int = 0
-    _step: int = 0
-    _tries: int = 0
-    _patient: bool = False
-    _exchange: Exchange | None = None
-    _again_ns: int | None = None
-    _repeats: int = 0
-    _answered: bytes = b""
-    """Index and subindex of the request that was answered last, where it had been sent once."""
     _booted_ns: int | None = None
     _was_running: bool = False
 
@@ -100,11 +81,7 @@ class DriveState:
             self.phase = Phase.CHECKING
             return None
         self.phase, self.configured = Phase.CONFIGURING, False
-        self._step = self._tries = self._repeats = 0
-        self.lacks, self.held = {}, {}
-        self._again_ns, self._answered = None, b""
-        self._patient = configure
-        return self._ask(now_ns)
+        return self._go_on(self.setup.begin(now_ns, patient=configure), now_ns)
 
     def fail(self, why: str, reconfigure: bool = False) -> None:
         """Latch a failure; the first one stays."""
@@ -115,42 +92,20 @@ class DriveState:
 
     def on_sdo(self, data: bytes, now_ns: int) -> bytes | None:
         """The next request, or None: nothing was waited for, it failed, or all is done (`configured`)."""
-        self._notice_second(data)
+        if self.setup.answers_twice(data):
+            self.fail("answers one request twice: two drives have its id", reconfigure=True)
         if self.phase is not Phase.CONFIGURING or self.configured:
             return None
-        answered = None if self._exchange is None else self._exchange.on_answer(data)
-        if answered is None:
-            return None
-        if isinstance(answered, More):
-            self._asked_ns = now_ns
-            return answered.request
-        transfer = self.setup[self._step]
-        if not answered.done and isinstance(transfer, Read):
-            if self._repeats < transfer.again:
-                self._repeats += 1
-                self._again_ns = now_ns + _AGAIN_NS
-                return None
-            answered = replace(answered, done=transfer.optional)
-        if not answered.done and not transfer.part_of:
-            self.fail(f"refuses its configuration: {answered.words}")
-            return None
-        self._note(transfer, answered)
-        self._answered = data[1:4] if self._tries == 1 and not self._repeats else b""
-        self._step += 1
-        while self._step < len(self.setup) and self.setup[self._step].part_of in self.lacks:
-            self._step += 1
-        self._tries = self._repeats = 0
-        if self._step < len(self.setup):
-            return self._ask(now_ns)
-        self.configured = True
-        self.phase, self.since_ns = Phase.CHECKING, now_ns
-        return None
+        return self._go_on(self.setup.on_answer(data, now_ns), now_ns)
 
-    def _note(self, transfer: Transfer, answered: SdoAnswer) -> None:
-        if not answered.done:
-            self.lacks[transfer.part_of] = answered.words
-        elif isinstance(transfer, Read) and answered.data:
-            self.held[transfer.index] = int.from_bytes(answered.data, "little")
+    def _go_on(self, request: bytes | None, now_ns: int) -> bytes | None:
+        """Take over what the set-up has come to, if it has ended."""
+        if self.setup.failure:
+            self.fail(self.setup.failure)
+        elif self.setup.done:
+            self.configured = True
+            self.phase, self.since_ns = Phase.CHECKING, now_ns
+        return request
 
     def on_boot(self, now_ns: int) -> bool:
         """It reports its start. False: two did so at once, so two drives have its id, and it has failed."""
@@ -175,25 +130,11 @@ class DriveState:
         if self.phase is Phase.CHECKING:
             self.phase, self.since_ns = Phase.ENABLING, now_ns
 
-    def _notice_second(self, data: bytes) -> None:
-        # a request that was sent once and is answered twice; the one under way may be for the same entry
-        asked = self.phase is Phase.CONFIGURING and request(self.setup[self._step])[1:4] == data[1:4]
-        if self._answered and data[1:4] == self._answered and data[0] >= _UPLOADED and not asked:
-            self.fail("answers one request twice: two drives have its id", reconfigure=True)
-
     def overdue(self, now_ns: int) -> bytes | None:
         """The request once more, where its answer is overdue; after the last try it has failed."""
-        if self._again_ns is not None and self.phase is Phase.CONFIGURING:
-            if now_ns < self._again_ns:
-                return None
-            self._again_ns, self._tries = None, 0
-            return self._ask(now_ns)
-        if self.phase is not Phase.CONFIGURING or now_ns - self._asked_ns < SDO_TIMEOUT_NS:
+        if self.phase is not Phase.CONFIGURING:
             return None
-        if self._tries >= SDO_TRIES and not self._patient:
-            self.fail(self._silence)
-            return None
-        return self._ask(now_ns)
+        return self._go_on(self.setup.overdue(now_ns), now_ns)
 
     def controlword(self, statusword: int, answered: bool, stopping: bool, now_ns: int) -> int:
         """What to send it, by the statusword it last sent (`answered`: since the last SYNC)."""
@@ -204,7 +145,8 @@ class DriveState:
             self._controlword = QUICK_STOP
         elif self.phase is Phase.CHECKING:
             # one that goes on holding is not made to brake and start anew
-            self._controlword = ENABLE if self._was_running and state is Power.ENABLED else QUICK_STOP
+            goes_on = self._was_running and state is Power.ENABLED
+            self._controlword = ENABLE_WORDS[self.setup.plan.mode] if goes_on else QUICK_STOP
         elif self.phase is Phase.ENABLING and answered:
             self._enable(state, statusword, now_ns)
         elif self.phase is Phase.RUNNING and answered and state is not Power.ENABLED:
@@ -227,7 +169,9 @@ class DriveState:
             self._controlword = QUICK_STOP
             return
         knows_16 = now_ns - self.since_ns < TRANSITION_16_NS
-        self._controlword = towards_enabled(state, self._controlword, self._may_reset, knows_16=knows_16)
+        self._controlword = towards_enabled(
+            state, self._controlword, self._may_reset, knows_16=knows_16, mode=self.setup.plan.mode
+        )
         if self._controlword == FAULT_RESET:
             self.emergency = None
 
@@ -239,25 +183,12 @@ class DriveState:
             if not self._told_sto:
                 self.torque_off = f"has no torque: {state}"
 
-    def _ask(self, now_ns: int) -> bytes:
-        self._asked_ns = now_ns
-        self._tries += 1
-        if self._tries == 1 or self._exchange is None:
-            self._exchange = Exchange(self.setup[self._step])
-        return self._exchange.begin()
-
-    @property
-    def _silence(self) -> str:
-        """What a request without a proper answer is called."""
-        strange = self._exchange.strange if self._exchange is not None else ""
-        return strange or "does not answer"
-
     @property
     def words(self) -> str:
         """What is wrong with it; empty where all is well."""
         problems = [self.failure] if self.failure else []
         if self.phase in (Phase.CONFIGURING, Phase.CHECKING, Phase.ENABLING):
-            problems.append(self._silence if self._tries > 1 else "is being enabled")
+            problems.append(self.setup.silence if self.setup.asked_again else "is being enabled")
         if self.emergency is not None:
             problems.append(self.emergency.words)
         if self.encoder:

@@ -5,15 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.servos.canopen.config import SAYS_NONE, CanopenConfig, DriveConfig, EffortSource
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.drive_config import SAYS_NONE, DriveConfig, EffortSource
+from slave.servos.canopen.mapping import Held
 from slave.servos.canopen.pdo import EFFORT_BYTES
-from slave.servos.canopen.setup import EFFORT, POLARITY, RATED_TORQUE
+from slave.servos.canopen.setup import POLARITY, RATED_TORQUE
 
 _OF_POSITION, _OF_TORQUE = 0x80, 0x20
 """Bits of 607Eh. A drive that turns round only one of them tells torque against its own position."""
@@ -39,11 +39,11 @@ class DriveEfforts:
         self._at_every_sync = config.effort_syncs(skeleton) == 1
         self._awaited: set[int] = set()
 
-    def configured(self, drive: int, held: Mapping[int, int], lacks: Mapping[str, str]) -> None:
-        """A drive is ready to tell: what was read of it, by index, and what it lacks."""
+    def configured(self, drive: int, held: Held, lacks: str) -> None:
+        """A drive is ready to tell: what was read of it, and why it tells none, or empty."""
         config = self._drives[drive]
         rated_nm = config.rated_torque_nm or _THOUSANDTH * held.get(RATED_TORQUE, 0)
-        why = _why_none(config, lacks.get(EFFORT, ""), rated_nm)
+        why = _why_none(config, lacks, rated_nm)
         self._tells_none.pop(drive, None)
         if why:
             self._tells_none[drive] = why

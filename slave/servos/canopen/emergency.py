@@ -11,24 +11,44 @@ SAFE_TORQUE_OFF = 0x8A88
 
 CODES = {
     0x1000: "generic error",
+    0x2220: "over-current inside of the drive",
     0x2310: "over-current at the output",
     0x2320: "short circuit at the output",
+    0x2330: "earth leakage at the output",
+    0x2340: "short circuit of the motor",
+    0x3110: "over-voltage of the mains",
+    0x3120: "under-voltage of the mains",
+    0x3130: "a phase is missing",
     0x3210: "over-voltage of the supply",
     0x3220: "under-voltage of the supply",
+    0x4110: "ambient temperature too high",
     0x4210: "over-temperature of the drive",
     0x4310: "over-temperature of the motor",
+    0x5113: "under-voltage of its 5 V supply",
     0x5200: "control hardware failed",
+    0x5440: "its contacts failed",
     0x5530: "its memory failed",
     0x6100: "its software failed",
     0x6320: "a parameter is wrong",
+    0x7110: "its brake failed",
     0x7121: "the motor is blocked",
+    0x7122: "wrong commutation, or the motor's wires are swapped",
     0x7300: "a sensor failed",
+    0x7303: "resolver 1 failed",
     0x7305: "the motor's encoder failed",
+    0x7306: "its second encoder failed",
+    0x7310: "too fast",
+    0x7320: "its position sensor failed",
     0x8110: "CAN frames lost",
     0x8120: "CAN error passive",
     HEARTBEAT_MISSED: "it missed the slave's heartbeat",
     0x8140: "recovered from bus-off",
+    0x8150: "two nodes send one identifier",
     0x8210: "a PDO was too short",
+    0x8220: "a PDO was too long",
+    0x8250: "it missed its PDO",
+    0x8480: "its speed controller failed",
+    0x8500: "its position controller failed",
     0x8611: "following error",
     0x8612: "position limit reached",
     SAFE_TORQUE_OFF: "safe torque off is active",
@@ -71,6 +91,8 @@ class Emergency:
 
     code: int
     register: int
+    own: bytes = b""
+    """The maker's five bytes; told where the code alone says little."""
 
     @property
     def over(self) -> bool:
@@ -82,9 +104,10 @@ class Emergency:
         """The message for a person."""
         named = CODES.get(self.code) or f"{CLASSES.get(self.code >> 12, 'unknown')}"
         bits = [name for bit, name in enumerate(REGISTER) if self.register >> bit & 1 and name != "generic"]
-        return f"{named} (code {self.code:04X}{', ' if bits else ''}{', '.join(bits)})"
+        makers = [f"maker's bytes {self.own.hex(' ')}"] if any(self.own) and self.code not in CODES else []
+        return f"{named} (code {', '.join([f'{self.code:04X}', *bits, *makers])})"
 
 
 def emergency(data: bytes) -> Emergency | None:
     """Read a message; None where it is not 8 bytes long."""
-    return Emergency(*_HEAD.unpack_from(data)) if len(data) == 8 else None
+    return Emergency(*_HEAD.unpack_from(data), own=data[3:]) if len(data) == 8 else None

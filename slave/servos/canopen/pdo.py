@@ -8,13 +8,10 @@ from numpy.typing import NDArray
 NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO3, TPDO2 = 0x000, 0x080, 0x080, 0x180, 0x200, 0x380, 0x280
 SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x580, 0x600, 0x700
 """Function codes of CiA 301's predefined connection set; a node's id is added to all but NMT and SYNC."""
+RPDOS = (RPDO1, 0x300, 0x400, 0x500)
 
 ENCODER = 0x2000
-"""Manufacturer's object: the output encoder's word."""
-RPDO_MAPPING = (0x6040_0010, 0x607A_0020)
-"""Controlword, target position: as entries of 1600h (index, subindex, bits)."""
-TPDO_MAPPING = (0x6041_0010, ENCODER << 16 | 0x0010, 0x6064_0020)
-"""Statusword, encoder word, actual position: the eight bytes that a classic frame has."""
+"""The object in which the drives of `tandem drives` show the output encoder's word."""
 INPUTS = 0x60FD
 """Digital inputs, 32 bits; sent by the drives of `tell_inputs`, as TPDO 3."""
 INPUTS_MAPPING = (INPUTS << 16 | 0x0020,)

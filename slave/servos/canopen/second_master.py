@@ -13,7 +13,6 @@ from slave.servos.canopen import pdo
 
 GONE_NS = NS_PER_S
 """A second master that is silent for this time is gone: a start or reset is possible again."""
-_RPDOS = (0x200, 0x300, 0x400, 0x500)
 _LSS = 0x7E5
 """LSS master to its slaves (CiA 305)."""
 
@@ -34,7 +33,7 @@ def master_s_frame(frame_id: int, nodes: Mapping[int, str], own_id: int) -> tupl
         return f"heartbeats with the slave's own node id {own_id}", ""
     if code == pdo.SDO_REQUEST and node in nodes:
         return "SDO requests to", f"node {node} ({nodes[node]})"
-    if code in _RPDOS and node in nodes:
+    if code in pdo.RPDOS and node in nodes:
         return "targets (RPDO) for", f"node {node} ({nodes[node]})"
     return None
 

@@ -30,9 +30,9 @@ from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drives import Drives
 from slave.servos.canopen.load import WELL, too_much
 from slave.servos.canopen.pdo import RPDO1
-from slave.servos.canopen.signs import DriveSigns
 from slave.servos.canopen.wiring import Outgoing
 from slave.servos.servos import EncoderReading, check_setpoint
+from slave.servos.signs import DriveSigns
 
 log = logging.getLogger(__name__)
 
@@ -108,6 +108,8 @@ class CanopenServos:
             self._listen()
             self._spoken = True
             self._come_up()
+            for joint, words in self._drives.left_out.items():
+                log.warning("%s: its drive lacks %s", joint, words)
         except BaseException:
             self.stop()
             raise
@@ -168,7 +170,8 @@ class CanopenServos:
                 "sync_period": self._period.summary(),
             },
             buses={name: bus.metrics() for name, bus in self._buses.items()},
-            no_effort=self._drives.efforts.missing,
+            no_effort=self._drives.no_effort,
+            left_out=self._drives.left_out,
         )
 
     def _check_load(self, bus: BusConfig) -> None:
@@ -260,7 +263,7 @@ class CanopenServos:
         name, frame_id, data = outgoing
         bus = self._buses.get(name)
         if bus is not None:
-            bus.send(CanFrame(frame_id, data, False))
+            bus.send(CanFrame(frame_id, data or b"", False, remote=data is None))
 
     def _on_frame(self, name: str, frame_id: int, data: bytes, now_ns: int) -> None:
         drives = self._drives

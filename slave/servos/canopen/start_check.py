@@ -35,6 +35,8 @@ class JointPlace:
     """The drive's software limits."""
     increments_per_rad: float
     zero_increments: int
+    single: bool = False
+    """Whether the drive alone tells the angle; the guard then asks for the last known one, or a person."""
 
 
 def refusal(place: JointPlace, statusword: int) -> str:
@@ -59,6 +61,8 @@ def _range(place: JointPlace) -> str:
 
 
 def _reference(place: JointPlace) -> str:
+    if place.single:
+        return ""
     if place.encoder_rad is not None:
         return _by_encoder(place, place.encoder_rad)
     if place.last_known_rad is None:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from slave.servos.canopen.config import CanopenConfig, limits_rad
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.drive_config import limits_rad
 
 
 @dataclass(frozen=True, slots=True)

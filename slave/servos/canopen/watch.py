@@ -43,11 +43,16 @@ class DriveWatch:
         period_ns: int,
         pending_ns: int,
         last_known_rad: Mapping[str, float],
+        single: Mask | None = None,
     ) -> None:
-        """Answers to the SYNCs of the last `pending_ns` may still be on their way."""
+        """Answers to the SYNCs of the last `pending_ns` may still be on their way.
+
+        `single` (J,): whose angle the drive alone tells, so that nothing can contradict it.
+        """
         joints = len(joint_names)
         self._names = tuple(joint_names)
         self._units = units
+        self._single: Mask = np.zeros(joints, np.bool_) if single is None else single
         self._encoders = encoders
         self._last_known = [last_known_rad.get(name) for name in joint_names]
         self._unanswered = [0] * joints
@@ -124,7 +129,9 @@ class DriveWatch:
         heard = seen.fresh & on
         span = self._targets_rad.min(axis=0), self._targets_rad.max(axis=0)
         moves = self._motion.judge(seen.synced_ns, span, self.drive_rad, heard)
-        differs = self._agreement.judge(self.drive_rad, self.encoder_rad, seen.fresh & seen.encoder_valid)
+        differs = self._agreement.judge(
+            self.drive_rad, self.encoder_rad, seen.fresh & seen.encoder_valid & ~self._single
+        )
         bad = (seen.statusword & WATCHED) != GOOD
         self._bad_bits = np.where(seen.fresh & running, np.where(bad, self._bad_bits + 1, 0), self._bad_bits)
         ignores = running & (self._bad_bits >= BAD_SYNCS)
@@ -156,4 +163,5 @@ class DriveWatch:
             limits_rad=units.limits_rad[drive],
             increments_per_rad=float(units.scale[drive]),
             zero_increments=int(units.zero[drive]),
+            single=bool(self._single[drive]),
         )

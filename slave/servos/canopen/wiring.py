@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 from common.skeleton import Skeleton
 from slave.servos.canopen import pdo
+from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION
 from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.mapping import DrivePdos, mapped
 
-Outgoing = tuple[str, int, bytes]
-"""Bus name, identifier, data."""
+Outgoing = tuple[str, int, bytes | None]
+"""Bus name, identifier, data; None: a remote request."""
 START, STOP, PRE_OPERATIONAL = 0x01, 0x02, 0x80
 """NMT commands."""
 BOOTED, OPERATIONAL = 0x00, 0x05
@@ -24,10 +26,26 @@ class DriveWiring:
         self.where = [(drive.bus, drive.id) for drive in config.drives_of(skeleton).values()]
         """Bus and node id of each drive."""
         self._buses = [bus.name for bus in config.buses]
+        self.pdos = [
+            mapped(drive.id, CYCLIC_SYNCHRONOUS_POSITION, drive.encoder)
+            for drive in config.drives_of(skeleton).values()
+        ]
+        """The PDOs of each drive; other ones once it is known that its mapping cannot be changed."""
         self._beat = pdo.HEARTBEAT + config.node_id
-        self._targets = [(bus, pdo.RPDO1 + node) for bus, node in self.where]
-        self._by_answer = {(bus, pdo.TPDO1 + node): i for i, (bus, node) in enumerate(self.where)}
+        self._by_answer: dict[tuple[str, int], int] = {}
+        self._guarded: set[int] = set()
+        for i, own in enumerate(self.pdos):
+            self.connect(i, own, guarded=False)
         self._by_node = {where: i for i, where in enumerate(self.where)}
+
+    def connect(self, drive: int, pdos: DrivePdos, guarded: bool) -> None:
+        """From now on a drive has these PDOs; `guarded`: it has no heartbeat and is asked for its state."""
+        bus = self.where[drive][0]
+        self._by_answer.pop((bus, self.pdos[drive].tpdo_id), None)
+        self._by_answer[bus, pdos.tpdo_id] = drive
+        self.pdos[drive] = pdos
+        self._guarded.discard(drive)
+        self._guarded |= {drive} if guarded else set()
 
     def answering(self, bus: str, frame_id: int) -> int | None:
         """The drive whose answer to SYNC has this identifier, or None."""
@@ -53,8 +71,10 @@ class DriveWiring:
         return bus, pdo.SDO_REQUEST + node, data
 
     def heartbeats(self) -> list[Outgoing]:
-        """The slave's own, one a bus."""
-        return [(bus, self._beat, bytes([OPERATIONAL])) for bus in self._buses]
+        """The slave's own, one a bus, and a request to each drive that is guarded instead."""
+        beats: list[Outgoing] = [(bus, self._beat, bytes([OPERATIONAL])) for bus in self._buses]
+        asked = (self.where[drive] for drive in sorted(self._guarded))
+        return beats + [(bus, pdo.HEARTBEAT + node, None) for bus, node in asked]
 
     def syncs(self) -> list[Outgoing]:
         """SYNC, one a bus."""
@@ -62,5 +82,5 @@ class DriveWiring:
 
     def targets(self, data: Sequence[bytes], seen: Sequence[bool]) -> list[Outgoing]:
         """Each drive's target, of those drives that are `seen`."""
-        rows = zip(self._targets, data, seen, strict=True)
-        return [(bus, frame_id, part) for (bus, frame_id), part, send in rows if send]
+        rows = zip(self.where, self.pdos, data, seen, strict=True)
+        return [(bus, own.rpdo_id, own.rpdo(part)) for (bus, _), own, part, send in rows if send]

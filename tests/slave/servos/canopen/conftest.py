@@ -15,6 +15,7 @@ from deploy.sim.drives.peer import DrivePeer
 from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drives import Drives
+from slave.servos.canopen.wiring import Outgoing
 
 STEP_NS = 4 * NS_PER_MS
 
@@ -44,9 +45,13 @@ class Wired:
         if self.alive and bus not in self.cut:
             self.drives.on_frame(bus, frame_id, data, self.now_ns)
 
-    def _to_drives(self, frames: list[tuple[str, int, bytes]]) -> None:
+    def _to_drives(self, frames: list[Outgoing]) -> None:
         for bus, frame_id, data in frames:
-            if bus not in self.cut:
+            if bus in self.cut:
+                continue
+            if data is None:
+                self.peer.on_remote(bus, frame_id, self.now_ns)
+            else:
                 self.peer.on_frame(bus, frame_id, data, self.now_ns)
 
     def _flush(self) -> None:

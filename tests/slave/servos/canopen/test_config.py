@@ -5,7 +5,8 @@ import pytest
 from common.skeleton import load_skeleton
 from slave.backends import ServosConfig
 from slave.encoders.counts import EncoderConfig
-from slave.servos.canopen.config import CanopenConfig, DriveConfig
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.drive_config import DriveConfig
 
 NURSING = load_skeleton("nursing")
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from common.quaternion import Array
 from deploy.sim.drives.faults import DriveFault
+from deploy.sim.drives.traits import Traits
 from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import Power
@@ -263,19 +262,11 @@ def test_a_drive_that_is_not_there_is_named_with_its_place(wired: Wired) -> None
 
 
 def test_a_setting_that_is_refused_is_told_with_its_object(wired: Wired) -> None:
-    node: Any = wired.peer.drives[0]._node
-    node.add_write_callback(_refuse_limits)
+    wired.peer.drives[0].become(Traits(read_only=frozenset({0x6060})))
     wired.start()
-    wired.run(0.2)
+    wired.run(0.3)
     said = wired.drives.not_running["neck_yaw"]
-    assert "refuses its configuration: object 607D:1: value out of range" in said
-
-
-def _refuse_limits(index: int, **_: object) -> None:
-    from canopen.sdo.exceptions import SdoAbortedError
-
-    if index == 0x607D:
-        raise SdoAbortedError(0x06090030)
+    assert "refuses its configuration: object 6060:0: cannot be written" in said
 
 
 def test_frames_of_wrong_length_and_of_strangers_change_nothing(wired: Wired) -> None:

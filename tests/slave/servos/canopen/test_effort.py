@@ -9,7 +9,8 @@ from common.quaternion import Array
 from common.skeleton import load_skeleton
 from deploy.sim.drives.faults import DriveFault
 from slave.encoders.counts import EncoderConfig
-from slave.servos.canopen.config import CanopenConfig, DriveConfig, EffortSource
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.drive_config import DriveConfig, EffortSource
 from tests.slave.servos.canopen.conftest import Wired
 
 ROLL = "left_shoulder_roll"
@@ -61,7 +62,7 @@ def test_what_is_told_is_the_torque_at_the_joint(reverse: bool) -> None:
     effort = outstretched(wired)
     assert abs(effort[wired.index(ROLL)]) > 3.0
     assert (np.abs(effort - wired.peer.plant.effort_nm) <= tolerance_nm(wired)).all()
-    assert wired.drives.efforts.missing == {}
+    assert wired.drives.no_effort == {}
 
 
 @pytest.mark.parametrize(("polarity", "correct"), [(0x00, False), (0xA0, False), (0x80, False), (0x00, True)])
@@ -97,7 +98,7 @@ def test_a_drive_that_cannot_tell_it_is_left_out_and_said(lacks: int, said: str)
     effort = outstretched(wired)
     assert np.isnan(effort).sum() == 1
     assert np.isnan(effort[wired.index(ROLL)])
-    assert wired.drives.efforts.missing == {ROLL: said}
+    assert wired.drives.no_effort == {ROLL: said}
     assert not wired.drives.faults
 
 
@@ -108,7 +109,7 @@ def test_where_no_drive_tells_any_there_is_none() -> None:
     wired.up()
     wired.run(0.5)
     assert wired.drives.reading.effort_nm is None
-    assert len(wired.drives.efforts.missing) == 25
+    assert len(wired.drives.no_effort) == 25
 
 
 def test_the_file_s_rated_torque_comes_before_the_drive_s() -> None:
@@ -129,7 +130,7 @@ def test_a_file_may_want_none_and_then_nothing_is_sent_for_it() -> None:
     wired = Wired(geared(effort=EffortSource.NONE))
     effort = outstretched(wired)
     assert np.isnan(effort[wired.index(ROLL)])
-    assert wired.drives.efforts.missing == {ROLL: 'the file says so (effort = "none")'}
+    assert wired.drives.no_effort == {ROLL: 'the file says so (effort = "none")'}
     assert wired.peer.drives[wired.index(ROLL)].value(0x1801, 1) & 0x8000_0000
 
 
@@ -156,11 +157,11 @@ def test_a_drive_that_stops_telling_is_known_after_three_misses(every: int) -> N
         syncs += 1
     # the last telling may have come with any of the SYNCs before
     assert 3 * every - (every - 1) <= syncs - 1 <= 3 * every
-    assert wired.drives.efforts.missing == {ROLL: "its drive has stopped telling it"}
+    assert wired.drives.no_effort == {ROLL: "its drive has stopped telling it"}
     assert not wired.drives.faults
     wired.happen(ROLL, DriveFault.NONE)
     wired.run(2 * every * period_s)
-    assert wired.drives.efforts.missing == {}
+    assert wired.drives.no_effort == {}
     assert agrees(wired, newest(wired))
 
 

@@ -7,7 +7,8 @@ import pytest
 from common.can.config import BusConfig
 from common.skeleton import load_skeleton
 from slave.encoders.counts import EncoderConfig
-from slave.servos.canopen.config import CanopenConfig, DriveConfig
+from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.drive_config import DriveConfig
 from slave.servos.canopen.load import BUSIEST, bits_per_s, frame_bits, too_much
 
 NURSING = load_skeleton("nursing")
