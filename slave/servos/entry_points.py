@@ -20,7 +20,7 @@ GROUP = "tandem.servos"
 class InstalledBackends(Mapping[str, Backend[BackendConfig]]):
     """All backends by name. Taking one loads its package."""
 
-    def __init__(self, own: Mapping[str, Backend[BackendConfig]]) -> None:
+    def __init__(self, own: Mapping[str, object]) -> None:
         """`own`: tandem's own, known also where tandem is a checkout that is not installed."""
         self._own = own
 
@@ -34,12 +34,10 @@ class InstalledBackends(Mapping[str, Backend[BackendConfig]]):
 
     def __getitem__(self, name: str) -> Backend[BackendConfig]:
         """The backend of a name. Raises KeyError for an unknown one, TandemError if it cannot be loaded."""
-        if name in self._own:
-            return self._own[name]
-        where = self._others()[name]
+        where = own_place(name) if name in self._own else self._others()[name]
         module, _, attribute = where.partition(":")
         try:
-            found = getattr(import_module(module), attribute)
+            found: object = self._own.get(name) or getattr(import_module(module), attribute)
         except (ImportError, AttributeError) as error:
             raise TandemError(
                 f"servo backend {name!r} cannot be loaded from {where} ({error}): "

@@ -55,9 +55,11 @@ class MappedPdos:
         """
         self._layouts.pop(index, None)
         self._ids.pop(index, None)
-        entries = index + 0x200
+        if cob_id & INVALID:
+            return
+        entries, emptied = index + 0x200, count == 0
         count = self._value(entries, 0) if count is None else count
-        if cob_id & INVALID or not count:
+        if not count and emptied:
             return
         mapped = [self._value(entries, sub) for sub in range(1, count + 1)]
         self._layouts[index] = layout(mapped, TAKEN if index in RPDOS else GIVEN)

@@ -20,10 +20,11 @@ def dictionary(wide_period: bool = False) -> canopen.ObjectDictionary:
 
     `wide_period`: with 16 bits in 60C2h:1.
     """
-    entries = canopen.import_od(str(EDS), node_id=1)
+    entries: Any = canopen.import_od(str(EDS), node_id=1)
     if wide_period:
         entries[0x60C2][1].data_type = canopen.objectdictionary.datatypes.UNSIGNED16
-    return entries
+    read: canopen.ObjectDictionary = entries
+    return read
 
 
 class Wire(canopen.Network):

@@ -58,8 +58,8 @@ class SyncAnswers:
 
     def statusword(self, drive: int) -> int:
         """The newest of one drive."""
-        set_, kept = self._good[drive].tolist()
-        return (int(self._table["statusword"][drive]) | set_) & kept
+        set_, kept = self._good[drive]
+        return int((self._table["statusword"][drive] | set_) & kept)
 
     def begin(self) -> None:
         """A new SYNC: nobody has answered it yet. Values stay until they are overwritten."""

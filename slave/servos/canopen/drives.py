@@ -20,7 +20,6 @@ from slave.servos.canopen.drive import DriveState, Phase
 from slave.servos.canopen.eds_check import eds_of
 from slave.servos.canopen.emergency import emergency
 from slave.servos.canopen.fault_words import FaultWords
-from slave.servos.canopen.mapping import Slice
 from slave.servos.canopen.readings import DriveReadings
 from slave.servos.canopen.second_master import SecondMaster
 from slave.servos.canopen.setup import SetupPlan
@@ -124,7 +123,7 @@ class Drives:
             return
         for told in (own.effort, own.inputs):
             if told is not None and told.frame_id == frame_id:
-                self._on_told(drive, own.effort is told, _cut(told, data), now_ns)
+                self._on_told(drive, own.effort is told, told.of(data), now_ns)
         twice = self._watch.answered(drive)
         if twice and self._drives[drive].phase in LISTENED:
             self._supervision.fail(drive, twice)
@@ -161,7 +160,7 @@ class Drives:
             case _:
                 both = (own.effort, own.inputs)
                 told = next((one for one in both if one and one.frame_id == frame_id), None)
-                if told is None or not self._on_told(i, told is own.effort, _cut(told, data), now_ns):
+                if told is None or not self._on_told(i, told is own.effort, told.of(data), now_ns):
                     self.unknown += 1
 
     def _on_told(self, i: int, effort: bool, data: bytes, now_ns: int) -> bool:
@@ -298,7 +297,3 @@ class Drives:
     def _update_faults(self) -> None:
         if self._words.update(self.second_master.words):
             self._supervision.settled = False
-
-
-def _cut(told: Slice, data: bytes) -> bytes:
-    return data[told.at : told.at + told.size] if len(data) > told.size else data

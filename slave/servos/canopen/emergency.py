@@ -110,4 +110,7 @@ class Emergency:
 
 def emergency(data: bytes) -> Emergency | None:
     """Read a message; None where it is not 8 bytes long."""
-    return Emergency(*_HEAD.unpack_from(data), own=data[3:]) if len(data) == 8 else None
+    if len(data) != 8:
+        return None
+    code, register = _HEAD.unpack_from(data)
+    return Emergency(code, register, data[3:])

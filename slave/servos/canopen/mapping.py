@@ -32,6 +32,11 @@ class Slice:
     frame_id: int
     at: int
     size: int
+    frame_bytes: int
+
+    def of(self, data: bytes) -> bytes:
+        """The bytes; empty where the frame is of another length."""
+        return data[self.at : self.at + self.size] if len(data) == self.frame_bytes else b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +83,8 @@ def mapped(node_id: int, mode: int, encoder: int | None) -> DrivePdos:
     return DrivePdos(
         pdo.RPDO1 + node_id, bytes(pdo.RPDO_BYTES), 0, 2, pdo.TPDO1 + node_id, 8 if has else 6, 0,
         4 if has else 2, 2 if has else None,
-        Slice(pdo.TPDO2 + node_id, 0, pdo.EFFORT_BYTES), Slice(pdo.TPDO3 + node_id, 0, pdo.INPUTS_BYTES),
+        Slice(pdo.TPDO2 + node_id, 0, pdo.EFFORT_BYTES, pdo.EFFORT_BYTES),
+        Slice(pdo.TPDO3 + node_id, 0, pdo.INPUTS_BYTES, pdo.INPUTS_BYTES),
     )  # fmt: skip
 
 
@@ -168,5 +174,5 @@ def where(tpdos: Sequence[FixedPdo], entry: int) -> Slice | None:
     for one in tpdos:
         at = one.at(entry)
         if at is not None:
-            return Slice(one.frame_id, at, (entry & 0xFF) // 8)
+            return Slice(one.frame_id, at, (entry & 0xFF) // 8, one.size)
     return None

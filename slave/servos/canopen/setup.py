@@ -66,7 +66,7 @@ class SetupPlan:
 
     def begin(self) -> list[Transfer]:
         """The first transfers; whatever was before is forgotten."""
-        self.mode = self._settings.drive.mode or 8
+        self.mode: int = self._settings.drive.mode or 8
         self.pdos: DrivePdos = mapped(self._settings.drive.id, self.mode, self._settings.drive.encoder)
         self.guarded = False
         """Whether node guarding takes the place of heartbeats."""

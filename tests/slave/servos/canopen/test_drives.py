@@ -302,7 +302,7 @@ def test_a_drive_that_restarts_while_configured_is_configured_anew(wired: Wired)
 
     def asked() -> list[bytes]:
         frames, drives.outbox = drives.outbox, []
-        return [data for where, frame_id, data in frames if (where, frame_id) == (bus, request)]
+        return [data or b"" for where, frame_id, data in frames if (where, frame_id) == (bus, request)]
 
     first = asked()[0]
     drives.on_frame(bus, pdo.SDO_ANSWER + node, b"\x60" + first[1:4] + bytes(4), now_ns)

@@ -7,6 +7,7 @@ import pytest
 
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.drives import Drives
+from slave.servos.canopen.wiring import Outgoing
 from tests.slave.servos.canopen.conftest import Wired
 
 FRAMES = [
@@ -66,16 +67,16 @@ class TwoMasters(Wired):
         if self.other is not None:
             self.other.on_frame(bus, frame_id, data, self.now_ns)
 
-    def _to_drives(self, frames: list[tuple[str, int, bytes]]) -> None:
+    def _to_drives(self, frames: list[Outgoing]) -> None:
         super()._to_drives(frames)
         if self.other is not None:
-            for frame in frames:
-                self.other.on_frame(*frame, self.now_ns)
+            for bus, frame_id, data in frames:
+                self.other.on_frame(bus, frame_id, data or b"", self.now_ns)
 
-    def of_other(self, frames: list[tuple[str, int, bytes]]) -> None:
-        for frame in frames:
-            self.peer.on_frame(*frame, self.now_ns)
-            self.drives.on_frame(*frame, self.now_ns)
+    def of_other(self, frames: list[Outgoing]) -> None:
+        for bus, frame_id, data in frames:
+            self.peer.on_frame(bus, frame_id, data or b"", self.now_ns)
+            self.drives.on_frame(bus, frame_id, data or b"", self.now_ns)
 
 
 def test_two_slaves_stop_the_robot_once_and_it_stands() -> None:

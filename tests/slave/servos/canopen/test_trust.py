@@ -13,7 +13,7 @@ from slave.guard import GuardConfig
 from slave.limit.limit import SetpointLimiter
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
-from slave.servos.canopen.drive import DriveState
+from slave.servos.canopen.setup_run import SetupRun
 from slave.servos.canopen.start_check import LAST_KNOWN_RAD, SLACK_RAD, JointPlace, refusal
 from slave.servos.canopen.status_bits import FOLLOWS, GOOD, LIMITED, REMOTE, VOLTAGE, wrong_bits
 from slave.servos.canopen.watch import DriveWatch
@@ -76,7 +76,7 @@ def wrong_from_the_start(fault: DriveFault, elbow_deg: float = 40.0) -> Wired:
 )
 def test_a_drive_that_is_wrong_at_the_start_is_named_and_moves_nothing(fault: DriveFault, said: str) -> None:
     wired = wrong_from_the_start(fault)
-    wired.run(2.0)
+    wired.until(lambda: wired.drives.failed, 5.0)
     assert said in wired.drives.faults[ELBOW]
     assert not wired.drives.running
     assert wired.drives.failed
@@ -318,16 +318,16 @@ def test_without_counting_answers_two_drives_of_one_id_look_alike(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(DriveWatch, "answered", lambda *_: "")
-    monkeypatch.setattr(DriveState, "_notice_second", lambda *_: None)
+    monkeypatch.setattr(SetupRun, "answers_twice", lambda *_: False)
     assert "two drives" not in wrong_from_the_start(DriveFault.DOUBLE_ID).drives.faults.get(ELBOW, "")
 
 
-@pytest.mark.parametrize("kept", ["answered", "_notice_second"])
+@pytest.mark.parametrize("kept", ["answered", "answers_twice"])
 def test_either_way_alone_finds_two_drives_of_one_id(monkeypatch: pytest.MonkeyPatch, kept: str) -> None:
     if kept != "answered":
         monkeypatch.setattr(DriveWatch, "answered", lambda *_: "")
     else:
-        monkeypatch.setattr(DriveState, "_notice_second", lambda *_: None)
+        monkeypatch.setattr(SetupRun, "answers_twice", lambda *_: False)
     assert "two drives" in wrong_from_the_start(DriveFault.DOUBLE_ID).drives.faults[ELBOW]
 
 
