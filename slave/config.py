@@ -75,13 +75,13 @@ class SlaveConfig(Section):
 
     def _unconfirmed(self, skeleton: Skeleton) -> list[ConfigMistake]:
         """A profile that an import guessed moves no real drive before a person has looked at it."""
-        if not skeleton.unconfirmed or self.servos.backend == "mujoco":
+        if not skeleton.unconfirmed or self.servos.simulated:
             return []
         expected = (
             f"mujoco while {len(skeleton.unconfirmed)} entries of the profile are guesses "
             f"({skeleton.unconfirmed[0]}, …): look at `tandem profile check`, then empty its list unconfirmed"
         )
-        return [ConfigMistake("servos.backend", self.servos.backend, expected)]
+        return [ConfigMistake("servos.backend", ", ".join(self.servos.names), expected)]
 
     def _unfelt_zones(self, skeleton: Skeleton) -> list[ConfigMistake]:
         """Force limits of zones that no drive could tell of."""

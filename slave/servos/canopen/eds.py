@@ -21,7 +21,7 @@ class EdsError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class EdsEntry:
     """One entry of an object dictionary."""
 
     access: str
@@ -39,7 +39,7 @@ class Eds:
     name: str
     vendor: int | None
     product: int | None
-    entries: dict[tuple[int, int], Entry] = field(repr=False)
+    entries: dict[tuple[int, int], EdsEntry] = field(repr=False)
 
     def refusal(self, transfer: Transfer) -> str:
         """Why a drive of this file refuses a transfer; empty where it takes it."""
@@ -83,7 +83,7 @@ def read_eds(path: Path) -> Eds:
         value = _number(table.get("ParameterValue", "") or table.get("DefaultValue", ""))
         bits = _BITS.get(_number(table.get("DataType", "")) or 0)
         place = int(found[1], 16), int(found[2] or "0", 16)
-        entries[place] = Entry(table.get("AccessType", "rw").strip().lower(), bits, value)
+        entries[place] = EdsEntry(table.get("AccessType", "rw").strip().lower(), bits, value)
     if (0x1000, 0) not in entries:
         raise EdsError("an EDS file, with a section [1000] and one for each object of the drive")
     about = parser["DeviceInfo"] if parser.has_section("DeviceInfo") else {}

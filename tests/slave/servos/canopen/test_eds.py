@@ -39,7 +39,7 @@ PDOS = {
 def eds(**changes: tuple[str, str, str] | None) -> str:
     """A file with these entries changed, or left out."""
     entries = {**NEEDED, **PDOS, **{name.removeprefix("o"): entry for name, entry in changes.items()}}
-    head = "[DeviceInfo]\nVendorNumber=0x000000FB\nProductNumber=1617428480\n"
+    head = "[DeviceInfo]\nVendorNumber=0x000000FB\nProductNumber=1615855616\n"
     sections = [
         f"[{name}]\nParameterName=x\nObjectType=0x7\nDataType={entry[0]}\nAccessType={entry[1]}\n"
         f"DefaultValue={entry[2]}\n"
