@@ -241,7 +241,7 @@ class Slave:
         """Why the drives may push harder than moving needs; empty where they may not."""
         if not self._config.contact.torque_limit:
             return "contact.torque_limit is switched off"
-        backend = self._config.servos.backend
+        backend = ", ".join(self._config.servos.names)
         return "" if self._limit_torque is not None else f"tandem cannot limit the torque of {backend} servos"
 
 

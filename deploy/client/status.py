@@ -201,7 +201,6 @@ class RobotStatus:
     """What a joint's drive lacks that it may lack, in words."""
     not_driven: dict[str, str] = field(default_factory=dict)
     """Joints without a servo, in words."""
-    """Joint groups that hold until the operator takes them up."""
 
 
 def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> RobotStatus:
