@@ -86,7 +86,7 @@ class SlaveConfig(Section):
     def _unfelt_zones(self, skeleton: Skeleton) -> list[ConfigMistake]:
         """Force limits of zones that no drive could tell of."""
         try:
-            unknown = self.servos.chosen.no_effort(skeleton)
+            unknown = self.servos.no_effort(skeleton)
         except ConfigError:  # told by the servos
             return []
         if len(unknown) < len(skeleton.joints):
