@@ -17,7 +17,7 @@ from slave.servos.backend import Backend, BackendConfig, Chosen, LastKnownAngles
 from slave.servos.canopen.backend import BACKEND as CANOPEN
 from slave.servos.dynamixel.backend import BACKEND as DYNAMIXEL
 from slave.servos.entry_points import InstalledBackends
-from slave.servos.mixed import MixedServos, Part
+from slave.servos.mixed import MixedServos, ServoPart
 from slave.servos.mujoco.backend import BACKEND as MUJOCO
 from slave.servos.payload import PayloadConfig, payload_mistakes
 from slave.servos.servos import Servos
@@ -171,7 +171,7 @@ class ServosConfig(Section):
             backend = _backend(share.name)
             servos = backend.open(share.section, share.skeleton, share.encoders, last_known_rad or {})
             own = [skeleton.joint_names.index(name) for name in share.skeleton.joint_names]
-            opened.append((backend.ticked, Part(share.name, servos, np.array(own, np.intp))))
+            opened.append((backend.ticked, ServoPart(share.name, servos, np.array(own, np.intp))))
         if not self.joints:
             return opened[0][1].servos
         opened.sort(key=lambda each: each[0])

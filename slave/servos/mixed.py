@@ -18,7 +18,7 @@ from slave.servos.signs import DriveSigns, TellingServos
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ServoPart:
     """The servos of one backend."""
 
     name: str
@@ -30,7 +30,7 @@ class Part:
 class MixedServos:
     """Servos (see `slave.servos.Servos`) of several backends. A fault of one is a fault of the robot."""
 
-    def __init__(self, joint_names: Sequence[str], parts: Sequence[Part]) -> None:
+    def __init__(self, joint_names: Sequence[str], parts: Sequence[ServoPart]) -> None:
         """`parts` in the order of their start; together they drive each joint once."""
         self._names = tuple(joint_names)
         self._parts = tuple(parts)
@@ -40,7 +40,7 @@ class MixedServos:
 
         Raises RobotError that names the backend.
         """
-        started: list[Part] = []
+        started: list[ServoPart] = []
         try:
             for part in self._parts:
                 started.append(part)

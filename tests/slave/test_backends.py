@@ -31,7 +31,7 @@ from slave.servos.backend import Backend, BackendConfig
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.contract import Subject, check
 from slave.servos.entry_points import GROUP, own_place
-from slave.servos.mixed import MixedServos, Part
+from slave.servos.mixed import MixedServos, ServoPart
 from slave.servos.shares import part_of
 
 HAND = load_skeleton("hand")
@@ -315,7 +315,7 @@ class WillNot(Ideal):
 def mixed(*servos: Ideal) -> MixedServos:
     """Hands of 14 joints: the first half by one kind of servos, the rest by another."""
     each = enumerate(zip(servos, HALVES, strict=True))
-    return MixedServos(HAND.joint_names, [Part(f"kind{i}", one, joints) for i, (one, joints) in each])
+    return MixedServos(HAND.joint_names, [ServoPart(f"kind{i}", one, joints) for i, (one, joints) in each])
 
 
 HALVES = np.array_split(np.arange(len(HAND.joints)), 2)
