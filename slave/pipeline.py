@@ -145,7 +145,8 @@ class SlavePipeline:
 
         A joint without a servo stays where it stands, as one of which the operator's angle is not known.
         """
-        if command.valid.shape == self._driven.shape:
+        # what is no mask of the joints goes to the gate as it came, and is refused there
+        if command.valid.shape == self._driven.shape and command.valid.dtype == np.bool_:
             command = replace(command, valid=command.valid & self._driven)
         admission = self.guard.admit(command, received_ns, now_ns, offset)
         if admission.accepted:
