@@ -42,8 +42,9 @@ class ContactConfig(Section):
     10 ms by the 12-bit output encoders, 4 ms where the drives tell their own, finer angles."""
     model_error: float = Field(0.15, ge=0.0, le=1.0)
     """Share of the torque that the model asks for by which it may be wrong: masses, payload, gears."""
-    effort_late_s: float = Field(0.004, ge=0.0, le=0.05)
-    """A motor's torque may be older than the angle beside it by so much: a cycle of the drives."""
+    effort_late_s: float = Field(0.006, ge=0.0, le=0.05)
+    """A motor's torque may be older than the angle beside it by so much: a cycle of the drives of 4 ms, and
+    half of one, for how fast the torque changes is known as late."""
     retreat_m: float = Field(0.03, gt=0.0, le=0.2)
     """How far `retreat` goes on once nothing pushes any more: no part of the robot moves farther."""
     retreat_m_s: float = Field(0.1, gt=0.0, le=0.25)

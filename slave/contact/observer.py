@@ -10,12 +10,11 @@ import numpy as np
 from common.clock import to_s
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from slave.contact.stamps import SETTLED, StampNoise
 from slave.model.build import build_model, unit_rates
 
 LONGEST_S = 0.025
 """With more time than this between two readings it is not known what happened meanwhile: begin anew."""
-_SETTLED = 12.0
-"""After so many time constants the residual no longer depends on where it began."""
 
 
 class MomentumObserver:
@@ -33,10 +32,14 @@ class MomentumObserver:
         """`time_constant_s`: 1/K. `model`: the robot's; None: that of the skeleton."""
         self.model = build_model(skeleton) if model is None else model
         self.data = mujoco.MjData(self.model)
+        # fetched once, as every access builds a new view
+        self._hinge_rad, self._hinge_rad_s = self.data.qpos, self.data.qvel
         self.rates: Array = unit_rates(skeleton, self.model)
         """(J, hinges)"""
         self._time_constant_s = time_constant_s
         self._inertial, self._bias = np.empty(self.model.nv), np.empty(self.model.nv)
+        self._inertia = np.empty((self.model.nv, self.model.nv))
+        self._joint_rates = np.abs(self.rates)
         self.restart()
 
     def restart(self) -> None:
@@ -47,11 +50,16 @@ class MomentumObserver:
         self._known_s = 0.0
         self._position_rad, self._velocity_rad_s, self._effort_nm = np.zeros((3, joints))
         self._poles = np.zeros((3, 3, joints))
+        self._value = np.zeros((3, joints))
+        self._unheard = False
+        """Whether a torque was not known in the last reading."""
+        self._stamps: StampNoise | None = None
+        """None while all stamps are exact."""
 
     @property
     def ready(self) -> bool:
         """Whether the estimate no longer depends on how it began."""
-        return self._known_s > _SETTLED * self._time_constant_s
+        return self._known_s > SETTLED * self._time_constant_s
 
     @property
     def external_nm(self) -> Array:
@@ -71,8 +79,16 @@ class MomentumObserver:
         out: Array = self._poles[2, 2]
         return out
 
-    def update(self, read_ns: int, position_rad: Array, effort_nm: Array) -> None:
-        """Take angles and motor torques (J,) read at one time, ns; NaN torques make NaN residuals."""
+    @property
+    def stamp_nm(self) -> Array | float:
+        """(J,) what the errors of the readings' stamps can feign at most; 0 where stamps are exact."""
+        return 0.0 if self._stamps is None else self._stamps.feigned_nm
+
+    def update(self, read_ns: int, position_rad: Array, effort_nm: Array, stamp_error_s: float = 0.0) -> None:
+        """Take angles and motor torques (J,) read at one time, ns; NaN torques make NaN residuals.
+
+        The angles may have been taken `stamp_error_s` earlier or later.
+        """
         before_ns, self._read_ns = self._read_ns, read_ns
         if before_ns is None:
             self._position_rad, self._effort_nm = position_rad, effort_nm
@@ -88,6 +104,7 @@ class MomentumObserver:
             between_s = 0.5 * (self._step_s + step_s)
             effort_rate = (effort_nm - self._effort_nm) / step_s
             self._advance(velocity, between_s, 0.5 * (self._effort_nm + effort_nm), effort_rate)
+            self._doubt_stamp(step_s, stamp_error_s)
         self._position_rad, self._velocity_rad_s = position_rad, velocity
         self._effort_nm, self._step_s = effort_nm, step_s
 
@@ -97,8 +114,8 @@ class MomentumObserver:
         """Move on from the middle of the last interval to that of this one, around the last reading."""
         model, data, rates = self.model, self.data, self.rates
         sped_up = velocity_rad_s - self._velocity_rad_s
-        data.qpos[:] = self._position_rad @ rates
-        data.qvel[:] = (0.5 * (velocity_rad_s + self._velocity_rad_s)) @ rates
+        self._hinge_rad[:] = self._position_rad @ rates
+        self._hinge_rad_s[:] = (0.5 * (velocity_rad_s + self._velocity_rad_s)) @ rates
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_crb(model, data)
@@ -106,13 +123,28 @@ class MomentumObserver:
         mujoco.mj_rne(model, data, 0, self._bias)
         mujoco.mj_mulM(model, data, self._inertial, (sped_up / elapsed_s) @ rates)
         inertial, bias = rates @ self._inertial, rates @ self._bias
-        value = np.stack(
-            (inertial + bias - effort_nm, np.abs(inertial) + np.abs(bias), np.abs(effort_rate_nm_s))
-        )
-        # a joint that is heard again begins anew
-        np.copyto(self._poles, 0.0, where=np.isnan(self._poles) & ~np.isnan(value))
+        value = self._value
+        value[0] = inertial + bias - effort_nm
+        value[1] = np.abs(inertial) + np.abs(bias)
+        value[2] = np.abs(effort_rate_nm_s)
+        unheard = math.isnan(value.sum())
+        if unheard or self._unheard:
+            # a joint that is heard again begins anew
+            np.copyto(self._poles, 0.0, where=np.isnan(self._poles) & ~np.isnan(value))
+        self._unheard = unheard
         share = -math.expm1(-elapsed_s / self._time_constant_s)
         for pole in self._poles:
             pole += share * (value - pole)
             value = pole
         self._known_s += elapsed_s
+
+    def _doubt_stamp(self, step_s: float, error_s: float) -> None:
+        """Note how wrong the newest stamp may be, beside the momentum that `_advance` has just worked out."""
+        if self._stamps is None:
+            if not error_s:
+                return
+            self._stamps = StampNoise(len(self.rates), self._time_constant_s)
+        model, data = self.model, self.data
+        mujoco.mj_fullM(model, data, self._inertia)
+        turning = np.abs(self._inertia) @ np.abs(self._hinge_rad_s)
+        self._stamps.add(step_s, error_s, self._joint_rates @ turning)

@@ -53,6 +53,8 @@ class ContactWatch:
         self._also: str | None = None
         self.count = 0
         """Contacts since the start."""
+        self.share: Array = np.zeros(len(self.floor_nm))
+        """(J,) external torque over threshold, by the newest reading that told."""
         self._watched: Mask = np.isfinite(self.floor_nm)
         self._fastest_rad_s = JUMP_FACTOR * skeleton.max_velocity_rad_s
         self._told: Mask = np.zeros(len(self.floor_nm), np.bool_)
@@ -83,7 +85,10 @@ class ContactWatch:
         """(J,) thresholds now: the more torque motion takes and the faster it changes, the higher."""
         seen, config = self.observer, self._config
         out: Array = (
-            self.floor_nm + config.model_error * seen.model_nm + config.effort_late_s * seen.effort_rate_nm_s
+            self.floor_nm
+            + config.model_error * seen.model_nm
+            + config.effort_late_s * seen.effort_rate_nm_s
+            + seen.stamp_nm
         )
         return out
 
@@ -117,11 +122,12 @@ class ContactWatch:
         if (reading.drive_rad is not None) != self._by_drives:
             self._tune(drives=reading.drive_rad is not None)
         angle_rad = position_rad if reading.drive_rad is None else reading.drive_rad
-        self.observer.update(reading.read_ns, angle_rad, effort)
+        self.observer.update(reading.read_ns, angle_rad, effort, to_s(reading.stamp_error_ns))
         if not self.observer.ready:
             return
         self._ready_ns = now_ns
         share = np.where(self._told, np.abs(self.observer.external_nm) / self.threshold_nm, 0.0)
+        self.share = share
         pushed = share > 1.0
         if pushed.any():
             self.count += self.finding is None

@@ -29,6 +29,8 @@ class EncoderReading:
     effort_nm: Array | None = None
     """(J,) torque of each motor at the joint's output, N m, positive in the joint's positive direction; NaN
     where a drive tells none. None where no drive does."""
+    stamp_error_ns: int = 0
+    """The drives may have read their angles so much before or after `read_ns`."""
 
 
 def check_setpoint(position_rad: Array, joints: int) -> None:

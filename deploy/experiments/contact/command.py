@@ -10,9 +10,12 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.progress import track
+from rich.table import Table
 
 from common.errors import TandemError
-from deploy.report.options import ReportFile
+from deploy.measure.verdict import Verdict
+from deploy.report.options import AsJson, ReportFile
+from deploy.report.output import write_json
 from slave.contact.config import Reflex
 
 
@@ -26,12 +29,13 @@ def contact(
             max=24,
         ),
     ] = 0,
-    minutes: Annotated[
-        float, typer.Option(help="Follow each motion through the air for so long, too.", min=0.0)
-    ] = 0.0,
-    payload_kg: Annotated[
+    hours: Annotated[
         float,
-        typer.Option(help="On those ways the right hand carries so much that nobody declared.", min=0.0),
+        typer.Option(
+            help="Meet nobody: follow motions through the air for so long with each load, by coarse and fine "
+            "angles.",
+            min=0.0,
+        ),
     ] = 0.0,
     person: Annotated[
         Path | None,
@@ -39,39 +43,45 @@ def contact(
             help="Recorded joint angles of people (.npz) to follow, too.", exists=True, dir_okay=False
         ),
     ] = None,
+    seed: Annotated[int, typer.Option(help="Random seed of the robots' masses and noise.")] = 1,
+    as_json: AsJson = False,
     report: ReportFile = None,
 ) -> None:
     """Let the simulated robot meet a soft patient with hand, forearm and elbow, noticed and not.
 
     The patient has 4 kg and 10 kN/m, is free to move or clamped against a wall, and is met at 0.25, 0.5 and
-    1 m/s. With `--minutes`, the robot then follows motions through the air, and each stop is a false one.
+    1 m/s. With `--hours`, the robot follows motions through the air instead, and each stop is a false one.
 
-    Example: `tandem contact --drive-bits 16 --minutes 5`
+    Examples: `tandem contact --drive-bits 16`; `tandem contact --hours 1 --person people.npz --json`
     """
-    from deploy.experiments.contact.trials import MEETINGS, fly, pair
-    from deploy.experiments.contact.view import flights_table, judge, pairs_table
+    from deploy.experiments.contact.hours import follow_for
     from deploy.measure.verdict import failed, verdict_table
 
-    console = Console()
+    console = Console(stderr=as_json)
+    tables, tree, verdicts = (
+        follow_for(hours, person, seed, console) if hours else _meet_all(reflex, drive_bits, console)
+    )
+    for table in tables:
+        console.print(table)
+    console.print(verdict_table("", verdicts))
+    tree = {**tree, "verdicts": [verdict.tree() for verdict in verdicts]}
+    if as_json:
+        typer.echo(json.dumps(tree, indent=2, ensure_ascii=False))
+    if report is not None:
+        write_json(report, tree)
+    if failed(verdicts):
+        raise TandemError("a target is missed")
+
+
+def _meet_all(
+    reflex: Reflex, drive_bits: int, console: Console
+) -> tuple[list[Table], dict[str, object], list[Verdict]]:
+    """All meetings: tables, JSON tree, verdicts."""
+    from deploy.experiments.contact.trials import MEETINGS, pair
+    from deploy.experiments.contact.view import judge, pairs_table
+
     pairs = [
         pair(meeting, reflex, drive_bits)
         for meeting in track(MEETINGS, "meeting the patient", console=console, transient=True)
     ]
-    console.print(pairs_table(pairs))
-    flights = fly(60.0 * minutes, payload_kg, drive_bits, person) if minutes else {}
-    if flights:
-        console.print(flights_table(flights))
-    verdicts = judge(pairs, flights)
-    console.print(verdict_table("", verdicts))
-    if report is not None:
-        tree = {
-            "meetings": [asdict(one) for one in pairs],
-            "flights": {name: asdict(one) for name, one in flights.items()},
-            "verdicts": [verdict.tree() for verdict in verdicts],
-        }
-        try:
-            report.write_text(json.dumps(tree, indent=2) + "\n", "utf-8")
-        except OSError as error:
-            raise TandemError(f"not written: {error}") from None
-    if failed(verdicts):
-        raise TandemError("a target is missed")
+    return [pairs_table(pairs)], {"meetings": [asdict(one) for one in pairs]}, judge(pairs)

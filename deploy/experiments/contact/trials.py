@@ -1,20 +1,14 @@
-"""The meetings that are tried, each with and without detection; the motions that are followed."""
+"""The meetings that are tried, each with and without detection."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
-from common.skeleton import load_skeleton
-from deploy.sim.patient.free_run import FreeRun, free_run, of_motion, of_person
 from deploy.sim.patient.impact import PLACES, Impact, meet
 from deploy.sim.patient.robot import Imperfect
-from slave.contact.config import ContactConfig, Reflex
+from slave.contact.config import Reflex
 
 SPEEDS_M_S = (0.25, 0.5, 1.0)
-MASS_SHARE = 0.05
-"""By so much the masses of the robot that follows through the air differ from its model's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,13 +61,3 @@ def pair(meeting: Meeting, reflex: Reflex, drive_bits: int) -> Pair:
         for chosen in (None, reflex)
     )
     return Pair(meeting, without, seen)
-
-
-def fly(seconds: float, payload_kg: float, drive_bits: int, person: Path | None) -> Mapping[str, FreeRun]:
-    """Follow each motion through the air for so long."""
-    skeleton = load_skeleton("nursing")
-    motions = {name: of_motion(name, skeleton) for name in ("bottle", "sweep")}
-    if person is not None:
-        motions[person.name] = of_person(person, skeleton)
-    imperfect = Imperfect(mass_share=MASS_SHARE, payload_kg=payload_kg, drive_bits=drive_bits)
-    return {name: free_run(moves, seconds, imperfect, ContactConfig()) for name, moves in motions.items()}

@@ -1,15 +1,14 @@
-"""The meetings and the motions on a terminal, and what they are judged by."""
+"""The meetings on a terminal, and what they are judged by."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from rich.table import Table
 
 from deploy.experiments.contact.trials import Pair
 from deploy.measure.verdict import Verdict, at_most
 from deploy.report.tables import number, plain_table
-from deploy.sim.patient.free_run import FreeRun
 
 JUDGED_M_S = 0.5
 MOST_RATIO = 0.35
@@ -40,24 +39,8 @@ def pairs_table(pairs: Sequence[Pair]) -> Table:
     return table
 
 
-def flights_table(flights: Mapping[str, FreeRun]) -> Table:
-    """One row a motion."""
-    table = plain_table("through the air", "followed s", "false stops", "other holds", "nearest", "at")
-    for name, one in flights.items():
-        table.add_row(
-            name,
-            number(one.followed_s, 0),
-            str(len(one.false_stops)),
-            str(one.other_holds),
-            number(one.nearest, 2),
-            one.joint,
-        )
-    table.caption = "nearest: largest torque from outside, as a share of its threshold"
-    return table
-
-
-def judge(pairs: Sequence[Pair], flights: Mapping[str, FreeRun]) -> list[Verdict]:
-    """Peak forces at 0.5 m/s, free and clamped; the slowest detection; what goes on pressing; false stops."""
+def judge(pairs: Sequence[Pair]) -> list[Verdict]:
+    """Peak forces at 0.5 m/s, free and clamped; the slowest detection; what goes on pressing."""
     verdicts = []
     for clamped, who in ((False, "free"), (True, "clamped")):
         ratios = [
@@ -77,8 +60,4 @@ def judge(pairs: Sequence[Pair], flights: Mapping[str, FreeRun]) -> list[Verdict
         verdicts.append(at_most(name, max(times, default=None), MOST_DETECTION_MS, "ms"))
     pressing = [one.with_detection.pressing_n for one in pairs]
     verdicts.append(at_most("goes on pressing", max(pressing, default=None), 0.0, "N"))
-    false_stops = [len(one.false_stops) for one in flights.values()]
-    verdicts.append(
-        at_most("false stops", float(sum(false_stops)) if flights else None, 0.0, why="--minutes")
-    )
     return verdicts

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
+from common.clock import NS_PER_S
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from deploy.sim.patient.patient import SoftPatient
@@ -18,6 +20,11 @@ from slave.servos.servos import EncoderReading
 STEPS = 8
 """Physics steps of 0.5 ms in a cycle of the drives: 60 to the contact's period."""
 
+LOADED = "right_hand"
+"""The segment that carries `Imperfect.payload_kg`."""
+_DRAWN = 256
+"""So many readings' noise is drawn at once, which is faster."""
+
 
 @dataclass(frozen=True, slots=True)
 class Imperfect:
@@ -26,7 +33,7 @@ class Imperfect:
     mass_share: float = 0.0
     """Standard deviation of each segment's mass and inertia."""
     payload_kg: float = 0.0
-    """At the right hand, on top."""
+    """At `LOADED`, on top."""
     noise_share: float = 0.005
     """Standard deviation of the torques told, share of each motor's limit: its current's noise."""
     step_share: float = 0.001
@@ -35,6 +42,10 @@ class Imperfect:
     """Cycles by which a torque is older than the angle beside it."""
     drive_bits: int = 0
     """Of a turn at the joint's output, of the drives' own encoders; 0: they tell no angles."""
+    cycles_a_reading: int = 1
+    """Drives on CANopen are read at each SYNC, every fifth cycle, and tell the mean torque since the last."""
+    stamp_error_s: float = 0.0
+    """All angles of a reading are taken so much before or after its stamp, at most; even in between."""
     seed: int = 1
 
 
@@ -61,12 +72,17 @@ class TouchingRobot(SimulatedRobot):
         self._spoil()
         self.patient: SoftPatient | None = None
         self.segment, self.local_m = "right_hand", np.zeros(3)
-        self._told = [np.zeros(len(skeleton.joints))] * (imperfect.late_cycles + 1)
+        self._told = np.zeros(len(skeleton.joints))
+        self._given_nm: list[Array] = []
+        """Of each cycle that is not yet told."""
+        self._cycles = 0
         limits = self._model.jnt_actfrcrange[self._model.dof_jntid[self._leaders], 1]
         self._rates = unit_rates(skeleton, self._model)
         self._limit_nm = limits / np.abs(self._joint_per_hinge)
         self.forces_n: list[float] = []
         """On the patient, one a physics step."""
+        self._noise: Iterator[Array] = iter(())
+        self._newest = self._reading()
 
     def _spoil(self) -> None:
         model, wrong = self._model, self._imperfect
@@ -74,7 +90,7 @@ class TouchingRobot(SimulatedRobot):
         model.body_mass[:] *= factors
         model.body_inertia[:] *= factors[:, None]
         if wrong.payload_kg:
-            self.load("right_hand", wrong.payload_kg)
+            self.load(LOADED, wrong.payload_kg)
 
     def load(self, segment: str, mass_kg: float) -> None:
         """A segment carries so much more, at its own centre."""
@@ -82,6 +98,7 @@ class TouchingRobot(SimulatedRobot):
 
     def advance(self, until_ns: int) -> None:
         """Run every cycle that ends by `until_ns`; none is ever skipped."""
+        each = self._imperfect.cycles_a_reading
         while self.now_ns + CYCLE_NS <= until_ns:
             given = np.zeros_like(self._limit_nm)
             for _ in range(self._steps):
@@ -90,17 +107,39 @@ class TouchingRobot(SimulatedRobot):
                 mujoco.mj_step(self._model, self._data)
                 self._torque.after()
                 given += self._torque.joint_nm
-            self._told = [*self._told[1:], self._measured(given / self._steps)]
             self._take_in()
             self.now_ns += CYCLE_NS
+            self._given_nm.append(self._measured(given / self._steps))
+            self._cycles += 1
+            if each > 1 and self._cycles % each == 0:
+                self._newest = self._reading()
 
     def read(self) -> EncoderReading:
-        """The counts of the last cycle, and torques as a drive tells them."""
-        reading, drive_rad = super().read(), None
-        if self._imperfect.drive_bits:
-            step = 2.0 * np.pi / (1 << self._imperfect.drive_bits)
-            drive_rad = np.rint(self.position_rad / step) * step
-        return replace(reading, effort_nm=self._told[0], drive_rad=drive_rad)
+        """The counts of the last cycle, or of the last SYNC, and torques as a drive tells them."""
+        if self._imperfect.cycles_a_reading == 1 and self.now_ns != self._newest.read_ns:
+            self._newest = self._reading()
+        return self._newest
+
+    def _reading(self) -> EncoderReading:
+        wrong, position_rad, drive_rad = self._imperfect, self.position_rad, None
+        if wrong.stamp_error_s:
+            position_rad += self.velocity_rad_s * self._random.uniform(-1.0, 1.0) * wrong.stamp_error_s
+        if wrong.drive_bits:
+            step = 2.0 * np.pi / (1 << wrong.drive_bits)
+            drive_rad = np.rint(position_rad / step) * step
+        return EncoderReading(
+            self.now_ns, self._encoders.counts(position_rad), self._all_valid, drive_rad, self._told_nm(),
+            round(wrong.stamp_error_s * NS_PER_S),
+        )  # fmt: skip
+
+    def _told_nm(self) -> Array:
+        """(J,) mean of the torques since the last reading, or of as many cycles before."""
+        kept, late = self._given_nm, self._imperfect.late_cycles
+        if len(kept) > late:
+            told: Array = np.mean(kept[: len(kept) - late], axis=0)
+            self._given_nm = kept[len(kept) - late :]
+            self._told = told
+        return self._told
 
     def point(self) -> tuple[Array, Array]:
         """Place and velocity (3,) of the point that may touch, base frame."""
@@ -135,7 +174,9 @@ class TouchingRobot(SimulatedRobot):
 
     def _measured(self, given_nm: Array) -> Array:
         wrong = self._imperfect
-        noise = wrong.noise_share * self._limit_nm * self._random.standard_normal(len(given_nm))
+        if (noise := next(self._noise, None)) is None:
+            self._noise = iter(self._random.standard_normal((_DRAWN, len(given_nm))))
+            noise = next(self._noise)
         step = wrong.step_share * self._limit_nm
-        told: Array = given_nm + noise
+        told: Array = given_nm + wrong.noise_share * self._limit_nm * noise
         return np.rint(told / step) * step if wrong.step_share else told

@@ -1,0 +1,106 @@
+"""Long ways through the air: each motion, robots that differ, loads that are declared or not."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from common.quaternion import Array
+from common.skeleton import load_skeleton
+from deploy.sim.patient.free_run import FreeFlight, FreeRun, of_motion, of_person
+from deploy.sim.patient.operator import TICK_NS, Moves
+from deploy.sim.patient.replay import Lap, held, replay
+from deploy.sim.patient.robot import Imperfect
+from slave.contact.config import ContactConfig
+
+MOTIONS = ("bottle", "sweep", "crossed")
+PERSON = "person"
+LONGEST_S = 700.0
+"""Of one way: a motion repeats after less, and 61 recorded clips of people take 695 s."""
+MASS_SHARE, PAYLOAD_KG = 0.05, 0.5
+READINGS: Mapping[str, Imperfect] = {
+    "12 bits": Imperfect(mass_share=MASS_SHARE),
+    "16 bits": Imperfect(mass_share=MASS_SHARE, drive_bits=16),
+    "CANopen": Imperfect(
+        mass_share=MASS_SHARE, drive_bits=16, cycles_a_reading=5, late_cycles=0, stamp_error_s=3e-4
+    ),
+}
+"""What the observer has: output encoders; drives' own; those at 50 SYNCs a second, stamped 0.3 ms wrong."""
+NOTHING, DECLARED = "nothing", "0.5 kg, declared"
+LOADS = (NOTHING, DECLARED)
+"""In the right hand."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """One motion, again and again, by one kind of readings and one load."""
+
+    motion: str
+    readings: str
+    load: str
+    laps: tuple[Lap, ...]
+
+    @property
+    def seconds(self) -> float:
+        """Together."""
+        return sum(lap.seconds for lap in self.laps)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """The words of each that would have been a stop."""
+        return tuple(words for lap in self.laps for words in lap.findings)
+
+    @property
+    def worst(self) -> Lap:
+        """The one that came nearest to a threshold."""
+        return max(self.laps, key=lambda lap: lap.nearest)
+
+
+@dataclass(frozen=True, slots=True)
+class Flights:
+    """All of them."""
+
+    by_pipeline: Mapping[str, FreeRun]
+    """Each motion once, by the slave's whole pipeline."""
+    flights: tuple[Flight, ...]
+
+
+def motions_of(person: Path | None) -> dict[str, Moves]:
+    """The motions by name. Raises RecordingError where the person's file cannot be read."""
+    skeleton = load_skeleton("nursing")
+    motions = {name: of_motion(name, skeleton) for name in MOTIONS}
+    return motions if person is None else {**motions, PERSON: of_person(person, skeleton)}
+
+
+def fly(
+    motions: Mapping[str, Moves], seconds: float, seed: int, flown: Callable[[float], None] = lambda s: None
+) -> Flights:
+    """Follow all motions by each kind of readings, `seconds` together, with each load.
+
+    Every lap is a robot with other masses and other noise. `flown` gets the seconds of each lap.
+    """
+    share_s = seconds / len(motions) / len(READINGS)
+    ways: dict[str, Array] = {}
+    by_pipeline = {}
+    for name, moves in motions.items():
+        flight = FreeFlight(moves, Imperfect(mass_share=MASS_SHARE, seed=seed), ContactConfig())
+        flight.follow(min(share_s, LONGEST_S))
+        ways[name], by_pipeline[name] = flight.setpoints_rad, flight.found
+    seeds = itertools.count(seed)
+    flights = []
+    for load, readings, name in itertools.product(LOADS, READINGS, motions):
+        laps: list[Lap] = []
+        while (done_s := sum(lap.seconds for lap in laps)) < share_s:
+            ticks = max(1, round((share_s - done_s) * 1e9 / TICK_NS))
+            laps.append(_lap(ways[name][:ticks], readings, load, next(seeds)))
+            flown(laps[-1].seconds)
+        flights.append(Flight(name, readings, load, tuple(laps)))
+    return Flights(by_pipeline, tuple(flights))
+
+
+def _lap(way: Array, readings: str, load: str, seed: int) -> Lap:
+    payload_kg = 0.0 if load == NOTHING else PAYLOAD_KG
+    imperfect = replace(READINGS[readings], payload_kg=payload_kg, seed=seed)
+    return replay(way, imperfect, ContactConfig(), held(PAYLOAD_KG) if load == DECLARED else None)

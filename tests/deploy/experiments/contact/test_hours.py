@@ -1,0 +1,79 @@
+"""`tandem contact --hours`: a short way by all readings and loads, and what turns each verdict red."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from common.quaternion import Array
+from deploy.experiments.contact import hours
+from deploy.experiments.contact.flights import (
+    LOADS,
+    NOTHING,
+    READINGS,
+    Flight,
+    Flights,
+    fly,
+    motions_of,
+)
+from deploy.measure.verdict import Outcome
+from deploy.sim.patient.free_run import FreeRun
+from deploy.sim.patient.replay import Lap
+
+LAP = Lap(60.0, (), 0.5, "neck_yaw")
+WHOLE = FreeRun(60.0, (), (), 0.5, "neck_yaw")
+STOPPED = replace(LAP, findings=("pushed",))
+
+
+@pytest.fixture(scope="module")
+def short() -> Flights:
+    return fly({"crossed": motions_of(None)["crossed"]}, 9.0, seed=3)
+
+
+def test_a_short_way_has_no_false_stop(short: Flights) -> None:
+    assert len(short.flights) == len(READINGS) * len(LOADS)
+    for one in short.flights:
+        assert one.seconds == pytest.approx(3.0)
+        assert one.findings == (), one
+        assert 0.02 < one.worst.nearest < 1.0
+    assert all(verdict.outcome is Outcome.PASSED for verdict in hours.judge_flights(short))
+
+
+def red(lap: Lap = LAP, whole: FreeRun = WHOLE) -> list[str]:
+    found = Flights({"bottle": whole}, (Flight("bottle", "12 bits", NOTHING, (LAP, lap)),))
+    return [v.name for v in hours.judge_flights(found) if v.outcome is Outcome.FAILED]
+
+
+def test_each_verdict_turns_red_by_one_stop() -> None:
+    assert red() == []
+    assert red(lap=STOPPED) == ["false stops, the hand holds nothing"]
+    assert red(whole=replace(WHOLE, false_stops=("pushed",))) == ["false stops, whole pipeline"]
+    assert red(whole=replace(WHOLE, other_stops=("moves",))) == ["stops for other reasons"]
+
+
+def test_table_and_tree_tell_each(short: Flights) -> None:
+    assert hours.flights_table(short.flights).row_count == len(short.flights)
+    tree = hours.flights_tree(short)
+    assert isinstance(tree["flights"], list)
+    assert {one["readings"] for one in tree["flights"]} == set(READINGS)
+
+
+def test_people_are_followed_without_a_false_stop(recordings_folder: Path) -> None:
+    found = fly({"person": motions_of(recordings_folder / "motion_cmu.npz")["person"]}, 15.0, seed=1)
+    assert all(verdict.outcome is Outcome.PASSED for verdict in hours.judge_flights(found))
+
+
+def test_the_time_is_that_asked_for_and_is_told_as_it_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    def still(t_s: float) -> tuple[Array, Array]:
+        return np.zeros(25), np.zeros(25)
+
+    monkeypatch.setattr(hours, "motions_of", lambda person: {"still": still})
+    tables, tree, verdicts = hours.follow_for(0.0004, None, 1, Console(file=StringIO()))
+    assert len(tables) == 2
+    assert [one["seconds"] for one in tree["flights"]] == pytest.approx([0.48] * 6)  # type: ignore[attr-defined]
+    assert [verdict.outcome for verdict in verdicts] == [Outcome.PASSED] * 4
