@@ -52,7 +52,9 @@ def contact(
     The patient has 4 kg and 10 kN/m, is free to move or clamped against a wall, and is met at 0.25, 0.5 and
     1 m/s. With `--hours`, the robot follows motions through the air instead, and each stop is a false one.
 
-    Examples: `tandem contact --drive-bits 16`; `tandem contact --hours 1 --person people.npz --json`
+    For false stops: `tandem contact --hours 1 --person people.npz --json`
+
+    Example: `tandem contact --drive-bits 16`
     """
     from deploy.experiments.contact.hours import follow_for
     from deploy.measure.verdict import failed, verdict_table

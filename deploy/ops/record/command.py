@@ -65,8 +65,9 @@ def record(
     The robot's endpoint gives states. Commands come from an endpoint where the master listens (`[link]
     listen` in its file), or from a router. It ends with status 1 if the disk failed or messages are missing.
 
-    Examples: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`,
-    `tandem record --tap /run/tandem/master.sock --out morning.mcap`
+    Beside a master: `tandem record --tap /run/tandem/master.sock --out morning.mcap`
+
+    Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
     """
     from deploy.ops.record.from_tap import record_tap
     from deploy.ops.record.record import RecordOptions, link_of

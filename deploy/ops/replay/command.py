@@ -56,7 +56,9 @@ def replay(
     With the recorded configuration they are identical to the last bit, whatever second it begins at. With
     --config, --filter or --set the filters learn anew, and the differences are shown by joint.
 
-    Examples: `tandem replay morning.mcap --check`, `tandem replay morning.mcap --filter ekf`
+    To see what another filter makes of it: `tandem replay morning.mcap --filter ekf`
+
+    Example: `tandem replay morning.mcap --check`
     """
     changes = [*(overrides or ()), *([f'estimation.filter="{filter_name}"'] if filter_name else ())]
     with ExitStack() as kept:

@@ -36,8 +36,8 @@ def bottle(skeleton: Skeleton) -> OperatorMotion:
 def test_every_motion_stays_within_all_limits(moved: tuple[OperatorMotion, Skeleton]) -> None:
     motion, skeleton = moved
     position, velocity, acceleration = sampled(motion)
-    assert (position >= skeleton.lower_rad).all()
-    assert (position <= skeleton.upper_rad).all()
+    assert (position >= skeleton.lower_rad - 1e-9).all()
+    assert (position <= skeleton.upper_rad + 1e-9).all()
     assert (np.abs(velocity) <= 0.85 * skeleton.max_velocity_rad_s).all()
     assert (np.abs(acceleration) <= 0.5 * skeleton.max_acceleration_rad_s2).all()
 
@@ -100,7 +100,7 @@ def test_the_bottles_joints_do_not_start_in_step(bottle: OperatorMotion) -> None
 def test_an_unknown_motion_is_refused_with_the_names_there_are(skeleton: Skeleton) -> None:
     with pytest.raises(
         ConfigError,
-        match="motion = 'dance': expected one of bottle, crossed, calibration_pose, sweep, move_joints,",
+        match="motion = 'dance': expected one of bottle, crossed, calibration_pose, sweep, postures, move_joints,",
     ):
         load_motion("dance", skeleton)
 
@@ -122,9 +122,13 @@ def test_a_motion_the_skeleton_cannot_make_is_refused(skeleton: Skeleton, text: 
 @pytest.mark.parametrize(
     ("name", "profile", "able"),
     [
-        ("bottle", "hand", "grasp, calibration_pose, sweep, move_joints, tray, calibration"),
-        ("grasp", "nursing", "bottle, crossed, calibration_pose, sweep, move_joints, tray, calibration"),
-        ("dance", "lower_limb", "walk, calibration_pose, sweep, move_joints, tray, calibration"),
+        ("bottle", "hand", "grasp, calibration_pose, sweep, postures, move_joints, tray, calibration"),
+        (
+            "grasp",
+            "nursing",
+            "bottle, crossed, calibration_pose, sweep, postures, move_joints, tray, calibration",
+        ),
+        ("dance", "lower_limb", "walk, calibration_pose, sweep, postures, move_joints, tray, calibration"),
     ],
 )
 def test_a_motion_of_another_profile_is_one_line(name: str, profile: str, able: str) -> None:
