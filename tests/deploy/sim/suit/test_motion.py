@@ -100,7 +100,7 @@ def test_the_bottles_joints_do_not_start_in_step(bottle: OperatorMotion) -> None
 def test_an_unknown_motion_is_refused_with_the_names_there_are(skeleton: Skeleton) -> None:
     with pytest.raises(
         ConfigError,
-        match="motion = 'dance': expected one of bottle, crossed, calibration_pose, sweep, postures, move_joints,",
+        match="motion = 'dance': expected one of bottle, crossed, calibration_pose, sweep, postures,",
     ):
         load_motion("dance", skeleton)
 
