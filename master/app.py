@@ -281,7 +281,7 @@ async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
     audit = Audit(config.link)
     async with open_session(config.link, waits=notifier.waits) as session:
         audit.attach(session)
-        tap = open_tap(config.tap, describe(config, config.commanded))
+        tap = open_tap(config.tap, describe(config))
         master = Master(config, session, notifier, tap)
         where = ", ".join(config.link.connect or config.link.listen)
         robots = ", ".join(config.commanded)

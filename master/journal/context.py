@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+import tomlkit
 
-from common.config.section import Section
+from common.skeleton.load import own_profile
 from common.wire.version import software
 
 CONFIG, FILES = "master_config", "master_files"
@@ -22,22 +24,50 @@ ENCODING = "latin-1"
 """Each byte is one character: a DBC file may be in any encoding."""
 
 
-def describe(config: Section, robots: Sequence[str]) -> dict[str, str]:
-    """The metadata of a recording of a master with this configuration, which commands these robots.
+class _Config(Protocol):
+    """The part of a master's configuration that is read here."""
+
+    @property
+    def profile(self) -> str:
+        """A name, or the path of one's own."""
+
+    @property
+    def commanded(self) -> list[str]:
+        """The robots' names."""
+
+    def model_dump(self, *, exclude: set[str]) -> dict[str, object]:
+        """As plain values."""
+
+
+def describe(config: _Config) -> dict[str, str]:
+    """The metadata of a recording of a master with this configuration.
 
     Raises OSError where a file that it names has gone.
     """
     files: dict[str, str] = {}
-    table = _embedded(config.model_dump(exclude=_NOT_READ), files)
+    table = {**config.model_dump(exclude=_NOT_READ), "profile": _profile(config.profile, files)}
     return {
         "role": "master",
-        "robots": " ".join(robots),
+        "robots": " ".join(config.commanded),
         "tandem": software().tandem,
         "numpy": np.__version__,
         "machine": f"{platform.machine()} {platform.system()}",
-        CONFIG: json.dumps(table),
+        CONFIG: json.dumps(_embedded(table, files)),
         FILES: json.dumps(files),
     }
+
+
+def _profile(name: str, files: dict[str, str]) -> object:
+    """The name of a profile that ships; else that of its file, embedded with the model that it names."""
+    path = own_profile(name)
+    if path is None:
+        return name
+    profile = tomlkit.parse(path.read_text("utf-8"))
+    if "model" in profile:
+        profile["model"] = _embedded(path.parent / str(profile["model"]), files)
+    embedded = f"{len(files)}.toml"
+    files[embedded] = tomlkit.dumps(profile).encode().decode(ENCODING)
+    return embedded
 
 
 def _embedded(value: object, files: dict[str, str]) -> object:

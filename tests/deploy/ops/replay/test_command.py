@@ -31,7 +31,7 @@ def bench() -> RecordedBench:
 def write(path: Path, bench: RecordedBench, entries: list[Recorded]) -> Path:
     """One entry each 5 ms of the bench's clock, which its ticks are too."""
     stamp_ns = first_ns = 1_000_000_000
-    with McapRecorder(path, describe(bench.config, ["robot-1"])) as recorder:
+    with McapRecorder(path, describe(bench.config)) as recorder:
         for topic, payload in entries:
             recorder.put(topic, payload, stamp_ns)
             stamp_ns += 5_000_000 if topic == FRAMES else 0

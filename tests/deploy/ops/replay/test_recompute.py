@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib import resources
 from pathlib import Path
 
 import msgpack
@@ -148,13 +149,26 @@ def test_after_missing_messages_it_goes_on_at_the_next_snapshot() -> None:
 
 def test_the_configuration_and_its_files_come_back_without_the_link(tmp_path: Path) -> None:
     config = load_config(EXAMPLES / "master.toml", MasterConfig)
-    metadata = describe(config, ["robot-1"])
+    metadata = describe(config)
     assert "tcp/" not in json.dumps(metadata)
     with recorded_config(metadata, "x.mcap") as back:
         assert back.capture.dbc.read_bytes() == config.capture.dbc.read_bytes()
         assert back.capture.dbc != config.capture.dbc
         assert back.estimation == config.estimation
         assert back.nodes.keys() == config.nodes.keys()
+
+
+def test_a_robot_s_own_profile_is_in_the_recording(tmp_path: Path) -> None:
+    """The folder of the profile is gone, or is another one, where the recording is computed again."""
+    shipped = resources.files("common.skeleton").joinpath("nursing.toml").read_text("utf-8")
+    own = tmp_path / "mine.toml"
+    own.write_text(shipped.replace('name = "nursing"', 'name = "mine"', 1))
+    config = load_config(EXAMPLES / "master.toml", MasterConfig, (f'profile="{own}"',))
+    metadata = describe(config)
+    own.unlink()
+    with recorded_config(metadata, "x.mcap") as back:
+        assert back.skeleton.name == "mine"
+        assert back.skeleton.joint_names == config.skeleton.joint_names
 
 
 def test_a_recording_without_a_configuration_says_what_to_do() -> None:
