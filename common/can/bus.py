@@ -29,6 +29,13 @@ OnFrame = Callable[[str, int, bytes, int], object]
 """(bus name, identifier, data, arrival in monotonic ns)."""
 OnRemote = Callable[[str, int, int], object]
 """(bus name, identifier, arrival in monotonic ns)."""
+Arrival = Callable[[can.Message], int]
+"""When a message arrived, monotonic ns."""
+
+
+def read_now(message: can.Message) -> int:
+    """It counts from when it is read."""
+    return monotonic_ns()
 
 
 class CanBus(KeptOpenBus):
@@ -45,6 +52,7 @@ class CanBus(KeptOpenBus):
         take_extended: bool = False,
         on_remote: OnRemote | None = None,
         state_of: StateOf = state_of,
+        arrived: Arrival = read_now,
     ) -> None:
         """`on_second_sender` takes frames with an identifier that this side sends, but did not send.
 
@@ -54,6 +62,7 @@ class CanBus(KeptOpenBus):
         self._take_extended = take_extended
         super().__init__(config, on_change, opener, state_of)
         self._on_frame = on_frame
+        self._arrived = arrived
         self._on_second_sender = on_second_sender
         self._on_remote = on_remote
         echoes = config.interface == "udp_multicast" or bool(config.options.get("receive_own_messages"))
@@ -116,7 +125,7 @@ class CanBus(KeptOpenBus):
             counters.received += 1
             self._attempt = 0
             self._on_the_bus()
-            self._on_frame(self.name, frame_id, bytes(message.data), monotonic_ns())
+            self._on_frame(self.name, frame_id, bytes(message.data), self._arrived(message))
 
     def _on_own_id(self, frame_id: int, data: bytes) -> None:
         now_ns = monotonic_ns()

@@ -71,12 +71,15 @@ class MixedServos:
                 effort_nm[part.joints] = reading.effort_nm
         told = [reading.drive_rad is not None for reading in readings]
         efforts = [reading.effort_nm is not None for reading in readings]
+        read_ns = min(reading.read_ns for reading in readings)
         return EncoderReading(
-            min(reading.read_ns for reading in readings),
+            read_ns,
             counts,
             valid,
             drive_rad if any(told) else None,
             effort_nm if any(efforts) else None,
+            # one stamp stands for all: that of another backend may be later by what lies between them
+            max(reading.read_ns - read_ns + reading.stamp_error_ns for reading in readings),
         )
 
     def faults(self) -> Mapping[str, str]:

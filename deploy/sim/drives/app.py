@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from types import MappingProxyType
@@ -14,7 +15,7 @@ from common.can.bus import CanBus
 from common.can.config import BusConfig
 from common.can.frame import CanFrame
 from common.can.without_echo import open_without_function_code
-from common.clock import monotonic_ns
+from common.clock import NS_PER_S, monotonic_ns
 from common.metrics.drives import DrivesMetrics
 from common.process.heap import freeze_heap
 from common.process.pacing import TickGrid
@@ -31,9 +32,18 @@ from slave.servos.mujoco.simulated import CYCLE_NS
 
 log = logging.getLogger(__name__)
 
+_OLDEST_S = 1.0
+"""A message that seems older has a stamp of another clock."""
+
 
 def _open(config: BusConfig) -> can.BusABC:
     return open_without_function_code(config, TPDO1)
+
+
+def _by_kernel(message: can.Message) -> int:
+    """When the kernel took a message in, monotonic ns: drives read angles then, however busy this host is."""
+    age_s = time.time() - message.timestamp
+    return monotonic_ns() - (round(age_s * NS_PER_S) if 0.0 < age_s < _OLDEST_S else 0)
 
 
 async def run(
@@ -67,7 +77,9 @@ async def run(
 
     try:
         for bus in canopen.buses:
-            buses[bus.name] = CanBus(bus, peer.on_frame, opener=_open, on_remote=peer.on_remote)
+            buses[bus.name] = CanBus(
+                bus, peer.on_frame, opener=_open, on_remote=peer.on_remote, arrived=_by_kernel
+            )
             buses[bus.name].open()
         freeze_heap()
         where = ", ".join(f"{bus.name} ({bus.interface} {bus.channel})" for bus in canopen.buses)

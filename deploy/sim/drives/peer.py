@@ -233,8 +233,8 @@ class DrivePeer:
         ends = [(drive.value(0x607D, sub) - self._zero[i]) / self._scale[i] for sub in (1, 2)]
         self._lower[i], self._upper[i] = min(ends), max(ends)
 
-    def _read(self, now_ns: int = 0) -> None:
-        seen_rad = self.plant.seen_rad(now_ns)
+    def _read(self, now_ns: int | None = None) -> None:
+        seen_rad = self.plant.position_rad if now_ns is None else self.plant.seen_rad(now_ns)
         position = seen_rad * self._gear
         shown = np.rint(self._zero + self._scale * position + self._shift)
         self._increments = shown.astype(np.int64).tolist()
@@ -242,7 +242,7 @@ class DrivePeer:
             self._increments[i] = increments
         self._counts = self.plant.counts(seen_rad).tolist()
 
-    def _show(self, now_ns: int = 0) -> None:
+    def _show(self, now_ns: int | None = None) -> None:
         self._read(now_ns)
         told = self._torque.thousandths.tolist()
         for drive, position, count, torque in zip(

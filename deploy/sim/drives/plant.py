@@ -17,6 +17,8 @@ from slave.servos.mujoco.simulated import CYCLE_NS, SimulatedRobot
 _AT_REST_RAD_S = 1e-6
 MOST_CYCLES = 25
 """A process held up for longer than these 100 ms does not catch up in a burst."""
+LATEST_CYCLES = 5
+"""Angles of longer ago are not made up."""
 
 
 class Plant:
@@ -54,8 +56,11 @@ class Plant:
         return self._robot.position_rad
 
     def seen_rad(self, now_ns: int) -> Array:
-        """(J,) where the joints are at a moment within a cycle: drives sample on SYNC."""
-        since_ns = min(max(0, now_ns - self._robot.now_ns), CYCLE_NS)
+        """(J,) where the joints are at a moment of this cycle, or were before: drives sample on SYNC.
+
+        A SYNC that this process reads late was still sampled when it arrived.
+        """
+        since_ns = min(max(-LATEST_CYCLES * CYCLE_NS, now_ns - self._robot.now_ns), CYCLE_NS)
         out: Array = self._robot.position_rad + self._robot.velocity_rad_s * (since_ns / NS_PER_S)
         return out
 

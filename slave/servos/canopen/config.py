@@ -52,6 +52,9 @@ class CanopenConfig(BackendConfig):
     """Emergency codes by which the drives say that safe torque off (STO) is active; each maker has others."""
     sync_hz: int = Field(50, ge=10, le=200)
     """SYNC: targets out, positions in."""
+    sample_error_ms: float = Field(0.3, ge=0.0, le=5.0)
+    """A drive may read its angle so much before or after a punctual SYNC: by the frame that SYNC waits for
+    (0.13 ms at 1 Mbit/s), and by its own control cycle where that is not locked to SYNC."""
     node_id: int = Field(127, ge=1, le=127)
     """The slave's own, of its heartbeat."""
     heartbeat_ms: int = Field(40, ge=10, le=1000)

@@ -28,6 +28,7 @@ from slave.servos.canopen.silence import DriveSilence
 from slave.servos.canopen.starts import DriveStarts
 from slave.servos.canopen.status_bits import VOLTAGE
 from slave.servos.canopen.supervision import LISTENED, Supervision
+from slave.servos.canopen.sync_stamp import SyncStamps
 from slave.servos.canopen.targets import DriveTargets
 from slave.servos.canopen.units import DriveUnits
 from slave.servos.canopen.watch import DriveWatch
@@ -71,6 +72,7 @@ class Drives:
         )
         self._silence = DriveSilence(config, len(self._drives))
         self._targets = DriveTargets(config, units)
+        self._stamps = SyncStamps(config.period_ns, round(config.sample_error_ms * NS_PER_MS))
         self._beat_every = max(1, config.heartbeat_ms * config.sync_hz // 1000)
         self._supervision = Supervision(self._drives, self._watch, self._silence)
         self._starts = DriveStarts(
@@ -197,7 +199,7 @@ class Drives:
         if not self._readings.answers.complete:
             self.unanswered += self._cycles > 0
         if not self._readings.complete:
-            self._readings.publish(self._synced_ns)
+            self._readings.publish(self._synced_ns, self._stamps.error_ns)
         seen = self._readings.seen(self._synced_ns)
         self._silence.cycle(now_ns, seen.fresh, self._synced_ns)
         self.pending(now_ns)
@@ -224,6 +226,10 @@ class Drives:
         self._watch.asked()
         self._synced_ns, self.answered_after_ns = now_ns, None
         return self._wiring.syncs()
+
+    def synced(self, now_ns: int) -> None:
+        """They have been sent."""
+        self._stamps.sent(self._synced_ns, now_ns)
 
     # what is known
 
@@ -287,7 +293,7 @@ class Drives:
 
     def _publish_if_complete(self) -> None:
         if self._readings.complete:
-            self._readings.publish(self._synced_ns)
+            self._readings.publish(self._synced_ns, self._stamps.error_ns)
 
     def _on_flags(self, words: Sequence[str]) -> None:
         for drive, said in zip(self._drives, words, strict=True):

@@ -62,13 +62,13 @@ class DriveReadings:
         self._effort_is_newer = self._effort_is_newer or taken
         return taken
 
-    def publish(self, synced_ns: int) -> None:
-        """Make what has come the newest reading."""
+    def publish(self, synced_ns: int, stamp_error_ns: int) -> None:
+        """Make what has come the newest reading; its stamp may be so wrong."""
         self._effort_is_newer = False
         seen = self.seen(synced_ns)
         self._reading = EncoderReading(
             synced_ns, seen.encoder_counts, seen.encoder_valid, self._units.angle_rad(seen.position),
-            self.efforts.joint_nm,
+            self.efforts.joint_nm, stamp_error_ns,
         )  # fmt: skip
         if (seen.encoder_flags != self._flags).any():
             self._flags = seen.encoder_flags

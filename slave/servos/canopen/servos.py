@@ -242,6 +242,7 @@ class CanopenServos:
         synced_ns = self._clock()
         for outgoing in drives.sync(synced_ns):
             self._send(outgoing)
+        drives.synced(self._clock())
         if drives.warnings is not self._warned:
             self._warned = drives.warnings
             for joint, words in self._warned.items():
