@@ -27,14 +27,14 @@ from deploy.ops.attitude.command import attitude
 from deploy.ops.audit import audit
 from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.ops.control.printer import acted
+from deploy.ops.convert.export_command import export_joints
+from deploy.ops.convert.import_command import import_recording
 from deploy.ops.doctor.command import doctor
 from deploy.ops.inputs import inputs
 from deploy.ops.keys.commands import app as keys_app
 from deploy.ops.network.command import app as network_app
 from deploy.ops.profile.command import app as profile_app
 from deploy.ops.record.command import record, recording
-from deploy.ops.recordings.export_command import export_joints
-from deploy.ops.recordings.import_command import import_recording
 from deploy.ops.replay.command import replay
 from deploy.ops.ros.command import ros
 from deploy.ops.router.command import router

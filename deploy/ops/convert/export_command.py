@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from common.errors import TandemError
-from deploy.ops.recordings.joints import AngleSource
+from deploy.ops.convert.joints import AngleSource
 from deploy.report.output import in_a_folder
 
 
@@ -44,9 +44,9 @@ def export_joints(
     Example: `tandem export morning.mcap --to bvh --of encoders --out morning.bvh`
     """
     from common.skeleton import load_skeleton
-    from deploy.ops.recordings.bvh import write_bvh
-    from deploy.ops.recordings.joint_files import write_bag, write_csv, write_mot
-    from deploy.ops.recordings.joints import read_joints
+    from deploy.ops.convert.bvh import write_bvh
+    from deploy.ops.convert.joint_files import write_bag, write_csv, write_mot
+    from deploy.ops.convert.joints import read_joints
 
     bag = to in (ExportFormat.BAG, ExportFormat.MCAP)
     path = out or file.with_name(f"{file.stem}_ros2" if bag else f"{file.stem}.{to}")

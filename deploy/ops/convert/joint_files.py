@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from common.errors import RecordingError
-from deploy.ops.recordings.joints import JointSeries
+from deploy.ops.convert.joints import JointSeries
 from deploy.report.output import writing
 
 

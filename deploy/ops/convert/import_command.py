@@ -18,7 +18,7 @@ from deploy.report.tables import number, plain_table
 if TYPE_CHECKING:
     from common.recording.formats.registry import ReadNodes
     from common.recording.formats.samples import ReadOptions
-    from deploy.ops.recordings.judge import ImportJudgement
+    from deploy.ops.convert.judge import ImportJudgement
 
 
 class Target(StrEnum):
@@ -76,8 +76,8 @@ def import_recording(
     Example: `tandem import left.csv --units acc=g,gyr=deg/s --name left=left_forearm --to npz`
     """
     from common.recording.formats.registry import read_nodes
-    from deploy.ops.recordings.judge import judge
-    from deploy.ops.recordings.write import write_npz, write_suit
+    from deploy.ops.convert.judge import judge
+    from deploy.ops.convert.write import write_npz, write_suit
 
     path = out or files[0].with_suffix(f".{to}")
     if path.suffix.lower() != f".{to}":

@@ -14,7 +14,7 @@ from common.errors import RecordingError
 from common.quaternion import Array, to_matrix
 from common.skeleton import Skeleton
 from common.skeleton.kinematics import relative_orientations
-from deploy.ops.recordings.joints import JointSeries
+from deploy.ops.convert.joints import JointSeries
 from deploy.report.output import writing
 
 _TO_BVH = [1, 2, 0]

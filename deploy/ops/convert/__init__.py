@@ -1,0 +1,1 @@
+"""Files of other programs: their recordings in, our joint angles out."""

@@ -1,1 +1,0 @@
-"""Recordings of others in, joint angles for others out."""
