@@ -54,7 +54,7 @@ def load_skeleton(name: str) -> Skeleton:
     Raises ConfigError naming the profiles there are, or the entry that is wrong.
     """
     path = own_profile(name)
-    if path is not None:
+    if path is not None and (path.suffix == ".toml" or path.is_file()):
         return _skeleton(load_config(path, ProfileFile), str(path))
     names = profile_names()
     if name not in names:

@@ -18,7 +18,7 @@ def example(role: str, profile: str = NURSING) -> Path:
     Raises ConfigError where there is no such profile.
     """
     own = own_profile(profile)
-    if own is not None:
+    if own is not None and own.is_file():
         return own.parent / f"{role}.toml"
     skeleton = load_skeleton(profile)
     folder = EXAMPLES if skeleton.name == NURSING else EXAMPLES / skeleton.name

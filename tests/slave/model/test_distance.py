@@ -52,7 +52,9 @@ def test_distances_are_those_of_closed_formulas() -> None:
         near = model.near(posture)
         for owner, expected in enumerate((own[k], *zones[k]), start=-1):
             if 0.0 < expected < REACH_M:
-                assert nearest(model, near, owner) == pytest.approx(expected, abs=1e-6)
+                assert nearest(model, near, owner) == pytest.approx(
+                    expected, abs=1e-5
+                )  # MuJoCo's boxes: iterated
                 compared += 1
             elif expected >= REACH_M:
                 assert nearest(model, near, owner) >= REACH_M
