@@ -36,6 +36,8 @@ class _Reader:
     refused: int = 0
     behind: bool = True
     """Lacks something that came before: owed a snapshot."""
+    full: bool = False
+    """Could not take the newest message."""
 
 
 class TapSender:
@@ -93,8 +95,11 @@ class TapSender:
 
     @property
     def behind(self) -> bool:
-        """Whether a reader lacks messages, so that it cannot go on without a snapshot."""
-        return any(reader.behind for reader in self._readers)
+        """Whether a reader that reads lacks messages, so that it cannot go on without a snapshot.
+
+        One that stands still is owed none before it reads again: a snapshot costs the loop milliseconds.
+        """
+        return any(reader.behind and not reader.full for reader in self._readers)
 
     def put(self, topic: str, payload: bytes, stamp_ns: int | None = None) -> None:
         """Hand one message to all readers."""
@@ -116,11 +121,12 @@ class TapSender:
         except BlockingIOError:
             reader.refused += 1
             self.refused += 1
-            reader.behind = True
+            reader.behind = reader.full = True
             return False
         except OSError as error:
             self._drop(reader, "" if isinstance(error, BrokenPipeError) else f": {error.strerror}")
             return False
+        reader.full = False
         return True
 
     def _accept(self) -> None:

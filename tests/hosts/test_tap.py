@@ -66,7 +66,7 @@ def test_recordings_at_the_taps_survive_a_kill_and_are_computed_again_bit_for_bi
             with TapReader(sockets["master"]), TapReader(sockets["slave"]):  # they never read
                 processes = {role: await recorder(sockets[role], files[role]) for role in sockets}
                 for number, (role, process) in enumerate(processes.items()):
-                    await killed_after(rig, process, files[role], 150 + 37 * number)
+                    await killed_after(rig, process, files[role], 300 + 37 * number)
             await until_tracking(rig, ROBOT)
         check_master(read_recording(files["master"]))
         check_slave(read_recording(files["slave"]))
