@@ -119,9 +119,11 @@ class ContactWatch:
         if not reading.valid.all() or self._leaps(reading.read_ns, position_rad):
             return  # a reading left out; the observer begins anew when too many are
         self._read_ns, self._position_rad = reading.read_ns, position_rad
-        if (reading.drive_rad is not None) != self._by_drives:
-            self._tune(drives=reading.drive_rad is not None)
-        angle_rad = position_rad if reading.drive_rad is None else reading.drive_rad
+        # in a mixture some joints have no drive's own angle: all are then watched by the output encoders'
+        by_drives = reading.drive_rad is not None and not np.isnan(reading.drive_rad).any()
+        if by_drives != self._by_drives:
+            self._tune(drives=by_drives)
+        angle_rad = reading.drive_rad if by_drives and reading.drive_rad is not None else position_rad
         self.observer.update(reading.read_ns, angle_rad, effort, to_s(reading.stamp_error_ns))
         if not self.observer.ready:
             return

@@ -337,6 +337,7 @@ def test_a_reading_is_put_together_and_as_old_as_its_oldest_part() -> None:
     faulty._read_ns = 100
     reading = servos.read()
     assert reading.read_ns == 1
+    assert reading.stamp_error_ns == 100
     assert reading.effort_nm is not None
     assert reading.drive_rad is not None
     assert np.isnan(reading.effort_nm[HALVES[0]]).all()

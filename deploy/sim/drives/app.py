@@ -40,7 +40,7 @@ def _open(config: BusConfig) -> can.BusABC:
     return open_without_function_code(config, TPDO1)
 
 
-def _by_kernel(message: can.Message) -> int:
+def arrived_ns(message: can.Message) -> int:
     """When the kernel took a message in, monotonic ns: drives read angles then, however busy this host is."""
     age_s = time.time() - message.timestamp
     return monotonic_ns() - (round(age_s * NS_PER_S) if 0.0 < age_s < _OLDEST_S else 0)
@@ -78,7 +78,7 @@ async def run(
     try:
         for bus in canopen.buses:
             buses[bus.name] = CanBus(
-                bus, peer.on_frame, opener=_open, on_remote=peer.on_remote, arrived=_by_kernel
+                bus, peer.on_frame, opener=_open, on_remote=peer.on_remote, arrived=arrived_ns
             )
             buses[bus.name].open()
         freeze_heap()

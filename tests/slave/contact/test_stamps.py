@@ -27,13 +27,16 @@ YAW = SKELETON.joint_names.index("neck_yaw")
 RATE_RAD_S, ERROR_S, JITTER_S = 0.5, 3e-4, 5e-4
 
 
-def turning(observer: MomentumObserver, step_s: float, errors: Array, told_s: float) -> tuple[Array, Array]:
+def turning(
+    observer: MomentumObserver, step_s: float, errors: Array, told_s: float | Array
+) -> tuple[Array, Array]:
     """Residual and what stamps can feign, (T,), of a neck that turns evenly: nothing pushes it."""
     residual, feigned = [], []
+    told = np.broadcast_to(told_s, errors.shape).tolist()
     for k, error in enumerate(errors.tolist()):
         position = np.zeros(25)
         position[YAW] = RATE_RAD_S * (step_s * k + ERROR_S * error)
-        observer.update(round(1e9 * step_s * (k + 1)), position, np.zeros(25), told_s)
+        observer.update(round(1e9 * step_s * (k + 1)), position, np.zeros(25), told[k])
         residual.append(observer.external_nm[YAW])
         feigned.append(observer.stamp_nm[YAW] if isinstance(observer.stamp_nm, np.ndarray) else 0.0)
     return np.array(residual), np.array(feigned)
@@ -61,6 +64,16 @@ def test_no_signs_feign_more(signs: list[float], step_s: float) -> None:
     errors = np.array([0.0, 0.0, *signs])
     residual, feigned = turning(MomentumObserver(SKELETON, 0.01, MODEL), step_s, errors, ERROR_S)
     assert (np.abs(residual[2:]) <= 1.02 * feigned[2:] + 1e-9).all()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_one_wrong_stamp_also_spoils_the_velocity_it_is_judged_by(sign: float) -> None:
+    errors = np.zeros(60)
+    errors[20] = sign
+    observer = MomentumObserver(SKELETON, 0.01, MODEL)
+    residual, feigned = turning(observer, 0.004, errors, ERROR_S * np.abs(errors))
+    # what is forgotten after twelve time constants is less than a thousandth
+    assert (np.abs(residual) <= feigned + 1e-4).all()
 
 
 def test_exact_stamps_cost_nothing() -> None:

@@ -163,3 +163,21 @@ def test_the_drives_own_angles_are_finer() -> None:
     )
     robot.watch.look(robot.now_ns, reading, STILL_RAD)
     assert robot.watch.floor_nm[ELBOW] < 0.5 * coarse_nm
+
+
+def test_a_mixture_whose_joints_do_not_all_have_a_drive_s_angle_is_watched() -> None:
+    """One angle that is not a number would make every joint's residual none, and nobody would be told."""
+    robot = Standing()
+    drive_rad = STILL_RAD.copy()
+    drive_rad[NAMES.index("left_index")] = np.nan
+    for share in (0.9, 1.3):
+        pushed = push(share, robot.watch)
+        for _ in range(200):
+            robot.now_ns += CYCLE_NS
+            counts = robot.encoders.counts(STILL_RAD)
+            reading = EncoderReading(
+                robot.now_ns, counts, np.ones(25, np.bool_), drive_rad, robot.needed_nm - pushed
+            )
+            robot.watch.look(robot.now_ns, reading, robot.encoders.position_rad(counts))
+        assert robot.watch.missing(robot.now_ns) == ""
+        assert (robot.watch.finding is not None) is (share > 1.0)

@@ -9,7 +9,7 @@ import pytest
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from deploy.sim.patient.free_run import MOST_STOPS, FreeFlight, free_run, of_motion
+from deploy.sim.patient.free_run import MOST_STOPS, FreeFlight, PatientOperator, free_run, of_motion
 from deploy.sim.patient.replay import held, replay
 from deploy.sim.patient.robot import Imperfect
 from slave.contact.config import ContactConfig, ContactJoint
@@ -78,3 +78,12 @@ def test_the_operator_waits_while_the_robot_aligns() -> None:
     run = free_run(turns, 1.0, PLAIN, USUAL)
     assert run.other_stops == ()
     assert run.followed_s > 1.5
+
+
+def test_an_operator_who_waits_does_not_move() -> None:
+    operator = PatientOperator(lambda t_s: (np.full(25, t_s), np.ones(25)))
+    assert not operator(5.0)[1].any()
+    operator.waits, operator.moved_s = False, 0.5
+    position, velocity = operator(5.0)
+    assert (position == 0.5).all()
+    assert (velocity == 1.0).all()

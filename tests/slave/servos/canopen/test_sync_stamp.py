@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from common.config.load import load_config
+from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING, example
 from slave.config import SlaveConfig
 from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.servos import CanopenServos
 from slave.servos.canopen.sync_stamp import SyncStamps
 
 PERIOD_NS, USUAL_NS = 20_000_000, 300_000
@@ -65,3 +68,19 @@ def test_the_file_says_what_is_usual(tmp_path: Path) -> None:
     file.write_text(text + "\n[servos.canopen]\nsample_error_ms = 1.5\n", "utf-8")
     config = load_config(file, SlaveConfig, ['servos.backend="canopen"'])
     assert config.servos.section(CanopenConfig).sample_error_ms == 1.5
+
+
+def test_the_adapter_tells_how_long_handing_over_took() -> None:
+    now_ns = 10**9
+
+    class Slow(CanopenServos):
+        def _send(self, outgoing: tuple[str, int, bytes]) -> None:
+            nonlocal now_ns
+            now_ns += 200_000
+
+    servos = Slow(CanopenConfig(sample_error_ms=0.0), load_skeleton("nursing"), clock=lambda: now_ns)
+    for _ in range(2):
+        servos.write(np.zeros(25))
+        now_ns += PERIOD_NS
+    # the reading of the first SYNC, ended by the second: one SYNC on each of two buses
+    assert servos.read().stamp_error_ns == 400_000
