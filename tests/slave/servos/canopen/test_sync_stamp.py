@@ -74,7 +74,7 @@ def test_the_adapter_tells_how_long_handing_over_took() -> None:
     now_ns = 10**9
 
     class Slow(CanopenServos):
-        def _send(self, outgoing: tuple[str, int, bytes]) -> None:
+        def _send(self, outgoing: tuple[str, int, bytes | None]) -> None:
             nonlocal now_ns
             now_ns += 200_000
 
