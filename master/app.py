@@ -159,6 +159,8 @@ class Master:
                     bus.send(sync)
             if late is not None:
                 self._send(late)
+                if self._tap is not None:  # the way of a suit of which no node is asked
+                    self._tap.rest(monotonic_ns())
             self._notifier.beat(monotonic_ns())
 
     async def _sound(self) -> None:

@@ -126,6 +126,8 @@ def _expected(kind: str, message: str, place: tuple[int | str, ...]) -> str:
     if kind == "extra_forbidden":
         new = RENAMED.get(str(place[-1]))
         return f"the key {new}, its new name" if new else "no such key (is it misspelt?)"
+    if kind == "path_type":
+        return "a path, in quotes"
     if kind == "union_tag_invalid":
         return message.rpartition("expected tags: ")[2]
     if kind in ("missing", "union_tag_not_found"):

@@ -160,6 +160,8 @@ class TapSender:
 def _remove_stale(path: Path) -> None:
     """Remove the socket of a process that was killed; one that is listened at is left, and refused."""
     if not path.is_socket():
+        if path.exists():
+            raise TandemError(f"{path}: a file lies there that is no socket; name another [tap] socket")
         return
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as trial:
         try:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import logging
+from typing import Protocol
+
 import msgpack
 
 from common.clock import to_ns
-from common.tap.sender import TapSender
 from master.journal.calls import SNAPSHOT, JournaledPipeline, Pipeline
 from master.journal.memory import recall
 
@@ -13,27 +15,57 @@ SNAPSHOT_NS = to_ns(60.0)
 SOONEST_NS = to_ns(2.0)
 """A snapshot takes 2 to 4 ms: a reader that keeps falling behind must not ask for one each tick."""
 
+log = logging.getLogger(__name__)
+
+
+class Readers(Protocol):
+    """The part of a `TapSender` that is needed here."""
+
+    @property
+    def read(self) -> bool:
+        """Whether anybody reads."""
+
+    @property
+    def behind(self) -> bool:
+        """Whether one who reads lacks messages."""
+
+    def put(self, topic: str, payload: bytes, stamp_ns: int | None = None) -> None:
+        """Hand one message to all readers."""
+
+    def put_snapshot(self, topic: str, payload: bytes) -> None:
+        """Hand on what a reader that lacks messages must know."""
+
 
 class MasterTap:
     """Everything that a recording needs to compute the joint angles again. Costs little without readers."""
 
-    def __init__(self, pipeline: Pipeline, sender: TapSender) -> None:
+    def __init__(self, pipeline: Pipeline, readers: Readers) -> None:
         self._raw = pipeline
-        self._sender = sender
-        self._snapshot_ns = 0
-        self.pipeline = JournaledPipeline(pipeline, sender.put, lambda: sender.read)
+        self._readers = readers
+        self._snapshot_ns: int | None = None
+        self._failed = False
+        self.pipeline = JournaledPipeline(pipeline, readers.put, lambda: readers.read)
         """To be called in the pipeline's place."""
 
     def overhear(self, key: str, payload: bytes, stamp_ns: int) -> None:
         """A message that was sent or heard on the link."""
-        self._sender.put(key, payload, stamp_ns)
+        self._readers.put(key, payload, stamp_ns)
 
     def rest(self, now_ns: int) -> None:
         """The tick's work is done: time for a snapshot, if one is due."""
-        since_ns = now_ns - self._snapshot_ns
-        if not self._sender.read or since_ns < SOONEST_NS:
+        if not self._readers.read or self._failed:
             return
-        if self._sender.behind or since_ns >= SNAPSHOT_NS:
+        since_ns = SNAPSHOT_NS if self._snapshot_ns is None else now_ns - self._snapshot_ns
+        if since_ns >= SNAPSHOT_NS or (self._readers.behind and since_ns >= SOONEST_NS):
             self._snapshot_ns = now_ns
-            self.pipeline.flush()
-            self._sender.put_snapshot(SNAPSHOT, msgpack.packb(recall(self._raw)))
+            self._put_snapshot()
+
+    def _put_snapshot(self) -> None:
+        try:
+            snapshot: bytes = msgpack.packb(recall(self._raw))
+        except Exception:  # whatever it is, the operator's robot goes on
+            self._failed = True
+            log.exception("no snapshot can be taken, so recordings of this run cannot be computed again")
+            return
+        self.pipeline.flush()
+        self._readers.put_snapshot(SNAPSHOT, snapshot)

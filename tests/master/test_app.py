@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from common.can.frame import CanFrame
 from common.config.load import load_config
 from common.process.notify import Notifier
 from common.process.pacing import DueTick, TickGrid
@@ -86,3 +87,21 @@ def test_what_is_told_beside_it_is_words_and_no_sign_of_life(master: tuple[app.M
     asyncio.run(running._publish_metrics())
     assert set(notifier.said) == {"robot-1: not heard"}
     assert notifier.beats == 0
+
+
+def test_a_suit_of_which_no_node_is_asked_gives_its_snapshots_too(
+    master: tuple[app.Master, Counting], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its windows close with the tick that opens them: no last frame ends them."""
+    running, _ = master
+    rests: list[int] = []
+
+    class Tap:
+        def rest(self, now_ns: int) -> None:
+            rests.append(now_ns)
+
+    monkeypatch.setattr(running, "_tap", Tap())
+    monkeypatch.setattr(running, "_send", lambda _: None)
+    monkeypatch.setattr(running._calls, "tick", lambda *_: (CanFrame(0x80, b"", fd=False), object()))
+    asyncio.run(running._capture())
+    assert len(rests) == 5

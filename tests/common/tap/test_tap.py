@@ -151,13 +151,25 @@ def test_the_socket_of_a_killed_process_is_taken_over_and_that_of_a_living_one_i
     run(tmp_path / "tap", story)
 
 
+def test_a_file_that_lies_there_is_kept_and_named(tmp_path: Path) -> None:
+    path = tmp_path / "tap"
+    path.write_text("a person's")
+    with pytest.raises(TandemError, match="no socket"):
+        TapSender(path, bytes).open()
+    assert path.read_text() == "a person's"
+
+
 def test_no_tap_is_opened_unless_it_is_named() -> None:
     assert open_tap(TapConfig(), {}) is None
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("no/such/folder/tap.sock", "folder that exists"), ("x" * 120, "at most 100 bytes")],
+    [
+        ('"no/such/folder/tap.sock"', "folder that exists"),
+        (f'"{"x" * 120}"', "at most 100 bytes"),
+        ("3", "a path, in quotes"),
+    ],
 )
 def test_a_path_that_no_socket_can_have_is_a_mistake_of_the_file(
     tmp_path: Path, text: str, expected: str
@@ -169,7 +181,7 @@ def test_a_path_that_no_socket_can_have_is_a_mistake_of_the_file(
             return self.tap.mistakes()
 
     file = tmp_path / "x.toml"
-    file.write_text(f'[tap]\nsocket = "{text}"\n')
+    file.write_text(f"[tap]\nsocket = {text}\n")
     with pytest.raises(ConfigError, match=expected):
         load_config(file, File)
 
