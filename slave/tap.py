@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import msgpack
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from common.errors import RecordingError
 from common.quaternion import Array
 from common.skeleton import Skeleton
+from common.tap.readers import Readers
 from common.wire.messages import Mask
 from common.wire.version import software
 
@@ -24,24 +24,6 @@ TICK, GUARD = "robot/tick", "robot/guard"
 VERSION = 1
 
 _pack = msgpack.Packer(autoreset=True).pack
-
-
-class Readers(Protocol):
-    """The part of a `TapSender` that is needed here."""
-
-    @property
-    def read(self) -> bool:
-        """Whether anybody reads."""
-
-    @property
-    def behind(self) -> bool:
-        """Whether a reader lacks messages."""
-
-    def put(self, topic: str, payload: bytes, stamp_ns: int | None = None) -> None:
-        """Hand one message to all readers."""
-
-    def put_snapshot(self, topic: str, payload: bytes) -> None:
-        """Hand on what a reader that lacks messages must know."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from typing import Protocol
 
 import msgpack
 
 from common.clock import to_ns
+from common.tap.readers import Readers
 from master.journal.calls import SNAPSHOT, JournaledPipeline, Pipeline
 from master.journal.memory import recall
 
@@ -16,24 +16,6 @@ SOONEST_NS = to_ns(2.0)
 """A snapshot takes 2 to 4 ms: a reader that keeps falling behind must not ask for one each tick."""
 
 log = logging.getLogger(__name__)
-
-
-class Readers(Protocol):
-    """The part of a `TapSender` that is needed here."""
-
-    @property
-    def read(self) -> bool:
-        """Whether anybody reads."""
-
-    @property
-    def behind(self) -> bool:
-        """Whether one who reads lacks messages."""
-
-    def put(self, topic: str, payload: bytes, stamp_ns: int | None = None) -> None:
-        """Hand one message to all readers."""
-
-    def put_snapshot(self, topic: str, payload: bytes) -> None:
-        """Hand on what a reader that lacks messages must know."""
 
 
 class MasterTap:
