@@ -74,7 +74,8 @@ class MasterPipeline:
         self._disbelieved: Mask = np.zeros(len(nodes), np.bool_)
         self._decimation = config.capture.decimation
         self._window_open = False
-        self._last_sweep: Sweep | None = None
+        self.last_sweep: Sweep | None = None
+        """The newest tick's readings, before the filters."""
         self._decided_period = -1
         self._parts: tuple[Callable[[], Doubts], ...] = (self._of_suit, self._of_estimator)
         self.doubts: Doubts = {}
@@ -121,11 +122,11 @@ class MasterPipeline:
         clashing = self.poll.doubted
         if clashing.any():
             sweep = replace(sweep, lost=sweep.lost | clashing)
-        sweeps = [*bridged(self._last_sweep, sweep), sweep]
-        dt_s = _spacing_s(self._last_sweep, sweep, len(sweeps))
+        sweeps = [*bridged(self.last_sweep, sweep), sweep]
+        dt_s = _spacing_s(self.last_sweep, sweep, len(sweeps))
         for each in sweeps:
             self.estimator.update(each, dt_s, each.q_world_from_sensor)
-        self._last_sweep = sweep
+        self.last_sweep = sweep
         self._watch_taps(sweep)
         # after a missed deciding tick the next one decides, so that no command is missing
         period = sweep.tick // self._decimation

@@ -165,7 +165,9 @@ class Slave:
     def _hand_on(self, tap: SlaveTap, reading: EncoderReading, setpoint: Setpoint) -> None:
         guard = self._pipeline.guard
         written, read = setpoint.position_rad, self._pipeline.position_rad
-        tick = RobotTick(monotonic_ns(), reading.read_ns, setpoint.ready, written, read, reading.valid)
+        target = self._pipeline.target
+        asked = None if target is None else target.position_rad
+        tick = RobotTick(monotonic_ns(), reading.read_ns, setpoint.ready, written, read, reading.valid, asked)
         tap.tick(tick, str(guard.state), guard.reason)
 
     def _body(self) -> Body:

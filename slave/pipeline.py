@@ -119,6 +119,8 @@ class SlavePipeline:
         """The base's attitude, if it carries a sensor; `Body.base` has what is wrong with it."""
         self._position_rad = np.zeros(len(self.skeleton.joints))
         self._setpoint = Setpoint(self._position_rad, np.zeros_like(self._position_rad), ready=False)
+        self.target: TrackTarget | None = None
+        """Where the tracker saw the operator at the newest tick; None while the robot follows nobody."""
 
     def on_command(self, payload: bytes, received_ns: int, now_ns: int, *, sender: str | None) -> None:
         """Take a command from the link; whatever is wrong with it is counted and changes nothing.
@@ -211,11 +213,12 @@ class SlavePipeline:
         """Gate ▸ track ▸ limit, for joint angles (J,) as read at `read_ns`."""
         permission = self.guard.step(now_ns, position_rad, valid, read_ns, body, drive_rad=drive_rad)
         self._begin_anew()
+        self.target = None
         if permission.seat_rad is not None:
             self.limiter.seat(permission.seat_rad)
         if not permission.ready:
             return Setpoint(position_rad.copy(), np.zeros_like(position_rad), ready=False)
-        target = self._track(now_ns, permission)
+        target = self.target = self._track(now_ns, permission)
         if target is None:
             self.blind.forget()
             # to stop and to hold takes what it takes

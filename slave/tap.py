@@ -21,7 +21,9 @@ from common.wire.messages import Mask
 from common.wire.version import software
 
 TICK, GUARD = "robot/tick", "robot/guard"
-VERSION = 1
+VERSION = 2
+_WITHOUT_TARGET = 1
+"""The version before, which is still read: it has no target."""
 
 _pack = msgpack.Packer(autoreset=True).pack
 
@@ -41,6 +43,8 @@ class RobotTick:
     """(J,) by the encoders."""
     valid: Mask
     """(J,) encoders that could be read."""
+    target_rad: Array | None = None
+    """(J,) where the tracker saw the operator, before the limits; None while the robot follows nobody."""
 
 
 class SlaveTap:
@@ -80,7 +84,8 @@ def describe(robot: str, skeleton: Skeleton) -> Mapping[str, str]:
 
 
 def encode_tick(tick: RobotTick) -> bytes:
-    """As a message: version, times, whether it was written, float64 setpoints and positions, valid."""
+    """As a message: version, times, whether it was written, float64 setpoints and positions, valid, target."""
+    target = tick.target_rad
     out: bytes = _pack(
         (
             VERSION,
@@ -90,25 +95,40 @@ def encode_tick(tick: RobotTick) -> bytes:
             tick.setpoint_rad.astype("<f8").tobytes(),
             tick.position_rad.astype("<f8").tobytes(),
             tick.valid.tobytes(),
+            None if target is None else target.astype("<f8").tobytes(),
         )
     )
     return out
 
 
 def decode_tick(payload: bytes) -> RobotTick:
-    """Read one back. Raises RecordingError."""
+    """Read one back, of this version or the one before. Raises RecordingError."""
     try:
-        version, now_ns, read_ns, ready, setpoint, position, valid = msgpack.unpackb(payload)
-        if version == VERSION:
-            setpoint_rad, position_rad = np.frombuffer(setpoint, "<f8"), np.frombuffer(position, "<f8")
+        version, *fields = msgpack.unpackb(payload)
+        if version == _WITHOUT_TARGET:
+            fields.append(None)
+        if version in (VERSION, _WITHOUT_TARGET):
+            now_ns, read_ns, ready, setpoint, position, valid, target = fields
             return RobotTick(
                 int(now_ns),
                 int(read_ns),
                 bool(ready),
-                setpoint_rad,
-                position_rad,
+                np.frombuffer(setpoint, "<f8"),
+                np.frombuffer(position, "<f8"),
                 np.frombuffer(valid, np.bool_),
+                None if target is None else np.frombuffer(target, "<f8"),
             )
     except Exception:  # msgpack raises its own family, and a buffer may be of any length
         pass
     raise RecordingError(f"a message of {TICK} is not of version {VERSION}")
+
+
+def decode_guard(payload: bytes) -> tuple[int, str, str]:
+    """When the guard changed (ns, the slave's clock), its state and its reason. Raises RecordingError."""
+    try:
+        version, now_ns, state, reason = msgpack.unpackb(payload)
+        if version in (VERSION, _WITHOUT_TARGET):
+            return int(now_ns), str(state), str(reason)
+    except Exception:  # msgpack raises its own family
+        pass
+    raise RecordingError(f"a message of {GUARD} is not of version {VERSION}")

@@ -11,7 +11,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["deploy/calibrate", "deploy/harness"],
     ["deploy/client"],
     ["deploy/sim"],
-    ["deploy/measure"],
+    ["deploy/measure", "deploy/recorded"],
     ["deploy/report", "deploy/certificates", "deploy/examples", "deploy/ros"],
     ["master", "slave"],
     ["master/calibrate", "master/comfort", "master/alarms", "master/journal"],

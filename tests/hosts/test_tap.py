@@ -21,8 +21,8 @@ from deploy.harness.engage import until_tracking
 from deploy.harness.host import HostWatch
 from deploy.harness.rig import ROBOT, Rig, open_rig
 from deploy.harness.start import start_all
-from deploy.ops.replay.recompute import Recorded, Replay
-from deploy.ops.replay.recorded_config import recorded_config
+from deploy.recorded.recompute import Recorded, Replay
+from deploy.recorded.recorded_config import recorded_config
 from master.journal.calls import FRAMES
 from slave.tap import TICK, decode_tick
 

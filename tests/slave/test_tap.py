@@ -36,18 +36,24 @@ class Readers:
 
 def tick(now_ns: int = 5) -> RobotTick:
     angles = np.linspace(-1.0, 1.0, 25)
-    return RobotTick(now_ns, now_ns - 1, True, angles, angles / 3, angles > 0.0)
+    return RobotTick(now_ns, now_ns - 1, True, angles, angles / 3, angles > 0.0, angles / 7)
 
 
 def test_a_tick_comes_back_bit_for_bit() -> None:
     before, after = tick(), decode_tick(encode_tick(tick()))
     assert (after.now_ns, after.read_ns, after.ready) == (5, 4, True)
     for one, other in zip(
-        (before.setpoint_rad, before.position_rad, before.valid),
-        (after.setpoint_rad, after.position_rad, after.valid),
+        (before.setpoint_rad, before.position_rad, before.valid, before.target_rad),
+        (after.setpoint_rad, after.position_rad, after.valid, after.target_rad),
         strict=True,
     ):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_tick_without_a_target_and_one_of_the_version_before_are_read() -> None:
+    version, *fields, _ = msgpack.unpackb(encode_tick(tick()))
+    assert decode_tick(msgpack.packb([version, *fields, None])).target_rad is None
+    assert decode_tick(msgpack.packb([1, *fields])).target_rad is None
 
 
 @pytest.mark.parametrize(

@@ -108,7 +108,7 @@ def recording(
 
     Example: `tandem recording morning.mcap --json`
     """
-    from deploy.ops.record.contents import survey
+    from deploy.recorded.contents import survey
     from deploy.report.tables import UNKNOWN, plain_table
 
     contents = survey(file)

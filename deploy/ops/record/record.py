@@ -19,8 +19,8 @@ from common.metrics.tree import WriteMetrics
 from common.process.runtime import until_stopped
 from common.wire.topics import COMMAND, STATE, STATISTICS, Topic, video
 from deploy.client.destination import destination
-from deploy.ops.record.missing import Missing, missing_in_words
 from deploy.ops.record.tape import Tape
+from deploy.recorded.missing import Missing, missing_in_words
 
 LIVE = (COMMAND, STATE, STATISTICS)
 """What is always recorded."""

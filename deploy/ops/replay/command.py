@@ -18,8 +18,8 @@ from common.errors import TandemError
 from common.recording.reader import RecordingStream
 from common.wire.version import software
 from deploy.ops.replay.comparison import ReplayFindings, compare
-from deploy.ops.replay.recompute import Recorded, Replay
-from deploy.ops.replay.recorded_config import recorded_config
+from deploy.recorded.recompute import Recorded, Replay
+from deploy.recorded.recorded_config import recorded_config
 from deploy.report.options import AsJson, Overrides
 from deploy.report.tables import plain_table
 from master.config import MasterConfig

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from deploy.ops.replay.recompute import Recomputed, Replay
+from deploy.recorded.recompute import Recomputed, Replay
 
 
 @dataclass(frozen=True, slots=True)

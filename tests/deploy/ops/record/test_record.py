@@ -20,8 +20,8 @@ from common.metrics.tree import Metrics
 from common.recording import McapRecorder, read_recording
 from common.wire.topics import COMMAND, STATE, STATISTICS, video
 from deploy import cli
-from deploy.ops.record.contents import survey
 from deploy.ops.record.record import RecordOptions, link_of, record
+from deploy.recorded.contents import survey
 from tests.deploy.ops.record.numbered import state
 
 ROBOT = "robot-1"

@@ -11,10 +11,10 @@ import pytest
 from common.errors import TandemError
 from common.recording import McapRecorder
 from deploy.ops.replay.command import replay
-from deploy.ops.replay.recompute import Recorded
+from deploy.recorded.recompute import Recorded
 from master.journal.calls import FRAMES, decode_calls
 from master.journal.context import describe
-from tests.deploy.ops.replay.test_recompute import RecordedBench
+from tests.deploy.recorded.test_recompute import RecordedBench
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ It begins at the first snapshot; where messages are missing in the middle, it go
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -60,11 +60,18 @@ class Recomputed:
 class Replay:
     """Computes a recording again, with the same configuration or another one."""
 
-    def __init__(self, config: MasterConfig, from_snapshots: bool = True) -> None:
+    def __init__(
+        self,
+        config: MasterConfig,
+        from_snapshots: bool = True,
+        look: Callable[[MasterPipeline], object] = lambda _: None,
+    ) -> None:
         """`from_snapshots`: begin with what the recorded filters had learnt.
 
         False for another configuration, whose filters learn anew from the recording's beginning.
+        `look` is called with the pipeline after each tick.
         """
+        self._look = look
         self._config = config
         self._protocol = SuitProtocol.load(config.capture.dbc)
         self._from_snapshots = from_snapshots
@@ -91,6 +98,7 @@ class Replay:
             elif topic == FRAMES and self._pipeline is not None:
                 self.ticks += 1
                 yield from self._make_calls(payload, self._pipeline)
+                self._look(self._pipeline)
             elif topic == ANGLES:
                 angles = decode_angles(payload)
                 self._recorded[angles.tick] = angles

@@ -16,8 +16,8 @@ from common.wire.numbering import Number, number_of
 from common.wire.topics import COMMAND, STATE
 from common.wire.video import VideoFrame, encode_frame
 from deploy import cli
-from deploy.ops.record.contents import survey
-from deploy.ops.record.missing import STREAMS, Missing
+from deploy.recorded.contents import survey
+from deploy.recorded.missing import STREAMS, Missing
 from deploy.sim.world.world import VirtualWorld, WorldSettings
 from tests.deploy.ops.record.numbered import command, state
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from common.clock import to_s
 from common.recording import RecordingStream
-from deploy.ops.record.missing import Missing
+from deploy.recorded.missing import Missing
 
 
 @dataclass(slots=True)

@@ -12,8 +12,8 @@ import pytest
 
 from common.config.load import load_config
 from common.errors import RecordingError
-from deploy.ops.replay.recompute import Recomputed, Recorded, Replay
-from deploy.ops.replay.recorded_config import recorded_config
+from deploy.recorded.recompute import Recomputed, Recorded, Replay
+from deploy.recorded.recorded_config import recorded_config
 from master.config import MasterConfig
 from master.journal.calls import FRAMES, MISSING, SNAPSHOT, JournaledPipeline, decode_calls
 from master.journal.context import describe

@@ -1,0 +1,1 @@
+"""What a recording holds: read back, counted, and computed again."""
