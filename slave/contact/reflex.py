@@ -33,10 +33,10 @@ further from its setpoint than it turns in this time is not where it says: nothi
 
 
 class ContactReflex:
-    """What the setpoint does in `hold` after contact. It keeps the joints' limits, but for its first step.
+    """What the setpoint does in `hold` after contact. It keeps the joints' limits; its first step is a jump.
 
-    That step puts the setpoint where the joints stand: what the drives were behind by no longer pushes, and
-    their damping brakes. It takes torque away, never adds any.
+    That step puts the setpoint where the joints stand, or at the limit beyond which they were pushed: what the
+    drives were behind by no longer pushes, and their damping brakes. It takes torque away, never adds any.
     """
 
     def __init__(self, config: ContactConfig, watch: ContactWatch, joint_names: Sequence[str]) -> None:
@@ -97,7 +97,7 @@ class ContactReflex:
         if (lead_rad > LEAD_S * limiter.limits.max_velocity_rad_s).any():
             return False
         self._began_ns, self._back, self._free_m = now_ns, 0, None
-        limiter.seat(np.where(doubted, limiter.position_rad, stand_rad))
+        limiter.yield_to(np.where(doubted, limiter.position_rad, stand_rad))
         here = self._way[-1][1]
         self._apart_m = [
             float(np.linalg.norm(there - here, axis=1).max()) for _, there in reversed(self._way)

@@ -9,6 +9,7 @@ import numpy as np
 
 from common.quaternion import Array
 from common.wire.messages import Mask
+from slave.encoders.counts import RAD_PER_COUNT
 from slave.guard.events import Clamp, Rule
 from slave.guard.limits import MotionLimits
 from slave.limit.damper import DamperStep, DistanceDamper
@@ -112,8 +113,8 @@ class SetpointLimiter:
     """The setpoint of all J joints.
 
     Whatever is asked, for every joint and step: |v| ≤ its velocity limit, |Δv| ≤ its acceleration limit
-    times dt, and the position stays within its limits, the way to brake included. A joint that was seated
-    beyond a limit only ever moves back.
+    times dt, and the position stays within its limits, the way to brake included. A joint that stood beyond a
+    limit when it was seated only ever moves back.
     """
 
     def __init__(
@@ -125,17 +126,32 @@ class SetpointLimiter:
         self.slowed: Slowed = lambda position_rad, wish_rad_s, step_s: wish_rad_s
         self._none: Mask = np.zeros(len(self._names), np.bool_)
         self.limits = limits
-        self.seat(np.zeros(len(self._names)))
+        self.seat(limits.reachable(np.zeros(len(self._names))))
 
     def seat(self, position_rad: Array) -> None:
-        """Put the setpoint where the joints stand (J,), at rest."""
-        self.position_rad: Array = position_rad.copy()
+        """Put the setpoint where the joints stand (J,), at rest.
+
+        A joint at its limit may read up to an encoder count beyond it: its setpoint is the limit. A joint
+        that stands further beyond is held there, since a setpoint at the limit would make it jump.
+        """
+        within = self.limits.reachable(position_rad)
+        by_reading = np.abs(position_rad - within) <= RAD_PER_COUNT
+        self.position_rad: Array = np.where(by_reading, within, position_rad)
         """(J,) read-only."""
         self.velocity_rad_s: Array = np.zeros_like(position_rad)
         """(J,) read-only."""
         self.position_rad.flags.writeable = self.velocity_rad_s.flags.writeable = False
         self._clamped = dict.fromkeys(Rule, self._none)
         self._clamping = False
+
+    def yield_to(self, position_rad: Array) -> None:
+        """Put the setpoint where somebody has pushed the joints (J,), at rest, but not beyond their limits.
+
+        A setpoint that is beyond a limit already goes no further beyond.
+        """
+        here, limits = self.position_rad, self.limits
+        lowest, highest = np.minimum(here, limits.lower_rad), np.maximum(here, limits.upper_rad)
+        self.seat(np.clip(position_rad, lowest, highest))
 
     @property
     def setpoint(self) -> Setpoint:

@@ -63,6 +63,16 @@ def test_the_first_step_gives_up_the_drives_lead(reflex: Reflex) -> None:
     assert course[0] == pytest.approx(0.4, abs=1e-3)
 
 
+@pytest.mark.parametrize("reflex", [Reflex.RETREAT, Reflex.FLOAT])
+def test_an_arm_that_is_pushed_beyond_its_limit_gets_its_setpoint_at_the_limit(reflex: Reflex) -> None:
+    robot = Raised(ContactConfig(reflex=reflex), turned_rad=float(SKELETON.upper_rad[SHOULDER]) - 0.01)
+    robot.limiter.seat(np.minimum(robot.limiter.position_rad, SKELETON.upper_rad))
+    robot.stand[SHOULDER] = SKELETON.upper_rad[SHOULDER] + 0.05
+    course = robot.step(20)
+    assert course
+    assert max(course) <= SKELETON.upper_rad[SHOULDER]
+
+
 def test_it_goes_back_slowly_and_stops_once_it_is_free_and_a_little_farther() -> None:
     robot = Raised(ContactConfig(retreat_m=0.02))
     pressed = robot.step(60)

@@ -1,5 +1,7 @@
 """The setpoint limiter: its promises for arbitrary targets, and what each rule is for."""
 
+from dataclasses import replace
+
 import hypothesis.strategies as st
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from hypothesis import given, settings
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.messages import Mask
+from slave.encoders.counts import RAD_PER_COUNT
 from slave.guard import GuardConfig
 from slave.guard.events import Clamp, Rule
 from slave.guard.limits import MotionLimits
@@ -214,6 +217,36 @@ def test_a_joint_beyond_its_limit_does_not_jump_and_moves_back() -> None:
     for _ in range(200):
         watched.step(MID)
     assert watched.limiter.position_rad[5] == pytest.approx(MID[5])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_joint_that_reads_a_count_beyond_its_limit_is_held_at_the_limit(sign: float) -> None:
+    end = LIMITS.upper_rad if sign > 0.0 else LIMITS.lower_rad
+    limiter = SetpointLimiter(SKELETON.joint_names, LIMITS)
+    limiter.seat(end + sign * (RAD_PER_COUNT - EPS))
+    assert (limiter.position_rad == end).all()
+    further = end + sign * (RAD_PER_COUNT + EPS)
+    limiter.seat(further)
+    assert (limiter.position_rad == further).all(), "the joint would jump to its limit"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_setpoint_that_yields_stops_at_the_limit(sign: float) -> None:
+    end = LIMITS.upper_rad if sign > 0.0 else LIMITS.lower_rad
+    watched = Watched(end - sign * 0.01)
+    watched.limiter.yield_to(end + sign * 0.05)
+    assert (watched.limiter.position_rad == end).all()
+    beyond = end + sign * 0.1
+    watched.limiter.seat(beyond)
+    watched.limiter.yield_to(end + sign * 0.2)
+    assert (watched.limiter.position_rad == beyond).all(), "it went further beyond"
+    watched.limiter.yield_to(end + sign * 0.06)
+    assert np.allclose(watched.limiter.position_rad, end + sign * 0.06), "it may come back"
+
+
+def test_before_the_joints_are_read_the_setpoint_is_within_limits_that_do_not_contain_zero() -> None:
+    limits = replace(LIMITS, lower_rad=np.full(JOINTS, 0.2), upper_rad=np.full(JOINTS, 0.4))
+    assert (SetpointLimiter(SKELETON.joint_names, limits).position_rad == 0.2).all()
 
 
 def test_a_joint_beyond_its_limit_has_no_room_outwards() -> None:
