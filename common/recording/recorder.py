@@ -3,7 +3,8 @@
 `put` only hands over: it never waits for the disk. What the thread cannot keep up with is dropped and
 counted; a disk that fails ends the recording, says so once, and leaves the process alone. Every `flush_s`
 what came is closed into a chunk and handed to the kernel, so that a process that is killed loses no more
-than that; a host that loses its power may lose more.
+than that; a host that loses its power may lose more. The file gets its name once its head is in it: a
+process that is killed, or a disk that is full, at the very beginning leaves no file that cannot be read.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from secrets import token_hex
 from types import TracebackType
 from typing import BinaryIO, NamedTuple, Self
 
@@ -80,7 +82,8 @@ class McapRecorder:
         self._wall = wall
         self._flush_ns = to_ns(flush_s)
         self._queue: queue.Queue[_Item | None] = queue.Queue(capacity)
-        self._stream = create(path) if stream is None else stream
+        hidden = path.with_name(f".{path.name}.{token_hex(4)}")
+        self._stream = create(hidden, path) if stream is None else stream
         self._whole = 0
         self._unflushed = 0
         self._channels: dict[str, int] = {}
@@ -90,8 +93,14 @@ class McapRecorder:
             self._writer.start(library="tandem")
             self._writer.add_metadata(METADATA, dict(metadata))
             self._flush()
-        except OSError as error:
-            self._stream.close()
+            if stream is None:
+                _reveal(hidden, path)
+        except (OSError, RecordingError) as error:
+            with suppress(OSError):  # it flushes once more, and fails as before
+                self._stream.close()
+            hidden.unlink(missing_ok=True)
+            if isinstance(error, RecordingError):
+                raise
             raise RecordingError(f"{path}: cannot be written ({error.strerror or error})") from None
         self._thread = threading.Thread(target=self._run, name=f"recorder {path.name}", daemon=True)
         self._thread.start()
@@ -190,11 +199,33 @@ class McapRecorder:
             log.info("%s: the incomplete chunk at its end could not be cut off: %s", self.path, second)
 
 
-def create(path: Path) -> BinaryIO:
-    """Open a new file for writing. Raises RecordingError where it is there already: none is written over."""
+def _reveal(hidden: Path, path: Path) -> None:
+    """Give a file its own name. Raises RecordingError where another file has it, else OSError."""
+    try:
+        os.link(hidden, path)  # unlike a renamed file, a linked one never replaces another
+    except FileExistsError:
+        raise _taken(path) from None
+    except OSError:  # a file system without hard links, such as a memory stick's
+        if path.exists():
+            raise _taken(path) from None
+        hidden.rename(path)
+    else:
+        hidden.unlink()
+
+
+def _taken(path: Path) -> RecordingError:
+    return RecordingError(f"{path}: is there already; name another file, or move it away")
+
+
+def create(path: Path, named: Path | None = None) -> BinaryIO:
+    """Open a new file for writing. Raises RecordingError where it is there already: none is written over.
+
+    `named`: the file that an error is about, where it is another one.
+    """
+    named = named or path
     try:
         return path.open("xb")
     except FileExistsError:
-        raise RecordingError(f"{path}: is there already; name another file, or move it away") from None
+        raise _taken(named) from None
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be written ({error.strerror})") from None
+        raise RecordingError(f"{named}: cannot be written ({error.strerror})") from None

@@ -95,6 +95,11 @@ async def _start_stepped(name: str, case: FaultCase) -> None:
     await case.stage.start(name, clock_step.through(case.step_s))
 
 
+async def _kill_recorder(case: FaultCase) -> None:
+    await case.stage.recorder.until_it_writes()
+    await _kill(recording.NAME, case)
+
+
 async def _restart_recorder(case: FaultCase) -> None:
     case.stage.record(await case.stage.check_recording("kill", case.ended_ns))
     await case.stage.start(recording.NAME)
@@ -112,11 +117,14 @@ async def _find_node(case: FaultCase) -> None:
 
 async def _fill_disk(case: FaultCase) -> None:
     stage = case.stage
+    await stage.recorder.until_it_writes()
     await stage.stop(recording.NAME)
     stage.record(await stage.check_recording("stop"))
     try:
         case.disk = await stage.recorder.start_on_small_disk()
+        await stage.recorder.until_it_writes()
     except TandemError:  # the fault does not come about; the recorder goes on as before it
+        await stage.stop(recording.NAME)
         await stage.recorder.disk.remove()
         await stage.start(recording.NAME)
         raise
@@ -194,7 +202,7 @@ FAULTS: Mapping[str, SoakFault] = {
         _killed("suit", "CAN bus of the suit off", notices_s=SUIT_LOST_S),
         SoakFault(
             "recorder-kill", "the recorder is killed (kill -9) and started again", "",
-            partial(_kill, recording.NAME), _restart_recorder, ends_process=True,
+            _kill_recorder, _restart_recorder, ends_process=True,
         ),
         _stepped("master", "master killed", lives=True),
         _stepped("slave", "robot's program killed", lives=False),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import shutil
 import sys
@@ -10,10 +11,11 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from common.clock import monotonic_ns, to_s
-from common.errors import CodecError, TandemError
+from common.clock import monotonic_ns, to_ns, to_s
+from common.errors import CodecError, RecordingError, TandemError
 from common.link.config import LinkConfig
 from common.metrics.tree import from_tree
+from common.recording import RecordingStream
 from deploy.experiments.soak.files.happenings import RecordingChecked
 from deploy.harness.child import Child
 from deploy.harness.spawn import finished
@@ -23,6 +25,9 @@ FULL_BYTES = 40 * 1024
 """A disk of this size is full after about 4 s: commands, states and statistics are 10 kB/s, compressed."""
 ENDS_HERE = "the recording ends here"
 """What the recorder logs once when its disk fails."""
+WRITES_S = 30.0
+"""A recorder whose file has no message after this is a fault that cannot be brought about."""
+LOOK_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,16 +85,29 @@ class RecorderProcess:
         await self.start(through, where)
         return how
 
+    async def until_it_writes(self, within_s: float = WRITES_S) -> None:
+        """Return once a message is in the file of this life: only then can a kill or a full disk cost one.
+
+        Raises TandemError where none is after `within_s`.
+        """
+        until_ns = monotonic_ns() + to_ns(within_s)
+        while not _has_message(self.file):
+            if monotonic_ns() >= until_ns:
+                raise TandemError(f"the recorder has written no message within {within_s:g} s: {self.file}")
+            await asyncio.sleep(LOOK_S)
+
     def complaints(self) -> int:
         """How often this process logged that its disk failed."""
         return self.child.log_text()[self._logged_before :].count(ENDS_HERE)
 
     async def look(self, ended_ns: int | None = None) -> RecordingChecked:
-        """What is in the last file of a process that has ended; all are deleted. `ended_ns`: when it died."""
+        """What the process that has ended wrote last; all its files are deleted. `ended_ns`: when it died."""
         files = sorted(
             self.file.parent.glob(f"{self.file.stem}*.mcap"), key=lambda file: file.stat().st_mtime
         )
         contents = await _contents(files[-1] if files else self.file)
+        if not contents.topics and not contents.error and len(files) > 1:
+            contents = await _contents(files[-2])  # the newest was begun less than a flush before the end
         size_mb = sum(file.stat().st_size for file in files) / 1e6
         for file in files:
             file.unlink()
@@ -102,7 +120,7 @@ class RecorderProcess:
             size_mb=size_mb,
             cut=contents.cut,
             lost_s=lost_s,
-            why_not=contents.error,
+            why_not=contents.error or ("" if topics else f"{self.file.name}: no message is in it"),
         )
 
     async def kill(self) -> int:
@@ -144,6 +162,13 @@ class SmallDisk:
             self._mounted = not await _succeeds("umount", str(self._folder))
         with suppress(OSError):
             self._folder.rmdir()
+
+
+def _has_message(file: Path) -> bool:
+    try:
+        return next(iter(RecordingStream(file)), None) is not None
+    except RecordingError:
+        return False
 
 
 async def _contents(file: Path) -> RecordedContents:

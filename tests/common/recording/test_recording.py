@@ -137,8 +137,65 @@ def test_a_file_that_is_there_is_never_written_over(tmp_path: Path) -> None:
     assert path.read_bytes() == b"precious"
 
 
+def in_another_process(path: Path, before: str) -> subprocess.CompletedProcess[str]:
+    """Run some lines, then begin a recording."""
+    body = f"{before}\nMcapRecorder(Path({str(path)!r}), {{'profile': 'nursing'}})"
+    program = f"import os\nfrom pathlib import Path\nfrom common.recording import McapRecorder\n{body}"
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+
+KILLED = """
+from mcap.writer import Writer
+Writer.{step} = lambda *_, **__: os.kill(os.getpid(), 9)
+"""
+
+
+@pytest.mark.parametrize("step", ["start", "add_metadata", "flush"])
+def test_killed_before_its_head_is_written_it_leaves_no_file(step: str, tmp_path: Path) -> None:
+    ended = in_another_process(tmp_path / "a.mcap", KILLED.format(step=step))
+    assert ended.returncode == -9, ended.stderr
+    assert not list(tmp_path.glob("*.mcap"))
+
+
+def test_killed_after_its_head_is_written_it_leaves_a_file_that_can_be_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    # the recorder's thread is started right after the head
+    ended = in_another_process(
+        path, "import threading\nthreading.Thread.start = lambda _: os.kill(os.getpid(), 9)"
+    )
+    assert ended.returncode == -9, ended.stderr
+    assert read_recording(path).metadata == {"profile": "nursing"}
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_disk_that_is_full_from_the_beginning_leaves_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    ended = in_another_process(path, "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))")
+    assert "RecordingError" in ended.stderr
+    assert "cannot be written (File too large)" in ended.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_hard_links_a_file_gets_its_name_all_the_same_and_replaces_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.mcap"
+
+    def no_link(*_: object) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", no_link)
+    with McapRecorder(path, METADATA) as recorder:
+        recorder.put("suit", b"x", 1)
+    whole = path.read_bytes()
+    with pytest.raises(RecordingError, match="is there already"):
+        McapRecorder(path, METADATA)
+    assert path.read_bytes() == whole
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_no_folder_no_recording(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match="cannot be written"):
+    with pytest.raises(RecordingError, match=r"nowhere/a.mcap: cannot be written"):
         McapRecorder(tmp_path / "nowhere" / "a.mcap", METADATA)
 
 

@@ -33,6 +33,10 @@ class FakeRecorder:
         await self.start()
         return "a small one"
 
+    async def until_it_writes(self) -> None:
+        if not self.running:
+            raise TandemError("the recorder does not run")
+
     def complaints(self) -> int:
         return 1
 
