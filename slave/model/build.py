@@ -34,7 +34,8 @@ _LEAST_ARMATURE_KG_M2 = 2e-4
 _STOP_RAD = math.radians(3.0)
 """The mechanical stops stand this far outside the table's limits, so that a limit can be reached."""
 _HEADROOM = 1.5
-"""Torque limit over what worst gravity and the table's greatest acceleration need together."""
+"""Torque limit over what worst gravity and the table's greatest accelerations, of the joint itself and of all
+others at once, need together."""
 
 
 def build_model(skeleton: Skeleton, step_s: float = STEP_S) -> mujoco.MjModel:
@@ -178,28 +179,31 @@ def _drives(skeleton: Skeleton, model: mujoco.MjModel) -> list[ServoGains]:
 
     Their lag behind a ramp is damping / stiffness = 2 ζ / ω, whatever the load.
     """
-    inertia, gravity = _loads(skeleton, model)
+    inertia, gravity, by_others = _loads(skeleton, model)
     armature = np.maximum(_ROTOR_TO_LOAD * inertia, _LEAST_ARMATURE_KG_M2)
     total = inertia + armature
     omega = 2.0 * math.pi * BANDWIDTH_HZ
-    torque = _HEADROOM * (gravity + total * skeleton.max_acceleration_rad_s2)
+    torque = _HEADROOM * (gravity + total * skeleton.max_acceleration_rad_s2 + by_others)
     return [
         ServoGains(float(a), float(i * omega**2), float(2.0 * DAMPING_RATIO * omega * i), float(t))
         for a, i, t in zip(armature, total, torque, strict=True)
     ]
 
 
-def _loads(skeleton: Skeleton, model: mujoco.MjModel) -> tuple[Array, Array]:
-    """Greatest inertia, kg m², and gravity torque, N m, (J,) each, that the joints meet.
+def _loads(skeleton: Skeleton, model: mujoco.MjModel) -> tuple[Array, Array, Array]:
+    """Greatest inertia, kg m², gravity torque and torque by the other joints' accelerations, N m, (J,) each.
 
-    Over four postures (zero, middle and limits of all ranges), turned any way up.
+    Over four postures (zero, middle and limits of all ranges), turned any way up. The last is Σ |M_jk| a_k
+    over the other joints k, each at the table's greatest acceleration a_k, with the signs that add up: a
+    wrist's drive must hold the hand still while the arm behind it speeds up.
     """
     data = mujoco.MjData(model)
     rates = unit_rates(skeleton, model)
     middle = 0.5 * (skeleton.lower_rad + skeleton.upper_rad)
     postures = (skeleton.zero_rad, middle, skeleton.lower_rad, skeleton.upper_rad)
-    inertia = np.empty((len(postures), len(middle)))
+    inertia, by_others = np.empty((2, len(postures), len(middle)))
     torque = np.empty((len(postures), 3, len(middle)))
+    products = np.empty((model.nv, len(middle)))
     product = np.empty(model.nv)
     down = model.opt.gravity.copy()
     for i, posture in enumerate(postures):
@@ -210,10 +214,16 @@ def _loads(skeleton: Skeleton, model: mujoco.MjModel) -> tuple[Array, Array]:
             torque[i, k] = rates @ data.qfrc_bias
         for j, rate in enumerate(rates):
             mujoco.mj_mulM(model, data, product, rate)
-            inertia[i, j] = rate @ product
+            products[:, j] = product
+        coupling = np.abs(rates @ products)
+        inertia[i] = np.diag(coupling)
+        by_others[i] = (
+            coupling @ skeleton.max_acceleration_rad_s2 - inertia[i] * skeleton.max_acceleration_rad_s2
+        )
     model.opt.gravity[:] = down
     # gravity torque is linear in gravity: the norm over three axes is that of the worst direction
-    return inertia.max(axis=0), np.linalg.norm(torque, axis=1).max(axis=0)
+    gravity = np.linalg.norm(torque, axis=1).max(axis=0)
+    return inertia.max(axis=0), gravity, by_others.max(axis=0)
 
 
 def unit_rates(skeleton: Skeleton, model: mujoco.MjModel) -> Array:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
-from deploy.sim.patient.free_run import FreeFlight, FreeRun, of_motion, of_person
+from deploy.sim.patient.free_run import FreeFlight, FreeRun, RecordedPeople, of_motion
 from deploy.sim.patient.operator import TICK_NS, Moves
 from deploy.sim.patient.replay import Lap, held, replay
 from deploy.sim.patient.robot import Imperfect
@@ -19,6 +19,8 @@ MOTIONS = ("bottle", "sweep", "crossed")
 PERSON = "person"
 LONGEST_S = 700.0
 """Of one way: a motion repeats after less, and 61 recorded clips of people take 695 s."""
+MOST_OF_PEOPLE = 0.75
+"""People's recording is followed from end to end where that takes no more than this share of the time."""
 MASS_SHARE, PAYLOAD_KG = 0.05, 0.5
 READINGS: Mapping[str, Imperfect] = {
     "12 bits": Imperfect(mass_share=MASS_SHARE),
@@ -71,29 +73,43 @@ def motions_of(person: Path | None) -> dict[str, Moves]:
     """The motions by name. Raises RecordingError where the person's file cannot be read."""
     skeleton = load_skeleton("nursing")
     motions = {name: of_motion(name, skeleton) for name in MOTIONS}
-    return motions if person is None else {**motions, PERSON: of_person(person, skeleton)}
+    return motions if person is None else {**motions, PERSON: RecordedPeople(person, skeleton)}
+
+
+def shares_s(motions: Mapping[str, Moves], seconds: float) -> dict[str, float]:
+    """How long each motion is followed, `seconds` together: alike, but people's recording whole."""
+    alike_s = seconds / len(motions)
+    whole = {
+        name: max(alike_s, min(moves.seconds, MOST_OF_PEOPLE * seconds))
+        for name, moves in motions.items()
+        if isinstance(moves, RecordedPeople)
+    }
+    if len(whole) == len(motions):
+        return dict.fromkeys(motions, alike_s)
+    rest_s = (seconds - sum(whole.values())) / (len(motions) - len(whole))
+    return {name: whole.get(name, rest_s) for name in motions}
 
 
 def fly(
     motions: Mapping[str, Moves], seconds: float, seed: int, flown: Callable[[float], None] = lambda s: None
 ) -> Flights:
-    """Follow all motions by each kind of readings, `seconds` together, with each load.
+    """Follow all motions by each kind of readings, `seconds` together, with each load; see `shares_s`.
 
     Every lap is a robot with other masses and other noise. `flown` gets the seconds of each lap.
     """
-    share_s = seconds / len(motions) / len(READINGS)
+    shares = shares_s(motions, seconds / len(READINGS))
     ways: dict[str, Array] = {}
     by_pipeline = {}
     for name, moves in motions.items():
         flight = FreeFlight(moves, Imperfect(mass_share=MASS_SHARE, seed=seed), ContactConfig())
-        flight.follow(min(share_s, LONGEST_S))
+        flight.follow(min(shares[name], LONGEST_S))
         ways[name], by_pipeline[name] = flight.setpoints_rad, flight.found
     seeds = itertools.count(seed)
     flights = []
     for load, readings, name in itertools.product(LOADS, READINGS, motions):
         laps: list[Lap] = []
-        while (done_s := sum(lap.seconds for lap in laps)) < share_s:
-            ticks = max(1, round((share_s - done_s) * 1e9 / TICK_NS))
+        while (done_s := sum(lap.seconds for lap in laps)) < shares[name]:
+            ticks = max(1, round((shares[name] - done_s) * 1e9 / TICK_NS))
             laps.append(_lap(ways[name][:ticks], readings, load, next(seeds)))
             flown(laps[-1].seconds)
         flights.append(Flight(name, readings, load, tuple(laps)))

@@ -65,28 +65,34 @@ def of_motion(name: str, skeleton: Skeleton) -> Moves:
     return moves
 
 
-def of_person(file: Path, skeleton: Skeleton) -> Moves:
-    """Recorded joint angles of people, clip after clip: `joints`, `rate_hz` and a `*_position_rad` a clip.
+class RecordedPeople:
+    """Recorded joint angles of people, clip after clip, again and again: `Moves`."""
 
-    Raises RecordingError where the file cannot be read.
-    """
-    arrays = read_arrays(file)
-    rate_hz = float(arrays["rate_hz"])
-    clips = [np.asarray(arrays[key], np.float64) for key in sorted(arrays) if key.endswith("_position_rad")]
-    angles = np.concatenate(clips)
-    columns = [skeleton.joint_names.index(str(name)) for name in arrays["joints"]]
-    positions = np.zeros((len(angles), len(skeleton.joints)))
-    positions[:, columns] = angles
-    positions = np.clip(positions, skeleton.lower_rad, skeleton.upper_rad)
-    # the difference of two samples, so that a clip's end is no infinite rate
-    rates: Array = np.asarray(np.gradient(positions, axis=0)) * rate_hz
-    rates = np.clip(rates, -skeleton.max_velocity_rad_s, skeleton.max_velocity_rad_s)
+    def __init__(self, file: Path, skeleton: Skeleton) -> None:
+        """`file`: `joints`, `rate_hz` and a `*_position_rad` a clip. Raises RecordingError if unreadable."""
+        arrays = read_arrays(file)
+        self._rate_hz = float(arrays["rate_hz"])
+        clips = [
+            np.asarray(arrays[key], np.float64) for key in sorted(arrays) if key.endswith("_position_rad")
+        ]
+        angles = np.concatenate(clips)
+        columns = [skeleton.joint_names.index(str(name)) for name in arrays["joints"]]
+        positions = np.zeros((len(angles), len(skeleton.joints)))
+        positions[:, columns] = angles
+        self._positions: Array = np.clip(positions, skeleton.lower_rad, skeleton.upper_rad)
+        # the difference of two samples, so that a clip's end is no infinite rate
+        rates = np.asarray(np.gradient(self._positions, axis=0)) * self._rate_hz
+        self._rates: Array = np.clip(rates, -skeleton.max_velocity_rad_s, skeleton.max_velocity_rad_s)
 
-    def moves(t_s: float) -> tuple[Array, Array]:
-        at = int(t_s * rate_hz) % len(positions)
-        return positions[at], rates[at]
+    @property
+    def seconds(self) -> float:
+        """Length of all clips."""
+        return len(self._positions) / self._rate_hz
 
-    return moves
+    def __call__(self, t_s: float) -> tuple[Array, Array]:
+        """Angles and rates (J,)."""
+        at = int(t_s * self._rate_hz) % len(self._positions)
+        return self._positions[at], self._rates[at]
 
 
 class FreeFlight:

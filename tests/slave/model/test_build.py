@@ -139,6 +139,21 @@ def test_torque_limits_leave_room_for_the_tables_accelerations() -> None:
             assert (np.abs(torque) < limit).all(), SKELETON.joint_names[j]
 
 
+def test_torque_limits_leave_room_for_what_the_other_joints_do_to_one() -> None:
+    """All others speed up as fast as they may, with the signs that add up: a wrist was thrown by its arm."""
+    hinges = MODEL.actuator_trnid[:, 0]
+    limit = MODEL.jnt_actfrcrange[hinges, 1]
+    mass = np.empty((MODEL.nv, MODEL.nv))
+    for j in range(15):
+        data = settled(MIDDLE)
+        mujoco.mj_fullM(MODEL, data, mass)
+        adding = np.sign(RATES @ mass @ RATES[j])
+        for t in steps(data, 0.08):
+            data.ctrl[:] = MIDDLE + 0.5 * adding * SKELETON.max_acceleration_rad_s2 * t**2
+            torque = abs(data.qfrc_actuator[MODEL.jnt_dofadr[hinges[j]]])
+            assert torque < limit[j], SKELETON.joint_names[j]
+
+
 def test_phalanges_follow_their_finger_by_the_tables_ratios() -> None:
     data = settled(NEUTRAL)
     fingers = np.array([n.endswith(FINGERS) for n in SKELETON.joint_names])

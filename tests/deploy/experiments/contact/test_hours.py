@@ -14,12 +14,14 @@ from common.quaternion import Array
 from deploy.experiments.contact import hours
 from deploy.experiments.contact.flights import (
     LOADS,
+    MOTIONS,
     NOTHING,
     READINGS,
     Flight,
     Flights,
     fly,
     motions_of,
+    shares_s,
 )
 from deploy.measure.verdict import Outcome
 from deploy.sim.patient.free_run import FreeRun
@@ -66,6 +68,19 @@ def test_table_and_tree_tell_each(short: Flights) -> None:
 def test_people_are_followed_without_a_false_stop(recordings_folder: Path) -> None:
     found = fly({"person": motions_of(recordings_folder / "motion_cmu.npz")["person"]}, 15.0, seed=1)
     assert all(verdict.outcome is Outcome.PASSED for verdict in hours.judge_flights(found))
+
+
+def test_an_hour_covers_the_whole_recording_of_people_by_each_kind_of_readings(
+    recordings_folder: Path,
+) -> None:
+    motions = motions_of(recordings_folder / "motion_cmu.npz")
+    shares = shares_s(motions, 3600.0 / len(READINGS))
+    assert sum(shares.values()) == pytest.approx(1200.0)
+    assert shares["person"] == pytest.approx(695.0, abs=1.0)
+    assert shares["bottle"] == shares["crossed"] > 100.0
+    # where it does not fit, the motions still get their part; alone it gets all
+    assert shares_s(motions, 100.0) == pytest.approx({"person": 75.0, **dict.fromkeys(MOTIONS, 25.0 / 3.0)})
+    assert shares_s({"person": motions["person"]}, 15.0) == {"person": 15.0}
 
 
 def test_the_time_is_that_asked_for_and_is_told_as_it_goes(monkeypatch: pytest.MonkeyPatch) -> None:
