@@ -84,7 +84,7 @@ def describe(robot: str, skeleton: Skeleton) -> Mapping[str, str]:
 
 
 def encode_tick(tick: RobotTick) -> bytes:
-    """As a message: version, times, whether it was written, float64 setpoints and positions, valid, target."""
+    """As a message: version, times, whether it was written, setpoints and positions, valid, target."""
     target = tick.target_rad
     out: bytes = _pack(
         (

@@ -35,8 +35,8 @@ further from its setpoint than it turns in this time is not where it says: nothi
 class ContactReflex:
     """What the setpoint does in `hold` after contact. It keeps the joints' limits; its first step is a jump.
 
-    That step puts the setpoint where the joints stand, or at the limit beyond which they were pushed: what the
-    drives were behind by no longer pushes, and their damping brakes. It takes torque away, never adds any.
+    That step puts the setpoint where the joints stand, or at the limit beyond which they were pushed: what
+    the drives were behind by no longer pushes, and their damping brakes. It takes torque away and adds none.
     """
 
     def __init__(self, config: ContactConfig, watch: ContactWatch, joint_names: Sequence[str]) -> None:
