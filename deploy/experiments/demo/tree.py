@@ -34,8 +34,8 @@ def report_tree(report: DemoReport) -> Tree:
         "host": {} if notes.host is None else to_tree(notes.host),
         "holds": [to_tree(hold) for hold in notes.holds],
         **_of_processes(report),
-        **_motion_tree(moved, report.comparison),
-        **_accuracy_tree(report.accuracy),
+        **motion_tree(moved, report.comparison),
+        **accuracy_tree(report.accuracy),
         "synergies": _joint_rows(report.synergies),
         "nearness": _tree_or_none(report.nearness),
         "one_way_plus_lag_ms": _answers_within(report.slave, moved),
@@ -114,7 +114,8 @@ def _answers_within(slave: SlaveMetrics | None, judged: FollowedMotion | None) -
     return None if p99 is None or lag_ms is None else p99 + max(0.0, lag_ms)
 
 
-def _motion_tree(judged: FollowedMotion | None, compared: Comparison | None) -> Tree:
+def motion_tree(judged: FollowedMotion | None, compared: Comparison | None) -> Tree:
+    """How the robot moved, and how it would have moved by each strategy."""
     replayed = compared.replayed if compared else {}
     return {
         "motion": _motion(judged),
@@ -135,7 +136,8 @@ def _motion(judged: FollowedMotion | None) -> dict[str, float | None]:
     }
 
 
-def _accuracy_tree(judged: Accuracy) -> Tree:
+def accuracy_tree(judged: Accuracy) -> Tree:
+    """How right the joint angles are."""
     return {
         "accuracy": _joint_rows(judged.joints),
         "table_1": _joint_rows(judged.fast),
