@@ -15,6 +15,8 @@ from tests.robots.imported import FILES, imported
 ROWS = (
     "link cut", "packets duplicated", "second operator", "values that are not numbers", "drive fault",
     "encoder silent", "valid but impossible jump", "yesterday's recording replayed", "stop button",
+    "drive moves by itself", "second master at the drives", "encoder stuck", "effort sensor lost",
+    "sensor axis stuck", "pedal released", "clutch released and pressed",
 )  # fmt: skip
 """Some of those that suit any robot; `tandem faults --profile` tries them all."""
 

@@ -11,11 +11,12 @@ from deploy.harness.faults.virtual import VirtualFault, goes_on
 from slave.servos.servos import EncoderReading
 
 JOINT = "left_elbow_pitch"
-"""Its motor works against gravity in the trial."""
+"""Its motor works against gravity in the trial. Of another robot: its first joint."""
 
 
 def _effort_lost(scene: Scene) -> None:
-    joint = scene.skeleton.joint_names.index(JOINT)
+    names = scene.skeleton.joint_names
+    joint = names.index(JOINT) if JOINT in names else 0
 
     def read(reading: EncoderReading) -> EncoderReading:
         assert reading.effort_nm is not None

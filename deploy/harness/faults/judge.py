@@ -18,6 +18,8 @@ SERVO_SHARE = 0.05
 STOP_RAD = math.radians(3.0)
 """The mechanical stops stand this far outside the position limits. A joint that stands at its limit is shaken
 beyond it when its neighbours brake (a finger by 1°); the stop it must not reach."""
+BRAKES_S = 0.1
+"""The nursing robot's joints stop from full speed in this time; `BRAKED_S` has it and the settling."""
 _ROUNDING = 1e-6
 
 
@@ -43,7 +45,10 @@ class FaultOutcome:
 
 
 def standing_amiss(fault: FaultRow, seen: Stillness, excused_s: float = 0.0) -> list[str]:
-    """What is wrong with how the joints came to stand. `excused_s`: what the host itself lost meanwhile."""
+    """What is wrong with how the joints came to stand.
+
+    `excused_s`: what the host itself lost meanwhile, or how much longer than the nursing robot it brakes.
+    """
     if fault.stands_s is None:
         return []
     if seen.standstill_s is None:
@@ -51,6 +56,11 @@ def standing_amiss(fault: FaultRow, seen: Stillness, excused_s: float = 0.0) -> 
     if seen.standstill_s > fault.stands_s + excused_s:
         return [f"stands after {seen.standstill_s:.3f} s, at most {fault.stands_s:g} s"]
     return []
+
+
+def brakes_longer_s(skeleton: Skeleton) -> float:
+    """By how much a robot takes longer to brake from its limits' speeds than the rows' times allow for."""
+    return max(0.0, float((skeleton.max_velocity_rad_s / skeleton.max_acceleration_rad_s2).max()) - BRAKES_S)
 
 
 @dataclass(frozen=True, slots=True)

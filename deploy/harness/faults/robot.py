@@ -14,7 +14,7 @@ from common.quaternion import Array
 from common.wire.messages import BaseAttitude
 from deploy.harness.faults.fault import AT_ONCE_S, BRAKED_S, ENGAGE, NOTHING
 from deploy.harness.faults.scene import Scene
-from deploy.harness.faults.virtual import goes_on, holds, stops
+from deploy.harness.faults.virtual import VirtualFault, goes_on, holds, holds_joints, stops
 from slave.attitude.config import BaseConfig
 from slave.attitude.frame import FrameAngles, FrameParser, encode
 from slave.attitude.port import of_frame
@@ -223,8 +223,8 @@ ROBOT = (
     holds(
         name="encoder stuck",
         done="The encoder of a moving joint shows one angle for ever, and says that it is well.",
-        robot="Takes it for a joint that is held up from outside: a protective stop. Without contact "
-        "detection it holds that joint alone and names it.",
+        robot="Takes it for a joint that is held up from outside: a protective stop. Where the torques do not "
+        "show it, the guard holds that joint alone and names it.",
         person="Repair the encoder, then engage.",
         act=_encoder_stuck,
         reacts_s=0.1, stands_s=0.1 + 1.0, yields=True, held_by={"contact"},
@@ -281,3 +281,16 @@ ROBOT = (
         reacts_s=AT_ONCE_S, stands_s=AT_ONCE_S + BRAKED_S, held_by={"drive"},
     ),
 )  # fmt: skip
+
+OTHERWISE: dict[str, VirtualFault] = {
+    "encoder stuck": holds_joints(
+        name="encoder stuck, not seen in the torques",
+        done="As in the row itself.",
+        robot="Holds that joint alone and names it.",
+        person="Repair the encoder, then engage.",
+        act=_encoder_stuck,
+        concerns=_one_joint, sway_deg=1.0, stands_s=1.0, strays_deg=1.0,
+    ),
+}  # fmt: skip
+"""What a robot that is not the nursing robot may do as well, by row: how much a fault changes the torques
+depends on the masses and the speeds."""

@@ -46,8 +46,8 @@ class Setting:
 
     @property
     def any_robot(self) -> bool:
-        """Whether the scene is the usual one but for its link: nothing in it names a joint or a segment."""
-        own = (self.suit, self.master, self.slave, self.aligned, self.patient, self.motion)
+        """Whether nothing in the scene is of the nursing robot alone: its postures, zones or thresholds."""
+        own = (self.slave, self.patient, self.motion)
         return not any(own)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from dataclasses import replace
 
+from deploy.examples.profiles import NURSING
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
 from deploy.harness.faults.contact import CONTACT
 from deploy.harness.faults.deadman import DEADMAN
@@ -15,7 +16,7 @@ from deploy.harness.faults.judge import FaultOutcome
 from deploy.harness.faults.link import LINK
 from deploy.harness.faults.operators import OPERATORS
 from deploy.harness.faults.processes import PROCESSES, ProcessFault, try_with_processes
-from deploy.harness.faults.robot import ROBOT
+from deploy.harness.faults.robot import OTHERWISE, ROBOT
 from deploy.harness.faults.shift import SHIFT
 from deploy.harness.faults.slow_link import SLOW_LINK
 from deploy.harness.faults.stop_inputs import STOP_INPUTS
@@ -45,14 +46,18 @@ FAULTS: dict[str, FaultRow] = {fault.name: fault for fault in (*VIRTUAL, *PROCES
 """Every fault, by name."""
 
 
-NURSING_ONLY = frozenset(fault.name for fault in (*EFFORT, *DISTANCE))
+NURSING_ONLY = frozenset(fault.name for fault in DISTANCE)
 """Rows that name joints of the nursing robot."""
 
 
 def faults_of(profile: str) -> dict[str, FaultRow]:
     """The rows that can be tried with any robot, by name, with the robot of a profile."""
     return {
-        fault.name: replace(fault, setting=replace(fault.setting, profile=profile))
+        fault.name: replace(
+            fault,
+            setting=replace(fault.setting, profile=profile),
+            otherwise=None if profile == NURSING else OTHERWISE.get(fault.name),
+        )
         for fault in VIRTUAL
         if fault.setting.any_robot and fault.name not in NURSING_ONLY
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -12,7 +12,13 @@ import numpy as np
 from common.wire.messages import Mask
 from deploy.examples.profiles import NURSING
 from deploy.harness.faults.fault import FaultRow, Reaction
-from deploy.harness.faults.judge import FaultOutcome, asked_beyond, moved_beyond, standing_amiss
+from deploy.harness.faults.judge import (
+    FaultOutcome,
+    asked_beyond,
+    brakes_longer_s,
+    moved_beyond,
+    standing_amiss,
+)
 from deploy.harness.faults.scene import Scene
 from deploy.harness.faults.setting import USUAL, Setting
 from deploy.measure.stillness import STILL_RAD, StoppingMotion, stillness
@@ -44,6 +50,8 @@ class VirtualFault(FaultRow):
     """What else may be wrong at the end of the trial."""
     refused_by: Set[str] = frozenset()
     """The gates that must have refused commands; `codec` is the decoder before them."""
+    otherwise: VirtualFault | None = None
+    """Another reaction that is as safe: of this row only what the robot is to do counts."""
     held_by: Set[str] = frozenset()
     """The gates, watches and rules of the guard that hold the fault off: without them the row must fail."""
 
@@ -65,7 +73,11 @@ def try_on_virtual_clock(fault: VirtualFault, without: Set[str] = frozenset()) -
         scene.run.run(fault.lasts_s)
         scene.undo()
     scene.run.run(TRIAL_S - (fault.lasts_s or 0.0))
-    return _judge(fault, scene)
+    outcome = _judge(fault, scene)
+    if outcome.wrong and fault.otherwise is not None:
+        other = _judge(replace(fault.otherwise, setting=fault.setting), scene)
+        outcome = outcome if other.wrong else replace(other, fault=fault)
+    return outcome
 
 
 def _judge(fault: VirtualFault, scene: Scene) -> FaultOutcome:
@@ -78,7 +90,7 @@ def _judge(fault: VirtualFault, scene: Scene) -> FaultOutcome:
     seen = stillness(course, skeleton, concerned, still_rad)
     wrong = [
         *_state_amiss(fault, scene, reacted_s),
-        *standing_amiss(fault, seen),
+        *standing_amiss(fault, seen, brakes_longer_s(skeleton)),
         *([] if fault.yields else asked_beyond(scene.asked(), skeleton)),
         *moved_beyond(course, skeleton),
         *[f"{scene.foul} foul commands were accepted"] * bool(scene.foul),
