@@ -31,10 +31,11 @@ from deploy.ops.convert.export_command import export_joints
 from deploy.ops.convert.import_command import import_recording
 from deploy.ops.doctor.command import doctor
 from deploy.ops.inputs import inputs
+from deploy.ops.inspect.command import inspect
 from deploy.ops.keys.commands import app as keys_app
 from deploy.ops.network.command import app as network_app
 from deploy.ops.profile.command import app as profile_app
-from deploy.ops.record.command import record, recording
+from deploy.ops.record.command import record
 from deploy.ops.replay.command import replay
 from deploy.ops.ros.command import ros
 from deploy.ops.router.command import router
@@ -64,7 +65,7 @@ for _name, _group in {
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, drives, router, demo, soak, faults, collisions, contact, bench, audit,
-    *OPERATORS_ACTS, attitude, video, ros, doctor, servos, stops, inputs, alarms, record, recording,
+    *OPERATORS_ACTS, attitude, video, ros, doctor, servos, stops, inputs, alarms, record, inspect,
     replay,
 )  # fmt: skip
 for _command in _COMMANDS:

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from common.clock import to_s
-from common.recording import RecordingStream
+from common.recording import Entry, RecordingStream
 from deploy.recorded.missing import Missing
 
 
@@ -57,16 +57,30 @@ class Contents:
         return {"metadata": self.metadata, "topics": topics, "cut": self.cut}
 
 
+class Survey:
+    """Counts messages as they come."""
+
+    def __init__(self) -> None:
+        self._topics: dict[str, TopicContents] = {}
+        self._gaps: dict[str, Missing] = {}
+
+    def take(self, entry: Entry) -> None:
+        """One message, in the file's order."""
+        if entry.topic not in self._gaps:
+            self._gaps[entry.topic] = Missing(entry.topic.rpartition("/")[2])
+        self._gaps[entry.topic].take(entry.payload, entry.monotonic_ns)
+        self._topics.setdefault(entry.topic, TopicContents()).take(entry.monotonic_ns, len(entry.payload))
+
+    def contents(self, stream: RecordingStream) -> Contents:
+        """Of a stream that has been gone through."""
+        for name, contents in self._topics.items():
+            contents.missing = self._gaps[name].count
+        return Contents(stream.metadata or {}, self._topics, stream.cut)
+
+
 def survey(path: Path) -> Contents:
     """Read a whole file. Raises RecordingError if tandem did not write it."""
-    stream = RecordingStream(path)
-    topics: dict[str, TopicContents] = {}
-    gaps: dict[str, Missing] = {}
+    stream, found = RecordingStream(path), Survey()
     for entry in stream:
-        if entry.topic not in gaps:
-            gaps[entry.topic] = Missing(entry.topic.rpartition("/")[2])
-        gaps[entry.topic].take(entry.payload, entry.monotonic_ns)
-        topics.setdefault(entry.topic, TopicContents()).take(entry.monotonic_ns, len(entry.payload))
-    for name, contents in topics.items():
-        contents.missing = gaps[name].count
-    return Contents(stream.metadata or {}, topics, stream.cut)
+        found.take(entry)
+    return found.contents(stream)

@@ -12,7 +12,7 @@ PANELS = {
     ),
     "Set up": (
         "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record",
-        "recording", "import", "export",
+        "inspect", "import", "export",
     ),
     "Judge": (
         "replay", "trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit",

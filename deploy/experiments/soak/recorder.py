@@ -32,7 +32,7 @@ LOOK_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class RecordedTopic:
-    """What the soak reads about one topic from `tandem recording --json`."""
+    """What the soak reads about one topic from `tandem inspect --json`."""
 
     last_ns: int
     count: int
@@ -40,7 +40,7 @@ class RecordedTopic:
 
 @dataclass(frozen=True, slots=True)
 class RecordedContents:
-    """What the soak reads about a file from `tandem recording --json`."""
+    """What the soak reads about a file from `tandem inspect --json`."""
 
     topics: Mapping[str, RecordedTopic] = field(default_factory=dict)
     cut: str = ""
@@ -174,7 +174,7 @@ def _has_message(file: Path) -> bool:
 async def _contents(file: Path) -> RecordedContents:
     """Read in another process: a long recording must cost the soak neither memory nor time."""
     nice = ("nice", "-n", "15") if shutil.which("nice") else ()
-    _, out, err = await finished([*nice, sys.executable, "-m", "deploy", "recording", str(file), "--json"])
+    _, out, err = await finished([*nice, sys.executable, "-m", "deploy", "inspect", str(file), "--json"])
     try:
         return from_tree(RecordedContents, json.loads(out))
     except CodecError as error:

@@ -89,9 +89,7 @@ def read_joints(path: Path, skeleton: Skeleton, source: AngleSource) -> JointSer
                 f"{path}: none of its {unreadable} {topic.name}s fits the profile {skeleton.name} ({why}); "
                 "give the robot's own as --profile NAME"
             )
-        raise RecordingError(
-            f"{path}: holds no {topic.name}s; `tandem recording {path.name}` shows its topics"
-        )
+        raise RecordingError(f"{path}: holds no {topic.name}s; `tandem inspect {path.name}` shows its topics")
     # several states show one reading of the encoders, and messages may overtake each other
     rows.sort(key=lambda row: row[0])
     time_ns = np.array([at for at, _ in rows], dtype=np.int64)

@@ -1,9 +1,8 @@
-"""`tandem record` and `tandem recording`."""
+"""`tandem record`."""
 
 from __future__ import annotations
 
 import asyncio
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -12,11 +11,8 @@ from rich.console import Console
 
 from common.errors import TandemError
 from common.process.runtime import run as run_until_stopped
-from deploy.report.options import AsJson, MetricsFile
+from deploy.report.options import MetricsFile
 from deploy.report.output import in_a_folder, metrics_writer
-
-LONGEST_SHOWN = 300
-"""Characters of a file's head: a whole configuration is for programs, by --json."""
 
 
 def record(
@@ -98,37 +94,3 @@ def record(
         console.print(summary, highlight=False)
 
     run_until_stopped(work)
-
-
-def recording(
-    file: Annotated[Path, typer.Argument(help="An .mcap file that `tandem record` wrote.")],
-    as_json: AsJson = False,
-) -> None:
-    """Show what is in a recording: topics, rates, silences, missing messages, and whether it ends early.
-
-    Example: `tandem recording morning.mcap --json`
-    """
-    from deploy.recorded.contents import survey
-    from deploy.report.tables import UNKNOWN, plain_table
-
-    contents = survey(file)
-    if as_json:
-        typer.echo(json.dumps(contents.tree(), indent=2, ensure_ascii=False))
-        return
-    console = Console()
-    table = plain_table("topic", "messages", "rate Hz", "MB", "longest silence s", "missing")
-    for name, topic in contents.topics.items():
-        table.add_row(
-            name,
-            str(topic.count),
-            f"{topic.rate_hz:.1f}",
-            f"{topic.size / 1e6:.2f}",
-            f"{topic.longest_gap_s:.2f}",
-            UNKNOWN if topic.missing is None else str(topic.missing),
-        )
-    console.print(table)
-    for key, value in contents.metadata.items():
-        shown = value if len(value) <= LONGEST_SHOWN else f"{len(value)} characters"
-        console.print(f"{key}: {shown}", highlight=False)
-    if contents.cut:
-        console.print(f"[yellow]{contents.cut}: only the part before it is shown", highlight=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
@@ -15,15 +15,14 @@ from rich.console import Console
 from common.clock import to_ns
 from common.config.load import load_config
 from common.errors import TandemError
-from common.recording.reader import RecordingStream
 from common.wire.version import software
 from deploy.ops.replay.comparison import ReplayFindings, compare
-from deploy.recorded.recompute import Recorded, Replay
+from deploy.recorded.files import begun_ns, entries_of, head_of, snapshot_ns
+from deploy.recorded.recompute import Replay
 from deploy.recorded.recorded_config import recorded_config
 from deploy.report.options import AsJson, Overrides
 from deploy.report.tables import plain_table
 from master.config import MasterConfig
-from master.journal.calls import SNAPSHOT
 
 MOST_JOINTS = 8
 """Rows of the table; --json has all."""
@@ -62,7 +61,7 @@ def replay(
     """
     changes = [*(overrides or ()), *([f'estimation.filter="{filter_name}"'] if filter_name else ())]
     with ExitStack() as kept:
-        metadata = _metadata(files[0])
+        metadata = head_of(files[0])
         if config is not None:
             used = load_config(config, MasterConfig, changes)
         else:
@@ -70,8 +69,8 @@ def replay(
         other = config is not None or bool(changes)
         run = Replay(used, from_snapshots=not other)
         with Console(stderr=True).status("computing"):
-            begin_ns = _begun_ns(files[0]) + to_ns(from_s)
-            pairs = run.pairs(_entries(files, _snapshot_ns(files, begin_ns)))
+            begin_ns = begun_ns(files[0]) + to_ns(from_s)
+            pairs = run.pairs(entries_of(files, snapshot_ns(files, begin_ns)))
             result = compare(run, (pair for pair in pairs if pair.recorded.sampled_ns >= begin_ns))
     if not result.postures:
         raise TandemError(
@@ -84,36 +83,6 @@ def replay(
         _print(result, metadata)
     if check and not result.whole:
         raise TandemError(f"{files[0]}: {result.postures - result.identical} postures differ")
-
-
-def _metadata(path: Path) -> Mapping[str, str]:
-    stream = RecordingStream(path)
-    for _ in stream:
-        break
-    return stream.metadata or {}
-
-
-def _begun_ns(path: Path) -> int:
-    return next((entry.monotonic_ns for entry in RecordingStream(path)), 0)
-
-
-def _snapshot_ns(files: Sequence[Path], before_ns: int) -> int:
-    """When the last snapshot before that time was taken; 0 where there is none."""
-    found_ns = 0
-    for path in files:
-        for entry in RecordingStream(path):
-            if entry.monotonic_ns > before_ns:
-                return found_ns
-            if entry.topic == SNAPSHOT:
-                found_ns = entry.monotonic_ns
-    return found_ns
-
-
-def _entries(files: Sequence[Path], from_ns: int) -> Iterator[Recorded]:
-    for path in files:
-        for entry in RecordingStream(path):
-            if entry.monotonic_ns >= from_ns:
-                yield Recorded(entry.topic, entry.payload)
 
 
 def _versions(metadata: Mapping[str, str]) -> dict[str, str]:

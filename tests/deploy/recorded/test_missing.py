@@ -101,6 +101,6 @@ def test_the_file_shows_what_is_missing(tmp_path: Path) -> None:
     topics = survey(path).topics
     assert topics["tandem/robot-1/state"].missing == 5
     assert topics["tandem/robot-1/statistics"].missing is None
-    shown = CliRunner().invoke(cli.app, ["recording", str(path)])
+    shown = CliRunner().invoke(cli.app, ["inspect", str(path)])
     assert "missing" in shown.output
     assert shown.exit_code == 0

@@ -138,12 +138,12 @@ def test_the_contents_are_counted_topic_by_topic(tmp_path: Path) -> None:
 def test_the_command_shows_them_and_where_a_file_was_cut_off(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     written(path)
-    whole = CliRunner().invoke(cli.app, ["recording", str(path)])
+    whole = CliRunner().invoke(cli.app, ["inspect", str(path)])
     assert whole.exit_code == 0
     assert "tandem/robot-1/state" in whole.output
     assert "cut off" not in whole.output
     path.write_bytes(path.read_bytes()[:-30])
-    assert "cut off" in CliRunner().invoke(cli.app, ["recording", str(path)]).output
+    assert "cut off" in CliRunner().invoke(cli.app, ["inspect", str(path)]).output
 
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:

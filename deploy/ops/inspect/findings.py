@@ -1,0 +1,81 @@
+"""What one pass through each file finds: contents, guard events, and the joints over time for pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from common.clock import to_s
+from common.recording import Entry, RecordingStream
+from common.skeleton import Skeleton
+from deploy.ops.inspect.guard_changes import GuardChange, GuardChanges
+from deploy.ops.inspect.jitter.robot_side import FOLLOWS
+from deploy.ops.inspect.pictures import draw_events, draw_joints, make_folder
+from deploy.ops.inspect.thinned import ThinnedJoints
+from deploy.recorded.contents import Contents, Survey
+from deploy.recorded.profile import recorded_skeleton
+
+
+@dataclass(frozen=True, slots=True)
+class FileFindings:
+    """One file."""
+
+    path: Path
+    contents: Contents
+    events: Sequence[GuardChange]
+    more_events: int
+
+    @property
+    def span_s(self) -> float:
+        """From its first message to its last."""
+        topics = self.contents.topics.values()
+        first, last = (
+            min((t.first_ns for t in topics), default=0),
+            max((t.last_ns for t in topics), default=0),
+        )
+        return to_s(last - first)
+
+    @property
+    def follows_s(self) -> float:
+        """When the robot was first heard to follow, since the recording began; 0 where it was never heard."""
+        return next((event.at_s for event in self.events if event.state == FOLLOWS), 0.0)
+
+    def tree(self) -> dict[str, object]:
+        """Plain values for JSON."""
+        guard = [event.tree() for event in self.events]
+        return {**self.contents.tree(), "span_s": self.span_s, "guard": guard, "more_guard": self.more_events}
+
+
+def look_into(
+    files: Sequence[Path], profile: str | None = None, plots: Path | None = None
+) -> tuple[list[FileFindings], Skeleton]:
+    """Go through each file once. Raises RecordingError where one is none of tandem's."""
+    found = []
+    contents = [(path, RecordingStream(path)) for path in files]
+    skeleton = recorded_skeleton(files, profile)
+    for number, (path, stream) in enumerate(contents):
+        survey, events = Survey(), GuardChanges(skeleton.joint_names)
+        thinned = ThinnedJoints(skeleton)
+        for entry in _each(stream):
+            survey.take(entry)
+            events.take(entry)
+            thinned.take(entry)
+        events.end()
+        found.append(FileFindings(path, survey.contents(stream), events.found, events.more))
+        if plots is not None:
+            folder = plots if number == 0 else plots / path.stem
+            make_folder(folder)
+            draw_events(folder, events.found, skeleton.joint_names)
+            if len(thinned.time_s) > 1:
+                draw_joints(
+                    folder / "joints.png", np.array(thinned.time_s), np.array(thinned.position_rad),
+                    np.array(thinned.setpoint_rad), skeleton.joint_names,
+                )  # fmt: skip
+    return found, skeleton
+
+
+def _each(stream: RecordingStream) -> Iterator[Entry]:
+    yield from stream

@@ -1,0 +1,1 @@
+"""Finds the stage at which jitter begins, on the way from the nodes to the encoders."""

@@ -1,0 +1,112 @@
+"""`tandem inspect` on recordings of a virtual run: contents, guard events, pictures, and planted jitter."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from common.clock import to_s
+from deploy import cli
+from deploy.sim.world.world import VirtualWorld
+from slave.tap import RobotTick
+from tests.deploy.recorded.virtual import RecordedRun, record_run
+
+FOLLOWED_S = 8.0
+SMOOTH = {"slave": ['track.strategy="interpolate"']}
+"""The tracker that predicts adds a hump at 12.5 Hz by itself: each command corrects what it foretold."""
+
+
+def cut_line(world: VirtualWorld) -> None:
+    """Follow for some seconds, then the link dies and the guard holds."""
+    world.engage()
+    world.run(FOLLOWED_S)
+    world.inject.carry = lambda kind, payload: ()
+    world.run(1.0)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
+    return record_run(tmp_path_factory.mktemp("inspected"), cut_line, overrides=SMOOTH)
+
+
+def inspected(*arguments: object) -> dict[str, object]:
+    result = CliRunner().invoke(cli.app, ["inspect", *map(str, arguments), "--json"])
+    assert result.exit_code == 0, result.output
+    tree: dict[str, object] = json.loads(result.stdout)
+    return tree
+
+
+def test_it_shows_what_the_guard_did_and_what_came_before(run: RecordedRun) -> None:
+    tree = inspected(run.slave)
+    guard = tree["guard"]
+    assert isinstance(guard, list)
+    states = [event["state"] for event in guard]
+    assert states[0] in ("boot", "hold")
+    assert {"align", "track"} <= set(states)
+    lost = guard[-1]
+    assert (lost["before"], lost["state"]) == ("track", "hold")
+    assert "command" in lost["reason"]
+    assert 30 <= lost["commands"] <= 38, "3 s of 12.5 Hz, less the silence"
+    assert 0.1 < lost["silence_s"] < 1.0
+    assert lost["off_joint"] in run.world.slave_config.skeleton.joint_names
+    assert 0.0 < lost["off_deg"] < 20.0
+
+
+def test_the_master_s_recording_shows_the_guard_by_the_states_that_came(run: RecordedRun) -> None:
+    guard = inspected(run.master)["guard"]
+    assert isinstance(guard, list)
+    assert {"align", "track"} <= {event["state"] for event in guard}
+
+
+def test_pictures_are_drawn_of_joints_and_events(run: RecordedRun, tmp_path: Path) -> None:
+    inspected(run.slave, "--plots", tmp_path / "drawn")
+    names = {path.name for path in (tmp_path / "drawn").iterdir()}
+    assert "joints.png" in names
+    assert any(name.startswith("guard-") and name.endswith("-hold.png") for name in names)
+
+
+def test_a_calm_run_has_no_stage_that_adds_jitter(run: RecordedRun, tmp_path: Path) -> None:
+    tree = inspected(run.master, run.slave, "--jitter", "--plots", tmp_path)
+    jitter = tree["jitter"]
+    assert isinstance(jitter, dict)
+    stages = [stage["stage"] for stage in jitter["stages"]]
+    assert stages == ["nodes", "fused", "solved", "received", "tracked", "limited", "encoders"]
+    assert jitter["first"] is None, jitter["words"]
+    assert (tmp_path / "jitter.png").stat().st_size > 10_000
+
+
+FIELDS = ("target_rad", "setpoint_rad", "position_rad")
+"""Of a tick, in the order in which a motion passes them."""
+
+
+def shaking(field: str) -> Callable[[RobotTick], RobotTick]:
+    """Joint 8 trembles by 0.7° at 9 Hz, from this field of a tick on."""
+
+    def change(tick: RobotTick) -> RobotTick:
+        shake = np.zeros_like(tick.setpoint_rad)
+        shake[8] = np.radians(0.7) * np.sin(2 * np.pi * 9.0 * to_s(tick.now_ns))
+        later = FIELDS[FIELDS.index(field) :]
+        known = {name: getattr(tick, name) for name in later}
+        return replace(tick, **{n: value + shake for n, value in known.items() if value is not None})
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("field", "stage"), [("target_rad", "tracked"), ("setpoint_rad", "limited"), ("position_rad", "encoders")]
+)
+def test_jitter_planted_in_the_robot_is_found(field: str, stage: str, tmp_path: Path) -> None:
+    def follow(world: VirtualWorld) -> None:
+        world.engage()
+        world.run(6.0)
+
+    run = record_run(tmp_path, follow, change=shaking(field), overrides=SMOOTH)
+    jitter = inspected(run.master, run.slave, "--jitter")["jitter"]
+    assert isinstance(jitter, dict)
+    assert jitter["first"] == stage, jitter["words"]
