@@ -13,6 +13,7 @@ from common.log.streams import lost_output, secure
 from common.process.extras import missing_extra
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.calibrate.live.command import live
+from deploy.console.command import console
 from deploy.experiments.accuracy.commands import app as accuracy_app
 from deploy.experiments.bench.command import bench
 from deploy.experiments.collisions.command import collisions
@@ -64,7 +65,7 @@ for _name, _group in {
 }.items():  # fmt: skip
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
-    master, slave, drives, router, demo, soak, faults, collisions, contact, bench, audit,
+    master, slave, console, drives, router, demo, soak, faults, collisions, contact, bench, audit,
     *OPERATORS_ACTS, attitude, video, ros, doctor, servos, stops, inputs, alarms, record, inspect,
     replay,
 )  # fmt: skip

@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from common.can.config import BusConfig
+from common.config.console import ConsoleConfig
 from common.config.section import RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
@@ -91,6 +92,7 @@ class MasterConfig(Section):
     process: ProcessConfig = ProcessConfig()
     alarms: AlarmsConfig = AlarmsConfig()
     tap: TapConfig = TapConfig()
+    console: ConsoleConfig = ConsoleConfig()
 
     @property
     def commanded(self) -> list[str]:
@@ -119,6 +121,7 @@ class MasterConfig(Section):
             *self.estimation.mistakes_at(self.capture.rate_hz),
             *self.link.mistakes(),
             *self.tap.mistakes(),
+            *self.console.mistakes(),
         ]
 
     def _switch_mistakes(self) -> list[ConfigMistake]:

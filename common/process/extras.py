@@ -12,6 +12,7 @@ EXTRAS = {
     "evdev": "input",
     "sounddevice": "sound",
     "rosbags": "ros",
+    "aiohttp": "console",
     "vqf": "vqf",
 }
 """The extra of pyproject.toml that brings each optional module."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 PANELS = {
-    "Run": ("demo", "master", "slave", "suit", "router", "drives"),
+    "Run": ("demo", "master", "slave", "console", "suit", "router", "drives"),
     "People": (
         "engage", "handover", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude",
         "video", "ros",

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from common.config.section import Section
+from common.config.section import RelativePath, Section
 from common.inputs.config import KeyConfig
 
 
@@ -36,18 +36,24 @@ class CanButton(Section):
     """Without a good frame for longer than this, by arrival, the button counts as released."""
 
 
+class ConsoleHold(Section):
+    """A key or a pedal that somebody holds on a page of `tandem console`, on this host."""
+
+    source: Literal["console"]
+    socket: RelativePath
+    """Where the console's beats come in, such as /run/tandem/deadman.sock."""
+    timeout_s: float = Field(0.3, ge=0.1, le=0.5)
+    """Without a fresh beat for longer than this, by arrival, it counts as released. Beats come each 50 ms."""
+
+
 def _known(value: object) -> object:
     if isinstance(value, str):
         raise ValueError(f'expected its new form: [operator.deadman] with source = "{value}"')
-    if isinstance(value, dict) and value.get("source") == "console":
-        raise ValueError(
-            "expected source 'pedal', 'can' or 'always_held': holding on the web page is not possible yet"
-        )
     return value
 
 
 DeadmanConfig = Annotated[
-    AlwaysHeld | Pedal | CanButton, Field(discriminator="source"), BeforeValidator(_known)
+    AlwaysHeld | Pedal | CanButton | ConsoleHold, Field(discriminator="source"), BeforeValidator(_known)
 ]
 ClutchConfig = Annotated[Pedal | CanButton, Field(discriminator="source")]
-SwitchConfig = AlwaysHeld | Pedal | CanButton
+SwitchConfig = AlwaysHeld | Pedal | CanButton | ConsoleHold

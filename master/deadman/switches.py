@@ -12,8 +12,10 @@ from common.inputs.key_state import KeyState
 from common.inputs.keys import InputKeys
 from common.log.throttle import LogThrottle
 from master.deadman.can_button import CanButtonState, load_button
-from master.deadman.config import CanButton, Pedal, SwitchConfig
+from master.deadman.config import CanButton, ConsoleHold, Pedal, SwitchConfig
 from master.deadman.grip import Grip, OperatorGrip, SwitchState
+from master.deadman.held_elsewhere import HeldElsewhere
+from master.deadman.hold_socket import HoldSocket
 
 ZERO_POSE = "zero pose"
 log = logging.getLogger(__name__)
@@ -44,7 +46,13 @@ class Switches:
             for name, config in configs.items()
             if isinstance(config, CanButton)
         }
+        self._held: dict[str, HoldSocket] = {
+            name: HoldSocket(config.socket, HeldElsewhere(config.timeout_s), clock)
+            for name, config in configs.items()
+            if isinstance(config, ConsoleHold)
+        }
         found: dict[str, SwitchState] = {**self._keys.states, **self._buttons}
+        found |= {name: each.held for name, each in self._held.items()}
         self._grip = OperatorGrip(found.get("deadman"), found.get("clutch"))
         self._on_end: Callable[[Grip], None] = lambda _: None
         self._on_zero_pose: Callable[[KeyState], None] = lambda _: None
@@ -59,10 +67,14 @@ class Switches:
         """
         self._on_end, self._on_zero_pose = on_end, on_zero_pose
         self._keys.start(self._changed)
+        for each in self._held.values():
+            each.open(self._changed)
 
     def close(self) -> None:
         """Let go of the devices."""
         self._keys.close()
+        for each in self._held.values():
+            each.close()
 
     def frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Take a frame of a bus; False where it is none of a button."""
@@ -80,6 +92,8 @@ class Switches:
     def take(self) -> Grip:
         """The grip for the command that is made now, by what has come until now."""
         self._keys.poll()
+        for each in self._held.values():
+            each.poll()
         grip = self._grip.take(self._clock())
         self._look_beside()
         return grip

@@ -8,7 +8,7 @@ from tests.architecture.imports import SourceTree
 ORDER: Sequence[Sequence[str]] = [
     ["deploy"],
     ["deploy/experiments", "deploy/ops"],
-    ["deploy/calibrate", "deploy/harness"],
+    ["deploy/calibrate", "deploy/harness", "deploy/console"],
     ["deploy/client"],
     ["deploy/sim"],
     ["deploy/measure", "deploy/recorded"],
@@ -40,7 +40,8 @@ IMPURE = [
     "common/clock.py", "common/can/*", "common/inputs/device.py", "common/inputs/reader.py",
     "common/link/*", "common/tap/*", "common/log/handler.py", "common/log/streams.py",
     "common/process/*", "common/recording/recorder.py",
-    "master/__main__.py", "master/app.py", "master/deadman/switches.py", "master/robot.py",
+    "master/__main__.py", "master/app.py", "master/deadman/switches.py",
+    "master/deadman/hold_socket.py", "master/robot.py",
     "master/alarms/player.py", "master/journal/tap.py",
     "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
     "slave/stop_inputs/gpio.py",

@@ -129,7 +129,7 @@ def estop(
 
     Example: `tandem estop --connect tcp/192.168.7.2:7447 --connect tcp/192.168.7.3:7447 --all`
     """
-    from deploy.ops.control.stop import stop_robots
+    from deploy.client.stop import stop_robots
 
     where = destination(connect, robot, operator, master, certificate)
     if not (all_ or where.robots):

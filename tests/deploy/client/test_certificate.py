@@ -23,8 +23,8 @@ from deploy.certificates.folder import stem
 from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask_robots
 from deploy.client.destination import destination
+from deploy.client.stop import stop_robots
 from deploy.harness.keys import make_keys, tls_of
-from deploy.ops.control.stop import stop_robots
 
 ACCESS = AccessConfig(operators={"nurse-1": ["robot-1"]}, routers=["router-1"])
 

@@ -33,7 +33,10 @@ def test_each_source_can_be_written() -> None:
     ("overrides", "words"),
     [
         (['operator.deadman="always_held"'], r"operator\.deadman = 'always_held': expected its new form: "),
-        (['operator.deadman.source="console"'], "not possible yet"),
+        (
+            ['operator.deadman.source="console"'],
+            r"operator\.deadman\.socket = \(not set\)",
+        ),
         (
             ['operator.deadman.source="wish"'],
             r"operator\.deadman\.source = 'wish': expected 'always_held', 'pedal', 'can'",

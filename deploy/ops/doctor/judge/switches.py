@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from deploy.ops.doctor.judge.finding import Finding, fail, ok, warn
 from deploy.ops.doctor.read.switches import PedalRead
-from master.deadman.config import AlwaysHeld, CanButton, SwitchConfig
+from master.deadman.config import AlwaysHeld, CanButton, ConsoleHold, SwitchConfig
 
 TRY = "press it meanwhile: `tandem inputs` shows each key that goes down and up"
 
@@ -17,6 +17,8 @@ def judge_switch(name: str, switch: SwitchConfig, pedal: PedalRead | None) -> Fi
     if isinstance(switch, CanButton):
         where = f"{switch.message}.{switch.signal} on {switch.bus}"
         return ok(name, f"{where}: shown by `tandem status` while the master runs")
+    if isinstance(switch, ConsoleHold):
+        return ok(name, f"held on a page of `tandem console`, heard at {switch.socket}")
     assert pedal is not None
     if pedal.down is None:
         return fail(name, pedal.why, "`tandem inputs` lists the devices and shows which key is pressed")

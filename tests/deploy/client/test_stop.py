@@ -20,8 +20,8 @@ from common.wire.stop import StopAnswer, pack_stop, pack_stop_answer, read_stop
 from common.wire.topics import STOP
 from deploy.client.answer import RobotAnswer
 from deploy.client.destination import Destination
-from deploy.ops.control.stop import OnAnswer, repeat_until_stopped, stop_robots
-from deploy.ops.control.stop_count import StopCount
+from deploy.client.stop import OnAnswer, repeat_until_stopped, stop_robots
+from deploy.client.stop_count import StopCount
 
 ACKNOWLEDGED = pack_stop_answer(StopAnswer(True, "estop", "stopped"))
 STOP_IT = pack_stop("robot-1", "anna")

@@ -20,7 +20,7 @@ from common.wire.stop import pack_stop, read_stop_answer
 from common.wire.topics import STOP
 from deploy.client.answer import RobotAnswer
 from deploy.client.destination import Destination
-from deploy.ops.control.stop_count import StopCount
+from deploy.client.stop_count import StopCount
 
 REPEAT_S = 0.2
 WITHIN_S = 5.0

@@ -1,0 +1,74 @@
+"""`[console]`: where the web page is served, and how. `tandem console` reads it; no control loop does."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from typing import Literal
+
+from pydantic import Field
+
+from common.config.section import RelativePath, Section
+from common.errors import ConfigMistake
+
+_HOST_NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]{0,251}[A-Za-z0-9])?")
+
+
+class ConsoleConfig(Section):
+    """`[console]`."""
+
+    listen: str = "127.0.0.1:8080"
+    """Address and port, such as 127.0.0.1:8080 or [::1]:8080; port 0: any that is free."""
+    names: list[str] = Field(default_factory=list)
+    """Other names by which browsers reach the page, such as `ward-3.example`. All others are refused."""
+    certificate: RelativePath | None = None
+    """For HTTPS: made by `tandem keys make` with `--host`; its .key lies beside it. Needed beyond
+    this host."""
+    language: Literal["en", "zh"] = "en"
+    hardware_estop: bool = False
+    """True only where the page's stop drives a certified emergency stop: the button may then be called so."""
+    losing_page: Literal["nothing", "stop"] = "nothing"
+    """`stop`: when the page of the person who engaged the robot is lost, the robot is stopped."""
+
+    @property
+    def host(self) -> str:
+        """The address, without brackets."""
+        return self.listen.rpartition(":")[0].strip("[]")
+
+    @property
+    def port(self) -> int:
+        """The port."""
+        return int(self.listen.rpartition(":")[2])
+
+    @property
+    def on_this_host_only(self) -> bool:
+        """Whether no other host can reach the page."""
+        return self.host == "localhost" or ipaddress.ip_address(self.host).is_loopback
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """An address that is one; HTTPS wherever others may reach it."""
+        host, colon, port = self.listen.rpartition(":")
+        if not colon or not port.isdigit() or int(port) > 65535 or not _is_address(host.strip("[]")):
+            return [ConfigMistake("console.listen", self.listen, "an address and a port: 127.0.0.1:8080")]
+        wrong = [name for name in self.names if not _HOST_NAME.fullmatch(name)]
+        if wrong:
+            return [ConfigMistake("console.names", wrong[0], "a host's name or address, without a port")]
+        if not self.on_this_host_only and self.certificate is None:
+            return [
+                ConfigMistake(
+                    "console.certificate",
+                    None,
+                    f"a certificate, as other hosts reach {self.listen}: `tandem keys make --host` makes one",
+                )
+            ]
+        return []
+
+
+def _is_address(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,83 @@
+"""What a person asks of a robot on the page, sent the way the command line sends it, answered in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from common.link import Link
+from common.wire.messages import Action
+from deploy.client.answer import RobotAnswer
+from deploy.client.ask import ask
+from deploy.client.destination import Destination
+from deploy.console.session import Person
+
+ACTS = {
+    action.value: action
+    for action in (
+        Action.ENGAGE, Action.DISENGAGE, Action.REST, Action.TAKE_UP, Action.HANDOVER, Action.RESET,
+        Action.HOME,
+    )
+}  # fmt: skip
+"""What `/api/act` takes; the stop goes its own way, without a role."""
+_MOST_GROUPS = 16
+_LONGEST = 128
+
+
+class ActRefusedError(Exception):
+    """The request is not one, or this person may not make it."""
+
+    def __init__(self, status: int, words: str) -> None:
+        super().__init__(words)
+        self.status = status
+        """Of HTTP."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActRequest:
+    """One act, well formed."""
+
+    action: Action
+    robot: str
+    key: str = ""
+    """The reset key; for `handover` the operator who shall take the robot."""
+    groups: tuple[str, ...] = ()
+
+
+def read_act(body: object, robots: tuple[str, ...], person: Person) -> ActRequest:
+    """The act of a request's body. Raises ActRefusedError with the words for the person."""
+    if not isinstance(body, dict):
+        raise ActRefusedError(400, "expected an object")
+    action = ACTS.get(_text(body, "act"))
+    if action is None:
+        raise ActRefusedError(400, f"no such act: expected one of {', '.join(ACTS)}")
+    robot = _text(body, "robot") or robots[0]
+    if robot not in robots:
+        raise ActRefusedError(400, f"no such robot here: expected one of {', '.join(robots)}")
+    if not person.role.acts:
+        status = 403 if person.name else 401
+        raise ActRefusedError(status, "log in first: this is for an operator or an engineer. Anyone may stop")
+    key = _text(body, "to" if action is Action.HANDOVER else "key")
+    if not key and action in (Action.RESET, Action.HOME, Action.HANDOVER):
+        raise ActRefusedError(400, "to whom?" if action is Action.HANDOVER else "the robot's key is missing")
+    groups = body.get("groups", [])
+    if not isinstance(groups, list) or not all(isinstance(each, str) for each in groups):
+        raise ActRefusedError(400, "groups: expected a list of joint groups")
+    if action in (Action.REST, Action.TAKE_UP) and not 0 < len(groups) <= _MOST_GROUPS:
+        raise ActRefusedError(400, "which joint groups?")
+    return ActRequest(action, robot, key, tuple(groups))
+
+
+async def carry_out(request: ActRequest, link: Link, where: Destination) -> RobotAnswer:
+    """Ask the robot. Where several bear its name, what the first answers, with all of their words."""
+    answers = await ask(
+        link, replace(where, robots=(request.robot,)), request.action, request.key, request.groups
+    )
+    words = "; ".join(dict.fromkeys(answer.text for answer in answers))
+    return replace(answers[0], done=all(answer.done for answer in answers), text=words)
+
+
+def _text(body: dict[object, object], name: str) -> str:
+    value = body.get(name, "")
+    if not isinstance(value, str) or len(value) > _LONGEST:
+        raise ActRefusedError(400, f"{name}: expected a short text")
+    return value

@@ -1,0 +1,210 @@
+"""The console's middle: models, open pages, and the clock that shows the ones to the others."""
+
+from __future__ import annotations
+
+import json
+import logging
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import psutil
+
+from common.clock import monotonic_ns, to_ns
+from common.process.pacing import TickGrid
+from common.process.ticker import ticks
+from deploy.console.deadman import DeadmanRelay
+from deploy.console.model.robot import RobotModel
+from deploy.console.session import Access, PageRole, Person
+from deploy.console.stopping import RobotStopper
+from deploy.console.viewers import LOST_S, MOST, OpenPage, pack
+
+VIEW_HZ = 25
+FACTS_EVERY = VIEW_HZ
+BEAT_S = 0.3
+"""A page that holds the deadman and says nothing for so long does not hold it any more."""
+SEEN_S = 0.5
+"""A beat of the deadman from a page that has seen nothing newer does not hold."""
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(eq=False)
+class Hub:
+    """What all handlers share."""
+
+    models: Mapping[str, RobotModel]
+    access: Access
+    stoppers: Mapping[str, RobotStopper]
+    deadman: DeadmanRelay | None = None
+    losing_page_stops: bool = False
+    pages: list[OpenPage] = field(default_factory=list)
+    session: str = field(default_factory=lambda: secrets.token_hex(4))
+    """Another one with each process."""
+    engaged: dict[str, str] = field(default_factory=dict)
+    """By robot, the log-in of the page that engaged it."""
+    _gone_ns: dict[str, int] = field(default_factory=dict)
+    _process: psutil.Process = field(default_factory=psutil.Process)
+
+    @property
+    def full(self) -> bool:
+        """Whether one more page would be too many."""
+        return len(self.pages) >= MOST
+
+    def enter(self, page: OpenPage) -> None:
+        """A page opened."""
+        self.pages.append(page)
+        self.greet(page)
+        log.info("page opened: %s sees %s (%d open)", page.name, page.model.robot, len(self.pages))
+
+    def leave(self, page: OpenPage) -> None:
+        """A page closed: what it held is released."""
+        self.pages.remove(page)
+        self.release(page)
+        log.info("page closed: %s (%d open)", page.name, len(self.pages))
+
+    def greet(self, page: OpenPage) -> None:
+        """Tell a page who it is taken for."""
+        role = page.person.role
+        page.say({
+            "kind": "hello",
+            "role": role.value,
+            "person": page.person.name,
+            "robot": page.model.robot,
+            "viewers": len(self.pages),
+            "session": self.session,
+            "may": {
+                "stop": True,
+                "act": role.acts,
+                "reset": role.acts,
+                "hold": role.acts and self.deadman is not None,
+            },
+        })  # fmt: skip
+
+    def on_picture(self, model: RobotModel, camera: str) -> None:
+        """A newer picture came."""
+        jpeg = model.pictures.newest[camera].frame.jpeg
+        for page in self.pages:
+            if page.model is model:
+                page.show_picture(camera, jpeg)
+
+    async def show(self) -> None:
+        """Show every page its robot until cancelled."""
+        async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / VIEW_HZ))):
+            now_ns = monotonic_ns()
+            watched = (
+                {page.model.robot for page in self.pages} if due.tick % FACTS_EVERY else set(self.models)
+            )
+            for robot in watched:
+                self._show_view(self.models[robot], now_ns)
+            if due.tick % FACTS_EVERY == 0:
+                for model in self.models.values():
+                    self._show_facts(model, now_ns)
+            self._watch_pages(now_ns)
+            self._watch_deadman(now_ns)
+
+    def held(self, page: OpenPage, down: bool, number: object) -> str:
+        """A beat of the deadman from a page; the words where it does not count, else empty."""
+        if self.deadman is None:
+            return "this console is not the operator's deadman: [operator.deadman] names another source"
+        if not self.access.person(page.secret, monotonic_ns()).role.acts:
+            return "log in first: only an operator's page can hold the deadman"
+        if not down:
+            self.release(page)
+            page.lapsed = False
+            return ""
+        if page.lapsed:
+            return "the page fell silent while it held: release, then press again"
+        if any(other.holds for other in self.pages if other is not page):
+            return "another page holds the deadman"
+        if not page.saw_lately(number, SEEN_S):
+            return "this page shows an old state, so it does not hold"
+        page.holds, page.beat_ns = True, monotonic_ns()
+        self.deadman.beat(True)
+        return ""
+
+    def release(self, page: OpenPage) -> None:
+        """The page holds nothing any more."""
+        if page.holds and self.deadman is not None:
+            self.deadman.beat(False)
+        page.holds = False
+
+    def refresh(self, secret: str) -> None:
+        """Somebody logged in or out: his pages are told."""
+        for page in self.pages:
+            if page.secret == secret:
+                page.person = self.access.person(secret, monotonic_ns())
+                self.greet(page)
+
+    def _show_view(self, model: RobotModel, now_ns: int) -> None:
+        body = pack(model.view(now_ns))
+        holder = next((page for page in self.pages if page.holds), None)
+        for page in self.pages:
+            if page.model is model:
+                held_by = "" if holder is None else "this page" if holder is page else holder.name
+                page.show("view", body, {"page_ms": page.outbox.page_ms, "holder": held_by})
+
+    def _show_facts(self, model: RobotModel, now_ns: int) -> None:
+        if not any(page.model is model for page in self.pages):
+            return
+        body = pack({**model.facts(now_ns), "console": self._figures()})
+        for page in self.pages:
+            if page.model is model:
+                viewers = [
+                    {"person": other.name, "robot": other.model.robot, "this": other is page}
+                    for other in self.pages
+                ]
+                page.show("facts", body, {"viewers": viewers})
+
+    def _watch_deadman(self, now_ns: int) -> None:
+        """A page that fell silent holds no more; while none holds, the master is told so again and again."""
+        if self.deadman is None:
+            return
+        for page in self.pages:
+            if page.holds and now_ns - page.beat_ns > to_ns(BEAT_S):
+                page.lapsed = True
+                self.release(page)
+        if not any(page.holds for page in self.pages):
+            self.deadman.beat(False)
+
+    def _figures(self) -> dict[str, object]:
+        return {
+            "cpu_percent": round(self._process.cpu_percent(), 1),
+            "rss_mb": round(self._process.memory_info().rss / 1e6, 1),
+            "skipped": sum(page.outbox.replaced for page in self.pages),
+            "refused": self.access.refused,
+        }
+
+    def _watch_pages(self, now_ns: int) -> None:
+        """Where it is configured so, the loss of the page that engaged a robot stops it."""
+        for robot, secret in list(self.engaged.items()):
+            lives = any(page.secret == secret and not _lost(page, now_ns) for page in self.pages)
+            if lives:
+                self._gone_ns.pop(robot, None)
+                continue
+            gone_ns = self._gone_ns.setdefault(robot, now_ns)
+            if self.losing_page_stops and now_ns - gone_ns > to_ns(LOST_S):
+                del self.engaged[robot]
+                self._gone_ns.pop(robot, None)
+                if self.models[robot].guard in ("align", "track", "clutch"):
+                    self.stoppers[robot].stop("the page that engaged the robot was lost")
+
+
+def _lost(page: OpenPage, now_ns: int) -> bool:
+    since_ns = page.outbox.owes_since_ns()
+    return since_ns is not None and now_ns - since_ns > to_ns(LOST_S)
+
+
+def stranger(on_this_host_only: bool) -> PageRole:
+    """What a page without a log-in may: beyond this host it sees nothing, for it shows a patient's home."""
+    return PageRole.VIEWER if on_this_host_only else PageRole.NOBODY
+
+
+def as_json(value: object) -> str:
+    """For answers to requests."""
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def person_of(role: PageRole, operator: str) -> Person:
+    """Who logs in with a token of a role."""
+    return Person(role, operator or role.value)

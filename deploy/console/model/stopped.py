@@ -1,0 +1,39 @@
+"""A stop that somebody asked for, and when what of it was seen. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from common.clock import to_s
+
+
+@dataclass(slots=True)
+class StopShown:
+    """Times are ns of this host's clock; None: not yet."""
+
+    number: int
+    by: str
+    asked_ns: int
+    robot_ns: int | None = None
+    """When the robot had acknowledged, or a state of it said that it is stopped."""
+    stands_ns: int | None = None
+    """When its encoders stood, after that."""
+    text: str = ""
+    failed: str = ""
+    """Why nobody knows that it stopped, in words."""
+
+    def shown(self, now_ns: int) -> dict[str, object]:
+        """As the page has it."""
+        return {
+            "id": self.number,
+            "by": self.by,
+            "since_s": round(to_s(now_ns - self.asked_ns), 3),
+            "asked_s": 0.0,
+            "robot_s": self._after(self.robot_ns),
+            "stands_s": self._after(self.stands_ns),
+            "text": self.text,
+            "failed": self.failed,
+        }
+
+    def _after(self, at_ns: int | None) -> float | None:
+        return None if at_ns is None else round(to_s(at_ns - self.asked_ns), 3)

@@ -1,0 +1,191 @@
+"""The console's process: its link, its tap, its pages, until it is stopped."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import ssl
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from aiohttp import web
+
+from common.clock import monotonic_ns
+from common.config.console import ConsoleConfig
+from common.errors import TandemError
+from common.link import LinkSession, open_session
+from common.process.runtime import until_stopped
+from common.skeleton import Skeleton
+from common.wire.version import software
+from deploy.client.destination import Destination
+from deploy.console.app import ConsoleApp
+from deploy.console.deadman import DeadmanRelay
+from deploy.console.hearing import Hearing
+from deploy.console.hub import VIEW_HZ, Hub, person_of, stranger
+from deploy.console.model.pictures import STALE_S
+from deploy.console.model.robot import SILENT_S, RobotModel, Whose
+from deploy.console.model.scene import scene
+from deploy.console.outbox import WINDOW
+from deploy.console.session import Access, PageRole, Person
+from deploy.console.stopping import RobotStopper
+from slave.guard.states import State
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class ConsoleOptions:
+    """What the command line and the files say."""
+
+    where: Destination
+    skeleton: Skeleton
+    config: ConsoleConfig
+    tap: Path | None = None
+    """The master's tap on this host; None: everything is heard over the link."""
+    deadman: str | None = None
+    """The source of the operator's deadman; None: not known."""
+    deadman_socket: Path | None = None
+    """Where the master hears a deadman that a page holds."""
+    zones: Sequence[Mapping[str, object]] | None = None
+    """The robot's zones; None: not known here."""
+    on_ready: Callable[[str], None] = field(default=lambda line: None)
+    """Takes each line for the person who started it: addresses with their tokens."""
+
+
+async def run_console(options: ConsoleOptions, stop: asyncio.Event) -> None:
+    """Serve until `stop` is set. Raises TandemError where address, keys or link do not allow it."""
+    await until_stopped(stop, _run(options))
+
+
+async def _run(options: ConsoleOptions) -> None:
+    where = options.where
+    whose = Whose(where.operator, masters_clock=options.tap is not None)
+    models = {robot: RobotModel(robot, options.skeleton, whose) for robot in where.robots}
+    async with open_session(where.link) as session:
+        hearing = Hearing(models)
+        hearing.listen(session, states=options.tap is None)
+        stoppers = {
+            robot: RobotStopper(session.link(robot), model, where.operator) for robot, model in models.items()
+        }
+        for stopper in stoppers.values():
+            stopper.watch(session)
+        relay = DeadmanRelay(options.deadman_socket) if options.deadman_socket else None
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                if options.tap is not None:
+                    tasks.create_task(hearing.read_tap(options.tap))
+                    tasks.create_task(hearing.stand_in(where.link))
+                await _serve(options, session, hearing, stoppers, relay)
+        finally:
+            for stopper in stoppers.values():
+                await stopper.close()
+            if relay is not None:
+                relay.close()
+
+
+async def _serve(
+    options: ConsoleOptions,
+    session: LinkSession,
+    hearing: Hearing,
+    stoppers: Mapping[str, RobotStopper],
+    relay: DeadmanRelay | None,
+) -> None:
+    config = options.config
+    tls = _tls(config)
+    listener = _listener(config)
+    port = listener.getsockname()[1]
+    access = Access(_names(config, port), tls is not None, stranger(config.on_this_host_only))
+    models = hearing.models
+    hub = Hub(models, access, stoppers, relay, losing_page_stops=config.losing_page == "stop")
+    hearing.on_picture = hub.on_picture
+    address = f"{'https' if tls else 'http'}://{_shown_host(config)}:{port}/"
+
+    def offer(person: Person) -> None:
+        token = access.issue(person, monotonic_ns())
+        page = "engineer" if person.role is PageRole.ENGINEER else ""
+        options.on_ready(f"{person.role}: {address}{page}#token={token}")
+
+    app = ConsoleApp(
+        hub, options.where, session, lambda robot: _setup(options), secure=tls is not None, on_login=offer
+    )
+    runner = web.AppRunner(app.make(), access_log=None, shutdown_timeout=1.0, handle_signals=False)
+    await runner.setup()
+    try:
+        await web.SockSite(runner, listener, ssl_context=tls).start()
+        options.on_ready(f"console: {address} (without a token it only shows, and stops)")
+        for role in (PageRole.OPERATOR, PageRole.ENGINEER):
+            offer(person_of(role, options.where.operator if role is PageRole.OPERATOR else ""))
+        await hub.show()
+    finally:
+        await runner.cleanup()
+
+
+def _setup(options: ConsoleOptions) -> dict[str, object]:
+    config = options.config
+    return {
+        "version": 1,
+        "tandem": software().tandem,
+        "operator": options.where.operator,
+        "side": "operator",
+        "language": config.language,
+        "hardware_estop": config.hardware_estop,
+        "deadman": options.deadman,
+        "losing_page_stops": config.losing_page == "stop",
+        "guard_states": [state.value for state in State],
+        "stale_picture_s": STALE_S,
+        "silent_s": SILENT_S,
+        "rate_hz": VIEW_HZ,
+        "window": WINDOW,
+        "zones": list(options.zones or ()),
+        "zones_known": options.zones is not None,
+        **scene(options.skeleton),
+    }
+
+
+def _names(config: ConsoleConfig, port: int) -> list[str]:
+    names = [config.host, *config.names]
+    if config.on_this_host_only:
+        names += ["localhost", "127.0.0.1", "::1"]
+    hosts = [f"[{name}]" if ":" in name else name for name in dict.fromkeys(names)]
+    # browsers leave out the port that is the scheme's own
+    return [f"{host}:{port}" for host in hosts] + (hosts if port in (80, 443) else [])
+
+
+def _shown_host(config: ConsoleConfig) -> str:
+    if config.host in ("0.0.0.0", "::") and config.names:
+        return config.names[0]
+    return f"[{config.host}]" if ":" in config.host else config.host
+
+
+def _listener(config: ConsoleConfig) -> socket.socket:
+    family = socket.AF_INET6 if ":" in config.host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((config.host, config.port))
+        listener.listen(64)
+    except OSError as error:
+        listener.close()
+        raise TandemError(
+            f"{config.listen}: the console cannot listen there ({error.strerror}); name another address by "
+            "--listen or [console] listen"
+        ) from None
+    listener.setblocking(False)
+    return listener
+
+
+def _tls(config: ConsoleConfig) -> ssl.SSLContext | None:
+    if config.certificate is None:
+        return None
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    key = config.certificate.with_suffix(".key")
+    try:
+        context.load_cert_chain(config.certificate, key)
+    except (OSError, ssl.SSLError) as error:
+        raise TandemError(
+            f"{config.certificate}: no HTTPS with it and {key.name} ({error}); `tandem keys make` makes them"
+        ) from None
+    return context

@@ -1,0 +1,101 @@
+"""Stops a robot straight over the link, whether or not the master lives: asked again until it says so."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from common.clock import monotonic_ns
+from common.link import Link, LinkSession
+from common.wire.presence import ProcessPresence
+from common.wire.stop import pack_stop
+from common.wire.topics import STOP
+from deploy.client.answer import RobotAnswer
+from deploy.client.stop import OnAnswer, repeat_until_stopped
+from deploy.client.stop_count import StopCount
+from deploy.console.model.robot import RobotModel
+from deploy.console.model.stopped import StopShown
+
+UNANSWERED_S = 1.0
+"""Without an acknowledgement for so long, the page says that nobody knows."""
+GIVE_UP_S = 60.0
+NOT_STOPPED = "no answer from the robot: use the switch at the robot. This console keeps asking"
+GIVEN_UP = "no answer from the robot for 60 s, so it is no longer asked: use the switch at the robot"
+
+log = logging.getLogger(__name__)
+
+
+class RobotStopper:
+    """The stops of one robot's name. Who asks needs no role."""
+
+    def __init__(self, link: Link, model: RobotModel, operator: str) -> None:
+        self._link = link
+        self._model = model
+        self._operator = operator
+        self._here: dict[int, ProcessPresence] = {}
+        self._task: asyncio.Task[None] | None = None
+        self._number = 0
+
+    def watch(self, session: LinkSession) -> None:
+        """Learn which processes bear the name: each must acknowledge."""
+        session.watch_presence(self._on_presence, self._model.robot)
+
+    def stop(self, by: str) -> StopShown:
+        """Ask for a stop. A stop under way goes on, and a robot that is stopped already is asked again."""
+        self._number += 1
+        shown = self._model.asked_to_stop(self._number, by, monotonic_ns())
+        if self._task is None or self._task.done():
+            log.warning("%s: %s asks to stop it", self._model.robot, by)
+            self._task = asyncio.create_task(self._repeat())
+        return shown
+
+    async def close(self) -> None:
+        """End what is under way."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+
+    def _on_presence(self, presence: ProcessPresence, here: bool) -> None:
+        if presence.role != "slave" or not presence.instance:
+            return
+        if here:
+            self._here[presence.instance] = presence
+        else:
+            self._here.pop(presence.instance, None)
+
+    async def _repeat(self) -> None:
+        count = StopCount(self._model.robot, GIVE_UP_S)
+        for presence in self._here.values():
+            count.expect(presence)
+        known = asyncio.Event()
+        known.set()
+
+        async def ask_all(question: bytes, on_answer: OnAnswer) -> object:
+            return await self._link.ask_all(STOP, question, on_answer)
+
+        unanswered = asyncio.get_running_loop().call_later(UNANSWERED_S, self._fail, NOT_STOPPED)
+        payload = pack_stop(self._model.robot, self._operator)
+        try:
+            async with asyncio.timeout(GIVE_UP_S):
+                await repeat_until_stopped(ask_all, count, payload, known, self._on_answer)
+        except TimeoutError:
+            self._fail(GIVEN_UP)
+        finally:
+            unanswered.cancel()
+        stop = self._model.stop
+        if count.complete and stop is not None:
+            stop.failed = ""
+
+    def _on_answer(self, answer: RobotAnswer) -> None:
+        stop = self._model.stop
+        if stop is None:
+            return
+        stop.text = answer.text
+        if stop.robot_ns is None:
+            stop.robot_ns, stop.failed = monotonic_ns(), ""
+
+    def _fail(self, words: str) -> None:
+        stop = self._model.stop
+        if stop is not None and stop.robot_ns is None:
+            stop.failed = words
+            log.warning("%s: the stop is not acknowledged: %s", self._model.robot, words)

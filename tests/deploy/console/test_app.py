@@ -1,0 +1,373 @@
+"""The console's doors: what is served to whom, and what is refused, each refusal with its words."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+
+import aiohttp
+import pytest
+
+from common.clock import monotonic_ns
+from deploy.console.app import COOKIE, LONGEST
+from deploy.console.model.robot import TAP
+from deploy.console.session import PageRole, Person
+from deploy.console.viewers import MOST
+from tests.deploy.console.robots import ROBOT, frame, state
+from tests.deploy.console.served import Served, served
+
+Story = Callable[[Served], Awaitable[None]]
+
+
+def run(story: Story, stranger: PageRole = PageRole.VIEWER) -> None:
+    async def told() -> None:
+        async with served(stranger) as console:
+            await story(console)
+
+    asyncio.run(told())
+
+
+def test_the_pages_and_their_files_are_served_with_a_policy() -> None:
+    async def story(console: Served) -> None:
+        for path in ("/", "/engineer"):
+            async with console.http.get(console.url + path) as response:
+                assert response.status == 200
+                assert response.content_type == "text/html"
+                assert "default-src 'self'" in response.headers["Content-Security-Policy"]
+                assert response.headers["Content-Encoding"] == "gzip"
+                tag = response.headers["ETag"]
+            async with console.http.get(console.url + path, headers={"If-None-Match": tag}) as response:
+                assert response.status == 304
+        for path in ("/page/../app.py", "/page/%2e%2e/app.py", "/page/none.js", "/vendor/", "/other"):
+            async with console.http.get(console.url + path) as response:
+                assert response.status == 404, path
+
+    run(story)
+
+
+def test_setup_says_what_the_page_draws() -> None:
+    async def story(console: Served) -> None:
+        async with console.http.get(f"{console.url}/api/setup?robot=robot-2") as response:
+            setup = await response.json()
+        assert (setup["robot"], setup["robots"]) == ("robot-2", [ROBOT, "robot-2"])
+        assert len(setup["joints"]) == 25
+        async with console.http.get(f"{console.url}/api/setup?robot=robot-9") as response:
+            assert response.status == 404
+
+    run(story)
+
+
+def test_another_hosts_name_is_refused_everywhere() -> None:
+    async def story(console: Served) -> None:
+        for path in ("/", "/api/setup", "/ws"):
+            async with console.http.get(console.url + path, headers={"Host": "evil.example"}) as response:
+                assert response.status == 403
+        assert console.access.refused == {"host": 3}
+
+    run(story)
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1"])
+def test_another_origin_neither_posts_nor_opens_a_socket(origin: str) -> None:
+    async def story(console: Served) -> None:
+        await console.log_in()
+        for path in ("/api/login", "/api/act", "/api/stop", "/api/logout"):
+            status, said = await console.post(path, {}, Origin=origin)
+            assert status == 403
+            assert "may not use this console" in said["error"]
+        with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+            await console.page(Origin=origin)
+        assert refused.value.status == 403
+        assert console.access.refused == {"origin": 5}
+        assert console.stops[ROBOT].by == []
+
+    run(story)
+
+
+def test_without_an_origin_nothing_is_posted() -> None:
+    async def story(console: Served) -> None:
+        async with console.http.post(f"{console.url}/api/stop", json={}) as response:
+            assert response.status == 403
+
+    run(story)
+
+
+def test_a_form_of_another_page_is_no_json() -> None:
+    async def story(console: Served) -> None:
+        status, _ = await console.post("/api/stop", {}, **{"Content-Type": "text/plain"})
+        assert status == 415
+
+    run(story)
+
+
+def test_a_token_logs_in_once_and_the_cookie_is_not_for_scripts() -> None:
+    async def story(console: Served) -> None:
+        token = console.access.issue(Person(PageRole.OPERATOR, "nurse-1"), monotonic_ns())
+        sent = {"json": {"token": token}, "headers": console.origin}
+        async with console.http.post(f"{console.url}/api/login", **sent) as response:  # type: ignore[arg-type]  # one call's arguments, used twice
+            assert await response.json() == {"role": "operator", "person": "nurse-1"}
+            cookie = response.headers["Set-Cookie"]
+        assert cookie.startswith(f"{COOKIE}=")
+        assert "HttpOnly" in cookie
+        assert "SameSite=Strict" in cookie
+        for wrong in (token, "guessed", ""):
+            status, said = await console.post("/api/login", {"token": wrong})
+            assert (status, "token" in said["error"]) == (403, True)
+        assert console.access.refused == {"token": 3}
+
+    run(story)
+
+
+@pytest.mark.parametrize(
+    ("person", "status"), [(None, 401), (Person(PageRole.VIEWER, "visitor"), 403)], ids=["stranger", "viewer"]
+)
+def test_only_operators_act_and_everybody_stops(person: Person | None, status: int) -> None:
+    async def story(console: Served) -> None:
+        if person is not None:
+            await console.log_in(person)
+        for act in ("engage", "disengage", "reset", "handover"):
+            answered, said = await console.post("/api/act", {"act": act, "robot": ROBOT})
+            assert (answered, "log in" in said["error"]) == (status, True)
+        assert (await console.post("/api/stop", {"robot": ROBOT}))[0] == 202
+        assert (await console.post("/api/act", {"act": "estop", "robot": ROBOT}))[0] == 202
+        assert len(console.stops[ROBOT].by) == 2
+
+    run(story)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"act": "dance"},
+        {"act": "claim"},
+        {"act": 5},
+        {"act": "engage", "robot": "robot-9"},
+        {"act": "engage", "robot": 5},
+        {"act": "rest"},
+        {"act": "rest", "groups": "left_arm"},
+        {"act": "rest", "groups": [5]},
+        {"act": "reset"},
+        {"act": "handover", "to": "x" * 200},
+        [],
+        "engage",
+    ],
+)
+def test_what_is_no_act_is_refused_in_words(body: object) -> None:
+    async def story(console: Served) -> None:
+        await console.log_in()
+        status, said = await console.post("/api/act", body)
+        assert (status, bool(said["error"])) == (400, True)
+
+    run(story)
+
+
+def test_a_session_that_expired_acts_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def story(console: Served) -> None:
+        monkeypatch.setattr("deploy.console.session.SESSION_S", 0.0)
+        await console.log_in()
+        status, _ = await console.post("/api/act", {"act": "engage", "robot": ROBOT})
+        assert status == 401
+
+    run(story)
+
+
+def test_a_log_out_ends_the_session() -> None:
+    async def story(console: Served) -> None:
+        await console.log_in()
+        assert (await console.post("/api/act", {"act": "engage"}))[0] == 503, "no link, but let in"
+        await console.post("/api/logout", {})
+        assert (await console.post("/api/act", {"act": "engage"}))[0] == 401
+
+    run(story)
+
+
+def test_a_long_body_is_refused() -> None:
+    async def story(console: Served) -> None:
+        await console.log_in()
+        status, _ = await console.post("/api/act", {"act": "engage", "key": "x" * 5000})
+        assert status == 413
+        assert console.access.refused == {"size": 1}
+
+    run(story)
+
+
+def test_more_than_20_posts_a_second_are_refused() -> None:
+    async def story(console: Served) -> None:
+        statuses = [(await console.post("/api/login", {"token": "guess"}))[0] for _ in range(40)]
+        assert statuses[:20] == [403] * 20
+        assert statuses.count(429) >= 10
+
+    run(story)
+
+
+def test_a_page_is_greeted_and_shown_the_robot() -> None:
+    async def story(console: Served) -> None:
+        showing = asyncio.create_task(console.hub.show())
+        page = await console.page()
+        hello = await page.hear("hello")
+        assert (hello["role"], hello["robot"], hello["may"]["stop"], hello["may"]["act"]) == (
+            "viewer", ROBOT, True, False
+        )  # fmt: skip
+        now_s = monotonic_ns() / 1e9
+        console.models[ROBOT].on_state(state(at_s=now_s), monotonic_ns(), TAP)
+        view = await page.hear("view")
+        while view["heard"] == "none":
+            view = await page.hear("view")
+        assert (view["guard"], view["situation"]) == ("track", "follows")
+        facts = await page.hear("facts")
+        assert facts["viewers"] == [{"person": "viewer", "robot": ROBOT, "this": True}]
+        await page.say(kind="robot", robot="robot-2")
+        assert (await page.hear("hello"))["robot"] == "robot-2"
+        showing.cancel()
+
+    run(story)
+
+
+def test_a_picture_has_its_header_before_it() -> None:
+    async def story(console: Served) -> None:
+        page = await console.page()
+        await page.hear("hello")
+        robot = console.models[ROBOT]
+        robot.on_picture("head", frame(7, 200.0), monotonic_ns())
+        console.hub.on_picture(robot, "head")
+        data = await page.socket.receive_bytes(timeout=5.0)
+        length = int.from_bytes(data[:4], "little")
+        header = json.loads(data[4 : 4 + length])
+        assert (header["kind"], header["camera"], header["number"], header["n"]) == ("picture", "head", 7, 1)
+        assert data[4 + length :] == robot.pictures.newest["head"].frame.jpeg
+
+    run(story)
+
+
+def test_anybody_stops_by_the_socket() -> None:
+    async def story(console: Served) -> None:
+        page = await console.page()
+        await page.say(kind="stop", robot="robot-2")
+        assert (await page.hear("answer"))["to"] == "stop"
+        assert console.stops["robot-2"].by == ["console: viewer"]
+        await page.say(kind="stop")
+        await page.hear("answer")
+        assert console.stops[ROBOT].by == ["console: viewer"], "the robot that the page shows"
+
+    run(story)
+
+
+def test_beyond_this_host_a_stranger_sees_nothing_and_may_stop() -> None:
+    async def story(console: Served) -> None:
+        showing = asyncio.create_task(console.hub.show())
+        async with console.http.get(f"{console.url}/api/setup") as response:
+            assert response.status == 401
+        page = await console.page()
+        assert (await page.hear("hello"))["role"] == "nobody"
+        robot = console.models[ROBOT]
+        robot.on_picture("head", frame(7, 200.0), monotonic_ns())
+        console.hub.on_picture(robot, "head")
+        await asyncio.sleep(0.1)
+        await page.say(kind="stop")
+        said = await page.socket.receive_json(timeout=5.0)
+        assert said["kind"] == "answer", "neither a view nor a picture came before"
+        showing.cancel()
+
+    run(story, stranger=PageRole.NOBODY)
+
+
+def test_the_ninth_page_is_told_so() -> None:
+    async def story(console: Served) -> None:
+        pages = [await console.page() for _ in range(MOST)]
+        for page in pages:
+            await page.hear("hello")
+        ninth = await console.page()
+        assert "8 pages are open" in (await ninth.hear("bye"))["why"]
+        assert await ninth.closed() == aiohttp.WSCloseCode.TRY_AGAIN_LATER
+        assert console.access.refused == {"viewers": 1}
+        await pages[0].socket.close()
+        while console.hub.full:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+        await (await console.page()).hear("hello")
+
+    run(story)
+
+
+def test_a_long_message_ends_the_socket() -> None:
+    async def story(console: Served) -> None:
+        page = await console.page()
+        await page.hear("hello")
+        await page.say(kind="stop", robot="x" * LONGEST)
+        assert await page.closed() == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
+        while console.hub.pages:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+        assert console.access.refused == {"size": 1}
+
+    run(story)
+
+
+@pytest.mark.parametrize("garbage", ["", "garbage", "[]", "5", "{", "[" * 4000])
+def test_garbage_ends_the_socket_in_words(garbage: str) -> None:
+    async def story(console: Served) -> None:
+        page = await console.page()
+        await page.socket.send_str(garbage)
+        assert "JSON" in (await page.hear("bye"))["why"]
+        assert await page.closed() == aiohttp.WSCloseCode.POLICY_VIOLATION
+
+    run(story)
+
+
+def test_a_flood_of_requests_ends_the_socket_and_a_stop_in_it_is_heard() -> None:
+    async def story(console: Served) -> None:
+        page = await console.page()
+        for _ in range(20):
+            await page.say(kind="robot", robot=ROBOT)
+        await page.say(kind="stop")
+        await page.say(kind="robot", robot=ROBOT)
+        assert "20 requests a second" in (await page.hear("bye"))["why"]
+        assert await page.closed() == aiohttp.WSCloseCode.POLICY_VIOLATION
+        assert console.stops[ROBOT].by == ["console: viewer"]
+
+    run(story)
+
+
+def test_a_flood_of_acknowledgements_ends_the_socket() -> None:
+    async def story(console: Served) -> None:
+        page = await console.page()
+        for _ in range(200):
+            await page.say(kind="ack", n=1)
+        assert "too many" in (await page.hear("bye"))["why"]
+
+    run(story)
+
+
+def test_a_page_that_is_told_nothing_new_answers_what_it_does_not_know() -> None:
+    async def story(console: Served) -> None:
+        page = await console.page()
+        await page.say(kind="dance")
+        assert (await page.hear("answer"))["text"] == "no such message"
+        await page.say(kind="stop", robot="robot-9")
+        assert (await page.hear("answer"))["done"] is False
+        await page.say(kind="held", n=1, down=True)
+        assert "not the operator's deadman" in (await page.hear("answer"))["text"]
+
+    run(story)
+
+
+def test_a_page_that_stands_still_gets_no_past_and_delays_no_other() -> None:
+    async def story(console: Served) -> None:
+        showing = asyncio.create_task(console.hub.show())
+        paused, lively = await console.page(), await console.page()
+        robot = console.models[ROBOT]
+        number = 0
+        seen: list[int] = []
+        while number < 60:
+            view = await lively.hear("view")
+            seen.append(view.get("state_n", 0))
+            number += 1
+            robot.on_state(state(number, at_s=monotonic_ns() / 1e9), monotonic_ns(), TAP)
+        assert console.hub.pages[1].outbox.replaced == 0
+        assert console.hub.pages[0].outbox.number == 8
+        past = []
+        while (view := await paused.hear("view")).get("state_n", 0) < number - 5:
+            past.append(view["n"])
+        assert 0 < len(past) <= 8, past
+        showing.cancel()
+
+    run(story)
