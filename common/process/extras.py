@@ -13,6 +13,12 @@ EXTRAS = {
     "sounddevice": "sound",
     "rosbags": "ros",
     "aiohttp": "console",
+    "foxglove_schemas_protobuf": "viewer",
+    "google": "viewer",
+    "pyarrow": "export",
+    "av": "export",
+    "prometheus_client": "metrics",
+    "pylsl": "lsl",
     "vqf": "vqf",
 }
 """The extra of pyproject.toml that brings each optional module."""

@@ -22,37 +22,57 @@ class ExportFormat(StrEnum):
     MOT = "mot"
     BAG = "bag"
     MCAP = "mcap"
+    FOXGLOVE = "foxglove"
+
+
+ENDINGS = {ExportFormat.BAG: "_ros2", ExportFormat.MCAP: "_ros2", ExportFormat.FOXGLOVE: "_foxglove.mcap"}
+"""What a name gets where it is not the format's own."""
 
 
 def export_joints(
     file: Annotated[Path, typer.Argument(help="An .mcap file that `tandem record` wrote.", dir_okay=False)],
     to: Annotated[
         ExportFormat,
-        typer.Option(help="csv; bvh; mot (OpenSim); bag or mcap (ROS 2 bag of JointState, sqlite3 or mcap)."),
+        typer.Option(
+            help="csv; bvh; mot (OpenSim); bag or mcap (ROS 2 bag of JointState, sqlite3 or mcap); foxglove "
+            "(everything that a viewer shows)."
+        ),
     ] = ExportFormat.CSV,
     out: Annotated[
         Path | None, typer.Option(help="New file or folder; by default FILE's name.", callback=in_a_folder)
     ] = None,
     of: Annotated[AngleSource, typer.Option(help="Whose angles to write.")] = AngleSource.ENCODERS,
-    profile: Annotated[str, typer.Option(help="Profile of the robot that was recorded.")] = "nursing",
+    profile: Annotated[
+        str | None,
+        typer.Option(help="Profile of the robot; by default the recording says it, else nursing."),
+    ] = None,
     rate: Annotated[
         float | None, typer.Option(help="Frames per second of a bvh; by default the recording's.", min=1.0)
     ] = None,
 ) -> None:
     """Write the joint angles of a recording as CSV, BVH, OpenSim .mot or a ROS 2 bag.
 
+    --to foxglove writes a copy for viewers such as Foxglove and Rerun: the robot with its frames, joints,
+    pictures, guard, latency and log. They open it with no set-up.
+
     Example: `tandem export morning.mcap --to bvh --of encoders --out morning.bvh`
     """
-    from common.skeleton import load_skeleton
     from deploy.ops.convert.bvh import write_bvh
     from deploy.ops.convert.joint_files import write_bag, write_csv, write_mot
     from deploy.ops.convert.joints import read_joints
+    from deploy.recorded.profile import recorded_skeleton
 
-    bag = to in (ExportFormat.BAG, ExportFormat.MCAP)
-    path = out or file.with_name(f"{file.stem}_ros2" if bag else f"{file.stem}.{to}")
-    if not bag and path.suffix.lower() != f".{to}":
-        raise TandemError(f"--out {path}: expected a name that ends in .{to}")
-    skeleton = load_skeleton(profile)
+    path = out or file.with_name(file.stem + ENDINGS.get(to, f".{to}"))
+    ending = file.with_name(file.stem + ENDINGS.get(to, f".{to}")).suffix
+    if ending and path.suffix.lower() != ending:
+        raise TandemError(f"--out {path}: expected a name that ends in {ending}")
+    skeleton = recorded_skeleton([file], profile)
+    if to is ExportFormat.FOXGLOVE:
+        from deploy.ops.convert.foxglove import write_foxglove
+
+        words = write_foxglove(path, file, skeleton)
+        Console().print(f"{path}: {words}", highlight=False, markup=False, soft_wrap=True)
+        return
     series = read_joints(file, skeleton, of)
     if to is ExportFormat.CSV:
         note = write_csv(path, series)

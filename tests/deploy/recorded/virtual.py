@@ -8,9 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import msgpack
+import numpy as np
+import simplejpeg
 
 from common.recording import McapRecorder
 from common.wire.codec import encode
+from common.wire.video import VideoFrame, encode_frame
 from deploy.sim.suit.motion import OperatorMotion
 from deploy.sim.world.world import VirtualWorld, WorldSettings
 from master.journal.calls import SNAPSHOT, JournaledPipeline
@@ -19,6 +22,7 @@ from master.journal.memory import recall
 from slave.tap import RobotTick, SlaveTap
 from slave.tap import describe as describe_slave
 
+JPEG: bytes = simplejpeg.encode_jpeg(np.full((240, 320, 3), 96, dtype=np.uint8))
 WALL_NS = 1_700_000_000_000_000_000
 MOST_QUEUED = 1_000_000
 """A virtual second takes less time than a disk does."""
@@ -64,8 +68,10 @@ class RecordedWorld(VirtualWorld):
         master: McapRecorder,
         slave: McapRecorder,
         change: Callable[[RobotTick], RobotTick],
+        with_pictures: bool,
     ) -> None:
         super().__init__(settings)
+        self._with_pictures = with_pictures
         self._change = change
         self._of_master = _FileReaders(master, lambda: self.master_ns)
         self._of_slave = _FileReaders(slave, lambda: self.slave_ns)
@@ -96,6 +102,9 @@ class RecordedWorld(VirtualWorld):
         self._of_slave.put(f"{self._key}/state", payload)
         if self.commands:
             self._of_master.put(f"{self._key}/operator/nurse/command", encode(self.commands[-1]))
+        if self._with_pictures and len(self.states) % 4 == 1:
+            frame = VideoFrame(len(self.states), self.slave_ns, self.slave_ns, 320, 240, JPEG)
+            self._of_slave.put(f"{self._key}/video/head", encode_frame(frame))
 
 
 def record_run(
@@ -104,6 +113,7 @@ def record_run(
     change: Callable[[RobotTick], RobotTick] = lambda tick: tick,
     motion: OperatorMotion | None = None,
     overrides: dict[str, list[str]] | None = None,
+    with_pictures: bool = False,
 ) -> RecordedRun:
     """Play a story from the master's first tick on, into `master.mcap` and `slave.mcap`.
 
@@ -127,7 +137,7 @@ def record_run(
                 ("slave", describe_slave(plain.robot, plain.slave_config.skeleton)),
             )
         ]
-        world = RecordedWorld(settings, recorders[0], recorders[1], change)
+        world = RecordedWorld(settings, recorders[0], recorders[1], change, with_pictures)
         clock.append(world)
         story(world)
     assert not any(recorder.counters.refused for recorder in recorders)
