@@ -30,7 +30,7 @@ from deploy.console.model.scene import scene
 from deploy.console.outbox import WINDOW
 from deploy.console.session import Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
-from slave.guard.states import State
+from slave.guard.states import TRANSITIONS, State
 
 log = logging.getLogger(__name__)
 
@@ -134,6 +134,7 @@ def _setup(options: ConsoleOptions) -> dict[str, object]:
         "deadman": options.deadman,
         "losing_page_stops": config.losing_page == "stop",
         "guard_states": [state.value for state in State],
+        "transitions": [[str(a), str(event), str(b)] for (a, event), b in TRANSITIONS.items()],
         "stale_picture_s": STALE_S,
         "silent_s": SILENT_S,
         "rate_hz": VIEW_HZ,

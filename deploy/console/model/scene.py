@@ -54,5 +54,8 @@ def scene(skeleton: Skeleton) -> dict[str, object]:
         "stand": [
             {"from_m": post.from_m, "to_m": post.to_m, "radius_m": post.radius_m} for post in skeleton.stand
         ],
-        "nodes": [{"name": segment.name, "parent": segment.parent} for segment in skeleton.segments],
+        "nodes": [
+            {"name": s.name, "parent": s.parent, "origin_m": s.origin_m, "node_m": s.node_m}
+            for s in skeleton.segments
+        ],
     }

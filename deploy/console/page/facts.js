@@ -1,0 +1,288 @@
+// The facts beside the picture and the robot: latency and its last minute, link, suit, events, joints.
+import { FILLED, picture, SHAPES } from "./state.js";
+import { nameOf, t } from "./words.js";
+
+const $ = (id) => document.getElementById(id);
+const NS = "http://www.w3.org/2000/svg";
+
+/** An element with text and attributes: what a robot or a person wrote is only ever text. */
+export function make(tag, text = "", attributes = {}) {
+  const element = document.createElement(tag);
+  element.textContent = text;
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  return element;
+}
+
+export function draw(tag, attributes, parent) {
+  const element = document.createElementNS(NS, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  parent?.append(element);
+  return element;
+}
+
+const fixed = (value, digits = 0) => (value === null || value === undefined ? "–" : value.toFixed(digits));
+
+export function latencyNow(latency) {
+  $("late-ms").textContent = fixed(latency?.ms);
+  const bound = latency?.ms === null || latency?.ms === undefined ? "" : `± ${fixed(latency.bound_ms, 1)} `;
+  $("late-bound").textContent = `${bound}ms`;
+  $("late-now").classList.toggle("untrusted", latency?.trusted === false);
+  $("late-now").title = latency?.trusted === false ? t("late.untrusted") : "";
+}
+
+/** The last minute as a curve with its bound as a band. Loaded late: without it the figures are still there. */
+export class Minute {
+  constructor(element, Plot) {
+    const axis = { stroke: "#b6c2ce", grid: { stroke: "#2d3744", width: 1 }, ticks: { show: false } };
+    this.element = element;
+    this.plot = new Plot({
+      ...this.size(), cursor: { show: false }, legend: { show: false }, padding: [6, 8, 0, 0],
+      scales: { x: { time: false, range: [-60, 0] }, y: { range: (_, low, high) => [0, Math.max(20, 1.15 * (high ?? low ?? 0))] } },
+      axes: [
+        { ...axis, size: 22, values: (_, at) => at.map((s) => `${s} s`) },
+        { ...axis, size: 46, splits: (_, __, low, high) => [low, high / 2, high].map(Math.round) },
+      ],
+      series: [{}, { stroke: "#56b4e9", width: 2.5 }, { stroke: "transparent" }, { stroke: "transparent" }],
+      bands: [{ series: [2, 3], fill: "rgba(86, 180, 233, .35)" }],
+    }, [[], [], [], []], element);
+    new ResizeObserver(() => this.plot.setSize(this.size())).observe(element);
+  }
+
+  size() {
+    return { width: Math.max(50, this.element.clientWidth), height: Math.max(40, this.element.clientHeight) };
+  }
+
+  show(minute) {
+    const add = (sign) => minute.map(([, ms, bound]) => (ms === null ? null : ms + sign * (bound ?? 0)));
+    this.plot.setData([minute.map(([s]) => s), minute.map(([, ms]) => ms), add(1), add(-1)]);
+  }
+}
+
+export function link(facts) {
+  const { link: found, latency } = facts;
+  const word = found?.word ?? "unknown";
+  const line = $("link");
+  line.replaceChildren(`${t("link")} `, make("b", t(`link.${word}`), { "data-word": word }));
+  if (found && word !== "unknown") {
+    line.append(` · ${t("link.lost", { percent: fixed(found.lost_percent, 1), ms: fixed(found.jitter_ms) })}`);
+  }
+  line.title = found?.why ?? "";
+  const stages = (latency?.stages ?? []).map((stage) => `${stage.name} ${fixed(stage.mean_ms, 1)}`).join(" ▸ ");
+  const creep = latency?.creep?.alarm ? latency.creep.words || t("late.creeps") : "";
+  const note = $("late-note");
+  note.textContent = creep || found?.needs || found?.why || stages;
+  note.classList.toggle("untrusted", Boolean(creep || found?.needs));
+  note.title = note.textContent;
+}
+
+const MARKS = { attention: "!", invalid: "■", silent: "✕", unknown: "?" };
+const WEIGHT = ["silent", "invalid", "attention", "unknown", "ok"];
+
+/** The suit as a figure seen from behind, arms a little away from the body, and in words what needs attention. */
+export class BodyFigure {
+  constructor(element, nodes) {
+    this.svg = draw("svg", { role: "img" });
+    element.replaceChildren(this.svg);
+    this.nodes = nodes;
+    const at = new Map([["world", [0, 0, 0]]]);
+    this.marks = new Map();
+    const lines = [];
+    for (const node of nodes) {
+      const from = plus(at.get(node.parent) ?? [0, 0, 0], node.origin_m ?? [0, 0, 0]);
+      at.set(node.name, from);
+      const children = nodes.filter((other) => other.parent === node.name);
+      const last = [0, 0, 2 * (node.node_m?.[2] ?? -0.05)];
+      const end = children.length ? mean(children.map((child) => child.origin_m)) : last;
+      lines.push([node.name, flat(from), flat(plus(from, end))]);
+    }
+    const x = lines.flatMap(([, a, b]) => [a[0], b[0]]);
+    const y = lines.flatMap(([, a, b]) => [a[1], b[1]]);
+    const [left, top] = [Math.min(...x) - 0.09, Math.min(...y) - 0.09];
+    const [width, height] = [Math.max(...x) + 0.09 - left, Math.max(...y) + 0.09 - top];
+    this.svg.setAttribute("viewBox", `${left} ${top} ${width} ${height}`);
+    this.unit = Math.max(width, height) / 30;
+    for (const [name, a, b] of lines) {
+      const bone = draw("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1], "stroke-linecap": "round" }, this.svg);
+      this.marks.set(name, { bone, middle: [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2] });
+    }
+    this.over = draw("g", {}, this.svg);
+  }
+
+  show(levels) {
+    this.over.replaceChildren();
+    const colours = { attention: "#f0e442", invalid: "#e69f00", silent: "#ff8a3d", unknown: "#66727e" };
+    for (const [name, { bone, middle }] of this.marks) {
+      const level = levels.get(name) ?? "unknown";
+      const hurt = level !== "ok" && level !== "unknown";
+      bone.setAttribute("stroke", colours[level] ?? "#c9d3dc");
+      bone.setAttribute("stroke-width", this.unit * (hurt ? 1.5 : 0.8));
+      if (level === "silent") bone.setAttribute("stroke-dasharray", this.unit * 1.2);
+      else bone.removeAttribute("stroke-dasharray");
+      if (!hurt) continue;
+      draw("circle", { cx: middle[0], cy: middle[1], r: this.unit * 1.7, fill: "#0d1117", stroke: colours[level], "stroke-width": this.unit * 0.4 }, this.over);
+      const letter = draw("text", { x: middle[0], y: middle[1] + this.unit * 0.8, "text-anchor": "middle", "font-size": this.unit * 2.3, "font-weight": 700, fill: "#ffffff" }, this.over);
+      letter.textContent = MARKS[level];
+    }
+  }
+}
+
+const plus = (a, b) => a.map((each, i) => each + b[i]);
+const mean = (points) => [0, 1, 2].map((i) => points.reduce((sum, p) => sum + (p ?? [0, 0, 0])[i], 0) / points.length);
+/** From behind: left is left. What is below and beside the shoulders is drawn a little further out. */
+const flat = ([, y, z]) => [-(y + Math.sign(Math.round(y * 20)) * Math.max(0, 1.42 - z) * 0.3), -z];
+
+/** What needs attention: sensors of the suit, then the robot's own faults, then what the shift says. */
+export function attention(facts, figure) {
+  const nodes = [...(facts.nodes ?? [])];
+  figure?.show(new Map(nodes.map((node) => [node.name, node.level])));
+  const list = $("nodes");
+  list.replaceChildren();
+  const bad = nodes.filter((node) => node.level !== "ok");
+  bad.sort((a, b) => WEIGHT.indexOf(a.level) - WEIGHT.indexOf(b.level));
+  const item = (level, name, words) => {
+    const entry = make("li", "", { "data-level": level });
+    entry.append(make("b", name), make("span", words, words ? { lang: "en" } : {}));
+    list.append(entry);
+  };
+  const unknown = bad.filter((node) => node.level === "unknown");
+  for (const [name, words] of Object.entries(facts.faults ?? {})) item("invalid", `${t("robot")}: ${nameOf(name)}`, words);
+  for (const node of bad.filter((each) => each.level !== "unknown")) {
+    item(node.level, `${nameOf(node.name)}: ${t(`level.${node.level}`)}`, node.words ?? "");
+  }
+  for (const words of facts.shift ?? []) item("attention", t("shift"), words);
+  if (list.children.length) return;
+  if (unknown.length || !nodes.length) item("unknown", t("suit.unknown"), "");
+  else item("ok", t("suit.ok", { count: nodes.length }), "");
+}
+
+/** What happened, newest first. Only what is new is added, so that a reader's place in the list stays. */
+export class Events {
+  constructor(list) {
+    this.list = list;
+    this.entries = new Map();
+  }
+
+  show(events) {
+    const now_ms = performance.now();
+    for (const event of events) {
+      if (this.entries.has(event.id)) continue;
+      const entry = make("li", "", { "data-what": event.what });
+      entry.append(make("time"), make("p", event.text, { lang: "en", title: event.text }));
+      this.entries.set(event.id, { entry, at_ms: now_ms - 1000 * event.age_s });
+      this.list.prepend(entry);
+    }
+    while (this.list.children.length > 50) this.list.lastChild.remove();
+    const kept = new Set(events.map((event) => event.id));
+    for (const [id, { entry }] of this.entries) {
+      if (kept.has(id)) continue;
+      entry.remove();
+      this.entries.delete(id);
+    }
+    this.tick();
+  }
+
+  tick() {
+    for (const { entry, at_ms } of this.entries.values()) {
+      entry.firstChild.textContent = ago((performance.now() - at_ms) / 1000);
+    }
+  }
+}
+
+export function ago(seconds) {
+  if (seconds < 60) return t("ago.s", { n: Math.floor(seconds) });
+  if (seconds < 3600) return t("ago.min", { n: Math.floor(seconds / 60) });
+  return t("ago.h", { n: Math.floor(seconds / 3600) });
+}
+
+/** The joints as numbers, in degrees and N m; `drives` adds what the drives tell: their torque, their temperature. */
+export class JointTable {
+  constructor(element, joints, drives = false) {
+    this.columns = ["encoder", "setpoint", "target", "external", ...(drives ? ["effort", "temperature"] : [])];
+    const table = make("table");
+    const head = make("tr");
+    head.append(make("th", t("column.joint")));
+    for (const key of this.columns) head.append(make("th", t(`column.${key}`), { class: "number" }));
+    table.append(head);
+    this.rows = joints.map((joint) => {
+      const row = make("tr", "", { "data-joint": joint.name });
+      row.append(make("td", nameOf(joint.name)));
+      for (const key of this.columns) row.append(make("td", "–", { class: "number", "data-key": key }));
+      table.append(row);
+      return row;
+    });
+    element.replaceChildren(table);
+  }
+
+  show(view, drives) {
+    const degrees = (values) => values?.map((rad) => (rad === null ? null : (rad * 180) / Math.PI));
+    const values = {
+      encoder: degrees(view.encoder), setpoint: degrees(view.setpoint), target: degrees(view.target),
+      external: view.external_nm, effort: view.effort_nm ?? drives?.effort_nm, temperature: drives?.temperature_c,
+    };
+    this.rows.forEach((row, j) => {
+      this.columns.forEach((key, i) => {
+        const words = fixed(values[key]?.[j], 1);
+        if (row.children[i + 1].textContent !== words) row.children[i + 1].textContent = words;
+      });
+      const [measured, aimed] = [values.encoder?.[j], values.target?.[j]];
+      row.classList.toggle("off", typeof measured === "number" && typeof aimed === "number" && Math.abs(measured - aimed) > 5);
+    });
+  }
+}
+
+/** The pictures of the patient's home, each with its own age: one that freezes does not freeze the others. */
+export class Cameras {
+  constructor(element, names) {
+    this.cameras = new Map();
+    element.replaceChildren(...(names.length ? names : [""]).map((name) => {
+      const box = make("div", "", { class: "camera none" });
+      const canvas = make("canvas", "", { role: "img", "aria-label": t("picture.of", { camera: nameOf(name) }) });
+      const over = make("p", "", { class: "over" });
+      box.append(canvas, over);
+      this.cameras.set(name, { box, over, canvas, header: null });
+      return box;
+    }));
+    this.speak();
+  }
+
+  speak() {
+    for (const [name, { over, header }] of this.cameras) {
+      if (!header) over.textContent = t(name ? "picture.none" : "picture.no_camera");
+    }
+  }
+
+  take(header) {
+    const camera = this.cameras.get(header.camera);
+    if (camera) {
+      const { canvas } = camera;
+      if (canvas.width !== header.bitmap.width) canvas.width = header.bitmap.width;
+      if (canvas.height !== header.bitmap.height) canvas.height = header.bitmap.height;
+      canvas.getContext("2d").drawImage(header.bitmap, 0, 0);
+      camera.header = header;
+    }
+    header.bitmap.close();
+  }
+
+  /** Say how old each picture is now, and in `line` how old the oldest is. */
+  tick(line, page_ms, stale_s) {
+    let oldest = null;
+    for (const { box, over, header } of this.cameras.values()) {
+      if (!header) continue;
+      const found = picture(header, page_ms, (performance.now() - header.arrived_ms) / 1000, stale_s);
+      box.classList.remove("none");
+      box.classList.toggle("stale", found.stale);
+      if (found.stale) over.textContent = t("picture.stale", { age: found.age_s.toFixed(1) });
+      if (!oldest || found.age_s > oldest.age_s) oldest = found;
+    }
+    if (!oldest || !line) return;
+    const age = { age: oldest.age_s.toFixed(1), ms: (oldest.age_s * 1000).toFixed(0), bound: Math.ceil(oldest.bound_ms ?? 0) };
+    line.textContent = t(oldest.stale ? "picture.old" : "picture.age", age);
+  }
+}
+
+/** The figure of a state: each differs from all others without its colour. */
+export function shape(id) {
+  const svg = draw("svg", { viewBox: "0 0 100 100", "aria-hidden": "true", fill: "none", stroke: "currentColor", "stroke-width": 11, "stroke-linejoin": "round", "stroke-linecap": "round" });
+  draw("path", { d: SHAPES[id] ?? SHAPES.starting, fill: FILLED.has(id) ? "currentColor" : "none" }, svg);
+  return svg;
+}

@@ -1,0 +1,55 @@
+"""Screenshots of the page in its states, to look at: `python -m tests.browser.console.shots FOLDER`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+from tests.browser.console.browser import ARGUMENTS, CHROMIUM
+from tests.browser.console.fake import FakeConsole
+
+
+def _say(what: object) -> None:
+    sys.stderr.write(f"{what}\n")
+
+
+def main(folder: Path, only: str = "") -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        for name, size, language in (("small", (1366, 768), "en"), ("large", (1920, 1080), "zh-CN")):
+            if only and only != name:
+                continue
+            fake = FakeConsole()
+            page = browser.new_page(viewport={"width": size[0], "height": size[1]}, locale=language)
+            page.on("console", _say)
+            page.on("pageerror", _say)
+            page.goto(fake.address)
+            page.wait_for_selector("#scene canvas")
+            page.wait_for_timeout(1500)
+            page.screenshot(path=folder / f"{name}-follows.png")
+            page.keyboard.press("Escape")
+            page.wait_for_timeout(700)
+            page.screenshot(path=folder / f"{name}-stopped.png")
+            fake.guard, fake.stop, fake.reason = "hold", None, "lease lost: commands are silent for 0.2 s"
+            fake.pictures = False
+            page.click("#show-zones")
+            page.click("#show-joints")
+            page.wait_for_timeout(1200)
+            page.screenshot(path=folder / f"{name}-holds-stale.png")
+            fake.silent = True
+            page.wait_for_timeout(1200)
+            page.screenshot(path=folder / f"{name}-no-contact.png")
+            fake.silent, fake.pictures = False, True
+            page.goto(f"{fake.address}/engineer")
+            page.wait_for_timeout(2500)
+            page.screenshot(path=folder / f"{name}-engineer.png")
+            page.close()
+            fake.close()
+        browser.close()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), *sys.argv[2:])

@@ -1,0 +1,253 @@
+"""The console's page in a real browser, against a console that plays a robot."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from tests.browser.console.browser import ARGUMENTS, CHROMIUM
+from tests.browser.console.fake import FakeConsole
+
+playwright_api = pytest.importorskip("playwright.sync_api", reason="the extra `browser` is not installed")
+pytestmark = [
+    pytest.mark.live,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here: apt install chromium"),
+]
+WATCH = """
+const Plain = WebSocket;
+window.WebSocket = class extends Plain {
+  constructor(...given) {
+    super(...given);
+    this.addEventListener("message", () => { window.heard_ms = performance.now(); });
+  }
+};
+document.addEventListener("DOMContentLoaded", () => new MutationObserver(() => {
+  if (document.body.dataset.state === "no_contact") window.black_ms ??= performance.now() - window.heard_ms;
+}).observe(document.body, { attributeFilter: ["data-state"] }));
+"""
+"""Keeps, by the page's own clock, when it heard the console last, and how long after that it said so."""
+CUT = ("WebSocket connection to", "net::ERR_")
+"""What the browser itself says where a test cuts the line."""
+SMALL = {"width": 1366, "height": 768}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright_api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def fake() -> Iterator[FakeConsole]:
+    console = FakeConsole()
+    yield console
+    console.close()
+
+
+@pytest.fixture
+def page(browser: Any, fake: FakeConsole) -> Iterator[Any]:
+    """The page in English. It says nothing on the browser's console, and asks no other place."""
+    context = browser.new_context(viewport=SMALL, locale="en-GB", reduced_motion="reduce")
+    context.add_init_script(WATCH)
+    opened = context.new_page()
+    said: list[str] = []
+    asked: set[str] = set()
+    opened.on("console", lambda message: said.append(message.text))
+    opened.on("pageerror", lambda error: said.append(str(error)))
+    opened.on("request", lambda request: asked.add(request.url.split("/")[2]))
+    opened.goto(fake.address)
+    yield opened
+    context.close()
+    assert asked == {fake.address.removeprefix("http://")}
+    assert [line for line in said if not any(word in line for word in CUT)] == []
+
+
+def until(page: Any, holds: Callable[[], bool], timeout_s: float = 8.0) -> None:
+    end = time.monotonic() + timeout_s
+    while not holds():
+        assert time.monotonic() < end, f"not within {timeout_s:g} s; the page says {page.title()!r}"
+        page.wait_for_timeout(20)
+
+
+def state(page: Any) -> str:
+    return str(page.evaluate("document.body.dataset.state"))
+
+
+def test_it_loads_and_shows_the_robot_move(page: Any, fake: FakeConsole) -> None:
+    page.wait_for_selector("#scene canvas")
+    until(page, lambda: state(page) == "follows")
+    look = "document.querySelector('#scene canvas').toDataURL()"
+    first = page.evaluate(look)
+    until(page, lambda: page.evaluate(look) != first)
+
+
+def test_the_joint_table_equals_the_encoders(page: Any, fake: FakeConsole) -> None:
+    page.wait_for_selector("#scene canvas")
+    page.click("#show-joints")
+    fake.still = True
+    cells = "document.querySelectorAll('#joints tr[data-joint] td:nth-child(2)')"
+    read = f"[...{cells}].map((cell) => Number(cell.textContent))"
+    wanted = [math.degrees(angle) for angle in fake.posture(-0.06)]
+    until(page, lambda: page.evaluate(read) == pytest.approx(wanted, abs=0.0501))
+
+
+@pytest.mark.parametrize("way", ["Escape", " ", "pointer"])
+def test_stop_is_sent_both_ways_and_the_three_lights_come(page: Any, fake: FakeConsole, way: str) -> None:
+    until(page, lambda: state(page) == "follows")
+    if way == "pointer":
+        page.hover("#stop")
+        page.mouse.down()  # acts on the press, not on the release
+    else:
+        page.keyboard.press(way)
+    until(page, lambda: bool(fake.of_kind("stop")) and ("stop", {"robot": "robot-1"}) in fake.posted)
+    until(page, lambda: state(page) == "stopped")
+    until(page, lambda: page.locator("#lights li.on").count() == 3)
+
+
+def test_stop_by_space_even_where_another_button_has_the_focus(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows")
+    page.focus("#language")
+    page.keyboard.press(" ")
+    until(page, lambda: bool(fake.of_kind("stop")))
+    assert page.evaluate("document.documentElement.lang") == "en"
+
+
+def test_without_messages_it_is_black_and_says_that_a_stop_was_not_sent(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows")
+    fake.silent = True
+    until(page, lambda: state(page) == "no_contact")
+    # half a second is tested at its boundary in test_state.py; here the browser itself may be late
+    assert 500.0 < page.evaluate("black_ms") < 3000.0
+    assert not page.is_visible("#home h2")
+    assert "dead" in page.get_attribute("#stop", "class")
+    assert "switch at the robot" in page.inner_text("#stop-note")
+    page.context.set_offline(True)
+    fake.drop_sockets()
+    page.keyboard.press("Escape")
+    until(page, lambda: "NOT SENT" in page.inner_text("#stop-note"))
+    page.context.set_offline(False)
+    fake.silent = False
+    # the stop is still wanted: it is sent as soon as it can be
+    until(page, lambda: ("stop", {"robot": "robot-1"}) in fake.posted)
+    until(page, lambda: state(page) == "stopped")
+
+
+def test_it_comes_back_when_the_socket_was_cut(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows")
+    fake.drop_sockets()
+    until(page, lambda: page.evaluate("performance.getEntriesByType('resource').length") > 0)
+    until(page, lambda: state(page) == "follows")
+
+
+def test_a_second_page_sees_the_same(page: Any, fake: FakeConsole) -> None:
+    second = page.context.new_page()
+    second.goto(fake.address)
+    until(second, lambda: state(second) == "follows")
+    assert second.inner_text("#why") == page.inner_text("#why")
+    second.keyboard.press("Escape")
+    until(page, lambda: state(page) == "stopped")
+
+
+def test_engage_wants_a_second_of_holding(page: Any, fake: FakeConsole) -> None:
+    fake.guard, fake.reason = "hold", "nobody has engaged"
+    until(page, lambda: state(page) == "holds")
+    page.keyboard.down("F2")
+    page.wait_for_timeout(300)
+    page.keyboard.up("F2")
+    page.wait_for_timeout(1000)
+    assert ("act", {"act": "engage", "robot": "robot-1"}) not in fake.posted
+    page.keyboard.down("F2")
+    until(page, lambda: ("act", {"act": "engage", "robot": "robot-1"}) in fake.posted)
+    page.keyboard.up("F2")
+    until(page, lambda: state(page) == "aligns")
+
+
+def test_disengage_mark_and_language_by_key(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows")
+    page.keyboard.press("F3")
+    page.keyboard.press("F4")
+    until(page, lambda: {body.get("act") for _, body in fake.posted} >= {"disengage", "mark"})
+    page.keyboard.press("F7")
+    until(page, lambda: page.inner_text("#word") == "跟随中")
+    assert page.evaluate("document.documentElement.lang") == "zh-Hans"
+
+
+def test_the_deadman_beats_while_its_key_is_held(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows" and page.is_visible("#hold"))
+    page.keyboard.down("F9")
+    until(page, lambda: len(fake.of_kind("held")) >= 8)
+    page.keyboard.up("F9")
+    until(page, lambda: fake.of_kind("held")[-1]["down"] is False)
+    beats = fake.of_kind("held")
+    page.wait_for_timeout(300)
+    assert len(fake.of_kind("held")) == len(beats)
+    assert all(beat["n"] > 0 for beat in beats)
+
+
+def test_the_deadman_is_let_go_when_the_page_loses_the_focus(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows" and page.is_visible("#hold"))
+    page.keyboard.down("F9")
+    until(page, lambda: len(fake.of_kind("held")) >= 2)
+    page.evaluate("window.dispatchEvent(new Event('blur'))")
+    until(page, lambda: fake.of_kind("held")[-1]["down"] is False)
+
+
+def test_who_only_looks_cannot_engage_but_can_stop(page: Any, fake: FakeConsole) -> None:
+    fake.may = {"stop": True, "act": False, "reset": False, "hold": False}
+    fake.drop_sockets()
+    until(page, lambda: "looking only" in page.inner_text("#badges"))
+    assert page.is_disabled("#engage")
+    page.keyboard.down("F2")
+    page.wait_for_timeout(1200)
+    page.keyboard.press("F3")
+    assert fake.posted == []
+    page.keyboard.press("Escape")
+    until(page, lambda: state(page) == "stopped")
+
+
+def test_an_old_picture_is_marked_over_the_whole_frame(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: page.locator(".camera.none").count() == 0 and state(page) == "follows")
+    assert page.locator(".camera.stale").count() == 0
+    fake.pictures = False
+    until(page, lambda: page.locator(".camera.stale").count() == 1)
+    over, frame = page.locator(".over").bounding_box(), page.locator(".camera").bounding_box()
+    assert over == frame
+    assert "OLD" in page.inner_text(".over")
+
+
+def test_markup_from_the_robot_is_text(page: Any, fake: FakeConsole) -> None:
+    evil = "<img src=x onerror=alert(1)><b>bold</b>"
+    fake.view = {"reason": evil, "operator": evil}
+    fake.facts = {
+        "events": [{"id": 99, "age_s": 0.0, "what": "hold", "text": evil}],
+        "faults": {evil: evil},
+        "doubt": evil,
+        "shift": [evil],
+    }
+    until(page, lambda: page.inner_text("#why") == evil)
+    until(page, lambda: evil in page.inner_text("#events"))
+    assert page.locator("img").count() == 0
+    assert page.locator("#events b").count() == 0
+
+
+def test_a_page_that_stood_still_does_not_replay_the_past(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows")
+    page.evaluate("{ const end = performance.now() + 3000; while (performance.now() < end); }")
+    until(page, lambda: state(page) == "follows")
+    assert fake.most_unacknowledged <= 10  # the window of 8, and a picture and facts of one turn
+
+
+def test_a_replay_is_striped_and_cannot_stop(page: Any, fake: FakeConsole) -> None:
+    fake.setup = {"replay": True}
+    page.reload()
+    until(page, lambda: page.evaluate("document.body.classList.contains('replay')"))
+    page.keyboard.press("Escape")
+    page.wait_for_timeout(200)
+    assert fake.of_kind("stop") == []
+    assert "REPLAY" in page.inner_text("#badges")
