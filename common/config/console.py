@@ -24,6 +24,8 @@ class ConsoleConfig(Section):
     certificate: RelativePath | None = None
     """For HTTPS: made by `tandem keys make` with `--host`; its .key lies beside it. Needed beyond
     this host."""
+    deadman_key: str = Field("F9", min_length=1, max_length=32)
+    """The key that is held where the page is the deadman, as browsers name it (`KeyboardEvent.key`)."""
     language: Literal["en", "zh"] = "en"
     hardware_estop: bool = False
     """True only where the page's stop drives a certified emergency stop: the button may then be called so."""

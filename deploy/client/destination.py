@@ -38,13 +38,15 @@ def destination(
     operator: str = "",
     master: Path | None = None,
     certificate: Path | None = None,
+    overrides: Sequence[str] = (),
 ) -> Destination:
     """What the command line says; what it leaves out comes from the master's file, where one is named.
 
-    Keys, access through a router and quality of service are the file's; a `certificate` is a person's own.
-    Raises ConfigError for a file or an endpoint that is none, TandemError where no endpoint is known.
+    `overrides`: of that file, as by `--set`. Keys, access through a router and quality of service are the
+    file's; a `certificate` is a person's own. Raises ConfigError for a file or an endpoint that is none,
+    TandemError where no endpoint is known.
     """
-    file = None if master is None else load_config(master, MasterConfig)
+    file = None if master is None else load_config(master, MasterConfig, overrides)
     endpoints = list(connect or (file.link.connect if file else ()))
     if not endpoints:
         raise TandemError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from common.link import Link
@@ -19,6 +20,8 @@ ACTS = {
     )
 }  # fmt: skip
 """What `/api/act` takes; the stop goes its own way, without a role."""
+MARK = "mark"
+"""A line that a person adds to the events: no request to a robot."""
 _MOST_GROUPS = 16
 _LONGEST = 128
 
@@ -50,12 +53,8 @@ def read_act(body: object, robots: tuple[str, ...], person: Person) -> ActReques
     action = ACTS.get(_text(body, "act"))
     if action is None:
         raise ActRefusedError(400, f"no such act: expected one of {', '.join(ACTS)}")
-    robot = _text(body, "robot") or robots[0]
-    if robot not in robots:
-        raise ActRefusedError(400, f"no such robot here: expected one of {', '.join(robots)}")
-    if not person.role.acts:
-        status = 403 if person.name else 401
-        raise ActRefusedError(status, "log in first: this is for an operator or an engineer. Anyone may stop")
+    robot = _robot(body, robots)
+    _may_act(person)
     key = _text(body, "to" if action is Action.HANDOVER else "key")
     if not key and action in (Action.RESET, Action.HOME, Action.HANDOVER):
         raise ActRefusedError(400, "to whom?" if action is Action.HANDOVER else "the robot's key is missing")
@@ -67,6 +66,26 @@ def read_act(body: object, robots: tuple[str, ...], person: Person) -> ActReques
     return ActRequest(action, robot, key, tuple(groups))
 
 
+def read_mark(body: dict[str, object], robots: tuple[str, ...], person: Person) -> tuple[str, str]:
+    """Robot and words of a mark. Raises ActRefusedError."""
+    robot = _robot(body, robots)
+    _may_act(person)
+    return robot, _text(body, "text") or "mark"
+
+
+def _robot(body: Mapping[str, object], robots: tuple[str, ...]) -> str:
+    robot = _text(body, "robot") or robots[0]
+    if robot not in robots:
+        raise ActRefusedError(400, f"no such robot here: expected one of {', '.join(robots)}")
+    return robot
+
+
+def _may_act(person: Person) -> None:
+    if not person.role.acts:
+        status = 403 if person.name else 401
+        raise ActRefusedError(status, "log in first: this is for an operator or an engineer. Anyone may stop")
+
+
 async def carry_out(request: ActRequest, link: Link, where: Destination) -> RobotAnswer:
     """Ask the robot. Where several bear its name, what the first answers, with all of their words."""
     answers = await ask(
@@ -76,7 +95,7 @@ async def carry_out(request: ActRequest, link: Link, where: Destination) -> Robo
     return replace(answers[0], done=all(answer.done for answer in answers), text=words)
 
 
-def _text(body: dict[object, object], name: str) -> str:
+def _text(body: Mapping[str, object], name: str) -> str:
     value = body.get(name, "")
     if not isinstance(value, str) or len(value) > _LONGEST:
         raise ActRefusedError(400, f"{name}: expected a short text")

@@ -14,7 +14,7 @@ from common.clock import monotonic_ns
 from common.link import LinkSession
 from common.wire.messages import Action
 from deploy.client.destination import Destination
-from deploy.console.acts import ActRefusedError, carry_out, read_act
+from deploy.console.acts import MARK, ActRefusedError, carry_out, read_act, read_mark
 from deploy.console.files import PageFiles
 from deploy.console.hub import Hub, as_json
 from deploy.console.session import SESSION_S, Person, RateLimit
@@ -183,6 +183,10 @@ class ConsoleApp:
         if body.get("act") == Action.ESTOP.value:
             return self._stopped(request, body)
         secret, person = self._person(request)
+        if body.get("act") == MARK:
+            robot, text = read_mark(body, self._robots, person)
+            self._hub.models[robot].events.add(MARK, f"{person.name}: {text}", monotonic_ns())
+            return _answer({"done": True, "text": "noted on every page of this console", "guard": ""})
         act = read_act(body, self._robots, person)
         if self._session is None:
             return _error(503, "there is no link to the robot")

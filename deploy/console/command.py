@@ -39,6 +39,10 @@ def console(
     ] = None,
     profile: Annotated[str | None, typer.Option(help="Profile of the robots.")] = None,
     certificate: Certificate = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Set one key of the master's file for this run."),
+    ] = None,
 ) -> None:
     """Serve the web page: what the robot sees and does, how late it is, and a stop. Prints its addresses.
 
@@ -46,16 +50,17 @@ def console(
 
     Example: `tandem console --master /etc/tandem/master.toml`
     """
-    from deploy.console.options import console_options
+    from deploy.console.options import ConsoleChoices, console_options
     from deploy.console.run import run_console
 
     def say(line: str) -> None:
         sys.stdout.write(f"{line}\n")
         sys.stdout.flush()
 
-    options = console_options(
-        master, connect, robot, operator, tap, slave, listen, profile, certificate, on_ready=say
+    chosen = ConsoleChoices(
+        master, connect, robot, operator, tap, slave, listen, profile, certificate, overrides or ()
     )
+    options = console_options(chosen, say)
 
     async def serve(stop: asyncio.Event) -> None:
         await run_console(options, stop)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from common.config.console import ConsoleConfig
@@ -16,37 +17,51 @@ from master.deadman.config import ConsoleHold
 from slave.config import SlaveConfig
 
 
-def console_options(
-    master: Path | None,
-    connect: Sequence[str] | None,
-    robot: Sequence[str] | None,
-    operator: str,
-    tap: Path | None,
-    slave: Path | None,
-    listen: str | None,
-    profile: str | None,
-    certificate: Path | None,
-    *,
-    on_ready: Callable[[str], None],
-) -> ConsoleOptions:
+@dataclass(frozen=True, slots=True)
+class ConsoleChoices:
+    """What the command line says; None where it says nothing."""
+
+    master: Path | None = None
+    connect: Sequence[str] | None = None
+    robots: Sequence[str] | None = None
+    operator: str = ""
+    tap: Path | None = None
+    slave: Path | None = None
+    listen: str | None = None
+    profile: str | None = None
+    certificate: Path | None = None
+    overrides: Sequence[str] = ()
+    """Of the master's file."""
+
+
+def console_options(chosen: ConsoleChoices, on_ready: Callable[[str], None]) -> ConsoleOptions:
     """The command line wins over the files. Raises TandemError where something is missing or wrong."""
-    where = destination(connect, robot, operator, master, certificate)
+    where = destination(
+        chosen.connect,
+        chosen.robots,
+        chosen.operator,
+        chosen.master,
+        chosen.certificate,
+        overrides=chosen.overrides,
+    )
     if not where.robots:
         raise TandemError("which robot? Name it by --robot, or the master's file by --master")
-    file = None if master is None else load_config(master, MasterConfig)
+    file = None if chosen.master is None else load_config(chosen.master, MasterConfig, chosen.overrides)
     config = ConsoleConfig() if file is None else file.console
-    if listen is not None:
-        config = check_config(Path("command line"), {**config.model_dump(), "listen": listen}, ConsoleConfig)
+    if chosen.listen is not None:
+        changed = {**config.model_dump(), "listen": chosen.listen}
+        config = check_config(Path("command line"), changed, ConsoleConfig)
     hold = file.operator.deadman if file is not None else None
+    zones = None
+    if chosen.slave is not None:
+        zones = [zone.model_dump() for zone in load_config(chosen.slave, SlaveConfig).guard.zones]
     return ConsoleOptions(
         where,
-        load_skeleton(profile or (file.profile if file is not None else "nursing")),
+        load_skeleton(chosen.profile or (file.profile if file is not None else "nursing")),
         config,
-        tap=tap or (file.tap.socket if file is not None else None),
+        tap=chosen.tap or (file.tap.socket if file is not None else None),
         deadman=None if hold is None else hold.source,
         deadman_socket=hold.socket if isinstance(hold, ConsoleHold) else None,
-        zones=None
-        if slave is None
-        else [zone.model_dump() for zone in load_config(slave, SlaveConfig).guard.zones],
+        zones=zones,
         on_ready=on_ready,
     )

@@ -95,12 +95,12 @@ class OpenPage:
 
     def acknowledge(self, number: object) -> None:
         """The page has processed all up to this number."""
-        if isinstance(number, int) and self.outbox.acknowledge(number, monotonic_ns()):
+        if type(number) is int and self.outbox.acknowledge(number, monotonic_ns()):
             self._ready.set()
 
     def saw_lately(self, number: object, within_s: float) -> bool:
         """Whether the message of that number left at most so long ago: a page that stands still did not."""
-        left_ns = self.outbox.left_ns(number) if isinstance(number, int) else None
+        left_ns = self.outbox.left_ns(number) if type(number) is int else None
         return left_ns is not None and monotonic_ns() - left_ns <= to_ns(within_s)
 
     def turn_to(self, model: RobotModel) -> None:

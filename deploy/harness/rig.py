@@ -94,14 +94,22 @@ class Rig:
         `through`: a command that becomes it, such as `unshare`.
         """
         role = self.children[name].role
+        await self.children[name].start(self.file(role), self.overrides(name), [*self._host(role), *through])
+
+    def file(self, role: str) -> Path:
+        """The example file that the processes of a role run on."""
+        return example("slave" if role == DRIVES else role, NURSING if role == ROUTER else self._profile)
+
+    def overrides(self, name: str) -> list[str]:
+        """What a process's file is changed by: this run's endpoints, and what was asked for."""
+        role = self.children[name].role
         theirs = dict.fromkeys((role, name))
         given = [override for each in theirs for override in self._overrides.get(each, ())]
         overrides = [*_local(name, self.slaves, self._endpoints), *given]
         if DRIVES in self.children and role in ("slave", DRIVES):
             # between processes SYNC may come late by milliseconds, which contact detection takes for a push
             overrides += [*drive_buses(self._endpoints.can_port), "servos.canopen.tell_effort=false"]
-        file = example("slave" if role == DRIVES else role, NURSING if role == ROUTER else self._profile)
-        await self.children[name].start(file, overrides, [*self._host(role), *through])
+        return overrides
 
     def _host(self, role: str) -> list[str]:
         """The command by which a process of that role runs on its host."""
@@ -149,8 +157,10 @@ class Rig:
 
     async def stop(self) -> dict[str, int | None]:
         """Stop all, the master first, so that the robot holds by itself; their exit statuses."""
-        last = [name for name in (DRIVES, ROUTER) if name in self.children]
-        return {name: await self.children[name].stop() for name in ("master", "suit", *self.slaves, *last)}
+        first = ("master", "suit", *self.slaves)
+        others = [name for name in self.children if name not in (*first, ROUTER)]
+        last = [ROUTER] if ROUTER in self.children else []
+        return {name: await self.children[name].stop() for name in (*first, *others, *last)}
 
 
 @asynccontextmanager

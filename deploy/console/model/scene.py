@@ -23,6 +23,7 @@ def scene(skeleton: Skeleton) -> dict[str, object]:
             {"from_m": capsule.from_m, "to_m": capsule.to_m, "radius_m": round(capsule.radius_m, 5)}
         )
     return {
+        "profile": skeleton.name,
         "joints": [
             {
                 "name": joint.name,

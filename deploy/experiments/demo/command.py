@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -59,6 +60,16 @@ ServoBackend = Annotated[
     ),
 ]
 Camera = Annotated[bool, typer.Option(help="Send video from the robot's camera.")]
+WithConsole = Annotated[
+    bool, typer.Option("--console/--no-console", help="Serve the web page too; needs the extra `console`.")
+]
+Listen = Annotated[
+    str | None,
+    typer.Option(help="Address and port of the page; else 127.0.0.1:8080, or any port if that is taken."),
+]
+Keep = Annotated[
+    bool, typer.Option("--keep", help="Go on until Ctrl-C, for the web page: nothing is judged then.")
+]
 
 
 def demo(
@@ -74,6 +85,9 @@ def demo(
     robots: RobotCount = 1,
     servos: ServoBackend = "mujoco",
     camera: Camera = True,
+    console_: WithConsole = True,
+    listen: Listen = None,
+    keep: Keep = False,
     plots: PlotsFile = None,
 ) -> None:
     """Run simulated suit, master and robot on this machine, and judge how well the robot follows.
@@ -82,7 +96,7 @@ def demo(
     """
     from deploy.experiments.demo.draw_curves import as_png
     from deploy.experiments.demo.options import DemoOptions
-    from deploy.experiments.demo.run import run_demo
+    from deploy.experiments.demo.run import keep_demo, run_demo
     from deploy.experiments.demo.tree import report_tree
     from deploy.experiments.demo.view import print_report
 
@@ -90,9 +104,13 @@ def demo(
     options = DemoOptions(
         profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
         strategy=strategy, filter=filter_, seed=seed, robots=robots, servos=servos, camera=camera,
+        console=console_ and find_spec("aiohttp") is not None, listen=listen, keep=keep,
     )  # fmt: skip
 
     async def run_and_report(stop: asyncio.Event) -> None:
+        if options.keep:
+            await keep_demo(options, stop, console)
+            return
         result = await run_demo(options, stop, console)
         if report is not None:
             write_json(report, report_tree(result))

@@ -34,6 +34,12 @@ class DemoOptions:
     """`canopen`: simulated drives in a process of their own, on two CAN buses."""
     camera: bool = True
     """Whether the robot shows what it sees."""
+    console: bool = False
+    """Whether `tandem console` runs beside the master."""
+    listen: str | None = None
+    """Where it serves its page; None: at its usual port if that is free, else at any."""
+    keep: bool = False
+    """Whether all goes on until Ctrl-C; nothing is judged then."""
 
     def overrides(self) -> dict[str, list[str]]:
         """What it changes in the processes' files."""

@@ -18,10 +18,13 @@ from deploy.experiments.demo.operators import DemoOperators
 from deploy.experiments.demo.options import DemoOptions
 from deploy.experiments.demo.report import DemoReport, RunNotes, make_report
 from deploy.experiments.demo.view import draw
+from deploy.harness.console import ConsoleChild
+from deploy.harness.engage import until_tracking
 from deploy.harness.host import HostWatch, watch_host
 from deploy.harness.rig import Rig, open_rig
 from deploy.harness.start import start_all
 
+LOOK_S = 0.25
 START_S, START_EACH_S = 30.0, 2.0
 """How long a demo may take to start, and so much more for each robot: they share this machine's cores."""
 
@@ -37,23 +40,58 @@ async def run_demo(options: DemoOptions, stop: asyncio.Event, console: Console) 
         raise
 
 
-async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> DemoReport:
-    options.check()
+async def keep_demo(options: DemoOptions, stop: asyncio.Event, console: Console) -> None:
+    """Start it, engage once, and leave the robots to whoever is at the page, until `stop` is set.
+
+    Raises TandemError when a process fails or does not become ready.
+    """
     async with AsyncExitStack() as stack:
-        overrides = options.overrides()
-        if options.replay is not None:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-alignment-"))
-            overrides["master"] += await _align(options, options.replay, Path(folder), console)
-        host = await stack.enter_async_context(watch_host())
-        rigging = open_rig(options.transport, overrides, options.profile, options.robots)
-        rig = await stack.enter_async_context(rigging)
-        with Live(console=console, refresh_per_second=4, transient=True) as live:
-            show = _Show(rig, host, stop, live)
-            await start_all(rig, START_S + START_EACH_S * options.robots, show.look)
-            operators = DemoOperators(rig, host, show.look, lambda line: console.print(line, style="yellow"))
-            await operators.follow(options.seconds, show.begin)
-            if not operators.problem:
-                await operators.let_go()
+        _, rig, show = await _started(options, stop, console, stack)
+        try:
+            for robot in rig.observers:
+                await until_tracking(rig, robot)
+            console.print("the robot follows; Ctrl-C ends the demo", style="green")
+            while not stop.is_set():
+                show.look()
+                await asyncio.sleep(LOOK_S)
+        except TandemError:
+            if not stop.is_set():
+                raise
+
+
+async def _started(
+    options: DemoOptions, stop: asyncio.Event, console: Console, stack: AsyncExitStack
+) -> tuple[HostWatch, Rig, _Show]:
+    """Everything runs and is ready; it ends with the stack."""
+    options.check()
+    overrides = options.overrides()
+    if options.replay is not None:
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-alignment-"))
+        overrides["master"] += await _align(options, options.replay, Path(folder), console)
+    if options.console:
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-tap-"))
+        overrides["master"] += [f'tap.socket="{folder}/master.sock"']
+    host = await stack.enter_async_context(watch_host())
+    rigging = open_rig(options.transport, overrides, options.profile, options.robots)
+    rig = await stack.enter_async_context(rigging)
+    live = stack.enter_context(Live(console=console, refresh_per_second=4, transient=True))
+    show = _Show(rig, host, stop, live)
+    await start_all(rig, START_S + START_EACH_S * options.robots, show.look)
+    if options.console:
+        page = ConsoleChild(rig)
+        await page.start(options.listen)
+        for line in (f"web page: {page.operator_address}", f"for engineers: {page.engineer_address}"):
+            console.print(line, style="bold", highlight=False, soft_wrap=True)
+    return host, rig, show
+
+
+async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> DemoReport:
+    async with AsyncExitStack() as stack:
+        host, rig, show = await _started(options, stop, console, stack)
+        operators = DemoOperators(rig, host, show.look, lambda line: console.print(line, style="yellow"))
+        await operators.follow(options.seconds, show.begin)
+        if not operators.problem:
+            await operators.let_go()
         notes = RunNotes(operators.holds(), host.metrics(monotonic_ns()), operators.problem)
         return make_report(options, rig, await rig.stop(), notes)
 

@@ -1,0 +1,139 @@
+"""The console beside real processes: its stop stops the robot, with the master and without it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import aiohttp
+import numpy as np
+import pytest
+
+from common.clock import monotonic_ns, to_ns, to_s
+from deploy.harness.console import ConsoleChild
+from deploy.harness.host import HostWatch
+from deploy.harness.rig import ROBOT, Rig, open_rig
+from deploy.harness.start import start_all
+from tests.deploy.console.served import OpenedPage
+
+if TYPE_CHECKING:
+    from tests.conftest import OnThisHost
+
+pytestmark = [pytest.mark.live, pytest.mark.timeout(400)]
+STANDS_S = 0.5
+STILL_RAD = 0.0031
+"""Two counts of an encoder."""
+
+
+class Browser:
+    """A page's requests, as a browser sends them."""
+
+    def __init__(self, http: aiohttp.ClientSession, address: str) -> None:
+        self.http = http
+        parts = urlsplit(address)
+        self.url = f"{parts.scheme}://{parts.netloc}"
+        self._origin = {"Origin": self.url}
+
+    async def post(self, path: str, body: object) -> Any:
+        async with self.http.post(self.url + path, json=body, headers=self._origin) as response:
+            return {"status": response.status, **json.loads(await response.text())}
+
+    async def log_in(self, address: str) -> None:
+        said = await self.post("/api/login", {"token": address.partition("#token=")[2]})
+        assert said["status"] == 200, said
+
+    async def page(self) -> OpenedPage:
+        return OpenedPage(await self.http.ws_connect(f"{self.url}/ws", headers=self._origin, max_msg_size=0))
+
+
+@asynccontextmanager
+async def with_console(
+    folder: Path, **overrides: list[str]
+) -> AsyncIterator[tuple[Rig, ConsoleChild, Browser]]:
+    """A rig that is ready, its console, and a browser that has logged in as the operator."""
+    socket = folder / "master.sock"
+    given = {"master": [f'tap.socket="{socket}"', *overrides.pop("master", [])], **overrides}
+    async with open_rig(overrides=given) as rig:
+        await start_all(rig)
+        console = ConsoleChild(rig)
+        await console.start()
+        async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as http:
+            browser = Browser(http, console.address)
+            await browser.log_in(console.operator_address)
+            yield rig, console, browser
+
+
+async def engaged_by_the_page(rig: Rig, browser: Browser) -> None:
+    """The page engages; where the robot refuses as things are not settled yet, again."""
+    for _ in range(20):
+        said = await browser.post("/api/act", {"act": "engage", "robot": ROBOT})
+        if said["status"] == 200 and said["done"]:
+            break
+        await asyncio.sleep(0.5)
+    else:
+        raise AssertionError(said)
+    await rig.until(lambda: rig.observer.guard == "track", 30.0, "track")
+
+
+def stood_after_s(rig: Rig, asked_ns: int) -> tuple[float, float]:
+    """From the asking to the last motion at the encoders, and how far the robot went meanwhile, °."""
+    rows = [s for s in rig.observer.states if s.encoder_ns > asked_ns]
+    angles = np.array([s.position_rad for s in rows])
+    moving = np.abs(angles - angles[-1]).max(axis=1) > STILL_RAD
+    at_s = np.array([to_s(s.encoder_ns - asked_ns) for s in rows])
+    return float(at_s[moving].max(initial=0.0)), float(np.degrees(np.abs(angles[-1] - angles[0]).max()))
+
+
+def in_motion(rig: Rig) -> bool:
+    """Whether some joint moves at 10°/s or more."""
+    first, last = rig.observer.states[-5], rig.observer.states[-1]
+    seconds = to_s(last.encoder_ns - first.encoder_ns)
+    return bool(np.abs(last.position_rad - first.position_rad).max() > np.radians(10.0) * seconds)
+
+
+@pytest.mark.parametrize("master", ["alive", "dead"])
+def test_a_stop_from_the_page_stops_the_robot_by_its_encoders(
+    master: str, on_this_host: OnThisHost, tmp_path: Path
+) -> None:
+    async def story(_: HostWatch) -> None:
+        folder = tmp_path / str(monotonic_ns())
+        folder.mkdir()
+        async with with_console(folder) as (rig, console, browser):
+            page = await browser.page()
+            assert (await page.hear("hello"))["role"] == "operator"
+            await engaged_by_the_page(rig, browser)
+            view = await page.hear("view")
+            while view["situation"] != "follows":
+                view = await page.hear("view")
+            assert (view["heard"], view["lease"], view["master"]) == ("tap", "ours", True)
+            rig.observer.recording = True
+            await rig.until(lambda: len(rig.observer.states) > 20 and in_motion(rig), 30.0, "motion")
+            if master == "dead":
+                await rig.children["master"].kill()
+            asked_ns = monotonic_ns()
+            await page.say(kind="stop", robot=ROBOT)
+            await rig.until(lambda: rig.observer.guard == "estop", 5.0, "e-stop")
+            told_s = to_s(monotonic_ns() - asked_ns)
+            until_ns = asked_ns + to_ns(1.5)
+            await rig.until(lambda: rig.observer.sent_ns > until_ns, 5.0, "a second and a half of states")
+            stood_s, way_deg = stood_after_s(rig, asked_ns)
+            print(f"\nmaster {master}: stop asked → e-stop {1e3 * told_s:.0f} ms, "  # noqa: T201
+                  f"last motion {1e3 * stood_s:.0f} ms, way {way_deg:.1f}°")  # fmt: skip
+            assert way_deg > 0.3, "the robot was not in motion: nothing is shown"
+            assert stood_s <= STANDS_S
+            stop = (await page.hear("view"))["stop"]
+            while stop is None or stop["stands_s"] is None:
+                view = await page.hear("view")
+                stop = view["stop"]
+            print(f"on the page: robot {stop['robot_s']} s, stands {stop['stands_s']} s")  # noqa: T201
+            assert 0 < stop["robot_s"] <= stop["stands_s"] < 3.0
+            if master == "dead":
+                assert (view["heard"], view["situation"], view["master"]) == ("link", "stopped", False)
+            console.child.check()
+
+    on_this_host(story)
