@@ -23,9 +23,20 @@ class ExportFormat(StrEnum):
     BAG = "bag"
     MCAP = "mcap"
     FOXGLOVE = "foxglove"
+    PARQUET = "parquet"
+    LEROBOT = "lerobot"
+    BIDS = "bids"
 
 
-ENDINGS = {ExportFormat.BAG: "_ros2", ExportFormat.MCAP: "_ros2", ExportFormat.FOXGLOVE: "_foxglove.mcap"}
+WHOLE = (ExportFormat.FOXGLOVE, ExportFormat.PARQUET, ExportFormat.LEROBOT, ExportFormat.BIDS)
+"""Formats of the whole recording; the others take the joint angles of one source."""
+ENDINGS = {
+    ExportFormat.BAG: "_ros2",
+    ExportFormat.MCAP: "_ros2",
+    ExportFormat.FOXGLOVE: "_foxglove.mcap",
+    ExportFormat.LEROBOT: "_lerobot",
+    ExportFormat.BIDS: "_bids",
+}
 """What a name gets where it is not the format's own."""
 
 
@@ -35,7 +46,7 @@ def export_joints(
         ExportFormat,
         typer.Option(
             help="csv; bvh; mot (OpenSim); bag or mcap (ROS 2 bag of JointState, sqlite3 or mcap); foxglove "
-            "(everything that a viewer shows)."
+            "(for viewers); parquet (one table); lerobot (a dataset to learn from); bids (BIDS-Motion)."
         ),
     ] = ExportFormat.CSV,
     out: Annotated[
@@ -47,10 +58,23 @@ def export_joints(
         typer.Option(help="Profile of the robot; by default the recording says it, else nursing."),
     ] = None,
     rate: Annotated[
-        float | None, typer.Option(help="Frames per second of a bvh; by default the recording's.", min=1.0)
+        float | None,
+        typer.Option(
+            help="Frames per second; by default the recording's (bvh), 50 (parquet, bids), 25 (lerobot).",
+            min=1.0,
+            max=200.0,
+        ),
     ] = None,
+    task: Annotated[
+        str | None, typer.Option(help="lerobot: what the robot does, in words. bids: one word.")
+    ] = None,
+    subject: Annotated[str, typer.Option(help="bids: the subject's code, never a name.")] = "01",
+    session: Annotated[str, typer.Option(help="bids: which session of that subject.")] = "1",
 ) -> None:
     """Write the joint angles of a recording as CSV, BVH, OpenSim .mot or a ROS 2 bag.
+
+    --to parquet, lerobot and bids write encoders, setpoints and commands together: at each instant the newest
+    that had arrived by then.
 
     --to foxglove writes a copy for viewers such as Foxglove and Rerun: the robot with its frames, joints,
     pictures, guard, latency and log. They open it with no set-up.
@@ -67,11 +91,13 @@ def export_joints(
     if ending and path.suffix.lower() != ending:
         raise TandemError(f"--out {path}: expected a name that ends in {ending}")
     skeleton = recorded_skeleton([file], profile)
-    if to is ExportFormat.FOXGLOVE:
-        from deploy.ops.convert.foxglove import write_foxglove
+    if to in WHOLE:
+        from deploy.ops.convert.whole import WholeOptions, write_whole
 
-        words = write_foxglove(path, file, skeleton)
-        Console().print(f"{path}: {words}", highlight=False, markup=False, soft_wrap=True)
+        options = WholeOptions(file, path, skeleton, rate, task, subject, session)
+        Console().print(
+            f"{path}: {write_whole(to.value, options)}", highlight=False, markup=False, soft_wrap=True
+        )
         return
     series = read_joints(file, skeleton, of)
     if to is ExportFormat.CSV:

@@ -1,0 +1,112 @@
+"""A recording on an even grid: at each instant, the newest of everything that had arrived by then. Pure.
+
+So a model that learns from it sees no more than the operator's or the robot's side saw at that instant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from common.clock import to_ns, to_s
+from common.errors import CodecError
+from common.quaternion import Array
+from common.recording import Entry
+from common.skeleton import Skeleton
+from common.wire.codec import decode
+from common.wire.messages import Command, RobotState
+from common.wire.video import VideoFrame, decode_frame
+
+FRESH_S = 0.5
+"""A state that is older says nothing about now."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldFrame:
+    """One instant of the grid."""
+
+    time_s: float
+    """Since the first message."""
+    wall_ns: int
+    """ns since 1970."""
+    guard: str
+    encoder_rad: Array
+    """(J,) NaN where an encoder was not valid."""
+    setpoint_rad: Array
+    """(J,)."""
+    operator_rad: Array
+    """(J,) of the newest command; NaN where there was none, or not valid."""
+    effort_nm: Array
+    """(J,) NaN where none is told."""
+    pictures: dict[str, VideoFrame]
+    """By camera; each frame bears its number."""
+    fresh: bool
+    """Whether the state is younger than 0.5 s."""
+
+
+@dataclass(slots=True)
+class _Newest:
+    """What has arrived so far."""
+
+    joints: int
+    state: RobotState | None = None
+    state_ns: int = 0
+    command: Command | None = None
+    pictures: dict[str, VideoFrame] = field(default_factory=dict)
+
+    def take(self, entry: Entry) -> bool:
+        """Keep one message; False where it cannot be read as this robot's."""
+        parts = entry.topic.split("/")
+        try:
+            if parts[-1] == "state":
+                self.state, self.state_ns = decode(entry.payload, RobotState, self.joints), entry.monotonic_ns
+            elif parts[-1] == "command":
+                self.command = decode(entry.payload, Command, self.joints)
+            elif len(parts) > 2 and parts[-2] == "video":
+                self.pictures[parts[-1]] = decode_frame(entry.payload)
+        except CodecError:
+            return False
+        return True
+
+
+class HeldFrames:
+    """Goes through a recording; `unreadable` counts messages of another profile or version."""
+
+    def __init__(self, skeleton: Skeleton, fps: float) -> None:
+        self._skeleton = skeleton
+        self._period_ns = to_ns(1.0 / fps)
+        self.unreadable = 0
+
+    def of(self, entries: Iterable[Entry]) -> Iterator[HeldFrame]:
+        """The grid from the first state to the last message. What arrives at an instant counts for it."""
+        newest = _Newest(len(self._skeleton.joints))
+        began_ns, due_ns, wall_less_ns = 0, 0, 0
+        for entry in entries:
+            if not began_ns:
+                began_ns = due_ns = entry.monotonic_ns
+            wall_less_ns = entry.wall_ns - entry.monotonic_ns
+            while due_ns < entry.monotonic_ns:
+                if newest.state is not None:
+                    yield self._frame(newest, newest.state, due_ns, began_ns, wall_less_ns)
+                due_ns += self._period_ns
+            self.unreadable += not newest.take(entry)
+
+    def _frame(
+        self, newest: _Newest, state: RobotState, due_ns: int, began_ns: int, wall_less_ns: int
+    ) -> HeldFrame:
+        command, nothing = newest.command, np.full(len(self._skeleton.joints), np.nan)
+        return HeldFrame(
+            time_s=to_s(due_ns - began_ns),
+            wall_ns=due_ns + wall_less_ns,
+            guard=state.guard,
+            encoder_rad=np.where(state.encoder_valid, state.position_rad, np.nan),
+            setpoint_rad=state.setpoint_rad,
+            operator_rad=nothing
+            if command is None
+            else np.where(command.valid, command.position_rad, np.nan),
+            effort_nm=nothing if state.effort_nm is None else state.effort_nm,
+            pictures=dict(newest.pictures),
+            fresh=due_ns - newest.state_ns <= to_ns(FRESH_S),
+        )
