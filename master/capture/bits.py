@@ -8,6 +8,7 @@ of all frames, whatever their length, byte order and sign.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -54,36 +55,57 @@ class IntegerField:
         return (bits >> above if above >= 0 else bits << -above) & self._mask
 
 
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A signal in a row of bytes that may hold several messages."""
+
+    signal: Signal
+    bit: int = 0
+    """Where its message begins in the row."""
+    factor: float = 1.0
+    """After the DBC's own scale."""
+
+
 class SignalReader:
-    """Reads S signals of one message."""
+    """Reads S signals out of rows of bytes, each row one message or several one after the other."""
 
-    def __init__(self, signals: Sequence[Signal], length: int) -> None:
-        """`length` in bytes: longer frames are cut, shorter ones must not be given."""
+    def __init__(self, signals: Sequence[Placed], length: int) -> None:
+        """`length`: bytes of a row."""
         self.length = length
-        self._weights = np.zeros((8 * length, len(signals)))
-        for place, signal in enumerate(signals):
-            weights = 2.0 ** np.arange(signal.length)
+        weights = np.zeros((8 * length, len(signals)))
+        for place, each in enumerate(signals):
+            signal = each.signal
+            powers = 2.0 ** np.arange(signal.length)
             if signal.is_signed and not signal.is_float:
-                weights[-1] = -weights[-1]
-            self._weights[columns_of(signal), place] = weights
-        self._floats = [place for place, signal in enumerate(signals) if signal.is_float]
-        self._scale = np.array([float(signal.conversion.scale) for signal in signals])
-        self._offset = np.array([float(signal.conversion.offset) for signal in signals])
-        self._as_they_are = bool((self._scale == 1.0).all() and (self._offset == 0.0).all())
+                powers[-1] = -powers[-1]
+            weights[np.array(columns_of(signal)) + each.bit, place] = powers
+        # bits of which no signal is made are left out
+        self._bits = np.flatnonzero(weights.any(axis=1))
+        self._all_bits = len(self._bits) == 8 * length
+        self._weights = weights[self._bits]
+        self._floats = [place for place, each in enumerate(signals) if each.signal.is_float]
+        conversions = [each.signal.conversion for each in signals]
+        self._scale = np.array([float(each.scale) for each in conversions])
+        self._offset = np.array([float(each.offset) for each in conversions])
+        self._factor = np.array([each.factor for each in signals])
 
-    def read(self, frames: Sequence[bytes]) -> Array:
-        """Values (F, S) in the DBC's units."""
-        length = self.length
-        joined = b"".join(frames)
-        if len(joined) != length * len(frames):
-            joined = b"".join([frame[:length] for frame in frames])
-        table = np.frombuffer(joined, np.uint8).reshape(len(frames), length)
-        values: Array = np.unpackbits(table, axis=1).astype(np.float64) @ self._weights
-        for place in self._floats:
-            values[:, place] = _as_float(values[:, place])
-        if not self._as_they_are:
+    def read(self, rows: bytes) -> Array:
+        """Values (F, S) of F rows, in the DBC's units times the signals' factors."""
+        table = np.frombuffer(rows, np.uint8).reshape(-1, self.length)
+        bits = np.unpackbits(table, axis=1)
+        if not self._all_bits:
+            bits = bits[:, self._bits]
+        values: Array = bits.astype(np.float64) @ self._weights
+        if self._floats:
+            # what a unit sends as NaN or infinity stays so
+            with np.errstate(invalid="ignore", over="ignore"):
+                for place in self._floats:
+                    values[:, place] = _as_float(values[:, place])
+                values = (values * self._scale + self._offset) * self._factor
+        else:
             values *= self._scale
             values += self._offset
+            values *= self._factor
         return values
 
 

@@ -12,6 +12,10 @@ arrival; b is the length of a step, learnt over some seconds: 100 ppm of drift a
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
+from statistics import median
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,143 +33,173 @@ _LARGEST_DRIFT = 0.01
 _SMOOTH = 0.05
 
 
+class NodeLine:
+    """What is known of one node's clock. Plain numbers: some 40 samples come in a tick, in turn."""
+
+    def __init__(self, stamp_wrap_s: float, counter_wrap: float, period_s: float) -> None:
+        self._stamped = stamp_wrap_s > 0.0
+        self._counted = not self._stamped and counter_wrap > 0.0
+        self._wrap = stamp_wrap_s if self._stamped else counter_wrap
+        self._step_s = 1.0 if self._stamped else period_s
+        self.period_s = period_s
+        self._learning: list[tuple[float, float]] = []
+        self._own = self._last_s = self._anchor_s = self._anchor_steps = math.nan
+        self._steps = 0.0
+        self.jitter_s = 0.0
+        self.missing = self.duplicates = self.resets = 0
+
+    def take(self, arrival_s: float, own: float, newest_s: float, left: int) -> float:
+        """When a sample was taken; NaN if it was seen before.
+
+        `own`: its own time or count. `left` more come with it until `newest_s`; -1: it is one of those.
+        """
+        before, step_s = self._last_s, self._step_s
+        delta = self._delta(own, newest_s, left)
+        self._own = own
+        if math.isnan(before):
+            return self._at(arrival_s)
+        if delta == 0.0:
+            self.duplicates += 1
+            return math.nan
+        if math.isnan(step_s):
+            self._steps += delta
+            return self._at(arrival_s)
+        expected = before + step_s * delta
+        late = arrival_s - expected
+        if abs(late) > _RESET_S:
+            self.resets += 1
+            self._anchor_s = math.nan
+            return self._at(arrival_s)
+        time_s = arrival_s
+        if late >= 0.0:
+            time_s = expected + (1.0 - math.exp(-step_s * delta / _FOLLOW_S)) * late
+            self.jitter_s += _SMOOTH * late
+        self.jitter_s -= _SMOOTH * self.jitter_s
+        # two samples are never one instant, however a burst of arrivals looks
+        time_s = max(time_s, before + 0.1 * step_s * delta)
+        self._count(time_s - before, delta)
+        self._steps += delta
+        self._last_s = time_s
+        if math.isnan(self.period_s):
+            self._learn()
+        self._tune()
+        return time_s
+
+    def _at(self, arrival_s: float) -> float:
+        """A sample of which only its arrival tells the time."""
+        self._last_s = arrival_s
+        self.jitter_s -= _SMOOTH * self.jitter_s
+        if math.isnan(self.period_s):
+            self._learn()
+        return arrival_s
+
+    def _delta(self, own: float, newest_s: float, left: int) -> float:
+        """Steps since the last sample."""
+        if self._wrap > 0.0 and not math.isnan(self._own):
+            delta = (own - self._own) % self._wrap
+            return delta if self._stamped else float(round(delta))
+        # what a stall held back comes at once: the steps are those up to the newest
+        periods = (newest_s - self._last_s) / self.period_s
+        if left < 0 or math.isnan(periods):
+            return 1.0
+        return float(max(round(periods) - left, 1))
+
+    def _count(self, took_s: float, delta: float) -> None:
+        """Lost samples, and the period of a node that lost none."""
+        gone = (took_s / self.period_s if self._stamped else delta) - 1.0
+        if math.isnan(gone):
+            return
+        missed = max(round(gone), 0)
+        self.missing += missed
+        if missed == 0 and not math.isnan(self.period_s):
+            self.period_s += _SMOOTH * (took_s - self.period_s)
+
+    def _learn(self) -> None:
+        """The first period of a node whose period is not known."""
+        seen = self._learning
+        seen.append((self._last_s, self._steps))
+        if len(seen) < _LEARN:
+            return
+        times = [time_s for time_s, _ in seen]
+        spent_s = times[-1] - times[0]
+        if self._counted:
+            period_s = spent_s / max(seen[-1][1] - seen[0][1], 1.0)
+        else:
+            gaps = [after - before for before, after in pairwise(times)]
+            usual_s = median(gaps)
+            many = sum(round(gap / usual_s) for gap in gaps) if usual_s > 0.0 else len(gaps)
+            period_s = spent_s / max(many, 1)
+        self.period_s = period_s
+        if not self._stamped:
+            self._step_s = period_s
+        self._learning = []
+
+    def _tune(self) -> None:
+        """The length of a step, over `_BASE_S`."""
+        ran_s = self._last_s - self._anchor_s
+        if ran_s <= _BASE_S:
+            return
+        if ran_s > _BASE_S:
+            step_s = ran_s / max(self._steps - self._anchor_steps, 1e-9)
+            if abs(step_s / self._step_s - 1.0) < _LARGEST_DRIFT:
+                self._step_s += 0.5 * (step_s - self._step_s)
+        self._anchor_s, self._anchor_steps = self._last_s, self._steps
+
+    def lose(self) -> None:
+        """Forget when it sampled last; its step's length stays."""
+        self._last_s = self._own = self._anchor_s = math.nan
+
+
 class ClockLines:
-    """State of N nodes. Times in seconds from a start that the caller chooses."""
+    """The lines of N nodes. Times in seconds from a start that the caller chooses."""
 
     def __init__(self, stamp_wrap_s: Array, counter_wrap: Array, period_s: Array) -> None:
         """(N,) each: wraps of own time and count, 0 where there is none; the period, NaN if not known."""
-        count = len(period_s)
-        self._stamp_wrap_s, self._counter_wrap = stamp_wrap_s, counter_wrap.astype(np.float64)
-        self._stamped: Mask = stamp_wrap_s > 0.0
-        self._counted: Mask = ~self._stamped & (counter_wrap > 0)
-        self._step_s = np.where(self._stamped, 1.0, period_s)
-        self.period_s = period_s.copy()
-        """(N,) from sample to sample; NaN until it is known."""
-        self._learning: list[list[tuple[float, float]]] = [[] for _ in range(count)]
-        self._own = np.full(count, np.nan)
-        self._last_s = np.full(count, np.nan)
-        self._steps = np.zeros(count)
-        self._anchor = np.full((2, count), np.nan)
-        self.jitter_s = np.zeros(count)
-        """(N,) by how much arrivals are late, on average."""
-        self.missing = np.zeros(count, np.int64)
-        """(N,) samples that never came."""
-        self.duplicates = np.zeros(count, np.int64)
-        self.resets = np.zeros(count, np.int64)
+        of_each = zip(stamp_wrap_s.tolist(), counter_wrap.tolist(), period_s.tolist(), strict=True)
+        self._nodes = [NodeLine(stamp_s, float(counter), period) for stamp_s, counter, period in of_each]
+        self._own_is_stamp = (stamp_wrap_s > 0.0).tolist()
 
     def take(self, rows: NDArray[np.intp], arrival_s: Array, stamp_s: Array, counts: Array) -> Array:
-        """Sample times (F,) of F samples in the order of arrival; NaN for one that was seen before."""
-        out = np.full(len(rows), np.nan)
-        repeats = np.bincount(rows, minlength=len(self.period_s))
-        newest = np.zeros(len(self.period_s))
-        newest[rows] = arrival_s
-        seen: dict[int, int] = {}
-        rounds: list[list[int]] = []
-        for place, row in enumerate(rows.tolist()):
-            turn = seen[row] = seen.get(row, -1) + 1
-            if turn == len(rounds):
-                rounds.append([])
-            rounds[turn].append(place)
-        for turn, chosen in enumerate(rounds):
-            here = np.array(chosen, np.intp)
-            of = rows[here]
-            own = np.where(self._stamped[of], stamp_s[here], counts[here])
-            left = repeats[of] - 1 if turn == 0 else np.full(len(of), -1)
-            out[here] = self._round(of, arrival_s[here], own, newest[of], left)
-        return out
+        """Sample times (F,) of F samples, each node's in the order of arrival; NaN if seen before."""
+        nodes, of = self._nodes, rows.tolist()
+        newest = dict(zip(of, arrival_s.tolist(), strict=True))
+        left: dict[int, int] = {}
+        for row in of:
+            left[row] = left.get(row, -1) + 1
+        out = []
+        samples = zip(of, arrival_s.tolist(), stamp_s.tolist(), counts.tolist(), strict=True)
+        for row, at_s, stamp, count in samples:
+            own = stamp if self._own_is_stamp[row] else count
+            out.append(nodes[row].take(at_s, own, newest[row], left[row]))
+            left[row] = -1
+        return np.array(out)
 
-    def _round(
-        self, of: NDArray[np.intp], arrival_s: Array, own: Array, newest_s: Array, left: NDArray[np.int64]
-    ) -> Array:
-        """One sample of each of some nodes; `left` more come with it, -1: it is one of these."""
-        begins = np.isnan(self._last_s[of])
-        delta = self._delta(of, own, newest_s, left)
-        repeated = ~begins & (delta == 0.0)
-        self.duplicates[of] += repeated
-        before = self._last_s[of]
-        step_s = self._step_s[of]
-        with np.errstate(invalid="ignore"):
-            expected = before + step_s * delta
-            late = arrival_s - expected
-            share = 1.0 - np.exp(-np.maximum(step_s * delta, 0.0) / _FOLLOW_S)
-            time_s = np.where(late < 0.0, arrival_s, expected + share * late)
-            # two samples are never one instant, however a burst of arrivals looks
-            time_s = np.maximum(time_s, before + 0.1 * step_s * delta)
-            lost = ~begins & (np.abs(late) > _RESET_S)
-        self.resets[of] += lost & ~repeated
-        unknown = begins | lost | np.isnan(step_s)
-        time_s = np.where(unknown, arrival_s, time_s)
-        self._own[of] = own
-        good = ~repeated
-        self._count(of[good & ~unknown], (time_s - before)[good & ~unknown], delta[good & ~unknown])
-        late = np.where(unknown, 0.0, np.maximum(late, 0.0))
-        self.jitter_s[of] += _SMOOTH * (late - self.jitter_s[of])
-        self._last_s[of[good]] = time_s[good]
-        self._steps[of[good]] += np.where(begins | lost, 0.0, delta)[good]
-        again = of[lost & good]
-        self._anchor[:, again] = np.nan
-        unlearnt = np.isnan(self.period_s[of])
-        if unlearnt.any():
-            self._learn(of[unlearnt & good])
-        self._tune(of[good & ~unknown])
-        return np.where(repeated, np.nan, time_s)
+    @property
+    def period_s(self) -> Array:
+        """(N,) from sample to sample; NaN until it is known."""
+        return np.array([node.period_s for node in self._nodes])
 
-    def _delta(self, of: NDArray[np.intp], own: Array, newest_s: Array, left: NDArray[np.int64]) -> Array:
-        """Steps since each node's last sample."""
-        wrap = np.where(self._stamped[of], self._stamp_wrap_s[of], self._counter_wrap[of])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            by_own = np.mod(own - self._own[of], np.where(wrap > 0.0, wrap, np.inf))
-            by_own = np.where(self._stamped[of], by_own, np.rint(by_own))
-            # what a stall held back comes at once: the steps are those up to the newest
-            periods = np.rint((newest_s - self._last_s[of]) / self.period_s[of])
-        by_arrival = np.where(left < 0, 1.0, np.maximum(np.nan_to_num(periods, nan=1.0) - left, 1.0))
-        return np.where(np.isnan(self._own[of]) | ~(wrap > 0.0), by_arrival, by_own)
+    @property
+    def jitter_s(self) -> Array:
+        """(N,) by how much arrivals are late, on average."""
+        return np.array([node.jitter_s for node in self._nodes])
 
-    def _count(self, of: NDArray[np.intp], took_s: Array, delta: Array) -> None:
-        """Lost samples, and the period of nodes that lost none."""
-        period_s = self.period_s[of]
-        with np.errstate(invalid="ignore"):
-            gone = np.where(self._stamped[of], np.rint(took_s / period_s), delta) - 1.0
-        gone = np.maximum(np.nan_to_num(gone), 0.0)
-        self.missing[of] += gone.astype(np.int64)
-        whole = (gone == 0.0) & ~np.isnan(period_s)
-        self.period_s[of[whole]] += _SMOOTH * (took_s - period_s)[whole]
+    @property
+    def missing(self) -> NDArray[np.int64]:
+        """(N,) samples that never came."""
+        return np.array([node.missing for node in self._nodes], np.int64)
 
-    def _learn(self, of: NDArray[np.intp]) -> None:
-        """The first period of nodes whose step is not known."""
-        for row in of.tolist():
-            seen = self._learning[row]
-            seen.append((float(self._last_s[row]), float(self._steps[row])))
-            if len(seen) < _LEARN:
-                continue
-            times = np.array([time_s for time_s, _ in seen])
-            if self._counted[row]:
-                period_s = (times[-1] - times[0]) / max(seen[-1][1] - seen[0][1], 1.0)
-            else:
-                gaps = np.diff(times)
-                usual = float(np.median(gaps))
-                period_s = gaps.sum() / max(np.rint(gaps / usual).sum(), 1.0) if usual > 0.0 else gaps.mean()
-            self.period_s[row] = period_s
-            if not self._stamped[row]:
-                self._step_s[row] = period_s
-            self._learning[row] = []
+    @property
+    def duplicates(self) -> NDArray[np.int64]:
+        """(N,) samples that came twice."""
+        return np.array([node.duplicates for node in self._nodes], np.int64)
 
-    def _tune(self, of: NDArray[np.intp]) -> None:
-        """The length of a step, over `_BASE_S`."""
-        anchor_s, anchor_steps = self._anchor[0, of], self._anchor[1, of]
-        ran_s = self._last_s[of] - anchor_s
-        new = of[np.isnan(anchor_s) | (ran_s > _BASE_S)]
-        if len(new) == 0:
-            return
-        due = ran_s > _BASE_S
-        rows = of[due]
-        step_s = ran_s[due] / np.maximum(self._steps[rows] - anchor_steps[due], 1e-9)
-        near = np.abs(step_s / self._step_s[rows] - 1.0) < _LARGEST_DRIFT
-        self._step_s[rows[near]] += 0.5 * (step_s - self._step_s[rows])[near]
-        self._anchor[:, new] = self._last_s[new], self._steps[new]
+    @property
+    def resets(self) -> NDArray[np.int64]:
+        """(N,) times that a node began anew."""
+        return np.array([node.resets for node in self._nodes], np.int64)
 
     def lose(self, nodes: Mask) -> None:
         """Forget when nodes (N,) sampled last, as their bus has failed; their steps' length stays."""
-        self._last_s[nodes] = np.nan
-        self._own[nodes] = np.nan
-        self._anchor[:, nodes] = np.nan
+        for row in np.flatnonzero(nodes).tolist():
+            self._nodes[row].lose()

@@ -16,10 +16,11 @@ from common.quaternion import Array
 from common.wire.messages import Mask
 from master.capture.bits import IntegerField
 from master.capture.clock_line import ClockLines
-from master.capture.decode import LayoutDecoder, Route
+from master.capture.decode import LayoutDecoder
 from master.capture.history import Instant, SampleHistory
 from master.capture.layout import MappedLayout
 from master.capture.parts import COUNTER, MAG, STAMP, Part
+from master.capture.route import Route
 from master.suit.doubt import NodeDoubt, Weight
 from master.suit.health import NodeCounters
 from master.suit.nodes import NodeConfig
@@ -30,8 +31,6 @@ LONGEST_DELAY_S = 0.045
 SLOWEST_HZ = 25.0
 _SLEW = 0.2
 """Share of a tick by which the instant may be moved against the tick, until the delay is as wanted."""
-_FRAMES_A_PART = 64
-"""Room in a window for each frame that may come; a bus with more than that babbles."""
 _HELD_SHARE = 0.05
 _FORGET = 0.995
 
@@ -53,9 +52,8 @@ class FreeNodes:
         count = len(nodes) + extra
         self.rows = np.array(list(nodes), np.intp)
         """(n,) of each node among all."""
-        self.counters = NodeCounters(len(nodes))
-        self.unknown = 0
-        self.overflow = 0
+        self.each_tick = NodeCounters(len(nodes))
+        """The counters that each tick adds to; `counters` has the others too."""
         self.routes: dict[tuple[str, int], Route] = {}
         self.identifiers: dict[tuple[str, int], str] = {}
         self._decoders: list[LayoutDecoder] = []
@@ -71,6 +69,7 @@ class FreeNodes:
         yes = np.ones(extra, np.bool_)
         measured = np.array([layout.config.accelerometer is not None for layout in layouts], np.bool_)
         turning = np.array([layout.config.gyroscope is not None for layout in layouts], np.bool_)
+        self._period_s = self._clock.period_s
         self._history = SampleHistory(count, np.concatenate([measured, yes]), np.concatenate([turning, yes]))
         self._latency_s = np.array([1e-3 * layout.config.latency_ms for layout in layouts])
         self._without_mag = np.array([not node.magnetometer for node in nodes.values()], np.bool_)
@@ -82,7 +81,6 @@ class FreeNodes:
         self._held_share = np.zeros(len(nodes))
         self.age_s = np.full(len(nodes), np.inf)
         """(n,) of each node's newest sample at the last tick."""
-        self._room = self._capacity = _FRAMES_A_PART * max(1, len(self.identifiers) * len(nodes))
 
     def _open_routes(self, nodes: Sequence[NodeConfig], layouts: Sequence[MappedLayout]) -> None:
         """One decoder for all nodes of a layout whose frames have one shape, and the way to it."""
@@ -103,7 +101,7 @@ class FreeNodes:
                     what = f"{part.message.name} of node {node.id} ({layout.name})"
                     fields, values = self._told_apart(layout, node, part)
                     route = self.routes.setdefault((node.bus, frame_id), Route())
-                    if not route.add(fields, values, (decoder, number, index)):
+                    if not route.add(fields, values, (decoder, number * decoder.parts + index)):
                         other = self.identifiers[node.bus, frame_id]
                         expected = (
                             f"identifiers that differ: {what} and {other} on bus {node.bus} have the same"
@@ -123,15 +121,6 @@ class FreeNodes:
         signals = {signal.name: signal for signal in part.message.signals}
         return {name: IntegerField(signals[name]) for name in told}, tuple(told.values())
 
-    def frame(self, route: Route, data: bytes, now_ns: int) -> None:
-        """Take one frame that came by one of the `routes`."""
-        if self._room == 0:
-            self.overflow += 1
-            return
-        self._room -= 1
-        if not route.frame(data, now_ns):
-            self.unknown += 1
-
     def put(self, rows: NDArray[np.intp], at_ns: int, readings: Array) -> None:
         """Readings (m, 9) of the `extra` nodes with numbers `rows` (m,), sampled exactly then."""
         values = np.full((len(rows), 13), np.nan)
@@ -142,21 +131,21 @@ class FreeNodes:
     def at_tick(self, tick_ns: int, now_ns: int) -> tuple[int, Instant]:
         """Take what has come; the instant that stands for the tick, ns, and what all nodes read there."""
         self._take()
+        self._period_s = self._clock.period_s
         tick_s = self._s(tick_ns)
         self._move_delay(tick_s)
         instant_s = tick_s - self.delay_s
-        instant = self._history.at(instant_s, self._s(now_ns), self._clock.period_s)
+        instant = self._history.at(instant_s, self._s(now_ns), self._period_s)
         free = len(self.rows)
         instant.values[:free][self._without_mag, MAG] = np.nan
         held = instant.held[:free]
         self.age_s = instant.age_s[:free]
-        self.counters.held += held
+        self.each_tick.held += held
         self._held_share = _FORGET * self._held_share + (1.0 - _FORGET) * held
         return tick_ns - round(self.delay_s * NS_PER_S), instant
 
     def _take(self) -> None:
-        self._room = self._capacity
-        counters, clock = self.counters, self._clock
+        clock = self._clock
         for decoder in self._decoders:
             samples = decoder.take()
             if samples is None:
@@ -165,22 +154,27 @@ class FreeNodes:
             values, rows = samples.values, samples.rows
             times_s = clock.take(rows, arrival_s, values[:, STAMP], values[:, COUNTER])
             self._history.put(rows, times_s - self._latency_s[rows], values[:, :13])
-        free = slice(0, len(self.rows))
+
+    @property
+    def counters(self) -> NodeCounters:
+        """All counters of the nodes, in their order."""
+        counters, clock, free = self.each_tick, self._clock, slice(0, len(self.rows))
         counters.missing, counters.resets = clock.missing[free], clock.resets[free]
         counters.duplicates = clock.duplicates[free]
         for decoder in self._decoders:
             counters.incomplete[decoder.nodes] = decoder.incomplete
             counters.bad_length[decoder.nodes] = decoder.short
+        return counters
 
     def _move_delay(self, tick_s: float) -> None:
         step_s, self._tick_s = tick_s - self._tick_s, tick_s
         if self._wanted_delay_s is not None:
             return
-        period_s = self._clock.period_s[: len(self.rows)]
+        period_s = self._period_s[: len(self.rows)]
         known = period_s[np.isfinite(period_s) & (period_s < 1.0 / SLOWEST_HZ) & (self.age_s < 1.0)]
         wanted_s = min(_MARGIN_S + float(known.max(initial=0.0)), LONGEST_DELAY_S)
         most_s = np.inf if np.isnan(step_s) else _SLEW * abs(step_s)
-        self.delay_s += float(np.clip(wanted_s - self.delay_s, -most_s, most_s))
+        self.delay_s += min(max(wanted_s - self.delay_s, -most_s), most_s)
 
     @property
     def _begin(self) -> int:

@@ -53,19 +53,24 @@ class SampleHistory:
         self._derived_gyr: NDArray[np.intp] = np.flatnonzero(~turning)
         self._times = np.full((KEPT, count), -np.inf)
         self._values = np.full((KEPT, count, WIDTH), np.nan)
-        self._next = np.zeros(count, np.intp)
-        self._newest = np.full(count, -np.inf)
+        self._next = [0] * count
+        self._newest = [-np.inf] * count
         self._all = np.arange(count)
         self._derived_rate = np.zeros((len(self._derived_gyr), 3))
 
     def put(self, rows: NDArray[np.intp], times_s: Array, values: Array) -> None:
-        """Samples (F,) and (F, 13) in the order of arrival; those without a time are left out."""
-        for place, row in enumerate(rows.tolist()):
-            if times_s[place] > self._newest[row]:
-                slot = self._next[row]
-                self._times[slot, row] = self._newest[row] = times_s[place]
-                self._values[slot, row] = values[place]
-                self._next[row] = (slot + 1) % KEPT
+        """Samples (F,) and (F, 13), of each node in order. Those without a time are left out."""
+        newest, following, slots, kept = self._newest, self._next, [], []
+        for place, (row, time_s) in enumerate(zip(rows.tolist(), times_s.tolist(), strict=True)):
+            if time_s > newest[row]:
+                newest[row] = time_s
+                slot = following[row]
+                slots.append(slot)
+                kept.append(place)
+                following[row] = (slot + 1) % KEPT
+        of = rows[kept]
+        self._times[slots, of] = times_s[kept]
+        self._values[slots, of] = values[kept]
 
     def at(self, instant_s: float, now_s: float, period_s: Array) -> Instant:
         """What the nodes read at an instant; `period_s` (N,), NaN where it is not known."""
@@ -85,10 +90,11 @@ class SampleHistory:
         mag, other = values[:, MAG], v_0[:, MAG]
         values[:, MAG] = np.where(np.isnan(mag), other, mag)
         since = np.where(np.isfinite(t_0), instant_s - t_0, np.inf)
-        held = ~follows & (since <= _HELD_PERIODS * np.nan_to_num(period_s, nan=0.01))
+        usual_s = np.where(np.isnan(period_s), 0.01, period_s)
+        held = ~follows & (since <= _HELD_PERIODS * usual_s)
         self._orient(values, v_0, v_1, gap, np.where(follows, 0.0, np.minimum(since, 0.05)), share)
         known = (follows & (gap <= LONGEST_GAP_S)) | held
-        return Instant(values, known, held, now_s - self._newest)
+        return Instant(values, known, held, now_s - np.array(self._newest))
 
     def _orient(
         self, values: Array, v_0: Array, v_1: Array, gap: Array, ahead_s: Array, share: Array

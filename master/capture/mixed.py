@@ -54,6 +54,7 @@ class MixedSuit:
         self._fd = dict(fd)
         kinds = [layouts[str(node.layout)] for node in free.values()]
         self._free = FreeNodes(free, kinds, len(polled), delay_s) if free else None
+        self._routes = {} if self._free is None else self._free.routes
         self._presence = NodePresence(len(free), lost_after)
         self._free_rows: NDArray[np.intp] = np.array(list(free), np.intp)
         self._free_bus = [node.bus for node in free.values()]
@@ -111,11 +112,11 @@ class MixedSuit:
 
     def on_frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Take one frame. True once every awaited node has answered this tick."""
-        if self._free is not None:
-            route = self._free.routes.get((bus, frame_id))
-            if route is not None:
-                self._free.frame(route, data, now_ns)
-                return False
+        route = self._routes.get((bus, frame_id))
+        if route is not None:
+            if not route.frame(data, now_ns):
+                self._poll.bus_health[bus].overflow += 1
+            return False
         return self._poll.on_frame(bus, frame_id, data, now_ns)
 
     def close_window(self, now_ns: int) -> Sweep:
@@ -143,7 +144,7 @@ class MixedSuit:
             here = known[: len(self._free_rows)]
             self._presence.close(here, here)
             lost[self._free_rows] = self._presence.lost
-            self._count_free(here)
+            self._count_free(self._free.each_tick, here)
         self._values, self._lost = values, lost
         return Sweep(
             tick=sweep.tick,
@@ -157,8 +158,7 @@ class MixedSuit:
             q_world_from_sensor=values[:, TURN] if self.fused.any() else None,
         )
 
-    def _count_free(self, fresh: Mask) -> None:
-        counters = self._free_counters
+    def _count_free(self, counters: NodeCounters, fresh: Mask) -> None:
         counters.times_lost = self._presence.times_lost
         counters.fresh += fresh
         counters.lost += self._presence.lost

@@ -223,8 +223,8 @@ ROBOT = (
     holds(
         name="encoder stuck",
         done="The encoder of a moving joint shows one angle for ever, and says that it is well.",
-        robot="Takes it for a joint that is held up from outside: a protective stop. Where the torques do not "
-        "show it, the guard holds that joint alone and names it.",
+        robot="Takes it for a joint that is held up from outside: a protective stop. Where the torques do "
+        "not show it, the guard holds that joint alone and names it.",
         person="Repair the encoder, then engage.",
         act=_encoder_stuck,
         reacts_s=0.1, stands_s=0.1 + 1.0, yields=True, held_by={"contact"},

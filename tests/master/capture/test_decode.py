@@ -29,7 +29,7 @@ class Wire:
     def send(self, index: int, without: tuple[int, ...] = (), now_ns: int = 0) -> None:
         for place, frame in enumerate(self.node.frames(index)):
             if place not in without:
-                self.decoder.frame(0, self.ids.index(frame.id), frame.data, now_ns)
+                self.decoder.frame(self.ids.index(frame.id), frame.data, now_ns)
 
     def take(self) -> NodeSamples:
         samples = self.decoder.take()
@@ -97,7 +97,8 @@ def test_a_lost_frame_loses_its_sample_and_mixes_no_two(load: Load, swing: Swing
 def test_a_short_frame_changes_nothing_and_is_counted(load: Load, swing: Swing) -> None:
     wire = Wire(load("lpms", 1), swing(2))
     for place, frame in enumerate(wire.node.frames(0)):
-        wire.decoder.frame(0, wire.ids.index(frame.id), frame.data[:-1] if place == 1 else frame.data, 0)
+        wire.decoder.frame(wire.ids.index(frame.id), frame.data[:-1] if place == 1 else frame.data, 0)
+    assert wire.decoder.take() is None
     assert wire.decoder.take() is None
     assert wire.decoder.short.tolist() == [1]
 
@@ -105,6 +106,6 @@ def test_a_short_frame_changes_nothing_and_is_counted(load: Load, swing: Swing) 
 def test_a_quaternion_that_is_none_is_no_orientation(load: Load, swing: Swing) -> None:
     wire = Wire(load("bno", 2), swing(2), number=2)
     frames = wire.node.frames(0)
-    wire.decoder.frame(0, wire.ids.index(frames[0].id), frames[0].data, 0)
-    wire.decoder.frame(0, wire.ids.index(frames[1].id), bytes(8), 0)
+    wire.decoder.frame(wire.ids.index(frames[0].id), frames[0].data, 0)
+    wire.decoder.frame(wire.ids.index(frames[1].id), bytes(8), 0)
     assert np.isnan(wire.take().values[0, TURN]).all()

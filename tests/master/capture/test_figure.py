@@ -79,8 +79,8 @@ def apart_deg(sweeps: list[Sweep], readings: list[Reading], configs: list[NodeCo
 def test_orientations_are_those_of_the_suit_on_sync(
     load: Callable[..., MappedLayout], swing: Callable[..., Reading]
 ) -> None:
-    readings = [swing(k, rest_s=REST_S) for k in range(12)]
-    run = FreeRun(load("mti", 1), readings, [100.0, 200.0, 400.0] * 4)
+    readings = [swing(k, rest_s=REST_S) for k in range(36)]
+    run = FreeRun(load("mti", 1), readings, [100.0, 200.0, 400.0] * 12)
     sweeps = run.sweeps(8.0, lost_share=0.0025)  # of four frames a sample: 1 % of the samples
     late = apart_deg(sweeps, readings, run.configs)
     figures = f"median {np.median(late):.3f}, 99 % {np.quantile(late, 0.99):.3f}, worst {late.max():.3f}°"
