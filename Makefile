@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all check bench audit clean
+.PHONY: demo test test-all check lint bench audit clean
 demo: $(VENV)/.ready
 	$(BIN)/tandem demo $(ARGS)
 
@@ -14,8 +14,7 @@ test: $(VENV)/.ready
 
 # the live tests run one after the other: two at a time would take each other's cores
 test-all: $(VENV)/.ready
-	failed=0; $(PARALLEL) -m "not live and not bench" $(ARGS) || failed=1; \
-	$(BIN)/python -m pytest -m "live and not bench" $(ARGS) || failed=1; exit $$failed
+	.ci/tests $(ARGS)
 
 bench: $(VENV)/.ready
 	$(BIN)/tandem bench $(ARGS)
@@ -24,10 +23,12 @@ bench: $(VENV)/.ready
 audit: $(VENV)/.ready
 	$(BIN)/tandem audit $(ARGS)
 
-check: $(VENV)/.ready
+check: lint
+	$(BIN)/mypy
+
+lint: $(VENV)/.ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 
 $(VENV)/.ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
