@@ -15,6 +15,7 @@ from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.load import ProfileName
+from common.recording.config import RecordingConfig
 from common.tap.config import TapConfig
 from master.alarms.config import AlarmsConfig
 from master.capture.config import SuitSection
@@ -92,6 +93,7 @@ class MasterConfig(Section):
     process: ProcessConfig = ProcessConfig()
     alarms: AlarmsConfig = AlarmsConfig()
     tap: TapConfig = TapConfig()
+    recording: RecordingConfig = RecordingConfig()
     console: ConsoleConfig = ConsoleConfig()
 
     @property
@@ -121,6 +123,7 @@ class MasterConfig(Section):
             *self.estimation.mistakes_at(self.capture.rate_hz),
             *self.link.mistakes(),
             *self.tap.mistakes(),
+            *self.recording.mistakes_with(self.tap.socket),
             *self.console.mistakes(),
         ]
 

@@ -10,6 +10,7 @@ from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.load import ProfileName
+from common.recording.config import RecordingConfig
 from common.tap.config import TapConfig
 from slave.attitude.config import BaseConfig
 from slave.backends import ServosConfig
@@ -48,6 +49,7 @@ class SlaveConfig(Section):
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
     tap: TapConfig = TapConfig()
+    recording: RecordingConfig = RecordingConfig()
 
     @property
     def skeleton(self) -> Skeleton:
@@ -71,6 +73,7 @@ class SlaveConfig(Section):
             *self.base.mistakes(),
             *self.link.mistakes(),
             *self.tap.mistakes(),
+            *self.recording.mistakes_with(self.tap.socket),
         ]
 
     def _unconfirmed(self, skeleton: Skeleton) -> list[ConfigMistake]:

@@ -18,7 +18,7 @@ from common.skeleton.load import own_profile
 from common.wire.version import software
 
 CONFIG, FILES = "master_config", "master_files"
-_NOT_READ = {"link", "tap", "process", "alarms", "console"}
+_NOT_READ = {"link", "tap", "recording", "process", "alarms", "console"}
 """Sections that the pipeline does not read."""
 ENCODING = "latin-1"
 """Each byte is one character: a DBC file may be in any encoding."""

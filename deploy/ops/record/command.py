@@ -16,7 +16,16 @@ from deploy.report.output import in_a_folder, metrics_writer
 
 
 def record(
-    out: Annotated[Path, typer.Option(help="New .mcap file to write.", dir_okay=False, callback=in_a_folder)],
+    out: Annotated[
+        Path | None, typer.Option(help="New .mcap file to write.", dir_okay=False, callback=in_a_folder)
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            help="Record for good, beside the master or slave of this file, as its [recording] says.",
+            dir_okay=False,
+        ),
+    ] = None,
     robot: Annotated[str | None, typer.Option(help="Name of the robot.")] = None,
     tap: Annotated[
         Path | None,
@@ -61,7 +70,12 @@ def record(
     The robot's endpoint gives states. Commands come from an endpoint where the master listens (`[link]
     listen` in its file), or from a router. It ends with status 1 if the disk failed or messages are missing.
 
+    With --config it records as long as the host runs: it waits for the process, begins a new file each hour,
+    removes the oldest files within `keep_gb` and `max_hours`, and survives a full disk.
+
     Beside a master: `tandem record --tap /run/tandem/master.sock --out morning.mcap`
+
+    For good: `tandem record --config /etc/tandem/operator.toml`
 
     Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
     """
@@ -69,6 +83,13 @@ def record(
     from deploy.ops.record.record import RecordOptions, link_of
     from deploy.ops.record.record import record as record_until
 
+    if config is not None:
+        _record_for_good(config)
+        return
+    if out is None:
+        raise TandemError(
+            "record: name the file to write by --out, or a master's or slave's file by --config"
+        )
     if out.suffix.lower() != ".mcap":
         raise TandemError(f"{out}: expected a name that ends in .mcap")
     each_s = 60.0 * minutes_per_file if minutes_per_file else None
@@ -92,5 +113,18 @@ def record(
         with console.status("waiting for the robot") as status:
             summary = await record_until(options, stop, status.update, metrics_writer(metrics))
         console.print(summary, highlight=False)
+
+    run_until_stopped(work)
+
+
+def _record_for_good(config: Path) -> None:
+    from deploy.ops.record.steady import record_steadily, steady_options
+
+    options = steady_options(config)
+    console = Console(stderr=True)
+
+    async def work(stop: asyncio.Event) -> None:
+        with console.status("waiting for the process") as status:
+            await record_steadily(options, stop, status.update)
 
     run_until_stopped(work)

@@ -27,9 +27,11 @@ async def record_tap(
     report: Callable[[str], None],
     seconds: float | None = None,
     each_s: float | None = None,
+    ends_when_failed: bool = False,
 ) -> str:
     """Record until `stop` is set, the time is over or the process ends. Returns a summary for people.
 
+    `ends_when_failed`: also once the disk takes nothing any more.
     Raises TandemError where there is no tap, the disk failed, or this process was too slow for the tap.
     """
     with TapReader(path) as reader:
@@ -37,7 +39,7 @@ async def record_tap(
             first = await asyncio.wait_for(reader.read(), GREETED_S)
         except TimeoutError:
             raise TandemError(f"{path}: it says nothing; is it a tap of tandem?") from None
-        taking = _Taking(reader, Tape(out, _greeting(path, first), each_s), report)
+        taking = _Taking(reader, Tape(out, _greeting(path, first), each_s), report, ends_when_failed)
         try:
             await until_stopped(stop, taking.run(seconds))
         finally:
@@ -58,7 +60,10 @@ def _greeting(path: Path, message: TapMessage) -> dict[str, str]:
 class _Taking:
     """One recording under way."""
 
-    def __init__(self, reader: TapReader, tape: Tape, report: Callable[[str], None]) -> None:
+    def __init__(
+        self, reader: TapReader, tape: Tape, report: Callable[[str], None], ends_when_failed: bool
+    ) -> None:
+        self._ends_when_failed = ends_when_failed
         self.tape = tape
         self._reader = reader
         self._report = report
@@ -72,7 +77,7 @@ class _Taking:
         progress = asyncio.create_task(self._progress())
         try:
             async with asyncio.timeout(seconds):
-                while True:
+                while not (self._ends_when_failed and self.tape.failed):
                     self._take(await self._reader.read())
         except TimeoutError:
             pass

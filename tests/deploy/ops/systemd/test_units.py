@@ -22,6 +22,7 @@ INSTANCES = {
     "tandem-master@.service": "tandem-master@operator.service",
     "tandem-can@.service": "tandem-can@can0.service",
     "tandem-router.service": "tandem-router.service",
+    "tandem-record@.service": "tandem-record@operator.service",
 }
 SIDES = ("tandem-slave@.service", "tandem-master@.service", "tandem-router.service")
 INSTALLED = "/opt/tandem/bin/tandem"
@@ -107,6 +108,17 @@ def test_what_runs_is_a_command_that_tandem_has(unit: str) -> None:
         str(c.name or getattr(c.callback, "__name__", "")) for c in cli.app.registered_commands
     }
     assert file.startswith("/etc/tandem/")
+
+
+def test_the_recorder_reaches_the_tap_and_its_folder_and_nothing_else() -> None:
+    service = settings("tandem-record@.service")
+    [start] = service["ExecStart"]
+    assert start == f"{INSTALLED} record --config /etc/tandem/%i.toml"
+    assert service["RestrictAddressFamilies"] == ["AF_UNIX"]
+    assert service["PrivateNetwork"] == ["yes"]
+    for unit in (*SIDES[:2], "tandem-record@.service"):
+        assert settings(unit)["RuntimeDirectory"] == ["tandem"]
+        assert settings(unit)["RuntimeDirectoryPreserve"] == ["yes"], "one that stops takes no other's socket"
 
 
 @pytest.mark.parametrize("unit", SIDES)

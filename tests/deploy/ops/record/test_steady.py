@@ -1,0 +1,199 @@
+"""The recorder that runs for good: it waits, begins again, keeps its bounds, survives a full disk."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import msgpack
+import pytest
+
+from common.clock import NS_PER_S
+from common.config.load import load_config
+from common.errors import ConfigError, TandemError
+from common.recording import read_recording
+from common.recording.config import RecordingConfig
+from common.tap.sender import TapSender
+from deploy.ops.record.retention import SEAL, KeptFile, remove, to_remove
+from deploy.ops.record.steady import ROOM_BYTES, SteadyOptions, record_steadily, steady_options
+from master.config import MasterConfig
+
+EXAMPLES = Path(__file__).parents[4] / "deploy/examples"
+HOUR_NS = 3600 * NS_PER_S
+
+
+def files(*sizes: int) -> list[KeptFile]:
+    """One an hour, the last the newest."""
+    return [KeptFile(Path(f"{i}.mcap"), size, i * HOUR_NS) for i, size in enumerate(sizes)]
+
+
+@pytest.mark.parametrize(
+    ("config", "gone"),
+    [
+        (RecordingConfig(), []),
+        (RecordingConfig(keep_gb=3.0), ["0", "1"]),
+        (RecordingConfig(keep_gb=4.0), ["0"]),
+        (RecordingConfig(keep_gb=5.0), []),
+        (RecordingConfig(keep_gb=0.1), ["0", "1", "2", "3"]),
+        (RecordingConfig(max_hours=2.5), ["0", "1"]),
+        (RecordingConfig(max_hours=0.1), ["0", "1", "2", "3"]),
+    ],
+)
+def test_the_oldest_go_and_the_newest_always_stays(config: RecordingConfig, gone: list[str]) -> None:
+    five = files(*[1_000_000_000] * 5)
+    assert [file.path.stem for file in to_remove(five, config, 4 * HOUR_NS)] == gone
+
+
+def test_only_its_own_files_go_and_none_of_a_sealed_folder(tmp_path: Path) -> None:
+    for name in ("operator-1.mcap", "operator-2.mcap", "robot-1.mcap", "operator-1.toml"):
+        (tmp_path / name).write_bytes(b"x" * 1000)
+    config = RecordingConfig(keep_gb=1e-9)
+    (tmp_path / SEAL).write_text("{}")
+    assert remove(tmp_path, "operator", config, 0) == []
+    (tmp_path / SEAL).unlink()
+    assert len(remove(tmp_path, "operator", config, 0)) == 1
+    assert {path.name for path in tmp_path.iterdir()} >= {"robot-1.mcap", "operator-1.toml"}
+
+
+def test_the_file_is_read_and_what_is_missing_is_said(tmp_path: Path) -> None:
+    def options(*lines: str) -> SteadyOptions:
+        file = tmp_path / "operator.toml"
+        file.write_text("\n".join(["robots = ['r']", *lines]))
+        return steady_options(file)
+
+    tap = f"[tap]\nsocket = '{tmp_path}/s.sock'"
+    with pytest.raises(TandemError, match=r"\[recording\] folder is not set"):
+        options(tap)
+    with pytest.raises(ConfigError, match="recording.folder .* a folder that exists"):
+        options(tap, "[recording]\nfolder = 'nowhere'")
+    with pytest.raises(ConfigError, match="tap.socket .* a path"):
+        options(f"[recording]\nfolder = '{tmp_path}'")
+    found = options(tap, f"[recording]\nfolder = '{tmp_path}'\nkeep_gb = 2.0")
+    assert (found.name, found.config.keep_gb) == ("operator", 2.0)
+
+
+def test_a_master_s_file_takes_the_section_and_starts_without_its_folder(tmp_path: Path) -> None:
+    tap = f'tap.socket="{tmp_path}/s.sock"'
+    config = load_config(EXAMPLES / "master.toml", MasterConfig, (tap, 'recording.folder="/not/mounted"'))
+    assert config.recording.folder == Path("/not/mounted")
+    with pytest.raises(ConfigError, match="tap.socket"):
+        load_config(EXAMPLES / "master.toml", MasterConfig, ('recording.folder="/tmp"',))
+
+
+Story = Callable[[Path, "Recorder"], Awaitable[None]]
+
+
+class Recorder:
+    """A recorder under way, and the room on its disk."""
+
+    def __init__(self) -> None:
+        self.room = 10 * ROOM_BYTES
+        self.told: list[str] = []
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        async with asyncio.timeout(20.0):
+            while not condition():
+                await asyncio.sleep(0.005)
+
+
+def play(folder: Path, story: Story) -> list[Path]:
+    """Run a story beside a recorder; the files that it leaves, in order."""
+    recorder, socket = Recorder(), folder / "s.sock"
+    options = SteadyOptions(socket, folder, "operator", RecordingConfig(folder=folder))
+
+    async def whole() -> None:
+        stop = asyncio.Event()
+        running = asyncio.create_task(
+            record_steadily(
+                options, stop, recorder.told.append, room=lambda _: recorder.room, retry_s=(0.01, 0.01)
+            )
+        )
+        await story(socket, recorder)
+        stop.set()
+        await running
+
+    asyncio.run(whole())
+    return sorted(folder.glob("operator-*.mcap"))
+
+
+async def a_run(socket: Path, recorder: Recorder, count: int) -> None:
+    """A process that hands on some messages and ends."""
+    sender = TapSender(socket, lambda: msgpack.packb({"role": "master"}))
+    sender.open()
+    await recorder.until(lambda: sender.count == 1)
+    for number in range(count):
+        sender.put("t", number.to_bytes(4, "big"), number)
+        await asyncio.sleep(0.001)
+    sender.close()
+    await asyncio.sleep(0.05)
+
+
+def test_each_start_of_the_process_begins_a_file(tmp_path: Path) -> None:
+    async def story(socket: Path, recorder: Recorder) -> None:
+        await recorder.until(lambda: any("waiting" in told for told in recorder.told))
+        await a_run(socket, recorder, 50)
+        await a_run(socket, recorder, 70)
+
+    found = play(tmp_path, story)
+    assert [len(read_recording(path).entries) for path in found] == [50, 70]
+    assert not any(read_recording(path).cut for path in found)
+
+
+def test_a_disk_without_room_is_waited_for(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    async def story(socket: Path, recorder: Recorder) -> None:
+        recorder.room = ROOM_BYTES - 1
+        sender = TapSender(socket, lambda: msgpack.packb({"role": "master"}))
+        sender.open()
+        await asyncio.sleep(0.1)
+        assert sender.count == 0
+        sender.close()
+        recorder.room = ROOM_BYTES
+        await a_run(socket, recorder, 30)
+
+    found = play(tmp_path, story)
+    assert [len(read_recording(path).entries) for path in found] == [30]
+    assert [record.message for record in caplog.records].count(
+        f"{tmp_path}: no room on the disk; recording goes on once there is"
+    ) == 1
+
+
+def test_a_disk_that_fails_in_the_middle_ends_the_file_and_not_the_recorder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from common.recording import McapRecorder
+
+    flush, failing = McapRecorder._flush, [False]
+
+    def full(recorder: McapRecorder) -> None:
+        if failing[0]:
+            raise OSError(28, "No space left on device")
+        flush(recorder)
+
+    monkeypatch.setattr(McapRecorder, "_flush", full)
+
+    async def story(socket: Path, recorder: Recorder) -> None:
+        sender = TapSender(socket, lambda: msgpack.packb({"role": "master"}))
+        sender.open()
+        number = 0
+
+        def put() -> bool:
+            nonlocal number
+            number += 1
+            sender.put("t", number.to_bytes(4, "big"), number)
+            return len(list(tmp_path.glob("operator-*.mcap"))) == 2
+
+        await recorder.until(lambda: sender.count == 1)
+        failing[0] = True
+        await recorder.until(lambda: put() or sender.count == 0)
+        failing[0] = False
+        await recorder.until(put)
+        for _ in range(20):
+            put()
+        await asyncio.sleep(0.05)
+        sender.close()
+
+    found = play(tmp_path, story)
+    assert len(found) == 2
+    assert read_recording(found[0]).metadata == {"role": "master"}, "it can be read as far as it goes"
+    assert len(read_recording(found[1]).entries) >= 20
