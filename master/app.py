@@ -93,6 +93,7 @@ class Master:
                 self._on_bus,
                 on_second_sender=self._on_frame,
                 take_extended=bus.name in with_extended(self._pipeline.poll.identifiers),
+                in_batches=bus.name in self._only_free_running(),
             )
             for bus in config.capture.buses
         ]
@@ -111,6 +112,11 @@ class Master:
         self._alarms = OperatorAlarms(config.commanded)
         self._player = TonePlayer(config.alarms)
         self._doubt_log = DoubtLog()
+
+    def _only_free_running(self) -> frozenset[str]:
+        """Buses of which no frame is waited for: they are read once a tick."""
+        poll = self._pipeline.poll
+        return poll.buses_with_nodes - poll.sync_buses - self._switches.buses
 
     async def run(self) -> None:
         """Capture, send, keep each robot's lease and clock until cancelled."""

@@ -6,24 +6,30 @@ Nothing that happens on the bus is raised into the session once `open` has retur
 from __future__ import annotations
 
 import errno
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 import can
 
+from common.can.batch import BatchReader, can_batch
 from common.can.config import BusConfig
 from common.can.controller import RESTARTED, Controller, error_words, of_error_frame
 from common.can.echo import SentFrames
 from common.can.frame import EXTENDED, CanFrame
-from common.can.interface import error_number, open_bus
+from common.can.interface import descriptor, error_number, open_bus
 from common.can.kept_open import KeptOpenBus, OnChange, Opener, StateOf
 from common.can.netlink import state_of
+from common.can.reader import Reader
 from common.clock import monotonic_ns
 from common.metrics.bus import BusMetrics
 
 SEND_ERRORS_IN_A_ROW = 20
 """A full queue is no reason to reopen a bus, but one that stays full is: 0.1 s at 200 Hz."""
 _QUEUE_FULL = frozenset({errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM})
+
+_ERROR_FRAME, _REMOTE = 0x2000_0000, 0x4000_0000
+"""SocketCAN's flags in an identifier (linux/can.h)."""
+_NO_DATA_FRAME = _ERROR_FRAME | _REMOTE
 
 OnFrame = Callable[[str, int, bytes, int], object]
 """(bus name, identifier, data, arrival in monotonic ns)."""
@@ -36,6 +42,17 @@ Arrival = Callable[[can.Message], int]
 def read_now(message: can.Message) -> int:
     """It counts from when it is read."""
     return monotonic_ns()
+
+
+def _message_of(can_id: int, data: bytes) -> can.Message:
+    return can.Message(
+        arbitration_id=can_id & 0x1FFF_FFFF,
+        is_extended_id=bool(can_id & EXTENDED),
+        is_error_frame=bool(can_id & _ERROR_FRAME),
+        is_remote_frame=bool(can_id & _REMOTE),
+        is_fd=len(data) > 8,
+        data=b"" if can_id & _REMOTE else data,
+    )
 
 
 class CanBus(KeptOpenBus):
@@ -53,13 +70,16 @@ class CanBus(KeptOpenBus):
         on_remote: OnRemote | None = None,
         state_of: StateOf = state_of,
         arrived: Arrival = read_now,
+        in_batches: bool = False,
     ) -> None:
         """`on_second_sender` takes frames with an identifier that this side sends, but did not send.
 
         `take_extended`: frames with 29 bits are handed on too; else they are counted as foreign. `on_remote`
-        takes the identifiers of others' remote requests, of 11 bits.
+        takes the identifiers of others' remote requests, of 11 bits. `in_batches`: where the interface can,
+        frames wait until `read` is called, and then come with the times at which the kernel took them in.
         """
         self._take_extended = take_extended
+        self._in_batches = in_batches and can_batch(config.interface)
         super().__init__(config, on_change, opener, state_of)
         self._on_frame = on_frame
         self._arrived = arrived
@@ -101,6 +121,30 @@ class CanBus(KeptOpenBus):
         self.counters.sent += 1
         self._send_errors_in_a_row = 0
         self._attempt = 0
+
+    def _reader_of(self, bus: can.BusABC) -> Reader:
+        number = descriptor(bus) if self._in_batches else None
+        if number is None:
+            return super()._reader_of(bus)
+        return BatchReader(number, self._on_batch, self._on_receive_error)
+
+    def _on_batch(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
+        """Data frames go on at once; what is rare takes the way of a python-can message."""
+        on_frame, name, received = self._on_frame, self.name, 0
+        for frame_id, data, at_ns in frames:
+            if (
+                frame_id & _NO_DATA_FRAME
+                or frame_id in self._sent_ids
+                or (frame_id & EXTENDED and not self._take_extended)
+            ):
+                self._on_message(_message_of(frame_id, data))
+            else:
+                received += 1
+                on_frame(name, frame_id, data, at_ns)
+        if received:
+            self.counters.received += received
+            self._attempt = 0
+            self._on_the_bus()
 
     def _on_message(self, message: can.Message) -> None:
         counters = self.counters

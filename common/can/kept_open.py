@@ -169,16 +169,17 @@ class KeptOpenBus(ABC):
         return bus_off_words(channel, report.restart_ms if report is not None else 0)
 
     def _attach(self, bus: can.BusABC) -> None:
-        loop = asyncio.get_running_loop()
-        number = descriptor(bus)
         self._bus = bus
         self._send_errors_in_a_row = 0
-        if number is None:
-            self._reader = ThreadReader(bus, loop, self._on_message, self._on_receive_error)
-        else:
-            self._reader = DescriptorReader(bus, number, loop, self._on_message, self._on_receive_error)
+        self._reader = self._reader_of(bus)
         if self._on_change is not None and not self._doubtful:
             self._on_change(self.name, True)
+
+    def _reader_of(self, bus: can.BusABC) -> Reader:
+        loop, number = asyncio.get_running_loop(), descriptor(bus)
+        if number is None:
+            return ThreadReader(bus, loop, self._on_message, self._on_receive_error)
+        return DescriptorReader(bus, number, loop, self._on_message, self._on_receive_error)
 
     def _detach(self) -> tuple[can.BusABC | None, Reader | None]:
         bus, reader = self._bus, self._reader

@@ -42,7 +42,14 @@ class SuitCapture:
         self._on_sweep = on_sweep
         extended = with_extended(source.identifiers)
         self._buses = [
-            CanBus(bus, self._on_frame, self._on_bus, take_extended=bus.name in extended) for bus in buses
+            CanBus(
+                bus,
+                self._on_frame,
+                self._on_bus,
+                take_extended=bus.name in extended,
+                in_batches=bus.name in source.buses_with_nodes - source.sync_buses,
+            )
+            for bus in buses
         ]
         self._open = False
 

@@ -76,6 +76,11 @@ class Switches:
         for each in self._held.values():
             each.close()
 
+    @property
+    def buses(self) -> frozenset[str]:
+        """Buses that carry a button's frames."""
+        return frozenset(button.bus for button in self._buttons.values())
+
     def frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Take a frame of a bus; False where it is none of a button."""
         took = [button.frame(bus, frame_id, data, now_ns) for button in self._buttons.values()]

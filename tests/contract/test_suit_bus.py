@@ -8,15 +8,18 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import can
 import pytest
 import uvloop
 
+from common.can.batch import BatchReader
 from common.can.bus import CanBus
 from common.can.config import BusConfig
-from common.can.frame import CanFrame
+from common.can.frame import EXTENDED, CanFrame
+from common.clock import monotonic_ns
 
 if TYPE_CHECKING:
     from tests.contract.conftest import Wire
@@ -38,16 +41,25 @@ def run(test: Coroutine[Any, Any, None]) -> None:
 class End:
     """One end of a wire: a CanBus and all it tells."""
 
-    def __init__(self, wire: Wire, config: BusConfig) -> None:
+    def __init__(self, wire: Wire, config: BusConfig, *, in_batches: bool = False) -> None:
+        self.arrived_ns: list[int] = []
         self.frames: list[tuple[int, bytes]] = []
         self.changes: list[bool] = []
         self._stirred = asyncio.Event()
-        self.bus = CanBus(config, self._on_frame, self._on_change, wire.open)
+        self.bus = CanBus(
+            config,
+            self._on_frame,
+            self._on_change,
+            wire.open,
+            take_extended=in_batches,
+            in_batches=in_batches,
+        )
 
     def _on_frame(self, name: str, frame_id: int, data: bytes, now_ns: int) -> None:
         assert name == self.bus.name
         assert now_ns > 0
         self.frames.append((frame_id, data))
+        self.arrived_ns.append(now_ns)
         self._stirred.set()
 
     def _on_change(self, name: str, up: bool) -> None:
@@ -108,6 +120,80 @@ def test_frames_arrive_in_order_and_unchanged_both_ways(wire: Wire) -> None:
                 assert receiver.frames == [(frame.id, frame.data) for frame in sent]
                 assert sender.bus.counters.sent == len(sent)
                 assert sender.bus.counters.send_errors == 0
+
+    run(test())
+
+
+def heard(end: End, count: int) -> bool:
+    return len(end.frames) >= count
+
+
+async def read_until(end: End, condition: Callable[[], bool]) -> None:
+    """As a master reads a bus of which it waits for no frame: once a tick."""
+    while not condition():
+        end.bus.read()
+        await asyncio.sleep(0.005)
+
+
+def test_frames_read_in_batches_are_the_same_and_have_their_times(wire: Wire) -> None:
+    async def test() -> None:
+        near, far = End(wire, wire.near, in_batches=True), End(wire, wire.far)
+        near.bus.open()
+        far.bus.open()
+        try:
+            sent = [*frames_of_all_lengths(wire.fd), CanFrame(0x12345 | EXTENDED, b"29 bits", fd=False)]
+            began_ns = monotonic_ns()
+            assert isinstance(near.bus._reader, BatchReader) == (wire.near.interface == "socketcan")
+            for number, frame in enumerate(sent, 1):
+                far.bus.send(frame)
+                if number % 8 == 0 or number == len(sent):  # a CAN card's own queue holds 10
+                    await read_until(near, partial(heard, near, number))
+            assert near.frames == [(frame.id, frame.data) for frame in sent]
+            assert near.bus.counters.received == len(sent)
+            times = near.arrived_ns
+            assert began_ns <= times[0]
+            assert times == sorted(times)
+            assert times[-1] <= monotonic_ns()
+        finally:
+            await near.bus.close()
+            await far.bus.close()
+
+    run(test())
+
+
+def test_what_is_no_data_frame_is_told_apart_in_a_batch_too(wire: Wire) -> None:
+    async def test() -> None:
+        near = End(wire, wire.near, in_batches=True)
+        near.bus.open()
+        try:
+            async with stranger(wire) as other:
+                other.send(can.Message(arbitration_id=0x101, is_extended_id=False, is_remote_frame=True))
+                other.send(can.Message(arbitration_id=0x102, is_extended_id=False, data=b"good"))
+                await read_until(near, lambda: bool(near.frames))
+                assert near.frames == [(0x102, b"good")]
+                assert near.bus.counters.foreign == 1
+        finally:
+            await near.bus.close()
+
+    run(test())
+
+
+def test_a_bus_read_in_batches_that_disappears_is_reopened(wire: Wire) -> None:
+    async def test() -> None:
+        near = End(wire, wire.near, in_batches=True)
+        near.bus.open()
+        try:
+            wire.disappear()
+            near.bus.send(CanFrame(0x080, b"lost", fd=False))
+            await read_until(near, lambda: not near.bus.up)
+            wire.come_back()
+            await read_until(near, lambda: near.bus.up)
+            assert near.changes[:3] == [True, False, True]
+            async with stranger(wire) as other:
+                other.send(can.Message(arbitration_id=0x102, is_extended_id=False, data=b"back"))
+                await read_until(near, lambda: bool(near.frames))
+        finally:
+            await near.bus.close()
 
     run(test())
 
