@@ -5,6 +5,7 @@ Numbers count for each reader, refused messages too, so that a reader knows what
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgpack
@@ -15,6 +16,9 @@ GREETING = "tap/greeting"
 """Topic of the first message, which says who sends."""
 LONGEST = 400_000
 """Bytes of a message: what a socket takes at the kernel's usual limit of its buffer."""
+
+MOST_CHOSEN = 1024
+"""Bytes of a reader's choice."""
 
 _pack = msgpack.Packer(autoreset=True).pack
 
@@ -43,3 +47,20 @@ def decode(datagram: bytes) -> TapMessage:
     if tuple(map(type, message)) != (int, str, int, bytes):
         raise CodecError("a message of the tap has fields of other types")
     return message
+
+
+def encode_choice(topics: Sequence[str]) -> bytes:
+    """What a reader sends to hear only topics that begin so; the greeting comes anyway."""
+    out: bytes = _pack(list(topics))
+    return out
+
+
+def decode_choice(datagram: bytes) -> tuple[str, ...]:
+    """Raises CodecError."""
+    try:
+        topics = tuple(msgpack.unpackb(datagram))
+    except Exception:  # msgpack raises its own family
+        raise CodecError("a choice of topics that is none") from None
+    if not all(isinstance(topic, str) for topic in topics):
+        raise CodecError("a choice of topics that is none")
+    return topics

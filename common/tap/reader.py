@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from common.errors import CodecError, TandemError
-from common.tap.message import LONGEST, TapMessage, decode
+from common.tap.message import LONGEST, TapMessage, decode, encode_choice
 
 
 class TapReader:
     """A connection to one process's tap; a context manager."""
 
-    def __init__(self, path: Path) -> None:
-        """Connect. Raises TandemError where nobody listens or this user may not read."""
+    def __init__(self, path: Path, topics: Sequence[str] | None = None) -> None:
+        """Connect. Raises TandemError where nobody listens or this user may not read.
+
+        `topics`: how those begin that are wanted; None: all. Who chooses spares the sender all others, and
+        is given no snapshot.
+        """
         self.path = path
         self.missed = 0
         """Messages that this reader was too slow for."""
@@ -25,6 +30,8 @@ class TapReader:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
         try:
             self._socket.connect(str(path))
+            if topics is not None:
+                self._socket.send(encode_choice(topics))
         except OSError as error:
             self._socket.close()
             raise TandemError(

@@ -10,14 +10,14 @@ class Readers(Protocol):
 
     @property
     def read(self) -> bool:
-        """Whether anybody reads."""
+        """Whether anybody reads everything."""
 
     @property
     def behind(self) -> bool:
         """Whether one who reads lacks messages."""
 
     def put(self, topic: str, payload: bytes, stamp_ns: int | None = None) -> None:
-        """Hand one message to all readers."""
+        """Hand one message to all readers that want it."""
 
     def put_snapshot(self, topic: str, payload: bytes) -> None:
         """Hand on what a reader that lacks messages must know."""

@@ -15,9 +15,9 @@ from pathlib import Path
 import msgpack
 
 from common.clock import monotonic_ns
-from common.errors import TandemError
+from common.errors import CodecError, TandemError
 from common.tap.config import TapConfig
-from common.tap.message import LONGEST, TapMessage, encode
+from common.tap.message import GREETING, LONGEST, MOST_CHOSEN, TapMessage, decode_choice, encode
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +38,8 @@ class _Reader:
     """Lacks something that came before: owed a snapshot."""
     full: bool = False
     """Could not take the newest message."""
+    chosen: tuple[str, ...] | None = None
+    """How the topics begin that it wants; None: it wants all."""
 
 
 class TapSender:
@@ -85,8 +87,8 @@ class TapSender:
 
     @property
     def read(self) -> bool:
-        """Whether anybody reads: without readers nothing need be encoded."""
-        return bool(self._readers)
+        """Whether anybody reads everything: else nothing need be encoded for the tap alone."""
+        return any(reader.chosen is None for reader in self._readers)
 
     @property
     def count(self) -> int:
@@ -97,12 +99,13 @@ class TapSender:
     def behind(self) -> bool:
         """Whether a reader that reads lacks messages, so that it cannot go on without a snapshot.
 
-        One that stands still is owed none before it reads again: a snapshot costs the loop milliseconds.
+        One that stands still is owed none before it reads again: a snapshot costs the loop milliseconds. One
+        that chose its topics is owed none.
         """
-        return any(reader.behind and not reader.full for reader in self._readers)
+        return any(reader.behind and not reader.full and reader.chosen is None for reader in self._readers)
 
     def put(self, topic: str, payload: bytes, stamp_ns: int | None = None) -> None:
-        """Hand one message to all readers."""
+        """Hand one message to all readers that want it."""
         stamp_ns = monotonic_ns() if stamp_ns is None else stamp_ns
         for reader in tuple(self._readers):
             self._send(reader, topic, payload, stamp_ns)
@@ -115,6 +118,8 @@ class TapSender:
                 reader.behind = False
 
     def _send(self, reader: _Reader, topic: str, payload: bytes, stamp_ns: int) -> bool:
+        if reader.chosen is not None and not topic.startswith(reader.chosen):
+            return True
         reader.number += 1
         try:
             reader.socket.send(encode(TapMessage(reader.number, topic, stamp_ns, payload)))
@@ -149,10 +154,31 @@ class TapSender:
         reader = _Reader(connection, pid)
         self._readers.append(reader)
         log.info("%s: process %d reads", self.path, pid)
-        self._send(reader, "tap/greeting", self._greeting(), monotonic_ns())
+        self._send(reader, GREETING, self._greeting(), monotonic_ns())
+        asyncio.get_running_loop().add_reader(connection, self._hear, reader)
+        self._hear(reader)  # one that chooses has often done so already
+
+    def _hear(self, reader: _Reader) -> None:
+        """A reader chose its topics, or has gone."""
+        try:
+            asked = reader.socket.recv(MOST_CHOSEN)
+            if asked:
+                reader.chosen = decode_choice(asked)
+                # once is enough: whatever else it sends costs this loop nothing
+                asyncio.get_running_loop().remove_reader(reader.socket)
+                return
+        except BlockingIOError:
+            return
+        except (OSError, CodecError) as error:
+            self._drop(reader, f": {error}")
+            return
+        self._drop(reader, "")
 
     def _drop(self, reader: _Reader, why: str) -> None:
+        if reader not in self._readers:
+            return
         self._readers.remove(reader)
+        asyncio.get_running_loop().remove_reader(reader.socket)
         reader.socket.close()
         log.info("%s: process %d has gone%s; %d messages refused", self.path, reader.pid, why, reader.refused)
 

@@ -24,6 +24,8 @@ from deploy.console.model.robot import LINK, TAP, RobotModel
 AGAIN_S = 0.5
 """Between two attempts to reach the tap."""
 LOOK_S = 0.25
+TOPICS = ("tandem/",)
+"""What is wanted of the tap: the link's messages."""
 Models = Mapping[str, RobotModel]
 
 log = logging.getLogger(__name__)
@@ -46,7 +48,7 @@ class Hearing:
         said = ""
         while True:
             try:
-                with TapReader(path) as reader:
+                with TapReader(path, TOPICS) as reader:
                     log.info("%s: the master is heard", path)
                     while True:
                         self.on_tap(await reader.read())
@@ -59,7 +61,7 @@ class Hearing:
     def on_tap(self, message: TapMessage) -> None:
         """One message of the tap."""
         self.heard_ns = monotonic_ns()
-        if message.topic.startswith("tandem/"):
+        if message.topic.startswith(TOPICS):
             self._take(message.topic, message.payload, message.stamp_ns, TAP)
 
     def listen(self, session: LinkSession, states: bool) -> None:

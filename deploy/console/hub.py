@@ -14,6 +14,7 @@ from common.clock import monotonic_ns, to_ns
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from deploy.console.deadman import DeadmanRelay
+from deploy.console.model.guard_table import ENGAGED
 from deploy.console.model.robot import RobotModel
 from deploy.console.session import Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
@@ -186,7 +187,7 @@ class Hub:
             if self.losing_page_stops and now_ns - gone_ns > to_ns(LOST_S):
                 del self.engaged[robot]
                 self._gone_ns.pop(robot, None)
-                if self.models[robot].guard in ("align", "track", "clutch"):
+                if self.models[robot].guard in ENGAGED:
                     self.stoppers[robot].stop("the page that engaged the robot was lost")
 
 

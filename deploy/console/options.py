@@ -14,7 +14,6 @@ from deploy.client.destination import destination
 from deploy.console.run import ConsoleOptions
 from master.config import MasterConfig
 from master.deadman.config import ConsoleHold
-from slave.config import SlaveConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +53,8 @@ def console_options(chosen: ConsoleChoices, on_ready: Callable[[str], None]) -> 
     hold = file.operator.deadman if file is not None else None
     zones = None
     if chosen.slave is not None:
+        from slave.config import SlaveConfig  # loads MuJoCo
+
         zones = [zone.model_dump() for zone in load_config(chosen.slave, SlaveConfig).guard.zones]
     return ConsoleOptions(
         where,

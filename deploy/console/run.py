@@ -24,13 +24,13 @@ from deploy.console.app import ConsoleApp
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.hearing import Hearing
 from deploy.console.hub import VIEW_HZ, Hub, person_of, stranger
+from deploy.console.model.guard_table import STATES, TRANSITIONS
 from deploy.console.model.pictures import STALE_S
 from deploy.console.model.robot import SILENT_S, RobotModel, Whose
 from deploy.console.model.scene import scene
 from deploy.console.outbox import WINDOW
 from deploy.console.session import Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
-from slave.guard.states import TRANSITIONS, State
 
 log = logging.getLogger(__name__)
 
@@ -133,8 +133,8 @@ def _setup(options: ConsoleOptions) -> dict[str, object]:
         "hardware_estop": config.hardware_estop,
         "deadman": options.deadman,
         "losing_page_stops": config.losing_page == "stop",
-        "guard_states": [state.value for state in State],
-        "transitions": [[str(before), str(by), str(after)] for (before, by), after in TRANSITIONS.items()],
+        "guard_states": list(STATES),
+        "transitions": list(TRANSITIONS),
         "deadman_key": config.deadman_key,
         "stale_picture_s": STALE_S,
         "silent_s": SILENT_S,

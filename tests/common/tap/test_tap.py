@@ -192,3 +192,43 @@ def test_a_message_comes_back_and_nonsense_is_refused() -> None:
     for nonsense in (b"", b"\xff", msgpack.packb([1, "t", 2]), msgpack.packb([1, b"t", 2, b""])):
         with pytest.raises(CodecError):
             decode(nonsense)
+
+
+def test_a_reader_that_chose_its_topics_gets_those_and_is_owed_no_snapshot(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        with TapReader(sender.path, ["tandem/"]) as reader:
+            await accepted(sender, 1)
+            while sender.read:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+            assert not sender.behind
+            for number in range(3):
+                sender.put("suit/frames", b"frames", number)
+                sender.put("tandem/robot-1/state", b"state", number)
+            sender.put_snapshot("suit/snapshot", b"snapshot")
+            assert (await reader.read()).topic == GREETING
+            heard = [await reader.read() for _ in range(3)]
+            assert {message.topic for message in heard} == {"tandem/robot-1/state"}
+            assert reader.missed == 0, "numbers count what was wanted"
+            with TapReader(sender.path) as other:
+                await accepted(sender, 2)
+                assert sender.read
+                sender.put("suit/frames", b"frames")
+                assert [(await other.read()).topic for _ in range(2)] == [GREETING, "suit/frames"]
+
+    run(tmp_path / "tap", story)
+
+
+@pytest.mark.parametrize("choice", [b"nonsense", b"\x05", msgpack.packb([5])])
+def test_a_reader_that_sends_nonsense_is_let_go(tmp_path: Path, choice: bytes) -> None:
+    async def story(sender: TapSender) -> None:
+        with TapReader(sender.path) as reader:
+            await accepted(sender, 1)
+            reader._socket.send(choice)
+            while sender.count:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+            sender.put("a", b"b")
+            assert (await reader.read()).topic == GREETING
+            with pytest.raises(TandemError, match="ended"):
+                await reader.read()
+
+    run(tmp_path / "tap", story)
