@@ -9,7 +9,7 @@ import numpy as np
 from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.guard.zones import Zone, distance_model
-from slave.model.distance import Indices
+from slave.model.distance import CLOSE_M, Indices
 
 TOUCHES_M = 0.01
 """A part so near to a zone's margin, or to the zone itself where parts may enter, counts as being there: the
@@ -46,7 +46,7 @@ class ZoneForces:
             self._beyond.clear()
             return
         weight = np.where(np.isnan(external_nm) | np.isinf(threshold_nm), 0.0, 1.0 / threshold_nm)
-        near = self._model.near(position_rad, close=True)
+        near = self._model.near(position_rad, CLOSE_M)
         owner = self._model.obstacle[near.pair]
         for place, zone in enumerate(self._zones):
             assert zone.max_force_n is not None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.quaternion import Array
+from common.wire.messages import Mask
 
 _PERIOD_S = 0.006
 """A step longer than this is late."""
@@ -58,18 +59,19 @@ def way_to_stop(velocity_rad_s: Array, brake_rad_s2: Array, dt_s: float) -> Brak
     return BrakingWay(velocity_rad_s, brake_rad_s2, dt_s, np.copysign(way, velocity_rad_s), parts, period_s)
 
 
-def moments(apart_m: Array, first_m: Array, stride_m: float, parts: int) -> list[int]:
-    """Which moments of a way to look at: `apart_m` (K, R) is what each kind has come towards each other.
+def next_look(apart_m: Array, spare_m: Array, stride_m: Array, parts: int = 0) -> int | None:
+    """The next moment of a way to look at; None: none, as nothing can come too near on the rest of it.
 
-    The first as late as `first_m` (R,) lets, the others a stride further each, and always the next setpoint.
+    `apart_m` (K, R): how far each kind of pair may have come towards each other since the last look, in which
+    it had `spare_m` (R,). As late as no kind has gone further than its spare and its `stride_m` (R,), but one
+    moment on at least. The end of the step at hand, moment `parts` - 1, is the next setpoint: it is looked at
+    unless nothing can be too near there.
     """
     last = len(apart_m) - 1
-    free = np.all(apart_m <= first_m, axis=1)
-    first = last if free[last] else max(int(np.argmin(free)) - 1, 0)
-    # not the growth of the greatest: what grows may be another kind each time
-    passed_m = np.append(0.0, np.cumsum(np.diff(apart_m, axis=0).max(axis=1)))
-    looks = [first]
-    while looks[-1] < last:
-        onward = int(np.searchsorted(passed_m, passed_m[looks[-1]] + stride_m, "right")) - 1
-        looks.append(max(onward, looks[-1] + 1))
-    return sorted({parts - 1, *looks})
+    free: Mask = np.all(apart_m <= spare_m, axis=1)
+    if free[last]:
+        return None
+    if parts and not free[parts - 1]:
+        return parts - 1
+    allowed: Mask = np.all(apart_m <= np.maximum(spare_m, stride_m), axis=1)
+    return last if allowed[last] else max(int(np.argmin(allowed)) - 1, 0)

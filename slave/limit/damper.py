@@ -23,16 +23,17 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.guard.zones import Zone, distance_model, speed_limits, zone_margins_m
-from slave.limit.braking import BrakingWay, moments, way_to_stop
-from slave.model.distance import CLOSE_M, REACH_M, NearPairs
+from slave.limit.braking import BrakingWay, next_look, way_to_stop
+from slave.model.distance import CLOSE_M, DistanceModel, NearPairs
 
 TIME_CONSTANT_S = 0.1
 """τ: at 10 cm beyond the margin a pair may approach at 1 m/s."""
 SKIN_M = 0.001
 """The damper stops this far before the margin, which rounding and curved ways then do not reach."""
-STRIDE_M = CLOSE_M
-"""On the way to standstill a pair is looked at again after this much way towards each other, at most. That is
-the sum of what each joint could add; convex parts that are apart at both ends then meet by 1 mm at most."""
+DIP_M = 0.001
+"""By so much a pair may come nearer between two looks at its way than it is at both."""
+_BENT_M = 0.25
+"""Radius by which ways are bent at most, where they are long enough to matter."""
 MOST_ROWS = 32
 """Of one kind in one programme: those that matter most. What is left out the look at the way still sees."""
 MOST_CUTS = 2
@@ -80,6 +81,18 @@ class _Rows:
         return _Rows(np.vstack([self.of, other.of]), np.append(self.least, other.least))
 
 
+def strides_m(model: DistanceModel, margins_m: Array) -> Array:
+    """(R,) how far joints may bring pairs of each kind along each other between two looks, for `DIP_M`.
+
+    Two parts that pass each other on an even way of length s, and keep their margin at both ends, are nearer
+    by at most s² / 8 r in between, where r is the sum of their radii and the margin. A bent way adds as much,
+    with the radius of its bend for r. So thin parts are looked at more often.
+    """
+    round_m = np.full(len(model.levers_m), np.inf)
+    np.minimum.at(round_m, model.kind, np.where(np.isfinite(margins_m), model.radius_m + margins_m, np.inf))
+    return np.asarray(np.sqrt(8.0 * DIP_M / (1.0 / np.maximum(round_m, DIP_M) + 1.0 / _BENT_M)))
+
+
 class DistanceDamper:
     """Limits the velocity (J,) of every setpoint. `self_margin_cm` and `zones` are the guard's."""
 
@@ -87,13 +100,16 @@ class DistanceDamper:
         self._model = model = distance_model(skeleton, self_margin_cm, zones)
         margins_m = np.array(zone_margins_m(self_margin_cm, zones))[1 + model.obstacle]
         self._margin_m = margins_m
+        self._slows = any(zone.max_speed_m_s is not None for zone in zones)
         # the robot's own parts have place -1
         self._most_m_s, self._slow_from_m = (
             np.append(a, b) for a, b in zip(speed_limits(zones), (np.inf, 0.0), strict=True)
         )
-        self._kept = np.zeros(len(model.levers_m), np.bool_)
-        """(R,) whether there are pairs of this kind that must not meet."""
-        np.logical_or.at(self._kept, model.kind, np.isfinite(margins_m))
+        kept = np.zeros(len(model.levers_m), np.bool_)
+        np.logical_or.at(kept, model.kind, np.isfinite(margins_m))
+        self._kept_m = np.where(kept, 0.0, np.inf)
+        """(R,) inf for kinds of pairs that may meet."""
+        self._stride_m = strides_m(model, margins_m)
         joints = model.levers_m.shape[1]
         self._cost = np.eye(joints), np.zeros(joints)
         self.clock: Callable[[], int] = lambda: 0
@@ -111,19 +127,27 @@ class DistanceDamper:
     def limit(self, step: DamperStep) -> Array:
         """The velocity (J,) to go on with; `held_back` and `words` tell about it."""
         began_ns = self.clock()
-        near = self._model.near(step.position_rad)
-        floor_m = self._margin_m.copy()
+        model = self._model
+        aim_m_s, wish_m_s = model.levers_m @ np.abs(step.aim_rad_s), model.levers_m @ np.abs(step.wish_rad_s)
+        # what neither can bring together in τ need not be found
+        fastest_m_s = max(float(aim_m_s.max()), float(wish_m_s.max()))
+        near = model.near(step.position_rad, TIME_CONSTANT_S * fastest_m_s + SKIN_M)
+        kind, margin_m = model.kind.take(near.pair), self._margin_m.take(near.pair)
         # what stands inside a margin already may not come nearer than it is
+        floor_m = self._margin_m.copy()
         np.minimum.at(floor_m, near.pair, near.distance_m)
+        spare_m = self._spare_m(near, floor_m)
         asked = step.wish_rad_s
-        step, slow = self._slowed(near, step)
-        rows = self._damping(near, step).and_also(slow)
+        slowed, slow = self._slowed(near, aim_m_s.take(kind), step)
+        if slowed is not step:
+            step, wish_m_s = slowed, model.levers_m @ np.abs(slowed.wish_rad_s)
+        rows = self._damping(near.distance_m - margin_m - SKIN_M, wish_m_s.take(kind), step).and_also(slow)
         velocity, late = step.wish_rad_s, False
         for _ in range(MOST_CUTS + 1):
             if rows.violated_by(velocity):
                 velocity = self._nearest_to_the_aim(rows, step)
             late = self.clock() - began_ns > BUDGET_NS
-            cut = None if late else self._cut(near, floor_m, velocity, step)
+            cut = None if late else self._cut(spare_m, floor_m, velocity, step)
             if cut is None:
                 break
             rows = rows.and_also(cut)
@@ -133,14 +157,12 @@ class DistanceDamper:
             velocity = step.braking_rad_s
         self._late_in_a_row = self._late_in_a_row + 1 if late else 0
         self._stands = bool(np.abs(velocity).max() < _STANDS_RAD_S)
-        self._tell(near, np.abs(velocity - asked))
+        self._tell(near, margin_m, np.abs(velocity - asked))
         return velocity
 
-    def _damping(self, near: NearPairs, step: DamperStep) -> _Rows:
-        """The damper of every pair that the wish could bring together too fast."""
-        spare_m = near.distance_m - self._margin_m[near.pair] - SKIN_M
-        fastest = self._model.levers_m @ np.abs(step.wish_rad_s)
-        rows = np.flatnonzero(spare_m < TIME_CONSTANT_S * fastest[self._model.kind[near.pair]])
+    def _damping(self, spare_m: Array, fastest_m_s: Array, step: DamperStep) -> _Rows:
+        """The damper of every near pair that the wish could bring together too fast, at `fastest_m_s`."""
+        rows = (spare_m < TIME_CONSTANT_S * fastest_m_s).nonzero()[0]
         if len(rows) > 2 * MOST_ROWS:
             rows = rows[np.argpartition(spare_m[rows], 2 * MOST_ROWS)[: 2 * MOST_ROWS]]
         gradient, spare_m = self._model.gradient(rows), spare_m[rows]
@@ -148,26 +170,29 @@ class DistanceDamper:
         parting = np.where(spare_m > -SKIN_M, -spare_m, 0.0) / TIME_CONSTANT_S
         return self._possible(gradient, parting, step)
 
-    def _slowed(self, near: NearPairs, step: DamperStep) -> tuple[DamperStep, _Rows | None]:
+    def _slowed(
+        self, near: NearPairs, fastest_m_s: Array, step: DamperStep
+    ) -> tuple[DamperStep, _Rows | None]:
         """Aim and wish within the speed limits of zones, and rows that keep them in these directions."""
-        zone = self._model.obstacle[near.pair]
-        further_m = np.maximum(near.distance_m - self._slow_from_m[zone], 0.0)
-        most_m_s = self._most_m_s[zone] + further_m / TIME_CONSTANT_S
-        fastest_m_s = self._model.levers_m @ np.abs(step.aim_rad_s)
-        rows = np.flatnonzero(most_m_s < fastest_m_s[self._model.kind[near.pair]])
+        if not self._slows:
+            return step, None
+        zone = self._model.obstacle.take(near.pair)
+        further_m = np.maximum(near.distance_m - self._slow_from_m.take(zone), 0.0)
+        most_m_s = self._most_m_s.take(zone) + further_m / TIME_CONSTANT_S
+        rows = (most_m_s < fastest_m_s).nonzero()[0]
         if not len(rows):
             return step, None
         most_m_s = most_m_s[rows]
         velocity_m_s = self._model.velocity(rows, step.aim_rad_s)
-        speed_m_s = np.linalg.norm(velocity_m_s, axis=1)
-        over = np.flatnonzero(speed_m_s > most_m_s)
+        speed_m_s = np.sqrt((velocity_m_s * velocity_m_s).sum(axis=1))
+        over = (speed_m_s > most_m_s).nonzero()[0]
         if not len(over):
             return step, None
         # all joints that move the part are slowed alike, so that it goes the same way
         moves = self._model.levers_m[self._model.kind[near.pair[rows[over]]]] > 0.0
         share = np.where(moves, (most_m_s[over] / speed_m_s[over])[:, None], 1.0).min(axis=0)
         aim = share * step.aim_rad_s
-        wish = np.clip(aim, step.lowest_rad_s, step.highest_rad_s)
+        wish = np.minimum(np.maximum(aim, step.lowest_rad_s), step.highest_rad_s)
         slowed = replace(step, aim_rad_s=aim, wish_rad_s=wish)
         over = over[np.argsort(most_m_s[over] / speed_m_s[over])[: MOST_ROWS // 2]]
         direction = velocity_m_s[over] / speed_m_s[over, None]
@@ -179,54 +204,66 @@ class DistanceDamper:
         if len(least) > MOST_ROWS:
             most = np.argpartition(lack, -MOST_ROWS)[-MOST_ROWS:]
             of, least = of[most], least[most]
-        highest = np.maximum(of * step.lowest_rad_s, of * step.highest_rad_s).sum(axis=1)
-        return _Rows(of, np.minimum(least, highest))
+        middle, half = (
+            0.5 * (step.lowest_rad_s + step.highest_rad_s),
+            0.5 * (step.highest_rad_s - step.lowest_rad_s),
+        )
+        return _Rows(of, np.minimum(least, of @ middle + np.abs(of) @ half))
 
-    def _cut(self, near: NearPairs, floor_m: Array, velocity: Array, step: DamperStep) -> _Rows | None:
+    def _cut(self, spare_m: Array, floor_m: Array, velocity: Array, step: DamperStep) -> _Rows | None:
         """What this velocity would break on the way to standstill, as rows that forbid it; None: nothing."""
-        model, spare_m, speed = self._model, self._spare(near, floor_m), np.abs(velocity)
+        model, speed = self._model, np.abs(velocity)
         far_rad = speed * (step.dt_s + speed / (2.0 * step.brake_rad_s2))
-        risky = model.levers_m @ far_rad > spare_m
-        if not risky.any():
+        risky = (model.levers_m @ far_rad > spare_m).nonzero()[0]
+        if not len(risky):
             return None
         way = way_to_stop(velocity, step.brake_rad_s2, step.dt_s)
         # no joint turns back on the way: what each adds only grows
-        apart_m, last = np.abs(way.gone_rad) @ (model.levers_m * risky[:, None]).T, len(way.gone_rad) - 1
+        apart_m = np.abs(way.gone_rad) @ model.levers_m.take(risky, 0).T
+        spare_m, stride_m, last = spare_m.take(risky), self._stride_m.take(risky), len(apart_m) - 1
         if (apart_m[last] <= spare_m).all():
             return None
+        suspect, suspected = -1, None
         if self._suspect is not None:
-            cut = self._broken_at(min(self._suspect, last), way, floor_m, step)[1]
+            suspect = min(self._suspect, last)
+            suspected, cut = self._broken_at(suspect, way, floor_m, step)
             if cut is not None:
                 return cut
-        for k in moments(apart_m, np.maximum(spare_m, STRIDE_M), STRIDE_M, way.parts):
-            then, cut = self._broken_at(k, way, floor_m, step)
-            if cut is not None:
-                self._suspect = k
-                return cut
-            ahead_m = apart_m[last] - apart_m[k]
-            spare_m = then.distance_m - floor_m[then.pair]
-            if ahead_m.max() <= CLOSE_M and (ahead_m[model.kind[then.pair]] <= spare_m).all():
+        k, onward = -1, next_look(apart_m, spare_m, stride_m, way.parts)
+        while onward is not None:
+            onward += k + 1
+            if suspected is not None and k < suspect <= onward:
+                k, then = suspect, suspected
+            else:
+                k = onward
+                then, cut = self._broken_at(k, way, floor_m, step)
+                if cut is not None:
+                    self._suspect = k
+                    return cut
+            if k == last:
                 break
+            ahead_m = self._spare_m(then, floor_m).take(risky)
+            onward = next_look(apart_m[k + 1 :] - apart_m[k], ahead_m, stride_m)
         self._suspect = None
         return None
+
+    def _spare_m(self, near: NearPairs, floor_m: Array) -> Array:
+        """(R,) how far the pairs of each kind may come towards each other, at least."""
+        spare_m = self._kept_m + near.reach_m
+        np.minimum.at(spare_m, self._model.kind.take(near.pair), near.distance_m - floor_m.take(near.pair))
+        return spare_m
 
     def _broken_at(
         self, k: int, way: BrakingWay, floor_m: Array, step: DamperStep
     ) -> tuple[NearPairs, _Rows | None]:
         """A look at moment k of a way, and rows that forbid what is too near then; None: nothing is."""
-        then = self._model.near(step.position_rad + way.gone_rad[k], close=True)
-        lack_m = floor_m[then.pair] - then.distance_m
+        then = self._model.near(step.position_rad + way.gone_rad[k], CLOSE_M)
+        lack_m = floor_m.take(then.pair) - then.distance_m
         if lack_m.max(initial=0.0) <= 0.0:
             return then, None
         worst = np.argsort(-lack_m)[: min(np.count_nonzero(lack_m > 0.0), MOST_ROWS)]
         of = self._model.gradient(worst) * way.moving_s(k)
         return then, self._possible(of, lack_m[worst] + 0.1 * SKIN_M + of @ way.velocity_rad_s, step)
-
-    def _spare(self, near: NearPairs, floor_m: Array) -> Array:
-        """(R,) how far the pairs of each kind may come towards each other, at least."""
-        spare_m = np.where(self._kept, REACH_M, np.inf)
-        np.minimum.at(spare_m, self._model.kind[near.pair], near.distance_m - floor_m[near.pair])
-        return spare_m
 
     def _nearest_to_the_aim(self, rows: _Rows, step: DamperStep) -> Array:
         """Solve for the v of min Σ ((v - aim) / v_max)² within bounds and rows.
@@ -238,19 +275,20 @@ class DistanceDamper:
         bounds = (step.lowest_rad_s - aim) / scale, (step.highest_rad_s - aim) / scale
         highest = np.concatenate([bounds[1], np.full(len(of), _FREE)])
         # not all rows may be possible at once; what braking keeps of them is
-        for least in (rows.least, np.minimum(rows.least, of @ step.braking_rad_s)):
+        for least in (rows.least, None):
+            if least is None:
+                least = np.minimum(rows.least, of @ step.braking_rad_s)
             lowest = np.concatenate([bounds[0], least - of @ aim])
             change, _, found, _ = daqp.solve(*self._cost, scaled, highest, lowest)
             if found == 1:
                 velocity = aim + np.asarray(change) * scale
-                return np.asarray(np.clip(velocity, step.lowest_rad_s, step.highest_rad_s))
+                return np.minimum(np.maximum(velocity, step.lowest_rad_s), step.highest_rad_s)
         return step.braking_rad_s
 
-    def _tell(self, near: NearPairs, lost_rad_s: Array) -> None:
+    def _tell(self, near: NearPairs, margin_m: Array, lost_rad_s: Array) -> None:
         self.held_back = lost_rad_s > _NOTICED_RAD_S
         self._nearest = None
         if self.held_back.any() and len(near.pair):
-            margin_m = self._margin_m[near.pair]
             k = int(np.argmin(near.distance_m - np.maximum(margin_m, 0.0)))
             self._nearest = int(near.pair[k]), float(near.distance_m[k])
 

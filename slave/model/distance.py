@@ -25,8 +25,11 @@ from slave.model.pairs import groups, moving, pairs
 REACH_M = 0.12
 """A pair further apart than its margin and this is not looked at."""
 
-CLOSE_M = 0.05
-"""The same, for a quicker look."""
+CLOSE_M = 0.02
+"""The same, for the quickest look."""
+
+_REACHES_M = (CLOSE_M, 0.05, REACH_M)
+"""A look takes the least of these that is enough: the fewer pairs it finds, the less it costs."""
 
 Indices = NDArray[np.intp]
 
@@ -47,6 +50,8 @@ class NearPairs:
     """(K,) places in `DistanceModel.names`."""
     distance_m: Array
     """(K,) between the surfaces; below 0 inside."""
+    reach_m: float
+    """All other pairs are further apart than this beyond their margins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +67,21 @@ class _Plan:
     carries: Array
     kind: Indices
     levers_m: Array
+    radius_m: Array
+
+
+class _Look:
+    """A model with its data, whose arrays are fetched once: each access would build a new view."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model, self.data = model, mujoco.MjData(model)
+        self.hinge, self.axis, self.anchor = self.data.qpos, self.data.xaxis, self.data.xanchor
+
+    def at(self, hinge: Array) -> None:
+        """Find the near pairs at hinge angles (H,)."""
+        self.hinge[:] = hinge
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_collision(self.model, self.data)
 
 
 class DistanceModel:
@@ -73,14 +93,15 @@ class DistanceModel:
         """`obstacles` beside the robot's own stand, and the margin of the robot itself, then of each."""
         margins = tuple(margins_m) or (0.0,) * (1 + len(obstacles))
         plan = _plan(skeleton, tuple(obstacles), margins)
-        close = copy.copy(plan.model)
-        close.pair_margin += CLOSE_M - REACH_M
-        close.pair_gap += CLOSE_M - REACH_M
-        self._far, self._close = (plan.model, mujoco.MjData(plan.model)), (close, mujoco.MjData(close))
-        self._data = self._far[1]
-        self._hinges_per_joint, self._pair_of, self._carries = (
-            plan.hinges_per_joint, plan.pair_of, plan.carries,
-        )  # fmt: skip
+        self._looks = {reach_m: _Look(_reaching(plan.model, reach_m)) for reach_m in _REACHES_M}
+        self._newest = self._looks[REACH_M]
+        self._hinges_per_joint, self._carries = plan.hinges_per_joint, plan.carries
+        self._joints_of_hinges = np.ascontiguousarray(plan.hinges_per_joint.T)
+        self._pair_of, self._geoms = plan.pair_of.ravel(), len(plan.pair_of)
+        self._geom: Indices = np.empty((0, 2), np.intp)
+        """(K, 2) the two of each row of the newest `near`."""
+        self._moment: Array | None = None
+        """(H, 3) anchor x axis of every hinge in the posture of the newest `near`; None: not computed yet."""
         self.names = plan.names
         """(P,) what people call the two of every pair; the first is a part of the robot."""
         self.obstacle = plan.obstacle
@@ -89,62 +110,79 @@ class DistanceModel:
         """(P,) the row in `levers_m` of each pair: pairs between which the same joints turn share one."""
         self.levers_m = plan.levers_m
         """(R, J) m a rad: how far each joint moves the two of such a pair relative to each other at most."""
+        self.radius_m = plan.radius_m
+        """(P,) sum of the radii of the two of each pair: 0 for the edges of a box, inf for a plane."""
 
-    def near(self, position_rad: Array, close: bool = False) -> NearPairs:
-        """Pairs nearer than `REACH_M` beyond their margins at joint angles (J,); `close`: than `CLOSE_M`."""
-        model, data = self._close if close else self._far
-        self._data = data
-        data.qpos[:] = position_rad @ self._hinges_per_joint
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_collision(model, data)
-        geom = data.contact.geom
-        return NearPairs(self._pair_of[geom[:, 0], geom[:, 1]], data.contact.dist.copy())
+    def near(self, position_rad: Array, reach_m: float = REACH_M) -> NearPairs:
+        """Pairs nearer than `reach_m`, or somewhat more, beyond their margins at joint angles (J,).
+
+        No look reaches further than `REACH_M`.
+        """
+        reach_m = next((one for one in _REACHES_M if one >= reach_m), REACH_M)
+        look = self._newest = self._looks[reach_m]
+        look.at(position_rad @ self._hinges_per_joint)
+        self._moment = None
+        contact = look.data.contact
+        self._geom = geom = contact.geom.astype(np.intp)
+        pair = self._pair_of.take(geom[:, 0] * self._geoms + geom[:, 1])
+        return NearPairs(pair, contact.dist.copy(), reach_m)
 
     def gradient(self, rows: Indices) -> Array:
         """(rows, J): how fast distances of the newest `near` grow by each joint's rad/s.
 
         For the nearest points p on b and q on a, and the normal n from a to b:  d' = n · (p' - q').
         """
-        contact = self._data.contact
-        geom = contact.geom[rows]
+        geom = self._geom.take(rows, 0)
+        carried = self._carries.take(geom[:, 1], 0)
+        carried -= self._carries.take(geom[:, 0], 0)
         # the point midway between p and q does as well as either: they differ along n
-        return self._along(
-            rows, contact.frame[rows, :3], self._carries[geom[:, 1]] - self._carries[geom[:, 0]]
-        )
+        return self._along(rows, self._newest.data.contact.frame[rows, :3], carried)
 
     def towards(self, rows: Indices, direction: Array) -> Array:
         """(rows, J): how fast the robot's points nearest to obstacles go along `direction`, (rows, 3)."""
-        return self._along(rows, direction, self._carries[self._data.contact.geom[rows]].max(axis=1))
+        return self._along(rows, direction, self._carried(rows))
 
     def velocity(self, rows: Indices, rate_rad_s: Array) -> Array:
         """(rows, 3) m/s: of the robot's points nearest to obstacles, at joint rates (J,)."""
-        carried = self._carries[self._data.contact.geom[rows]].max(axis=1)
-        axis, anchor = self._data.xaxis, self._data.xanchor
-        turning = (rate_rad_s @ self._hinges_per_joint)[:, None] * axis
-        # hinges with axes h through o that turn at w:  Σ w h x (p - o) = (Σ w h) x p - Σ w h x o
-        out: Array = _cross(carried @ turning, self._data.contact.pos[rows])
-        out -= carried @ _cross(turning, anchor)
+        carried = self._carried(rows)
+        turning = rate_rad_s @ self._hinges_per_joint
+        # hinges with axes h through o that turn at w:  Σ w h x (p - o) = (Σ w h) x p + Σ w (o x h)
+        out = cross(
+            carried @ (turning[:, None] * self._newest.axis), self._newest.data.contact.pos.take(rows, 0)
+        )
+        out += carried @ (turning[:, None] * self._moments())
         return out
 
+    def _carried(self, rows: Indices) -> Array:
+        """(rows, H): 1 where the hinge moves the robot's part of a pair with an obstacle."""
+        geom = self._geom.take(rows, 0)
+        return np.maximum(self._carries.take(geom[:, 0], 0), self._carries.take(geom[:, 1], 0))
+
+    def _moments(self) -> Array:
+        if self._moment is None:
+            self._moment = cross(self._newest.anchor, self._newest.axis)
+        return self._moment
+
     def _along(self, rows: Indices, direction: Array, carried: Array) -> Array:
-        """A hinge with axis h through o moves p along n by  n · (h x (p - o)) = h · (p x n) - n · (h x o)."""
-        axis, anchor = self._data.xaxis, self._data.xanchor
-        turning = _cross(self._data.contact.pos[rows], direction) @ axis.T
-        turning -= direction @ _cross(axis, anchor).T
-        out: Array = (carried * turning) @ self._hinges_per_joint.T
+        """A hinge with axis h through o moves p along n by  n · (h x (p - o)) = h · (p x n) + n · (o x h)."""
+        turning = cross(self._newest.data.contact.pos.take(rows, 0), direction) @ self._newest.axis.T
+        turning += direction @ self._moments().T
+        turning *= carried
+        out: Array = turning @ self._joints_of_hinges
         return out
 
 
 _ZONE, _PART = "zone ", "part "
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Of rows of three; numpy's own takes four times as long."""
-    out: Array = a[:, _AFTER] * b[:, _BEFORE] - a[:, _BEFORE] * b[:, _AFTER]
+_AFTER, _BEFORE = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products of rows (N, 3); numpy's own takes six times as long."""
+    out: Array = a.take(_AFTER, 1) * b.take(_BEFORE, 1)
+    out -= a.take(_BEFORE, 1) * b.take(_AFTER, 1)
     return out
-
-
-_AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
 def _shown(model: mujoco.MjModel, geom: int, part: dict[str, str]) -> str:
@@ -179,6 +217,7 @@ def _plan(skeleton: Skeleton, obstacles: tuple[Obstacle, ...], margins_m: tuple[
     return _Plan(
         model, hinges_per_joint, pair_of, names=[(shown[a], shown[b]) for a, b in both],
         obstacle=np.maximum(owner[first], owner[second]), carries=carries, kind=kind, levers_m=levers_m,
+        radius_m=_radius_m(model)[first] + _radius_m(model)[second],
     )  # fmt: skip
 
 
@@ -218,6 +257,21 @@ def _compiled(
         for a in range(len(geoms)):
             watch(f"{_PART}{a}", _ZONE + obstacle.name, margin_m)
     return mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+
+
+def _reaching(model: mujoco.MjModel, reach_m: float) -> mujoco.MjModel:
+    """The model whose pairs begin at another reach."""
+    out = copy.copy(model)
+    out.pair_margin += reach_m - REACH_M
+    out.pair_gap += reach_m - REACH_M
+    return out
+
+
+def _radius_m(model: mujoco.MjModel) -> Array:
+    """(geoms,) by how much each is round: the radius of a capsule or sphere, 0 of a box, inf of a plane."""
+    kind = model.geom_type
+    out: Array = np.where(kind == mujoco.mjtGeom.mjGEOM_BOX, 0.0, model.geom_size[:, 0])
+    return np.where(kind == mujoco.mjtGeom.mjGEOM_PLANE, np.inf, out)
 
 
 def _carries(model: mujoco.MjModel) -> Array:

@@ -7,7 +7,7 @@ from common.quaternion import Array
 from slave.guard.events import Rule
 from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Zone, distance_model
 from slave.limit import damper
-from slave.limit.braking import moments, way_to_stop
+from slave.limit.braking import next_look, way_to_stop
 from tests.slave.limit.apart import (
     CROSSED,
     DT_S,
@@ -238,7 +238,7 @@ def test_without_the_damping_a_hand_comes_fast_to_the_margin(monkeypatch: pytest
 
 
 def test_without_its_part_a_zone_does_not_slow(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(damper.DistanceDamper, "_slowed", lambda _, near, step: (step, None))
+    monkeypatch.setattr(damper.DistanceDamper, "_slowed", lambda _, near, fastest, step: (step, None))
     with pytest.raises(AssertionError):
         test_a_zone_limits_the_speed_of_what_is_inside()
 
@@ -253,16 +253,54 @@ def test_a_step_right_after_the_last_one_costs_no_more_than_any_other() -> None:
     assert np.abs(way_rad[-1] - continuous).max() <= 0.5 * 0.001 * float(speed.max()) + 1e-6
 
 
-def test_no_two_looks_at_the_way_are_more_than_a_stride_apart() -> None:
+def looks_at(apart_m: Array, spare_m: Array, stride_m: Array, parts: int) -> list[int]:
+    """The moments at which a way is looked at, where every look finds what the first one had to spare."""
+    looks: list[int] = []
+    onward = next_look(apart_m, spare_m, stride_m, parts)
+    while onward is not None:
+        looks.append(onward if not looks else looks[-1] + 1 + onward)
+        if looks[-1] == len(apart_m) - 1:
+            break
+        onward = next_look(apart_m[looks[-1] + 1 :] - apart_m[looks[-1]], spare_m, stride_m)
+    return looks
+
+
+def test_no_two_looks_at_the_way_are_further_apart_than_spare_or_stride() -> None:
     """Whichever kind of pair it is that comes nearer, and the next setpoint is always looked at."""
     growth = np.random.default_rng(3).uniform(0.0, 0.02, (60, 4))
     growth[:30, 1:] *= 0.1
     growth[30:, 0] = 0.0  # another kind than at first goes on
     apart_m = np.cumsum(growth, axis=0)
-    looks = moments(apart_m, np.full(4, 0.12), 0.05, 2)
-    assert 1 in looks
-    assert looks[-1] == 59
-    later = [k for k in looks if k > 1]
-    assert apart_m[later[0]].max() <= 0.12
-    assert np.diff(apart_m[later], axis=0).max() <= 0.05
-    assert len(later) < 20
+    spare_m, stride_m = np.array([0.001, 0.03, 0.03, 0.03]), np.array([0.04, 0.02, 0.02, 0.02])
+    looks = looks_at(apart_m, spare_m, stride_m, 2)
+    assert looks[0] == 1
+    assert (apart_m[-1] - apart_m[looks[-1]] <= spare_m).all()
+    assert (np.diff(apart_m[looks], axis=0) <= np.maximum(spare_m, stride_m)).all()
+    assert len(looks) < 35
+
+
+def test_a_way_on_which_nothing_can_come_too_near_is_not_looked_at() -> None:
+    apart_m = np.cumsum(np.full((10, 1), 0.01), axis=0)
+    none = np.zeros(1)
+    assert looks_at(apart_m, np.array([0.1001]), none, 1) == []
+    assert looks_at(apart_m, np.array([0.0999]), none, 1) == [8]
+    # the next setpoint, too, only where it could be too near
+    assert looks_at(apart_m, np.array([0.009]), np.array([0.2]), 1) == [0, 9]
+
+
+def test_a_thin_part_is_looked_at_so_often_that_nothing_slips_through_between_two_looks() -> None:
+    """Two round parts pass each other evenly, at their margin at both looks: how far inside are they?"""
+    model = distance_model(SKELETON, 100.0 * MARGIN_M, [RAIL, BED, HEAD])
+    margin_m = np.array([MARGIN_M, RAIL.margin_m, BED.margin_m, HEAD.margin_m])[1 + model.obstacle]
+    stride_m = damper.strides_m(model, margin_m)[model.kind]
+    round_m = model.radius_m + margin_m
+    inside_m = round_m - np.sqrt(round_m**2 - (0.5 * stride_m) ** 2)
+    assert inside_m.max() <= 1.02 * damper.DIP_M
+    assert inside_m.max() >= 0.5 * damper.DIP_M, "no oftener than needed"
+    assert stride_m.max() > 1.5 * stride_m.min(), "thick parts are looked at less often"
+
+
+def test_bent_ways_and_planes_have_strides_too() -> None:
+    model = distance_model(SKELETON, 100.0 * MARGIN_M, [WALL])
+    margin_m = np.array([MARGIN_M, WALL.margin_m])[1 + model.obstacle]
+    assert np.isfinite(damper.strides_m(model, margin_m)).all()
