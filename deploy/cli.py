@@ -41,6 +41,7 @@ from deploy.ops.replay.command import replay
 from deploy.ops.ros.command import ros
 from deploy.ops.router.command import router
 from deploy.ops.servos import servos
+from deploy.ops.session.commands import app as session_app
 from deploy.ops.sides import master, slave
 from deploy.ops.stops import stops
 from deploy.ops.suit.command import check
@@ -62,6 +63,7 @@ suit_app.command("check")(check)
 for _name, _group in {
     "calibrate": calibrate_app, "accuracy": accuracy_app, "keys": keys_app,
     "network": network_app, "profile": profile_app, "trial": trial_app, "suit": suit_app,
+    "session": session_app,
 }.items():  # fmt: skip
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (

@@ -13,9 +13,9 @@ from common.config.section import RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
+from common.recording.config import RecordingConfig
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.load import ProfileName
-from common.recording.config import RecordingConfig
 from common.tap.config import TapConfig
 from master.alarms.config import AlarmsConfig
 from master.capture.config import SuitSection

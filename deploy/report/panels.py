@@ -12,7 +12,7 @@ PANELS = {
     ),
     "Set up": (
         "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record",
-        "inspect", "import", "export",
+        "inspect", "session", "import", "export",
     ),
     "Judge": (
         "replay", "trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit",

@@ -11,7 +11,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["deploy/calibrate", "deploy/harness", "deploy/console"],
     ["deploy/client"],
     ["deploy/sim"],
-    ["deploy/measure", "deploy/recorded", "deploy/viewer"],
+    ["deploy/measure", "deploy/recorded", "deploy/viewer", "deploy/study"],
     ["deploy/report", "deploy/certificates", "deploy/examples", "deploy/ros"],
     ["master", "slave"],
     ["master/calibrate", "master/comfort", "master/alarms", "master/journal"],

@@ -161,6 +161,39 @@ def serve(
 
 
 @app.command()
+def verify(
+    folder: Annotated[Path, typer.Argument(help="Report folder of a trial.", exists=True, file_okay=False)],
+    tasks: Tasks = None,
+) -> None:
+    """Compute a trial's tables again from its cells, and compare them with the report in the folder.
+
+    If the folder is sealed (`tandem session seal`), the seal is verified first. It ends with status 1 and
+    names the lines and figures that differ.
+
+    Example: `tandem trial verify trial`
+    """
+    from deploy.experiments.trial.cell.folder import Folder
+    from deploy.experiments.trial.report.tasks import TASKS
+    from deploy.experiments.trial.report.verify import differences
+    from deploy.study.seal import SEAL
+    from deploy.study.seal import verify as verify_seal
+
+    sealed = (folder / SEAL).exists()
+    changed = verify_seal(folder)[1] if sealed else []
+    for one in changed:
+        typer.echo(f"{one.name}: {one.words}")
+    apart = differences(Folder(folder), tasks or TASKS)
+    for words in apart:
+        typer.echo(words)
+    if changed or apart:
+        raise TandemError(
+            f"{folder}: {len(changed) + len(apart)} things are not as sealed, or not what the cells give"
+        )
+    words = "the seal is whole" if sealed else "it is not sealed"
+    typer.echo(f"{folder}: every table is what the cells give; {words}")
+
+
+@app.command()
 def report(
     folder: Annotated[Path, typer.Argument(help="Report folder of a trial.", exists=True, file_okay=False)],
     tasks: Tasks = None,

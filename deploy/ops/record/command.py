@@ -57,6 +57,10 @@ def record(
         float | None,
         typer.Option(help="Stop after this many seconds; without it, stop with Ctrl-C.", min=0.1),
     ] = None,
+    session: Annotated[
+        Path | None,
+        typer.Option(help="With --tap: the folder of a session (`tandem session start`).", file_okay=False),
+    ] = None,
     may_miss: Annotated[
         bool, typer.Option("--may-miss", help="End with status 0 even if numbered messages are missing.")
     ] = False,
@@ -95,11 +99,15 @@ def record(
     each_s = 60.0 * minutes_per_file if minutes_per_file else None
     console = Console(stderr=True)
     if tap is not None:
+        from deploy.study.session import Session
+
+        of_study = None if session is None else Session(session)
 
         async def take(stop: asyncio.Event) -> None:
             with console.status("waiting for the process") as status:
                 console.print(
-                    await record_tap(tap, out, stop, status.update, seconds, each_s), highlight=False
+                    await record_tap(tap, out, stop, status.update, seconds, each_s, session=of_study),
+                    highlight=False,
                 )
 
         run_until_stopped(take)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 import msgpack
@@ -14,6 +16,7 @@ from common.process.runtime import until_stopped
 from common.tap.message import GREETING, TapMessage
 from common.tap.reader import TapReader
 from deploy.ops.record.tape import Tape
+from deploy.study.session import MARK_TOPIC, Session
 from master.journal.calls import MISSING
 
 GREETED_S = 5.0
@@ -28,10 +31,12 @@ async def record_tap(
     seconds: float | None = None,
     each_s: float | None = None,
     ends_when_failed: bool = False,
+    session: Session | None = None,
 ) -> str:
     """Record until `stop` is set, the time is over or the process ends. Returns a summary for people.
 
-    `ends_when_failed`: also once the disk takes nothing any more.
+    `ends_when_failed`: also once the disk takes nothing any more. `session`: of a study; its marks are
+    recorded, and nothing that its subject has not consented to.
     Raises TandemError where there is no tap, the disk failed, or this process was too slow for the tap.
     """
     with TapReader(path) as reader:
@@ -39,7 +44,8 @@ async def record_tap(
             first = await asyncio.wait_for(reader.read(), GREETED_S)
         except TimeoutError:
             raise TandemError(f"{path}: it says nothing; is it a tap of tandem?") from None
-        taking = _Taking(reader, Tape(out, _greeting(path, first), each_s), report, ends_when_failed)
+        head = {**_greeting(path, first), **(session.metadata() if session is not None else {})}
+        taking = _Taking(reader, Tape(out, head, each_s), report, ends_when_failed, session)
         try:
             await until_stopped(stop, taking.run(seconds))
         finally:
@@ -61,8 +67,15 @@ class _Taking:
     """One recording under way."""
 
     def __init__(
-        self, reader: TapReader, tape: Tape, report: Callable[[str], None], ends_when_failed: bool
+        self,
+        reader: TapReader,
+        tape: Tape,
+        report: Callable[[str], None],
+        ends_when_failed: bool,
+        session: Session | None,
     ) -> None:
+        self._session = session
+        self._marks = 0
         self._ends_when_failed = ends_when_failed
         self.tape = tape
         self._reader = reader
@@ -85,19 +98,31 @@ class _Taking:
             self._ended = str(error)
         finally:
             progress.cancel()
+            self._take_marks()
 
     def _take(self, message: TapMessage) -> None:
         if self._reader.missed > self._missed:
             self._missed = self._reader.missed
             self.tape.put(MISSING, b"", message.stamp_ns)
+        if self._session is not None and not self._session.may_record(message.topic):
+            return
         self._counts[message.topic] = self._counts.get(message.topic, 0) + 1
         self.tape.put(message.topic, message.payload, message.stamp_ns)
 
     async def _progress(self) -> None:
         while True:
             self._report(f"recording, {self._words()} (Ctrl-C ends it)")
+            self._take_marks()
             await self.tape.turn()
             await asyncio.sleep(PROGRESS_S)
+
+    def _take_marks(self) -> None:
+        """Record what has been marked since the last time."""
+        if self._session is None:
+            return
+        for mark in self._session.marks()[self._marks :]:
+            self._marks += 1
+            self.tape.put(MARK_TOPIC, json.dumps(asdict(mark)).encode(), mark.monotonic_ns)
 
     def _words(self) -> str:
         elapsed_s = max(1e-3, to_s(monotonic_ns() - self._since_ns))

@@ -1,0 +1,191 @@
+"""`tandem session …`."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from common.errors import TandemError
+from common.process.runtime import run as run_until_stopped
+from deploy.report.options import AsJson
+from deploy.report.output import in_a_folder
+
+app = typer.Typer(
+    no_args_is_help=True,
+    help="Record a session of a study, seal it, and show what was changed since.\n\n"
+    "Example: `tandem session start --protocol cup.toml --subject k7pd --tap /run/tandem/operator.sock`",
+)
+Folder = Annotated[Path, typer.Argument(help="Folder of a session.", exists=True, file_okay=False)]
+Root = Annotated[Path, typer.Option(help="Folder of the whole study.", file_okay=False)]
+Subject = Annotated[str, typer.Option(help="The subject's code, never a name.")]
+Table = Annotated[
+    Path, typer.Option(help="The table of names and codes; it must lie outside of the study.", dir_okay=False)
+]
+
+
+@app.command()
+def start(
+    protocol: Annotated[Path, typer.Option(help="The protocol's TOML file.", dir_okay=False)],
+    subject: Subject,
+    root: Root = Path(),
+    session: Annotated[
+        str | None, typer.Option(help="The session's code; by default the next number.")
+    ] = None,
+    tap: Annotated[
+        list[Path] | None, typer.Option(help="Record at this `[tap] socket`; repeat for both sides.")
+    ] = None,
+    consent: Annotated[str, typer.Option(help="Number of the signed consent form.")] = "",
+    scope: Annotated[
+        list[str] | None,
+        typer.Option(help="What was consented to: motion, video; repeat. Without video none is recorded."),
+    ] = None,
+    language: Annotated[str, typer.Option(help="Of the steps' texts: en, zh.")] = "en",
+) -> None:
+    """Begin a session: make its folder, record, and lead through the protocol's steps until the end.
+
+    At a terminal: space begins the next step, m marks an event, q ends. Elsewhere: `tandem session mark`.
+
+    Example: `tandem session start --protocol cup.toml --subject k7pd --tap /run/tandem/operator.sock`
+    """
+    from deploy.ops.session.run import lead
+    from deploy.study.session import begin
+
+    begun = begin(root, protocol, subject, session, consent, tuple(scope or ("motion",)))
+    console = Console()
+    console.print(f"{begun.path}: begun", highlight=False, markup=False)
+
+    async def work(stop: asyncio.Event) -> None:
+        await lead(
+            begun, tap or (), stop, lambda text: console.print(text, highlight=False, markup=False), language
+        )
+
+    run_until_stopped(work)
+
+
+@app.command()
+def mark(
+    folder: Folder,
+    text: Annotated[str, typer.Argument(help="One word or a few; no names.")] = "event",
+    step: Annotated[bool, typer.Option("--step", help="Begin the protocol's next step.")] = False,
+    end: Annotated[bool, typer.Option("--end", help="End the session.")] = False,
+) -> None:
+    """Mark an event, the next step or the end of a session that is under way.
+
+    Example: `tandem session mark study/sub-k7pd/ses-01 "cup dropped"`
+    """
+    from deploy.study.session import MarkKind, Session
+
+    session = Session(folder)
+    if step:
+        begun = session.next_step()
+        if begun is None:
+            raise TandemError(f"{folder}: all steps have begun; --end ends the session")
+        typer.echo(f"step {begun}")
+        return
+    session.mark(MarkKind.END if end else MarkKind.EVENT, text)
+
+
+@app.command("seal")
+def seal_folder(
+    folder: Folder,
+    people: Annotated[
+        Path | None,
+        typer.Option(
+            help="Table of names: refuse to seal while one of them stands in a file.", dir_okay=False
+        ),
+    ] = None,
+) -> None:
+    """Seal a session's files: a chain of SHA-256, of which any changed byte can be named later.
+
+    Keep the head that is printed somewhere else too: whoever can write the folder could seal it anew.
+
+    Example: `tandem session seal study/sub-k7pd/ses-01`
+    """
+    from deploy.study.pseudonyms import Pseudonyms, names_in
+    from deploy.study.seal import seal
+
+    if people is not None:
+        found = names_in(folder, list(Pseudonyms(people, folder).names().values()))
+        if found:
+            raise TandemError("a name stands in " + "; in ".join(found) + ": use codes as operators' names")
+    typer.echo(f"{folder}: sealed; head {seal(folder)}")
+
+
+@app.command("verify")
+def verify_folder(
+    folder: Folder,
+    head: Annotated[str | None, typer.Option(help="The head as it was noted when it was sealed.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check a sealed session; ends with status 1 and names the file and the bytes that were changed.
+
+    Example: `tandem session verify study/sub-k7pd/ses-01`
+    """
+    from deploy.study.seal import verify
+
+    written, broken = verify(folder, head)
+    if as_json:
+        typer.echo(json.dumps({"head": written, "broken": [asdict(one) for one in broken]}, indent=2))
+    else:
+        for one in broken:
+            typer.echo(f"{one.name}: {one.words}")
+    if broken:
+        raise TandemError(f"{folder}: {len(broken)} things are not as they were sealed")
+    if not as_json:
+        typer.echo(f"{folder}: as it was sealed; head {written}")
+
+
+@app.command()
+def person(
+    name: Annotated[str, typer.Argument(help="The person's name, as on the consent form.")],
+    table: Table,
+    root: Root = Path(),
+) -> None:
+    """Give a person a code, in a table apart from the study that only its owner reads.
+
+    Example: `tandem session person "Li Mei" --table ~/keys/people.csv --root study`
+    """
+    from deploy.study.pseudonyms import Pseudonyms
+
+    typer.echo(Pseudonyms(table, root).add(name))
+
+
+@app.command("export")
+def export_all(
+    subject: Subject,
+    out: Annotated[Path, typer.Option(help="New zip file.", dir_okay=False, callback=in_a_folder)],
+    root: Root = Path(),
+) -> None:
+    """Write everything of one subject into a zip file, for that person.
+
+    Example: `tandem session export --subject k7pd --out k7pd.zip --root study`
+    """
+    from deploy.study.subject import export_subject
+
+    typer.echo(f"{out}: {export_subject(root, subject, out)} files")
+
+
+@app.command("delete")
+def delete_all(
+    subject: Subject,
+    root: Root = Path(),
+    yes: Annotated[bool, typer.Option("--yes", help="Do it; without it nothing is deleted.")] = False,
+) -> None:
+    """Delete everything of one subject in the study's folder, and keep a receipt without its content.
+
+    Example: `tandem session delete --subject k7pd --root study --yes`
+    """
+    from deploy.study.subject import delete_subject
+
+    if not yes:
+        raise TandemError(f"this deletes all files of sub-{subject} in {root}: repeat with --yes")
+    gone = delete_subject(root, subject)
+    typer.echo(
+        f"{gone.files} files of {gone.subject} deleted; not copies elsewhere, nor the row of the table"
+    )

@@ -1,0 +1,52 @@
+"""A study's protocol: a TOML file with its steps, in their order."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+from pydantic import Field
+
+from common.config.load import load_config
+from common.config.section import Section
+from common.errors import ConfigMistake, TandemError
+
+CODE = re.compile(r"[A-Za-z0-9]{2,16}")
+
+
+class ProtocolStep(Section):
+    """One `[[step]]`."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")
+    text: dict[str, str]
+    """What the person is told, by language: en, zh."""
+    seconds: float | None = Field(default=None, gt=0.0)
+    """How long it is meant to last; None: as long as it takes."""
+
+
+class StudyProtocol(Section):
+    """The whole file."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")
+    version: str
+    step: list[ProtocolStep] = Field(min_length=1)
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """Each step's name once."""
+        names = [step.name for step in self.step]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        return [ConfigMistake("step.name", name, "a name that no other step has") for name in twice]
+
+
+def load_protocol(path: Path) -> tuple[StudyProtocol, str]:
+    """The protocol, and the SHA-256 of its file. Raises ConfigError."""
+    protocol = load_config(path, StudyProtocol)
+    return protocol, hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def check_code(what: str, code: str) -> str:
+    """A subject's or session's code. Raises TandemError where it looks like a name."""
+    if not CODE.fullmatch(code):
+        raise TandemError(f"{what} {code!r}: expected a code of 2 to 16 letters and digits, never a name")
+    return code

@@ -1,0 +1,148 @@
+"""A seal over a folder: a chain of SHA-256 over its files. It names the file and the part that was changed.
+
+    h₀ = SHA-256("tandem seal 1");   hₖ = SHA-256(hₖ₋₁ ‖ name ‖ 0 ‖ size ‖ 0 ‖ the blocks)
+
+The last h, the head, stands for everything. Whoever can write the folder can seal it anew, so the head is to
+be kept elsewhere too: on paper, or by the other side.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from common.clock import NS_PER_S, Clock, wall_ns
+from common.errors import TandemError
+from deploy.study.blocks import Block, blocks_of
+
+SEAL = "seal.json"
+VERSION = 1
+_FIRST = b"tandem seal 1"
+
+
+@dataclass(frozen=True, slots=True)
+class SealedFile:
+    """One file as it was sealed."""
+
+    name: str
+    """Relative to the folder, with slashes."""
+    size: int
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SealBroken:
+    """One thing that is not as it was sealed."""
+
+    name: str
+    words: str
+    offset: int | None = None
+    """Where the changed part begins."""
+    length: int | None = None
+
+
+def seal(folder: Path, wall: Clock = wall_ns) -> str:
+    """Write the seal; returns its head. Raises TandemError where there is one already, or nothing to seal."""
+    if (folder / SEAL).exists():
+        raise TandemError(f"{folder}: it is sealed already; `tandem session verify {folder}`")
+    files = tuple(_sealed(folder, name) for name in _names(folder))
+    if not files:
+        raise TandemError(f"{folder}: there are no files to seal")
+    head = head_of(files)
+    sealed = datetime.fromtimestamp(wall() / NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    tree = {"version": VERSION, "sealed": sealed, "head": head, "files": [asdict(file) for file in files]}
+    (folder / SEAL).write_text(json.dumps(tree, indent=1) + "\n", "utf-8")
+    return head
+
+
+def _sealed(folder: Path, name: str) -> SealedFile:
+    path = folder / name
+    return SealedFile(name, path.stat().st_size, tuple(blocks_of(path)))
+
+
+def head_of(files: Sequence[SealedFile]) -> str:
+    """The last hash of the chain."""
+    value = hashlib.sha256(_FIRST).digest()
+    for file in files:
+        digests = "".join(f"{block.offset} {block.length} {block.sha256} " for block in file.blocks)
+        value = hashlib.sha256(value + f"{file.name}\0{file.size}\0{digests}".encode()).digest()
+    return value.hex()
+
+
+def verify(folder: Path, head: str | None = None) -> tuple[str, list[SealBroken]]:
+    """The seal's head, and all that is not as it was sealed; empty where everything is.
+
+    `head`: as it was noted elsewhere when it was sealed. Raises TandemError without a seal that can be read.
+    """
+    files, written = _read(folder)
+    broken = []
+    if head_of(files) != written:
+        broken.append(SealBroken(SEAL, "the seal was changed: its files do not give its head"))
+    if head is not None and head != written:
+        broken.append(SealBroken(SEAL, f"it is another seal: its head is {written}, not {head}"))
+    sealed = {file.name: file for file in files}
+    names = _names(folder)
+    broken += [SealBroken(name, "was added after sealing") for name in names if name not in sealed]
+    for name, file in sealed.items():
+        if name not in names:
+            broken.append(SealBroken(name, "is missing"))
+        else:
+            broken += _compare(folder / name, file)
+    return written, broken
+
+
+def _compare(path: Path, file: SealedFile) -> list[SealBroken]:
+    size, found = path.stat().st_size, []
+    if size != file.size:
+        found.append(SealBroken(file.name, f"has {size} bytes, was sealed with {file.size}"))
+    with path.open("rb") as stream:
+        for block in file.blocks:
+            stream.seek(block.offset)
+            if hashlib.sha256(stream.read(block.length)).hexdigest() != block.sha256:
+                words = f"bytes {block.offset} to {block.offset + block.length - 1} were changed"
+                if block.times_ns is not None:
+                    words += f" (a chunk of messages, {_span(block.times_ns)})"
+                found.append(SealBroken(file.name, words, block.offset, block.length))
+    return found
+
+
+def _span(times_ns: tuple[int, int]) -> str:
+    first, last = (datetime.fromtimestamp(t / NS_PER_S, UTC).strftime("%H:%M:%S.%f")[:-3] for t in times_ns)
+    return f"{first} to {last} UTC"
+
+
+def _names(folder: Path) -> list[str]:
+    """All files but the seal itself and hidden ones, by name."""
+    return sorted(
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != SEAL and not path.name.startswith(".")
+    )
+
+
+def _read(folder: Path) -> tuple[list[SealedFile], str]:
+    try:
+        tree = json.loads((folder / SEAL).read_text("utf-8"))
+        if tree["version"] != VERSION:
+            raise TandemError(f"{folder / SEAL}: version {tree['version']}, this tandem knows {VERSION}")
+        files = [
+            SealedFile(file["name"], file["size"], tuple(_block(block) for block in file["blocks"]))
+            for file in tree["files"]
+        ]
+        return files, str(tree["head"])
+    except FileNotFoundError:
+        raise TandemError(f"{folder}: it is not sealed; `tandem session seal {folder}`") from None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise TandemError(f"{folder / SEAL}: cannot be read as a seal ({error})") from None
+
+
+def _block(tree: dict[str, object]) -> Block:
+    offset, length, times = tree["offset"], tree["length"], tree["times_ns"]
+    if not isinstance(offset, int) or not isinstance(length, int):
+        raise TypeError("a block without offset and length")
+    spans = None if not isinstance(times, list) else (int(times[0]), int(times[1]))
+    return Block(offset, length, str(tree["sha256"]), spans)

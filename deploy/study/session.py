@@ -1,0 +1,175 @@
+"""The folder of one session: what it is, its marks, its recordings.
+
+ROOT/sub-03/ses-02/session.json   protocol.toml   marks.jsonl   master.mcap   seal.json
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+
+from common.clock import NS_PER_S, Clock, monotonic_ns, wall_ns
+from common.errors import TandemError
+from common.wire.version import software
+from deploy.study.protocol import StudyProtocol, check_code, load_protocol
+
+SESSION, PROTOCOL, MARKS = "session.json", "protocol.toml", "marks.jsonl"
+MARK_TOPIC = "session/mark"
+"""Under which a recording holds the marks, each a line of JSON."""
+
+
+class MarkKind(StrEnum):
+    """What a mark says."""
+
+    STEP = "step"
+    """A step of the protocol begins."""
+    EVENT = "event"
+    END = "end"
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """One line of `marks.jsonl`."""
+
+    wall_ns: int
+    """ns since 1970."""
+    monotonic_ns: int
+    """This host's monotonic clock, as in the recordings."""
+    kind: MarkKind
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class SessionHead:
+    """`session.json`."""
+
+    subject: str
+    """A code, never a name."""
+    session: str
+    protocol: str
+    protocol_version: str
+    protocol_sha256: str
+    begun: str
+    """Time of day, UTC."""
+    consent: str
+    """Number of the consent form; empty where none is named."""
+    scope: tuple[str, ...]
+    """What the subject has consented to: `motion`, `video`."""
+    tandem: str
+    machine: str
+
+
+class Session:
+    """A session's folder."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises TandemError where there is no session."""
+        self.path = path
+        try:
+            tree = json.loads((path / SESSION).read_text("utf-8"))
+            self.head = SessionHead(**{**tree, "scope": tuple(tree["scope"])})
+            self.protocol: StudyProtocol = load_protocol(path / PROTOCOL)[0]
+        except (OSError, ValueError, TypeError, KeyError):
+            raise TandemError(f"{path}: there is no session; `tandem session start` makes one") from None
+
+    def metadata(self) -> dict[str, str]:
+        """For the head of each recording."""
+        plain = {key: value for key, value in asdict(self.head).items() if key not in ("tandem", "machine")}
+        return {f"study_{key}": " ".join(v) if isinstance(v, tuple) else str(v) for key, v in plain.items()}
+
+    def may_record(self, topic: str) -> bool:
+        """Whether the subject has consented to what a topic holds."""
+        return "/video/" not in topic or "video" in self.head.scope
+
+    def mark(self, kind: MarkKind, text: str, wall: Clock = wall_ns, clock: Clock = monotonic_ns) -> Mark:
+        """Write a mark down, for whoever records to find. Raises TandemError after the end."""
+        if self.ended:
+            raise TandemError(f"{self.path}: the session has ended; it takes no more marks")
+        mark = Mark(wall(), clock(), kind, text)
+        line = json.dumps(asdict(mark), ensure_ascii=False) + "\n"
+        # one write, so that two who mark at once never mix their lines
+        descriptor = os.open(self.path / MARKS, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o640)
+        try:
+            os.write(descriptor, line.encode())
+        finally:
+            os.close(descriptor)
+        return mark
+
+    def marks(self) -> list[Mark]:
+        """All, in order. Raises TandemError where a line is none."""
+        path = self.path / MARKS
+        if not path.exists():
+            return []
+        found = []
+        for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
+            try:
+                tree = json.loads(line)
+                found.append(
+                    Mark(tree["wall_ns"], tree["monotonic_ns"], MarkKind(tree["kind"]), tree["text"])
+                )
+            except (ValueError, KeyError, TypeError):
+                raise TandemError(f"{path}: line {number} is no mark") from None
+        return found
+
+    @property
+    def ended(self) -> bool:
+        """Whether its end is marked."""
+        return any(mark.kind is MarkKind.END for mark in self.marks())
+
+    def next_step(self) -> str | None:
+        """Begin the next step; its name, None where all are done."""
+        begun = [mark.text for mark in self.marks() if mark.kind is MarkKind.STEP]
+        left = [step.name for step in self.protocol.step if step.name not in begun]
+        if not left:
+            return None
+        self.mark(MarkKind.STEP, left[0])
+        return left[0]
+
+
+def begin(
+    root: Path,
+    protocol: Path,
+    subject: str,
+    session: str | None = None,
+    consent: str = "",
+    scope: Sequence[str] = ("motion",),
+    wall: Clock = wall_ns,
+) -> Session:
+    """Make the folder of a new session; without a code it is numbered. Raises TandemError, ConfigError."""
+    check_code("--subject", subject)
+    checked, digest = load_protocol(protocol)
+    of_subject = root / f"sub-{subject}"
+    if session is None:
+        session = f"{1 + len(list(of_subject.glob('ses-*'))):02}"
+    check_code("--session", session)
+    unknown = sorted(set(scope) - {"motion", "video"})
+    if unknown:
+        raise TandemError(f"--scope {unknown[0]}: expected motion or video")
+    path = of_subject / f"ses-{session}"
+    try:
+        path.mkdir(parents=True)
+    except FileExistsError:
+        raise TandemError(f"{path}: this session is there already; choose another --session") from None
+    except OSError as error:
+        raise TandemError(f"{path}: cannot be made ({error.strerror})") from None
+    head = SessionHead(
+        subject=subject,
+        session=session,
+        protocol=checked.name,
+        protocol_version=checked.version,
+        protocol_sha256=digest,
+        begun=datetime.fromtimestamp(wall() / NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        consent=consent,
+        scope=tuple(scope),
+        tandem=software().tandem,
+        machine=f"{platform.machine()} {platform.system()}",
+    )
+    (path / PROTOCOL).write_bytes(protocol.read_bytes())
+    (path / SESSION).write_text(json.dumps(asdict(head), indent=2, ensure_ascii=False) + "\n", "utf-8")
+    return Session(path)

@@ -1,0 +1,66 @@
+"""A trial's tables computed again: identical, and each planted change is named."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from common.errors import TandemError
+from deploy import cli
+from deploy.experiments.trial.cell.folder import Folder
+from deploy.experiments.trial.report.verify import differences
+from deploy.study.seal import seal
+from tests.deploy.experiments.trial.report.test_report import whole as whole  # the fixture
+
+
+@pytest.fixture
+def copy(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "trial"))
+
+
+def test_every_table_is_what_the_cells_give(copy: Path) -> None:
+    assert differences(Folder(copy)) == []
+    shown = CliRunner().invoke(cli.app, ["trial", "verify", str(copy)])
+    assert shown.exit_code == 0, shown.output
+    assert "it is not sealed" in shown.output
+
+
+def test_a_changed_figure_of_the_report_is_named(copy: Path) -> None:
+    report = json.loads((copy / "report.json").read_text())
+    setup = next(iter(report["compared"]["setups"]))
+    figure = next(iter(report["compared"]["setups"][setup]["figures"]))
+    report["compared"]["setups"][setup]["figures"][figure]["median"] += 1.0
+    (copy / "report.json").write_text(json.dumps(report))
+    assert differences(Folder(copy)) == [
+        f"report.json: compared.setups.{setup}.figures.{figure}.median is not what the cells give"
+    ]
+
+
+def test_a_changed_line_of_the_table_and_a_changed_cell_are_named(copy: Path) -> None:
+    lines = (copy / "cells.csv").read_text().splitlines()
+    (copy / "cells.csv").write_text("\n".join([*lines[:2], lines[2] + "0", *lines[3:]]) + "\n")
+    assert differences(Folder(copy)) == ["cells.csv: line 3 is not what the cells give"]
+    (copy / "cells.csv").write_text("\n".join(lines[:-1]) + "\n")
+    assert differences(Folder(copy)) == [
+        f"cells.csv: has {len(lines) - 1} lines, the cells give {len(lines)}"
+    ]
+
+
+def test_a_sealed_trial_with_a_changed_cell_is_refused(copy: Path) -> None:
+    seal(copy)
+    assert "the seal is whole" in CliRunner().invoke(cli.app, ["trial", "verify", str(copy)]).output
+    cell = sorted((copy / "cells").glob("*.json"))[0]
+    cell.write_text(cell.read_text().replace("1", "2", 1))
+    result = CliRunner().invoke(cli.app, ["trial", "verify", str(copy)])
+    assert isinstance(result.exception, TandemError)
+    assert f"cells/{cell.name}" in result.output
+
+
+def test_a_folder_without_a_report_says_so(copy: Path) -> None:
+    (copy / "report.json").unlink()
+    with pytest.raises(TandemError, match="no report that can be read"):
+        differences(Folder(copy))

@@ -1,0 +1,87 @@
+"""A session with a real recorder at a real tap: marks are in the recording, video only with consent."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+
+import msgpack
+import pytest
+
+from common.errors import TandemError
+from common.recording import McapRecording, read_recording
+from common.tap.sender import TapSender
+from deploy.examples import profiles
+from deploy.ops.session.run import lead
+from deploy.study.session import MARK_TOPIC, MarkKind, Session, begin
+
+CUP = Path(profiles.__file__).parent / "study" / "cup.toml"
+VIDEO = "tandem/robot-1/video/head"
+
+
+def played(
+    root: Path, scope: tuple[str, ...], dies: bool = False
+) -> tuple[Session, McapRecording, list[str]]:
+    """Two steps and an event while a tap speaks; `dies`: the process ends first."""
+    session, shown = begin(root, CUP, "k7pd", scope=scope), list[str]()
+
+    async def story() -> None:
+        sender = TapSender(root / "operator.sock", lambda: msgpack.packb({"role": "master"}))
+        sender.open()
+        leading = asyncio.create_task(lead(session, [sender.path], asyncio.Event(), shown.append, "zh"))
+
+        async def until(condition: object) -> None:
+            async with asyncio.timeout(60.0):
+                while not condition():  # type: ignore[operator]  # a function without arguments
+                    sender.put("suit/frames", b"frame")
+                    sender.put(VIDEO, b"picture")
+                    await asyncio.sleep(0.01)
+
+        await until(lambda: (session.path / "operator.mcap").exists())
+        session.next_step()
+        await until(lambda: any("rest" in line for line in shown))
+        session.mark(MarkKind.EVENT, "cup dropped")
+        await until(lambda: any("cup dropped" in line for line in shown))
+        if dies:
+            sender.close()
+        else:
+            session.mark(MarkKind.END, "done")
+        try:
+            await leading
+        finally:
+            sender.close()
+
+    try:
+        asyncio.run(story())
+    finally:
+        recording = read_recording(session.path / "operator.mcap")
+    return session, recording, shown
+
+
+def test_marks_steps_and_consent_are_in_the_recording(tmp_path: Path) -> None:
+    session, recording, shown = played(tmp_path, ("motion",))
+    assert recording.metadata["study_subject"] == "k7pd"
+    assert recording.metadata["study_scope"] == "motion"
+    marks = [json.loads(entry.payload) for entry in recording.entries if entry.topic == MARK_TOPIC]
+    assert [(mark["kind"], mark["text"]) for mark in marks] == [
+        ("step", "rest"), ("event", "cup dropped"), ("end", "done"),
+    ]  # fmt: skip
+    topics = {entry.topic for entry in recording.entries}
+    assert "suit/frames" in topics
+    assert VIDEO not in topics
+    assert not recording.cut
+    assert any("请站立不动" in line for line in shown)
+    assert session.ended
+
+
+def test_with_consent_there_is_video(tmp_path: Path) -> None:
+    _, recording, _ = played(tmp_path, ("motion", "video"))
+    assert VIDEO in {entry.topic for entry in recording.entries}
+
+
+def test_a_process_that_ends_ends_the_session_with_an_error(tmp_path: Path) -> None:
+    with pytest.raises(TandemError, match="the recorder of operator ended"):
+        played(tmp_path, ("motion",), dies=True)
+    session = Session(tmp_path / "sub-k7pd/ses-01")
+    assert session.ended

@@ -1,0 +1,111 @@
+"""A seal names the file and the part that was changed, whatever was changed."""
+
+from __future__ import annotations
+
+import json
+import random
+from pathlib import Path
+
+import pytest
+
+from common.errors import TandemError
+from common.recording import McapRecorder
+from deploy.study.blocks import BLOCK, blocks_of
+from deploy.study.seal import SEAL, seal, verify
+
+NOW_NS = 1_700_000_000_000_000_000
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "session.json").write_text('{"subject": "k7pd"}')
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "notes.txt").write_bytes(random.Random(1).randbytes(3 * BLOCK + 5))
+    wall_ns = NOW_NS
+    with McapRecorder(tmp_path / "master.mcap", {"role": "master"}, 0.001, wall=lambda: wall_ns) as recorder:
+        for number in range(60):
+            wall_ns = NOW_NS + number * 100_000_000
+            recorder.put("suit/frames", random.Random(number).randbytes(500), number)
+            while recorder.counters.written < number:
+                pass
+    return tmp_path
+
+
+def test_a_sealed_folder_is_as_it_was(folder: Path) -> None:
+    head = seal(folder)
+    assert verify(folder) == (head, [])
+    assert verify(folder, head)[1] == []
+    with pytest.raises(TandemError, match="sealed already"):
+        seal(folder)
+
+
+def test_blocks_cover_a_file_without_a_gap(folder: Path) -> None:
+    for name in ("master.mcap", "deep/notes.txt", "session.json"):
+        at = 0
+        for block in blocks_of(folder / name):
+            assert block.offset == at
+            at += block.length
+        assert at == (folder / name).stat().st_size
+    chunks = [block for block in blocks_of(folder / "master.mcap") if block.times_ns is not None]
+    assert len(chunks) > 10
+    assert chunks[0].times_ns is not None
+    assert chunks[0].times_ns[0] == NOW_NS
+
+
+@pytest.mark.parametrize("name", ["master.mcap", "deep/notes.txt", "session.json"])
+@pytest.mark.parametrize("seed", range(8))
+def test_one_changed_byte_is_placed(folder: Path, name: str, seed: int) -> None:
+    seal(folder)
+    data = bytearray((folder / name).read_bytes())
+    place = random.Random(seed).randrange(len(data))
+    data[place] ^= 1 << seed
+    (folder / name).write_bytes(data)
+    _, [broken] = verify(folder)
+    assert broken.name == name
+    assert broken.offset is not None
+    assert broken.length is not None
+    assert broken.offset <= place < broken.offset + broken.length
+    chunk = next(b for b in blocks_of(folder / name) if b.offset <= place < b.offset + b.length)
+    assert ("chunk of messages" in broken.words) == (chunk.times_ns is not None and name == "master.mcap")
+
+
+def test_what_is_missing_added_cut_or_grown_is_named(folder: Path) -> None:
+    seal(folder)
+    (folder / "session.json").unlink()
+    (folder / "more.txt").write_text("later")
+    with (folder / "master.mcap").open("ab") as stream:
+        stream.write(b"x")
+    found = {broken.name: broken.words for broken in verify(folder)[1]}
+    assert found["session.json"] == "is missing"
+    assert found["more.txt"] == "was added after sealing"
+    assert "bytes, was sealed with" in found["master.mcap"]
+
+
+def test_a_changed_seal_and_a_new_seal_are_seen(folder: Path) -> None:
+    head = seal(folder)
+    tree = json.loads((folder / SEAL).read_text())
+    tree["files"][0]["blocks"][0]["sha256"] = "0" * 64
+    (folder / SEAL).write_text(json.dumps(tree))
+    assert [b.name for b in verify(folder)[1]].count(SEAL) == 1
+    (folder / SEAL).unlink()
+    (folder / "session.json").write_text('{"subject": "another"}')
+    again = seal(folder)
+    assert verify(folder)[1] == [], "nothing in the folder shows it: the head noted elsewhere does"
+    assert again != head
+    assert [b.name for b in verify(folder, head)[1]] == [SEAL]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"version": 1, "head": "x", "files": [{}]}', '{"version": 7}']
+)
+def test_what_is_no_seal_is_refused(folder: Path, text: str) -> None:
+    (folder / SEAL).write_text(text)
+    with pytest.raises(TandemError):
+        verify(folder)
+
+
+def test_a_folder_without_a_seal_or_files(tmp_path: Path) -> None:
+    with pytest.raises(TandemError, match="not sealed"):
+        verify(tmp_path)
+    with pytest.raises(TandemError, match="no files"):
+        seal(tmp_path)

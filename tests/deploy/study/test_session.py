@@ -1,0 +1,119 @@
+"""A session's folder, its marks, its subject, and names where none may be."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from common.errors import ConfigError, TandemError
+from common.recording import McapRecorder
+from deploy.examples import profiles
+from deploy.study.pseudonyms import Pseudonyms, names_in
+from deploy.study.seal import seal
+from deploy.study.session import MARKS, MarkKind, Session, begin
+from deploy.study.subject import RECEIPTS, delete_subject, export_subject
+
+CUP = Path(profiles.__file__).parent / "study" / "cup.toml"
+
+
+def test_sessions_are_numbered_and_say_what_they_are(tmp_path: Path) -> None:
+    first, second = begin(tmp_path, CUP, "k7pd"), begin(tmp_path, CUP, "k7pd", consent="C-17")
+    assert [one.path.name for one in (first, second)] == ["ses-01", "ses-02"]
+    head = Session(second.path).metadata()
+    assert (head["study_subject"], head["study_session"], head["study_consent"]) == ("k7pd", "02", "C-17")
+    assert len(head["study_protocol_sha256"]) == 64
+    with pytest.raises(TandemError, match="there already"):
+        begin(tmp_path, CUP, "k7pd", "02")
+
+
+@pytest.mark.parametrize("name", ["Li Mei", "x", "../k7", "a" * 17])
+def test_a_name_is_no_code(tmp_path: Path, name: str) -> None:
+    with pytest.raises(TandemError, match="never a name"):
+        begin(tmp_path, CUP, name)
+
+
+def test_a_protocol_with_a_step_twice_is_refused(tmp_path: Path) -> None:
+    twice = tmp_path / "p.toml"
+    step = '[[step]]\nname = "a"\ntext = { en = "x" }\n'
+    twice.write_text(f'name = "p"\nversion = "1"\n{step}{step}')
+    with pytest.raises(ConfigError, match="step.name"):
+        begin(tmp_path, twice, "k7pd")
+
+
+def test_steps_come_in_order_and_the_end_takes_no_more(tmp_path: Path) -> None:
+    session = begin(tmp_path, CUP, "k7pd")
+    assert [session.next_step() for _ in range(4)] == ["rest", "reach", "questions", None]
+    session.mark(MarkKind.EVENT, "cup dropped")
+    session.mark(MarkKind.END, "done")
+    marks = session.marks()
+    assert [mark.kind for mark in marks] == ["step", "step", "step", "event", "end"]
+    assert [mark.monotonic_ns for mark in marks] == sorted(mark.monotonic_ns for mark in marks)
+    with pytest.raises(TandemError, match="has ended"):
+        session.mark(MarkKind.EVENT, "late")
+    with (session.path / MARKS).open("a") as stream:
+        stream.write("not a mark\n")
+    with pytest.raises(TandemError, match="line 6 is no mark"):
+        session.marks()
+
+
+def test_without_consent_for_it_no_video_is_recorded(tmp_path: Path) -> None:
+    motion = begin(tmp_path, CUP, "k7pd")
+    both = begin(tmp_path, CUP, "k7pd", scope=("motion", "video"))
+    assert [s.may_record("tandem/robot-1/video/head") for s in (motion, both)] == [False, True]
+    assert motion.may_record("tandem/robot-1/state")
+    with pytest.raises(TandemError, match="motion or video"):
+        begin(tmp_path, CUP, "k7pd", scope=("all",))
+
+
+def test_the_table_of_names_is_apart_and_its_owner_s(tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    study.mkdir()
+    table = Pseudonyms(tmp_path / "people.csv", study)
+    code, other = table.add("Li Mei"), table.add("Anna Möller")
+    assert table.add("Li Mei") == code != other
+    assert table.names() == {code: "Li Mei", other: "Anna Möller"}
+    assert table.path.stat().st_mode & 0o777 == 0o600
+    assert table.remove(code)
+    assert not table.remove(code)
+    assert table.names() == {other: "Anna Möller"}
+    assert table.path.stat().st_mode & 0o777 == 0o600
+    table.path.chmod(0o644)
+    with pytest.raises(TandemError, match="others may read"):
+        Pseudonyms(table.path)
+    with pytest.raises(TandemError, match="must not lie in the study"):
+        Pseudonyms(study / "people.csv", study)
+
+
+def test_a_name_in_any_file_is_found(tmp_path: Path) -> None:
+    session = begin(tmp_path, CUP, "k7pd")
+    with McapRecorder(session.path / "master.mcap", {"operator": "k7pd"}) as recorder:
+        recorder.put("tandem/robot-1/state", b"\x01\xffnurse Li Mei\x00", 1)
+        recorder.put("suit/frames", b"nothing", 2)
+    session.mark(MarkKind.EVENT, "LI MEI dropped it")
+    found = names_in(session.path, ["Li Mei", "Anna Möller", "x"])
+    assert found == [f"{session.path / MARKS}", f"{session.path / 'master.mcap'}: tandem/robot-1/state"]
+    with McapRecorder(session.path / "head.mcap", {"operator": "Anna Möller"}) as recorder:
+        recorder.put("t", b"", 1)
+    assert names_in(session.path, ["anna möller"]) == [f"{session.path / 'head.mcap'}: its head"]
+
+
+def test_one_subject_is_handed_out_and_deleted_and_the_others_stay(tmp_path: Path) -> None:
+    root = tmp_path / "study"
+    mine, others = begin(root, CUP, "k7pd"), begin(root, CUP, "m2qa")
+    head = seal(mine.path)
+    out = tmp_path / "k7pd.zip"
+    assert export_subject(root, "k7pd", out) == 3
+    with zipfile.ZipFile(out) as archive:
+        assert all(name.startswith("sub-k7pd/ses-01/") for name in archive.namelist())
+    with pytest.raises(TandemError, match="is there already"):
+        export_subject(root, "k7pd", out)
+    receipt = delete_subject(root, "k7pd")
+    assert (receipt.files, receipt.heads) == (3, (head,))
+    assert not mine.path.exists()
+    assert others.path.exists()
+    assert json.loads((root / RECEIPTS).read_text())["subject"] == "k7pd"
+    with pytest.raises(TandemError, match="no such subject"):
+        delete_subject(root, "k7pd")
