@@ -20,6 +20,7 @@ from slave.encoders.counts import EncoderConfig
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
+from slave.servos.canopen.units import counted_over, nearest_to
 
 SendOn = Callable[[str, int, bytes], None]
 """(bus name, identifier, data)."""
@@ -67,6 +68,7 @@ class DrivePeer:
         drives = list(config.drives_of(skeleton).values())
         self._scale = np.array([drive.increments_per_rad for drive in drives])
         self._zero = np.array([drive.zero_increments for drive in drives], dtype=np.float64)
+        self._over = np.array([drive.counts_over for drive in drives])
         self._lower, self._upper = np.full(len(drives), -np.inf), np.full(len(drives), np.inf)
         self._period_ns = NS_PER_S // config.sync_hz
         self._gear, self._shift = np.ones(len(drives)), np.zeros(len(drives))
@@ -202,7 +204,10 @@ class DrivePeer:
             step = _RUNS_AWAY_RAD_S * self._period_ns / NS_PER_S
             self.plant.follow(i, float(self.plant.position_rad[i]) + 2.0 * step, 2 * self._period_ns, now_ns)
             return
-        believed = (drive.target - self._zero[i]) / self._scale[i]
+        target = float(drive.target)
+        if self._over[i]:  # by the shorter way from where it stands
+            target = float(nearest_to(self._unbounded[i], np.array(target)))
+        believed = (target - self._zero[i]) / self._scale[i]
         allowed = min(max(believed, self._lower[i]), self._upper[i])
         drive.limited = abs(believed - allowed) > 1e-6
         true = (self._zero[i] + self._scale[i] * allowed - self._shift[i] - self._zero[i]) / self._scale[i]
@@ -228,7 +233,7 @@ class DrivePeer:
         self.plant.window_rad[i] = np.inf if window == _UNBOUNDED else window / scale
         if ramp := 0 if 0x6085 in lacks else drive.value(0x6085):
             self.plant.ramp_rad_s2[i] = ramp / scale
-        if 0x607D in lacks:
+        if 0x607D in lacks or self._over[i]:
             return
         ends = [(drive.value(0x607D, sub) - self._zero[i]) / self._scale[i] for sub in (1, 2)]
         self._lower[i], self._upper[i] = min(ends), max(ends)
@@ -236,7 +241,8 @@ class DrivePeer:
     def _read(self, now_ns: int | None = None) -> None:
         seen_rad = self.plant.position_rad if now_ns is None else self.plant.seen_rad(now_ns)
         position = seen_rad * self._gear
-        shown = np.rint(self._zero + self._scale * position + self._shift)
+        shown = self._unbounded = np.rint(self._zero + self._scale * position + self._shift)
+        shown = np.where(self._over, counted_over(shown), shown)
         self._increments = shown.astype(np.int64).tolist()
         for i, increments in self._stuck.items():
             self._increments[i] = increments

@@ -228,10 +228,14 @@ class CanopenConfig(BackendConfig):
             furthest = max(abs(lower), abs(upper)) * abs(drive.increments_per_rad) + abs(
                 drive.zero_increments
             )
-            if furthest > _INT32:
+            if furthest > _INT32 and not drive.counts_over:
                 expected = (
                     "the joint's whole range within the drive's 32 bits of increments: beyond them a target "
-                    "leads the long way round; set its home offset (607Ch), or fewer increments a turn"
+                    "leads the long way round; set its home offset (607Ch), or fewer increments a turn, or "
+                    "counts_over = true if the drive counts over and takes targets so"
                 )
+                mistakes.append(ConfigMistake(f"{key}.gear_ratio", drive.gear_ratio, expected))
+            elif (upper - lower) * abs(drive.increments_per_rad) > _INT32:
+                expected = "less than 2³¹ increments over the joint's range: fewer increments a turn"
                 mistakes.append(ConfigMistake(f"{key}.gear_ratio", drive.gear_ratio, expected))
         return mistakes

@@ -45,8 +45,11 @@ class DriveConfig(Section):
     """The resolution of the motor's encoder."""
     reversed: bool = False
     """True: the drive's position falls as the joint's angle rises."""
-    zero_increments: int = Field(0, ge=-(2**30), le=2**30)
+    zero_increments: int = Field(0, ge=-(2**31), le=2**31 - 1)
     """The drive's position where the joint's angle is 0."""
+    counts_over: bool = False
+    """True: its position (6064h) goes from 2³¹ − 1 on to −2³¹, and it takes targets in the same way, as its
+    range (607Bh) is all 32 bits. Only then may the joint's range cross that point."""
     lower_deg: float | None = Field(None, ge=-360.0, le=360.0)
     """Lower software limit; None: 2° beyond the joint's own."""
     upper_deg: float | None = Field(None, ge=-360.0, le=360.0)
@@ -128,6 +131,11 @@ class DriveSettings:
         window = round(abs(scale) * math.radians(times.following_error_deg))
         ramp = round(abs(scale) * joint.max_acceleration_rad_s2)
         return cls(drive, times, tells_inputs, lower, upper, window, ramp)
+
+    @property
+    def crosses(self) -> bool:
+        """Whether the joint's range crosses ±2³¹ increments, so that no software limits can be told."""
+        return not -(2**31) <= self.lower <= self.upper < 2**31
 
     @property
     def eds(self) -> Path | None:

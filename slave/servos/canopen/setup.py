@@ -81,7 +81,8 @@ class SetupPlan:
             transfers = list(stage(held, lacks))
             if transfers:
                 return transfers
-        self.left_out = checks.left_out(lacks)
+        crosses = {"607Dh": "its range crosses 2³¹ increments"} if self._settings.crosses else {}
+        self.left_out = checks.left_out({**lacks, **crosses})
         return []
 
     def refusal(self, transfer: Transfer) -> str:
@@ -120,8 +121,9 @@ class SetupPlan:
         yield Write(0x6060, 0, 1, self.mode)
         yield Write(0x6065, 0, 4, self._settings.window, "6065h")
         yield Write(0x6066, 0, 2, times.following_error_ms, "6065h")
-        yield Write(0x607D, 1, 4, self._settings.lower, "607Dh")
-        yield Write(0x607D, 2, 4, self._settings.upper, "607Dh")
+        if not self._settings.crosses:
+            yield Write(0x607D, 1, 4, self._settings.lower, "607Dh")
+            yield Write(0x607D, 2, 4, self._settings.upper, "607Dh")
         yield Write(0x6085, 0, 4, self._settings.ramp, "6085h")
         yield Write(0x60C2, 1, 1, times.period_ms, PERIOD)
         yield Write(0x60C2, 2, 1, _MILLISECONDS, PERIOD)
