@@ -97,7 +97,7 @@ class SlavePipeline:
         self.reflex = ContactReflex(config.contact, self.contact, self.skeleton.joint_names)
         self.torque_limit = TorqueLimit(self.skeleton, config.contact, self.contact.observer.model)
         self.blind = BlindDistance(
-            self.skeleton, limits, config.guard.max_blind_cm, 1.0 / config.loop.rate_hz
+            self.skeleton, limits, config.guard.max_blind_cm, 1.0 / config.loop.rate_hz, config.guard.zones
         )
         self.limiter.slowed = self.blind.slowed
         self._episode = 0

@@ -38,10 +38,18 @@ class _Zone(Section):
     """The greatest force of a part that presses there, as the motors' torques tell it: beyond it, a
     protective stop. Counts within the margin, or inside of the zone itself where the robot may enter."""
 
+    max_blind_cm: float | None = Field(None, gt=0.0, le=200.0)
+    """Should the line die, no hand's end goes farther than this within the margin (or inside of the zone
+    itself where the robot may enter), wherever it comes from: hands are slowed so that it holds."""
+
     @property
     def margin_m(self) -> float:
         """-inf where the robot may enter."""
         return -np.inf if self.enter else _ONE_CM * self.margin_cm
+
+    @abstractmethod
+    def distance_m(self, point_m: Array) -> Array:
+        """(N,) from points (N, 3), base frame; 0 inside."""
 
     @abstractmethod
     def _attributes(self) -> dict[str, Sequence[float]]:
@@ -64,6 +72,14 @@ class BoxZone(_Zone):
     yaw_deg: float = Field(0.0, ge=-360.0, le=360.0)
     """How far it is turned to the left."""
 
+    def distance_m(self, point_m: Array) -> Array:
+        """See `_Zone`."""
+        cos, sin = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
+        from_center = point_m - np.array(self.center_m)
+        local = from_center @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        beyond = np.maximum(np.abs(local) - 0.5 * np.array(self.size_m), 0.0)
+        return np.asarray(np.linalg.norm(beyond, axis=1))
+
     def _attributes(self) -> dict[str, Sequence[float]]:
         half = 0.5 * np.radians(self.yaw_deg)
         quat = [float(np.cos(half)), 0.0, 0.0, float(np.sin(half))]
@@ -79,6 +95,13 @@ class CapsuleZone(_Zone):
     to_m: _Point
     radius_m: _Size
 
+    def distance_m(self, point_m: Array) -> Array:
+        """See `_Zone`."""
+        begin, way = np.array(self.from_m), np.array(self.to_m) - np.array(self.from_m)
+        share = np.clip((point_m - begin) @ way / (way @ way), 0.0, 1.0)
+        off_m = np.linalg.norm(point_m - begin - share[:, None] * way, axis=1)
+        return np.asarray(np.maximum(off_m - self.radius_m, 0.0))
+
     def _attributes(self) -> dict[str, Sequence[float]]:
         return {"fromto": [*self.from_m, *self.to_m], "size": [self.radius_m]}
 
@@ -90,6 +113,11 @@ class SphereZone(_Zone):
     shape: Literal["sphere"]
     center_m: _Point
     radius_m: _Size
+
+    def distance_m(self, point_m: Array) -> Array:
+        """See `_Zone`."""
+        off_m = np.linalg.norm(point_m - np.array(self.center_m), axis=1)
+        return np.asarray(np.maximum(off_m - self.radius_m, 0.0))
 
     def _attributes(self) -> dict[str, Sequence[float]]:
         return {"pos": self.center_m, "size": [self.radius_m]}
@@ -104,6 +132,11 @@ class HalfSpaceZone(_Zone):
     """Any point of the plane."""
     free_side: _Point
     """Which way from the plane the robot may be; of any length but 0."""
+
+    def distance_m(self, point_m: Array) -> Array:
+        """See `_Zone`."""
+        free = np.array(self.free_side) / np.linalg.norm(self.free_side)
+        return np.asarray(np.maximum((point_m - np.array(self.point_m)) @ free, 0.0))
 
     def _attributes(self) -> dict[str, Sequence[float]]:
         return {"pos": self.point_m, "zaxis": self.free_side, "size": [0.0, 0.0, 1.0]}
@@ -161,8 +194,9 @@ def zone_mistakes(
 def _own_mistakes(zone: Zone, earlier: Sequence[str]) -> Iterator[tuple[str, object, str]]:
     if zone.name in earlier:
         yield "name", zone.name, "another name: an earlier zone has it"
-    if zone.enter and zone.max_speed_m_s is None and zone.max_force_n is None:
-        yield "enter", True, "max_speed_m_s with it, or max_force_n, or the zone would do nothing"
+    limits = (zone.max_speed_m_s, zone.max_force_n, zone.max_blind_cm)
+    if zone.enter and all(limit is None for limit in limits):
+        yield "enter", True, "max_speed_m_s with it, or max_force_n or max_blind_cm, or it would do nothing"
     if isinstance(zone, HalfSpaceZone) and not any(zone.free_side):
         yield "free_side", zone.free_side, "a direction: not all three 0"
     if isinstance(zone, CapsuleZone) and zone.from_m == zone.to_m:

@@ -9,7 +9,7 @@ from where the encoders are, since the servos have yet to follow what was writte
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.guard.limits import MotionLimits
+from slave.guard.zones import Zone
 from slave.limit.limit import approach
 from slave.model.ends import limb_ends
 
@@ -57,7 +58,7 @@ class Course:
 
 
 class BlindDistance:
-    """Foretells the way, and slows the setpoint where `most_m` is set."""
+    """Foretells the way, and slows the setpoint where the robot or a zone has a `max_blind_cm`."""
 
     def __init__(
         self,
@@ -65,15 +66,17 @@ class BlindDistance:
         limits: MotionLimits,
         most_cm: float | None = None,
         period_s: float = 0.005,
+        zones: Sequence[Zone] = (),
     ) -> None:
-        """`most_cm`: `[guard] max_blind_cm`; `period_s`: of the servo loop."""
+        """`most_cm`: `[guard] max_blind_cm`; `period_s`: of the servo loop. Zones may allow less."""
         self.ends = limb_ends(skeleton)
         self._limits = limits
         self._period_s = period_s
         self._decides_s = 0.0
-        self._most_m = None if most_cm is None else most_cm / 100.0
+        self._most_m = math.inf if most_cm is None else most_cm / 100.0
+        self._zones = [(zone, zone.max_blind_cm / 100.0) for zone in zones if zone.max_blind_cm is not None]
         self._brake_s = float((limits.max_velocity_rad_s / limits.max_acceleration_rad_s2).max())
-        self._most_m_s = math.inf
+        self._blind_s = math.inf
         self._heard_ns: int | None = None
         self.newest: BlindWay | None = None
         """As of the newest command; None while the robot follows nobody."""
@@ -153,20 +156,28 @@ class BlindDistance:
         With v the end's speed: v (lag + decides) until then, v t / 2 while the joints brake for t.
         """
         self._decides_s = timeout_s + self._period_s
-        if self._most_m is not None:
-            blind_s = SERVO_LAG_S + self._decides_s + 0.5 * self._brake_s
-            self._most_m_s = max((self._most_m - PLUS_M) / (1.0 + SHARE), 0.0) / blind_s
+        self._blind_s = SERVO_LAG_S + self._decides_s + 0.5 * self._brake_s
+
+    def _most_m_s(self, end_m: Array) -> Array:
+        """(E,) how fast ends at (E, 3) may be. From outside, an end may go as far as into a zone, and on."""
+        most_m = np.full(len(end_m), self._most_m)
+        for zone, inside_m in self._zones:
+            outside_m = np.maximum(zone.distance_m(end_m) - max(zone.margin_m, 0.0), 0.0)
+            np.minimum(most_m, inside_m + outside_m, out=most_m)
+        out: Array = np.maximum((most_m - PLUS_M) / (1.0 + SHARE), 0.0) / self._blind_s
+        return out
 
     def slowed(self, position_rad: Array, wish_rad_s: Array, step_s: float) -> Array:
         """The wish (J,), slowed so that no end is faster than allowed.
 
         All joints of a limb are slowed alike, so that its hand keeps its way.
         """
-        if self._most_m is None or step_s <= 0.0:
+        if (math.isinf(self._most_m) and not self._zones) or step_s <= 0.0:
             return wish_rad_s
-        way_m = self.ends.at(position_rad + wish_rad_s * step_s) - self.ends.at(position_rad)
+        end_m = self.ends.at(position_rad)
+        way_m = self.ends.at(position_rad + wish_rad_s * step_s) - end_m
         speed_m_s = np.linalg.norm(way_m, axis=1) / step_s
-        share = np.minimum(1.0, self._most_m_s / np.maximum(speed_m_s, 1e-9))
+        share = np.minimum(1.0, self._most_m_s(end_m) / np.maximum(speed_m_s, 1e-9))
         slowest = np.where(self.ends.moved_by, share[:, None], 1.0).min(axis=0)
         out: Array = wish_rad_s * slowest
         return out

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from common.clock import to_ns
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from slave.guard.config import GuardConfig
+from slave.guard.zones import BoxZone, CapsuleZone, HalfSpaceZone, SphereZone, Zone, distance_model
 from slave.limit import blind
 from slave.limit.blind import BlindDistance, Course
 from slave.limit.limit import SetpointLimiter
@@ -26,8 +29,10 @@ ELBOW = SKELETON.joint_names.index("left_elbow_pitch")
 class Robot:
     """A setpoint that follows swings of several joints at once; perfect servos."""
 
-    def __init__(self, seed: int, most_cm: float | None = None, share: float = 0.5) -> None:
-        self.blind = BlindDistance(SKELETON, LIMITS, most_cm)
+    def __init__(
+        self, seed: int, most_cm: float | None = None, share: float = 0.5, zones: Sequence[Zone] = ()
+    ) -> None:
+        self.blind = BlindDistance(SKELETON, LIMITS, most_cm, zones=zones)
         self.limiter = SetpointLimiter(SKELETON.joint_names, LIMITS)
         self.limiter.slowed = self.blind.slowed
         self.limiter.seat(MIDDLE)
@@ -141,6 +146,93 @@ def test_a_longer_time_until_the_guard_decides_allows_less_speed() -> None:
         slow.allow(timeout_s)
         after.append(np.abs(slow.slowed(MIDDLE, wish, STEP_S)).max())
     assert after[1] < after[0]
+
+
+HANDS_M = BlindDistance(SKELETON, LIMITS).ends.at(MIDDLE)
+LEFT_M = HANDS_M[0].tolist()
+
+
+def at_left_hand(**limits: object) -> SphereZone:
+    """A place around the left hand's, which swings through it."""
+    return SphereZone.model_validate(
+        {"name": "head", "shape": "sphere", "center_m": LEFT_M, "radius_m": 0.08, **limits}
+    )
+
+
+def gone_inside_m(zone: Zone, margin_m: float) -> list[float]:
+    """How far the left hand goes within a margin of the zone in each of 40 outages, on its whole way."""
+    out = []
+    for seed in range(40):
+        robot = Robot(seed, zones=[zone])
+        for _ in range(60 + 7 * (seed % 40)):
+            robot.step()
+        ends = [robot.ends_m()[0]]
+        for k in range(round((DECIDES_S + 0.3) / STEP_S)):
+            if k < round(DECIDES_S / STEP_S):
+                robot.step()
+            else:
+                robot.limiter.stop(STEP_S)
+            ends.append(robot.ends_m()[0])
+        way = np.array(ends)
+        inside = zone.distance_m(0.5 * (way[1:] + way[:-1])) <= margin_m
+        out.append(float(np.linalg.norm(np.diff(way, axis=0), axis=1)[inside].sum()))
+    return out
+
+
+@pytest.mark.parametrize(
+    ("limits", "margin_m"), [({"enter": True}, 0.0), ({"margin_cm": 4.0}, 0.04)], ids=["may enter", "margin"]
+)
+def test_within_a_zone_no_hand_goes_farther_than_the_zone_allows(
+    limits: dict[str, object], margin_m: float
+) -> None:
+    gone_m = gone_inside_m(at_left_hand(max_blind_cm=4.0, **limits), margin_m)
+    assert max(gone_m) <= 0.04
+    assert max(gone_m) > 0.02, "slowed more than needed"
+
+
+def test_without_the_zone_s_own_limit_it_does() -> None:
+    assert max(gone_inside_m(at_left_hand(enter=True, max_speed_m_s=5.0), 0.0)) > 0.08
+
+
+def test_outside_of_a_zone_hands_are_not_slowed_by_it() -> None:
+    far = [HANDS_M[0][0], HANDS_M[0][1], HANDS_M[0][2] + 5.0]
+    slow = BlindDistance(SKELETON, LIMITS, zones=[at_left_hand(enter=True, max_blind_cm=1.0, center_m=far)])
+    slow.allow(TIMEOUT_S)
+    wish = 0.5 * LIMITS.max_velocity_rad_s
+    assert (slow.slowed(MIDDLE, wish, STEP_S) == wish).all()
+    here = BlindDistance(SKELETON, LIMITS, zones=[at_left_hand(enter=True, max_blind_cm=1.0)])
+    here.allow(TIMEOUT_S)
+    after = here.slowed(MIDDLE, wish, STEP_S)
+    right = here.ends.moved_by[1] & ~here.ends.moved_by[0]
+    assert (after[right] == wish[right]).all()
+    assert (after[ELBOW] < wish[ELBOW]).all()
+
+
+@pytest.mark.parametrize(
+    "zone",
+    [
+        BoxZone(name="z", shape="box", center_m=[0.5, 0.1, 0.9], size_m=[0.6, 1.4, 0.3], yaw_deg=25.0),
+        CapsuleZone(name="z", shape="capsule", from_m=[0.4, -0.5, 1.2], to_m=[0.6, 0.4, 1.0], radius_m=0.05),
+        SphereZone(name="z", shape="sphere", center_m=[0.4, 0.2, 1.3], radius_m=0.1),
+        HalfSpaceZone(name="z", shape="half_space", point_m=[0.6, 0.0, 0.0], free_side=[-2.0, 0.3, 0.1]),
+    ],
+    ids=lambda zone: zone.shape,
+)
+def test_distances_of_points_are_those_that_mujoco_finds(zone: Zone) -> None:
+    """The middle of the gap to a part is half the gap away from the zone."""
+    model = distance_model(SKELETON, 0.0, [zone])
+    draw = np.random.default_rng(5)
+    compared = 0
+    for _ in range(60):
+        posture = LIMITS.reachable(draw.normal(0.0, 0.8, len(MIDDLE)))
+        near = model.near(posture)
+        rows = np.flatnonzero(model.obstacle[near.pair] == 0)
+        contact = model._newest.data.contact
+        for row in rows[near.distance_m[rows] > 0.01]:
+            middle, half = contact.pos[row], 0.5 * near.distance_m[row]
+            assert zone.distance_m(middle[None])[0] == pytest.approx(half, abs=1e-4)
+            compared += 1
+    assert compared > 20
 
 
 @pytest.mark.parametrize(
