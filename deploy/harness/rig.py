@@ -107,8 +107,7 @@ class Rig:
         given = [override for each in theirs for override in self._overrides.get(each, ())]
         overrides = [*_local(name, self.slaves, self._endpoints), *given]
         if DRIVES in self.children and role in ("slave", DRIVES):
-            # between processes SYNC may come late by milliseconds, which contact detection takes for a push
-            overrides += [*drive_buses(self._endpoints.can_port), "servos.canopen.tell_effort=false"]
+            overrides += drive_buses(self._endpoints.can_port)
         return overrides
 
     def _host(self, role: str) -> list[str]:
