@@ -83,8 +83,9 @@ def record(
 
     Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
     """
+    from deploy.client.observer import link_of
     from deploy.ops.record.from_tap import record_tap
-    from deploy.ops.record.record import RecordOptions, link_of
+    from deploy.ops.record.record import RecordOptions
     from deploy.ops.record.record import record as record_until
 
     if config is not None:

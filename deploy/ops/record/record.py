@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 from common.clock import monotonic_ns, to_s
-from common.config.load import load_config
-from common.config.section import Section
 from common.errors import TandemError
 from common.link import Link, open_link
 from common.link.config import LinkConfig
@@ -18,26 +16,12 @@ from common.metrics.recorder import RecorderMetrics
 from common.metrics.tree import WriteMetrics
 from common.process.runtime import until_stopped
 from common.wire.topics import COMMAND, STATE, STATISTICS, Topic, video
-from deploy.client.destination import destination
 from deploy.ops.record.tape import Tape
 from deploy.recorded.missing import Missing, missing_in_words
 
 LIVE = (COMMAND, STATE, STATISTICS)
 """What is always recorded."""
 PROGRESS_S = 0.5
-
-
-class ObserverConfig(Section):
-    """The TOML file of a process that only observes."""
-
-    link: LinkConfig
-
-
-def link_of(connect: Sequence[str], file: Path | None) -> LinkConfig:
-    """Where to listen in: the endpoints, or the file's `[link]`. Raises ConfigError, TandemError."""
-    if file is not None:
-        return load_config(file, ObserverConfig).link
-    return destination(connect, None).link
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,8 @@ from common.metrics.tree import Metrics
 from common.recording import McapRecorder, read_recording
 from common.wire.topics import COMMAND, STATE, STATISTICS, video
 from deploy import cli
-from deploy.ops.record.record import RecordOptions, link_of, record
+from deploy.client.observer import link_of
+from deploy.ops.record.record import RecordOptions, record
 from deploy.recorded.contents import survey
 from tests.deploy.ops.record.numbered import state
 

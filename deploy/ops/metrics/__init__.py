@@ -1,0 +1,1 @@
+"""`tandem metrics`: what both sides publish each second, for Prometheus."""

@@ -1,0 +1,115 @@
+"""The newest statistics as Prometheus scrapes them (extra `metrics`)."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from common.clock import Clock, monotonic_ns, to_s, wall_ns
+from common.errors import CodecError
+from common.metrics.master import MasterMetrics
+from common.metrics.parts import Summary
+from common.wire.codec import decode
+from common.wire.messages import Statistics
+from deploy.ops.metrics.table import (
+    BESIDE,
+    RECORDING_AGE,
+    RECORDING_FREE,
+    TABLE,
+    UP,
+    HeardStatistics,
+    MetricType,
+    ServedMetric,
+    ServedSample,
+    is_fresh,
+)
+
+if TYPE_CHECKING:
+    from prometheus_client.core import Metric
+
+QUANTILES = {"0.5": "p50", "0.99": "p99"}
+
+
+class StatisticsCollector:
+    """Takes statistics in the event loop; scraped by the server's thread, which sees whole entries only."""
+
+    def __init__(
+        self, recordings: Path | None = None, clock: Clock = monotonic_ns, wall: Clock = wall_ns
+    ) -> None:
+        self._newest: dict[tuple[str, str], HeardStatistics] = {}
+        self._recordings = recordings
+        self._clock, self._wall = clock, wall
+        self.unreadable = 0
+
+    def take(self, robot: str, payload: bytes, arrived_ns: int) -> None:
+        """One message of a robot's statistics topic."""
+        try:
+            metrics = decode(payload, Statistics).metrics
+        except CodecError:
+            self.unreadable += 1
+            return
+        role = "master" if isinstance(metrics, MasterMetrics) else "slave"
+        self._newest[robot, role] = HeardStatistics(robot, role, metrics, arrived_ns)
+
+    def collect(self) -> Iterator[Metric]:
+        """What is known now. A process that has been silent for 5 s has `tandem_up` 0 and no other value."""
+        heard, now_ns = list(self._newest.values()), self._clock()
+        fresh = [one for one in heard if is_fresh(one, now_ns)]
+        yield self._beside(UP, [({"robot": h.robot, "role": h.role}, float(h in fresh)) for h in heard])
+        for metric in TABLE:
+            yield _family(metric, fresh)
+        if self._recordings is not None:
+            yield from self._of_recordings(self._recordings)
+
+    def _beside(self, name: str, samples: list[tuple[dict[str, str], float]]) -> Metric:
+        from prometheus_client.core import Metric
+
+        family = Metric(name, BESIDE[name], "gauge")
+        for labels, value in samples:
+            family.add_sample(name, labels, value)
+        return family
+
+    def _of_recordings(self, folder: Path) -> Iterator[Metric]:
+        try:
+            newest_ns = max((path.stat().st_mtime_ns for path in folder.glob("*.mcap")), default=None)
+            free = shutil.disk_usage(folder).free
+        except OSError:  # the disk has gone: no value, and the alert's `absent` says so
+            return
+        if newest_ns is not None:
+            yield self._beside(RECORDING_AGE, [({}, to_s(self._wall() - newest_ns))])
+        yield self._beside(RECORDING_FREE, [({}, float(free))])
+
+
+def _family(metric: ServedMetric, heard: list[HeardStatistics]) -> Metric:
+    from prometheus_client.core import Metric
+
+    family = Metric(metric.name, metric.help, metric.type.value)
+    done: set[tuple[str, ...]] = set()
+    for one in heard:
+        labels = {"role": one.role}
+        if metric.by_robot:
+            labels["robot"] = one.robot
+        for sample in metric.take(one.metrics):
+            of_sample = {**labels, **sample.labels}
+            # one master sends each robot the same figures of itself
+            key = tuple(of_sample.values())
+            if key not in done:
+                done.add(key)
+                _add(family, metric, sample, of_sample)
+    return family
+
+
+def _add(family: Metric, metric: ServedMetric, sample: ServedSample, labels: dict[str, str]) -> None:
+    value = sample.value
+    if not isinstance(value, Summary):
+        family.add_sample(metric.full_name, labels, value)
+        return
+    for quantile, name in QUANTILES.items():
+        percentile = getattr(value, name)
+        if percentile is not None:
+            family.add_sample(metric.name, {**labels, "quantile": quantile}, percentile / 1e3)
+    family.add_sample(f"{metric.name}_count", labels, value.count)
+    family.add_sample(f"{metric.name}_sum", labels, value.total / 1e3)
+    assert metric.type is MetricType.SUMMARY
