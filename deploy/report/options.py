@@ -51,4 +51,22 @@ PlotsFile = Annotated[
         callback=_a_png,
     ),
 ]
+ConnectTo = Annotated[
+    list[str] | None,
+    typer.Option("--connect", help="Endpoint to connect to, such as tcp/192.168.7.2:7447; repeat for more."),
+]
+LinkFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--link", help="Take endpoints and keys from the section [link] of this TOML file.", dir_okay=False
+    ),
+]
+Cameras = Annotated[
+    list[str] | None,
+    typer.Option("--video", help="Also take the pictures of this camera, such as `head`; repeat for more."),
+]
+StopAfter = Annotated[
+    float | None,
+    typer.Option("--seconds", help="Stop after this many seconds; without it, stop with Ctrl-C.", min=0.1),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]

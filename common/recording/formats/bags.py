@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -75,19 +76,20 @@ def _unit(topic: str) -> str:
     return "_".join(kept)
 
 
-def _take(rows: Rows, kind: str, message: object) -> None:
-    stamp = message.header.stamp  # type: ignore[attr-defined]
+def _take(rows: Rows, kind: str, message: Any) -> None:
+    """Take a message, whose class rosbags makes from the definition in the bag: no type is known of it."""
+    stamp = message.header.stamp
     at = stamp.sec + 1e-9 * stamp.nanosec
     if kind == _FIELD:
-        field = message.magnetic_field  # type: ignore[attr-defined]
+        field = message.magnetic_field
         rows[MAG].append((at, 1e6 * field.x, 1e6 * field.y, 1e6 * field.z))
         return
-    acc, gyr = message.linear_acceleration, message.angular_velocity  # type: ignore[attr-defined]
+    acc, gyr = message.linear_acceleration, message.angular_velocity
     rows[ACC].append((at, acc.x, acc.y, acc.z))
     rows[GYR].append((at, gyr.x, gyr.y, gyr.z))
     # a first covariance of -1 says that there is no orientation; all zeros says nothing is known of it
-    q = message.orientation  # type: ignore[attr-defined]
-    if message.orientation_covariance[0] != -1.0 and any((q.w, q.x, q.y, q.z)):  # type: ignore[attr-defined]
+    q = message.orientation
+    if message.orientation_covariance[0] != -1.0 and any((q.w, q.x, q.y, q.z)):
         rows[QUAT].append((at, q.w, q.x, q.y, q.z))
 
 

@@ -18,7 +18,7 @@ from deploy.ops.convert.joints import JointSeries
 from deploy.report.output import writing
 
 _TO_BVH = [1, 2, 0]
-"""x ahead, y left, z up ▸ x left, y up, z ahead: which of ours stands at each place."""
+"""For each axis of BVH (left, up, ahead), the place of the same axis in tandem's order (ahead, left, up)."""
 _ROOT = "base"
 
 

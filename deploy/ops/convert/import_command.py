@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,6 +19,7 @@ from deploy.report.tables import number, plain_table
 if TYPE_CHECKING:
     from common.recording.formats.registry import ReadNodes
     from common.recording.formats.samples import ReadOptions
+    from common.recording.node import NodeRecording
     from deploy.ops.convert.judge import ImportJudgement
 
 
@@ -76,32 +78,57 @@ def import_recording(
     Example: `tandem import left.csv --units acc=g,gyr=deg/s --name left=left_forearm --to npz`
     """
     from common.recording.formats.registry import read_nodes
-    from deploy.ops.convert.judge import judge
-    from deploy.ops.convert.write import write_npz, write_suit
 
     path = out or files[0].with_suffix(f".{to}")
     if path.suffix.lower() != f".{to}":
         raise TandemError(f"--out {path}: expected a name that ends in .{to}")
     read = read_nodes(files, _options(columns or (), units or (), rate), _renamed(name or ()))
-    missing = [one for one in node or () if one not in read.nodes]
-    if missing:
-        raise TandemError(f"--node {', '.join(missing)}: is not there; there are {', '.join(read.nodes)}")
-    nodes = {one: found for one, found in read.nodes.items() if not node or one in node}
-    judged = {one: judge(found) for one, found in nodes.items()}
-    refused = [found.refused for found in judged.values() if found.refused]
-    if refused and not force:
-        _show(read, judged, Console(stderr=True))
-        raise TandemError("\n".join(refused) + "\n(--force writes it all the same)")
-    written = write_npz(path, nodes, rate) if to is Target.NPZ else write_suit(path, nodes, rate, profile)
-    notes = (*read.notes, *written, *refused)
+    nodes = _only(read.nodes, node or ())
+    judged = _judged(read, nodes, Console(stderr=True), force=force)
+    notes = _write(to, path, nodes, rate, profile)
+    notes += [found.refused for found in judged.values() if found.refused]
     if as_json:
-        typer.echo(json.dumps(_tree(path, read, judged, notes), indent=2, ensure_ascii=False))
+        tree = _tree(path, read, judged, (*read.notes, *notes))
+        typer.echo(json.dumps(tree, indent=2, ensure_ascii=False))
         return
     console = Console()
     _show(read, judged, console)
-    for note in (*written, *refused):
+    for note in notes:
         console.print(note, style="yellow", highlight=False, markup=False)
     console.print(f"written: {path}", style="dim", highlight=False, soft_wrap=True)
+
+
+def _only(nodes: Mapping[str, NodeRecording], chosen: Sequence[str]) -> dict[str, NodeRecording]:
+    """The nodes that are chosen; all where none is named. Raises TandemError."""
+    missing = [name for name in chosen if name not in nodes]
+    if missing:
+        raise TandemError(f"--node {', '.join(missing)}: is not there; there are {', '.join(nodes)}")
+    return {name: found for name, found in nodes.items() if not chosen or name in chosen}
+
+
+def _judged(
+    read: ReadNodes, nodes: Mapping[str, NodeRecording], console: Console, *, force: bool
+) -> dict[str, ImportJudgement]:
+    """What the units and axes of each node are judged to be. Raises TandemError where they contradict."""
+    from deploy.ops.convert.judge import judge
+
+    judged = {name: judge(found) for name, found in nodes.items()}
+    refused = [found.refused for found in judged.values() if found.refused]
+    if refused and not force:
+        _show(read, judged, console)
+        raise TandemError("\n".join(refused) + "\n(--force writes it all the same)")
+    return judged
+
+
+def _write(
+    to: Target, path: Path, nodes: Mapping[str, NodeRecording], rate_hz: float | None, profile: str
+) -> list[str]:
+    """Write the file; what is to be said of it."""
+    from deploy.ops.convert.write import write_npz, write_suit
+
+    if to is Target.NPZ:
+        return list(write_npz(path, nodes, rate_hz))
+    return list(write_suit(path, nodes, rate_hz, profile))
 
 
 def _options(

@@ -46,7 +46,7 @@ def write_npz(path: Path, nodes: Mapping[str, NodeRecording], rate_hz: float | N
         arrays["t_s"] = grid.time_s
     _new(path)
     with writing(path), path.open("xb") as stream:
-        np.savez(stream, **arrays)  # type: ignore[arg-type]
+        np.savez(stream, **arrays)  # type: ignore[arg-type]  # numpy types any key as allow_pickle
     return grid.notes
 
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from common.errors import TandemError
 from common.process.runtime import run as run_until_stopped
-from deploy.report.options import MetricsFile
+from deploy.report.options import Cameras, ConnectTo, LinkFile, MetricsFile, StopAfter
 from deploy.report.output import in_a_folder, metrics_writer
+
+if TYPE_CHECKING:
+    from deploy.ops.record.record import RecordOptions
 
 
 def record(
@@ -34,29 +38,16 @@ def record(
             "the sensors said, so that `tandem replay` can compute it again.",
         ),
     ] = None,
-    connect: Annotated[
-        list[str] | None,
-        typer.Option(help="Endpoint to connect to, such as tcp/192.168.7.2:7447; repeat for more."),
-    ] = None,
-    link: Annotated[
-        Path | None,
-        typer.Option(
-            help="Take endpoints and keys from the section [link] of this TOML file.", dir_okay=False
-        ),
-    ] = None,
-    video: Annotated[
-        list[str] | None, typer.Option(help="Also record the pictures of this camera, such as `head`.")
-    ] = None,
+    connect: ConnectTo = None,
+    link: LinkFile = None,
+    video: Cameras = None,
     minutes_per_file: Annotated[
         float,
         typer.Option(
             help="Begin a new file (FILE-2.mcap, …) after this many minutes; 0: keep one file.", min=0.0
         ),
     ] = 60.0,
-    seconds: Annotated[
-        float | None,
-        typer.Option(help="Stop after this many seconds; without it, stop with Ctrl-C.", min=0.1),
-    ] = None,
+    seconds: StopAfter = None,
     session: Annotated[
         Path | None,
         typer.Option(help="With --tap: the folder of a session (`tandem session start`).", file_okay=False),
@@ -83,40 +74,71 @@ def record(
 
     Example: `tandem record --connect tcp/192.168.7.2:7447 --robot robot-1 --out morning.mcap`
     """
-    from deploy.client.observer import link_of
-    from deploy.ops.record.from_tap import record_tap
-    from deploy.ops.record.record import RecordOptions
-    from deploy.ops.record.record import record as record_until
-
+    of_a_robot = {
+        "--robot": robot, "--connect": connect, "--link": link, "--video": video, "--may-miss": may_miss,
+        "--metrics": metrics,
+    }  # fmt: skip
     if config is not None:
+        _refuse("--config", {"--tap": tap, "--out": out, "--session": session, **of_a_robot})
         _record_for_good(config)
         return
+    file, each_s = _mcap(out), 60.0 * minutes_per_file if minutes_per_file else None
+    if tap is not None:
+        _refuse("--tap", of_a_robot)
+        _record_at(tap, file, seconds, each_s, session)
+        return
+    if session is not None:
+        raise TandemError("record: --session goes with --tap, as only a process knows what it decided")
+    if robot is None:
+        raise TandemError("record: name the robot by --robot, or a process's socket by --tap")
+    from deploy.client.observer import link_of
+    from deploy.ops.record.record import RecordOptions
+
+    where = link_of(connect or (), link)
+    options = RecordOptions(where, robot, file, tuple(video or ()), seconds, each_s, may_miss=may_miss)
+    _record_robot(options, metrics)
+
+
+def _refuse(source: str, others: Mapping[str, object]) -> None:
+    """Raise TandemError for options that mean nothing beside a source."""
+    given = [name for name, value in others.items() if value]
+    if given:
+        raise TandemError(
+            f"record: {source} says already what is recorded; leave out {', '.join(given)}, or {source}"
+        )
+
+
+def _mcap(out: Path | None) -> Path:
     if out is None:
         raise TandemError(
             "record: name the file to write by --out, or a master's or slave's file by --config"
         )
     if out.suffix.lower() != ".mcap":
         raise TandemError(f"{out}: expected a name that ends in .mcap")
-    each_s = 60.0 * minutes_per_file if minutes_per_file else None
+    return out
+
+
+def _record_at(
+    tap: Path, out: Path, seconds: float | None, each_s: float | None, session: Path | None
+) -> None:
+    from deploy.ops.record.from_tap import record_tap
+    from deploy.study.session import Session
+
+    of_study = None if session is None else Session(session)
     console = Console(stderr=True)
-    if tap is not None:
-        from deploy.study.session import Session
 
-        of_study = None if session is None else Session(session)
+    async def work(stop: asyncio.Event) -> None:
+        with console.status("waiting for the process") as status:
+            summary = await record_tap(tap, out, stop, status.update, seconds, each_s, session=of_study)
+        console.print(summary, highlight=False)
 
-        async def take(stop: asyncio.Event) -> None:
-            with console.status("waiting for the process") as status:
-                console.print(
-                    await record_tap(tap, out, stop, status.update, seconds, each_s, session=of_study),
-                    highlight=False,
-                )
+    run_until_stopped(work)
 
-        run_until_stopped(take)
-        return
-    if robot is None:
-        raise TandemError("record: name the robot by --robot, or a process's socket by --tap")
-    where = link_of(connect or (), link)
-    options = RecordOptions(where, robot, out, tuple(video or ()), seconds, each_s, may_miss=may_miss)
+
+def _record_robot(options: RecordOptions, metrics: Path | None) -> None:
+    from deploy.ops.record.record import record as record_until
+
+    console = Console(stderr=True)
 
     async def work(stop: asyncio.Event) -> None:
         with console.status("waiting for the robot") as status:

@@ -11,19 +11,13 @@ from rich.console import Console
 
 from common.process.runtime import run as run_until_stopped
 from deploy.ops.ros.publishers import KeyFormat
+from deploy.report.options import Cameras, ConnectTo, LinkFile, StopAfter
 
 
 def ros(
     robot: Annotated[str, typer.Option(help="Name of the robot.")],
-    connect: Annotated[
-        list[str] | None, typer.Option(help="Endpoint of the robot, such as tcp/192.168.7.2:7447.")
-    ] = None,
-    link: Annotated[
-        Path | None,
-        typer.Option(
-            help="Take endpoints and keys from the section [link] of this TOML file.", dir_okay=False
-        ),
-    ] = None,
+    connect: ConnectTo = None,
+    link: LinkFile = None,
     to: Annotated[
         list[str] | None, typer.Option(help="Endpoint of the Zenoh router on the ROS side.")
     ] = None,
@@ -32,14 +26,9 @@ def ros(
         KeyFormat,
         typer.Option(help="rmw_zenoh: ROS 2 nodes with that middleware; ros2dds: a zenoh-bridge-ros2dds."),
     ] = KeyFormat.RMW_ZENOH,
-    video: Annotated[
-        list[str] | None, typer.Option(help="Also publish the pictures of this camera, such as `head`.")
-    ] = None,
+    video: Cameras = None,
     profile: Annotated[str, typer.Option(help="Profile of the robot.")] = "nursing",
-    seconds: Annotated[
-        float | None,
-        typer.Option(help="Stop after this many seconds; without it, stop with Ctrl-C.", min=0.1),
-    ] = None,
+    seconds: StopAfter = None,
 ) -> None:
     """Publish a robot's joint states, targets, tf, diagnostics and video for ROS 2. Commands never come in.
 

@@ -32,7 +32,7 @@ def judge(config: MasterConfig, source: SuitSource, sweeps: list[Sweep], seconds
     """What the sweeps of some seconds say of each node. Raises TandemError where there is none."""
     names = config.skeleton.segment_names
     if not sweeps:
-        raise TandemError(f"no tick of the suit in {seconds:g} s: the host stood still; try again")
+        raise TandemError(f"no tick in {seconds:g} s: this host was stalled; run the check again")
     readings = np.array([np.concatenate([s.acc_m_s2, s.gyr_rad_s, s.mag_ut], axis=1) for s in sweeps])
     fresh = np.array([sweep.fresh for sweep in sweeps])
     answered_ms = np.array([1e-6 * (sweep.frames_in_ns - sweep.sampled_ns) for sweep in sweeps])

@@ -80,7 +80,8 @@ class FreeNode:
         from scipy.spatial.transform import Rotation
 
         turned = Rotation.from_quat(np.roll(q, -1))
-        angles: Array = turned.as_euler(orientation.sequence)  # type: ignore[call-overload]
+        sequence = orientation.sequence
+        angles: Array = turned.as_euler(sequence)  # type: ignore[call-overload]  # scipy types literals only
         return np.append(angles, 0.0)
 
     def _frame(self, part: Part, channels: Array) -> CanFrame:

@@ -28,7 +28,10 @@ class FaultWords:
             self._down.pop(bus, None)
 
     def update(self, second_master: str) -> bool:
-        """Put the words together anew; whether they have changed. `second_master`: what is said of one."""
+        """Compose each joint's text again, and return whether any text has changed.
+
+        `second_master`: the text about a second master on the buses; empty if there is none.
+        """
         words = {}
         for name, (bus, _), drive in zip(self._wiring.joints, self._wiring.where, self._drives, strict=True):
             down = f"bus {bus} is down: {self._down[bus]}" if bus in self._down else ""

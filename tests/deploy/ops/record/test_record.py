@@ -182,3 +182,21 @@ def test_states_that_never_came_are_reported_as_an_error(tmp_path: Path, may_mis
         assert metrics.missing == {"tandem/robot-1/state": 2200}
 
     run(test)
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--tap", "m.sock", "--robot", "robot-1"], "--robot"),
+        (["--tap", "m.sock", "--connect", "tcp/127.0.0.1:1", "--video", "head"], "--connect, --video"),
+        (["--config", "master.toml", "--tap", "m.sock"], "--tap"),
+    ],
+)
+def test_options_that_mean_nothing_beside_a_source_are_refused(
+    tmp_path: Path, options: list[str], named: str
+) -> None:
+    out = [] if "--config" in options else ["--out", str(tmp_path / "a.mcap")]
+    refused = CliRunner().invoke(cli.app, ["record", *options, *out])
+    assert isinstance(refused.exception, TandemError)
+    assert f"leave out {named}" in str(refused.exception)
+    assert not list(tmp_path.iterdir())
