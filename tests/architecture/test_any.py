@@ -8,6 +8,7 @@ import pytest
 from tests.architecture.imports import SourceTree
 
 ADAPTERS = {
+    "common/recording/formats/bags.py": "rosbags",
     "deploy/report/group.py": "typer",
     "deploy/sim/drives/server.py": "canopen",
     "deploy/sim/drives/wire.py": "canopen",

@@ -5,7 +5,8 @@ steps ─▶ SYNC, or something a node must not answer ─▶ frames ─▶ one 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -56,13 +57,18 @@ class RuleVerdict:
 
 
 @dataclass(slots=True)
-class _Tested:
-    identifiers: tuple[int, ...]
-    broken: dict[str, list[str]] = field(default_factory=dict)
-    raw: dict[int, set[bytes]] = field(default_factory=dict)
-    """Readings that each identifier has borne."""
-    got: dict[int, int] = field(default_factory=dict)
-    answered: int = 0
+class _AskedNow:
+    """What one period showed."""
+
+    step: AskedPeriod
+    began_ns: int
+    ended_ns: int = 0
+    broken: list[tuple[str, str, str]] = field(default_factory=list)
+    """Node, rule, and what breaks it."""
+    got: Counter[tuple[str, int]] = field(default_factory=Counter)
+    """Sound frames by node and identifier."""
+    raw: list[tuple[str, int, bytes]] = field(default_factory=list)
+    """The readings of each, by node and identifier."""
 
 
 class Conformance:
@@ -74,80 +80,97 @@ class Conformance:
         """`fd` says of each bus whether it is CAN FD."""
         self._protocol = protocol
         self._fd = dict(fd)
-        self._nodes: dict[str, _Tested] = {}
+        self._identifiers: dict[str, tuple[int, ...]] = {}
         self._of: dict[tuple[str, int], str] = {}
         for name, node in nodes.items():
             form = protocol.answer_format(fd[node.bus])
             identifiers = tuple(part.base_id + node.id for part in form.parts)
-            self._nodes[name] = _Tested(identifiers)
+            self._identifiers[name] = identifiers
             self._of.update({(node.bus, identifier): name for identifier in identifiers})
         self.steps: Sequence[AskedPeriod] = _steps(protocol)
-        self._step: AskedPeriod | None = None
-        self._asked_ns = 0
-        self._asked = 0
+        self._periods: list[_AskedNow] = []
+        self._now: _AskedNow | None = None
 
     def begin(self, step: AskedPeriod, now_ns: int) -> CanFrame | None:
-        """Begin a period; returns what to send."""
-        self._conclude()
-        self._step, self._asked_ns = step, now_ns
-        self._asked += step.number is not None
+        """Begin a period, which ends the one before; returns what to send."""
+        self.end(now_ns)
+        self._now = _AskedNow(step, now_ns)
+        self._periods.append(self._now)
         return step.frame
+
+    def end(self, now_ns: int) -> None:
+        """End the period under way: frames that come between two periods are not judged."""
+        if self._now is not None:
+            self._now.ended_ns = now_ns
+        self._now = None
+
+    def void(self, stalled: Callable[[int, int], bool]) -> list[AskedPeriod]:
+        """Forget the periods in which this host was stalled, and return them: they are to be asked again.
+
+        `stalled` takes the beginning and the end of a period, ns.
+        """
+        spoiled = [each for each in self._periods if stalled(each.began_ns, each.ended_ns)]
+        self._periods = [each for each in self._periods if each not in spoiled]
+        return [each.step for each in spoiled]
 
     def frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> None:
         """Take one frame."""
-        name, step = self._of.get((bus, frame_id)), self._step
-        if name is None or step is None:
+        name, now = self._of.get((bus, frame_id)), self._now
+        if name is None or now is None:
             return
-        node = self._nodes[name]
-        if step.number is None:
-            self._break(name, step.rule, f"frame {frame_id:#x} came")
+        if now.step.number is None:
+            now.broken.append((name, now.step.rule, f"frame {frame_id:#x} came"))
             return
         form = self._protocol.answer_format(self._fd[bus])
-        part = form.parts[node.identifiers.index(frame_id)]
+        part = form.parts[self._identifiers[name].index(frame_id)]
         if len(data) != part.length or frame_crc(frame_id, data[:-1]) != data[-1]:
-            self._break(name, "R3", f"{data.hex()} in {frame_id:#x}")
+            now.broken.append((name, "R3", f"{data.hex()} in {frame_id:#x}"))
             return
         decoded = part.decode(data)
         mask = part.tick.mask
-        if int(decoded.tick[0]) != step.number & mask:
-            self._break(name, "R2", f"{int(decoded.tick[0])} to the SYNC {step.number}")
+        if int(decoded.tick[0]) != now.step.number & mask:
+            words = f"{int(decoded.tick[0])} to the SYNC {now.step.number}"
+            now.broken.append((name, "R2", words))
         if int(decoded.status[0]) & ~int(NodeStatus.FAULT | NodeStatus.SATURATED):
-            self._break(name, "R7", f"STATUS {int(decoded.status[0]):#x}")
-        if now_ns - self._asked_ns > MOST_LATE_NS:
-            self._break(name, "R4", f"{1e-6 * (now_ns - self._asked_ns):.1f} ms")
-        node.got[frame_id] = node.got.get(frame_id, 0) + 1
-        node.raw.setdefault(frame_id, set()).add(np.asarray(decoded.raw).tobytes())
+            now.broken.append((name, "R7", f"STATUS {int(decoded.status[0]):#x}"))
+        if now_ns - now.began_ns > MOST_LATE_NS:
+            now.broken.append((name, "R4", f"{1e-6 * (now_ns - now.began_ns):.1f} ms"))
+        now.got[name, frame_id] += 1
+        now.raw.append((name, frame_id, np.asarray(decoded.raw).tobytes()))
 
     def verdicts(self) -> list[RuleVerdict]:
         """One for each node and rule."""
-        self._conclude()
-        self._step = None
         out = []
-        for name, node in self._nodes.items():
+        for name, identifiers in self._identifiers.items():
+            broken: dict[str, list[str]] = {}
+            for period in self._periods:
+                for node, rule, seen in period.broken:
+                    if node == name:
+                        broken.setdefault(rule, []).append(seen)
+            unanswered = self._unanswered(name)
+            if unanswered:
+                broken["R1"] = unanswered
+            raw = {(which, data) for each in self._periods for node, which, data in each.raw if node == name}
             # a magnetometer of its own frame may be absent
-            if any(len(node.raw.get(identifier, "ab")) < 2 for identifier in node.identifiers[:2]):
-                self._break(name, "R8", "the same readings in every answer")
+            if any(sum(which == identifier for which, _ in raw) == 1 for identifier in identifiers[:2]):
+                broken.setdefault("R8", []).append("the same readings in every answer")
+            answered = sum(each.step.number is not None for each in self._periods) - len(unanswered)
             for rule, words in RULES.items():
-                broken = node.broken.get(rule, [])
-                judged = node.answered > 0 or rule == "R1"
-                seen = f"{len(broken)}×: {broken[0]}" if broken else f"{node.answered} answers"
-                out.append(RuleVerdict(name, f"{rule}: {words}", judged and not broken, seen))
+                wrong = broken.get(rule, [])
+                judged = answered > 0 or rule == "R1"
+                said = f"{len(wrong)}×: {wrong[0]}" if wrong else f"{answered} answers"
+                out.append(RuleVerdict(name, f"{rule}: {words}", judged and not wrong, said))
         return out
 
-    def _conclude(self) -> None:
-        """Whether each node answered the period that ends."""
-        step = self._step
-        for name, node in self._nodes.items():
-            if step is not None and step.number is not None:
-                counts = [node.got.get(identifier, 0) for identifier in node.identifiers]
-                if counts != [1] * len(counts):
-                    self._break(name, "R1", f"{counts} frames to the SYNC {step.number}")
-                else:
-                    node.answered += 1
-            node.got = {}
-
-    def _break(self, name: str, rule: str, seen: str) -> None:
-        self._nodes[name].broken.setdefault(rule, []).append(seen)
+    def _unanswered(self, name: str) -> list[str]:
+        """The SYNCs to which a node did not send each of its frames once, in words."""
+        identifiers = self._identifiers[name]
+        counts = [
+            (each.step.number, [each.got[name, identifier] for identifier in identifiers])
+            for each in self._periods
+            if each.step.number is not None
+        ]
+        return [f"{got} frames to the SYNC {number}" for number, got in counts if got != [1] * len(got)]
 
 
 def _steps(protocol: SuitProtocol) -> list[AskedPeriod]:

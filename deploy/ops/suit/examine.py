@@ -42,6 +42,8 @@ class Observed:
     jitter_ms: float | None
     fused: bool = False
     """It gives an orientation; readings may follow from it."""
+    stalled_s: float = 0.0
+    """For so long this host was stalled: what did not come then is not the node's fault."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +97,8 @@ def examine(name: str, seen: Observed, tick_s: float) -> NodeFinding:
 def _lost_share(seen: Observed) -> float:
     missing = seen.counts.get("missing")
     if missing is not None:
-        return missing / max(missing + seen.rate_hz * len(seen.fresh) / 200.0, 1.0)
+        lost = max(missing - seen.rate_hz * seen.stalled_s, 0.0)
+        return lost / max(lost + seen.rate_hz * len(seen.fresh) / 200.0, 1.0)
     # before its first answer a node was not lost, but not there
     first = int(np.argmax(seen.fresh))
     return float(1.0 - seen.fresh[first:].mean())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
@@ -16,6 +17,8 @@ from deploy.ops.suit.examine import NodeFinding, Observed, examine
 from master.capture.source import SuitSource
 from master.config import MasterConfig
 from master.suit.sweep import Sweep
+
+log = logging.getLogger(__name__)
 
 
 async def listen(config: MasterConfig, seconds: float) -> list[NodeFinding]:
@@ -33,6 +36,7 @@ def judge(config: MasterConfig, source: SuitSource, sweeps: list[Sweep], seconds
     names = config.skeleton.segment_names
     if not sweeps:
         raise TandemError(f"no tick in {seconds:g} s: this host was stalled; run the check again")
+    stalled_s, judged_s = _without_stalls(sweeps, 1.0 / config.capture.rate_hz)
     readings = np.array([np.concatenate([s.acc_m_s2, s.gyr_rad_s, s.mag_ut], axis=1) for s in sweeps])
     fresh = np.array([sweep.fresh for sweep in sweeps])
     answered_ms = np.array([1e-6 * (sweep.frames_in_ns - sweep.sampled_ns) for sweep in sweeps])
@@ -44,13 +48,26 @@ def judge(config: MasterConfig, source: SuitSource, sweeps: list[Sweep], seconds
             continue
         figure = figures.get(row)
         counts = {what: count for what, count in asdict(health[row]).items() if count}
-        rate_hz, jitter_ms = _rate(figure, fresh[:, row].sum() / seconds, answered_ms)
+        rate_hz, jitter_ms = _rate(figure, fresh[:, row].sum() / judged_s, answered_ms)
         seen = Observed(
             readings[:, row], fresh[:, row], rate_hz, counts, jitter_ms,
-            fused is not None and bool(fused[row]),
+            fused is not None and bool(fused[row]), stalled_s,
         )  # fmt: skip
         found.append(examine(name, seen, 1.0 / config.capture.rate_hz))
     return found
+
+
+def _without_stalls(sweeps: list[Sweep], tick_s: float) -> tuple[float, float]:
+    """Take out the ticks around each stall of this host; for how long it was stalled, and the time left."""
+    ticks = np.array([sweep.tick for sweep in sweeps])
+    missed = np.diff(ticks) - 1
+    after = np.flatnonzero(missed) + 1
+    for place in reversed(after.tolist()):
+        del sweeps[place]
+    stalled_s = float((missed.sum() + len(after)) * tick_s)
+    if len(after):
+        log.warning("this host missed %d ticks: what was lost then does not count", missed.sum())
+    return stalled_s, len(sweeps) * tick_s
 
 
 def _rate(

@@ -99,3 +99,22 @@ def test_numbers_wrap_and_come_again() -> None:
     ]
     assert {0, 63, 64, 2**32 - 1} <= set(asked)
     assert any(b < a for a, b in itertools.pairwise(asked))
+
+
+@pytest.mark.parametrize("voided", [True, False])
+def test_a_period_in_which_this_host_was_stalled_is_asked_again(voided: bool) -> None:
+    """Every tenth answer seems 9 ms late, as this host read it late; without `void` the node is blamed."""
+    answer, test = good(fd=True), Conformance(NODES, PROTOCOL, {"arm": True})
+    now_ns = 0
+    for period, step in enumerate(test.steps):
+        now_ns += 2 * PERIOD_NS
+        stalled = period % 10 == 0
+        asked = test.begin(step, now_ns)
+        for late_ns, frame in answer(asked, period):
+            test.frame("arm", frame.id, frame.data, now_ns + (9_000_000 if stalled else late_ns))
+        test.end(now_ns + (PERIOD_NS + 5_000_000 if stalled else PERIOD_NS))
+    if voided:
+        again = test.void(lambda began_ns, ended_ns: ended_ns - began_ns > PERIOD_NS + 1_000_000)
+        assert len(again) == -(-len(test.steps) // 10)
+        assert test.void(lambda began_ns, ended_ns: ended_ns - began_ns > PERIOD_NS + 1_000_000) == []
+    assert {v.rule[:2] for v in test.verdicts() if not v.held} == (set() if voided else {"R4"})

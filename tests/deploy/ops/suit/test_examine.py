@@ -81,3 +81,12 @@ def test_silence_and_loss_are_said() -> None:
     assert losing.lost_share == pytest.approx(0.048, abs=0.001)
     assert "samples are lost" in losing.troubles[0]
     assert examine("head", replace(SEEN, counts={"missing": 20}), TICK_S).troubles == ()
+
+
+def test_what_did_not_come_while_this_host_was_stalled_is_not_lost() -> None:
+    counts = {"missing": 200}
+    blamed = replace(SEEN, counts=counts)
+    assert "samples are lost" in "; ".join(examine("head", blamed, TICK_S).troubles)
+    assert examine("head", replace(blamed, stalled_s=1.0), TICK_S).troubles == ()
+    short = replace(blamed, stalled_s=0.5)
+    assert "samples are lost" in "; ".join(examine("head", short, TICK_S).troubles)
