@@ -75,22 +75,14 @@ function keyUp(event) {
 
 let engage = null;
 
+/** The request is made after a second of holding, whether or not a frame could be drawn meanwhile. */
 function engaging(down) {
-  cancelAnimationFrame(engage?.frame);
-  $("engage").style.setProperty("--held", 0);
-  if (!down || !seen.hello?.may?.act) {
-    if (down) tell(t("may.not"), false);
-    engage = null;
-    return;
-  }
-  engage = { since_ms: performance.now() };
-  const step = () => {
-    const share = (performance.now() - engage.since_ms) / ENGAGE_MS;
-    $("engage").style.setProperty("--held", Math.min(1, share));
-    if (share < 1) engage.frame = requestAnimationFrame(step);
-    else act("engage");
-  };
-  step();
+  clearTimeout(engage);
+  engage = null;
+  $("engage").classList.toggle("down", down && Boolean(seen.hello?.may?.act));
+  if (!down) return;
+  if (seen.hello?.may?.act) engage = setTimeout(() => act("engage"), ENGAGE_MS);
+  else tell(t("may.not"), false);
 }
 
 async function act(name, more = {}) {
@@ -186,6 +178,7 @@ async function prepare(robot) {
   parts.figure = found.nodes?.length && $("figure") ? new BodyFigure($("figure"), found.nodes) : null;
   parts.table = new JointTable($("joints"), found.joints, engineer);
   parts.cameras = $("cameras") ? new Cameras($("cameras"), found.cameras ?? []) : null;
+  cameras(Object.keys(seen.view?.video ?? {}));
   if (parts.more) parts.more.prepare(found);
   if (seen.facts) facts(seen.facts);
   await threeD(found);
@@ -215,6 +208,7 @@ function view(message) {
     const off = joints_off(message, OFF_DEG).slice(0, 3);
     if ($("off")) $("off").textContent = off.map(({ joint, off_deg }) => t("off", { joint: nameOf(seen.setup.joints[joint].name), degrees: off_deg.toFixed(0) })).join(" · ");
   }
+  cameras(Object.keys(message.video ?? {}));
   latencyNow(message.latency);
   parts.more?.view(message);
   show();
@@ -229,7 +223,15 @@ function facts(message) {
   parts.more?.facts(message);
 }
 
+/** Cameras that are heard of later get their place too. */
+function cameras(names) {
+  if (parts.cameras && names.some((name) => !parts.cameras.has(name))) {
+    parts.cameras = new Cameras($("cameras"), [...new Set([...parts.cameras.names(), ...names])]);
+  }
+}
+
 function gotPicture(header) {
+  cameras([header.camera]);
   parts.cameras?.take(header);
   showPictures();
 }
@@ -295,11 +297,17 @@ function showStop(id = situation(now()).id) {
   const note = seen.setup?.replay ? "stop.replay" : found.failed ? `stop.${found.failed}` : "stop.keys";
   put($("stop-note"), t(note, { words: found.words }));
   const list = $("lights");
-  if (!list.children.length) list.append(...found.lights.map((light) => make("li", "", { "data-light": light.id })));
+  if (!list.children.length) {
+    for (const { id } of found.lights) {
+      list.append(make("li", "", { "data-light": id }));
+      list.lastChild.append(make("span"), make("b"));
+    }
+  }
   found.lights.forEach((light, i) => {
     list.children[i].classList.toggle("on", light.on);
-    const when = light.on && light.at_s !== null && light.id !== "asked" ? ` ${light.at_s.toFixed(2)} s` : "";
-    put(list.children[i], t(`light.${light.id}`) + when);
+    const when = light.on && light.at_s !== null && light.id !== "asked" ? `${light.at_s.toFixed(2)} s` : "";
+    put(list.children[i].firstChild, t(`light.${light.id}`));
+    put(list.children[i].lastChild, when);
   });
 }
 

@@ -45,7 +45,7 @@ function stages(found) {
   for (const stage of found) {
     const row = make("tr");
     const bar = make("span", "", { class: "bar" });
-    bar.style.width = `${(5 * (stage.mean_ms ?? 0)) / most}rem`;
+    bar.style.width = `${(2.4 * (stage.mean_ms ?? 0)) / most}rem`;
     const mean = make("td", fixed(stage.mean_ms, 2), { class: "number" });
     mean.prepend(bar);
     row.append(make("td", stage.name, { lang: "en" }), mean, make("td", fixed(stage.p99_ms, 2), { class: "number" }));

@@ -67,12 +67,19 @@ export function link(facts) {
     line.append(` · ${t("link.lost", { percent: fixed(found.lost_percent, 1), ms: fixed(found.jitter_ms) })}`);
   }
   line.title = found?.why ?? "";
-  const stages = (latency?.stages ?? []).map((stage) => `${stage.name} ${fixed(stage.mean_ms, 1)}`).join(" ▸ ");
   const creep = latency?.creep?.alarm ? latency.creep.words || t("late.creeps") : "";
   const note = $("late-note");
-  note.textContent = creep || found?.needs || found?.why || stages;
+  note.textContent = creep || found?.needs || (word === "good" ? parts(latency?.stages ?? []) : found?.why ?? "");
   note.classList.toggle("untrusted", Boolean(creep || found?.needs));
-  note.title = note.textContent;
+  note.title = [note.textContent, found?.why].join("\n");
+}
+
+/** The stages in three parts: until the command is sent, the line, and the robot until it moves. */
+function parts(stages) {
+  const line = stages.findIndex((stage) => stage.name.startsWith("put"));
+  if (line < 0) return "";
+  const sum = (some) => fixed(some.reduce((total, stage) => total + (stage.mean_ms ?? 0), 0), 1);
+  return t("late.parts", { operator: sum(stages.slice(0, line)), line: sum([stages[line]]), robot: sum(stages.slice(line + 1)) });
 }
 
 const MARKS = { attention: "!", invalid: "■", silent: "✕", unknown: "?" };
@@ -97,15 +104,26 @@ export class BodyFigure {
     }
     const x = lines.flatMap(([, a, b]) => [a[0], b[0]]);
     const y = lines.flatMap(([, a, b]) => [a[1], b[1]]);
-    const [left, top] = [Math.min(...x) - 0.09, Math.min(...y) - 0.09];
+    const [left, top] = [Math.min(...x) - 0.09, Math.min(...y) - 0.12];
     const [width, height] = [Math.max(...x) + 0.09 - left, Math.max(...y) + 0.09 - top];
     this.svg.setAttribute("viewBox", `${left} ${top} ${width} ${height}`);
     this.unit = Math.max(width, height) / 30;
+    this.skeleton(lines);
     for (const [name, a, b] of lines) {
       const bone = draw("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1], "stroke-linecap": "round" }, this.svg);
       this.marks.set(name, { bone, middle: [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2] });
     }
     this.over = draw("g", {}, this.svg);
+  }
+
+  /** What is no sensor: from a segment's end to the joints of those that hang on it, and the head's outline. */
+  skeleton(lines) {
+    const of = new Map(lines.map(([name, a, b]) => [name, { a, b }]));
+    for (const node of this.nodes) {
+      const [own, above] = [of.get(node.name), of.get(node.parent)];
+      if (above) draw("line", { x1: above.b[0], y1: above.b[1], x2: own.a[0], y2: own.a[1], stroke: "#55626f", "stroke-width": this.unit * 0.5 }, this.svg);
+      if (node.name === "head") draw("circle", { cx: own.b[0], cy: own.b[1], r: this.unit * 2.4, fill: "#161c24", stroke: "#55626f", "stroke-width": this.unit * 0.5 }, this.svg);
+    }
   }
 
   show(levels) {
@@ -249,6 +267,14 @@ export class Cameras {
     for (const [name, { over, header }] of this.cameras) {
       if (!header) over.textContent = t(name ? "picture.none" : "picture.no_camera");
     }
+  }
+
+  has(name) {
+    return this.cameras.has(name);
+  }
+
+  names() {
+    return [...this.cameras.keys()].filter(Boolean);
   }
 
   take(header) {

@@ -4,7 +4,8 @@
 
 const ACKNOWLEDGE_MS = 15;
 const BEAT_MS = 50; // the held deadman
-const SILENT_MS = 2000; // an open socket that says nothing for so long is opened anew
+const LOOK_MS = 250;
+const SILENT_LOOKS = 8; // a socket that says nothing for so many looks is opened anew
 const RETRY_MS = 300; // a stop that nobody has confirmed yet
 
 const json = { "Content-Type": "application/json" };
@@ -24,7 +25,7 @@ export class Link {
     this.beat = null;
     this.stopping = null;
     this.open();
-    setInterval(() => this.watch(), 250);
+    setInterval(() => this.watch(), LOOK_MS);
   }
 
   open() {
@@ -32,7 +33,6 @@ export class Link {
     const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws${query}`);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
-    this.opened_ms = performance.now();
     this.processed = this.acknowledged = this.drawnView = 0;
     socket.onmessage = (event) => {
       if (socket !== this.socket) return;
@@ -55,9 +55,15 @@ export class Link {
     old?.close();
   }
 
+  /** Counts looks, not time: after a pause of the page the looks come before the messages that wait. */
   watch() {
-    const last = Math.max(this.lastFrame_ms ?? 0, this.opened_ms);
-    if (this.socket && !this.quiet && !document.hidden && performance.now() - last > SILENT_MS) this.reopen();
+    const heard = this.lastFrame_ms !== this.looked_ms;
+    this.looked_ms = this.lastFrame_ms;
+    this.silentLooks = heard || this.quiet || document.hidden ? 0 : (this.silentLooks ?? 0) + 1;
+    if (this.socket && this.silentLooks >= SILENT_LOOKS) {
+      this.silentLooks = 0;
+      this.reopen();
+    }
   }
 
   message(message) {

@@ -1,14 +1,16 @@
 // The robot in three dimensions: encoders solid, the operator's target as an outline, torque from outside as colour.
 import {
   AmbientLight, BoxGeometry, CapsuleGeometry, CircleGeometry, Color, CylinderGeometry, DirectionalLight, GridHelper,
-  Group, HemisphereLight, LineBasicMaterial, LineSegments, EdgesGeometry, Mesh, MeshBasicMaterial, MeshLambertMaterial,
+  BackSide, Group, HemisphereLight, LineBasicMaterial, LineSegments, EdgesGeometry, Mesh, MeshBasicMaterial, MeshLambertMaterial,
   OrbitControls, PerspectiveCamera, Quaternion, Scene, SphereGeometry, Vector3, WebGLRenderer,
 } from "/vendor/three.js";
 import { jointsOfLinks, placeLinks } from "./kinematics.js";
 import { push } from "./state.js";
 
-const FULL_NM = 10; // the torque from outside at which a link is wholly red
+const FULL_NM = 20; // the torque from outside at which a link is wholly red, where the robot tells no threshold
+const NOTHING = 0.25; // what moving itself makes: this share of it has no colour
 const SLOWEST_MS = 250;
+const OUTLINE_M = 0.012;
 const CALM = new Color("#c9d3dc");
 const NOTICED = new Color("#f0e442");
 const PUSHED = new Color("#d55e00");
@@ -18,10 +20,10 @@ const UP = new Vector3(0, 1, 0);
 const vector = (p) => new Vector3(...p);
 
 /** A mesh between two points with round ends. */
-function bar({ from_m, to_m, radius_m }, material) {
+function bar({ from_m, to_m, radius_m }, material, more_m = 0) {
   const [from, to] = [vector(from_m), vector(to_m)];
   const along = to.clone().sub(from);
-  const mesh = new Mesh(new CapsuleGeometry(radius_m, along.length(), 5, 12), material);
+  const mesh = new Mesh(new CapsuleGeometry(radius_m + more_m, along.length(), 5, 12), material);
   mesh.position.copy(from).addScaledVector(along, 0.5);
   if (along.length() > 0) mesh.quaternion.setFromUnitVectors(UP, along.normalize());
   return mesh;
@@ -29,12 +31,12 @@ function bar({ from_m, to_m, radius_m }, material) {
 
 /** A body's links, each a group of bars, placed by joint positions. */
 class Figure {
-  constructor(links, materialOf) {
+  constructor(links, materialOf, more_m = 0) {
     this.links = links;
     this.whole = new Group();
     this.groups = links.map((link, i) => {
       const group = new Group();
-      for (const capsule of link.capsules) group.add(bar(capsule, materialOf(i)));
+      for (const capsule of link.capsules) group.add(bar(capsule, materialOf(i), more_m));
       this.whole.add(group);
       return group;
     });
@@ -96,6 +98,7 @@ export class RobotView {
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.enableDamping = false;
     this.controls.addEventListener("change", () => this.draw());
+    this.full = setup.joints.map((joint) => joint.contact_nm ?? FULL_NM);
     this.turners = jointsOfLinks(setup.links);
     this.build();
     this.look();
@@ -122,8 +125,9 @@ export class RobotView {
     }
     this.skins = links.map(() => new MeshLambertMaterial({ color: CALM }));
     this.solid = new Figure(links, (i) => this.skins[i]);
-    const outline = new MeshBasicMaterial({ color: "#56b4e9", transparent: true, opacity: 0.38, depthWrite: false });
-    this.ghost = new Figure(links, () => outline);
+    // the far sides of bars that are a little thicker: a rim round the robot where it is at the target, else a body
+    const outline = new MeshBasicMaterial({ color: "#56b4e9", side: BackSide, transparent: true, opacity: 0.6, depthWrite: false });
+    this.ghost = new Figure(links, () => outline, OUTLINE_M);
     this.ghost.whole.visible = false;
     this.zones = new Group();
     for (const each of zones ?? []) {
@@ -131,13 +135,13 @@ export class RobotView {
       if (mesh) this.zones.add(mesh);
     }
     this.zones.visible = false;
+    this.solid.place(this.setup.joints.map(() => 0));
     this.scene.add(this.solid.whole, this.ghost.whole, this.zones);
   }
 
   /** From where all of the robot is seen, from ahead and its left. */
-  look() {
+  look(further = 1) {
     const zero = this.setup.joints.map((joint) => Math.min(Math.max(0, joint.lower_rad), joint.upper_rad));
-    this.solid.place(zero);
     const points = placeLinks(this.setup.links, zero).flatMap(({ origin, q }, i) =>
       this.setup.links[i].capsules.flatMap((c) =>
         [c.from_m, c.to_m].map((p) => vector(p).applyQuaternion(new Quaternion(q[1], q[2], q[3], q[0])).add(vector(origin)))));
@@ -150,8 +154,9 @@ export class RobotView {
     const middle = points.length ? low.clone().add(high).multiplyScalar(0.5) : new Vector3(0, 0, 1);
     const size = points.length ? Math.max(0.3, high.distanceTo(low)) : 1.5;
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).add(new Vector3(0.88, 0.4, 0.18).multiplyScalar(2.0 * size));
+    this.camera.position.copy(middle).add(new Vector3(0.88, 0.4, 0.18).multiplyScalar(1.85 * size * further));
     this.controls.update();
+    this.draw();
   }
 
   resize() {
@@ -166,8 +171,7 @@ export class RobotView {
 
   showZones(on) {
     this.zones.visible = on;
-    this.skins.forEach((skin) => (skin.wireframe = on));
-    this.draw();
+    this.look(on ? 1.5 : 1);
   }
 
   /** Draw the newest view at the next frame; where frames come slowly, leave time for the rest of the page. */
@@ -199,7 +203,7 @@ export class RobotView {
     this.solid.place(this.last);
     this.skins.forEach((skin, i) => {
       const joints = this.turners[i];
-      const share = push(view, joints, FULL_NM) ?? 0;
+      const share = Math.max(0, (push(view, joints, this.full) ?? 0) - NOTHING) / (1 - NOTHING);
       if (joints.some((j) => view.encoder[j] === null)) skin.color.copy(UNKNOWN);
       else if (share < 0.5) skin.color.copy(CALM).lerp(NOTICED, share * 2);
       else skin.color.copy(NOTICED).lerp(PUSHED, share * 2 - 1);

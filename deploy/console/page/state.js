@@ -99,10 +99,12 @@ export function joints_off(view, limit_deg) {
   return off.sort((a, b) => b.off_deg - a.off_deg);
 }
 
-/** 0 to 1 of the scale on which an external torque is coloured; null where it is not known. */
+/** The largest torque from outside at these joints as a share of what is full there; null where none is known. */
 export function push(view, joints, full_nm) {
-  const known = joints.map((joint) => view.external_nm?.[joint]).filter((nm) => nm !== null && nm !== undefined);
-  return known.length ? Math.min(1, Math.max(...known.map(Math.abs)) / full_nm) : null;
+  const shares = joints
+    .filter((joint) => typeof view.external_nm?.[joint] === "number")
+    .map((joint) => Math.abs(view.external_nm[joint]) / full_nm[joint]);
+  return shares.length ? Math.min(1, Math.max(...shares)) : null;
 }
 
 /** The figure of each state and badge, a path in 100 × 100: each differs from all others without its colour. */
