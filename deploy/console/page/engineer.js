@@ -45,10 +45,11 @@ function stages(found) {
   for (const stage of found) {
     const row = make("tr");
     const bar = make("span", "", { class: "bar" });
-    bar.style.width = `${(2.4 * (stage.mean_ms ?? 0)) / most}rem`;
-    const mean = make("td", fixed(stage.mean_ms, 2), { class: "number" });
-    mean.prepend(bar);
-    row.append(make("td", stage.name, { lang: "en" }), mean, make("td", fixed(stage.p99_ms, 2), { class: "number" }));
+    bar.style.width = `${(100 * (stage.mean_ms ?? 0)) / most}%`;
+    const name = make("td", stage.name, { lang: "en" });
+    name.append(bar);
+    const number = (ms) => make("td", fixed(ms, 2), { class: "number" });
+    row.append(name, number(stage.mean_ms), number(stage.p99_ms));
     table.append(row);
   }
   $("stage-table").replaceChildren(table);

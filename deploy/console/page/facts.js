@@ -88,7 +88,7 @@ const WEIGHT = ["silent", "invalid", "attention", "unknown", "ok"];
 /** The suit as a figure seen from behind, arms a little away from the body, and in words what needs attention. */
 export class BodyFigure {
   constructor(element, nodes) {
-    this.svg = draw("svg", { role: "img" });
+    this.svg = draw("svg", { role: "img", "aria-label": t("figure") });
     element.replaceChildren(this.svg);
     this.nodes = nodes;
     const at = new Map([["world", [0, 0, 0]]]);

@@ -5,7 +5,9 @@ export const LANGUAGES = ["en", "zh"];
 let language = "en";
 
 export async function load() {
-  for (const each of LANGUAGES) files[each] = await (await fetch(`/page/${each}.json`)).json();
+  await Promise.all(LANGUAGES.map(async (each) => {
+    files[each] = await (await fetch(`/page/${each}.json`)).json();
+  }));
 }
 
 export function choose(next) {

@@ -3,80 +3,27 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
-from tests.browser.console.browser import ARGUMENTS, CHROMIUM
+from tests.browser.console.browser import CHROMIUM
 from tests.browser.console.fake import FakeConsole
+from tests.browser.console.steps import state, until
 
-playwright_api = pytest.importorskip("playwright.sync_api", reason="the extra `browser` is not installed")
 pytestmark = [
     pytest.mark.live,
     pytest.mark.skipif(CHROMIUM is None, reason="no chromium here: apt install chromium"),
 ]
-WATCH = """
-const Plain = WebSocket;
-window.WebSocket = class extends Plain {
-  constructor(...given) {
-    super(...given);
-    this.addEventListener("message", () => { window.heard_ms = performance.now(); });
-  }
-};
-document.addEventListener("DOMContentLoaded", () => new MutationObserver(() => {
-  if (document.body.dataset.state === "no_contact") window.black_ms ??= performance.now() - window.heard_ms;
-}).observe(document.body, { attributeFilter: ["data-state"] }));
-"""
-"""Keeps, by the page's own clock, when it heard the console last, and how long after that it said so."""
-CUT = ("WebSocket connection to", "net::ERR_")
-"""What the browser itself says where a test cuts the line."""
-SMALL = {"width": 1366, "height": 768}
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright_api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield opened
-        opened.close()
-
-
-@pytest.fixture
-def fake() -> Iterator[FakeConsole]:
-    console = FakeConsole()
-    yield console
-    console.close()
-
-
-@pytest.fixture
-def page(browser: Any, fake: FakeConsole) -> Iterator[Any]:
-    """The page in English. It says nothing on the browser's console, and asks no other place."""
-    context = browser.new_context(viewport=SMALL, locale="en-GB", reduced_motion="reduce")
-    context.add_init_script(WATCH)
-    opened = context.new_page()
-    said: list[str] = []
-    asked: set[str] = set()
-    opened.on("console", lambda message: said.append(message.text))
-    opened.on("pageerror", lambda error: said.append(str(error)))
-    opened.on("request", lambda request: asked.add(request.url.split("/")[2]))
-    opened.goto(fake.address)
-    yield opened
-    context.close()
-    assert asked == {fake.address.removeprefix("http://")}
-    assert [line for line in said if not any(word in line for word in CUT)] == []
-
-
-def until(page: Any, holds: Callable[[], bool], timeout_s: float = 8.0) -> None:
-    end = time.monotonic() + timeout_s
-    while not holds():
-        assert time.monotonic() < end, f"not within {timeout_s:g} s; the page says {page.title()!r}"
-        page.wait_for_timeout(20)
-
-
-def state(page: Any) -> str:
-    return str(page.evaluate("document.body.dataset.state"))
+def test_it_moves_within_two_seconds_of_opening(page: Any, fake: FakeConsole) -> None:
+    took_ms = []
+    for _ in range(3):  # another process may have taken the cores
+        page.goto(f"{fake.address}/")
+        until(page, lambda: page.evaluate("Boolean(window.drawn_ms)"))
+        took_ms.append(page.evaluate("window.drawn_ms"))
+    assert min(took_ms) < 2000.0, took_ms
 
 
 def test_it_loads_and_shows_the_robot_move(page: Any, fake: FakeConsole) -> None:
@@ -212,8 +159,7 @@ def test_who_only_looks_cannot_engage_but_can_stop(page: Any, fake: FakeConsole)
 
 
 def test_an_old_picture_is_marked_over_the_whole_frame(page: Any, fake: FakeConsole) -> None:
-    until(page, lambda: page.locator(".camera.none").count() == 0 and state(page) == "follows")
-    assert page.locator(".camera.stale").count() == 0
+    until(page, lambda: page.locator(".camera:not(.none, .stale)").count() == 1)
     fake.pictures = False
     until(page, lambda: page.locator(".camera.stale").count() == 1)
     over, frame = page.locator(".over").bounding_box(), page.locator(".camera").bounding_box()
