@@ -34,6 +34,7 @@ from deploy.ops.doctor.command import doctor
 from deploy.ops.inputs import inputs
 from deploy.ops.inspect.command import inspect
 from deploy.ops.keys.commands import app as keys_app
+from deploy.ops.lsl.command import lsl
 from deploy.ops.metrics.command import metrics
 from deploy.ops.network.command import app as network_app
 from deploy.ops.profile.command import app as profile_app
@@ -70,7 +71,7 @@ for _name, _group in {
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, console, drives, router, demo, soak, faults, collisions, contact, bench, audit,
     *OPERATORS_ACTS, attitude, video, ros, doctor, servos, stops, inputs, alarms, record, inspect,
-    replay, metrics,
+    replay, metrics, lsl,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

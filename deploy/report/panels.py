@@ -13,7 +13,7 @@ PANELS = {
     "Set up": (
         "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record",
         "inspect", "session", "import", "export",
-        "metrics",
+        "metrics", "lsl",
     ),
     "Judge": (
         "replay", "trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit",

@@ -34,7 +34,9 @@ async def killed(sender: TapSender, out: Path, after_s: float) -> tuple[Path, in
         stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
     )  # fmt: skip
     async with asyncio.timeout(60.0):
-        while not out.exists():
+        while True:
+            if await asyncio.to_thread(out.exists):
+                break
             await asyncio.sleep(0.02)
     await asyncio.sleep(after_s)
     process.send_signal(signal.SIGKILL)

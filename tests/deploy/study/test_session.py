@@ -39,7 +39,7 @@ def test_a_protocol_with_a_step_twice_is_refused(tmp_path: Path) -> None:
     twice = tmp_path / "p.toml"
     step = '[[step]]\nname = "a"\ntext = { en = "x" }\n'
     twice.write_text(f'name = "p"\nversion = "1"\n{step}{step}')
-    with pytest.raises(ConfigError, match="step.name"):
+    with pytest.raises(ConfigError, match=r"step\.name"):
         begin(tmp_path, twice, "k7pd")
 
 

@@ -65,9 +65,9 @@ def test_the_file_is_read_and_what_is_missing_is_said(tmp_path: Path) -> None:
     tap = f"[tap]\nsocket = '{tmp_path}/s.sock'"
     with pytest.raises(TandemError, match=r"\[recording\] folder is not set"):
         options(tap)
-    with pytest.raises(ConfigError, match="recording.folder .* a folder that exists"):
+    with pytest.raises(ConfigError, match=r"recording.folder .* a folder that exists"):
         options(tap, "[recording]\nfolder = 'nowhere'")
-    with pytest.raises(ConfigError, match="tap.socket .* a path"):
+    with pytest.raises(ConfigError, match=r"tap\.socket .* a path"):
         options(f"[recording]\nfolder = '{tmp_path}'")
     found = options(tap, f"[recording]\nfolder = '{tmp_path}'\nkeep_gb = 2.0")
     assert (found.name, found.config.keep_gb) == ("operator", 2.0)
@@ -77,7 +77,7 @@ def test_a_master_s_file_takes_the_section_and_starts_without_its_folder(tmp_pat
     tap = f'tap.socket="{tmp_path}/s.sock"'
     config = load_config(EXAMPLES / "master.toml", MasterConfig, (tap, 'recording.folder="/not/mounted"'))
     assert config.recording.folder == Path("/not/mounted")
-    with pytest.raises(ConfigError, match="tap.socket"):
+    with pytest.raises(ConfigError, match=r"tap\.socket"):
         load_config(EXAMPLES / "master.toml", MasterConfig, ('recording.folder="/tmp"',))
 
 
@@ -93,7 +93,9 @@ class Recorder:
 
     async def until(self, condition: Callable[[], bool]) -> None:
         async with asyncio.timeout(20.0):
-            while not condition():
+            while True:
+                if condition():
+                    return
                 await asyncio.sleep(0.005)
 
 
@@ -177,19 +179,19 @@ def test_a_disk_that_fails_in_the_middle_ends_the_file_and_not_the_recorder(
         sender.open()
         number = 0
 
-        def put() -> bool:
+        def put(files: int) -> bool:
             nonlocal number
             number += 1
             sender.put("t", number.to_bytes(4, "big"), number)
-            return len(list(tmp_path.glob("operator-*.mcap"))) == 2
+            return len(list(tmp_path.glob("operator-*.mcap"))) == files
 
-        await recorder.until(lambda: sender.count == 1)
+        await recorder.until(lambda: put(1))
         failing[0] = True
-        await recorder.until(lambda: put() or sender.count == 0)
+        await recorder.until(lambda: put(2) or sender.count == 0)
         failing[0] = False
-        await recorder.until(put)
+        await recorder.until(lambda: put(2))
         for _ in range(20):
-            put()
+            put(2)
         await asyncio.sleep(0.05)
         sender.close()
 

@@ -1,0 +1,1 @@
+"""`tandem lsl`: joints, targets, latency and events for Lab Streaming Layer."""
