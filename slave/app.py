@@ -35,6 +35,7 @@ from slave.attitude.sensor import BaseSensor
 from slave.camera.feed import CameraFeed, open_feed
 from slave.config import SlaveConfig
 from slave.guard.body import Body
+from slave.guard.eyes import video_loss
 from slave.guard.states import State
 from slave.guard.tilt import base_loss
 from slave.last_known import EVERY_S, LastKnown, state_file
@@ -176,7 +177,9 @@ class Slave:
         now_ns = monotonic_ns()
         base = None if self._base is None else base_loss(attitude, now_ns, self._config.guard)
         stops = {} if self._stops is None else self._stops.read(now_ns)
-        return Body(self._servos.faults(), base, stops=stops)
+        seen_ns = None if self._camera is None else self._camera.sight.captured_ns
+        video = video_loss(seen_ns, now_ns, self._config.guard)
+        return Body(self._servos.faults(), base, stops=stops, video=video)
 
     def _brake_drives(self, stop: bool) -> None:
         """On an e-stop the drives also brake by themselves, whatever happens to this process."""

@@ -71,10 +71,19 @@ class SlaveConfig(Section):
             *self.encoders.mistakes_for(skeleton),
             *self.servos.mistakes_for(skeleton, self.encoders),
             *self.base.mistakes(),
+            *self._too_fresh_pictures(),
             *self.link.mistakes(),
             *self.tap.mistakes(),
             *self.recording.mistakes_with(self.tap.socket),
         ]
+
+    def _too_fresh_pictures(self) -> list[ConfigMistake]:
+        """A camera on a poor link sends rarely: the limit must leave it the time."""
+        limit_s, slowest_s = self.guard.max_video_age_s, 1.0 / self.camera.least_rate_hz
+        if self.camera.source == "off" or not limit_s or limit_s >= 2.0 * slowest_s:
+            return []
+        expected = f"0 (never), or at least {2.0 * slowest_s:g}: two pictures at camera.least_rate_hz"
+        return [ConfigMistake("guard.max_video_age_s", limit_s, expected)]
 
     def _unconfirmed(self, skeleton: Skeleton) -> list[ConfigMistake]:
         """A profile that an import guessed moves no real drive before a person has looked at it."""

@@ -1,6 +1,7 @@
 """The slave's side of its camera: a thread that asks for pictures and puts them on the link.
 
-Never on the loop. Whatever happens to the camera is words in `fault`, never a loss of motion.
+Never on the loop. Whatever happens to the camera is words in `fault`. The guard holds a robot whose operator
+had pictures and gets none any more (`[guard] max_video_age_s`).
 """
 
 from __future__ import annotations

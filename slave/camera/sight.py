@@ -31,6 +31,9 @@ class Sight:
     def __init__(self) -> None:
         self._pictures: OrderedDict[int, tuple[int, int]] = OrderedDict()
         self._newest = 0
+        self._lease = 0
+        self.captured_ns: int | None = None
+        """When the newest picture was taken that the lease's holder has; None where none came yet."""
         self.observation_age = Durations()
         """From a picture to the operator's posture that was sampled while it was the newest one seen."""
         self.transit = Durations()
@@ -44,10 +47,13 @@ class Sight:
 
     def on_command(self, command: Command, now_ns: int, offset: Offset) -> SeenPicture | None:
         """Take an accepted command; the picture that it acknowledges first, else None."""
+        if command.lease != self._lease:
+            self._lease, self.captured_ns = command.lease, None
         known = self._pictures.get(command.seen_frame)
         if known is None:
             return None
         captured_ns, sent_ns = known
+        self.captured_ns = captured_ns
         to_master = offset.reversed()
         age_ns = one_way_ns(captured_ns, command.stamps.sampled_ns, to_master)
         if age_ns is not None:

@@ -20,6 +20,8 @@ class Body:
     """Emergency stop inputs that are pressed or broken, by name: where each is connected, and why."""
     contact: str | None = None
     """Where the robot is pushed, or None."""
+    video: str | None = None
+    """Why the operator does not see what the robot does, or None."""
 
     def also(self, drives: Mapping[str, str]) -> Body:
         """The same with further drive faults, by joint."""
@@ -28,7 +30,7 @@ class Body:
     @property
     def first_fault(self) -> str | None:
         """The first fault as text, or None."""
-        return self.first_besides_contact or self.contact
+        return self.first_besides_contact or self.contact or self.video
 
     @property
     def first_besides_contact(self) -> str | None:

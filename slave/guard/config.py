@@ -81,6 +81,8 @@ class GuardConfig(Section):
     """A base that tilts by more than this makes the robot hold; asked of a base that carries a sensor."""
     base_timeout_s: float = Field(0.5, gt=0.0, le=10.0)
     """And so does a base whose sensor is silent for longer than this."""
+    max_video_age_s: float = Field(3.0, ge=0.0, le=30.0)
+    """An operator who had the robot's pictures and whose newest is older than this is not followed; 0: is."""
 
     velocity_scale: float = Field(1.0, gt=0.0, le=1.0)
     """Share of the velocity limits that is used."""

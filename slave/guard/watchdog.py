@@ -132,6 +132,10 @@ def _contact(signs: Signs) -> str | None:
     return signs.body.contact
 
 
+def _video(signs: Signs) -> str | None:
+    return signs.body.video
+
+
 def _namesake(signs: Signs) -> str | None:
     return signs.body.namesake
 
@@ -151,6 +155,7 @@ BODY_WATCHES: tuple[LossWatch, ...] = (
     LossWatch("base", _base),
     LossWatch("namesake", _namesake),
     LossWatch("contact", _contact),
+    LossWatch("video", _video),
 )
 """Looked at in every step, right after the encoders were read."""
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from common.clock_sync import Offset
@@ -53,3 +55,19 @@ def test_only_the_newest_pictures_are_remembered() -> None:
         sight.sent(number, number, number)
     assert sight.on_command(command(700, 5150, 5200), 300 * MS, AHEAD) is None
     assert sight.on_command(command(1000, 5150, 5200), 300 * MS, AHEAD) is not None
+
+
+def test_it_knows_when_the_newest_picture_was_taken_that_the_operator_has() -> None:
+    sight = Sight()
+    sight.sent(7, 100 * MS, 110 * MS)
+    sight.sent(8, 200 * MS, 210 * MS)
+    assert sight.captured_ns is None
+    sight.on_command(command(0, 0, 5200), 300 * MS, AHEAD)
+    assert sight.captured_ns is None, "none has come yet"
+    sight.on_command(command(7, 5150, 5200), 300 * MS, AHEAD)
+    sight.on_command(command(8, 5250, 5280), 380 * MS, AHEAD)
+    assert sight.captured_ns == 200 * MS
+    sight.on_command(command(99, 5250, 5280), 400 * MS, AHEAD)
+    assert sight.captured_ns == 200 * MS, "a picture that nobody remembers is no newer one"
+    sight.on_command(replace(command(0, 0, 5400), lease=2), 500 * MS, AHEAD)
+    assert sight.captured_ns is None, "another operator, who has none"
