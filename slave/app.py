@@ -14,7 +14,7 @@ from common.link import Link, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
 from common.metrics.parts import Ticks
-from common.metrics.slave import OffsetMetrics, SlaveMetrics
+from common.metrics.slave import OffsetMetrics, ServoMetrics, SlaveMetrics
 from common.metrics.tree import WriteMetrics
 from common.process.heap import freeze_heap, heap_in_use, reserve_heap
 from common.process.notify import Notifier, open_notifier
@@ -74,7 +74,7 @@ class Slave:
         self._config = config
         self._link = link
         self._servos = servos
-        self._limit_torque = servos.limit_torque if isinstance(servos, LimitsTorque) else None
+        self._limiting = servos if isinstance(servos, LimitsTorque) else None
         self._base = base
         self._notifier = notifier or Notifier()
         endpoints = own_endpoints(config.link)
@@ -140,8 +140,8 @@ class Slave:
             setpoint = self._pipeline.tick(monotonic_ns(), reading, body)
             self._brake_drives(self._pipeline.guard.state is State.ESTOP)
             if setpoint.ready:
-                if self._limit_torque is not None:
-                    self._limit_torque(setpoint.torque_nm)
+                if self._limiting is not None:
+                    self._limiting.limit_torque(setpoint.torque_nm)
                 self._servos.write(setpoint.position_rad)
                 self._pipeline.written(monotonic_ns())
             if self._tap is not None:
@@ -236,18 +236,21 @@ class Slave:
             offset=OffsetMetrics(to_ms(offset.offset_ns), to_ms(offset.bound_ns), offset.trusted),
             undecodable=dict(pipeline.unread.counts),
             base=self._base.counters() if self._base else {},
-            servos=replace(self._servos.metrics(), unlimited=self._unlimited()),
+            servos=self._servo_metrics(),
             video=self._camera.metrics() if self._camera else None,
             link=self._link.counters(),
             times=guard.times.metrics(),
         )
 
-    def _unlimited(self) -> str:
-        """Why the drives may push harder than moving needs; empty where they may not."""
+    def _servo_metrics(self) -> ServoMetrics:
+        """The backend's, and which drives may push harder than moving needs."""
+        metrics = self._servos.metrics()
         if not self._config.contact.torque_limit:
-            return "contact.torque_limit is switched off"
-        backend = ", ".join(self._config.servos.names)
-        return "" if self._limit_torque is not None else f"tandem cannot limit the torque of {backend} servos"
+            return replace(metrics, unlimited="contact.torque_limit is switched off")
+        if self._limiting is None:
+            backend = ", ".join(self._config.servos.names)
+            return replace(metrics, unlimited=f"tandem cannot limit the torque of {backend} servos")
+        return replace(metrics, no_torque_limit=dict(self._limiting.no_torque_limit))
 
 
 async def run(config: SlaveConfig, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:

@@ -98,6 +98,8 @@ class SlaveConfig(Section):
     def _unfelt_zones(self, skeleton: Skeleton) -> list[ConfigMistake]:
         """Force limits of zones that no drive could tell of."""
         try:
+            if self.servos.mistakes_for(skeleton, self.encoders):
+                return []  # told by the servos
             unknown = self.servos.no_effort(skeleton)
         except ConfigError:  # told by the servos
             return []

@@ -107,6 +107,8 @@ class ServoMetrics(Metrics):
     """Why a joint's effort is not known, by joint: there is no contact detection there."""
     unlimited: str = ""
     """Why the drives may push harder than moving needs; empty where they may not."""
+    no_torque_limit: dict[str, str] = field(default_factory=dict)
+    """Why the drive of a joint takes no torque limit, by joint, where others do."""
     left_out: dict[str, str] = field(default_factory=dict)
     """What a joint's drive lacks that it may lack, in words."""
     not_driven: dict[str, str] = field(default_factory=dict)

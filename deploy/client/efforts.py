@@ -34,12 +34,25 @@ def largest(torques: Mapping[str, float | None], between: str = ", ") -> str:
     return between.join(f"{name} {known[name]:+.1f}" for name in first) + " N m" * bool(first)
 
 
+def without_torque_limit(no_torque_limit: Mapping[str, str]) -> list[str]:
+    """A line for each reason why the drives of some joints take no torque limit."""
+    return [
+        f"the drive{'s' * (len(joints) > 1)} of {', '.join(joints)} may push as hard as "
+        f"{'they' if len(joints) > 1 else 'it'} can: {why}"
+        for why, joints in _by_reason(no_torque_limit).items()
+    ]
+
+
 def without_detection(no_effort: Mapping[str, str]) -> list[str]:
     """A line for each reason why the efforts of some joints are not known."""
-    reasons: dict[str, list[str]] = {}
-    for joint, why in no_effort.items():
-        reasons.setdefault(why, []).append(joint)
     return [
         f"no contact detection: {', '.join(joints)} tell{'s' * (len(joints) == 1)} no effort: {why}"
-        for why, joints in reasons.items()
+        for why, joints in _by_reason(no_effort).items()
     ]
+
+
+def _by_reason(words: Mapping[str, str]) -> dict[str, list[str]]:
+    reasons: dict[str, list[str]] = {}
+    for joint, why in words.items():
+        reasons.setdefault(why, []).append(joint)
+    return reasons

@@ -27,7 +27,13 @@ from common.wire.topics import STATE, STATISTICS
 from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask
 from deploy.client.destination import ROUTER_S, Destination
-from deploy.client.efforts import TorquesByJoint, by_joint, largest, without_detection
+from deploy.client.efforts import (
+    TorquesByJoint,
+    by_joint,
+    largest,
+    without_detection,
+    without_torque_limit,
+)
 from deploy.client.shift import shift_lines
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
 from slave.model.ends import limb_ends
@@ -195,6 +201,8 @@ class RobotStatus:
     """From outside."""
     no_effort: dict[str, str] = field(default_factory=dict)
     """Why a joint's effort is not known."""
+    no_torque_limit: dict[str, str] = field(default_factory=dict)
+    """Why the drive of a joint takes no torque limit, where others do."""
     unlimited: str = ""
     """Why the drives may push harder than moving needs; empty where they may not, or nothing is known."""
     left_out: dict[str, str] = field(default_factory=dict)
@@ -241,6 +249,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         effort_nm=by_joint(state.effort_nm) if state else None,
         external_nm=by_joint(state.external_nm) if state else None,
         no_effort=metrics.servos.no_effort if metrics else {},
+        no_torque_limit=metrics.servos.no_torque_limit if metrics else {},
         unlimited=metrics.servos.unlimited if metrics else "",
         left_out=metrics.servos.left_out if metrics else {},
         not_driven=metrics.servos.not_driven if metrics else {},
@@ -329,6 +338,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     words += [(f"{name}: {why}", "yellow") for name, why in (one.switches or {}).items() if why != "held"]
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
     words += [(line, "yellow") for line in without_detection(one.no_effort)]
+    words += [(line, "yellow") for line in without_torque_limit(one.no_torque_limit)]
     words += [(f"drives push as hard as they can: {one.unlimited}", "yellow")] * bool(one.unlimited)
     words += [(f"{joint} {why}", "yellow") for joint, why in one.not_driven.items()]
     words += [(f"{joint}: its drive lacks {what}", "dim") for joint, what in one.left_out.items()]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from common.errors import RobotError
 from common.metrics.slave import ServoMetrics
 from common.quaternion import Array
-from slave.servos.servos import EncoderReading, Servos, check_setpoint
+from slave.servos.servos import EncoderReading, LimitsTorque, Servos, check_setpoint, check_torque_limit
 from slave.servos.signs import DriveSigns, TellingServos
 
 
@@ -56,6 +56,25 @@ class MixedServos:
         check_setpoint(position_rad, len(self._names))
         for part in self._parts:
             part.servos.write(position_rad[part.joints])
+
+    def limit_torque(self, torque_nm: Array | None) -> None:
+        """Hand each backend that can limit torque the ranges of its joints, of (2, J). See `LimitsTorque`."""
+        check_torque_limit(torque_nm, len(self._names))
+        for part in self._parts:
+            if isinstance(part.servos, LimitsTorque):
+                part.servos.limit_torque(None if torque_nm is None else torque_nm[:, part.joints])
+
+    @property
+    def no_torque_limit(self) -> Mapping[str, str]:
+        """See `LimitsTorque`: of backends that cannot, every joint."""
+        out: dict[str, str] = {}
+        for part in self._parts:
+            if isinstance(part.servos, LimitsTorque):
+                out |= part.servos.no_torque_limit
+            else:
+                words = f"tandem cannot limit the torque of {part.name} servos"
+                out |= {self._names[joint]: words for joint in part.joints}
+        return {name: out[name] for name in self._names if name in out}
 
     def read(self) -> EncoderReading:
         """The newest reading of each backend; its time is that of the oldest among them."""

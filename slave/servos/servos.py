@@ -59,6 +59,11 @@ class LimitsTorque(Protocol):
         """
         ...
 
+    @property
+    def no_torque_limit(self) -> Mapping[str, str]:
+        """Why the drive of a joint takes no limit, by joint; empty where all do."""
+        ...
+
 
 class Servos(Protocol):
     """The robot as the slave sees it. No method blocks for longer than `start` and `stop` must."""

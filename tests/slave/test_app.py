@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -156,6 +157,8 @@ def test_torque_limits_reach_drives_that_take_them_and_others_are_named(
             written.append("setpoint")
 
     class Limiting(Plain):
+        no_torque_limit = MappingProxyType({"neck_yaw": "its drive takes none"})
+
         def limit_torque(self, torque_nm: Array | None) -> None:
             assert torque_nm is LIMIT_NM
             written.append("limit")
@@ -177,7 +180,9 @@ def test_torque_limits_reach_drives_that_take_them_and_others_are_named(
     monkeypatch.setattr(slave._pipeline, "tick", Pipeline().tick)
     asyncio.run(slave._drive())
     assert written == (["limit", "setpoint"] if limits else ["setpoint"])
-    assert slave.metrics().servos.unlimited == said
+    metrics = slave.metrics().servos
+    assert metrics.unlimited == said
+    assert metrics.no_torque_limit == ({"neck_yaw": "its drive takes none"} if limits and on else {})
 
 
 class StuckServos(StillServos):

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -32,6 +32,7 @@ from slave.servos.canopen.config import CanopenConfig
 from slave.servos.contract import Subject, check
 from slave.servos.entry_points import GROUP, own_place
 from slave.servos.mixed import MixedServos, ServoPart
+from slave.servos.servos import LimitsTorque
 from slave.servos.shares import part_of
 
 HAND = load_skeleton("hand")
@@ -345,6 +346,36 @@ def test_a_reading_is_put_together_and_as_old_as_its_oldest_part() -> None:
     assert (reading.effort_nm[HALVES[1]] == 1.0).all()
     assert (reading.drive_rad[HALVES[1]] == 0.0).all()
     assert mixed(half(Ideal, 0), half(Ideal, 1)).read().effort_nm is None
+
+
+class Limiting(Ideal):
+    """Takes torque limits, but for one joint."""
+
+    no_torque_limit = MappingProxyType({HAND.joint_names[HALVES[0][1]]: "its drive takes none"})
+    torque_nm: Array | None = None
+
+    def limit_torque(self, torque_nm: Array | None) -> None:
+        self.torque_nm = torque_nm
+
+
+def test_torque_limits_reach_the_backends_that_take_them_and_the_others_are_named() -> None:
+    taking = half(Limiting, 0)
+    assert isinstance(taking, Limiting)
+    servos = mixed(taking, half(Ideal, 1))
+    assert isinstance(servos, LimitsTorque)
+    most_nm = np.arange(float(len(HAND.joints)))
+    servos.limit_torque(np.stack((-most_nm, most_nm)))
+    assert taking.torque_nm is not None
+    np.testing.assert_array_equal(taking.torque_nm, [-most_nm[HALVES[0]], most_nm[HALVES[0]]])
+    servos.limit_torque(None)
+    assert taking.torque_nm is None
+    with pytest.raises(ValueError, match="torque limits must be"):
+        servos.limit_torque(np.stack((-most_nm, most_nm))[:, :3])
+    said = servos.no_torque_limit
+    assert said[HAND.joint_names[HALVES[0][1]]] == "its drive takes none"
+    for joint in HALVES[1]:
+        assert said[HAND.joint_names[joint]].startswith("tandem cannot limit the torque of ")
+    assert len(said) == 1 + len(HALVES[1])
 
 
 def test_a_fault_of_one_backend_is_a_fault_of_the_robot() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from common.config.load import load_config
 from common.errors import ConfigError
+from deploy.examples.profiles import NURSING, example
 from slave.config import SlaveConfig
 
 EXAMPLE = Path(__file__).parents[2] / "deploy" / "examples" / "slave.toml"
@@ -39,3 +40,10 @@ def test_one_line_a_mistake(override: str, expected: list[str]) -> None:
     assert len(lines) == 1
     for part in (str(EXAMPLE), *expected):
         assert part in lines[0]
+
+
+def test_a_file_that_leaves_out_a_drive_names_the_joint() -> None:
+    """It ended with a KeyError before: zones were asked for efforts of drives that the file does not have."""
+    overrides = ['servos.backend="canopen"', 'servos.canopen.drives.neck_yaw={id=1, bus="left"}']
+    with pytest.raises(ConfigError, match=r"servos\.canopen\.drives\.neck_pitch = .*a drive for each joint"):
+        load_config(example("slave", NURSING), SlaveConfig, overrides)

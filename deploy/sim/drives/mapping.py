@@ -12,7 +12,16 @@ from slave.servos.canopen.mapping import INVALID, RPDOS, TPDOS
 
 PdoLayout = tuple[struct.Struct, list[str]]
 """The bytes, and what each value is called in `TAKEN` or `GIVEN`."""
-TAKEN = {0x6040: "controlword", 0x607A: "target", 0x60C1: "target", 0x6060: "mode", 0x60FF: "velocity"}
+TAKEN = {
+    0x6040: "controlword",
+    0x607A: "target",
+    0x60C1: "target",
+    0x6060: "mode",
+    0x60FF: "velocity",
+    0x60E0: "positive_limit",
+    0x60E1: "negative_limit",
+    0x6072: "max_torque",
+}
 GIVEN = {
     0x6041: "statusword", pdo.ENCODER: "encoder", 0x6064: "position", pdo.INPUTS: "inputs",
     pdo.TORQUE: "thousandths", pdo.CURRENT: "thousandths", 0x6061: "mode", 0x606C: "velocity",

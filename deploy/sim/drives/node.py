@@ -12,7 +12,7 @@ from canopen.sdo.exceptions import SdoAbortedError
 from common.clock import NS_PER_MS
 from deploy.sim.drives.faults import CODES, DEMAND, IGNORES_TARGETS, STATUS_BITS, WITHHOLDS, DriveFault
 from deploy.sim.drives.machine import after, statusword
-from deploy.sim.drives.mapping import MappedPdos
+from deploy.sim.drives.mapping import TAKEN, MappedPdos
 from deploy.sim.drives.server import ObjectServer
 from deploy.sim.drives.torque_off import DROPS, STO_EMERGENCY, inputs, without_torque
 from deploy.sim.drives.traits import Traits
@@ -30,6 +30,7 @@ _PROFILE_POSITION, _HOMING = 1, 6
 _INTERPOLATES = 1 << 4
 """Controlword: in interpolated position mode, follow."""
 _QUICK_STOP_OPTION = 0x605A
+_LIMITS = {index: TAKEN[index] for index in (0x60E0, 0x60E1, 0x6072)}
 _MAPPINGS = 0x200
 """From a PDO's communication parameters to its mapping."""
 
@@ -49,6 +50,8 @@ class SimulatedDrive:
         self.rated_torque_mnm = 0
         """6076h."""
         self.target = 0
+        self.torque_limits: dict[str, int] = {}
+        """60E0h, 60E1h and 6072h by their names in `mapping`, thousandths of its rating, once written."""
         self.limited = False
         """Whether a limit of its own keeps it from its target."""
         self.state = Power.SWITCH_ON_DISABLED
@@ -71,7 +74,7 @@ class SimulatedDrive:
         self._pdos, self._master = MappedPdos(self.value), MasterWatch()
         # fetched where they are written, as they are needed hundreds of times a second
         self._beat_ns = self._mode = self._mode_after = 0
-        self._controlword = 0
+        self._controlword, self.torque_limits = 0, {}
         for index in (*RPDOS, *TPDOS):
             if (index + _MAPPINGS, 0) in self.traits.presets and index not in self.traits.lacks:
                 self._pdos.activate(index, self.value(index, 1))
@@ -129,6 +132,7 @@ class SimulatedDrive:
             self._emergency(0x8210, 0x11)
         elif taken:
             self.target = taken.get("target", self.target)
+            self.torque_limits.update({name: taken[name] for name in _LIMITS.values() if name in taken})
             self._command(taken.get("controlword", self._controlword))
         now = {
             "statusword": self.statusword, "encoder": self.encoder, "position": self.position,
@@ -311,6 +315,8 @@ class SimulatedDrive:
                 self._master.life_factor = value
             case 0x6040:
                 self._command(value)
+            case _ if index in _LIMITS:
+                self.torque_limits[_LIMITS[index]] = value
             case 0x6060:
                 self._mode_after = self.traits.mode_after_syncs if value != self._mode else 0
                 self._mode = value

@@ -194,10 +194,12 @@ class DrivePeer:
         for i in self._on_bus.get(bus, ()):
             drive = self.drives[i]
             drive.on_sync()
+            self._torque.limit(i, drive.torque_limits)
             if i in self._twins:
                 self._twins[i].on_sync()
             if drive.follows:
                 self._follow(i, drive, now_ns)
+        self.plant.limit_torque(self._torque.limit_nm)
 
     def _follow(self, i: int, drive: SimulatedDrive, now_ns: int) -> None:
         if drive.fault is DriveFault.RUNS_AWAY:

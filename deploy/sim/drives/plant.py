@@ -85,6 +85,10 @@ class Plant:
         self._since_ns[joint], self._period_ns[joint] = now_ns, period_ns
         self._follows[joint] = True
 
+    def limit_torque(self, torque_nm: Array) -> None:
+        """Least and greatest torque (2, J) of the motors, N m at the joint."""
+        self._robot.limit_torque(torque_nm)
+
     def brake(self, joint: int) -> None:
         """Stop by the ramp, then hold."""
         self._follows[joint] = False

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +32,8 @@ class ToldTorque:
         self._sign = np.array([-1.0 if drive.reversed else 1.0 for drive in drives])
         self.rated_mnm: NDArray[np.int64] = np.ceil(1000.0 * most_nm / _PEAK / self._through).astype(np.int64)
         """(J,) of the motors, whole mN m as in 6076h."""
+        self.limit_nm: Array = np.stack((np.full(len(drives), -np.inf), np.full(len(drives), np.inf)))
+        """(2, J) what the drives have been told that their motors may give, N m at the joint."""
         self._random = np.random.default_rng(seed)
         self._apart_ns = config.period_ns // 2
         self._latched_ns = origin_ns
@@ -41,6 +46,14 @@ class ToldTorque:
         motor = 1e6 * joint_nm / self._through / self.rated_mnm
         self._sum += motor + _FRICTION * np.tanh(velocity_rad_s / _SLOW_RAD_S)
         self._count += 1
+
+    def limit(self, drive: int, thousandths: Mapping[str, int]) -> None:
+        """What one drive has been told: `positive_limit`, `negative_limit` and `max_torque`, where it was."""
+        through_nm = 1e-6 * float(self.rated_mnm[drive]) * float(self._through[drive])
+        most = thousandths.get("max_torque", math.inf)
+        up = through_nm * min(thousandths.get("positive_limit", math.inf), most)
+        down = through_nm * min(thousandths.get("negative_limit", math.inf), most)
+        self.limit_nm[:, drive] = (-down, up) if self._sign[drive] > 0.0 else (-up, down)
 
     def latch(self, now_ns: int) -> None:
         """A SYNC has come, or the same one on another bus."""

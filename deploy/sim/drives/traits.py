@@ -14,7 +14,7 @@ _SEGMENT_BYTES = 7
 GUARDING = frozenset({0x100C, 0x100D})
 INTERPOLATED = frozenset({0x60C0, 0x60C1})
 MORE_PDOS = frozenset({0x1401, 0x1402, 0x1403, 0x1601, 0x1602, 0x1603, 0x1803, 0x1A03})
-NOT_TANDEMS = frozenset({0x1006, *GUARDING, *INTERPOLATED, *MORE_PDOS, 0x606C, 0x60FF})
+NOT_TANDEMS = frozenset({0x1006, *GUARDING, *INTERPOLATED, *MORE_PDOS, 0x606C, 0x60FF}) - {0x1401, 0x1601}
 """Objects of `drive.eds` that makers' drives have, and tandem's own does not."""
 
 

@@ -13,7 +13,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from slave.encoders.counts import EncoderConfig, Encoders
 from slave.servos.absent.config import AbsentConfig
-from slave.servos.servos import EncoderReading, check_setpoint
+from slave.servos.servos import EncoderReading, check_setpoint, check_torque_limit
 
 
 class AbsentServos:
@@ -35,6 +35,15 @@ class AbsentServos:
     def write(self, position_rad: Array) -> None:
         """No effect. Raises ValueError if not finite or not J."""
         check_setpoint(position_rad, len(self._counts))
+
+    def limit_torque(self, torque_nm: Array | None) -> None:
+        """Nothing pushes here. See `LimitsTorque`."""
+        check_torque_limit(torque_nm, len(self._counts))
+
+    @property
+    def no_torque_limit(self) -> Mapping[str, str]:
+        """See `LimitsTorque`: no joint pushes harder than it may."""
+        return {}
 
     def read(self) -> EncoderReading:
         """What encoders would show if there were any."""

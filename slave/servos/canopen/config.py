@@ -18,12 +18,20 @@ from slave.servos.canopen.drive_config import (
     DriveSettings,
     EffortSource,
     NetworkTimes,
+    TorqueLimitBy,
     limits_rad,
 )
 from slave.servos.canopen.eds_check import eds_mistakes
 from slave.servos.canopen.emergency import SAFE_TORQUE_OFF
-from slave.servos.canopen.load import BUSIEST, WELL, bits_per_s, configured_bitrate, too_much
-from slave.servos.canopen.pdo import ENCODER
+from slave.servos.canopen.load import (
+    BUSIEST,
+    WELL,
+    bits_per_s,
+    configured_bitrate,
+    frame_bits,
+    too_much,
+)
+from slave.servos.canopen.pdo import ENCODER, LIMITS
 
 _INT32 = 2**31 - 1
 MOST_SYNCS = 20
@@ -162,8 +170,13 @@ class CanopenConfig(BackendConfig):
             here = {name: drive for name, drive in drives if drive.bus == bus.name}
             inputs = sum(name in self.tell_inputs for name in here)
             efforts = sum(drive.effort is not EffortSource.NONE for drive in here.values()) / every
+            limits = sum(
+                frame_bits(2 * len(LIMITS[drive.torque_limit.value]))
+                for drive in here.values()
+                if drive.torque_limit is not TorqueLimitBy.NONE
+            )
             beats = beat_ms, self.drive_heartbeat_ms
-            loads[bus.name] = len(here), bits_per_s(len(here), self.sync_hz, *beats, inputs, efforts)
+            loads[bus.name] = len(here), bits_per_s(len(here), self.sync_hz, *beats, inputs, efforts, limits)
         return loads
 
     def mistakes_for(self, skeleton: Skeleton, encoders: EncoderConfig) -> list[ConfigMistake]:
@@ -222,6 +235,9 @@ class CanopenConfig(BackendConfig):
             other = taken.setdefault((drive.bus, drive.id), joint.name)
             if other != joint.name:
                 mistakes.append(ConfigMistake(f"{key}.id", drive.id, f"an id that {other} does not have"))
+            if drive.torque_limit is not TorqueLimitBy.NONE and drive.most_torque_percent is None:
+                expected = "the drive's greatest torque, as torque_limit needs it"
+                mistakes.append(ConfigMistake(f"{key}.most_torque_percent", NOT_SET, expected))
             lower, upper = limits_rad(drive, joint.lower_rad, joint.upper_rad)
             if lower >= upper:
                 mistakes.append(ConfigMistake(f"{key}.lower_deg", drive.lower_deg, "less than upper_deg"))

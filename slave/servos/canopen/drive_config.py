@@ -29,6 +29,16 @@ class EffortSource(StrEnum):
     NONE = "none"
 
 
+class TorqueLimitBy(StrEnum):
+    """Which object of a drive takes the torque limit at every SYNC."""
+
+    BOTH_DIRECTIONS = "60E0h"
+    """60E0h and 60E1h, which count in every mode."""
+    MAX_TORQUE = "6072h"
+    """Max torque. Of some drives it counts in torque modes only: look it up in the manual first."""
+    NONE = "none"
+
+
 SAYS_NONE = 'the file says so (effort = "none")'
 
 
@@ -75,6 +85,13 @@ class DriveConfig(Section):
     """Share of the motor's torque that the gear lets through."""
     effort_reversed: bool = False
     """True: the drive tells torque against its own direction of position, though 607Eh does not say so."""
+
+    # from a file it comes as text, which strict sections would refuse
+    torque_limit: TorqueLimitBy = Field(TorqueLimitBy.NONE, strict=False)
+    """While the robot follows, the drive may push no harder than the motion needs: which of its objects says
+    so. Should the slave die, the drive brakes with no more torque than it was told last."""
+    most_torque_percent: float | None = Field(None, gt=0.0, le=1000.0)
+    """Of its rated torque, with `torque_limit`: what it may give where nothing else limits it."""
 
     @property
     def increments_per_rad(self) -> float:

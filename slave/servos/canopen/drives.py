@@ -30,6 +30,7 @@ from slave.servos.canopen.status_bits import VOLTAGE
 from slave.servos.canopen.supervision import LISTENED, Supervision
 from slave.servos.canopen.sync_stamp import SyncStamps
 from slave.servos.canopen.targets import DriveTargets
+from slave.servos.canopen.torque_limits import DriveTorqueLimits
 from slave.servos.canopen.units import DriveUnits
 from slave.servos.canopen.watch import DriveWatch
 from slave.servos.canopen.wiring import DriveWiring, Outgoing
@@ -72,12 +73,14 @@ class Drives:
         )
         self._silence = DriveSilence(config, len(self._drives))
         self._targets = DriveTargets(config, units)
+        self._limits = DriveTorqueLimits(config, skeleton)
         self._stamps = SyncStamps(config.period_ns, round(config.sample_error_ms * NS_PER_MS))
         self._beat_every = max(1, config.heartbeat_ms * config.sync_hz // 1000)
         self._supervision = Supervision(self._drives, self._watch, self._silence)
         self._starts = DriveStarts(
             self._drives, self._wiring, self._supervision, silence=self._silence, watch=self._watch,
-            readings=self._readings, second_master=self.second_master, may_reset=config.fault_reset,
+            readings=self._readings, limits=self._limits, second_master=self.second_master,
+            may_reset=config.fault_reset,
         )  # fmt: skip
         self._words = FaultWords(self._drives, self._wiring)
         self._inputs = dict.fromkeys(config.tell_inputs, (0, 0))
@@ -194,8 +197,13 @@ class Drives:
         """Repeat SDO requests whose answers are overdue, into the outbox."""
         self._starts.pending(now_ns)
 
-    def cycle(self, now_ns: int, setpoint_rad: Array | None) -> list[Outgoing]:
-        """The frames before a SYNC: heartbeats, and every drive's controlword and target (RPDOs)."""
+    def cycle(
+        self, now_ns: int, setpoint_rad: Array | None, torque_nm: Array | None = None
+    ) -> list[Outgoing]:
+        """The frames before a SYNC: heartbeats, and every drive's controlword, target and torque limit.
+
+        `torque_nm`: (2, J) the least and greatest torque at each joint; None: as much as the drives have.
+        """
         if not self._readings.answers.complete:
             self.unanswered += self._cycles > 0
         if not self._readings.complete:
@@ -217,7 +225,9 @@ class Drives:
             # its controlwords and these would lead each drive to and fro, SYNC by SYNC: NMT has stopped them
             return out
         data = pdo.pack_targets(controlwords, targets)
-        return out + self._wiring.targets(data, self._silence.seen(now_ns))
+        sent = self._silence.seen(now_ns)
+        limits = self._limits.data(None if supervision.stopping else torque_nm)
+        return out + self._wiring.targets(data, sent) + self._wiring.limits(limits, sent)
 
     def sync(self, now_ns: int) -> list[Outgoing]:
         """The SYNCs, to be sent right now."""
@@ -247,6 +257,11 @@ class Drives:
     def no_effort(self) -> dict[str, str]:
         """Why the effort of a joint is not known, by joint."""
         return self._readings.efforts.missing
+
+    @property
+    def no_torque_limit(self) -> dict[str, str]:
+        """Why a joint's drive takes no torque limit, by joint."""
+        return self._limits.missing
 
     @property
     def left_out(self) -> dict[str, str]:

@@ -28,10 +28,14 @@ def bits_per_s(
     drive_heartbeat_ms: int,
     telling: int = 0,
     efforts_a_sync: float = 0.0,
+    limit_bits: int = 0,
 ) -> float:
-    """SYNC, targets and answers of every drive, inputs and efforts of those that tell them, heartbeats."""
+    """SYNC, targets and answers of every drive, inputs and efforts of those that tell them, heartbeats.
+
+    `limit_bits`: of all torque limits, with each SYNC.
+    """
     a_sync: float = frame_bits(0) + drives * (frame_bits(RPDO_BYTES) + frame_bits(TPDO_BYTES))
-    a_sync += telling * frame_bits(INPUTS_BYTES) + efforts_a_sync * frame_bits(EFFORT_BYTES)
+    a_sync += telling * frame_bits(INPUTS_BYTES) + efforts_a_sync * frame_bits(EFFORT_BYTES) + limit_bits
     beats = 1000.0 / heartbeat_ms + drives * 1000.0 / drive_heartbeat_ms
     return sync_hz * a_sync + beats * frame_bits(_HEARTBEAT_BYTES)
 

@@ -56,6 +56,8 @@ class DrivePdos:
     """None: it tells no encoder of the joint's own."""
     effort: Slice | None = None
     inputs: Slice | None = None
+    limit_id: int | None = None
+    """Of the RPDO that takes the torque limit; None: it takes none."""
 
     def rpdo(self, controlword_and_target: bytes) -> bytes:
         """The RPDO's data, from two bytes and four."""

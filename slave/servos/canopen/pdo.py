@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO3, TPDO2 = 0x000, 0x080, 0x080, 0x180, 0x200, 0x380, 0x280
 SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x580, 0x600, 0x700
 """Function codes of CiA 301's predefined connection set; a node's id is added to all but NMT and SYNC."""
-RPDOS = (RPDO1, 0x300, 0x400, 0x500)
+RPDO2 = 0x300
+RPDOS = (RPDO1, RPDO2, 0x400, 0x500)
 
 ENCODER = 0x2000
 """The object in which the drives of `tandem drives` show the output encoder's word."""
@@ -19,6 +20,8 @@ INPUTS_BYTES = 4
 TORQUE, CURRENT = 0x6077, 0x6078
 """What a drive tells of its effort, in thousandths of its rating, signed 16 bits: in a TPDO of its own."""
 EFFORT_BYTES = 2
+LIMITS = {"60E0h": (0x60E0, 0x60E1), "6072h": (0x6072,)}
+"""What takes a torque limit, in thousandths of the rating, unsigned 16 bits: in RPDO 2."""
 
 COUNT_BITS, MAGNET_LOST, PARITY_ERROR = 0x0FFF, 0x8000, 0x4000
 """Bits of the encoder word: the AS5045's 12-bit count, its magnet flags, and an SSI frame of wrong parity."""

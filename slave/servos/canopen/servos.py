@@ -31,7 +31,7 @@ from slave.servos.canopen.drives import Drives
 from slave.servos.canopen.load import WELL, too_much
 from slave.servos.canopen.pdo import RPDO1
 from slave.servos.canopen.wiring import Outgoing
-from slave.servos.servos import EncoderReading, check_setpoint
+from slave.servos.servos import EncoderReading, check_setpoint, check_torque_limit
 from slave.servos.signs import DriveSigns
 
 log = logging.getLogger(__name__)
@@ -80,6 +80,7 @@ class CanopenServos:
         self._drives = Drives(config, skeleton, encoders, last_known_rad=last_known_rad or {})
         self._buses: dict[str, CanBus] = {}
         self._setpoint: Array | None = None
+        self._torque_nm: Array | None = None
         self._due_ns = 0
         self._spoken = False
         """Whether anything has been sent since the buses were opened."""
@@ -96,7 +97,7 @@ class CanopenServos:
         """
         if self._buses:
             raise RobotError("the drives run already: stop them before they are started again")
-        self._setpoint = None
+        self._setpoint = self._torque_nm = None
         try:
             for config in self._config.buses:
                 bus = CanBus(
@@ -120,6 +121,16 @@ class CanopenServos:
         self._setpoint = np.clip(position_rad, self._skeleton.lower_rad, self._skeleton.upper_rad)
         if self._clock() >= self._due_ns - _EARLY_NS:
             self._cycle()
+
+    def limit_torque(self, torque_nm: Array | None) -> None:
+        """See `LimitsTorque`: goes with the next SYNC."""
+        check_torque_limit(torque_nm, len(self._skeleton.joints))
+        self._torque_nm = torque_nm
+
+    @property
+    def no_torque_limit(self) -> Mapping[str, str]:
+        """See `LimitsTorque`."""
+        return self._drives.no_torque_limit
 
     def read(self) -> EncoderReading:
         """All positions of the newest SYNC that all drives have answered, or that the next has ended."""
@@ -236,7 +247,7 @@ class CanopenServos:
     def _cycle(self) -> None:
         now_ns = self._clock()
         drives = self._drives
-        for outgoing in drives.cycle(now_ns, self._setpoint):
+        for outgoing in drives.cycle(now_ns, self._setpoint, self._torque_nm):
             self._send(outgoing)
         self._flush()
         synced_ns = self._clock()

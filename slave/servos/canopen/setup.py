@@ -7,9 +7,10 @@ what takes the place of refused ones; its mode. Pure.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from slave.servos.canopen import setup_checks as checks
-from slave.servos.canopen.drive_config import DriveSettings, EffortSource
+from slave.servos.canopen.drive_config import DriveSettings, EffortSource, TorqueLimitBy
 from slave.servos.canopen.eds import Eds
 from slave.servos.canopen.mapping import (
     INVALID,
@@ -26,7 +27,17 @@ from slave.servos.canopen.mapping import (
     rpdo_mapping,
     tpdo_mapping,
 )
-from slave.servos.canopen.pdo import CURRENT, INPUTS_MAPPING, RPDO1, TORQUE, TPDO1, TPDO2, TPDO3
+from slave.servos.canopen.pdo import (
+    CURRENT,
+    INPUTS_MAPPING,
+    LIMITS,
+    RPDO1,
+    RPDO2,
+    TORQUE,
+    TPDO1,
+    TPDO2,
+    TPDO3,
+)
 from slave.servos.canopen.sdo import Read, Transfer, Write
 from slave.servos.canopen.setup_checks import (
     ANSWER,
@@ -35,6 +46,7 @@ from slave.servos.canopen.setup_checks import (
     EFFORT_PDO,
     GUARDING,
     INPUTS,
+    LIMIT,
     LOSS,
     MAPPING,
     MODES,
@@ -149,6 +161,7 @@ class SetupPlan:
             yield Write(0x60C2, 1, 2, self._settings.times.period_ms, WIDE_PERIOD)
             yield Write(0x60C2, 2, 1, _MILLISECONDS, WIDE_PERIOD)
         if MAPPING not in lacks:
+            yield from self._torque_limit()
             return
         # an identifier that cannot be changed does not mean that the entries cannot
         yield from _entries(0x1400, rpdo_mapping(self.mode), "entries of RPDO 1")
@@ -158,6 +171,20 @@ class SetupPlan:
             yield Read(index, 1, 0, 0, "its identifier", part_of=part)
             subs = range(MOST_ENTRIES + 1)
             yield from (Read(index + 0x200, sub, 0, 0, "its mapping", part_of=part) for sub in subs)
+
+    def _torque_limit(self) -> Iterator[Transfer]:
+        drive = self._settings.drive
+        if drive.torque_limit is TorqueLimitBy.NONE or drive.most_torque_percent is None:
+            return
+        objects = LIMITS[drive.torque_limit.value]
+        if drive.effort is EffortSource.NONE:
+            yield Read(*RATED_TORQUE, 0, 0, "its rated torque", optional=True, part_of=LIMIT)
+        # a slave that died may have left less
+        most = round(10.0 * drive.most_torque_percent)
+        yield from (Write(index, 0, 2, most, LIMIT) for index in objects)
+        yield from _pdo(
+            0x1401, RPDO2 + drive.id, tuple(index << 16 | 0x0010 for index in objects), part_of=LIMIT
+        )
 
     def _node_guarding(self) -> Iterator[Transfer]:
         times = self._settings.times
@@ -200,6 +227,8 @@ class SetupPlan:
 
     def _last(self, held: Held, lacks: Mapping[str, str]) -> Iterator[Transfer]:
         checks.check_answer(lacks)
+        if not self.no_limit(lacks) and self._settings.drive.torque_limit is not TorqueLimitBy.NONE:
+            self.pdos = replace(self.pdos, limit_id=RPDO2 + self._settings.drive.id)
         checks.check_inputs(lacks, self._settings.tells_inputs, self.pdos.inputs is not None)
         if self.mode == 7:
             yield Write(0x60C0, 0, 2, 0, "linear interpolation")
@@ -211,6 +240,10 @@ class SetupPlan:
     def no_effort(self, lacks: Mapping[str, str]) -> str:
         """Why the drive tells no effort; empty where it does."""
         return lacks.get(EFFORT, "") or (lacks.get(EFFORT_PDO, "") if self._untold(lacks) else "")
+
+    def no_limit(self, lacks: Mapping[str, str]) -> str:
+        """Why the drive takes no torque limit; empty where it does, or is not asked to."""
+        return lacks.get(LIMIT, "") or ("its PDOs cannot be mapped anew" if MAPPING in lacks else "")
 
     def _untold(self, lacks: Mapping[str, str]) -> bool:
         return MAPPING not in lacks or self.pdos.effort is None

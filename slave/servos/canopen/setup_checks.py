@@ -9,6 +9,7 @@ from slave.servos.canopen.mapping import Held
 
 MODES = 0x6502, 0
 EFFORT, EFFORT_PDO, INPUTS = "effort", "effort PDO", "inputs"
+LIMIT = "torque limit"
 BEAT, GUARDING, MAPPING, ANSWER = "heartbeat", "node guarding", "mapping", "answer at each SYNC"
 LOSS, QUICK_STOP, PERIOD, WIDE_PERIOD = "6007h", "605Ah", "60C2h", "60C2h of 16 bits"
 WRONG_LENGTH = "wrong length"

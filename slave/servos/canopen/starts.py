@@ -9,6 +9,7 @@ from slave.servos.canopen.readings import DriveReadings
 from slave.servos.canopen.second_master import SecondMaster
 from slave.servos.canopen.silence import DriveSilence
 from slave.servos.canopen.supervision import Supervision
+from slave.servos.canopen.torque_limits import DriveTorqueLimits
 from slave.servos.canopen.watch import DriveWatch
 from slave.servos.canopen.wiring import (
     BOOTED,
@@ -33,12 +34,13 @@ class DriveStarts:
         silence: DriveSilence,
         watch: DriveWatch,
         readings: DriveReadings,
+        limits: DriveTorqueLimits,
         second_master: SecondMaster,
         may_reset: bool,
     ) -> None:
         """`may_reset`: whether a start may reset a drive's fault."""
         self._drives, self._wiring, self._supervision = drives, wiring, supervision
-        self._silence, self._watch, self._readings = silence, watch, readings
+        self._silence, self._watch, self._readings, self._limits = silence, watch, readings, limits
         self._second_master, self._may_reset = second_master, may_reset
         self._commands = False
         """Whether it has ever sent a drive anything: before, another master may be the rightful one."""
@@ -118,5 +120,6 @@ class DriveStarts:
         self._silence.begin(i, now_ns)
         self._wiring.connect(i, setup.plan.pdos, setup.plan.guarded)
         self._readings.efforts.configured(i, setup.held, setup.plan.no_effort(setup.lacks))
+        self._limits.configured(i, setup.held, setup.plan.no_limit(setup.lacks))
         self._watch.connect(i)
         self.outbox.append(self._wiring.nmt(i, START))

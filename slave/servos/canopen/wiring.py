@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from common.skeleton import Skeleton
 from slave.servos.canopen import pdo
@@ -79,6 +79,11 @@ class DriveWiring:
     def syncs(self) -> list[Outgoing]:
         """SYNC, one a bus."""
         return [(bus, pdo.SYNC, b"") for bus in self._buses]
+
+    def limits(self, data: Mapping[int, bytes], seen: Sequence[bool]) -> list[Outgoing]:
+        """Each drive's torque limit, by drive, of those drives that are `seen`."""
+        rows = ((self.where[i][0], self.pdos[i].limit_id, part) for i, part in data.items() if seen[i])
+        return [(bus, limit_id, part) for bus, limit_id, part in rows if limit_id is not None]
 
     def targets(self, data: Sequence[bytes], seen: Sequence[bool]) -> list[Outgoing]:
         """Each drive's target, of those drives that are `seen`."""

@@ -53,6 +53,11 @@ class MujocoServos:
         """Hand over setpoints (J,), taken in at the drives' next cycle. Raises ValueError if not finite."""
         self._robot.write(position_rad)
 
+    @property
+    def no_torque_limit(self) -> Mapping[str, str]:
+        """See `LimitsTorque`: every simulated drive takes it."""
+        return {}
+
     def limit_torque(self, torque_nm: Array | None) -> None:
         """Limit the motors from their next cycle on. See `slave.servos.LimitsTorque`."""
         self._robot.limit_torque(torque_nm)

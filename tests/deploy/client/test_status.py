@@ -242,6 +242,15 @@ def test_drives_that_push_as_hard_as_they_can_are_said(why: str) -> None:
     assert (f"drives push as hard as they can: {why}" in shown) is bool(why)
 
 
+def test_the_joints_whose_drives_take_no_torque_limit_are_said_with_the_reason() -> None:
+    why = {"neck_yaw": "its drive is old", "left_thumb": "not asked", "left_index": "not asked"}
+    said = status(Heard(state(), slave_metrics(servos=ServoMetrics(no_torque_limit=why))))
+    shown = " ".join(rendered({"robot-1": said}).split())
+    assert "the drive of neck_yaw may push as hard as it can: its drive is old" in shown
+    assert "the drives of left_thumb, left_index may push as hard as they can: not asked" in shown
+    assert json.loads(json.dumps(to_tree(said)))["no_torque_limit"] == why
+
+
 def test_a_robot_whose_drives_tell_nothing_has_no_efforts() -> None:
     said = status(heard())
     assert (said.effort_nm, said.external_nm) == (None, None)

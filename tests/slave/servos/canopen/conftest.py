@@ -37,6 +37,7 @@ class Wired:
             self.config, self.skeleton, encoders or EncoderConfig(), self._to_slave, self.now_ns
         )
         self.setpoint: Array | None = None
+        self.torque_nm: Array | None = None
         self.positions: list[Array] = []
         """True joint angles, every 4 ms."""
         self._due_ns = self.now_ns
@@ -75,7 +76,7 @@ class Wired:
             self.positions.append(self.peer.plant.position_rad)
             if self.alive and self.now_ns >= self._due_ns:
                 self._due_ns = self.now_ns + self.config.period_ns
-                self._to_drives(self.drives.cycle(self.now_ns, self.setpoint))
+                self._to_drives(self.drives.cycle(self.now_ns, self.setpoint, self.torque_nm))
                 self._flush()
                 self._to_drives(self.drives.sync(self.now_ns))
 
