@@ -10,7 +10,13 @@ from common.skeleton import Skeleton
 Follower = PostureFollower | ChainFollower
 
 
-def make_follower(skeleton: Skeleton, lower_rad: Array, upper_rad: Array) -> Follower:
-    """Closed formulas where the robot's joints are the table's axes, else least squares."""
-    kind = PostureFollower if skeleton.plain else ChainFollower
-    return kind(skeleton, lower_rad, upper_rad)
+def make_follower(
+    skeleton: Skeleton, lower_rad: Array, upper_rad: Array, *, spread: bool = False
+) -> Follower:
+    """Closed formulas where the robot's joints are the table's axes, else least squares.
+
+    `spread`: no posture may take long, as in a control loop (`ChainFollower`).
+    """
+    if skeleton.plain:
+        return PostureFollower(skeleton, lower_rad, upper_rad)
+    return ChainFollower(skeleton, lower_rad, upper_rad, spread=spread)

@@ -41,8 +41,16 @@ _ALIKE_RAD = 0.02
 class ChainFollower:
     """A robot's limits, and the posture it was last given. Its methods are those of `PostureFollower`."""
 
-    def __init__(self, skeleton: Skeleton, lower_rad: Array, upper_rad: Array) -> None:
-        """For joint limits (J,), rad."""
+    def __init__(
+        self, skeleton: Skeleton, lower_rad: Array, upper_rad: Array, *, spread: bool = False
+    ) -> None:
+        """For joint limits (J,), rad.
+
+        `spread`: other branches are looked for over five postures, so that none takes long. Until then the
+        branch next to the zero pose, or the one so far, is followed.
+        """
+        self._steps_a_call = _STEPS_ANEW // _LOOKED_EVERY if spread else _STEPS_ANEW
+        self._first_steps = 2 * _STEPS if spread else _STEPS_ANEW
         count, most = skeleton.turn_axes.shape[:2]
         joints = len(skeleton.joints)
         self._lower, self._upper, self._zero = lower_rad.copy(), upper_rad.copy(), skeleton.zero_rad
@@ -58,12 +66,17 @@ class ChainFollower:
         self._found, self._last = np.full((2, joints), np.nan)
         self._last_q = np.full((count, 4), np.nan)
         self._since_looked = 0
+        self._tried: Array | None = None
+        """(S, J) where the search from each seed is; None: no search is under way."""
+        self._looks_at: Mask = np.zeros(joints, np.bool_)
+        self._gain, self._steps_left = 0.0, 0
         self.short_rad: Array = np.zeros(count)
         """(N,) what the robot cannot follow of each segment: the angle from the robot's posture to theirs."""
 
     def forget(self) -> None:
         """The next posture has nothing to do with those before: it becomes the nearest there is."""
         self._found[:] = self._last[:] = np.nan
+        self._tried = None
 
     def joints_beside(self, joints: Mask) -> Mask:
         """Those (J,) that turn a segment together with one of `joints` (J,), these included."""
@@ -100,30 +113,54 @@ class ChainFollower:
 
     def _search(self, wanted: Array, weight: Array, lost: Mask) -> None:
         """Put the nearest posture (J,) into `_found`."""
-        fresh = ~np.isfinite(self._found)
-        start = np.where(fresh, self._seeds[0], self._found)
-        if not fresh.any():
-            self._found = self._solve(start[None], wanted, weight, _STEPS)[0]
-            self._since_looked += 1
-            far = np.linalg.norm(self._left(self._found[None], wanted, weight)[0][0], axis=-1) > _MUCH_RAD
-            if not far.any() or self._since_looked < _LOOKED_EVERY:
-                return
-            fresh = np.isin(self._part_of_joint, self._part_of_segment[far])
-            start, gain = self._found, _MUCH_RAD
+        fresh: Mask = ~np.isfinite(self._found)
+        if fresh.any():
+            start = np.where(fresh, self._seeds[0], self._found)
+            self._found = self._solve(start[None], wanted, weight, self._first_steps)[0]
+            # where the first seed's branch is as near as any can be, the others need not be tried
+            unsettled = self._costs(self._found[None], wanted, weight)[0] >= _ALIKE_RAD
+            self._since_looked = 0
+            self._look_among(fresh & ~lost & unsettled[self._part_of_joint], _ALIKE_RAD)
+            if self._first_steps < _STEPS_ANEW:
+                return  # the search begins with the next posture
         else:
-            gain = _ALIKE_RAD
-        self._since_looked = 0
-        starts = np.where(fresh, self._seeds, start)
-        starts[0] = start
-        tried = self._solve(starts, wanted, weight, _STEPS_ANEW)
-        left = np.linalg.norm(self._left(tried, wanted, weight)[0], axis=-1)
-        self._found = tried[0].copy()
-        for part in np.unique(self._part_of_joint[fresh & ~lost]):
-            cost = np.sqrt((left[:, self._part_of_segment == part] ** 2).sum(axis=1))
+            self._found = self._solve(self._found[None], wanted, weight, _STEPS)[0]
+            self._since_looked += 1
+            if self._tried is None and self._since_looked >= _LOOKED_EVERY:
+                far = np.linalg.norm(self._left(self._found[None], wanted, weight)[0][0], axis=-1) > _MUCH_RAD
+                self._look_among(np.isin(self._part_of_joint, self._part_of_segment[far]), _MUCH_RAD)
+        if self._tried is not None:
+            self._look(wanted, weight, lost)
+
+    def _look_among(self, joints: Mask, gain: float) -> None:
+        """Begin to look for another branch of these joints' parts (J,), to be taken if nearer by `gain`."""
+        self._tried = np.where(joints, self._seeds, self._found) if joints.any() else None
+        self._looks_at, self._gain, self._steps_left = joints, gain, _STEPS_ANEW
+
+    def _look(self, wanted: Array, weight: Array, lost: Mask) -> None:
+        """Go on with the search from all seeds; at its end take the branches that are nearer."""
+        assert self._tried is not None
+        tried = self._tried = self._solve(self._tried, wanted, weight, self._steps_a_call)
+        self._steps_left -= self._steps_a_call
+        if self._steps_left > 0:
+            return
+        self._tried, self._since_looked = None, 0
+        tried[0] = self._found
+        costs = self._costs(tried, wanted, weight)
+        for part in np.unique(self._part_of_joint[self._looks_at & ~lost]):
+            cost = costs[:, part]
             best = int(np.argmax(cost < cost.min() + _ALIKE_RAD))
-            if cost[best] < cost[0] - gain:
+            if cost[best] < cost[0] - self._gain:
                 of_part = self._part_of_joint == part
                 self._found[of_part] = tried[best, of_part]
+
+    def _costs(self, tried: Array, wanted: Array, weight: Array) -> Array:
+        """(S, P) how far the segments of each part are from the operator's, for postures (S, J)."""
+        left = np.linalg.norm(self._left(tried, wanted, weight)[0], axis=-1)
+        out = np.zeros((len(tried), len(self._lower)))
+        for part in np.unique(self._part_of_joint):
+            out[:, part] = np.sqrt((left[:, self._part_of_segment == part] ** 2).sum(axis=1))
+        return out
 
     def _solve(self, position: Array, wanted: Array, weight: Array, steps: int) -> Array:
         """Nearest postures (S, J) next to `position` (S, J)."""

@@ -24,7 +24,7 @@ class JointSolver:
         self._rate = np.zeros((count + 1, 3))
         self._parents = np.where(skeleton.parents < 0, count, skeleton.parents)
         self._rates = np.empty((count, 6))
-        self._reach = make_follower(skeleton, skeleton.lower_rad, skeleton.upper_rad)
+        self._reach = make_follower(skeleton, skeleton.lower_rad, skeleton.upper_rad, spread=True)
 
     @property
     def short_rad(self) -> Array:

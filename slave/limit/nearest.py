@@ -33,7 +33,7 @@ class NearestPosture:
     def __init__(self, skeleton: Skeleton, limits: MotionLimits) -> None:
         self._skeleton = skeleton
         self._names: Sequence[str] = skeleton.joint_names
-        self._reach = make_follower(skeleton, limits.lower_rad, limits.upper_rad)
+        self._reach = make_follower(skeleton, limits.lower_rad, limits.upper_rad, spread=True)
         tighter = (limits.lower_rad > skeleton.lower_rad) | (limits.upper_rad < skeleton.upper_rad)
         self._concerned: Mask = self._reach.joints_beside(tighter)
         self._any = bool(self._concerned.any())

@@ -144,3 +144,41 @@ def test_its_cost_beside_the_closed_formulas(skeleton: Skeleton) -> None:
             follower.follow(one, np.zeros_like(one), PERIOD_S)
         costs[name] = (time.perf_counter() - begin) / len(q)
     assert costs["own"] < 100.0 * costs["nursing"]
+
+
+def test_a_search_that_is_spread_ends_on_branches_as_near(skeleton: Skeleton) -> None:
+    """After some postures alike, what is left is as little as where the whole search is made at once."""
+    random = np.random.default_rng(4)
+    at_once, spread = (
+        ChainFollower(skeleton, skeleton.lower_rad, skeleton.upper_rad, spread=each) for each in (False, True)
+    )
+    for _ in range(10):
+        joints = random.uniform(skeleton.lower_rad, skeleton.upper_rad)
+        q = relative_orientations(skeleton, joints)
+        still = np.zeros_like(q)
+        for follower in (at_once, spread):
+            follower.forget()
+            for _ in range(12):
+                follower.follow(q, still)
+        assert np.abs(spread.short_rad - at_once.short_rad).max() < np.radians(2.0)
+
+
+def test_a_spread_search_takes_few_steps_a_posture(
+    skeleton: Skeleton, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Counted in linear systems that are solved, of which a whole search takes 450 at once."""
+    follower = ChainFollower(skeleton, skeleton.lower_rad, skeleton.upper_rad, spread=True)
+    solved: list[int] = []
+    solve = np.linalg.solve
+
+    def counted(matrix: Array, right: Array) -> Array:
+        solved.append(len(matrix) if matrix.ndim == 3 else 0)
+        return np.asarray(solve(matrix, right))
+
+    monkeypatch.setattr(np.linalg, "solve", counted)
+    random = np.random.default_rng(5)
+    q = from_rotation_vector(1.5 * random.normal(size=(len(skeleton.segments), 3)))
+    for _ in range(12):
+        solved.clear()
+        follower.follow(q, np.zeros_like(q))
+        assert sum(solved) <= 15 * 6 + 10
