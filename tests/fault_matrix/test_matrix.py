@@ -11,6 +11,7 @@ import slave.limit.limit
 from common.errors import TandemError
 from common.inputs.held import HeldSwitch
 from common.inputs.key_state import KeyState
+from deploy.harness.faults.begun import BegunScenes
 from deploy.harness.faults.fault import Reaction
 from deploy.harness.faults.table import FAULTS as EVERY
 from deploy.harness.faults.table import VIRTUAL as FAULTS
@@ -34,6 +35,8 @@ BARED = (
     "master's clock an hour back", "pedal released", "link lost while the clutch is released",
 )  # fmt: skip
 """Of the rows with a protection to take away; more would say no more, and each takes a second."""
+SCENES = BegunScenes()
+"""Not for a test that patches something: what it patches may be at work before the fault."""
 RULES = {str(rule) for rule, _ in slave.limit.limit.RULES}
 
 
@@ -47,7 +50,7 @@ def rows() -> list[object]:
 
 @pytest.mark.parametrize("name", rows())
 def test_the_robot_does_what_the_table_says(name: str) -> None:
-    outcome = try_on_virtual_clock(TABLE[name])
+    outcome = try_on_virtual_clock(TABLE[name], scenes=SCENES)
     assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"
 
 

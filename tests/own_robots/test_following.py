@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from common.skeleton import load_skeleton
+from deploy.harness.faults.begun import BegunScenes
 from deploy.harness.faults.table import faults_of
 from deploy.harness.faults.virtual import VirtualFault, try_on_virtual_clock
 from deploy.measure import accuracy, motion
@@ -19,6 +20,8 @@ ROWS = (
     "sensor axis stuck", "pedal released", "clutch released and pressed",
 )  # fmt: skip
 """Some of those that suit any robot; `tandem faults --profile` tries them all."""
+
+SCENES = BegunScenes()
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -48,7 +51,7 @@ def test_the_robot_follows_the_operators_postures(file: str) -> None:
 def test_a_fault_does_to_it_what_the_table_says(file: str, row: str) -> None:
     fault = faults_of(str(imported(file)))[row]
     assert isinstance(fault, VirtualFault)
-    outcome = try_on_virtual_clock(fault)
+    outcome = try_on_virtual_clock(fault, scenes=SCENES)
     assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"
 
 

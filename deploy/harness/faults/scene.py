@@ -6,7 +6,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from common.clock import NS_PER_MS, NS_PER_S, to_s
 from common.errors import TandemError
 from common.skeleton import Skeleton, load_skeleton
-from common.wire.messages import Action, Command
+from common.wire.messages import Action, Command, Mask
 from deploy.examples.profiles import NURSING
 from deploy.harness.faults.judge import Asked
 from deploy.harness.faults.setting import USUAL, Later, Setting, files
@@ -80,6 +80,10 @@ class _RobotTick:
     state: State
     reading: EncoderReading
     setpoint: Setpoint
+
+
+def _read_as(valid: Mask, reading: EncoderReading) -> EncoderReading:
+    return EncoderReading(reading.read_ns, reading.counts, valid)
 
 
 def turned(command: Command, by_rad: float = JOINT_TURN_RAD) -> Command:
@@ -156,7 +160,7 @@ class Scene:
         """Bring the robot to a state. Raises TandemError where it does not get there."""
         if state is State.BOOT:
             blind = np.zeros(len(self.skeleton.joints), np.bool_)
-            self.inject.read = lambda reading: EncoderReading(reading.read_ns, reading.counts, blind)
+            self.inject.read = partial(_read_as, blind)
         self.run.run(self._begins_s + ENGAGED_S)
         if state in (State.ALIGN, State.TRACK):
             if state is State.ALIGN:  # once the operator has reached, so that there is some way to go

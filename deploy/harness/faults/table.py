@@ -6,6 +6,7 @@ import asyncio
 from dataclasses import replace
 
 from deploy.examples.profiles import NURSING
+from deploy.harness.faults.begun import BegunScenes
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
 from deploy.harness.faults.contact import CONTACT
 from deploy.harness.faults.deadman import DEADMAN
@@ -63,9 +64,12 @@ def faults_of(profile: str) -> dict[str, FaultRow]:
     }
 
 
+_SCENES = BegunScenes()
+
+
 def try_fault(fault: FaultRow) -> FaultOutcome:
     """Bring the fault about and judge the robot. Raises TandemError where the trial cannot begin."""
     if isinstance(fault, ProcessFault):
         return asyncio.run(try_with_processes(fault))
     assert isinstance(fault, VirtualFault)
-    return try_on_virtual_clock(fault)
+    return try_on_virtual_clock(fault, scenes=_SCENES)

@@ -11,6 +11,7 @@ import numpy as np
 
 from common.wire.messages import Mask
 from deploy.examples.profiles import NURSING
+from deploy.harness.faults.begun import BegunScenes
 from deploy.harness.faults.fault import FaultRow, Reaction
 from deploy.harness.faults.judge import (
     FaultOutcome,
@@ -63,10 +64,18 @@ follows_limited = partial(VirtualFault, reaction=Reaction.LIMITED, ends=State.TR
 stops = partial(VirtualFault, reaction=Reaction.STOPS, ends=State.ESTOP)
 
 
-def try_on_virtual_clock(fault: VirtualFault, without: Set[str] = frozenset()) -> FaultOutcome:
-    """Try it on a guard. `without`: names of the gates and watches that this guard lacks."""
-    scene = Scene(fault.setting, without)
-    scene.to(fault.begins)
+def try_on_virtual_clock(
+    fault: VirtualFault, without: Set[str] = frozenset(), scenes: BegunScenes | None = None
+) -> FaultOutcome:
+    """Try it on a guard. `without`: names of the gates and watches that this guard lacks.
+
+    `scenes`: where a scene that has begun is copied from, for a guard that lacks nothing.
+    """
+    if scenes is not None and not without:
+        scene = scenes.begun(fault.setting, fault.begins)
+    else:
+        scene = Scene(fault.setting, without)
+        scene.to(fault.begins)
     scene.begin()
     fault.act(scene)
     if fault.lasts_s is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from deploy.sim.network.profile import Profile
 from deploy.sim.network.scheduler import PacketScheduler
@@ -40,7 +41,7 @@ class VirtualLink:
     def _await(self, direction: PacketScheduler[Callable[[], None]]) -> None:
         due_ns = direction.next_ns
         if due_ns is not None:
-            self._at(due_ns, lambda: self._deliver(direction, due_ns))
+            self._at(due_ns, partial(self._deliver, direction, due_ns))
 
     def _deliver(self, direction: PacketScheduler[Callable[[], None]], now_ns: int) -> None:
         arrived = direction.due(now_ns)
