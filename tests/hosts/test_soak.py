@@ -30,7 +30,7 @@ def criteria(folder: Path) -> dict[str, dict[str, Any]]:
 def test_it_comes_back_from_each_fault_and_judges_itself(tmp_path: Path) -> None:
     report = tmp_path / "report"
     faults = "master-kill,suit-kill,recorder-kill,disk-full,node-loss"
-    options = ["--duration", "60s", "--every", "7", "--faults", faults, "--report", str(report)]
+    options = ["--duration", "46s", "--every", "6", "--faults", faults, "--report", str(report)]
     ended = subprocess.run([*SOAK, *options], capture_output=True, text=True, timeout=280, check=False)
     said = ended.stdout + ended.stderr
     events = read_events(report)

@@ -16,7 +16,7 @@ from deploy.experiments.soak.files.happenings import FaultRecovered
 @pytest.mark.timeout(200)
 def test_an_outage_stops_the_robot_and_its_end_only_the_commands(tmp_path: Path) -> None:
     report = tmp_path / "report"
-    options = ["--duration", "40s", "--every", "12", "--faults", "outage", "--profile", "4g"]
+    options = ["--duration", "28s", "--every", "12", "--faults", "outage", "--profile", "4g"]
     soak = [sys.executable, "-m", "deploy", "soak", *options, "--report", str(report)]
     ended = subprocess.run(soak, capture_output=True, text=True, timeout=180, check=False)
     said = ended.stdout + ended.stderr

@@ -25,6 +25,7 @@ SCENES = BegunScenes()
 
 
 @pytest.mark.parametrize("file", FILES)
+@pytest.mark.long
 def test_the_robot_follows_the_operators_postures(file: str) -> None:
     """With calibrated sensors: as well as the nursing robot follows its own motions."""
     profile = str(imported(file))

@@ -226,6 +226,7 @@ def test_raw_counts_need_a_calibration_first(upper_body: Worn, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
+@pytest.mark.long
 def test_a_real_person_moves_as_people_can(
     profile: str,
     real_person: Path,
@@ -253,6 +254,7 @@ def test_a_real_person_moves_as_people_can(
             assert np.quantile(angles[:, j], 0.05) > -15.0, name
 
 
+@pytest.mark.long
 def test_what_the_real_person_s_halves_say_agrees(real_person: Path) -> None:
     """Sitting down and standing up, and walking: two motions without a sample in common, one alignment."""
     skeleton = load_skeleton("lower_limb")

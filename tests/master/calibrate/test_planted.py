@@ -5,9 +5,12 @@ All 200 sessions (some ten minutes): `python -m tests.master.calibrate.planted 0
 
 from collections import Counter
 
+import pytest
+
 from tests.master.calibrate.planted import KINDS, count
 
 
+@pytest.mark.long
 def test_nine_tenths_of_what_is_written_lie_within_the_stated_95_percent() -> None:
     found = count(range(2 * len(KINDS)))
     total: Counter[str] = sum(found.values(), Counter())

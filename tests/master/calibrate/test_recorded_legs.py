@@ -70,6 +70,7 @@ def person(real_person: Path) -> Person:
 
 
 @pytest.mark.parametrize("joint", POSSIBLE)
+@pytest.mark.long
 def test_every_angle_is_one_that_a_person_has(person: Person, joint: str) -> None:
     lower, upper = POSSIBLE[joint]
     for side in SIDES:

@@ -32,6 +32,7 @@ def test_exchanged_sides_are_refused(profile: str) -> None:
 
 
 @pytest.mark.parametrize("profile", ["nursing", "lower_limb"])
+@pytest.mark.long
 def test_a_real_person_s_too(profile: str, real_person: Path) -> None:
     units = load_recordings(real_person)
     check(of_profile(units, load_skeleton(profile)), profile)

@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass, field
 
 import numpy as np
+import pytest
 
 from common.quaternion import Array, conjugate, rotate
 from master.calibrate.carried import signed_permutations
@@ -156,6 +157,7 @@ def inertial_tally(count: int) -> Tally:
     return tally
 
 
+@pytest.mark.long
 def test_magnetometers_are_as_sure_as_is_written() -> None:
     tally = magnetic_tally(40)
     sys.stdout.write(f"{tally}\n")
@@ -164,6 +166,7 @@ def test_magnetometers_are_as_sure_as_is_written() -> None:
     assert tally.wrongly_written == []
 
 
+@pytest.mark.long
 def test_inertial_sensors_are_as_sure_as_is_written() -> None:
     tally = inertial_tally(27)
     sys.stdout.write(f"{tally}\n")

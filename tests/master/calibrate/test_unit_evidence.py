@@ -36,6 +36,7 @@ def test_sound_units_are_believed(units: dict[str, NodeRecording]) -> None:
     assert {name: said(unit) for name, unit in units.items()} == dict.fromkeys(units)
 
 
+@pytest.mark.long
 def test_a_real_person_s_units_are_believed(real_person: Path) -> None:
     units = load_recordings(real_person)
     assert {name: said(unit) for name, unit in units.items()} == dict.fromkeys(units)

@@ -112,6 +112,7 @@ CHECKS = [within_limits, no_joint_jumps, no_segment_jumps, no_joint_is_told_to_r
 
 
 @pytest.mark.parametrize("profile", MOTIONS)
+@pytest.mark.long
 def test_of_every_motion(profile: str) -> None:
     count = int(os.environ.get("TANDEM_MOTIONS", MOTIONS[profile]))
     done = 0

@@ -40,6 +40,7 @@ def turning(filter_: OrientationFilter, seconds: float, iron_from_s: float, offs
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.long
 def test_hard_iron_is_told_and_believed_less(name: str, axis: int) -> None:
     offset = np.roll(IRON_UT, axis - 1) * 1.5
     filter_ = FILTERS[name]().make(RATE_HZ, 1)

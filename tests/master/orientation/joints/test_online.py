@@ -67,6 +67,7 @@ def test_a_bed_s_rail_that_was_always_there(wear: Any, arms: Skeleton) -> None:
     assert off.rmse_deg("elbow") > 2.0 * quiet.rmse_deg("elbow")
 
 
+@pytest.mark.long
 def test_arms_without_magnetometers_worn_askew(wear: Any, arms: Skeleton) -> None:
     """A zero pose gives the headings; the joints keep them while the gyros' biases drift."""
     askew = Rotation.random(5, rng=3).as_quat(scalar_first=True)

@@ -74,6 +74,7 @@ def by_kind(person: Person) -> list[tuple[str, str, Array]]:
     ]
 
 
+@pytest.mark.long
 def test_every_angle_is_one_that_a_person_has(
     person: Person, possible_deg: Mapping[str, tuple[float, float]]
 ) -> None:
