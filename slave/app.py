@@ -239,6 +239,7 @@ class Slave:
             servos=self._servo_metrics(),
             video=self._camera.metrics() if self._camera else None,
             link=self._link.counters(),
+            contact_from="" if pipeline.contact.missing(monotonic_ns()) else pipeline.contact.dull,
             times=guard.times.metrics(),
         )
 

@@ -170,6 +170,8 @@ class SlaveMetrics(Metrics):
     """Each one-way time since the message before; in messages only, not in the file at the end."""
     one_way_missing_recent_us: tuple[int, ...] = ()
     """What `one_way_corrected_ms` took for each command that did not come; likewise in messages only."""
+    contact_from: str = ""
+    """Below which force no push is noticed, by segment, in words; empty where none is at all."""
     times: GuardTimes | None = None
     access: AccessMetrics | None = None
     """In the file at the end only."""

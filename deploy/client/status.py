@@ -201,6 +201,8 @@ class RobotStatus:
     """From outside."""
     no_effort: dict[str, str] = field(default_factory=dict)
     """Why a joint's effort is not known."""
+    contact_from: str = ""
+    """Below which force no push is noticed; empty where none is at all, or nothing is known."""
     no_torque_limit: dict[str, str] = field(default_factory=dict)
     """Why the drive of a joint takes no torque limit, where others do."""
     unlimited: str = ""
@@ -249,6 +251,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         effort_nm=by_joint(state.effort_nm) if state else None,
         external_nm=by_joint(state.external_nm) if state else None,
         no_effort=metrics.servos.no_effort if metrics else {},
+        contact_from=metrics.contact_from if metrics else "",
         no_torque_limit=metrics.servos.no_torque_limit if metrics else {},
         unlimited=metrics.servos.unlimited if metrics else "",
         left_out=metrics.servos.left_out if metrics else {},
@@ -338,6 +341,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
     words += [(f"{name}: {why}", "yellow") for name, why in (one.switches or {}).items() if why != "held"]
     words += [(f"node {node}: {why}", "yellow") for node, why in (one.node_doubts or {}).items()]
     words += [(line, "yellow") for line in without_detection(one.no_effort)]
+    words += [(f"contact: {one.contact_from}", "dim")] * bool(one.contact_from)
     words += [(line, "yellow") for line in without_torque_limit(one.no_torque_limit)]
     words += [(f"drives push as hard as they can: {one.unlimited}", "yellow")] * bool(one.unlimited)
     words += [(f"{joint} {why}", "yellow") for joint, why in one.not_driven.items()]

@@ -13,6 +13,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.contact.config import ContactConfig
+from slave.contact.least_push import least_push_n, push_words
 from slave.contact.observer import MomentumObserver
 from slave.contact.payload import loaded_model
 from slave.contact.thresholds import angles_of, thresholds_nm
@@ -72,6 +73,8 @@ class ContactWatch:
         self.observer = MomentumObserver(self._skeleton, angles.time_constant_s, self._model)
         self.floor_nm = thresholds_nm(self._skeleton, self._model, self._config, angles)
         """(J,) thresholds of a robot whose motors do nothing."""
+        self.dull = push_words(least_push_n(self._skeleton, self.floor_nm), drives)
+        """Below which force no push is noticed, in words."""
 
     @property
     def external_nm(self) -> Array | None:

@@ -242,6 +242,12 @@ def test_drives_that_push_as_hard_as_they_can_are_said(why: str) -> None:
     assert (f"drives push as hard as they can: {why}" in shown) is bool(why)
 
 
+def test_below_which_force_no_push_is_noticed_is_said() -> None:
+    said = status(Heard(state(), slave_metrics(contact_from="no push is noticed below 31 N at the elbow")))
+    assert "contact: no push is noticed below 31 N at the elbow" in rendered({"robot-1": said})
+    assert "contact:" not in rendered({"robot-1": status(heard())})
+
+
 def test_the_joints_whose_drives_take_no_torque_limit_are_said_with_the_reason() -> None:
     why = {"neck_yaw": "its drive is old", "left_thumb": "not asked", "left_index": "not asked"}
     said = status(Heard(state(), slave_metrics(servos=ServoMetrics(no_torque_limit=why))))
