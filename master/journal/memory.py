@@ -55,11 +55,13 @@ def recall(root: object) -> Plain:
 def restore(root: object, memory: Plain) -> None:
     """Fill `root`, freshly built from the same configuration, with a memory. Raises RecordingError."""
     try:
-        _Restore().value(memory, root)
+        filled = _Restore().value(memory, root)
     except RecordingError:
         raise
     except Exception as error:  # the data may be of any shape
         raise RecordingError(f"a snapshot does not fit this version's pipeline ({error})") from None
+    if filled is not root:
+        raise RecordingError(f"a snapshot is not the memory of a {type(root).__name__}")
 
 
 class _Filter(Protocol):

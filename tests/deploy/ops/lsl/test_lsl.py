@@ -33,7 +33,7 @@ def state(number: int, **changes: Any) -> RobotState:
     made = RobotState(
         "robot-1", number, 50 * NS_PER_MS, 45 * NS_PER_MS, "track", "follows nurse-1", "nurse-1",
         valid, ANGLES + number, ANGLES + number + 0.01,
-        CommandEcho(number, 10 * NS_PER_MS, 30 * NS_PER_MS, 31 * NS_PER_MS, 35 * NS_PER_MS), NS_PER_MS, 200_000,
+        CommandEcho(number, *(ms * NS_PER_MS for ms in (10, 30, 31, 35))), NS_PER_MS, 200_000,
     )  # fmt: skip
     return replace(made, **changes)
 
