@@ -123,7 +123,7 @@ def test_a_master_file_tells_the_mistakes_of_all_its_layouts(tmp_path: Path) -> 
         'head = { id = 2, bus = "suit" }', 'head = { id = 2, bus = "suit", layout = "other" }'
     )
     layouts = (HERE / "layouts.toml").read_text("utf-8").replace("[layout.", "[suit.layout.")
-    for name in ("mti", "lpms", "bno"):
+    for name in ("mti", "lpms", "bno", "muxed"):
         (tmp_path / f"{name}.dbc").write_bytes((HERE / f"{name}.dbc").read_bytes())
     (tmp_path / "master.toml").write_text(text + layouts, "utf-8")
     with pytest.raises(
