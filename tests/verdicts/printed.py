@@ -9,9 +9,13 @@ from pathlib import Path
 
 from common.errors import TandemError
 from deploy.experiments.bench.targets import BENCH
+from deploy.experiments.contact.flights import LOADS, Flight, Flights
+from deploy.experiments.contact.hours import judge_flights
+from deploy.experiments.contact.view import judge
 from deploy.experiments.demo.targets import BY_PROFILE
 from deploy.experiments.soak.judge.judge import verdicts_of
 from deploy.experiments.trial.report.targets import LIMITS
+from deploy.sim.patient.replay import Lap
 from tests.deploy.experiments.soak.conftest import FAULT, PROCESSES, STORY, Make, happened
 
 ROOT = Path(__file__).parents[2]
@@ -42,6 +46,11 @@ def printed(make: Make) -> set[tuple[str, str]]:
             for words in texts("deploy/experiments/trial/cell/judge.py", "_nothing_to_judge", _is_return)
         ),
         *(("faults", words) for words in fault_words()),
+        *(("contact", name) for name in contact_names()),
+        *(
+            ("collisions", words)
+            for words in texts("deploy/experiments/collisions/report.py", "wrong", _is_message)
+        ),
         *(("accuracy", words) for words in texts("deploy/experiments/accuracy/view.py", "_notes", _is_note)),
         *(
             ("record", _first_words(text))
@@ -66,11 +75,18 @@ def _process(found: re.Match[str]) -> str:
     return ": PROCESS" if found[1] else "the PROCESS missed"
 
 
+def contact_names() -> set[str]:
+    """Of the meetings with a patient, and of the hours through the air."""
+    lap = Lap(1.0, (), 0.5, "neck_yaw")
+    flights = tuple(Flight("bottle", "12 bits", load, (lap,)) for load in LOADS)
+    return {verdict.name for verdict in (*judge(()), *judge_flights(Flights({}, flights)))}
+
+
 def fault_words() -> set[str]:
     """Of a row of the fault matrix: what should not have been."""
     executor, judge = "deploy/harness/faults/virtual.py", "deploy/harness/faults/judge.py"
     return {
-        *texts(executor, "_judge", lambda node: isinstance(node, ast.JoinedStr)),
+        *texts(executor, "_judge", _is_message),
         *texts(executor, "_state_amiss", _is_return),
         *texts(judge, "standing_amiss", _is_return),
         *texts(judge, "asked_beyond", _is_argument),
@@ -135,6 +151,10 @@ def _is_note(node: ast.AST) -> bool:
 
 def _appends(node: ast.AST, to: str) -> bool:
     return isinstance(node, ast.Call) and ast.unparse(node.func) == f"{to}.append"
+
+
+def _is_message(node: ast.AST) -> bool:
+    return isinstance(node, ast.JoinedStr)
 
 
 def _is_return(node: ast.AST) -> bool:

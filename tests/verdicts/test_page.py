@@ -60,7 +60,9 @@ def test_every_verdict_has_a_row_and_every_row_a_test(make: Make) -> None:
     assert amiss(rows(PAGE.read_text("utf-8")), printed(make)) == []
 
 
-@pytest.mark.parametrize("command", ["demo", "bench", "soak", "trial", "faults", "accuracy", "record"])
+@pytest.mark.parametrize("command", [
+    "demo", "bench", "soak", "trial", "faults", "accuracy", "record", "contact", "collisions"
+])  # fmt: skip
 def test_a_page_that_lacks_a_row_or_names_no_test_fails(make: Make, command: str) -> None:
     table, verdicts = rows(PAGE.read_text("utf-8")), printed(make)
     mine = next(row for row in table if row.command == command)

@@ -46,14 +46,15 @@ def test_a_short_way_has_no_false_stop(short: Flights) -> None:
     assert all(verdict.outcome is Outcome.PASSED for verdict in hours.judge_flights(short))
 
 
-def red(lap: Lap = LAP, whole: FreeRun = WHOLE) -> list[str]:
-    found = Flights({"bottle": whole}, (Flight("bottle", "12 bits", NOTHING, (LAP, lap)),))
+def red(lap: Lap = LAP, whole: FreeRun = WHOLE, load: str = NOTHING) -> list[str]:
+    found = Flights({"bottle": whole}, (Flight("bottle", "12 bits", load, (LAP, lap)),))
     return [v.name for v in hours.judge_flights(found) if v.outcome is Outcome.FAILED]
 
 
 def test_each_verdict_turns_red_by_one_stop() -> None:
     assert red() == []
-    assert red(lap=STOPPED) == ["false stops, the hand holds nothing"]
+    for load in LOADS:
+        assert red(lap=STOPPED, load=load) == [f"false stops, the hand holds {load}"]
     assert red(whole=replace(WHOLE, false_stops=("pushed",))) == ["false stops, whole pipeline"]
     assert red(whole=replace(WHOLE, other_stops=("moves",))) == ["stops for other reasons"]
 

@@ -16,9 +16,10 @@ UNSEEN = Impact(0.5, 100.0, 1.5, 90.0, None, None, 0.0)
 SEEN = Impact(0.5, 35.0, 0.1, 0.0, 0.052, 0.002, 0.03)
 
 
-def pairs(**changes: Any) -> list[Pair]:
+def pairs(changed: bool = True, **changes: Any) -> list[Pair]:
+    """One meeting with a free patient and one with a clamped one; the changes are of the latter, or not."""
     return [
-        Pair(Meeting("hand", 0.5, clamped), UNSEEN, replace(SEEN, **changes) if clamped else SEEN)
+        Pair(Meeting("hand", 0.5, clamped), UNSEEN, replace(SEEN, **changes) if clamped is changed else SEEN)
         for clamped in (False, True)
     ]
 
@@ -42,6 +43,7 @@ def test_all_passes_at_the_limits() -> None:
 )
 def test_each_turns_red_just_beyond(changes: dict[str, Any], name: str) -> None:
     assert red(pairs(**changes)) == [name]
+    assert red(pairs(changed=False, **changes)) == [name.replace("clamped", "free")]
 
 
 def test_the_table_has_a_row_each() -> None:
