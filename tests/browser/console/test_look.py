@@ -40,6 +40,12 @@ OVERFLOWS = """() => {
       }
     }
   }
+  const panels = "header, footer, main, section, section div, section ol, section ul";
+  for (const e of document.querySelectorAll(panels)) {
+    const more = e.scrollWidth - e.clientWidth;
+    if (!shown(e) || !e.clientWidth || more <= 1) continue;
+    found.push(`the panel ${e.id || e.className || e.tagName} is ${more} px too wide`);
+  }
   return found;
 }"""
 COVERED = """() => {
@@ -70,9 +76,12 @@ def show(page: Any, fake: FakeConsole, wanted: str) -> None:
 
 @pytest.mark.parametrize("path", ["/", "/engineer"])
 @pytest.mark.parametrize("language", ["en", "zh"])
+@pytest.mark.parametrize("size", [(1366, 768), (1920, 1080)])
 def test_nothing_overflows_and_nothing_covers_the_stop(
-    page: Any, fake: FakeConsole, path: str, language: str
+    page: Any, fake: FakeConsole, path: str, language: str, size: tuple[int, int]
 ) -> None:
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    fake.facts = {"effort_nm": [-12.3] * 25, "drives": {"temperature_c": [41.0] * 25}}
     page.goto(fake.address + path)
     until(page, lambda: state(page) == "follows")
     if language == "zh":
@@ -84,6 +93,11 @@ def test_nothing_overflows_and_nothing_covers_the_stop(
         assert page.evaluate(COVERED) == 0, wanted
         places.add(str(page.locator("#stop").bounding_box()))
     show(page, fake, "stopped")
+    if path == "/":
+        page.click("#show-joints")
+        until(page, lambda: page.is_visible("#joints"))
+        assert page.evaluate(OVERFLOWS) == []
+        page.click("#show-joints")
     page.click("#reset")
     assert page.evaluate(COVERED) == 0
     fake.silent = True
