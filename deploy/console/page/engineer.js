@@ -46,7 +46,7 @@ function stages(found) {
     const row = make("tr");
     const bar = make("span", "", { class: "bar" });
     bar.style.width = `${(100 * (stage.mean_ms ?? 0)) / most}%`;
-    const name = make("td", stage.name, { lang: "en" });
+    const name = make("td", stage.name.replaceAll("→", "→\u200b"), { lang: "en" });
     name.append(bar);
     const number = (ms) => make("td", fixed(ms, 2), { class: "number" });
     row.append(name, number(stage.mean_ms), number(stage.p99_ms));

@@ -152,9 +152,11 @@ export class RobotView {
       high.max(p);
     }
     const middle = points.length ? low.clone().add(high).multiplyScalar(0.5) : new Vector3(0, 0, 1);
-    const size = points.length ? Math.max(0.3, high.distanceTo(low)) : 1.5;
+    // all of its height, with room for a raised head; wide as the panel is, its breadth fits too
+    const height = points.length ? Math.max(0.3, high.z - low.z) + 0.25 : 1.5;
+    const away = height / 2 / Math.tan((this.camera.fov * Math.PI) / 360);
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).add(new Vector3(0.88, 0.4, 0.18).multiplyScalar(1.85 * size * further));
+    this.camera.position.copy(middle).add(new Vector3(0.88, 0.4, 0.18).normalize().multiplyScalar(away * further));
     this.controls.update();
     this.draw();
   }

@@ -210,13 +210,13 @@ class FakeConsole:
 
     def posture(self, at_s: float) -> list[float]:
         moving = self.guard in ("track", "align")
-        return [
-            min(
-                max(0.45 * math.sin((1.1 * at_s if moving else 0.0) + 0.7 * j), joint["lower_rad"]),
-                joint["upper_rad"],
-            )
-            for j, joint in enumerate(self.shape["joints"])
-        ]
+        phase = 1.1 * at_s if moving else 0.0
+        angles = []
+        for j, joint in enumerate(self.shape["joints"]):
+            around = _BASE.get(joint["name"].partition("_")[2], 0.0)
+            angle = around + 0.25 * math.sin(phase + 0.7 * j)
+            angles.append(min(max(angle, joint["lower_rad"]), joint["upper_rad"]))
+        return angles
 
     def _facts(self, n: int) -> dict[str, Any]:
         return {"kind": "facts", "n": n, "robot": "robot-1", **_FACTS, **self._levels(), **self.facts}
@@ -256,6 +256,8 @@ def _jpeg() -> bytes:
     return bytes(simplejpeg.encode_jpeg(picture, quality=80))
 
 
+_BASE = {"shoulder_pitch": 0.7, "elbow_pitch": 0.9}
+"""About which the arms move, rad: ahead of the body."""
 _BED = {"name": "bed", "shape": "box", "center_m": [0.9, 0.0, 0.35], "size_m": [0.8, 1.9, 0.7], "yaw_deg": 0}
 _FACTS: dict[str, Any] = {
     "latency": {

@@ -5,10 +5,25 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
+import simplejpeg
 from playwright.sync_api import sync_playwright
 
+from common.errors import RobotError
+from slave.camera.drawn import DrawnCamera
 from tests.browser.console.browser import ARGUMENTS, CHROMIUM
 from tests.browser.console.fake import FakeConsole
+
+
+def _room(fake: FakeConsole) -> bytes | None:
+    """What the simulated robot sees, arms ahead; None where this machine cannot draw."""
+    try:
+        camera = DrawnCamera("nursing", "head", 640, 480)
+        posture = np.array(fake.posture(0.0))
+        posture[[j["name"] == "neck_pitch" for j in fake.shape["joints"]]] = 0.35
+        return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(camera.draw(posture)), quality=85))
+    except RobotError:
+        return None
 
 
 def _say(what: object) -> None:
@@ -23,6 +38,7 @@ def main(folder: Path, only: str = "") -> None:
             if only and only != name:
                 continue
             fake = FakeConsole()
+            fake.picture = _room(fake)
             page = browser.new_page(viewport={"width": size[0], "height": size[1]}, locale=language)
             page.on("console", _say)
             page.on("pageerror", _say)

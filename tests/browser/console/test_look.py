@@ -58,7 +58,12 @@ SCENES: dict[str, dict[str, Any]] = {
     "follows": {"guard": "track"},
     "holds": {"guard": "hold"},
     "aligns": {"guard": "align"},
-    "stopped": {"guard": "estop"},
+    "stopped": {
+        "guard": "estop",
+        "view": {
+            "stop": {"id": 1, "by": "", "asked_s": 0.0, "robot_s": 0.02, "stands_s": 12.31, "failed": ""}
+        },
+    },
     "starting": {"guard": "boot"},
     "clutch": {"guard": "clutch", "view": {"situation": "repositions"}},
     "other": {
