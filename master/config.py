@@ -16,13 +16,13 @@ from common.process.realtime import ProcessConfig
 from common.recording.config import RecordingConfig
 from common.skeleton import Skeleton, load_skeleton
 from common.skeleton.load import ProfileName
-from common.tap.config import TapConfig
+from common.tap.config import TapConfig, socket_mistakes
 from master.alarms.config import AlarmsConfig
 from master.capture.config import SuitSection
 from master.capture.source import suit_mistakes
 from master.comfort.config import ZeroPoseAgainConfig
 from master.comfort.scaling import scaling_mistakes
-from master.deadman.config import CanButton, ClutchConfig, DeadmanConfig, Pedal
+from master.deadman.config import CanButton, ClutchConfig, ConsoleHold, DeadmanConfig, Pedal
 from master.orientation.config import EstimationConfig
 from master.orientation.filters import filter_mistakes
 from master.suit.nodes import NodeConfig, wiring_mistakes
@@ -60,8 +60,10 @@ class OperatorConfig(Section):
     """By joint group, the share of the operator's motion that the robot makes; see comfort/scaling.py."""
 
     def mistakes(self) -> list[ConfigMistake]:
-        """Deadman and clutch must be two switches."""
+        """Deadman and clutch must be two switches; a socket must be possible where it is named."""
         one, other = self.deadman, self.clutch
+        if isinstance(one, ConsoleHold):
+            return socket_mistakes("operator.deadman.socket", one.socket)
         if (
             isinstance(one, Pedal)
             and isinstance(other, Pedal)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from pathlib import Path
 
 from common.config.section import RelativePath, Section
 from common.errors import ConfigMistake
@@ -19,12 +20,15 @@ class TapConfig(Section):
 
     def mistakes(self) -> list[ConfigMistake]:
         """A path that a socket can have, on a system that has such sockets."""
-        if self.socket is None:
-            return []
-        if not hasattr(socket, "AF_UNIX") or not hasattr(socket, "SO_PEERCRED"):
-            return [ConfigMistake("tap.socket", str(self.socket), "no tap: this system has no such sockets")]
-        if len(str(self.socket).encode()) > LONGEST:
-            return [ConfigMistake("tap.socket", str(self.socket), f"a path of at most {LONGEST} bytes")]
-        if not self.socket.parent.is_dir():
-            return [ConfigMistake("tap.socket", str(self.socket), "a path in a folder that exists")]
-        return []
+        return [] if self.socket is None else socket_mistakes("tap.socket", self.socket)
+
+
+def socket_mistakes(key: str, path: Path) -> list[ConfigMistake]:
+    """Why no Unix socket can be at a path."""
+    if not hasattr(socket, "AF_UNIX") or not hasattr(socket, "SO_PEERCRED"):
+        return [ConfigMistake(key, str(path), "no socket: this system has none of this kind")]
+    if len(str(path).encode()) > LONGEST:
+        return [ConfigMistake(key, str(path), f"a path of at most {LONGEST} bytes")]
+    if not path.parent.is_dir():
+        return [ConfigMistake(key, str(path), "a path in a folder that exists")]
+    return []

@@ -56,10 +56,20 @@ class ConsoleOptions:
 
 async def run_console(options: ConsoleOptions, stop: asyncio.Event) -> None:
     """Serve until `stop` is set. Raises TandemError where address, keys or link do not allow it."""
-    await until_stopped(stop, _run(options))
+    tls = _tls(options.config)
+    with _listener(options.config) as listener:
+        await until_stopped(stop, _run(options, _Door(listener, tls)))
 
 
-async def _run(options: ConsoleOptions) -> None:
+@dataclass(frozen=True, slots=True)
+class _Door:
+    """Where browsers come in."""
+
+    listener: socket.socket
+    tls: ssl.SSLContext | None
+
+
+async def _run(options: ConsoleOptions, door: _Door) -> None:
     where = options.where
     whose = Whose(where.operator, masters_clock=options.tap is not None)
     models = {robot: RobotModel(robot, options.skeleton, whose) for robot in where.robots}
@@ -77,7 +87,7 @@ async def _run(options: ConsoleOptions) -> None:
                 if options.tap is not None:
                     tasks.create_task(hearing.read_tap(options.tap))
                     tasks.create_task(hearing.stand_in(where.link))
-                await _serve(options, session, hearing, stoppers, relay)
+                await _serve(options, door, session, hearing, stoppers, relay)
         finally:
             for stopper in stoppers.values():
                 await stopper.close()
@@ -87,15 +97,15 @@ async def _run(options: ConsoleOptions) -> None:
 
 async def _serve(
     options: ConsoleOptions,
+    door: _Door,
     session: LinkSession,
     hearing: Hearing,
     stoppers: Mapping[str, RobotStopper],
     relay: DeadmanRelay | None,
 ) -> None:
     config = options.config
-    tls = _tls(config)
-    listener = _listener(config)
-    port = listener.getsockname()[1]
+    tls = door.tls
+    port = door.listener.getsockname()[1]
     access = Access(_names(config, port), tls is not None, stranger(config.on_this_host_only))
     models = hearing.models
     hub = Hub(models, access, stoppers, relay, losing_page_stops=config.losing_page == "stop")
@@ -113,7 +123,7 @@ async def _serve(
     runner = web.AppRunner(app.make(), access_log=None, shutdown_timeout=1.0, handle_signals=False)
     await runner.setup()
     try:
-        await web.SockSite(runner, listener, ssl_context=tls).start()
+        await web.SockSite(runner, door.listener, ssl_context=tls).start()
         options.on_ready(f"console: {address} (without a token it only shows, and stops)")
         for role in (PageRole.OPERATOR, PageRole.ENGINEER):
             offer(person_of(role, options.where.operator if role is PageRole.OPERATOR else ""))

@@ -20,6 +20,8 @@ from common.wire.version import software
 CONFIG, FILES = "master_config", "master_files"
 _NOT_READ = {"link", "tap", "recording", "process", "alarms", "console"}
 """Sections that the pipeline does not read."""
+SOCKET = "socket"
+"""The key of a socket's path, in any section."""
 ENCODING = "latin-1"
 """Each byte is one character: a DBC file may be in any encoding."""
 
@@ -77,7 +79,8 @@ def _embedded(value: object, files: dict[str, str]) -> object:
         files[name] = value.read_bytes().decode(ENCODING)
         return name
     if isinstance(value, Mapping):
-        return {key: _embedded(part, files) for key, part in value.items()}
+        # a socket has no content, and the pipeline does not read it
+        return {key: str(part) if key == SOCKET else _embedded(part, files) for key, part in value.items()}
     if isinstance(value, list | tuple):
         return [_embedded(part, files) for part in value]
     return value

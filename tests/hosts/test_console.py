@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import signal
+import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -49,6 +51,35 @@ class Browser:
 
     async def page(self) -> OpenedPage:
         return OpenedPage(await self.http.ws_connect(f"{self.url}/ws", headers=self._origin, max_msg_size=0))
+
+
+class Hold:
+    """A page that holds the deadman: beats as a browser sends them, with what it saw last."""
+
+    def __init__(self, page: OpenedPage) -> None:
+        self.page = page
+        self.down = False
+        self.beat_ns = 0
+        """When the newest beat left that said it is held."""
+        self._seen = 0
+        self._tasks = [asyncio.create_task(self._see()), asyncio.create_task(self._beat())]
+
+    async def _see(self) -> None:
+        while True:
+            self._seen = (await self.page.hear("view"))["n"]
+
+    async def _beat(self) -> None:
+        while True:
+            if self.down:
+                self.beat_ns = monotonic_ns()
+                await self.page.say(kind="held", n=self._seen, down=True)
+            await asyncio.sleep(0.05)
+
+    async def end(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self.page.socket.close()
 
 
 @asynccontextmanager
@@ -135,5 +166,58 @@ def test_a_stop_from_the_page_stops_the_robot_by_its_encoders(
             if master == "dead":
                 assert (view["heard"], view["situation"], view["master"]) == ("link", "stopped", False)
             console.child.check()
+
+    on_this_host(story)
+
+
+@pytest.mark.parametrize("how", ["lets go", "console stands still"])
+def test_a_page_that_holds_the_deadman_ends_it_by_letting_go_and_by_silence(
+    how: str, on_this_host: OnThisHost
+) -> None:
+    async def story(_: HostWatch) -> None:
+        # a short path: a socket's has at most 107 bytes
+        folder = Path(tempfile.mkdtemp(prefix="tandem-"))
+        held = f'operator.deadman={{source="console",socket="{folder / "deadman.sock"}"}}'
+        given = {"master": [f'tap.socket="{folder / "master.sock"}"', held]}
+        async with (
+            open_rig(overrides=given) as rig,
+            aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as http,
+        ):
+            console, holds = ConsoleChild(rig), list[Hold]()
+
+            async def start(name: str) -> None:
+                await rig.start(name)
+                if name != "master":
+                    return
+                await console.start()
+                browser = Browser(http, console.address)
+                await browser.log_in(console.operator_address)
+                holds.append(Hold(await browser.page()))
+                await rig.until(lambda: rig.observer.command is not None, 30.0, "command")
+                assert rig.observer.command is not None
+                assert not rig.observer.command.deadman_held
+                holds[0].down = True
+
+            await start_all(rig, start=start)
+            (hold,) = holds
+            await engaged_by_the_page(rig, Browser(http, console.address))
+            before = len(rig.observer.guard_changes)
+            rig.observer.recording = True
+            if how == "lets go":
+                hold.down = False
+                released_ns = monotonic_ns()
+                await hold.page.say(kind="held", down=False)
+            else:
+                console.child.send(signal.SIGSTOP)
+                released_ns = hold.beat_ns
+            await rig.until(lambda: rig.observer.guard == "hold", 5.0, "hold")
+            change = rig.observer.guard_changes[before]
+            told_s = to_s(change.at_ns - released_ns)
+            print(f"\n{how}: released → hold in the robot's state {1e3 * told_s:.0f} ms")  # noqa: T201
+            console.child.send(signal.SIGCONT)
+            await hold.end()
+            assert "deadman" in change.reason
+            # the newest beats may have waited in the console that was stopped
+            assert 0.0 < told_s <= (0.1 if how == "lets go" else 0.45)
 
     on_this_host(story)

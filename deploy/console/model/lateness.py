@@ -9,6 +9,7 @@ from statistics import median
 from common.clock import NS_PER_S, to_ms, to_s
 from common.latency.one_way import master_offset, one_way_ns, round_trip_ns
 from common.wire.messages import Command, RobotState
+from deploy.console.model.creep import CreepWatch
 from deploy.console.model.values import ms
 
 _REMEMBERED = 64
@@ -39,6 +40,7 @@ class LatenessLog:
         self.newest: CommandLateness | None = None
         self.newest_ns = 0
         """When it was told."""
+        self.creep = CreepWatch()
         self._sampled: dict[tuple[int, int], int] = {}
         self._echoed = 0, 0
         self._second = 0
@@ -98,5 +100,6 @@ class LatenessLog:
             bounds = [bound for _, bound in self._in_second if bound is not None]
             value = round(median(value for value, _ in self._in_second), 2)
             self._seconds.append((self._second, value, max(bounds, default=None)))
+            self.creep.add(self._second, value)
             self._in_second = []
         self._second = second

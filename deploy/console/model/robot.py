@@ -65,6 +65,7 @@ class RobotModel:
         self._command_ns = 0
         self._said: tuple[str, str] = "", ""
         self._was_silent = True
+        self._creeps = False
 
     def on_state(self, state: RobotState, arrived_ns: int, source: str) -> None:
         """A state came, from the tap or from the link."""
@@ -127,6 +128,7 @@ class RobotModel:
         if silent and not self._was_silent:
             self._was_silent = True
             self.events.add("link", "the robot is not heard", now_ns)
+        self._look_for_creep(now_ns)
         out: dict[str, object] = {
             "robot": self.robot,
             "heard": "none" if silent else self._source,
@@ -158,12 +160,14 @@ class RobotModel:
         efforts = None if state is None or state.effort_nm is None else rounded(state.effort_nm, digits=2)
         base = None if state is None else state.base
         fresh = command is not None and self.master_heard(now_ns)
+        creep = self.lateness.creep.look(now_ns)
         shown = self.figures.shown(now_ns)
         return {
             "robot": self.robot,
             "latency": {
                 "minute": self.lateness.seconds(now_ns),
                 "stages": self.figures.stages(),
+                "creep": None if creep is None else creep.shown(),
             },
             "effort_nm": efforts,
             "faults": {} if state is None else state.faults,
@@ -172,6 +176,13 @@ class RobotModel:
             "base": None if base is None else {"tilt_deg": round(float(base.tilt_rad) * 57.29578, 2)},
             **shown,
         }
+
+    def _look_for_creep(self, now_ns: int) -> None:
+        creep = self.lateness.creep.look(now_ns)
+        creeps = creep is not None and creep.alarm
+        if creep is not None and creeps and not self._creeps:
+            self.events.add("alarm", creep.words, now_ns)
+        self._creeps = creeps
 
     def _light(self, state: RobotState, now_ns: int) -> None:
         """The lights of the stop that is under way."""

@@ -38,6 +38,14 @@ def test_each_source_can_be_written() -> None:
             r"operator\.deadman\.socket = \(not set\)",
         ),
         (
+            ['operator.deadman={source="console",socket="/nowhere/deadman.sock"}'],
+            r"operator\.deadman\.socket = .*a path in a folder that exists",
+        ),
+        (
+            [f'operator.deadman={{source="console",socket="/tmp/{"x" * 100}"}}'],
+            r"operator\.deadman\.socket = .*a path of at most 100 bytes",
+        ),
+        (
             ['operator.deadman.source="wish"'],
             r"operator\.deadman\.source = 'wish': expected 'always_held', 'pedal', 'can'",
         ),

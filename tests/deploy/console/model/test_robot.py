@@ -227,3 +227,18 @@ def test_the_masters_figures_reach_the_page_and_grow_old() -> None:
     old = facts(robot, 4.1)
     assert old["switches"] == {}
     assert {n["level"] for n in old["nodes"]} == {"unknown"}
+
+
+def test_a_latency_that_creeps_is_an_alarm_once_long_before_a_hold() -> None:
+    robot = model()
+    for second in range(700):
+        put_s, late_s = 10.0 + second, 0.04 + 0.00002 * second
+        told = state(second, at_s=put_s + late_s, echo=echo(second, put_s, put_s + late_s, put_s + late_s))
+        robot.on_state(told, to_ns(put_s + 0.1), TAP)
+        view(robot, put_s + 0.1)
+    shown = facts(robot, put_s + 0.1)
+    assert shown["latency"]["creep"]["alarm"] is True
+    assert shown["latency"]["creep"]["ms_per_min"] == pytest.approx(1.2)
+    alarms = [event for event in shown["events"] if event["what"] == "alarm"]
+    assert len(alarms) == 1
+    assert "12 ms in ten minutes" in alarms[0]["text"]

@@ -1,0 +1,153 @@
+"""How the console starts: where it may listen, with which keys, and what it refuses before it serves."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import ssl
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import aiohttp
+import pytest
+
+from common.config.console import ConsoleConfig
+from common.config.load import check_config
+from common.errors import ConfigError, TandemError
+from common.link.config import LinkConfig
+from common.link.roles import Role
+from deploy.certificates.folder import stem, write_pair
+from deploy.certificates.make import new_authority, new_identity
+from deploy.client.destination import Destination
+from deploy.console.options import ConsoleChoices, console_options
+from deploy.console.run import ConsoleOptions, run_console
+from deploy.examples.profiles import example
+from deploy.harness.endpoints import free_port
+from tests.deploy.console.robots import OPERATOR, ROBOT, SKELETON
+
+
+def config(**keys: object) -> ConsoleConfig:
+    return check_config(Path("test.toml"), keys, ConsoleConfig)
+
+
+@pytest.mark.parametrize("listen", ["127.0.0.1:8080", "localhost:0", "[::1]:8080", "127.5.0.1:1"])
+def test_on_this_host_it_needs_no_keys(listen: str) -> None:
+    assert config(listen=listen).on_this_host_only
+
+
+@pytest.mark.parametrize("listen", ["0.0.0.0:8080", "192.168.7.3:8080", "[::]:8080"])
+def test_where_others_reach_it_it_needs_keys(listen: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="certificate"):
+        config(listen=listen)
+    assert not config(listen=listen, certificate=str(tmp_path / "console.pem")).on_this_host_only
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("listen", "8080"),
+        ("listen", "host:port"),
+        ("listen", "1.2.3.4:99999"),
+        ("names", ["a b"]),
+        ("port", 80),
+    ],
+)
+def test_what_is_no_address_is_a_mistake_of_the_file(key: str, value: object) -> None:
+    with pytest.raises(ConfigError, match=key):
+        config(**{key: value})
+
+
+def options(chosen: ConsoleConfig, said: list[str]) -> ConsoleOptions:
+    link = LinkConfig(listen=[f"tcp/127.0.0.1:{free_port('tcp')}"])
+    return ConsoleOptions(Destination(link, (ROBOT,), OPERATOR), SKELETON, chosen, on_ready=said.append)
+
+
+async def address(said: list[str], of: str) -> str:
+    """What it printed for a role, once it serves."""
+    async with asyncio.timeout(20.0):
+        while not (found := [line for line in said if line.startswith(of)]):  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+    return found[-1].removeprefix(of).split()[0]
+
+
+def test_it_prints_addresses_serves_and_ends() -> None:
+    async def story() -> None:
+        said: list[str] = []
+        stop = asyncio.Event()
+        running = asyncio.create_task(run_console(options(config(listen="127.0.0.1:0"), said), stop))
+        page = await address(said, "operator: ")
+        url, _, token = page.partition("/#token=")
+        async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as http:
+            async with http.get(f"{url}/api/setup") as response:
+                setup = await response.json()
+            assert (setup["robot"], setup["zones_known"], setup["deadman"]) == (ROBOT, False, None)
+            sent = {"json": {"token": token}, "headers": {"Origin": url}}
+            async with http.post(f"{url}/api/login", **sent) as response:  # type: ignore[arg-type]  # as keywords
+                assert response.status == 200
+        newer = await address(said, "operator: ")
+        assert newer != page, "the next token is printed once this one is used"
+        stop.set()
+        await running
+
+    asyncio.run(story())
+
+
+def test_beyond_this_host_it_serves_https_with_the_keys_of_tandem_keys(tmp_path: Path) -> None:
+    now, valid = datetime.now(UTC), timedelta(days=1)
+    authority = new_authority("test", now, valid)
+    write_pair(tmp_path, "ca", authority)
+    name = stem(Role.OPERATOR, "ward-3")
+    write_pair(tmp_path, name, new_identity(authority, Role.OPERATOR, "ward-3", ["127.0.0.1"], now, valid))
+
+    async def story() -> None:
+        said: list[str] = []
+        stop = asyncio.Event()
+        chosen = config(listen="0.0.0.0:0", names=["127.0.0.1"], certificate=str(tmp_path / f"{name}.pem"))
+        running = asyncio.create_task(run_console(options(chosen, said), stop))
+        url = (await address(said, "console: ")).rstrip("/")
+        assert url.startswith("https://127.0.0.1:")
+        trusted = ssl.create_default_context(cafile=str(tmp_path / "ca.pem"))
+        async with aiohttp.ClientSession(connector=aiohttp.TCPConnector(ssl=trusted)) as http:
+            async with http.get(url) as response:
+                assert response.status == 200
+            async with http.get(f"{url}/api/setup") as response:
+                assert response.status == 401, "the patient's home is for those who log in"
+        stop.set()
+        await running
+
+    asyncio.run(story())
+
+
+def test_a_port_that_is_taken_and_keys_that_are_not_there_are_said(tmp_path: Path) -> None:
+    async def story(chosen: ConsoleConfig) -> None:
+        await run_console(options(chosen, []), asyncio.Event())
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(TandemError, match="cannot listen there"):
+            asyncio.run(story(config(listen=f"127.0.0.1:{port}")))
+    with pytest.raises(TandemError, match="no HTTPS"):
+        asyncio.run(story(config(certificate=str(tmp_path / "none.pem"))))
+
+
+def test_what_the_command_line_leaves_out_comes_from_the_masters_file(tmp_path: Path) -> None:
+    chosen = ConsoleChoices(
+        master=example("master"),
+        listen="127.0.0.1:0",
+        slave=example("slave"),
+        overrides=[
+            f'tap.socket="{tmp_path / "tap.sock"}"',
+            f'operator.deadman={{source="console",socket="{tmp_path / "deadman.sock"}"}}',
+            'console.language="zh"',
+        ],
+    )
+    found = console_options(chosen, lambda _: None)
+    assert found.where.robots == ("robot-1",)
+    assert found.tap == tmp_path / "tap.sock"
+    assert (found.deadman, found.deadman_socket) == ("console", tmp_path / "deadman.sock")
+    assert (found.config.language, found.config.port) == ("zh", 0)
+    assert found.zones is not None
+    with pytest.raises(TandemError, match="which robot"):
+        console_options(ConsoleChoices(connect=["tcp/127.0.0.1:7447"]), lambda _: None)
