@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -15,8 +16,10 @@ from rich.console import Console
 from common.clock import to_ns
 from common.config.load import load_config
 from common.errors import TandemError
+from common.process.runtime import run as run_until_stopped
 from common.wire.version import software
 from deploy.ops.replay.comparison import ReplayFindings, compare
+from deploy.ops.replay.played import PlayedMotion, motion_of
 from deploy.recorded.files import begun_ns, entries_of, head_of, snapshot_ns
 from deploy.recorded.recompute import Replay
 from deploy.recorded.recorded_config import recorded_config
@@ -48,6 +51,16 @@ def replay(
     from_s: Annotated[
         float, typer.Option("--from", help="Begin this many seconds after the recording did.", min=0.0)
     ] = 0.0,
+    robot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Play the motion to a simulated robot: the slave's file. Its process is started, engaged.",
+            dir_okay=False,
+        ),
+    ] = None,
+    speed: Annotated[
+        float, typer.Option(help="With --robot: times the recording's own speed.", min=0.1, max=4.0)
+    ] = 1.0,
     as_json: AsJson = False,
 ) -> None:
     """Compute a recording again from the sensors' frames, and compare the joint angles with those recorded.
@@ -55,7 +68,11 @@ def replay(
     With the recorded configuration they are identical to the last bit, whatever second it begins at. With
     --config, --filter or --set the filters learn anew, and the differences are shown by joint.
 
+    --robot plays the motion to a simulated robot, live. Real drives are refused.
+
     To see what another filter makes of it: `tandem replay morning.mcap --filter ekf`
+
+    To see how a robot would have followed: `tandem replay morning.mcap --robot slave.toml --speed 0.5`
 
     Example: `tandem replay morning.mcap --check`
     """
@@ -71,7 +88,14 @@ def replay(
         with Console(stderr=True).status("computing"):
             begin_ns = begun_ns(files[0]) + to_ns(from_s)
             pairs = run.pairs(entries_of(files, snapshot_ns(files, begin_ns)))
-            result = compare(run, (pair for pair in pairs if pair.recorded.sampled_ns >= begin_ns))
+            wanted = (pair for pair in pairs if pair.recorded.sampled_ns >= begin_ns)
+            if robot is not None:
+                motion = motion_of(pair.computed for pair in wanted)
+            else:
+                result = compare(run, wanted)
+    if robot is not None:
+        _play(motion, robot, speed, as_json=as_json)
+        return
     if not result.postures:
         raise TandemError(
             f"{files[0]}: nothing could be computed: {result.skipped} postures are recorded, and no snapshot "
@@ -112,3 +136,29 @@ def _print(result: ReplayFindings, metadata: Mapping[str, str]) -> None:
     for name in sorted(result.worst_deg, key=result.worst_deg.__getitem__, reverse=True)[:MOST_JOINTS]:
         table.add_row(name, f"{result.rms_deg[name]:.3g}", f"{result.worst_deg[name]:.3g}")
     console.print(table)
+
+
+def _play(motion: PlayedMotion, robot: Path, speed: float, *, as_json: bool) -> None:
+    from deploy.ops.replay.onto_robot import play, simulated
+
+    simulated(robot)  # said at once
+    console = Console(stderr=True)
+
+    async def work(stop: asyncio.Event) -> None:
+        with console.status("starting the robot") as status:
+            found = await play(motion, robot, speed, stop, status.update)
+        if as_json:
+            typer.echo(json.dumps(asdict(found), indent=2))
+            return
+        worst = sorted(found.rms_deg, key=found.rms_deg.__getitem__, reverse=True)[:MOST_JOINTS]
+        typer.echo(
+            f"{found.seconds:.1f} s at {speed:g} x: the robot followed {100 * found.followed:.0f} % of it"
+        )
+        for hold in found.holds:
+            typer.echo(f"stopped following: {hold}")
+        table = plain_table("joint", "RMS off the recording °")
+        for name in worst:
+            table.add_row(name, f"{found.rms_deg[name]:.2f}")
+        Console().print(table)
+
+    run_until_stopped(work)
