@@ -14,6 +14,8 @@ from deploy.console.model.nodes import NodeWatch
 
 SILENT_NS = 3 * NS_PER_S
 """Older figures are not shown."""
+AGAIN_NS = 10 * NS_PER_S
+"""A limit that is met again within this is no new event."""
 GOOD_PERCENT, FAIR_PERCENT = 1.0, 5.0
 """Up to so many commands missing the link is good, or fair."""
 
@@ -28,6 +30,8 @@ class RobotFigures:
         self._master_ns = 0
         self._robot: SlaveMetrics | None = None
         self._robot_ns = 0
+        self._clamped_ns: dict[str, int] = {}
+        """By rule, when a limit was met last."""
         self._missing_percent: float | None = None
         self._lost_percent: float | None = None
 
@@ -43,8 +47,10 @@ class RobotFigures:
         if before is None or before.instance != metrics.instance:
             self._missing_percent = self._lost_percent = None
             return
-        for rule, count in _grown(before.guard.clamps, metrics.guard.clamps).items():
-            self._events.add("clamp", f"limited by {rule}, {count} times", now_ns)
+        for rule in _grown(before.guard.clamps, metrics.guard.clamps):
+            if now_ns - self._clamped_ns.get(rule, -AGAIN_NS) >= AGAIN_NS:
+                self._events.add("clamp", f"the motion is limited: {rule}", now_ns)
+            self._clamped_ns[rule] = now_ns
         for what, count in _grown(before.guard.losses, metrics.guard.losses).items():
             self._events.add("loss", f"lost: {what}" + f", {count} times" * (count > 1), now_ns)
         due = metrics.due.expected - before.due.expected
@@ -52,6 +58,11 @@ class RobotFigures:
         arrived = metrics.commands.arrived - before.commands.arrived
         lost = metrics.commands.lost - before.commands.lost
         self._lost_percent = 100.0 * lost / (arrived + lost) if arrived + lost > 0 else None
+
+    @property
+    def has_camera(self) -> bool:
+        """Whether the robot says that it has a camera."""
+        return self._robot is not None and self._robot.video is not None
 
     def stages(self) -> list[dict[str, object]]:
         """The latency budget: the master's own stages are those of the robot's table where there are any."""

@@ -65,7 +65,7 @@ class LatenessLog:
         offset = master_offset(state)
         sampled_ns = self._sampled.pop(self._echoed, None)
         whole = None
-        if sampled_ns is not None and offset.trusted:
+        if sampled_ns is not None and offset.trusted and echo.written_ns >= echo.received_ns:
             whole = offset.remote_ns(echo.written_ns) - sampled_ns
         self.newest = CommandLateness(
             echo.sequence,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 SOUND_PERCENT = 99.0
 """A node that answered less of the last second's windows needs attention."""
+_WORSE = {"unknown": 0, "ok": 1, "attention": 2, "silent": 3}
 _WINDOWS = ("fresh", "late", "lost")
 _TROUBLES = {
     "bad_checksum": "{} frames with a wrong checksum",
@@ -39,10 +40,12 @@ class NodeWatch:
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names
         self._before: Mapping[str, Mapping[str, int]] | None = None
+        self._told: set[str] = set()
+        """Nodes of which it was told that they need attention."""
         self.qualities: list[NodeQuality] = [NodeQuality(name, "unknown", None, 0, "") for name in names]
 
     def on_counters(self, nodes: Mapping[str, Mapping[str, int]], doubts: Mapping[str, str]) -> list[str]:
-        """Counters since the start, by node. Returns a line for each node whose level became worse or better.
+        """Counters since the start, by node. Returns a line for each node that became worse, or well again.
 
         A master that started anew counts from 0: its first second is then compared with nothing.
         """
@@ -54,11 +57,18 @@ class NodeWatch:
             _judge(name, nodes.get(name, {}), before.get(name, {}), doubts.get(name, ""))
             for name in self._names
         ]
-        return [
-            f"{quality.name}: {quality.words or 'answers as it should'}"
-            for quality in self.qualities
-            if quality.level != old[quality.name] and "unknown" not in (old[quality.name], quality.level)
-        ]
+        return [line for quality in self.qualities if (line := self._line(quality, old[quality.name]))]
+
+    def _line(self, quality: NodeQuality, before: str) -> str:
+        """What is new, in words; empty where nothing is. How a node begins is no news."""
+        name = quality.name
+        if quality.level == "ok" and name in self._told:
+            self._told.discard(name)
+            return f"{name}: answers as it should"
+        if _WORSE[quality.level] > max(_WORSE[before], _WORSE["ok"]) and before != "unknown":
+            self._told.add(name)
+            return f"{name}: {quality.words}"
+        return ""
 
     def forget(self) -> None:
         """Nothing is heard of the nodes any more."""

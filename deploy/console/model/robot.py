@@ -27,6 +27,7 @@ SILENT_S = 0.5
 """Without a state for so long this console does not know what the robot does."""
 COMMAND_SILENT_S = 1.0
 LATENESS_SILENT_NS = 2 * NS_PER_S
+CAMERA = "head"
 TAP, LINK = "tap", "link"
 """Whence a state came: from the master on this host, or from the robot itself."""
 _SITUATIONS = {
@@ -97,8 +98,11 @@ class RobotModel:
         self.figures.on_robot(metrics, now_ns)
 
     def asked_to_stop(self, number: int, by: str, now_ns: int) -> StopShown:
-        """Somebody asked for a stop: the page shows what comes of it. One under way goes on."""
-        if self.stop is None or self.stop.robot_ns is not None or self.stop.failed:
+        """Somebody asked for a stop: the page shows what comes of it.
+
+        Until the robot leaves the stop it stays the same one, unless nobody knows what became of it.
+        """
+        if self.stop is None or self.stop.failed:
             self.stop = StopShown(number, by, now_ns)
             self.events.add("stop", f"{by} asked to stop the robot", now_ns)
         return self.stop
@@ -136,7 +140,7 @@ class RobotModel:
             "master": self.master_heard(now_ns),
             "stop": None if self.stop is None else self.stop.shown(now_ns),
             "latency": self._latency(now_ns),
-            "video": self.pictures.shown(self.offset(now_ns), now_ns),
+            "video": self._video(now_ns),
             **self._commanded(now_ns),
         }
         if state is not None:
@@ -177,6 +181,13 @@ class RobotModel:
             **shown,
         }
 
+    def _video(self, now_ns: int) -> dict[str, dict[str, object]]:
+        """A camera from which nothing came is shown too, by the name that it usually has."""
+        shown = self.pictures.shown(self.offset(now_ns), now_ns)
+        if shown or not self.figures.has_camera:
+            return shown
+        return {CAMERA: {"age_ms": None, "bound_ms": None, "fps": 0.0, "stale": True}}
+
     def _look_for_creep(self, now_ns: int) -> None:
         creep = self.lateness.creep.look(now_ns)
         creeps = creep is not None and creep.alarm
@@ -187,12 +198,14 @@ class RobotModel:
     def _light(self, state: RobotState, now_ns: int) -> None:
         """The lights of the stop that is under way."""
         stop = self.stop
-        if stop is None:
+        if stop is None or now_ns < stop.asked_ns:
             return
         if state.guard != STOPPED:
-            if stop.robot_ns is not None:
-                self.stop = None  # it was reset
+            # a state may have left before the stop came; after one that said "stopped" it means a reset
+            if stop.in_state:
+                self.stop = None
             return
+        stop.in_state = True
         if stop.robot_ns is None:
             stop.robot_ns, stop.failed = now_ns, ""
         if not stop.text:

@@ -18,6 +18,8 @@ class StopShown:
     """When the robot had acknowledged, or a state of it said that it is stopped."""
     stands_ns: int | None = None
     """When its encoders stood, after that."""
+    in_state: bool = False
+    """Whether a state of the robot said since the asking that it is stopped."""
     text: str = ""
     failed: str = ""
     """Why nobody knows that it stopped, in words."""

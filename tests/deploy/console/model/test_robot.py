@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from common.clock import to_ns
-from common.metrics.slave import DueMetrics
+from common.metrics.slave import CameraMetrics, DueMetrics
 from deploy.console.model.robot import LINK, SILENT_S, TAP, RobotModel
 from deploy.console.viewers import pack
 from tests.deploy.console.robots import BOUND_NS, JPEG, J, command, echo, frame, heard, model, state
-from tests.published import guard_metrics, master_metrics, slave_metrics
+from tests.published import NOTHING, guard_metrics, master_metrics, slave_metrics
+
+CAMERA = CameraMetrics(0, 0.0, 0.0, 0.0, 0, 0.0, 0, 0, 0, NOTHING, NOTHING, NOTHING, "no OpenGL")
 
 
 def view(of: RobotModel, at_s: float) -> dict[str, Any]:
@@ -180,12 +183,54 @@ def test_a_robot_that_moves_on_is_never_said_to_stand() -> None:
     assert view(robot, 3.0)["stop"]["stands_s"] is None
 
 
-def test_a_second_stop_of_a_stopped_robot_is_asked_anew() -> None:
+def test_a_robot_that_is_stopped_has_one_stop_until_it_is_reset() -> None:
     robot = heard(1.0)
     first = robot.asked_to_stop(1, "nurse-1", to_ns(1.0))
     assert robot.asked_to_stop(2, "somebody", to_ns(1.1)) is first, "the same stop, under way"
     robot.on_state(state(2, at_s=1.2, guard="estop"), to_ns(1.2), TAP)
-    assert robot.asked_to_stop(3, "somebody", to_ns(1.3)) is not first
+    assert robot.asked_to_stop(3, "somebody", to_ns(1.3)) is first
+    assert view(robot, 1.4)["stop"]["robot_s"] == pytest.approx(0.2)
+    robot.on_state(state(3, at_s=1.5, guard="hold"), to_ns(1.5), TAP)
+    assert robot.asked_to_stop(4, "somebody", to_ns(1.6)) is not first
+    failed = robot.asked_to_stop(5, "somebody", to_ns(1.7))
+    failed.failed = "no answer"
+    assert robot.asked_to_stop(6, "somebody", to_ns(1.8)) is not failed
+
+
+def test_a_state_that_left_before_the_stop_ends_none() -> None:
+    robot = heard(1.0)
+    stop = robot.asked_to_stop(1, "nurse-1", to_ns(1.0))
+    stop.robot_ns = to_ns(1.003)  # its answer came
+    robot.on_state(state(2, at_s=1.001), to_ns(1.004), TAP)
+    assert robot.stop is stop
+    robot.on_state(state(3, at_s=0.9, guard="estop"), to_ns(0.9), TAP)
+    assert not stop.in_state, "older than the asking"
+
+
+def test_a_command_that_was_not_written_yet_has_no_lateness() -> None:
+    robot = model()
+    robot.on_command(command(4, 201.0, 201.002), to_ns(201.002))
+    not_written = replace(echo(4, 201.002, 201.040, 201.043), written_ns=0)
+    robot.on_state(state(at_s=201.05, echo=not_written), to_ns(201.09), TAP)
+    latency = view(robot, 201.1)["latency"]
+    assert (latency["ms"], latency["one_way_ms"]) == (None, 38.0)
+
+
+def test_a_limit_that_is_met_every_second_is_one_event() -> None:
+    robot = heard(1.0)
+    for second in range(40):
+        met = second if second < 15 else 15 if second < 30 else second
+        robot.on_robot(slave_metrics(guard=guard_metrics(clamps={"velocity": met})), to_ns(1.0 + second))
+    clamps = [event for event in facts(robot, 41.0)["events"] if event["what"] == "clamp"]
+    assert [event["age_s"] for event in clamps] == [39.0, 10.0]
+
+
+def test_a_camera_from_which_nothing_came_is_shown() -> None:
+    robot = heard(1.0)
+    assert view(robot, 1.0)["video"] == {}
+    robot.on_robot(slave_metrics(video=CAMERA), to_ns(1.0))
+    assert view(robot, 1.0)["video"]["head"]["age_ms"] is None
+    assert view(robot, 1.0)["video"]["head"]["stale"]
 
 
 def test_holds_clamps_and_losses_are_events() -> None:
@@ -198,7 +243,7 @@ def test_holds_clamps_and_losses_are_events() -> None:
     events = facts(robot, 2.0)["events"]
     assert [event["what"] for event in events] == ["state", "hold", "clamp", "loss"]
     assert events[1] == {"id": 2, "age_s": 0.9, "what": "hold", "text": "hold: commands are late"}
-    assert events[2]["text"] == "limited by velocity, 3 times"
+    assert events[2]["text"] == "the motion is limited: velocity"
 
 
 @pytest.mark.parametrize(("missing", "word"), [(0, "good"), (1, "fair"), (10, "poor")])
