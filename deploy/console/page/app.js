@@ -261,8 +261,7 @@ function show() {
     $("said").textContent = `${words}. ${t(found.act, places)}`;
   }
   put($("word"), words);
-  put($("why"), found.why || t(`why.${found.id}`));
-  $("why").lang = found.why ? "en" : "";
+  showWhy(found);
   put($("todo"), t(found.act, places));
   const title = `${words} · ${robotOf() || "tandem"}`;
   if (document.title !== title) document.title = title;
@@ -272,6 +271,14 @@ function show() {
   for (const id of ["engage", "disengage", "mark"]) $(id).disabled = !may;
   $("reset").hidden = found.id === "no_contact" || seen.view?.guard !== "estop" || !seen.hello?.may?.reset;
   $("login").hidden = found.id === "no_contact" || Boolean(seen.hello?.may?.act) || !seen.hello;
+}
+
+/** The robot's own words are English: in another language, what the state means stands before them. */
+function showWhy(found) {
+  const own = chosen() === "en" && found.why ? "" : t(`why.${found.id}`, found.places);
+  const [meaning, words] = $("why").children;
+  put(meaning, own + (own && found.why ? " " : ""));
+  put(words, found.why);
 }
 
 function showBadges() {

@@ -1,6 +1,6 @@
 // The facts beside the picture and the robot: latency and its last minute, link, suit, events, joints.
 import { FILLED, picture, SHAPES } from "./state.js";
-import { nameOf, t } from "./words.js";
+import { chosen, nameOf, t } from "./words.js";
 
 const $ = (id) => document.getElementById(id);
 const NS = "http://www.w3.org/2000/svg";
@@ -185,7 +185,10 @@ export class Events {
     for (const event of events) {
       if (this.entries.has(event.id)) continue;
       const entry = make("li", "", { "data-what": event.what });
-      entry.append(make("time"), make("p", event.text, { lang: "en", title: event.text }));
+      const words = make("p", "", { title: event.text });
+      const kind = make("b", "", { "data-kind": event.what });
+      words.append(kind, make("span", event.text, { lang: "en" }));
+      entry.append(make("time"), words);
       this.entries.set(event.id, { entry, at_ms: now_ms - 1000 * event.age_s });
       this.list.prepend(entry);
     }
@@ -201,6 +204,9 @@ export class Events {
 
   tick() {
     for (const { entry, at_ms } of this.entries.values()) {
+      // the words are English: in another language, the kind of event stands before them
+      const kind = entry.querySelector("b");
+      kind.textContent = chosen() === "en" ? "" : `${t(`event.${kind.dataset.kind}`)} `;
       entry.firstChild.textContent = ago((performance.now() - at_ms) / 1000);
     }
   }

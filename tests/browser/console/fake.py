@@ -36,6 +36,7 @@ class FakeConsole:
         """Replaces keys of each `view`."""
         self.facts: dict[str, Any] = {}
         self.setup: dict[str, Any] = {}
+        self.role = "operator"
         self.may = {"stop": True, "act": True, "reset": True, "hold": True}
         self.guard, self.reason = "track", "follows nurse-1"
         self.silent = False
@@ -168,19 +169,19 @@ class FakeConsole:
     async def _send(self, socket: web.WebSocketResponse, acknowledged: dict[str, int]) -> None:
         while self.silent:  # noqa: ASYNC110 - a test sets it from another thread
             await asyncio.sleep(0.04)
-        who = {"role": "operator", "person": "nurse-1", "may": self.may, "session": "0badcafe"}
+        who = {"role": self.role, "person": "nurse-1", "may": self.may, "session": "0badcafe"}
         await socket.send_json({"kind": "hello", "robot": "robot-1", "viewers": len(self._sockets), **who})
-        n, turn = 0, 0
+        n, turn, facts_turn = 0, 0, 0
         while True:
             await asyncio.sleep(0.04)
             turn += 1
             self.most_unacknowledged = max(self.most_unacknowledged, n - acknowledged["n"])
-            if self.silent or n - acknowledged["n"] >= WINDOW:
+            if self.silent or self.role == "nobody" or n - acknowledged["n"] >= WINDOW:
                 continue
             n += 1
             await socket.send_json(self._view(n))
-            if turn % 25 == 1:
-                n += 1
+            if turn >= facts_turn:
+                n, facts_turn = n + 1, turn + 25
                 await socket.send_json(self._facts(n))
             if turn % 2 and self.pictures:
                 n += 1

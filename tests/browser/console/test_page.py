@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import pytest
@@ -179,7 +180,7 @@ def test_markup_from_the_robot_is_text(page: Any, fake: FakeConsole) -> None:
     until(page, lambda: page.inner_text("#why") == evil)
     until(page, lambda: evil in page.inner_text("#events"))
     assert page.locator("img").count() == 0
-    assert page.locator("#events b").count() == 0
+    assert page.locator("#events p b", has_text="bold").count() == 0
 
 
 def test_a_page_that_stood_still_does_not_replay_the_past(page: Any, fake: FakeConsole) -> None:
@@ -197,3 +198,64 @@ def test_a_replay_is_striped_and_cannot_stop(page: Any, fake: FakeConsole) -> No
     page.wait_for_timeout(200)
     assert fake.of_kind("stop") == []
     assert "REPLAY" in page.inner_text("#badges")
+
+
+def test_in_chinese_the_robots_words_are_introduced(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows")
+    page.keyboard.press("F7")
+    until(page, lambda: page.inner_text("#why") == "机器人跟随操作者。 follows nurse-1")
+    assert page.inner_text("#events li:first-child p").startswith("保持")
+
+
+def test_without_a_log_in_it_shows_nothing_and_stops(page: Any, fake: FakeConsole) -> None:
+    fake.role, fake.may = "nobody", {"stop": True, "act": False, "reset": False, "hold": False}
+    page.reload()
+    until(page, lambda: state(page) == "locked")
+    page.wait_for_timeout(2500)
+    assert state(page) == "locked"
+    assert not page.is_visible("#home h2")
+    page.keyboard.press("Escape")
+    until(page, lambda: bool(fake.of_kind("stop")))
+    page.click("#login")
+    page.fill("#sheet-field", "secret")
+    page.keyboard.press("Enter")
+    until(page, lambda: ("login", {"token": "secret"}) in fake.posted)
+
+
+def test_the_token_in_the_address_is_used_once_and_removed(page: Any, fake: FakeConsole) -> None:
+    page.goto(f"{fake.address}/#token=abc")
+    page.reload()
+    until(page, lambda: ("login", {"token": "abc"}) in fake.posted)
+    until(page, lambda: "token" not in page.url)
+
+
+def test_reset_asks_for_the_key_and_esc_still_stops(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows")
+    page.keyboard.press("Escape")
+    until(page, lambda: page.is_visible("#reset"))
+    page.click("#reset")
+    page.keyboard.type("a key")  # a blank in the key is no stop
+    stops = len(fake.of_kind("stop"))
+    page.keyboard.press("Escape")
+    until(page, lambda: len(fake.of_kind("stop")) > stops)
+    page.keyboard.press("Enter")
+    until(page, lambda: ("act", {"act": "reset", "robot": "robot-1", "key": "a key"}) in fake.posted)
+    until(page, lambda: not page.is_visible("#sheet"))
+
+
+def test_only_a_hardware_stop_says_emergency(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: page.inner_text("#stop-word") == "STOP THE ROBOT")
+    fake.setup = {"hardware_estop": True}
+    page.reload()
+    until(page, lambda: page.inner_text("#stop-word") == "EMERGENCY STOP")
+
+
+def test_a_frozen_page_shows_the_present_when_it_goes_on(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows")
+    devtools = page.context.new_cdp_session(page)
+    devtools.send("Page.setWebLifecycleState", {"state": "frozen"})
+    time.sleep(2.0)
+    fake.guard, fake.reason = "hold", "nobody has engaged"
+    devtools.send("Page.setWebLifecycleState", {"state": "active"})
+    until(page, lambda: state(page) == "holds")
+    assert fake.most_unacknowledged <= 10

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
 import re
@@ -65,3 +66,9 @@ def test_the_libraries_are_what_their_sums_say() -> None:
         digest, name = line.split()
         assert hashlib.sha256((CONSOLE / "vendor" / name).read_bytes()).hexdigest() == digest
         assert (CONSOLE / "vendor" / f"{name.split('.')[0]}.LICENSE").is_file()
+
+
+def test_the_whole_page_is_small() -> None:
+    """All that a browser loads, compressed as the console sends it: 250 kB at most."""
+    files = [*PAGE.glob("*"), *(CONSOLE / "vendor").glob("*.js"), *(CONSOLE / "vendor").glob("*.css")]
+    assert sum(len(gzip.compress(path.read_bytes(), 6)) for path in files) < 250_000
