@@ -13,10 +13,10 @@ STILL_S = 5.0
 @pytest.fixture(scope="module")
 def stood_still() -> VirtualWorld:
     run = engaged(WorldSettings())
-    run.run(20.0)
+    run.run(6.0)
     assert run.slave.traffic.due.metrics().missing == 0
     run.stand_still(STILL_S)
-    run.run(10.0)
+    run.run(4.0)
     return run
 
 

@@ -38,11 +38,11 @@ def test_once_the_node_is_mended_the_robot_can_be_engaged() -> None:
 
 
 def test_who_is_engaged_goes_on_with_every_other_joint() -> None:
-    run = VirtualWorld(lying("frozen", 40.0))
+    run = VirtualWorld(lying("frozen", 15.0))
     run.run(6.0)
     assert run.ask(Action.ENGAGE).done
     run.run(20.0, until=lambda: run.slave.guard.state == "track")
-    run.run(41.0 - 1e-9 * run.now_ns + 1.0)
+    run.run(16.0 - 1e-9 * run.now_ns + 1.0)
     names = run.slave_config.skeleton.joint_names
     invalid = {name for name, valid in zip(names, run.commands[-1].valid, strict=True) if not valid}
     assert invalid == HELD
