@@ -130,7 +130,7 @@ class DistanceDamper:
         model = self._model
         aim_m_s, wish_m_s = model.levers_m @ np.abs(step.aim_rad_s), model.levers_m @ np.abs(step.wish_rad_s)
         # what neither can bring together in τ need not be found
-        fastest_m_s = max(float(aim_m_s.max()), float(wish_m_s.max()))
+        fastest_m_s = max(float(aim_m_s.max(initial=0.0)), float(wish_m_s.max(initial=0.0)))
         near = model.near(step.position_rad, TIME_CONSTANT_S * fastest_m_s + SKIN_M)
         kind, margin_m = model.kind.take(near.pair), self._margin_m.take(near.pair)
         # what stands inside a margin already may not come nearer than it is
