@@ -69,4 +69,20 @@ StopAfter = Annotated[
     float | None,
     typer.Option("--seconds", help="Stop after this many seconds; without it, stop with Ctrl-C.", min=0.1),
 ]
+
+
+def _where_it_lies(profile: str) -> str:
+    """A profile of one's own by its full path, so that it is found from every folder."""
+    path = Path(profile)
+    return str(path.resolve()) if path.exists() else profile
+
+
+WhichRobot = Annotated[
+    str,
+    typer.Option(
+        "--robot-profile",
+        help="Robot profile: nursing, hand or lower_limb, or the folder of your own.",
+        callback=_where_it_lies,
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]

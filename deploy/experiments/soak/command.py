@@ -17,6 +17,7 @@ from rich.table import Table
 from common.errors import TandemError
 from common.process.runtime import run as run_until_stopped
 from common.process.runtime import until_stopped
+from deploy.report.options import WhichRobot
 
 if TYPE_CHECKING:
     from deploy.experiments.soak.files.events import AnyEvent
@@ -75,6 +76,7 @@ def soak(
     faults: FaultNames = "all",
     every: FaultInterval = None,
     seed: Seed = 1,
+    robot_profile: WhichRobot = "nursing",
     report: ReportFolder = None,
     judge: EarlierSoak = None,
 ) -> None:
@@ -98,8 +100,9 @@ def soak(
         _report(judge_soak(judge), judge, console)
         return
     options = SoakOptions(
-        seconds(duration), transport, profile, router, faults=tuple(chosen(faults)), every_s=every, seed=seed
-    )
+        seconds(duration), transport, profile, router, faults=tuple(chosen(faults)), every_s=every, seed=seed,
+        robot_profile=robot_profile,
+    )  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="tandem-soak-") as temporary:
         from deploy.experiments.soak.run import folder_for
 
@@ -156,7 +159,9 @@ async def _soak(options: SoakOptions, folder: Path, stop: asyncio.Event, console
             master = [f"link.open_timeout_s={open_timeout_s(network.profile)}"]
             slave = [*master, f"guard.max_age_s={needed_age_s(network.profile)}"]
         overrides = {"slave": slave, "master": master}
-        rigging = open_rig(options.transport, overrides, routed=options.router, network=network)
+        rigging = open_rig(
+            options.transport, overrides, options.robot_profile, routed=options.router, network=network
+        )
         rig = await stack.enter_async_context(rigging)
         log: SoakLog | None = None
         watch = Watch(rig.skeleton, lambda what: log.add(what) if log else None)

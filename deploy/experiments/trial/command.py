@@ -11,6 +11,7 @@ from rich.console import Console
 
 from common.errors import NetworkError, TandemError
 from common.process.runtime import run as run_until_stopped
+from deploy.report.options import WhichRobot
 
 if TYPE_CHECKING:
     from deploy.experiments.trial.cell.plan import TrialPlan
@@ -41,7 +42,13 @@ OutageSeconds = Annotated[
         help="Seconds of link outage after the judged time, at least 1; 0: no outage.", min=0.0, max=60.0
     ),
 ]
-Motion = Annotated[str, typer.Option(help="Motion of the simulated operator: bottle or sweep.")]
+Motion = Annotated[
+    str | None,
+    typer.Option(
+        help="Motion of the simulated operator, such as sweep; by default the robot profile's own (bottle).",
+        show_default=False,
+    ),
+]
 Seed = Annotated[
     int, typer.Option(help="Random seed for sensor errors, the network and the order of the runs.")
 ]
@@ -88,7 +95,8 @@ def trial(
     repeat: Annotated[int, typer.Option(help="Number of runs of each combination.", min=1, max=100)] = 3,
     seconds: Seconds = 20.0,
     outage: OutageSeconds = 2.0,
-    motion: Motion = "bottle",
+    motion: Motion = None,
+    robot_profile: WhichRobot = "nursing",
     seed: Seed = 1,
     router: Router = False,
     max_age: MaxAge = 0.0,
@@ -116,13 +124,22 @@ def trial(
     plan = TrialPlan(
         transports=choose("--transports", transports), profiles=networks,
         strategies=choose("--strategies", strategies), repeat=repeat, seconds=seconds,
-        outage_s=0.0 if remote else outage, robot="nursing", motion=motion, seed=seed, router=router,
+        outage_s=0.0 if remote else outage, robot=robot_profile, motion=motion or _own_motion(robot_profile),
+        seed=seed, router=router,
         max_age_s=max_age, hosts=remote or "namespaces",
     )  # fmt: skip
     if remote is None:
         _run_here(plan, report, tasks)
     else:
         _run_remote(plan, report, tasks, link)
+
+
+def _own_motion(robot_profile: str) -> str:
+    from common.config.load import load_config
+    from deploy.examples.profiles import example
+    from deploy.sim.suit.config import SuitConfig
+
+    return str(load_config(example("suit", robot_profile), SuitConfig).motion)
 
 
 @app.command()

@@ -53,6 +53,7 @@ class SoakBegun(Happening):
     every_s: float | None = None
     seed: int | None = None
     left_out: Mapping[str, str] = field(default_factory=dict)
+    robot_profile: str = "nursing"
     """Faults that cannot be brought about here, and why."""
     network: NetworkNature | None = None
 

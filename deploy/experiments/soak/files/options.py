@@ -26,6 +26,7 @@ class SoakOptions:
     every_s: float | None = None
     """Mean time between faults; None: by duration and kinds."""
     seed: int = 1
+    robot_profile: str = "nursing"
 
 
 def seconds(text: str) -> float:

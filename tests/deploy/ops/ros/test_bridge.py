@@ -11,6 +11,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 import numpy as np
+import pytest
 import zenoh
 
 import deploy.ops.ros.bridge
@@ -25,8 +26,8 @@ from common.wire.topics import COMMAND, CONTROL, STATE, STOP
 from deploy.ops.ros.bridge import BridgeOptions, bridge
 from deploy.ops.ros.publishers import KeyFormat
 from tests.deploy.ros.decoded import JointState, read
+from tests.robots.imported import imported
 
-NURSING = load_skeleton("nursing")
 WAIT_S = 30.0
 
 
@@ -36,8 +37,8 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{taken.getsockname()[1]}"
 
 
-def state(sequence: int) -> bytes:
-    valid, zeros = np.ones(25, np.bool_), np.zeros(25)
+def state(sequence: int, joints: int) -> bytes:
+    valid, zeros = np.ones(joints, np.bool_), np.zeros(joints)
     return encode(
         RobotState(
             "robot-1", sequence, sequence, sequence, "hold", "", "", valid, zeros + 0.25, zeros, None, 0, 1
@@ -57,13 +58,15 @@ def router(endpoint: str) -> zenoh.Session:
     return zenoh.open(config)
 
 
-async def until(done: Callable[[], bool], publish: Callable[[bytes], None] | None = None) -> None:
-    """Look fifty times a second, and publish a state each time."""
+async def until(
+    done: Callable[[], bool], publish: Callable[[bytes], None] | None = None, joints: int = 25
+) -> None:
+    """Look fifty times a second, and publish a state of so many joints each time."""
     for sequence in range(1, round(50 * WAIT_S)):
         if done():
             return
         if publish is not None:
-            publish(state(sequence))
+            publish(state(sequence, joints))
         await asyncio.sleep(0.02)
     raise AssertionError("it never came about")
 
@@ -75,7 +78,10 @@ def run(story: Callable[[], Coroutine[Any, Any, None]]) -> None:
     asyncio.run(bounded())
 
 
-def test_ros_hears_the_robot_and_cannot_speak_to_it() -> None:
+@pytest.mark.parametrize("own", [None, "arm_pair.xml"])
+def test_ros_hears_the_robot_and_cannot_speak_to_it(own: str | None) -> None:
+    skeleton = load_skeleton("nursing" if own is None else str(imported(own)))
+    joints_of_robot = len(skeleton.joints)
     to_robot, to_ros = free_endpoint(), free_endpoint()
     ros = router(to_ros)
     heard: list[tuple[str, bytes, bytes]] = []
@@ -91,14 +97,14 @@ def test_ros_hears_the_robot_and_cannot_speak_to_it() -> None:
         asked: list[bytes] = []
         stop = asyncio.Event()
         options = BridgeOptions(
-            LinkConfig(connect=[to_robot]), "robot-1", NURSING, LinkConfig(connect=[to_ros], mode="client")
+            LinkConfig(connect=[to_robot]), "robot-1", skeleton, LinkConfig(connect=[to_ros], mode="client")
         )
         async with open_link(LinkConfig(listen=[to_robot]), "robot-1") as robot:
             robot.subscribe(COMMAND, lambda payload, _: commands.append(payload))
             robot.answer(CONTROL, lambda payload, _: asked.append(payload) or b"")  # type: ignore[func-returns-value]
             publish = robot.publish(STATE)
             told = asyncio.create_task(bridge(options, stop, lambda _: None))
-            await until(lambda: any("joint_targets" in key for key, _, _ in heard), publish)
+            await until(lambda: any("joint_targets" in key for key, _, _ in heard), publish, joints_of_robot)
             tokens = [str(r.ok.key_expr) for r in ros.liveliness().get("@ros2_lv/**") if r.ok]
             for key in (COMMAND.of("nurse-1"), CONTROL.of("nurse-1"), STOP, STATE):
                 ros.put(key.key_for("robot-1"), b"move")
@@ -107,7 +113,7 @@ def test_ros_hears_the_robot_and_cannot_speak_to_it() -> None:
                 )
             # after what was put, another state has passed: what could pass would have
             before = len(heard)
-            await until(lambda: len(heard) >= before + 3, publish)
+            await until(lambda: len(heard) >= before + 3, publish, joints_of_robot)
             stop.set()
             sent = await told
             assert commands == []
@@ -121,7 +127,7 @@ def test_ros_hears_the_robot_and_cannot_speak_to_it() -> None:
         head, _, type_hash = key.rpartition("/")
         assert head == "0/robot_1/joint_states/sensor_msgs::msg::dds_::JointState_"
         message = read(JointState, payload)
-        assert message.name == list(NURSING.joint_names)
+        assert message.name == list(skeleton.joint_names)
         np.testing.assert_allclose(message.position, 0.25)
         numbers = [struct.unpack("<qqB16s", one[2]) for one in joints]
         assert [n[0] for n in numbers] == list(range(numbers[0][0], numbers[0][0] + len(numbers)))
@@ -175,7 +181,7 @@ def test_keys_for_the_dds_bridge() -> None:
 
     async def story() -> None:
         options = BridgeOptions(
-            LinkConfig(listen=[free_endpoint()]), "robot-1", NURSING,
+            LinkConfig(listen=[free_endpoint()]), "robot-1", load_skeleton("nursing"),
             LinkConfig(connect=[to_ros], mode="client"), keys=KeyFormat.ROS2DDS,
         )  # fmt: skip
         stop = asyncio.Event()
