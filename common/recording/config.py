@@ -16,7 +16,7 @@ class RecordingConfig(Section):
     folder: RelativePath | None = None
     """An existing folder for the files; None: nothing is recorded."""
     minutes_per_file: float = Field(default=60.0, ge=1.0, le=240.0)
-    """A new file begins after this time. The index of an open file takes 5 MB of memory an hour."""
+    """A new file begins after this time. The index of an open file takes 15 MB an hour."""
     keep_gb: float | None = Field(default=None, gt=0.0)
     """The oldest files are removed while all together are larger; None: however large."""
     max_hours: float | None = Field(default=None, gt=0.0)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import json
 import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +22,7 @@ from common.wire.messages import RobotState
 from deploy.harness.engage import until_tracking
 from deploy.harness.host import HostWatch
 from deploy.harness.rig import ROBOT, Rig, open_rig
+from deploy.harness.spawn import finished
 from deploy.harness.start import start_all
 from deploy.recorded.recompute import Recorded, Replay
 from deploy.recorded.recorded_config import recorded_config
@@ -66,12 +69,36 @@ def test_recordings_at_the_taps_survive_a_kill_and_are_computed_again_bit_for_bi
             with TapReader(sockets["master"]), TapReader(sockets["slave"]):  # they never read
                 processes = {role: await recorder(sockets[role], files[role]) for role in sockets}
                 for number, (role, process) in enumerate(processes.items()):
-                    await killed_after(rig, process, files[role], 300 + 37 * number)
+                    await killed_after(rig, process, files[role], 400 + 37 * number)
             await until_tracking(rig, ROBOT)
         check_master(read_recording(files["master"]))
         check_slave(read_recording(files["slave"]))
+        await check_commands(files["master"], files["slave"], tmp_path / f"out-{attempt}")
 
     on_this_host(story)
+
+
+async def check_commands(master: Path, slave: Path, out: Path) -> None:
+    """What a person runs on such files, each to its end; the stages of jitter are all there."""
+    await asyncio.to_thread(out.mkdir)
+    for arguments in (
+        ("replay", master, "--check"),
+        ("inspect", slave, "--plots", out / "plots"),
+        ("export", slave, "--to", "foxglove", "--out", out / "view.mcap"),
+        ("export", slave, "--to", "parquet", "--out", out / "all.parquet"),
+        ("export", slave, "--to", "bids", "--out", out / "study"),
+    ):
+        status, _, error = await run_command(arguments)
+        assert status == 0, (arguments, error)
+    status, text, error = await run_command(("inspect", master, slave, "--jitter", "--json"))
+    assert status == 0, error
+    stages = [stage["stage"] for stage in json.loads(text)["jitter"]["stages"]]
+    assert stages == ["nodes", "fused", "solved", "received", "tracked", "limited", "encoders"]
+
+
+async def run_command(arguments: Sequence[object]) -> tuple[int, str, str]:
+    status, text, error = await finished([sys.executable, "-m", "deploy", *map(str, arguments)])
+    return status, text.decode(), error.decode()
 
 
 def check_master(recording: McapRecording) -> None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from deploy.recorded.recorded_config import recorded_config
-
 from common.config.load import load_config
 from deploy.examples.profiles import example
+from deploy.recorded.recorded_config import recorded_config
 from master.config import MasterConfig
 from master.deadman.config import ConsoleHold
 from master.journal.context import CONFIG, describe

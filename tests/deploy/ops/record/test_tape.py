@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import gc
+import threading
+import tracemalloc
 from pathlib import Path
 
 import pytest
 
 from common.clock import to_ns
-from common.recording import read_recording
+from common.recording import McapRecorder, read_recording
 from deploy.ops.record.tape import Tape
 
 
@@ -22,6 +25,33 @@ class Clock:
 
 def messages(path: Path) -> list[int]:
     return [int.from_bytes(entry.payload, "little") for entry in read_recording(path).entries]
+
+
+def test_the_index_of_an_open_file_is_small_and_goes_with_it(tmp_path: Path) -> None:
+    """An hour has 7200 chunks: with a file an hour the memory of a recorder is bounded."""
+    chunks, most_of_an_hour = 400, 20_000_000
+
+    def held() -> int:
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        before = held()
+        recorder = McapRecorder(tmp_path / "a.mcap", {}, flush_s=0.0)
+        for number in range(chunks):
+            for topic in ("suit/frames", "suit/angles", "tandem/robot-1/state", "tandem/robot-1/command"):
+                recorder.put(topic, number.to_bytes(1200, "big"), number)
+            while recorder.counters.written < 4 * (number + 1):
+                threading.Event().wait(0.0005)
+        each = (held() - before) / chunks
+        recorder.close()
+        del recorder
+        after = held() - before
+    finally:
+        tracemalloc.stop()
+    assert each * 7200 < most_of_an_hour, f"{each:.0f} bytes a chunk"
+    assert after < 0.3 * each * chunks, "it goes when the file is closed"
 
 
 async def filled(tape: Tape, clock: Clock, count: int) -> None:
