@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from common.quaternion import Array
 from common.skeleton import load_skeleton
@@ -33,6 +34,7 @@ def knees_deg(recording: Path, overrides: list[str]) -> Array:
     return positions[:, [LEGS.joint_names.index(f"{side}_knee_flexion") for side in ("left", "right")]]
 
 
+@pytest.mark.long
 def test_knees_bend_forwards_once_the_sensors_are_aligned(tmp_path: Path, real_person: Path) -> None:
 
     aligned = align(real_person, LEGS, tmp_path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import dataclass, replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -28,6 +29,7 @@ from deploy.harness.rig import Rig
 from deploy.measure import Trace
 from deploy.measure.target import judge_targets
 from deploy.measure.verdict import verdict_table
+from deploy.sim.world.copy import copied
 from deploy.sim.world.world import VirtualWorld, WorldSettings
 from slave.pipeline import SlavePipeline
 from tests.published import master_metrics, slave_metrics
@@ -81,26 +83,33 @@ def rig(run: VirtualWorld, guards_seen: list[str]) -> Rig:
     )
 
 
-def followed(profile: str, seconds: float) -> VirtualWorld:
-    """Some seconds on one host: one clock, half a millisecond of link."""
+@cache
+def followed(profile: str) -> VirtualWorld:
+    """8 s on one host: one clock, half a millisecond of link. No test changes it."""
     run = VirtualWorld(
         WorldSettings(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile=profile)
     )
     run.run(5.0, until=lambda: bool(run.commands and run.commands[-1].valid.all() and run.commands[-1].lease))
     run.run(1.0)
     assert run.ask(Action.ENGAGE).done
-    run.run(seconds)
+    run.run(8.0)
     return run
 
 
-@pytest.fixture(scope="module")
+@cache
+def reported(profile: str) -> DemoReport:
+    run = rig(followed(profile), ["hold", "align", "track"])
+    return make_report(DemoOptions(profile=profile), run, ENDED_WELL)
+
+
+@pytest.fixture
 def tracked() -> VirtualWorld:
-    return followed("nursing", 12.0)
+    return followed("nursing")
 
 
-@pytest.fixture(scope="module")
-def report(tracked: VirtualWorld) -> DemoReport:
-    return make_report(DemoOptions(), rig(tracked, ["hold", "align", "track"]), ENDED_WELL)
+@pytest.fixture
+def report() -> DemoReport:
+    return reported("nursing")
 
 
 def tree_of(report: DemoReport) -> dict[str, Any]:
@@ -166,10 +175,10 @@ def test_every_problem_is_named(tracked: VirtualWorld) -> None:
     ]
 
 
-def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: VirtualWorld) -> None:
+def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(report: DemoReport) -> None:
     host = HostMetrics(Ticks(90, 40), longest_ms=143.0, priority=True, steal_percent=4.2)
     held = HoldRecord("robot-1", 6.3, "track", "no encoder", 1.7, 0, "the host kept its time", counts=True)
-    report = make_report(DemoOptions(), rig(tracked, ["track"]), ENDED_WELL, RunNotes([held], host))
+    report = replace(report, notes=RunNotes([held], host))
     assert tree_of(report)["holds"][0]["reason"] == "no encoder"
     assert tree_of(report)["host"]["ticks"] == {"expected": 90, "missed": 40}
     shown = " ".join(text(report).split())
@@ -182,8 +191,7 @@ def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(tracked: Virt
 
 
 def test_a_hand_s_report_has_five_joints_curves_and_paper_b_s_targets() -> None:
-    run = followed("hand", 5.0)
-    report = make_report(DemoOptions(profile="hand"), rig(run, ["hold", "align", "track"]), ENDED_WELL)
+    report = reported("hand")
     tree = json.loads(json.dumps(tree_of(report), allow_nan=False))
     assert tree["options"]["profile"] == "hand"
     assert tree["options"]["motion"] == "grasp"
@@ -202,8 +210,7 @@ def test_a_hand_s_report_has_five_joints_curves_and_paper_b_s_targets() -> None:
 @pytest.mark.parametrize("profile", sorted(BY_PROFILE))
 def test_every_target_s_path_leads_to_a_figure_in_a_real_report(profile: str) -> None:
     """A renamed figure would not be missed otherwise: its target would only not be judged."""
-    report = make_report(DemoOptions(profile=profile), rig(followed(profile, 8.0), ["track"]), ENDED_WELL)
-    tree = json.loads(json.dumps(tree_of(report), allow_nan=False))
+    tree = json.loads(json.dumps(tree_of(reported(profile)), allow_nan=False))
     nowhere = [v.name for v in judge_targets(tree, BY_PROFILE[profile]) if v.measured is None]
     assert nowhere == []
 
@@ -223,6 +230,7 @@ def shown_verdicts(tree: dict[str, object]) -> str:
 
 def test_a_run_in_which_no_command_reached_the_robot_failed(tracked: VirtualWorld) -> None:
     deaf = rig(tracked, ["track"])
+    deaf.observer.trace = Trace(tracked.trace.joint_names)
     child = cast(FakeChild, deaf.children["slave"])
     child.slave = replace(child.slave, guard=replace(child.slave.guard, received=0))
     assert make_report(DemoOptions(), deaf, ENDED_WELL).problems == [
@@ -238,8 +246,8 @@ def test_a_run_in_which_no_command_was_observed_failed(tracked: VirtualWorld) ->
     ]
 
 
-def test_both_sides_still_for_5_s_miss_a_target_and_are_said() -> None:
-    run = followed("nursing", 5.0)
+def test_both_sides_still_for_5_s_miss_a_target_and_are_said(tracked: VirtualWorld) -> None:
+    run = copied(tracked)
     run.stand_still(5.0)
     run.run(5.0)
     report = make_report(DemoOptions(), rig(run, ["track"]), ENDED_WELL)

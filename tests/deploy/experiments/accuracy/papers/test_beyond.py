@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import pytest
+
 from deploy.experiments.accuracy.papers import beyond
 from deploy.experiments.accuracy.papers.figures import gather
 
 
+@pytest.mark.long
 def test_the_joints_constraints_keep_the_elbows_where_the_field_turns() -> None:
     rows = {row.name: row for row in gather({1: beyond.experiment(1, 9.0, ["nursing"])})}
     held = rows["elbow, constraints online: disturbed / undisturbed"]

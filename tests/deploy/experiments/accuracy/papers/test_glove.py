@@ -13,6 +13,7 @@ from deploy.sim.suit.tray import TrayConfig
 SHORT_SESSION = TrayConfig(attitudes=20, still_s=2.5, tumble_s=60.0)
 
 
+@pytest.mark.long
 def test_units_as_delivered_meet_every_target_once_calibrated() -> None:
     rows = gather({1: glove.experiment(1, hold_s=1.0, moved_s=10.0, session=SHORT_SESSION)})
     asked = [row for row in rows if row.target is not None]

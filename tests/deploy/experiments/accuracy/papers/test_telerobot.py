@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pytest
+
 from deploy.experiments.accuracy.papers import telerobot
 from deploy.experiments.accuracy.papers.figures import gather
 from deploy.measure.paper import ETA_PERCENT, TABLE_1
@@ -8,6 +10,7 @@ from deploy.sim.suit.tray import TrayConfig
 SHORT_SESSION = TrayConfig(attitudes=20, still_s=2.5, tumble_s=60.0)
 
 
+@pytest.mark.long
 def test_units_as_delivered_reach_table_1_and_eta_once_calibrated() -> None:
     """One loop of the motion; the command runs two, with a longer session."""
     rows = {row.name: row for row in gather({1: telerobot.own_calibration(1, 16.5, SHORT_SESSION)})}
@@ -21,6 +24,7 @@ def test_units_as_delivered_reach_table_1_and_eta_once_calibrated() -> None:
     assert eta.outcome == "passed", eta.values
 
 
+@pytest.mark.long
 def test_what_only_a_suit_knows_brings_eta_below_its_target() -> None:
     """Of the arms of this seed one is the worst of ten where each node goes by itself."""
     alone, suit = (

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -86,24 +88,30 @@ def master_told(at_ns: int, round_trip_recent_us: Sequence[int]) -> Statistics:
     return Statistics(at_ns, master_metrics(robot, ticks=Ticks(at_ns // (5 * MS), 0)))
 
 
+@cache
+def true_course() -> tuple[Truth, ...]:
+    """What the operator did, 200 times a second from 1 s before."""
+    return tuple(
+        Truth(t, BEGIN_NS + 5 * MS * t, posture(BEGIN_NS + 5 * MS * t), np.zeros(len(VALID)))
+        for t in range(-200, SECONDS * 200)
+    )
+
+
 def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) -> CellMessages:
     """Commands at 12.5 Hz, all accepted but the lost ones; states at 50 Hz; `guards` by number of state."""
     commands = [command(n) for n in range(round(SECONDS * 12.5))]
     echoes = [echo(c) for c in commands if c.sequence not in set(lost)]
+    received_ns = [e.received_ns for e in echoes]
     states = []
     for k in range(SECONDS * 50):
         at_ns = BEGIN_NS + 20 * MS * k
-        newest = [e for e in echoes if e.received_ns < at_ns]
-        states.append(state(at_ns, newest[-1] if newest else None, (guards or {}).get(k, "track")))
-    truth = [
-        Truth(t, BEGIN_NS + 5 * MS * t, posture(BEGIN_NS + 5 * MS * t), np.zeros(len(VALID)))
-        for t in range(-200, SECONDS * 200)
-    ]
+        heard = bisect_left(received_ns, at_ns)
+        states.append(state(at_ns, echoes[heard - 1] if heard else None, (guards or {}).get(k, "track")))
     ends = (BEGIN_NS + S, BEGIN_NS + (SECONDS - 1) * S)
     return CellMessages(
         commands,
         states,
-        truth,
+        list(true_course()),
         [slave_told(ends[0], 12, 0), slave_told(ends[1], 132, 5, age=3),
          *(master_told(at_ns, [81_000, 99_000]) for at_ns in ends)],
     )  # fmt: skip
