@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from common.config.console import ConsoleConfig
 from common.config.section import Section
 from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
@@ -49,6 +50,7 @@ class SlaveConfig(Section):
     link: LinkConfig
     process: ProcessConfig = ProcessConfig()
     tap: TapConfig = TapConfig()
+    console: ConsoleConfig = ConsoleConfig()
     recording: RecordingConfig = RecordingConfig()
 
     @property
@@ -74,6 +76,7 @@ class SlaveConfig(Section):
             *self._too_fresh_pictures(),
             *self.link.mistakes(),
             *self.tap.mistakes(),
+            *self.console.mistakes(),
             *self.recording.mistakes_with(self.tap.socket),
         ]
 

@@ -32,7 +32,10 @@ def console(
     ] = None,
     slave: Annotated[
         Path | None,
-        typer.Option(help="Show the zones of this slave's TOML file.", dir_okay=False),
+        typer.Option(
+            help="This slave's TOML file: beside --master shows its zones; alone serves the robot's side.",
+            dir_okay=False,
+        ),
     ] = None,
     listen: Annotated[
         str | None, typer.Option(help="Address and port of the page; 127.0.0.1:8080 unless the file says.")
@@ -41,7 +44,7 @@ def console(
     certificate: Certificate = None,
     overrides: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Set one key of the master's file for this run."),
+        typer.Option("--set", metavar="KEY=VALUE", help="Set one key of the file for this run."),
     ] = None,
 ) -> None:
     """Serve the web page: what the robot sees and does, how late it is, and a stop. Prints its addresses.

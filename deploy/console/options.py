@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from common.config.console import ConsoleConfig
 from common.config.load import check_config, load_config
 from common.errors import TandemError
+from common.link.config import LinkConfig
 from common.skeleton import load_skeleton
-from deploy.client.destination import destination
+from deploy.client.destination import Destination, destination
+from deploy.console.model.robot import Side
 from deploy.console.run import ConsoleOptions
 from master.config import MasterConfig
 from master.deadman.config import ConsoleHold
+
+_EVERYWHERE = {"0.0.0.0": "127.0.0.1", "[::]": "[::1]", "*": "127.0.0.1"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +34,22 @@ class ConsoleChoices:
     profile: str | None = None
     certificate: Path | None = None
     overrides: Sequence[str] = ()
-    """Of the master's file."""
+    """Of the master's file; of the slave's where it stands alone."""
 
 
 def console_options(chosen: ConsoleChoices, on_ready: Callable[[str], None]) -> ConsoleOptions:
     """The command line wins over the files. Raises TandemError where something is missing or wrong."""
+    alone = chosen.slave is not None and chosen.master is None and not chosen.connect
+    options = _at_the_robot(chosen) if alone else _at_the_operator(chosen)
+    config = options.config
+    if chosen.listen is not None:
+        changed = {**config.model_dump(), "listen": chosen.listen}
+        config = check_config(Path("command line"), changed, ConsoleConfig)
+    return replace(options, config=config, on_ready=on_ready)
+
+
+def _at_the_operator(chosen: ConsoleChoices) -> ConsoleOptions:
+    """A console at the master's tap, or one that only knows endpoints."""
     where = destination(
         chosen.connect,
         chosen.robots,
@@ -46,11 +61,8 @@ def console_options(chosen: ConsoleChoices, on_ready: Callable[[str], None]) -> 
     if not where.robots:
         raise TandemError("which robot? Name it by --robot, or the master's file by --master")
     file = None if chosen.master is None else load_config(chosen.master, MasterConfig, chosen.overrides)
-    config = ConsoleConfig() if file is None else file.console
-    if chosen.listen is not None:
-        changed = {**config.model_dump(), "listen": chosen.listen}
-        config = check_config(Path("command line"), changed, ConsoleConfig)
     hold = file.operator.deadman if file is not None else None
+    tap = chosen.tap or (file.tap.socket if file is not None else None)
     zones = None
     if chosen.slave is not None:
         from slave.config import SlaveConfig  # loads MuJoCo
@@ -59,10 +71,39 @@ def console_options(chosen: ConsoleChoices, on_ready: Callable[[str], None]) -> 
     return ConsoleOptions(
         where,
         load_skeleton(chosen.profile or (file.profile if file is not None else "nursing")),
-        config,
-        tap=chosen.tap or (file.tap.socket if file is not None else None),
+        ConsoleConfig() if file is None else file.console,
+        side=Side.ELSEWHERE if tap is None else Side.OPERATOR,
+        tap=tap,
         deadman=None if hold is None else hold.source,
         deadman_socket=hold.socket if isinstance(hold, ConsoleHold) else None,
         zones=zones,
-        on_ready=on_ready,
     )
+
+
+def _at_the_robot(chosen: ConsoleChoices) -> ConsoleOptions:
+    """A console on the slave's host, for those who stand by the robot."""
+    from slave.config import SlaveConfig
+
+    assert chosen.slave is not None
+    file = load_config(chosen.slave, SlaveConfig, chosen.overrides)
+    kept = file.link.model_dump(exclude={"listen", "access", "revoked"})
+    doors = file.link.connect if file.link.mode == "client" else map(_own_door, file.link.listen)
+    link = check_config(chosen.slave, {**kept, "connect": list(doors)}, LinkConfig)
+    tap = chosen.tap or file.tap.socket
+    if tap is None and not link.connect:
+        raise TandemError(f"{chosen.slave}: name [tap] socket, so that the console can hear the robot")
+    return ConsoleOptions(
+        Destination(link, (file.robot,), chosen.operator, chosen.operator),
+        file.skeleton,
+        file.console,
+        side=Side.ROBOT,
+        tap=tap,
+        zones=[zone.model_dump() for zone in file.guard.zones],
+    )
+
+
+def _own_door(endpoint: str) -> str:
+    """Where this host itself reaches what listens at an endpoint."""
+    transport, _, address = endpoint.partition("/")
+    host, colon, port = address.rpartition(":")
+    return f"{transport}/{_EVERYWHERE.get(host, host)}{colon}{port}"

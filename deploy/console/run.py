@@ -26,7 +26,7 @@ from deploy.console.hearing import Hearing
 from deploy.console.hub import VIEW_HZ, Hub, person_of, stranger
 from deploy.console.model.guard_table import STATES, TRANSITIONS
 from deploy.console.model.pictures import STALE_S
-from deploy.console.model.robot import SILENT_S, RobotModel, Whose
+from deploy.console.model.robot import SILENT_S, RobotModel, Side, Whose
 from deploy.console.model.scene import scene
 from deploy.console.outbox import WINDOW
 from deploy.console.session import Access, PageRole, Person
@@ -42,8 +42,9 @@ class ConsoleOptions:
     where: Destination
     skeleton: Skeleton
     config: ConsoleConfig
+    side: Side = Side.ELSEWHERE
     tap: Path | None = None
-    """The master's tap on this host; None: everything is heard over the link."""
+    """The tap of master or slave on this host; None: everything is heard over the link."""
     deadman: str | None = None
     """The source of the operator's deadman; None: not known."""
     deadman_socket: Path | None = None
@@ -71,11 +72,13 @@ class _Door:
 
 async def _run(options: ConsoleOptions, door: _Door) -> None:
     where = options.where
-    whose = Whose(where.operator, masters_clock=options.tap is not None)
+    whose = Whose(where.operator, options.side)
     models = {robot: RobotModel(robot, options.skeleton, whose) for robot in where.robots}
     async with open_session(where.link) as session:
         hearing = Hearing(models)
-        hearing.listen(session, states=options.tap is None)
+        # the robot's own tap has its figures; the master's has those of the master alone
+        if options.side is not Side.ROBOT or options.tap is None:
+            hearing.listen(session, states=options.tap is None)
         stoppers = {
             robot: RobotStopper(session.link(robot), model, where.operator) for robot, model in models.items()
         }
@@ -138,7 +141,7 @@ def _setup(options: ConsoleOptions) -> dict[str, object]:
         "version": 1,
         "tandem": software().tandem,
         "operator": options.where.operator,
-        "side": "operator",
+        "side": options.side.value,
         "language": config.language,
         "hardware_estop": config.hardware_estop,
         "deadman": options.deadman,

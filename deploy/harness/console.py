@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Sequence
+from typing import Literal
 
 from deploy.harness.child import Child
 from deploy.harness.rig import Rig
@@ -14,9 +15,11 @@ STARTS_S = 30.0
 
 
 class ConsoleChild:
-    """`tandem console` of a rig whose master has a tap (`tap.socket` among its overrides)."""
+    """`tandem console` of a rig whose master or slave has a tap (`tap.socket` among its overrides)."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, side: Literal["master", "slave"] = "master") -> None:
+        """`side`: at whose tap it stands."""
+        self._side = side
         self.child = rig.children.setdefault(CONSOLE, Child(CONSOLE, rig.folder))
         self._rig = rig
 
@@ -26,8 +29,8 @@ class ConsoleChild:
         `listen` None: at its usual port if that is free, else at any.
         """
         listen = _usual_or_any() if listen is None else listen
-        given = ["--master", str(self._rig.file("master")), "--listen", listen, *arguments]
-        for override in self._rig.overrides("master"):
+        given = [f"--{self._side}", str(self._rig.file(self._side)), "--listen", listen, *arguments]
+        for override in self._rig.overrides(self._side):
             given += ["--set", override]
         await self.child.run(given)
         await self._rig.until_logged(CONSOLE, "engineer: ", STARTS_S)

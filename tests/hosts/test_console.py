@@ -18,6 +18,7 @@ import pytest
 
 from common.clock import monotonic_ns, to_ns, to_s
 from deploy.harness.console import ConsoleChild
+from deploy.harness.engage import until_tracking
 from deploy.harness.host import HostWatch
 from deploy.harness.rig import ROBOT, Rig, open_rig
 from deploy.harness.start import start_all
@@ -219,5 +220,30 @@ def test_a_page_that_holds_the_deadman_ends_it_by_letting_go_and_by_silence(
             assert "deadman" in change.reason
             # the newest beats may have waited in the console that was stopped
             assert 0.0 < told_s <= (0.1 if how == "lets go" else 0.45)
+
+    on_this_host(story)
+
+
+def test_a_console_beside_the_robot_shows_and_stops_it(on_this_host: OnThisHost) -> None:
+    async def story(_: HostWatch) -> None:
+        folder = Path(tempfile.mkdtemp(prefix="tandem-"))
+        async with (
+            open_rig(overrides={"slave": [f'tap.socket="{folder / "slave.sock"}"']}) as rig,
+            aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as http,
+        ):
+            await start_all(rig)
+            console = ConsoleChild(rig, side="slave")
+            await console.start()
+            page = await Browser(http, console.address).page()
+            await until_tracking(rig, ROBOT)
+            view = await page.hear("view")
+            while view["situation"] != "follows" or view["latency"]["ms"] is None:
+                view = await page.hear("view")
+            assert (view["heard"], view["operator"], view["master"]) == ("tap", "nurse-1", True)
+            await page.say(kind="stop")
+            await rig.until(lambda: rig.observer.guard == "estop", 5.0, "e-stop")
+            while view["situation"] != "stopped":
+                view = await page.hear("view")
+            await page.socket.close()
 
     on_this_host(story)

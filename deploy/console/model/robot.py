@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 from common.clock import NS_PER_S, to_ns, to_s
 from common.clock_sync import Offset
@@ -36,14 +37,24 @@ _SITUATIONS = {
 }  # fmt: skip
 
 
+class Side(StrEnum):
+    """Where a console runs."""
+
+    OPERATOR = "operator"
+    """On the master's host."""
+    ROBOT = "robot"
+    """On the slave's host."""
+    ELSEWHERE = "elsewhere"
+
+
 @dataclass(frozen=True, slots=True)
 class Whose:
     """For whom the console stands."""
 
     operator: str
     """The operator's name; empty: nobody's."""
-    masters_clock: bool
-    """Whether the console's host is the master's, so that both read one clock."""
+    side: Side
+    """Whose host the console runs on, and so whose clock it reads."""
 
 
 class RobotModel:
@@ -72,7 +83,7 @@ class RobotModel:
         """A state came, from the tap or from the link."""
         self._state, self._state_ns, self._source = state, arrived_ns, source
         self._still.add(state.encoder_ns, state.position_rad)
-        self.lateness.on_state(state, arrived_ns, self.whose.masters_clock and source == TAP)
+        self.lateness.on_state(state, arrived_ns, self.whose.side is Side.OPERATOR and source == TAP)
         self._was_silent = False
         if (state.guard, state.reason) != self._said:
             self._said = state.guard, state.reason
@@ -122,7 +133,9 @@ class RobotModel:
 
     def offset(self, now_ns: int) -> Offset | None:
         """The clock of this host minus the robot's; None where it is not known."""
-        if self._state is None or not self.whose.masters_clock or self.silent(now_ns):
+        if self.whose.side is Side.ROBOT:
+            return Offset(0, 0, trusted=True)
+        if self._state is None or self.whose.side is Side.ELSEWHERE or self.silent(now_ns):
             return None
         return master_offset(self._state)
 
@@ -218,7 +231,7 @@ class RobotModel:
             return "silent"
         state = self._state
         word = _SITUATIONS.get(state.guard, "holds")
-        others = state.operator not in ("", self.whose.operator)
+        others = bool(self.whose.operator) and state.operator not in ("", self.whose.operator)
         return "other_operator" if others and word not in ("stopped", "starting") else word
 
     def _lease(self, state: RobotState) -> str:
@@ -226,7 +239,7 @@ class RobotModel:
             return "none"
         if self._command is not None and self._command.lease:
             return "ours" if lease_id(self._command.lease) == state.lease_id else "other"
-        return "ours" if state.operator == self.whose.operator else "other"
+        return "ours" if state.operator == self.whose.operator or not self.whose.operator else "other"
 
     def _commanded(self, now_ns: int) -> dict[str, object]:
         command = self._command if self.master_heard(now_ns) else None

@@ -11,7 +11,7 @@ from common.skeleton import load_skeleton
 from common.wire.lease import lease_id
 from common.wire.messages import Command, CommandEcho, CommandStamps, RobotState
 from common.wire.video import VideoFrame
-from deploy.console.model.robot import TAP, RobotModel, Whose
+from deploy.console.model.robot import TAP, RobotModel, Side, Whose
 
 ROBOT, OPERATOR, LEASE = "robot-1", "nurse-1", 77
 SKELETON = load_skeleton("nursing")
@@ -57,9 +57,9 @@ def frame(number: int, captured_s: float) -> VideoFrame:
     return VideoFrame(number, max(own_ns, 0), max(own_ns, 0), 320, 240, JPEG)
 
 
-def model(masters_clock: bool = True, robot: str = ROBOT) -> RobotModel:
+def model(side: Side = Side.OPERATOR, robot: str = ROBOT) -> RobotModel:
     """Of a robot of which nothing was heard yet."""
-    return RobotModel(robot, SKELETON, Whose(OPERATOR, masters_clock))
+    return RobotModel(robot, SKELETON, Whose(OPERATOR, side))
 
 
 def heard(at_s: float = 1.0, **changes: Any) -> RobotModel:

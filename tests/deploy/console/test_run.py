@@ -19,6 +19,7 @@ from common.link.roles import Role
 from deploy.certificates.folder import stem, write_pair
 from deploy.certificates.make import new_authority, new_identity
 from deploy.client.destination import Destination
+from deploy.console.model.robot import Side
 from deploy.console.options import ConsoleChoices, console_options
 from deploy.console.run import ConsoleOptions, run_console
 from deploy.examples.profiles import example
@@ -151,3 +152,15 @@ def test_what_the_command_line_leaves_out_comes_from_the_masters_file(tmp_path: 
     assert found.zones is not None
     with pytest.raises(TandemError, match="which robot"):
         console_options(ConsoleChoices(connect=["tcp/127.0.0.1:7447"]), lambda _: None)
+
+
+def test_beside_the_robot_the_slaves_file_is_enough(tmp_path: Path) -> None:
+    chosen = ConsoleChoices(
+        slave=example("slave"),
+        overrides=[f'tap.socket="{tmp_path / "tap.sock"}"', 'link.listen=["tcp/0.0.0.0:7447"]'],
+    )
+    found = console_options(chosen, lambda _: None)
+    assert (found.side, found.where.robots, found.where.operator) == (Side.ROBOT, ("robot-1",), "")
+    assert found.where.link.connect == ["tcp/127.0.0.1:7447"]
+    assert found.where.link.listen == []
+    assert found.tap == tmp_path / "tap.sock"

@@ -11,7 +11,8 @@ import pytest
 
 from common.clock import to_ns
 from common.metrics.slave import CameraMetrics, DueMetrics
-from deploy.console.model.robot import LINK, SILENT_S, TAP, RobotModel
+from common.wire.video import VideoFrame
+from deploy.console.model.robot import LINK, SILENT_S, TAP, RobotModel, Side
 from deploy.console.viewers import pack
 from tests.deploy.console.robots import BOUND_NS, JPEG, J, command, echo, frame, heard, model, state
 from tests.published import NOTHING, guard_metrics, master_metrics, slave_metrics
@@ -139,7 +140,7 @@ def test_a_picture_is_as_old_as_its_capture_by_the_robots_clock() -> None:
 
 
 def test_a_picture_whose_age_nobody_knows_is_stale_by_its_arrival() -> None:
-    robot = model(masters_clock=False)
+    robot = model(side=Side.ELSEWHERE)
     robot.on_picture("head", frame(1, 200.9), to_ns(1.0))
     assert view(robot, 1.5)["video"]["head"] == {"age_ms": None, "bound_ms": None, "fps": 0.5, "stale": False}
     assert view(robot, 1.51)["video"]["head"]["stale"]
@@ -287,3 +288,14 @@ def test_a_latency_that_creeps_is_an_alarm_once_long_before_a_hold() -> None:
     alarms = [event for event in shown["events"] if event["what"] == "alarm"]
     assert len(alarms) == 1
     assert "12 ms in ten minutes" in alarms[0]["text"]
+
+
+def test_beside_the_robot_both_read_one_clock() -> None:
+    robot = model(side=Side.ROBOT)
+    own = state(at_s=301.0)
+    robot.on_state(own, own.sent_ns, TAP)
+    taken = VideoFrame(1, own.sent_ns - to_ns(0.1), own.sent_ns, 320, 240, JPEG)
+    robot.on_picture("head", taken, own.sent_ns)
+    shown = json.loads(pack(robot.view(own.sent_ns)))
+    assert (shown["situation"], shown["video"]["head"]["age_ms"]) == ("follows", 100.0)
+    assert shown["video"]["head"]["bound_ms"] == 0.0
