@@ -23,6 +23,8 @@ from deploy.console.viewers import MOST, REQUESTS_PER_S, OpenPage, pack
 COOKIE = "tandem_console"
 LONGEST = 4096
 """Bytes of a message or a body."""
+READS_PER_S = 200.0
+"""Files and sockets a second, and as many at once, for one client; a page has some twenty files."""
 STILL_S = 10.0
 """A socket is asked for a sign of life so often; a process that stands still is closed after half as long."""
 POLICY = (
@@ -66,7 +68,7 @@ class ConsoleApp:
         self._on_login = on_login
         self._files = files or PageFiles()
         self._robots = tuple(hub.models)
-        self._posts: dict[str, RateLimit] = {}
+        self._rates: dict[tuple[str, float], RateLimit] = {}
 
     def make(self) -> web.Application:
         """The application."""
@@ -93,9 +95,10 @@ class ConsoleApp:
         if words:
             log.warning("refused %s %s: %s", request.method, request.path, words)
             return _error(403, words)
-        if request.method == "POST" and not self._post_passes(request):
+        limit = REQUESTS_PER_S if request.method == "POST" else READS_PER_S
+        if not self._passes(request, limit):
             access.count_refusal("rate")
-            return _error(429, f"more than {REQUESTS_PER_S:g} requests a second")
+            return _error(429, f"more than {limit:g} requests a second")
         try:
             response = await handler(request)
         except web.HTTPRequestEntityTooLarge:
@@ -110,11 +113,11 @@ class ConsoleApp:
             response.headers.update(HEADERS)
         return response
 
-    def _post_passes(self, request: web.Request) -> bool:
-        client = request.remote or ""
-        while len(self._posts) >= _CLIENTS and client not in self._posts:
-            self._posts.pop(next(iter(self._posts)))
-        return self._posts.setdefault(client, RateLimit(REQUESTS_PER_S)).passes(monotonic_ns())
+    def _passes(self, request: web.Request, limit: float) -> bool:
+        client = request.remote or "", limit
+        while len(self._rates) >= _CLIENTS and client not in self._rates:
+            self._rates.pop(next(iter(self._rates)))
+        return self._rates.setdefault(client, RateLimit(limit)).passes(monotonic_ns())
 
     async def _nurse(self, request: web.Request) -> web.StreamResponse:
         return self._file(request, "page", "index.html")

@@ -201,6 +201,19 @@ def test_more_than_20_posts_a_second_are_refused() -> None:
     run(story)
 
 
+def test_a_flood_of_reads_is_refused_and_a_stop_in_it_is_heard() -> None:
+    async def story(console: Served) -> None:
+        statuses = []
+        for _ in range(300):
+            async with console.http.get(f"{console.url}/page/none.js") as response:
+                statuses.append(response.status)
+        assert statuses[:200] == [404] * 200
+        assert 429 in statuses
+        assert (await console.post("/api/stop", {}))[0] == 202
+
+    run(story)
+
+
 def test_a_page_is_greeted_and_shown_the_robot() -> None:
     async def story(console: Served) -> None:
         showing = asyncio.create_task(console.hub.show())

@@ -23,6 +23,7 @@ INSTANCES = {
     "tandem-can@.service": "tandem-can@can0.service",
     "tandem-router.service": "tandem-router.service",
     "tandem-record@.service": "tandem-record@operator.service",
+    "tandem-console@.service": "tandem-console@operator.service",
 }
 SIDES = ("tandem-slave@.service", "tandem-master@.service", "tandem-router.service")
 INSTALLED = "/opt/tandem/bin/tandem"
