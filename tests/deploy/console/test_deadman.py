@@ -32,6 +32,13 @@ class HeardBeats(DeadmanRelay):
 Story = Callable[[Served, HeardBeats], Awaitable[None]]
 
 
+@pytest.fixture(autouse=True)
+def still(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What left, left now: how old a view is does not depend on how fast this host is."""
+    now_ns = monotonic_ns()
+    monkeypatch.setattr("deploy.console.viewers.monotonic_ns", lambda: now_ns)
+
+
 def run(story: Story, logged_in: bool = True) -> None:
     async def told() -> None:
         relay = HeardBeats()
