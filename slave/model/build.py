@@ -34,8 +34,8 @@ _LEAST_ARMATURE_KG_M2 = 2e-4
 _STOP_RAD = math.radians(3.0)
 """The mechanical stops stand this far outside the table's limits, so that a limit can be reached."""
 _HEADROOM = 1.5
-"""Torque limit over what worst gravity and the table's greatest accelerations, of the joint itself and of all
-others at once, need together."""
+"""Torque limit over what worst gravity and the joint's greatest acceleration need together, or over what all
+other joints at their greatest accelerations do to it, where that is more: at wrists."""
 
 
 def build_model(skeleton: Skeleton, step_s: float = STEP_S) -> mujoco.MjModel:
@@ -183,7 +183,8 @@ def _drives(skeleton: Skeleton, model: mujoco.MjModel) -> list[ServoGains]:
     armature = np.maximum(_ROTOR_TO_LOAD * inertia, _LEAST_ARMATURE_KG_M2)
     total = inertia + armature
     omega = 2.0 * math.pi * BANDWIDTH_HZ
-    torque = _HEADROOM * (gravity + total * skeleton.max_acceleration_rad_s2 + by_others)
+    alone = gravity + total * skeleton.max_acceleration_rad_s2
+    torque = _HEADROOM * np.maximum(alone, by_others)
     return [
         ServoGains(float(a), float(i * omega**2), float(2.0 * DAMPING_RATIO * omega * i), float(t))
         for a, i, t in zip(armature, total, torque, strict=True)

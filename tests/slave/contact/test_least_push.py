@@ -66,9 +66,9 @@ def test_finer_angles_notice_less_and_the_words_say_whose() -> None:
     coarse = watch.dull
     watch._tune(drives=True)
     assert "by the output encoders no push is noticed below 6 N at left_hand, right_hand" in coarse
-    assert "31 N at left_upper_arm, right_upper_arm" in coarse
-    assert "by the drives' angles no push is noticed below 5 N at left_hand, right_hand" in watch.dull
-    assert "16 N at left_upper_arm, right_upper_arm" in watch.dull
+    assert "30 N at left_upper_arm, right_upper_arm" in coarse
+    assert "by the drives' angles no push is noticed below 4 N at left_hand, right_hand" in watch.dull
+    assert "15 N at left_upper_arm, right_upper_arm" in watch.dull
     assert push_words({}, drives=True) == ""
 
 
