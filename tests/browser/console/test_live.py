@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,10 +29,10 @@ STILL_RAD = 0.0031
 """Two counts of an encoder."""
 MOVES_RAD = 0.05
 STANDS_S = 0.5
-WAIT_MS = 20_000
+WAIT_MS = 60_000
 
 
-async def until(page: Any, holds: str, timeout_s: float = 20.0) -> None:
+async def until(page: Any, holds: str, timeout_s: float = 40.0) -> None:
     """Wait until an expression is true in the page, whose policy forbids it to evaluate one by itself."""
     end_ns = monotonic_ns() + to_ns(timeout_s)
     while not await page.evaluate(holds):
@@ -39,13 +40,19 @@ async def until(page: Any, holds: str, timeout_s: float = 20.0) -> None:
         await page.wait_for_timeout(20)
 
 
-async def until_state(page: Any, wanted: str, timeout_s: float = 20.0) -> None:
+async def until_state(page: Any, wanted: str, timeout_s: float = 40.0) -> None:
     await until(page, f"document.body.dataset.state === '{wanted}'", timeout_s)
 
 
-async def engage(page: Any) -> None:
-    """By the keyboard, as a person does: again where the robot refused or held."""
+async def engage(page: Any, deadman: str = "") -> None:
+    """By the keyboard, as a person does: again where the robot refused or held.
+
+    `deadman`: a key that is pressed anew before each try, and stays down.
+    """
     for _ in range(5):
+        if deadman:
+            await page.keyboard.up(deadman)
+            await page.keyboard.down(deadman)
         await page.keyboard.down("F2")
         await page.wait_for_timeout(1300)
         await page.keyboard.up("F2")
@@ -125,3 +132,44 @@ async def restart_master(page: Any, rig: Rig) -> None:
     await page.wait_for_selector("#badges [data-tone=no_master]", state="detached", timeout=WAIT_MS)
     assert await page.evaluate("document.body.dataset.state") == "stopped"
     assert ROBOT in await page.title()
+
+
+def test_the_deadman_is_a_key_and_the_stop_needs_no_master(on_this_host: OnThisHost) -> None:
+    async def story(host: HostWatch) -> None:
+        folder = Path(tempfile.mkdtemp(prefix="tandem-"))  # a socket's path has at most 107 bytes
+        held = f'operator.deadman={{source="console",socket="{folder / "deadman.sock"}"}}'
+        given = {"master": [f'tap.socket="{folder / "master.sock"}"', held]}
+        async with open_rig(overrides=given) as rig, playwright_api.async_playwright() as playwright:
+            console = ConsoleChild(rig)
+            browser = await playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+            context = await browser.new_context(viewport={"width": 1366, "height": 768}, locale="en-GB")
+            page = await context.new_page()
+
+            async def start(name: str) -> None:
+                await rig.start(name)
+                if name == "master":
+                    await console.start()
+                    await page.goto(console.operator_address)
+                    await page.wait_for_selector("#hold", timeout=WAIT_MS)
+                    await page.keyboard.down("F9")
+
+            await start_all(rig, start=start)
+            await engage(page, "F9")
+            await page.keyboard.up("F9")
+            await rig.until(lambda: rig.observer.guard == "hold", 5.0, "hold")
+            await until_state(page, "holds")
+            assert "deadman" in await page.inner_text("#why")
+            await engage(page, "F9")
+            other = await context.new_page()
+            await other.goto(console.address)
+            await until_state(other, "follows")
+            await page.close()
+            await rig.until(lambda: rig.observer.guard == "hold", 5.0, "hold after the page was lost")
+            await rig.children["master"].kill()
+            await other.wait_for_selector("#badges [data-tone=no_master]", timeout=WAIT_MS)
+            await other.keyboard.press("Escape")
+            await rig.until(lambda: rig.observer.guard == "estop", 5.0, "e-stop")
+            await until_state(other, "stopped")
+            await browser.close()
+
+    on_this_host(story)
