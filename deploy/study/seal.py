@@ -18,6 +18,7 @@ from pathlib import Path
 from common.clock import NS_PER_S, Clock, wall_ns
 from common.errors import TandemError
 from deploy.study.blocks import Block, blocks_of
+from deploy.study.signature import sign, signer_of
 
 SEAL = "seal.json"
 VERSION = 1
@@ -45,8 +46,11 @@ class SealBroken:
     length: int | None = None
 
 
-def seal(folder: Path, wall: Clock = wall_ns) -> str:
-    """Write the seal; returns its head. Raises TandemError where there is one already, or nothing to seal."""
+def seal(folder: Path, wall: Clock = wall_ns, key: Path | None = None) -> str:
+    """Write the seal, signed where a `key` is given; returns its head.
+
+    Raises TandemError where there is one already, nothing to seal, or a key that cannot sign.
+    """
     if (folder / SEAL).exists():
         raise TandemError(f"{folder}: it is sealed already; `tandem session verify {folder}`")
     files = tuple(_sealed(folder, name) for name in _names(folder))
@@ -54,7 +58,10 @@ def seal(folder: Path, wall: Clock = wall_ns) -> str:
         raise TandemError(f"{folder}: there are no files to seal")
     head = head_of(files)
     sealed = datetime.fromtimestamp(wall() / NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    tree = {"version": VERSION, "sealed": sealed, "head": head, "files": [asdict(file) for file in files]}
+    tree: dict[str, object] = {"version": VERSION, "sealed": sealed, "head": head}
+    if key is not None:
+        tree["signature"], tree["certificate"] = sign(head, key)
+    tree["files"] = [asdict(file) for file in files]
     (folder / SEAL).write_text(json.dumps(tree, indent=1) + "\n", "utf-8")
     return head
 
@@ -80,6 +87,8 @@ def verify(folder: Path, head: str | None = None) -> tuple[str, list[SealBroken]
     """
     files, written = _read(folder)
     broken = []
+    if signer(folder) is None:
+        broken.append(SealBroken(SEAL, "its signature is not of this head, or of another certificate"))
     if head_of(files) != written:
         broken.append(SealBroken(SEAL, "the seal was changed: its files do not give its head"))
     if head is not None and head != written:
@@ -93,6 +102,17 @@ def verify(folder: Path, head: str | None = None) -> tuple[str, list[SealBroken]
         else:
             broken += _compare(folder / name, file)
     return written, broken
+
+
+def signer(folder: Path) -> str | None:
+    """Who signed the seal, by the certificate in it; empty where it is not signed, None where it is forged.
+
+    The certificate is the seal's own: whether it is to be trusted is for whoever knows its authority.
+    """
+    tree = _tree(folder)
+    if "signature" not in tree:
+        return ""
+    return signer_of(str(tree.get("head")), str(tree["signature"]), str(tree.get("certificate")))
 
 
 def _compare(path: Path, file: SealedFile) -> list[SealBroken]:
@@ -125,19 +145,37 @@ def _names(folder: Path) -> list[str]:
 
 
 def _read(folder: Path) -> tuple[list[SealedFile], str]:
+    tree = _tree(folder)
+    try:
+        return [_file(file) for file in _list(tree["files"])], str(tree["head"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise TandemError(f"{folder / SEAL}: cannot be read as a seal ({error})") from None
+
+
+def _list(value: object) -> list[dict[str, object]]:
+    if not isinstance(value, list) or not all(isinstance(one, dict) for one in value):
+        raise TypeError("a list of tables is missing")
+    return value
+
+
+def _file(tree: dict[str, object]) -> SealedFile:
+    size = tree["size"]
+    if not isinstance(size, int):
+        raise TypeError("a file without its size")
+    return SealedFile(str(tree["name"]), size, tuple(_block(block) for block in _list(tree["blocks"])))
+
+
+def _tree(folder: Path) -> dict[str, object]:
     try:
         tree = json.loads((folder / SEAL).read_text("utf-8"))
-        if tree["version"] != VERSION:
-            raise TandemError(f"{folder / SEAL}: version {tree['version']}, this tandem knows {VERSION}")
-        files = [
-            SealedFile(file["name"], file["size"], tuple(_block(block) for block in file["blocks"]))
-            for file in tree["files"]
-        ]
-        return files, str(tree["head"])
+        version = tree["version"]
     except FileNotFoundError:
         raise TandemError(f"{folder}: it is not sealed; `tandem session seal {folder}`") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise TandemError(f"{folder / SEAL}: cannot be read as a seal ({error})") from None
+    if version != VERSION:
+        raise TandemError(f"{folder / SEAL}: version {version}, this tandem knows {VERSION}")
+    return dict(tree)
 
 
 def _block(tree: dict[str, object]) -> Block:

@@ -100,6 +100,9 @@ def seal_folder(
             help="Table of names: refuse to seal while one of them stands in a file.", dir_okay=False
         ),
     ] = None,
+    key: Annotated[
+        Path | None, typer.Option(help="Sign it with this host's key of `tandem keys`.", dir_okay=False)
+    ] = None,
 ) -> None:
     """Seal a session's files: a chain of SHA-256, of which any changed byte can be named later.
 
@@ -114,7 +117,7 @@ def seal_folder(
         found = names_in(folder, list(Pseudonyms(people, folder).names().values()))
         if found:
             raise TandemError("a name stands in " + "; in ".join(found) + ": use codes as operators' names")
-    typer.echo(f"{folder}: sealed; head {seal(folder)}")
+    typer.echo(f"{folder}: sealed; head {seal(folder, key=key)}")
 
 
 @app.command("verify")
@@ -127,7 +130,7 @@ def verify_folder(
 
     Example: `tandem session verify study/sub-k7pd/ses-01`
     """
-    from deploy.study.seal import verify
+    from deploy.study.seal import signer, verify
 
     written, broken = verify(folder, head)
     if as_json:
@@ -138,7 +141,8 @@ def verify_folder(
     if broken:
         raise TandemError(f"{folder}: {len(broken)} things are not as they were sealed")
     if not as_json:
-        typer.echo(f"{folder}: as it was sealed; head {written}")
+        by = signer(folder)
+        typer.echo(f"{folder}: as it was sealed{f' and signed by {by}' if by else ''}; head {written}")
 
 
 @app.command()

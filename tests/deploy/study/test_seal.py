@@ -7,11 +7,13 @@ import random
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from common.errors import TandemError
 from common.recording import McapRecorder
+from deploy import cli
 from deploy.study.blocks import BLOCK, blocks_of
-from deploy.study.seal import SEAL, seal, verify
+from deploy.study.seal import SEAL, seal, signer, verify
 
 NOW_NS = 1_700_000_000_000_000_000
 
@@ -56,6 +58,7 @@ def test_blocks_cover_a_file_without_a_gap(folder: Path) -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_one_changed_byte_is_placed(folder: Path, name: str, seed: int) -> None:
     seal(folder)
+    blocks = blocks_of(folder / name)
     data = bytearray((folder / name).read_bytes())
     place = random.Random(seed).randrange(len(data))
     data[place] ^= 1 << seed
@@ -65,7 +68,7 @@ def test_one_changed_byte_is_placed(folder: Path, name: str, seed: int) -> None:
     assert broken.offset is not None
     assert broken.length is not None
     assert broken.offset <= place < broken.offset + broken.length
-    chunk = next(b for b in blocks_of(folder / name) if b.offset <= place < b.offset + b.length)
+    chunk = next(b for b in blocks if b.offset <= place < b.offset + b.length)
     assert ("chunk of messages" in broken.words) == (chunk.times_ns is not None and name == "master.mcap")
 
 
@@ -109,3 +112,35 @@ def test_a_folder_without_a_seal_or_files(tmp_path: Path) -> None:
         verify(tmp_path)
     with pytest.raises(TandemError, match="no files"):
         seal(tmp_path)
+
+
+def test_a_signature_is_the_host_s_and_of_this_head(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    keys = tmp_path_factory.mktemp("keys")
+    for command in (
+        ("authority", keys),
+        ("make", keys, "operator:nurse-1"),
+        ("make", keys, "operator:other"),
+    ):
+        made = CliRunner().invoke(cli.app, ["keys", *map(str, command)])
+        assert made.exit_code == 0, made.output
+    seal(folder, key=keys / "operator-nurse-1.key")
+    assert signer(folder) == "operator:nurse-1"
+    assert verify(folder)[1] == []
+    written = json.loads((folder / SEAL).read_text())
+    for forged in (
+        {**written, "certificate": (keys / "operator-other.pem").read_text()},
+        {**written, "signature": "00" + written["signature"][2:]},
+        {**written, "signature": "no hex"},
+        {**written, "certificate": "none"},
+    ):
+        (folder / SEAL).write_text(json.dumps(forged))
+        assert signer(folder) is None
+        assert [broken.name for broken in verify(folder)[1]] == [SEAL]
+
+
+def test_a_key_that_cannot_sign_seals_nothing(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(TandemError, match="cannot be read"):
+        seal(folder, key=tmp_path / "none.key")
+    assert not (folder / SEAL).exists()
