@@ -6,7 +6,7 @@ import pytest
 
 from common.skeleton import load_skeleton
 from deploy.harness.faults.begun import BegunScenes
-from deploy.harness.faults.table import faults_of
+from deploy.harness.faults.table import OF_THE_REACHING_ARM, faults_of
 from deploy.harness.faults.virtual import VirtualFault, try_on_virtual_clock
 from deploy.measure import accuracy, motion
 from deploy.sim.suit.postures import posture_motion
@@ -62,3 +62,14 @@ def test_the_row_fails_without_its_protection(file: str, row: str) -> None:
     fault = faults_of(str(imported(file)))[row]
     assert isinstance(fault, VirtualFault)
     assert try_on_virtual_clock(fault, fault.held_by).wrong
+
+
+@pytest.mark.parametrize("row", ["drive fault", "second suit on the bus"])
+def test_a_robot_without_a_right_arm_is_tried_without_the_rows_of_that_arm(row: str) -> None:
+    table = faults_of("lower_limb")
+    assert not OF_THE_REACHING_ARM & table.keys()
+    assert faults_of("nursing").keys() >= OF_THE_REACHING_ARM
+    fault = table[row]
+    assert isinstance(fault, VirtualFault)
+    outcome = try_on_virtual_clock(fault)
+    assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"

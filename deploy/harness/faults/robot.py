@@ -53,10 +53,12 @@ class _Frozen(Generic[T]):
 
 
 def _name(scene: Scene) -> str:
-    """The nursing robot's, or the first joint of another robot's right upper arm."""
+    """The nursing robot's, or the first joint of another robot's right upper arm, or of all."""
     skeleton = scene.skeleton
     if JOINT in skeleton.joint_names:
         return JOINT
+    if "right_upper_arm" not in skeleton.segment_names:
+        return skeleton.joint_names[0]
     arm = skeleton.segment_names.index("right_upper_arm")
     turns = (
         joint.name for joint in skeleton.joints for a in joint.drives if skeleton.angle_slots[a][0] == arm

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from dataclasses import replace
 
+from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING
 from deploy.harness.faults.begun import BegunScenes
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
@@ -22,7 +23,7 @@ from deploy.harness.faults.shift import SHIFT
 from deploy.harness.faults.slow_link import SLOW_LINK
 from deploy.harness.faults.stop_inputs import STOP_INPUTS
 from deploy.harness.faults.strangers import STRANGERS
-from deploy.harness.faults.suit import SUIT
+from deploy.harness.faults.suit import NODE, SUIT
 from deploy.harness.faults.values import VALUES
 from deploy.harness.faults.virtual import VirtualFault, try_on_virtual_clock
 
@@ -51,8 +52,16 @@ NURSING_ONLY = frozenset(fault.name for fault in DISTANCE)
 """Rows that name joints of the nursing robot."""
 
 
+OF_THE_REACHING_ARM = frozenset(
+    fault.name for fault in (*SUIT, *SHIFT) if fault.concerns is not None or fault.setting.suit
+)
+"""Rows that are about the right arm or its node: a robot without one is tried without them."""
+
+
 def faults_of(profile: str) -> dict[str, FaultRow]:
     """The rows that can be tried with any robot, by name, with the robot of a profile."""
+    has_arm = NODE in load_skeleton(profile).segment_names
+    left_out = NURSING_ONLY if has_arm else NURSING_ONLY | OF_THE_REACHING_ARM
     return {
         fault.name: replace(
             fault,
@@ -60,7 +69,7 @@ def faults_of(profile: str) -> dict[str, FaultRow]:
             otherwise=None if profile == NURSING else OTHERWISE.get(fault.name),
         )
         for fault in VIRTUAL
-        if fault.setting.any_robot and fault.name not in NURSING_ONLY
+        if fault.setting.any_robot and fault.name not in left_out
     }
 
 
