@@ -178,6 +178,7 @@ def files_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
 
 
 @pytest.mark.usefixtures("files_of_the_page")
+@pytest.mark.long
 def test_a_robot_of_the_profile_follows_the_operator() -> None:
     run = VirtualWorld(
         WorldSettings(slave_ahead_ns=0, slave_drift_ppm=0.0, one_way_ns=500_000, profile="one_arm")

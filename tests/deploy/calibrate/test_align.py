@@ -59,6 +59,7 @@ def test_evidence_that_contradicts_itself_writes_nothing(tmp_path: Path) -> None
         assert any(e["verdict"] == "contradicts" for e in report["evidence"]["left_forearm"])
 
 
+@pytest.mark.long
 def test_a_real_person_s_suit(tmp_path: Path, capsys: pytest.CaptureFixture[str], real_person: Path) -> None:
     align(real_person, out=tmp_path, report=tmp_path / "report.json")
     report = json.loads((tmp_path / "report.json").read_text("utf-8"))

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from vqf import VQF
 
 from common.quaternion import Array, angle_between, conjugate, multiply
@@ -62,6 +63,7 @@ def test_mahony_s_error_on_broad_is_no_worse_than_the_reference(recording: LoadR
     assert slow_rotation_total < 3.0
 
 
+@pytest.mark.long
 def test_the_ekf_s_error_is_within_five_degrees_on_each_of_broad(recording: LoadRecording) -> None:
     # the figure is for the whole of the recordings, which takes its time
     scores = scores_deg(recording, lambda rate_hz, count: EkfFilter(EkfConfig(), rate_hz, count))

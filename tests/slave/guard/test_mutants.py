@@ -216,6 +216,7 @@ def test_the_guard_as_it_is_passes_every_story(name: str, make_rig: Callable[...
 
 
 @pytest.mark.timeout(300)  # every story in one test
+@pytest.mark.long
 def test_a_new_gate_without_a_story_would_survive(
     make_rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -134,6 +134,7 @@ def worst(done: Done, sensor: int, strength: float) -> tuple[float, float]:
     return raw_error, error
 
 
+@pytest.mark.long
 def test_it_comes_to_the_end_and_refuses_nothing(done: Done) -> None:
     assert done.session.session.finished
     # the simulated person cannot move the pelvis, so which way it faces cannot be told, and that is said

@@ -242,6 +242,7 @@ def one_arm(file: Path, hand: bool) -> Path:
 
 
 @pytest.mark.parametrize("hand", [True, False])
+@pytest.mark.long
 def test_a_single_arm_follows_too(tmp_path: Path, hand: bool) -> None:
     file, out = one_arm(tmp_path / "arm.xml", hand), tmp_path / "own"
     done = CliRunner().invoke(app, ["profile", "import", str(file), "--out", str(out)])
