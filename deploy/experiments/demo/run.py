@@ -49,14 +49,25 @@ async def keep_demo(options: DemoOptions, stop: asyncio.Event, console: Console)
         _, rig, show = await _started(options, stop, console, stack)
         try:
             for robot in rig.observers:
-                await until_tracking(rig, robot)
-            console.print("the robot follows; Ctrl-C ends the demo", style="green")
+                await _engaged(rig, robot, show, console)
+            console.print("all goes on until Ctrl-C", style="green")
             while not stop.is_set():
                 show.look()
                 await asyncio.sleep(LOOK_S)
         except TandemError:
             if not stop.is_set():
                 raise
+
+
+async def _engaged(rig: Rig, robot: str, show: _Show, console: Console) -> None:
+    """Engage a robot; where it refuses, as somebody stopped it on the page, it is left to the page."""
+    try:
+        await until_tracking(rig, robot)
+    except TandemError as error:
+        show.look()  # raises where a process has ended
+        console.print(f"{error}: engage it on the page", style="yellow")
+    else:
+        console.print(f"{robot} follows", style="green")
 
 
 async def _started(
