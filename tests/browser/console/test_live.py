@@ -102,7 +102,7 @@ def test_a_person_engages_sees_it_move_and_stops_it_by_esc(on_this_host: OnThisH
             page.on("pageerror", lambda error: said.append(str(error)))
             await page.goto(console.operator_address)
             await until_state(page, "holds")
-            assert OPERATOR in await page.inner_text("#badges")
+            await until(page, f"document.getElementById('badges').textContent.includes('{OPERATOR}')")
             await page.wait_for_selector("#scene canvas")
             await engage(page)
             look = "document.querySelector('#scene canvas').toDataURL()"
