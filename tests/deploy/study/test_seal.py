@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import random
+import shutil
+import threading
 from pathlib import Path
 
 import pytest
@@ -18,19 +20,25 @@ from deploy.study.seal import SEAL, seal, signer, verify
 NOW_NS = 1_700_000_000_000_000_000
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "session.json").write_text('{"subject": "k7pd"}')
-    (tmp_path / "deep").mkdir()
-    (tmp_path / "deep" / "notes.txt").write_bytes(random.Random(1).randbytes(3 * BLOCK + 5))
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "session.json").write_text('{"subject": "k7pd"}')
+    (folder / "deep").mkdir()
+    (folder / "deep" / "notes.txt").write_bytes(random.Random(1).randbytes(3 * BLOCK + 5))
     wall_ns = NOW_NS
-    with McapRecorder(tmp_path / "master.mcap", {"role": "master"}, 0.001, wall=lambda: wall_ns) as recorder:
-        for number in range(60):
+    with McapRecorder(folder / "master.mcap", {"role": "master"}, 0.001, wall=lambda: wall_ns) as recorder:
+        for number in range(30):
             wall_ns = NOW_NS + number * 100_000_000
             recorder.put("suit/frames", random.Random(number).randbytes(500), number)
             while recorder.counters.written < number:
-                pass
-    return tmp_path
+                threading.Event().wait(0.001)
+    return folder
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "session"))
 
 
 def test_a_sealed_folder_is_as_it_was(folder: Path) -> None:

@@ -21,9 +21,10 @@ from master.pipeline import MasterPipeline
 
 
 class _Gathered:
-    """Rows of one replay, tick by tick."""
+    """Rows of one replay, tick by tick, from an instant on: filters before it only learn."""
 
-    def __init__(self) -> None:
+    def __init__(self, from_ns: int) -> None:
+        self._from_ns = from_ns
         self.tick_ns: list[int] = []
         self.gyr_rad_s: list[Array] = []
         self.answered: list[Mask] = []
@@ -33,7 +34,11 @@ class _Gathered:
     def look(self, pipeline: MasterPipeline) -> None:
         """After a tick: what its nodes said, and how the segments stand by the filters."""
         sweep = pipeline.last_sweep
-        if sweep is None or (self.tick_ns and sweep.sampled_ns <= self.tick_ns[-1]):
+        if (
+            sweep is None
+            or sweep.sampled_ns < self._from_ns
+            or (self.tick_ns and sweep.sampled_ns <= self.tick_ns[-1])
+        ):
             return
         posture = pipeline.estimator.posture()
         self.tick_ns.append(sweep.sampled_ns)
@@ -48,7 +53,7 @@ def operator_stages(files: Sequence[Path], from_ns: int, until_ns: int, wall_les
 
     `wall_less_ns`: time of day less that clock. Raises RecordingError where nothing can be computed again.
     """
-    gathered = _Gathered()
+    gathered = _Gathered(from_ns)
     with recorded_config(head_of(files[0]), files[0].name) as config:
         replay = Replay(config, look=gathered.look)
         begin_ns = snapshot_ns(files, from_ns)
