@@ -37,7 +37,9 @@ def test_a_killed_camera_changes_one_word_in_the_state_and_nothing_else(
     on_this_host: OnThisHost,
 ) -> None:
     async def story(host: HostWatch) -> None:
-        async with open_rig(overrides={"slave": ['camera.source="robot"']}) as rig:
+        async with open_rig(
+            overrides={"slave": ['camera.source="robot"', "guard.max_video_age_s=0.0"]}
+        ) as rig:
             observer = rig.observer
             await start_tracking(rig)
             assert observer.state is not None
