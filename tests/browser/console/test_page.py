@@ -19,8 +19,10 @@ pytestmark = [
 
 
 def test_it_moves_within_two_seconds_of_opening(page: Any, fake: FakeConsole) -> None:
-    took_ms = []
-    for _ in range(3):  # another process may have taken the cores
+    took_ms: list[float] = []
+    while (
+        len(took_ms) < 6 and min(took_ms, default=9e9) >= 2000.0
+    ):  # another process may have taken the cores
         page.goto(f"{fake.address}/")
         until(page, lambda: page.evaluate("Boolean(window.drawn_ms)"))
         took_ms.append(page.evaluate("window.drawn_ms"))
