@@ -159,9 +159,12 @@ def test_the_deadman_is_a_key_and_the_stop_needs_no_master(on_this_host: OnThisH
             await rig.until(lambda: rig.observer.guard == "hold", 5.0, "hold")
             await until_state(page, "holds")
             assert "deadman" in await page.inner_text("#why")
-            await engage(page, "F9")
+            # opened before: while a page opens, the held one may be too late with its beats
             other = await context.new_page()
             await other.goto(console.address)
+            await until_state(other, "holds")
+            await page.bring_to_front()
+            await engage(page, "F9")
             await until_state(other, "follows")
             await page.close()
             await rig.until(lambda: rig.observer.guard == "hold", 5.0, "hold after the page was lost")
