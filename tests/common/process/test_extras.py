@@ -16,7 +16,7 @@ from deploy import cli
 from slave.servos.dynamixel.bus import Bus
 from slave.servos.dynamixel.port import Port
 
-PACKAGES = {"cyclonedx_py": "cyclonedx_bom"}
+PACKAGES = {"cyclonedx_py": "cyclonedx_bom", "google": "protobuf"}
 """Packages whose module has another name."""
 PROJECT = tomllib.loads((Path(cli.__file__).parents[1] / "pyproject.toml").read_text("utf-8"))["project"]
 

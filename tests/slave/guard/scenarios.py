@@ -138,6 +138,15 @@ def base(make_rig: MakeRig) -> None:
     assert rig.guard.state is State.HOLD
 
 
+@about("watch video")
+def old_picture(make_rig: MakeRig) -> None:
+    """The operator sees a picture of a while ago."""
+    rig = make_rig().to_track()
+    rig.body = Body(video="the operator's newest picture is 3.1 s old, limit 3 s")
+    rig.step()
+    assert rig.guard.state is State.HOLD
+
+
 @about("watch contact")
 def contact(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
