@@ -1,6 +1,6 @@
 // The page: hears the console, shows one state, and asks for the stop. The stop is wired first, before anything else.
 import { Link, setup as askSetup } from "./link.js";
-import { badges, joints_off, situation, stopLights } from "./state.js";
+import { badges, confirms, joints_off, situation, stopLights } from "./state.js";
 import { choose, chosen, LANGUAGES, load, nameOf, other, t, translate } from "./words.js";
 import {
   attention, BodyFigure, Cameras, Events, JointTable, latencyNow, link as linkFacts, make, Minute, shape,
@@ -12,13 +12,14 @@ const OFF_DEG = 5;
 const engineer = document.body.dataset.page === "engineer";
 const seen = { hello: null, view: null, facts: null, setup: null, opened_ms: performance.now(), stopAsked: null, holdKey: "F9" };
 const parts = {};
-const robotOf = () => seen.view?.robot ?? seen.hello?.robot ?? seen.setup?.robot ?? "";
+const robotOf = () => seen.view?.robot ?? seen.hello?.robot ?? seen.setup?.robot ?? link.robot ?? undefined;
 
 // ---- stop: first, so that nothing that fails below can take it away
 
 const link = new Link({
   hello, view, facts, picture: gotPicture,
   answer: (answer) => (answer.to === "stop" ? answer.done && stopConfirmed() : tell(answer.text, answer.done)),
+  stop: ({ stop: told }) => ((seen.stop = told), showStop()), // to a page that is shown nothing else
   bye: (bye) => tell(bye.why, false),
 }, new URLSearchParams(location.search).get("robot"));
 let stopConfirmed = () => {};
@@ -57,6 +58,7 @@ function keyDown(event) {
   }
   if (event.key === seen.holdKey && mayHold()) {
     event.preventDefault();
+    seen.heldCode = event.code;
     if (!event.repeat) hold(true);
     return;
   }
@@ -67,7 +69,8 @@ function keyDown(event) {
 
 function keyUp(event) {
   if (event.key === " ") event.preventDefault();
-  if (event.key === seen.holdKey) hold(false);
+  // the key's place too: with Shift or another layout it has another name when it comes up
+  if (event.key === seen.holdKey || (event.code && event.code === seen.heldCode)) hold(false);
   KEYS[event.key]?.up?.();
 }
 
@@ -81,9 +84,11 @@ function engaging(down) {
   engage = null;
   $("engage").classList.toggle("down", down && Boolean(seen.hello?.may?.act));
   if (!down) return;
-  if (seen.hello?.may?.act) engage = setTimeout(() => act("engage"), ENGAGE_MS);
+  if (seen.hello?.may?.act) engage = setTimeout(() => (blind() ? tell(t("told.no_contact"), false) : act("engage")), ENGAGE_MS);
   else tell(t("may.not"), false);
 }
+
+const blind = () => situation(now()).id === "no_contact";
 
 async function act(name, more = {}) {
   if (!seen.hello?.may?.act && name !== "reset") return tell(t("may.not"), false);
@@ -155,8 +160,11 @@ async function hello(message) {
   const other_robot = seen.setup && seen.setup.robot !== message.robot;
   parts.session = message.session;
   seen.hello = message;
+  seen.stop = null;
   if (message.role === "nobody") seen.view = seen.facts = null;
   link.quiet = message.role === "nobody";
+  $("hold").classList.remove("down");
+  if (message.may?.hold) link.letGo();
   show();
   if (link.quiet) return;
   if (!seen.setup || other_console || other_robot) await prepare(message.robot);
@@ -200,7 +208,7 @@ function view(message) {
   if (message.guard !== "estop" && !message.stop && performance.now() - (seen.stopped_ms ?? 0) > 3000) {
     if (seen.stopAsked === "sent") seen.stopAsked = null;
   }
-  if (message.stop && seen.stopAsked) stopConfirmed();
+  if (seen.stopAsked && confirms(message.stop, (performance.now() - seen.stopped_ms) / 1000)) stopConfirmed();
   const known = seen.setup && message.encoder?.length === seen.setup.joints.length;
   if (known && message.heard !== "none") {
     parts.robot?.show(message);
@@ -295,7 +303,7 @@ function showBadges() {
 }
 
 function showStop(id = situation(now()).id) {
-  const found = stopLights(id, seen.view, seen.stopAsked);
+  const found = stopLights(id, seen.view ?? { stop: seen.stop }, seen.stopAsked);
   $("stop").classList.toggle("dead", found.dead || Boolean(seen.setup?.replay));
   put($("stop-word"), t(seen.setup?.hardware_estop ? "stop.hardware" : "stop"));
   const others = LANGUAGES[1 - LANGUAGES.indexOf(chosen())];

@@ -303,12 +303,12 @@ export class Cameras {
       const found = picture(header, page_ms, (performance.now() - header.arrived_ms) / 1000, stale_s);
       box.classList.remove("none");
       box.classList.toggle("stale", found.stale);
-      if (found.stale) over.textContent = t("picture.stale", { age: found.age_s.toFixed(1) });
+      if (found.stale) over.textContent = t(found.known ? "picture.stale" : "picture.stale_least", { age: found.age_s.toFixed(1) });
       if (!oldest || found.age_s > oldest.age_s) oldest = found;
     }
     if (!oldest || !line) return;
     const age = { age: oldest.age_s.toFixed(1), ms: (oldest.age_s * 1000).toFixed(0), bound: Math.ceil(oldest.bound_ms ?? 0) };
-    line.textContent = t(oldest.stale ? "picture.old" : "picture.age", age);
+    line.textContent = t(!oldest.known ? "picture.age_unknown" : oldest.stale ? "picture.old" : "picture.age", age);
   }
 }
 

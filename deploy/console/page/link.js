@@ -107,7 +107,11 @@ export class Link {
     return true;
   }
 
-  /** Ask for the stop, by the socket and by a request that survives the page, until the console has confirmed. */
+  /**
+   * Ask for the stop, by the socket and by a request that survives the page, until the console has confirmed.
+   *
+   * Without a robot's name the console takes the one that this page shows, or its first.
+   */
   stop(robot, told) {
     clearTimeout(this.stopping?.timer);
     const stopping = { sent: false, timer: null };
@@ -137,6 +141,13 @@ export class Link {
     clearInterval(this.beat);
     this.beat = down ? setInterval(say, BEAT_MS) : null;
     say();
+  }
+
+  /** Let the deadman go, and say so whether or not it was held: a page that comes back must not go on holding. */
+  letGo() {
+    clearInterval(this.beat);
+    this.beat = null;
+    this.send({ kind: "held", n: this.drawnView, down: false });
   }
 
   /** What a person asks of the robot: {done, text, status}. */

@@ -61,10 +61,20 @@ export function badges(seen) {
   return found;
 }
 
-/** A picture's age and whether it is too old to act upon. `since_s`: since it arrived at this page. */
+/**
+ * A picture's age and whether it is too old to act upon. `since_s`: since it arrived at this page.
+ *
+ * Where the clocks' offset is not known (`age_ms` null), `age_s` is the least that it can be, and `known` is false.
+ */
 export function picture(header, page_ms, since_s, stale_s) {
-  const age_s = (header.age_ms + (page_ms ?? 0)) / 1000 + since_s;
-  return { age_s, bound_ms: header.bound_ms, stale: age_s > stale_s };
+  const known = typeof header.age_ms === "number";
+  const age_s = known ? (header.age_ms + (page_ms ?? 0)) / 1000 + since_s : since_s;
+  return { age_s, bound_ms: header.bound_ms, known, stale: age_s > stale_s };
+}
+
+/** Whether the console tells of a stop that was asked `since_s` ago or later: an older one is not this page's. */
+export function confirms(stop, since_s) {
+  return typeof stop?.since_s === "number" && stop.since_s <= since_s;
 }
 
 /**

@@ -41,6 +41,10 @@ class FakeConsole:
         self.guard, self.reason = "track", "follows nurse-1"
         self.silent = False
         """Frames are no longer sent, and stops are not answered."""
+        self.mute = False
+        """No socket is told anything, as where too many pages are open; posts are answered."""
+        self.told_stop: dict[str, Any] | None = None
+        """What a page that may not look is told of its stop."""
         self.pictures = True
         self.picture: bytes | None = None
         self.still = False
@@ -167,7 +171,7 @@ class FakeConsole:
             self._stop()
 
     async def _send(self, socket: web.WebSocketResponse, acknowledged: dict[str, int]) -> None:
-        while self.silent:  # noqa: ASYNC110 - a test sets it from another thread
+        while self.silent or self.mute:  # noqa: ASYNC110 - a test sets it from another thread
             await asyncio.sleep(0.04)
         who = {"role": self.role, "person": "nurse-1", "may": self.may, "session": "0badcafe"}
         await socket.send_json({"kind": "hello", "robot": "robot-1", "viewers": len(self._sockets), **who})
@@ -176,7 +180,9 @@ class FakeConsole:
             await asyncio.sleep(0.04)
             turn += 1
             self.most_unacknowledged = max(self.most_unacknowledged, n - acknowledged["n"])
-            if self.silent or self.role == "nobody" or n - acknowledged["n"] >= WINDOW:
+            if self.role == "nobody" and self.stop is not None and self.told_stop is not None:
+                await socket.send_json({"kind": "stop", "stop": self.told_stop})
+            if self.silent or self.mute or self.role == "nobody" or n - acknowledged["n"] >= WINDOW:
                 continue
             n += 1
             await socket.send_json(self._view(n))

@@ -91,8 +91,8 @@ def test_without_messages_it_is_black_and_says_that_a_stop_was_not_sent(page: An
 def test_it_comes_back_when_the_socket_was_cut(page: Any, fake: FakeConsole) -> None:
     until(page, lambda: state(page) == "follows")
     fake.drop_sockets()
-    until(page, lambda: page.evaluate("performance.getEntriesByType('resource').length") > 0)
-    until(page, lambda: state(page) == "follows")
+    fake.guard, fake.reason = "hold", "nobody has engaged"
+    until(page, lambda: state(page) == "holds")
 
 
 def test_a_second_page_sees_the_same(page: Any, fake: FakeConsole) -> None:
@@ -137,7 +137,66 @@ def test_the_deadman_beats_while_its_key_is_held(page: Any, fake: FakeConsole) -
     beats = fake.of_kind("held")
     page.wait_for_timeout(300)
     assert len(fake.of_kind("held")) == len(beats)
-    assert all(beat["n"] > 0 for beat in beats)
+    assert all(beat["n"] > 0 for beat in beats if beat["down"])
+
+
+def test_the_deadmans_key_is_let_go_also_under_another_name(page: Any, fake: FakeConsole) -> None:
+    fake.setup = {"deadman_key": "h"}
+    page.reload()
+    until(page, lambda: state(page) == "follows" and page.is_visible("#hold"))
+    page.keyboard.down("h")
+    until(page, lambda: len([beat for beat in fake.of_kind("held") if beat["down"]]) >= 2)
+    page.evaluate("window.dispatchEvent(new KeyboardEvent('keyup', { key: 'H', code: 'KeyH' }))")
+    until(page, lambda: fake.of_kind("held")[-1]["down"] is False)
+
+
+def test_a_page_that_comes_back_holds_nothing(page: Any, fake: FakeConsole) -> None:
+    until(page, lambda: state(page) == "follows" and page.is_visible("#hold"))
+    page.keyboard.down("F9")
+    until(page, lambda: len([beat for beat in fake.of_kind("held") if beat["down"]]) >= 2)
+    fake.drop_sockets()
+    until(page, lambda: fake.of_kind("held")[-1]["down"] is False)
+    page.wait_for_timeout(300)
+    assert fake.of_kind("held")[-1]["down"] is False, "the key is still down"
+    assert "down" not in (page.get_attribute("#hold", "class") or "")
+
+
+def test_nobody_engages_what_the_page_does_not_see(page: Any, fake: FakeConsole) -> None:
+    fake.guard, fake.reason = "hold", "nobody has engaged"
+    until(page, lambda: state(page) == "holds")
+    fake.mute = True
+    until(page, lambda: state(page) == "no_contact")
+    page.keyboard.down("F2")
+    until(page, lambda: "Not sent" in page.inner_text("#told"))
+    page.keyboard.up("F2")
+    assert ("act", {"act": "engage", "robot": "robot-1"}) not in fake.posted
+
+
+def test_a_page_that_is_told_nothing_stops_the_robot_that_its_address_names(
+    page: Any, fake: FakeConsole
+) -> None:
+    fake.mute = True
+    page.goto(f"{fake.address}/?robot=robot-2")
+    until(page, lambda: state(page) == "no_contact")
+    page.keyboard.press("Escape")
+    until(page, lambda: ("stop", {"robot": "robot-2"}) in fake.posted)
+
+
+def test_the_stop_says_that_it_is_not_ready_where_the_page_is_not_whole(page: Any, fake: FakeConsole) -> None:
+    page.route("**/page/facts.js", lambda route: route.abort())
+    page.goto(fake.address)
+    until(page, lambda: "NOT READY" in page.inner_text("#stop-note"))
+    assert "dead" in page.get_attribute("#stop", "class")
+
+
+def test_who_may_not_look_reads_that_his_stop_failed(page: Any, fake: FakeConsole) -> None:
+    fake.role, fake.may = "nobody", {"stop": True, "act": False, "reset": False, "hold": False}
+    lights = {"since_s": 0.0, "asked_s": 0.0, "robot_s": None, "stands_s": None}
+    fake.told_stop = {**lights, "failed": "no answer"}
+    page.reload()
+    until(page, lambda: state(page) == "locked")
+    page.keyboard.press("Escape")
+    until(page, lambda: "NOT STOPPED: no answer" in page.inner_text("#stop-note"))
 
 
 def test_the_deadman_is_let_go_when_the_page_loses_the_focus(page: Any, fake: FakeConsole) -> None:

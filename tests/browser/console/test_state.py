@@ -79,6 +79,22 @@ def test_a_picture_older_than_half_a_second_is_stale(tmp_path: Path, since_s: fl
     assert found["stale"] is stale
 
 
+@pytest.mark.parametrize(("since_s", "stale"), [(0.5, False), (0.51, True)])
+def test_a_picture_of_unknown_age_is_not_said_to_be_new(tmp_path: Path, since_s: float, stale: bool) -> None:
+    found = ask(tmp_path, "picture", {"age_ms": None, "bound_ms": None}, 10.0, since_s, 0.5)
+    assert (found["known"], found["age_s"], found["stale"]) == (False, since_s, stale)
+
+
+@pytest.mark.parametrize(
+    ("stop", "confirmed"),
+    [(None, False), ({}, False), ({"since_s": 0.2}, True), ({"since_s": 0.21}, False)],
+)
+def test_an_older_stop_confirms_no_later_press(
+    tmp_path: Path, stop: dict[str, Any] | None, confirmed: bool
+) -> None:
+    assert ask(tmp_path, "confirms", stop, 0.2) is confirmed
+
+
 def test_lights_of_a_stop(tmp_path: Path) -> None:
     def lights(state: str, stop: dict[str, Any] | None, asked: str | None) -> list[bool]:
         given = {**VIEW, "stop": stop}
