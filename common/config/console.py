@@ -11,6 +11,8 @@ from pydantic import Field
 from common.config.section import RelativePath, Section
 from common.errors import ConfigMistake
 
+PAGE_KEYS = ("Escape", " ", "F2", "F3", "F4", "F6", "F7")
+"""What the page's other keys are called by browsers: the first two stop the robot."""
 _HOST_NAME = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]{0,251}[A-Za-z0-9])?")
 
 
@@ -52,6 +54,8 @@ class ConsoleConfig(Section):
         host, colon, port = self.listen.rpartition(":")
         if not colon or not port.isdigit() or int(port) > 65535 or not _is_address(host.strip("[]")):
             return [ConfigMistake("console.listen", self.listen, "an address and a port: 127.0.0.1:8080")]
+        if self.deadman_key in PAGE_KEYS:
+            return [ConfigMistake("console.deadman_key", self.deadman_key, "a key without another use")]
         wrong = [name for name in self.names if not _HOST_NAME.fullmatch(name)]
         if wrong:
             return [ConfigMistake("console.names", wrong[0], "a host's name or address, without a port")]

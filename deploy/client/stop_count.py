@@ -28,7 +28,7 @@ class StopCount:
         if not answer.stopped or replier in self._stopped:
             return None
         shown = self._shown.get(answer.instance)
-        place = shown.words if shown is not None and self._several else ""
+        place = shown.words if shown is not None and self.several else ""
         acknowledged = RobotAnswer(self._robot, True, answer.text, answer.guard, answer.instance, place)
         self._stopped[replier] = acknowledged
         return acknowledged
@@ -53,12 +53,13 @@ class StopCount:
 
     def namesakes(self) -> str | None:
         """The warning if several robots have the name, else None."""
-        if not self._several:
+        if not self.several:
             return None
         return several_bear(self._robot, [each.words for each in self._shown.values()] or ["unknown places"])
 
     @property
-    def _several(self) -> bool:
+    def several(self) -> bool:
+        """Whether more than one process bears the name, as far as is known."""
         return len(self._shown.keys() | self._stopped.keys()) > 1
 
     def _silent(self) -> list[ProcessPresence]:

@@ -12,6 +12,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from common.clock import monotonic_ns
 from common.link import LinkSession
+from common.log.throttle import LogThrottle
 from common.wire.messages import Action
 from deploy.client.destination import Destination
 from deploy.console.acts import MARK, ActRefusedError, carry_out, read_act, read_mark
@@ -21,6 +22,7 @@ from deploy.console.session import SESSION_S, Person, RateLimit
 from deploy.console.viewers import MOST, REQUESTS_PER_S, OpenPage, pack
 
 COOKIE = "tandem_console"
+STOP_PATH = "/api/stop"
 LONGEST = 4096
 """Bytes of a message or a body."""
 READS_PER_S = 200.0
@@ -68,6 +70,7 @@ class ConsoleApp:
         self._on_login = on_login
         self._files = files or PageFiles()
         self._robots = tuple(hub.models)
+        self._throttle = LogThrottle()
         self._rates: dict[tuple[str, float], RateLimit] = {}
 
     def make(self) -> web.Application:
@@ -82,7 +85,7 @@ class ConsoleApp:
         app.router.add_post("/api/login", self._log_in)
         app.router.add_post("/api/logout", self._log_out)
         app.router.add_post("/api/act", self._act)
-        app.router.add_post("/api/stop", self._stop)
+        app.router.add_post(STOP_PATH, self._stop)
         return app
 
     @web.middleware
@@ -93,10 +96,12 @@ class ConsoleApp:
         if not words and (request.method != "GET" or request.path == "/ws"):
             words = access.wrong_origin(request.headers.get("Origin", ""), request.host)
         if words:
-            log.warning("refused %s %s: %s", request.method, request.path, words)
+            if self._throttle.passes(monotonic_ns()):
+                log.warning("refused %s %r: %s", request.method, request.path, words)
             return _error(403, words)
         limit = REQUESTS_PER_S if request.method == "POST" else READS_PER_S
-        if not self._passes(request, limit):
+        # all that share an address share its limit: what others send must not take the stop away
+        if request.path != STOP_PATH and not self._passes(request, limit):
             access.count_refusal("rate")
             return _error(429, f"more than {limit:g} requests a second")
         try:
@@ -176,7 +181,7 @@ class ConsoleApp:
     async def _log_out(self, request: web.Request) -> web.StreamResponse:
         secret, _ = self._person(request)
         self._hub.access.log_out(secret)
-        self._hub.refresh(secret)
+        self._hub.refresh(monotonic_ns())
         response = _answer({})
         response.del_cookie(COOKIE, path="/")
         return response
@@ -207,7 +212,7 @@ class ConsoleApp:
         return self._stopped(request, await _body(request))
 
     def _stopped(self, request: web.Request, body: Mapping[str, object]) -> web.StreamResponse:
-        robot = body.get("robot", self._robots[0])
+        robot = body.get("robot") or self._robots[0]
         if not isinstance(robot, str) or robot not in self._hub.stoppers:
             return _error(400, f"no such robot here: expected one of {', '.join(self._robots)}")
         _, person = self._person(request)
@@ -253,24 +258,26 @@ class ConsoleApp:
                 access.count_refusal("size" if message.data.code == WSCloseCode.MESSAGE_TOO_BIG else "form")
                 break
             now_ns = monotonic_ns()
+            body = _parsed(message.data) if message.type is WSMsgType.TEXT else None
+            kind = None if body is None else body.get("kind")
+            if body is not None and kind == "stop":  # before any limit
+                self._request(page, kind, body.get("robot") or page.model.robot)
             if not page.messages.passes(now_ns):
                 access.count_refusal("rate")
                 return "too many messages"
-            body = _parsed(message.data) if message.type is WSMsgType.TEXT else None
             if body is None:
                 access.count_refusal("form")
                 return "a message that is no JSON object"
-            kind = body.get("kind")
             if kind == "ack":
                 page.acknowledge(body.get("n"))
             elif kind == "held":
                 words = self._hub.held(page, body.get("down") is True, body.get("n"))
                 if words:
                     page.say({"kind": "answer", "to": "held", "done": False, "text": words})
-            elif not page.requests.passes(now_ns) and kind != "stop":
+            elif kind != "stop" and not page.requests.passes(now_ns):
                 access.count_refusal("rate")
                 return f"more than {REQUESTS_PER_S:g} requests a second"
-            else:
+            elif kind != "stop":
                 self._request(page, kind, body.get("robot", page.model.robot))
         return ""
 
@@ -280,6 +287,7 @@ class ConsoleApp:
             text = f"no such robot here: expected one of {', '.join(self._robots)}"
             page.say({"kind": "answer", "to": str(kind)[:20], "done": False, "text": text})
         elif kind == "stop":
+            page.asked_stop |= robot == page.model.robot
             shown = self._hub.stoppers[str(robot)].stop(f"console: {page.name}")
             page.say({"kind": "answer", "to": "stop", "done": True, "text": "asked", "id": shown.number})
         elif kind == "robot":

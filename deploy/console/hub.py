@@ -45,6 +45,8 @@ class Hub:
     engaged: dict[str, str] = field(default_factory=dict)
     """By robot, the log-in of the page that engaged it."""
     _gone_ns: dict[str, int] = field(default_factory=dict)
+    _lapsed: set[str] = field(default_factory=set)
+    """Log-ins of pages that were lost while they held: where they come back, they must let go first."""
     _process: psutil.Process = field(default_factory=psutil.Process)
 
     @property
@@ -54,6 +56,8 @@ class Hub:
 
     def enter(self, page: OpenPage) -> None:
         """A page opened."""
+        page.lapsed = page.secret in self._lapsed
+        self._lapsed.discard(page.secret)
         self.pages.append(page)
         self.greet(page)
         log.info("page opened: %s sees %s (%d open)", page.name, page.model.robot, len(self.pages))
@@ -61,6 +65,8 @@ class Hub:
     def leave(self, page: OpenPage) -> None:
         """A page closed: what it held is released."""
         self.pages.remove(page)
+        if page.holds or page.lapsed:
+            self._lapsed.add(page.secret)
         self.release(page)
         log.info("page closed: %s (%d open)", page.name, len(self.pages))
 
@@ -99,10 +105,13 @@ class Hub:
             for robot in watched:
                 self._show_view(self.models[robot], now_ns)
             if due.tick % FACTS_EVERY == 0:
+                self.refresh(now_ns)
                 for model in self.models.values():
                     self._show_facts(model, now_ns)
             self._watch_pages(now_ns)
             self._watch_deadman(now_ns)
+            for page in self.pages:
+                page.tell_stop(now_ns)
 
     def held(self, page: OpenPage, down: bool, number: object) -> str:
         """A beat of the deadman from a page; the words where it does not count, else empty."""
@@ -114,6 +123,8 @@ class Hub:
             self.release(page)
             page.lapsed = False
             return ""
+        if self._silent(page, monotonic_ns()):
+            self._lapse(page)
         if page.lapsed:
             return "the page fell silent while it held: release, then press again"
         if any(other.holds for other in self.pages if other is not page):
@@ -130,11 +141,12 @@ class Hub:
             self.deadman.beat(False)
         page.holds = False
 
-    def refresh(self, secret: str) -> None:
-        """Somebody logged in or out: his pages are told."""
+    def refresh(self, now_ns: int) -> None:
+        """Take the role from pages whose log-in has ended, by a person or by its age, and tell them."""
         for page in self.pages:
-            if page.secret == secret:
-                page.person = self.access.person(secret, monotonic_ns())
+            person = self.access.person(page.secret, now_ns)
+            if person != page.person:
+                page.person = person
                 self.greet(page)
 
     def _show_view(self, model: RobotModel, now_ns: int) -> None:
@@ -162,11 +174,18 @@ class Hub:
         if self.deadman is None:
             return
         for page in self.pages:
-            if page.holds and now_ns - page.beat_ns > to_ns(BEAT_S):
-                page.lapsed = True
-                self.release(page)
+            if self._silent(page, now_ns):
+                self._lapse(page)
         if not any(page.holds for page in self.pages):
             self.deadman.beat(False)
+
+    @staticmethod
+    def _silent(page: OpenPage, now_ns: int) -> bool:
+        return page.holds and now_ns - page.beat_ns > to_ns(BEAT_S)
+
+    def _lapse(self, page: OpenPage) -> None:
+        page.lapsed = True
+        self.release(page)
 
     def _figures(self) -> dict[str, object]:
         return {

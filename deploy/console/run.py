@@ -29,7 +29,7 @@ from deploy.console.model.pictures import STALE_S
 from deploy.console.model.robot import SILENT_S, RobotModel, Side, Whose
 from deploy.console.model.scene import scene
 from deploy.console.outbox import WINDOW
-from deploy.console.session import Access, PageRole, Person
+from deploy.console.session import TOKEN_S, Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
 
 log = logging.getLogger(__name__)
@@ -128,11 +128,19 @@ async def _serve(
     try:
         await web.SockSite(runner, door.listener, ssl_context=tls).start()
         options.on_ready(f"console: {address} (without a token it only shows, and stops)")
-        for role in (PageRole.OPERATOR, PageRole.ENGINEER):
-            offer(person_of(role, options.where.operator if role is PageRole.OPERATOR else ""))
-        await hub.show()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(_offer_again(offer, options.where.operator))
+            await hub.show()
     finally:
         await runner.cleanup()
+
+
+async def _offer_again(offer: Callable[[Person], None], operator: str) -> None:
+    """Offer tokens now, and new ones as often as they grow too old, until cancelled."""
+    while True:
+        for role in (PageRole.OPERATOR, PageRole.ENGINEER):
+            offer(person_of(role, operator if role is PageRole.OPERATOR else ""))
+        await asyncio.sleep(TOKEN_S)
 
 
 def _setup(options: ConsoleOptions) -> dict[str, object]:

@@ -75,6 +75,7 @@ class Access:
 
     def issue(self, person: Person, now_ns: int) -> str:
         """A token with which somebody may log in once."""
+        self._tokens = {token: ticket for token, ticket in self._tokens.items() if now_ns <= ticket.until_ns}
         token = self._draw()
         self._tokens[token] = _Ticket(person, now_ns + to_ns(TOKEN_S))
         return token

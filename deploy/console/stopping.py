@@ -8,7 +8,7 @@ import logging
 from common.clock import monotonic_ns
 from common.link import Link, LinkSession
 from common.wire.presence import ProcessPresence
-from common.wire.stop import pack_stop
+from common.wire.stop import STOPPED, pack_stop
 from common.wire.topics import STOP
 from deploy.client.answer import RobotAnswer
 from deploy.client.stop import OnAnswer, repeat_until_stopped
@@ -21,6 +21,7 @@ UNANSWERED_S = 1.0
 GIVE_UP_S = 60.0
 NOT_STOPPED = "no answer from the robot: use the switch at the robot. This console keeps asking"
 GIVEN_UP = "no answer from the robot for 60 s, so it is no longer asked: use the switch at the robot"
+ONE_SILENT = "a second robot of this name has not answered: use the switch at each robot"
 
 log = logging.getLogger(__name__)
 
@@ -34,6 +35,9 @@ class RobotStopper:
         self._operator = operator
         self._here: dict[int, ProcessPresence] = {}
         self._task: asyncio.Task[None] | None = None
+        self._count = StopCount(model.robot, GIVE_UP_S)
+        self._shown: StopShown | None = None
+        """What the questions under way are for."""
         self._number = 0
 
     def watch(self, session: LinkSession) -> None:
@@ -43,10 +47,17 @@ class RobotStopper:
     def stop(self, by: str) -> StopShown:
         """Ask for a stop. A stop under way goes on, and a robot that is stopped already is asked again."""
         self._number += 1
-        shown = self._model.asked_to_stop(self._number, by, monotonic_ns())
-        if self._task is None or self._task.done():
+        under_way = self._task is not None and not self._task.done()
+        shown = self._model.asked_to_stop(self._number, by, monotonic_ns(), under_way)
+        if not under_way or shown is not self._shown:
+            if self._task is not None:
+                self._task.cancel()
+            self._shown = shown
             log.warning("%s: %s asks to stop it", self._model.robot, by)
-            self._task = asyncio.create_task(self._repeat())
+            self._count = StopCount(self._model.robot, GIVE_UP_S)
+            for presence in self._here.values():
+                self._count.expect(presence)
+            self._task = asyncio.create_task(self._repeat(self._count))
         return shown
 
     async def close(self) -> None:
@@ -63,10 +74,7 @@ class RobotStopper:
         else:
             self._here.pop(presence.instance, None)
 
-    async def _repeat(self) -> None:
-        count = StopCount(self._model.robot, GIVE_UP_S)
-        for presence in self._here.values():
-            count.expect(presence)
+    async def _repeat(self, count: StopCount) -> None:
         known = asyncio.Event()
         known.set()
 
@@ -82,20 +90,22 @@ class RobotStopper:
             self._fail(GIVEN_UP)
         finally:
             unanswered.cancel()
-        stop = self._model.stop
-        if count.complete and stop is not None:
-            stop.failed = ""
 
     def _on_answer(self, answer: RobotAnswer) -> None:
         stop = self._model.stop
         if stop is None:
             return
         stop.text = answer.text
-        if stop.robot_ns is None:
-            stop.robot_ns, stop.failed = monotonic_ns(), ""
+        if self._count.complete:
+            stop.failed = ""
+            if stop.robot_ns is None:
+                stop.robot_ns = monotonic_ns()
 
     def _fail(self, words: str) -> None:
-        stop = self._model.stop
-        if stop is not None and stop.robot_ns is None:
-            stop.failed = words
-            log.warning("%s: the stop is not acknowledged: %s", self._model.robot, words)
+        """Say so, unless each robot of that name has acknowledged or the only one says that it is stopped."""
+        stop, count = self._model.stop, self._count
+        says_so = self._model.guard == STOPPED and not self._model.silent(monotonic_ns())
+        if stop is None or count.complete or (says_so and not count.several):
+            return
+        stop.failed = ONE_SILENT if any(answer.done for answer in count.answers()) else words
+        log.warning("%s: the stop is not acknowledged: %s", self._model.robot, stop.failed)

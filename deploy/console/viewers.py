@@ -54,6 +54,9 @@ class OpenPage:
         """When it last said so."""
         self.lapsed = False
         """Fell silent while it held: must release before it can hold again."""
+        self.asked_stop = False
+        """Whether it asked for a stop of the robot that it shows."""
+        self._stop_told: Mapping[str, object] | None = None
         self._first: list[str] = []
         self._ready = asyncio.Event()
 
@@ -93,6 +96,17 @@ class OpenPage:
         self.outbox.offer(f"picture {camera}", make)
         self._ready.set()
 
+    def tell_stop(self, now_ns: int) -> None:
+        """What became of the stop that this page asked for, where no view tells it: not who else asked."""
+        if self.person.role.sees or not self.asked_stop:
+            return
+        stop = self.model.stop
+        told = None if stop is None else stop.lights()
+        if told != self._stop_told:
+            self._stop_told = told
+            since_s = None if stop is None else stop.shown(now_ns)["since_s"]
+            self.say({"kind": "stop", "stop": None if told is None else {**told, "since_s": since_s}})
+
     def acknowledge(self, number: object) -> None:
         """The page has processed all up to this number."""
         if type(number) is int and self.outbox.acknowledge(number, monotonic_ns()):
@@ -106,6 +120,7 @@ class OpenPage:
     def turn_to(self, model: RobotModel) -> None:
         """Show another robot."""
         self.model = model
+        self.asked_stop, self._stop_told = False, None
         self.outbox.clear()
 
     async def write(self) -> None:

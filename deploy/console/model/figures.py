@@ -64,12 +64,12 @@ class RobotFigures:
         """Whether the robot says that it has a camera."""
         return self._robot is not None and self._robot.video is not None
 
-    def stages(self) -> list[dict[str, object]]:
+    def stages(self, now_ns: int) -> list[dict[str, object]]:
         """The latency budget: the master's own stages are those of the robot's table where there are any."""
         summaries: Mapping[str, Summary] = {}
-        if self._robot is not None:
+        if self._robot is not None and now_ns - self._robot_ns <= SILENT_NS:
             summaries = self._robot.stages_ms
-        if not summaries and self._master is not None:
+        if not summaries and self._master is not None and now_ns - self._master_ns <= SILENT_NS:
             summaries = self._master.stages_ms
         return [
             {

@@ -42,30 +42,37 @@ class LatenessLog:
         """When it was told."""
         self.creep = CreepWatch()
         self._sampled: dict[tuple[int, int], int] = {}
-        self._echoed = 0, 0
+        self._told = 0, 0, False
+        """Number and put of the newest command that was told of, and whether it was written."""
+        self._hears_commands = False
         self._second = 0
         self._in_second: list[tuple[float, float | None]] = []
         self._seconds: deque[tuple[int, float, float | None]] = deque(maxlen=KEPT_S)
 
     def on_command(self, command: Command) -> None:
         """A command left: remember when it was sampled."""
+        self._hears_commands = True
         self._sampled[command.sequence, command.stamps.put_ns] = command.stamps.sampled_ns
         while len(self._sampled) > _REMEMBERED:
             self._sampled.pop(next(iter(self._sampled)))
 
     def on_state(self, state: RobotState, arrived_ns: int, masters_clock: bool) -> CommandLateness | None:
-        """The lateness of a command that the state is the first to tell of.
+        """The lateness of a command that the state is the first to tell of, or to tell that it was written.
 
         `masters_clock`: whether `arrived_ns` is of the master's clock.
         """
         echo = state.echo
-        if echo is None or (echo.sequence, echo.put_ns) == self._echoed:
+        if echo is None:
             return None
-        self._echoed = echo.sequence, echo.put_ns
+        written = echo.written_ns >= echo.received_ns
+        told = echo.sequence, echo.put_ns, written
+        if told == self._told:
+            return None
+        self._told = told
         offset = master_offset(state)
-        sampled_ns = self._sampled.pop(self._echoed, None)
+        sampled_ns = self._sampled.get((echo.sequence, echo.put_ns))
         whole = None
-        if sampled_ns is not None and offset.trusted and echo.written_ns >= echo.received_ns:
+        if sampled_ns is not None and offset.trusted and written:
             whole = offset.remote_ns(echo.written_ns) - sampled_ns
         self.newest = CommandLateness(
             echo.sequence,
@@ -75,23 +82,31 @@ class LatenessLog:
             offset.bound_ns if offset.trusted else None,
         )
         self.newest_ns = arrived_ns
-        self._record(self.newest, arrived_ns)
+        self._record(whole if self._hears_commands else self.newest.one_way_ns, self.newest, arrived_ns)
         return self.newest
 
     def seconds(self, now_ns: int) -> list[list[float | None]]:
-        """[s before now, median ms, bound ms] of each whole second that is known, oldest first."""
-        self._close(now_ns // NS_PER_S)
+        """[s before now, median ms, bound ms] of each whole second, oldest first.
+
+        It begins with the first that is known; later ones that are not have None, so that a curve has gaps.
+        """
+        this = now_ns // NS_PER_S
+        self._close(this)
+        known = {second: (value, bound) for second, value, bound in self._seconds}
         return [
-            [round(to_s(second * NS_PER_S - now_ns), 1), value, bound]
-            for second, value, bound in self._seconds
-            if now_ns - second * NS_PER_S <= (KEPT_S + 1) * NS_PER_S
+            [round(to_s(second * NS_PER_S - now_ns), 1), *known.get(second, (None, None))]
+            for second in range(max(min(known, default=this), this - KEPT_S), this)
         ]
 
-    def _record(self, one: CommandLateness, arrived_ns: int) -> None:
+    def _record(self, late_ns: int | None, one: CommandLateness, arrived_ns: int) -> None:
+        """One figure for the minute and the creep: a console that hears no commands knows the way alone.
+
+        It never changes from the one to the other: each hold would look like less latency, and the next
+        engagement like a latency that creeps.
+        """
         self._close(arrived_ns // NS_PER_S)
-        value = one.whole_ns if one.whole_ns is not None else one.one_way_ns
-        if value is not None:
-            self._in_second.append((to_ms(value), ms(one.bound_ns)))
+        if late_ns is not None:
+            self._in_second.append((to_ms(late_ns), ms(one.bound_ns)))
 
     def _close(self, second: int) -> None:
         if second == self._second:

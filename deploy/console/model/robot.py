@@ -82,14 +82,14 @@ class RobotModel:
     def on_state(self, state: RobotState, arrived_ns: int, source: str) -> None:
         """A state came, from the tap or from the link."""
         self._state, self._state_ns, self._source = state, arrived_ns, source
-        self._still.add(state.encoder_ns, state.position_rad)
+        read_anew = self._still.add(state.encoder_ns, state.position_rad, state.encoder_valid)
         self.lateness.on_state(state, arrived_ns, self.whose.side is Side.OPERATOR and source == TAP)
         self._was_silent = False
         if (state.guard, state.reason) != self._said:
             self._said = state.guard, state.reason
             what = {STOPPED: "stop", "hold": "hold"}.get(state.guard, "state")
             self.events.add(what, f"{state.guard}: {state.reason}", arrived_ns)
-        self._light(state, arrived_ns)
+        self._light(state, arrived_ns, read_anew)
 
     def on_command(self, command: Command, sent_ns: int) -> None:
         """The master sent a command."""
@@ -108,15 +108,18 @@ class RobotModel:
         """The robot's figures of a second."""
         self.figures.on_robot(metrics, now_ns)
 
-    def asked_to_stop(self, number: int, by: str, now_ns: int) -> StopShown:
+    def asked_to_stop(self, number: int, by: str, now_ns: int, under_way: bool = False) -> StopShown:
         """Somebody asked for a stop: the page shows what comes of it.
 
-        Until the robot leaves the stop it stays the same one, unless nobody knows what became of it.
+        Until the robot leaves the stop it stays the same one. What failed begins anew, unless the robot is
+        still being asked (`under_way`); so does one that was acknowledged while no state told of it.
         """
-        if self.stop is None or self.stop.failed:
-            self.stop = StopShown(number, by, now_ns)
+        stop = self.stop
+        failed = stop is not None and bool(stop.failed) and not under_way
+        if stop is None or failed or stop.unconfirmed(now_ns):
+            stop = self.stop = StopShown(number, by, now_ns)
             self.events.add("stop", f"{by} asked to stop the robot", now_ns)
-        return self.stop
+        return stop
 
     @property
     def guard(self) -> str:
@@ -183,7 +186,7 @@ class RobotModel:
             "robot": self.robot,
             "latency": {
                 "minute": self.lateness.seconds(now_ns),
-                "stages": self.figures.stages(),
+                "stages": self.figures.stages(now_ns),
                 "creep": None if creep is None else creep.shown(),
             },
             "effort_nm": efforts,
@@ -208,8 +211,8 @@ class RobotModel:
             self.events.add("alarm", creep.words, now_ns)
         self._creeps = creeps
 
-    def _light(self, state: RobotState, now_ns: int) -> None:
-        """The lights of the stop that is under way."""
+    def _light(self, state: RobotState, now_ns: int, read_anew: bool) -> None:
+        """The lights of the stop that is under way. `read_anew`: the state has a new reading of encoders."""
         stop = self.stop
         if stop is None or now_ns < stop.asked_ns:
             return
@@ -223,7 +226,7 @@ class RobotModel:
             stop.robot_ns, stop.failed = now_ns, ""
         if not stop.text:
             stop.text = state.reason
-        if stop.stands_ns is None and self._still.stands:
+        if stop.stands_ns is None and read_anew and self._still.stands:
             stop.stands_ns = now_ns
 
     def _situation(self, silent: bool) -> str:

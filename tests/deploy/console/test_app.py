@@ -9,11 +9,11 @@ from collections.abc import Awaitable, Callable
 import aiohttp
 import pytest
 
-from common.clock import monotonic_ns
+from common.clock import monotonic_ns, to_ns
 from deploy.console.app import COOKIE, LONGEST
 from deploy.console.model.robot import TAP
-from deploy.console.session import PageRole, Person
-from deploy.console.viewers import MOST
+from deploy.console.session import SESSION_S, PageRole, Person
+from deploy.console.viewers import MESSAGES_PER_S, MOST
 from tests.deploy.console.robots import ROBOT, frame, state
 from tests.deploy.console.served import Served, served
 
@@ -65,12 +65,14 @@ def test_setup_says_what_the_page_draws() -> None:
     run(story)
 
 
-def test_another_hosts_name_is_refused_everywhere() -> None:
+@pytest.mark.usefixtures("still")
+def test_another_hosts_name_is_refused_everywhere(caplog: pytest.LogCaptureFixture) -> None:
     async def story(console: Served) -> None:
         for path in ("/", "/api/setup", "/ws"):
             async with console.http.get(console.url + path, headers={"Host": "evil.example"}) as response:
                 assert response.status == 403
         assert console.access.refused == {"host": 3}
+        assert len([line for line in caplog.messages if line.startswith("refused GET")]) == 1, "no flood"
 
     run(story)
 
@@ -204,6 +206,8 @@ def test_more_than_20_posts_a_second_are_refused() -> None:
     async def story(console: Served) -> None:
         statuses = [(await console.post("/api/login", {"token": "guess"}))[0] for _ in range(40)]
         assert statuses == [403] * 20 + [429] * 20
+        stops = [(await console.post("/api/stop", {}))[0] for _ in range(30)]
+        assert stops == [202] * 30, "what others send from this address takes the stop away from nobody"
 
     run(story)
 
@@ -357,6 +361,65 @@ def test_a_flood_of_acknowledgements_ends_the_socket() -> None:
         assert "too many" in (await page.hear("bye"))["why"]
 
     run(story)
+
+
+@pytest.mark.usefixtures("still")
+def test_a_stop_is_heard_beyond_every_limit() -> None:
+    async def story(console: Served) -> None:
+        page = await console.page()
+        for _ in range(int(MESSAGES_PER_S)):
+            await page.say(kind="ack", n=1)
+        await page.say(kind="stop")
+        assert "too many" in (await page.hear("bye"))["why"]
+        assert console.stops[ROBOT].by == ["console: viewer"]
+
+    run(story)
+
+
+def test_a_stop_without_a_robots_name_is_for_the_robot_that_is_shown() -> None:
+    async def story(console: Served) -> None:
+        assert (await console.post("/api/stop", {"robot": ""}))[0] == 202
+        page = await console.page("robot-2")
+        await page.say(kind="stop", robot="")
+        await page.hear("answer")
+        assert [len(each.by) for each in console.stops.values()] == [1, 1]
+        assert (await console.post("/api/stop", {"robot": "robot-9"}))[0] == 400
+
+    run(story)
+
+
+def test_who_may_not_look_is_told_what_became_of_his_stop() -> None:
+    async def story(console: Served) -> None:
+        asking, other = await console.page(), await console.page()
+        await asking.say(kind="stop")
+        await asking.hear("answer")
+        showing = asyncio.create_task(console.hub.show())
+        assert (await asking.hear("stop"))["stop"]["robot_s"] is None
+        stop = console.models[ROBOT].stop
+        assert stop is not None
+        stop.failed = "no answer"
+        told = (await asking.hear("stop"))["stop"]
+        assert told["failed"] == "no answer"
+        assert told.keys() == {"asked_s", "robot_s", "stands_s", "failed", "since_s"}, "not by whom"
+        await other.say(kind="dance")
+        assert (await other.hear("hello"))["role"] == "nobody"
+        assert (await other.socket.receive_json(timeout=5.0))["kind"] == "answer", "nothing of a stop before"
+        showing.cancel()
+
+    run(story, stranger=PageRole.NOBODY)
+
+
+def test_a_page_whose_log_in_grew_too_old_sees_nothing_more() -> None:
+    async def story(console: Served) -> None:
+        await console.log_in()
+        page = await console.page()
+        assert (await page.hear("hello"))["role"] == "operator"
+        console.hub.refresh(monotonic_ns())
+        console.hub.refresh(monotonic_ns() + to_ns(SESSION_S) + 1)
+        assert (await page.hear("hello"))["role"] == "nobody"
+        assert not console.hub.pages[0].person.role.sees
+
+    run(story, stranger=PageRole.NOBODY)
 
 
 def test_a_page_that_is_told_nothing_new_answers_what_it_does_not_know() -> None:

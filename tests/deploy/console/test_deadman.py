@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
 
 from common.clock import monotonic_ns, to_ns
-from common.inputs.heartbeat import DeadmanBeat
+from common.inputs.heartbeat import decode_beat
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.hub import BEAT_S, SEEN_S
 from deploy.console.model.robot import TAP
@@ -36,7 +37,8 @@ Story = Callable[[Served, HeardBeats], Awaitable[None]]
 def still(monkeypatch: pytest.MonkeyPatch) -> None:
     """What left, left now: how old a view is does not depend on how fast this host is."""
     now_ns = monotonic_ns()
-    monkeypatch.setattr("deploy.console.viewers.monotonic_ns", lambda: now_ns)
+    for module in ("viewers", "hub"):
+        monkeypatch.setattr(f"deploy.console.{module}.monotonic_ns", lambda: now_ns)
 
 
 def run(story: Story, logged_in: bool = True) -> None:
@@ -154,10 +156,47 @@ def test_a_page_that_falls_silent_releases_and_must_let_go_before_it_holds_again
     run(story)
 
 
+def test_a_gap_counts_though_the_console_itself_stood_still(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def story(console: Served, relay: HeardBeats) -> None:
+        _, own, number = await seeing(console)
+        assert console.hub.held(own, True, number) == ""
+        now_ns = [own.beat_ns + to_ns(BEAT_S)]
+        monkeypatch.setattr("deploy.console.hub.monotonic_ns", lambda: now_ns[0])
+        assert console.hub.held(own, True, number) == ""
+        now_ns[0] += to_ns(BEAT_S) + 1
+        assert "release" in console.hub.held(own, True, number), "before anybody looked"
+        assert relay.told == [True, True, False]
+
+    run(story)
+
+
+def test_a_page_that_was_lost_while_it_held_must_let_go_when_it_is_back() -> None:
+    async def story(console: Served, relay: HeardBeats) -> None:
+        page, own, number = await seeing(console)
+        assert console.hub.held(own, True, number) == ""
+        for _ in range(2):  # also where it was lost again before it let go
+            await page.socket.close()
+            while console.hub.pages:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+            page, own, number = await seeing(console)
+            assert "release" in console.hub.held(own, True, number)
+        assert relay.told == [True, False]
+        assert console.hub.held(own, False, number) == ""
+        assert console.hub.held(own, True, number) == ""
+
+    run(story)
+
+
 def test_beats_are_numbered_and_one_that_nobody_takes_is_counted(tmp_path: Path) -> None:
     relay = DeadmanRelay(tmp_path / "none.sock")
     relay.beat(True)
     relay.beat(False)
     assert relay.failed == 2
+    master = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+    with master:
+        master.bind(str(relay.path))
+        relay.beat(True)
+        relay.beat(False)
+        beats = [decode_beat(master.recv(256)) for _ in range(2)]
+    assert [(each.number, each.down) for each in beats] == [(3, True), (4, False)]
     relay.close()
-    assert DeadmanBeat(True, 1, 0).down

@@ -11,7 +11,7 @@ from pathlib import Path
 import aiohttp
 import pytest
 
-from common.config.console import ConsoleConfig
+from common.config.console import PAGE_KEYS, ConsoleConfig
 from common.config.load import check_config
 from common.errors import ConfigError, TandemError
 from common.link.config import LinkConfig
@@ -58,6 +58,13 @@ def test_what_is_no_address_is_a_mistake_of_the_file(key: str, value: object) ->
         config(**{key: value})
 
 
+@pytest.mark.parametrize("key", PAGE_KEYS)
+def test_a_key_that_stops_or_engages_is_no_deadman(key: str) -> None:
+    with pytest.raises(ConfigError, match="deadman_key"):
+        config(deadman_key=key)
+    assert config(deadman_key="F9").deadman_key == "F9"
+
+
 def options(chosen: ConsoleConfig, said: list[str]) -> ConsoleOptions:
     link = LinkConfig(listen=[f"tcp/127.0.0.1:{free_port('tcp')}"])
     return ConsoleOptions(Destination(link, (ROBOT,), OPERATOR), SKELETON, chosen, on_ready=said.append)
@@ -89,6 +96,22 @@ def test_it_prints_addresses_serves_and_ends() -> None:
         assert newer != page, "the next token is printed once this one is used"
         stop.set()
         await running
+
+    asyncio.run(story())
+
+
+def test_new_tokens_are_printed_before_the_last_ones_are_too_old(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def story() -> None:
+        monkeypatch.setattr("deploy.console.run.TOKEN_S", 0.01)
+        said: list[str] = []
+        stop = asyncio.Event()
+        running = asyncio.create_task(run_console(options(config(listen="127.0.0.1:0"), said), stop))
+        async with asyncio.timeout(20.0):
+            while sum(line.startswith("operator: ") for line in said) < 3:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        stop.set()
+        await running
+        assert len(set(said)) == len(said)
 
     asyncio.run(story())
 

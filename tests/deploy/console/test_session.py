@@ -40,6 +40,13 @@ def test_a_token_and_a_session_end() -> None:
     assert doors.person(found[0], began_ns + to_ns(SESSION_S) + 1).role is PageRole.VIEWER
 
 
+def test_tokens_that_are_too_old_are_not_kept() -> None:
+    doors = access()
+    for day in range(10):
+        doors.issue(NURSE, day * to_ns(86400.0))
+    assert len(doors._tokens) == 1
+
+
 def test_who_logs_out_is_a_stranger() -> None:
     doors = access(stranger=PageRole.NOBODY)
     found = doors.log_in(doors.issue(NURSE, 0), 1)

@@ -7,14 +7,16 @@ from typing import Any
 
 import pytest
 
+from common.clock import monotonic_ns
 from common.errors import LinkTimeoutError
 from common.link.queries import Answered
 from common.wire.presence import ProcessPresence
 from common.wire.stop import StopAnswer, pack_stop_answer, read_stop
 from deploy.client.stop import OnAnswer
 from deploy.console import stopping
-from deploy.console.stopping import GIVEN_UP, NOT_STOPPED, RobotStopper
-from tests.deploy.console.robots import OPERATOR, ROBOT, heard
+from deploy.console.model.robot import TAP
+from deploy.console.stopping import GIVEN_UP, NOT_STOPPED, ONE_SILENT, RobotStopper
+from tests.deploy.console.robots import OPERATOR, ROBOT, heard, state
 
 
 class Asked:
@@ -92,6 +94,52 @@ def test_without_an_answer_it_is_said_and_in_the_end_given_up(monkeypatch: pytes
         assert again is not shown
         await until(lambda: again.robot_ns is not None)
         assert again.failed == ""
+        await one.close()
+
+    asyncio.run(story())
+
+
+def test_one_who_presses_again_still_reads_that_nobody_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def story() -> None:
+        monkeypatch.setattr(stopping, "UNANSWERED_S", 0.01)
+        one = stopper(Asked(silent=1000))
+        shown = one.stop("nurse-1")
+        await until(lambda: shown.failed == NOT_STOPPED)
+        assert one.stop("nurse-1").failed == NOT_STOPPED, "the robot is being asked all the time"
+        one._model.stop = None  # it was reset by somebody else meanwhile
+        anew = one.stop("nurse-1")
+        assert anew.failed == ""
+        await until(lambda: anew.failed == NOT_STOPPED)
+        await one.close()
+
+    asyncio.run(story())
+
+
+def test_a_second_robot_of_that_name_that_says_nothing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def story() -> None:
+        monkeypatch.setattr(stopping, "UNANSWERED_S", 0.01)
+        link = Asked(silent=0)
+        one = stopper(link)
+        one._on_presence(ProcessPresence(ROBOT, "slave", 9, place="other host"), True)
+        shown = one.stop("nurse-1")
+        now_ns = monotonic_ns()
+        one._model.on_state(state(at_s=now_ns / 1e9, guard="estop"), now_ns, TAP)
+        await until(lambda: shown.failed == ONE_SILENT)
+        await one.close()
+
+    asyncio.run(story())
+
+
+def test_a_robot_that_says_that_it_is_stopped_did_not_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def story() -> None:
+        monkeypatch.setattr(stopping, "monotonic_ns", lambda: 10**9)
+        monkeypatch.setattr(stopping, "UNANSWERED_S", 0.01)
+        link = Asked(silent=1000)
+        one = stopper(link)
+        shown = one.stop("nurse-1")
+        one._model.on_state(state(at_s=1.0, guard="estop"), 10**9, TAP)
+        await until(lambda: len(link.questions) == 2)
+        assert shown.failed == ""
         await one.close()
 
     asyncio.run(story())

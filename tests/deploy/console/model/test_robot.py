@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from common.clock import to_ns
+from common.metrics.parts import Summary
 from common.metrics.slave import CameraMetrics, DueMetrics
 from common.wire.video import VideoFrame
 from deploy.console.model.robot import LINK, SILENT_S, TAP, RobotModel, Side
+from deploy.console.model.stopped import CONFIRM_S
 from deploy.console.viewers import pack
 from tests.deploy.console.robots import BOUND_NS, JPEG, J, command, echo, frame, heard, model, state
 from tests.published import NOTHING, guard_metrics, master_metrics, slave_metrics
@@ -184,6 +186,41 @@ def test_a_robot_that_moves_on_is_never_said_to_stand() -> None:
     assert view(robot, 3.0)["stop"]["stands_s"] is None
 
 
+@pytest.mark.parametrize("valid", [False, None])
+def test_encoders_that_are_not_read_do_not_stand(valid: bool | None) -> None:
+    robot = heard(1.0)
+    robot.asked_to_stop(1, "nurse-1", to_ns(1.0))
+    for n in range(100):
+        at_s = 1.0 + 0.02 * n
+        mask = np.full(J, n % 2 == 0 if valid is None else valid)  # None: it comes and goes
+        robot.on_state(state(2 + n, at_s=at_s, guard="estop", encoder_valid=mask), to_ns(at_s), TAP)
+    assert view(robot, 3.0)["stop"]["stands_s"] is None
+
+
+def test_what_the_encoders_said_before_the_stop_is_no_standstill() -> None:
+    robot = model()
+    for n in range(50):
+        robot.on_state(state(1 + n, at_s=1.0 + 0.02 * n), to_ns(1.0 + 0.02 * n), TAP)
+    robot.asked_to_stop(1, "nurse-1", to_ns(2.0))
+    frozen = state(99, at_s=1.98, guard="estop")
+    robot.on_state(frozen, to_ns(2.1), TAP)
+    assert view(robot, 2.1)["stop"]["stands_s"] is None
+    robot.on_state(state(100, at_s=2.12, guard="estop"), to_ns(2.12), TAP)
+    assert view(robot, 2.2)["stop"]["stands_s"] == pytest.approx(0.12)
+
+
+def test_a_stop_that_no_state_told_of_is_not_the_next_one() -> None:
+    robot = heard(1.0)
+    stop = robot.asked_to_stop(1, "nurse-1", to_ns(1.0))
+    stop.robot_ns = to_ns(1.5)
+    assert robot.asked_to_stop(2, "nurse-1", to_ns(1.5 + CONFIRM_S)) is stop
+    again = robot.asked_to_stop(3, "nurse-1", to_ns(1.5 + CONFIRM_S) + 1)
+    assert again is not stop
+    assert again.robot_ns is None
+    again.failed = "no answer"
+    assert robot.asked_to_stop(4, "nurse-1", to_ns(3.0), under_way=True) is again
+
+
 def test_a_robot_that_is_stopped_has_one_stop_until_it_is_reset() -> None:
     robot = heard(1.0)
     first = robot.asked_to_stop(1, "nurse-1", to_ns(1.0))
@@ -215,6 +252,37 @@ def test_a_command_that_was_not_written_yet_has_no_lateness() -> None:
     robot.on_state(state(at_s=201.05, echo=not_written), to_ns(201.09), TAP)
     latency = view(robot, 201.1)["latency"]
     assert (latency["ms"], latency["one_way_ms"]) == (None, 38.0)
+
+
+def test_a_command_that_is_told_of_before_it_is_written_has_its_lateness_once_it_is() -> None:
+    robot = model()
+    robot.on_command(command(4, 201.0, 201.002), to_ns(201.002))
+    whole = echo(4, 201.002, 201.040, 201.043)
+    robot.on_state(state(at_s=201.041, echo=replace(whole, written_ns=0)), to_ns(201.08), TAP)
+    robot.on_state(state(2, at_s=201.06, echo=whole), to_ns(201.09), TAP)
+    assert view(robot, 201.1)["latency"]["ms"] == 43.0
+
+
+def test_commands_that_are_not_written_are_in_no_figure_of_the_minute() -> None:
+    robot = model()
+    for n in range(300):
+        put_s = 201.0 + 0.1 * n
+        holds = 100 <= n < 200
+        robot.on_command(command(n, put_s - 0.002, put_s), to_ns(put_s))
+        told = echo(n, put_s, put_s + 0.01, put_s + 0.04)
+        told = replace(told, written_ns=0) if holds else told
+        robot.on_state(state(n, at_s=put_s + 0.04, echo=told), to_ns(put_s + 0.05), TAP)
+    minute = facts(robot, 231.5)["latency"]["minute"]
+    late = [value for _, value, _ in minute]
+    assert set(late) == {42.0, None}, "never the way of 10 ms alone"
+    assert 9 <= late.count(None) <= 11, "a curve has its gap"
+
+
+def test_stages_of_a_robot_that_fell_silent_are_not_shown() -> None:
+    robot = heard(1.0)
+    robot.on_robot(slave_metrics(stages_ms={"put→received": Summary(1)}), to_ns(1.0))
+    assert facts(robot, 4.0)["latency"]["stages"]
+    assert not facts(robot, 4.1)["latency"]["stages"]
 
 
 def test_a_limit_that_is_met_every_second_is_one_event() -> None:
