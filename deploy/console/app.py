@@ -19,7 +19,7 @@ from deploy.console.acts import MARK, ActRefusedError, carry_out, read_act, read
 from deploy.console.files import PageFiles
 from deploy.console.hub import Hub, as_json
 from deploy.console.session import SESSION_S, Person, RateLimit
-from deploy.console.viewers import MOST, REQUESTS_PER_S, OpenPage, pack
+from deploy.console.viewers import REQUESTS_PER_S, OpenPage, pack
 
 COOKIE = "tandem_console"
 STOP_PATH = "/api/stop"
@@ -226,12 +226,13 @@ class ConsoleApp:
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         socket = web.WebSocketResponse(max_msg_size=LONGEST, heartbeat=STILL_S, compress=False)
         await socket.prepare(request)
-        if self._hub.full:
+        secret, person = self._person(request)
+        if self._hub.full(person):
             self._hub.access.count_refusal("viewers")
-            await socket.send_str(pack({"kind": "bye", "why": f"{MOST} pages are open already"}))
+            why = f"{len(self._hub.pages)} pages are open already"
+            await socket.send_str(pack({"kind": "bye", "why": why}))
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER)
             return socket
-        secret, person = self._person(request)
         robot = request.query.get("robot", "")
         model = self._hub.models.get(robot, self._hub.models[self._robots[0]])
         page = OpenPage(socket, model, secret, person)

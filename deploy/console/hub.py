@@ -18,7 +18,7 @@ from deploy.console.model.guard_table import ENGAGED
 from deploy.console.model.robot import RobotModel
 from deploy.console.session import Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
-from deploy.console.viewers import LOST_S, MOST, OpenPage, pack
+from deploy.console.viewers import KEPT, LOST_S, MOST, OpenPage, pack
 
 VIEW_HZ = 25
 FACTS_EVERY = VIEW_HZ
@@ -49,10 +49,9 @@ class Hub:
     """Log-ins of pages that were lost while they held: where they come back, they must let go first."""
     _process: psutil.Process = field(default_factory=psutil.Process)
 
-    @property
-    def full(self) -> bool:
-        """Whether one more page would be too many."""
-        return len(self.pages) >= MOST
+    def full(self, person: Person) -> bool:
+        """Whether one more page, of this person, would be too many."""
+        return len(self.pages) >= MOST + KEPT * person.role.acts
 
     def enter(self, page: OpenPage) -> None:
         """A page opened."""

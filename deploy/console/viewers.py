@@ -16,6 +16,8 @@ from deploy.console.session import Person, RateLimit
 
 MOST = 8
 """Pages at once."""
+KEPT = 4
+"""More pages at once, of those who may act: strangers cannot take the places of all."""
 MESSAGES_PER_S = 150.0
 REQUESTS_PER_S = 20.0
 """Messages that are neither acknowledgements nor beats of the deadman."""

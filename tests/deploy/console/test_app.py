@@ -13,7 +13,7 @@ from common.clock import monotonic_ns, to_ns
 from deploy.console.app import COOKIE, LONGEST
 from deploy.console.model.robot import TAP
 from deploy.console.session import SESSION_S, PageRole, Person
-from deploy.console.viewers import MESSAGES_PER_S, MOST
+from deploy.console.viewers import KEPT, MESSAGES_PER_S, MOST
 from tests.deploy.console.robots import ROBOT, frame, state
 from tests.deploy.console.served import Served, served
 
@@ -306,9 +306,22 @@ def test_the_ninth_page_is_told_so() -> None:
         assert await ninth.closed() == aiohttp.WSCloseCode.TRY_AGAIN_LATER
         assert console.access.refused == {"viewers": 1}
         await pages[0].socket.close()
-        while console.hub.full:  # noqa: ASYNC110
+        while len(console.hub.pages) == MOST:  # noqa: ASYNC110
             await asyncio.sleep(0)
         await (await console.page()).hear("hello")
+
+    run(story)
+
+
+def test_strangers_do_not_take_all_places() -> None:
+    async def story(console: Served) -> None:
+        strangers = [await console.page() for _ in range(MOST)]
+        await console.log_in()
+        own = [await console.page() for _ in range(KEPT)]
+        for page in strangers + own:
+            await page.hear("hello")
+        one_more = await console.page()
+        assert "12 pages are open" in (await one_more.hear("bye"))["why"]
 
     run(story)
 
