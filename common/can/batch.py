@@ -20,7 +20,9 @@ from common.can.reader import OnError
 from common.clock import NS_PER_MS, NS_PER_S, monotonic_ns, wall_ns
 
 AT_ONCE = 64
-"""Frames in one call; what still waits comes with the next."""
+"""Frames in one call."""
+MOST_CALLS = 16
+"""In one `read`: a bus that never falls silent must not keep the loop. What still waits comes in the next."""
 _FRAME_BYTES = 72
 """struct canfd_frame; a classic can_frame is its first 16 bytes (linux/can.h)."""
 _FRAME = struct.Struct("=IB3x64s")
@@ -31,6 +33,8 @@ _STAMP = struct.Struct("=16xqq")
 _SO_TIMESTAMPNS = 35
 _OLDEST_NS = 500 * NS_PER_MS
 """A stamp further back than this was made before the wall clock was set: the frame counts from now."""
+_READINGS = 3
+"""Of both clocks, one after the other."""
 
 Waiting = Callable[[list[tuple[int, bytes, int]]], None]
 """Takes frames: identifier with SocketCAN's flags, data, arrival in monotonic ns."""
@@ -87,23 +91,27 @@ class BatchReader:
         self._used: list[_Header] = []
 
     def read(self) -> None:
-        """Hand on all frames that wait, at most `AT_ONCE`."""
-        if self._stopped:
-            return
+        """Hand on all frames that wait, at most `AT_ONCE` times `MOST_CALLS`."""
+        for _ in range(MOST_CALLS):
+            if self._stopped or self._read_once() < AT_ONCE:
+                return
+
+    def _read_once(self) -> int:
         for header in self._used:
             header.control_length = _CONTROL_BYTES
-        count = self._receive(self._number, self._messages, AT_ONCE, socket.MSG_DONTWAIT, None)
+        count: int = self._receive(self._number, self._messages, AT_ONCE, socket.MSG_DONTWAIT, None)
         if count < 0:
             number = ctypes.get_errno()
             if number not in (errno.EAGAIN, errno.EINTR):
                 self._on_failure(can.CanOperationError(os.strerror(number), number))
-            return
+            return 0
         self._used = self._headers[:count]
         self._on_frames(self._taken(count))
+        return count
 
     def _taken(self, count: int) -> list[tuple[int, bytes, int]]:
+        began_ns = _wall_minus_monotonic_ns()
         now_ns = monotonic_ns()
-        began_ns = wall_ns() - now_ns
         oldest_ns = now_ns - _OLDEST_NS
         out = []
         frames = _FRAME.iter_unpack(memoryview(self._frames)[: count * _FRAME_BYTES])
@@ -119,3 +127,12 @@ class BatchReader:
 
     def join(self) -> None:
         """There is nothing to wait for."""
+
+
+def _wall_minus_monotonic_ns() -> int:
+    """What to take from a time of the wall clock. The reading that was interrupted least counts."""
+    tries = []
+    for _ in range(_READINGS):
+        before_ns, wall, after_ns = monotonic_ns(), wall_ns(), monotonic_ns()
+        tries.append((after_ns - before_ns, wall - after_ns))
+    return min(tries)[1]

@@ -138,13 +138,16 @@ class CanBus(KeptOpenBus):
                 or (frame_id & EXTENDED and not self._take_extended)
             ):
                 self._on_message(_message_of(frame_id, data))
+                if self._reader is None:
+                    break  # this frame told that the bus has failed
             else:
                 received += 1
+                if self._doubtful:
+                    self._on_the_bus()
                 on_frame(name, frame_id, data, at_ns)
         if received:
             self.counters.received += received
             self._attempt = 0
-            self._on_the_bus()
 
     def _on_message(self, message: can.Message) -> None:
         counters = self.counters

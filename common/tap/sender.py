@@ -155,24 +155,25 @@ class TapSender:
         self._readers.append(reader)
         log.info("%s: process %d reads", self.path, pid)
         self._send(reader, GREETING, self._greeting(), monotonic_ns())
+        if reader not in self._readers:
+            return  # it has gone already
         asyncio.get_running_loop().add_reader(connection, self._hear, reader)
         self._hear(reader)  # one that chooses has often done so already
 
     def _hear(self, reader: _Reader) -> None:
-        """A reader chose its topics, or has gone."""
+        """A reader chose its topics, or has gone: its place is free at once, whatever topics it waits for."""
         try:
             asked = reader.socket.recv(MOST_CHOSEN)
-            if asked:
+            if not asked:
+                self._drop(reader, "")
+            elif reader.chosen is None:
                 reader.chosen = decode_choice(asked)
-                # once is enough: whatever else it sends costs this loop nothing
-                asyncio.get_running_loop().remove_reader(reader.socket)
-                return
+            else:
+                self._drop(reader, ": it chose twice")
         except BlockingIOError:
             return
         except (OSError, CodecError) as error:
             self._drop(reader, f": {error}")
-            return
-        self._drop(reader, "")
 
     def _drop(self, reader: _Reader, why: str) -> None:
         if reader not in self._readers:

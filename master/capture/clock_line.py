@@ -95,7 +95,7 @@ class NodeLine:
 
     def _delta(self, own: float, newest_s: float, left: int) -> float:
         """Steps since the last sample."""
-        if self._wrap > 0.0 and not math.isnan(self._own):
+        if self._wrap > 0.0 and math.isfinite(own - self._own):
             delta = (own - self._own) % self._wrap
             return delta if self._stamped else float(round(delta))
         # what a stall held back comes at once: the steps are those up to the newest
@@ -120,8 +120,11 @@ class NodeLine:
         seen.append((self._last_s, self._steps))
         if len(seen) < _LEARN:
             return
+        self._learning = []
         times = [time_s for time_s, _ in seen]
         spent_s = times[-1] - times[0]
+        if spent_s <= 0.0:
+            return  # all of them were held back until one instant, which tells nothing of a period
         if self._counted:
             period_s = spent_s / max(seen[-1][1] - seen[0][1], 1.0)
         else:
@@ -132,7 +135,6 @@ class NodeLine:
         self.period_s = period_s
         if not self._stamped:
             self._step_s = period_s
-        self._learning = []
 
     def _tune(self) -> None:
         """The length of a step, over `_BASE_S`."""

@@ -88,7 +88,7 @@ class CameraFeed:
         self._wake = threading.Event()
         self._stopping = False
         self._camera: CameraSource | None = None
-        # above any number of an earlier run on this machine, which the master may still acknowledge
+        # above any number of an earlier run since this host started, which the master may still acknowledge
         self._number = clock() // NS_PER_MS
         self._count = _Count(clock())
         self._make = Durations()

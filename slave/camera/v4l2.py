@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from common.clock import NS_PER_S
+from common.clock import of_driver_ns, to_ns
 from common.errors import RobotError
 
 WAIT_S = 1.0
@@ -19,9 +19,18 @@ class V4l2Camera:
     """Keeps the newest picture of a device. `open_capture` stands in for linuxpy in tests."""
 
     def __init__(
-        self, device: str, width: int, height: int, open_capture: Callable[[str], Any] | None = None
+        self,
+        device: str,
+        width: int,
+        height: int,
+        open_capture: Callable[[str], Any] | None = None,
+        of_driver: Callable[[int], int] = of_driver_ns,
     ) -> None:
-        """Raises RobotError where there is no such camera, or it gives no MJPG."""
+        """Raises RobotError where there is no such camera, or it gives no MJPG.
+
+        `of_driver`: from the driver's clock to the slave's, ns.
+        """
+        self._of_driver = of_driver
         try:
             self._capture = (open_capture or _open_capture)(device)
             self._capture.set_format(width, height, "MJPG")
@@ -36,7 +45,7 @@ class V4l2Camera:
         threading.Thread(target=self._read, name="v4l2", daemon=True).start()
 
     def newest(self) -> tuple[int, bytes]:
-        """When it was taken, ns of the monotonic clock, and the JPEG; each once.
+        """When it was taken, ns of the slave's clock, and the JPEG; each once.
 
         Raises RobotError where none comes.
         """
@@ -52,8 +61,8 @@ class V4l2Camera:
         why = "it ended"
         try:
             for frame in self._capture:
-                # the driver's stamps are of the monotonic clock
-                taken = round(frame.timestamp * NS_PER_S), bytes(frame.data)
+                # drivers stamp by CLOCK_MONOTONIC, and the guard holds a robot whose pictures are old
+                taken = self._of_driver(to_ns(frame.timestamp)), bytes(frame.data)
                 with self._fresh:
                     self._newest = taken
                     self._fresh.notify()

@@ -1,7 +1,9 @@
 """How hard each drive may turn now: what the motion needs by the robot's model, and a margin. Pure.
 
 A position drive that is held up pushes harder and harder, up to its own limit. With this limit it never
-pushes harder than moving needs, without anything having to be noticed first.
+pushes harder than moving or standing needs, without anything having to be noticed first. What standing needs
+is always allowed: an arm that speeds up downwards needs next to nothing, but a drive whose slave dies then
+must hold it with what it was told last.
 """
 
 from __future__ import annotations
@@ -66,7 +68,7 @@ class TorqueLimit:
         margin = MARGIN * (floor_nm + self._config.model_error * (np.abs(inertial) + np.abs(bias)))
         needed = inertial + bias
         self._needed = deque((age + dt_s, a, b) for age, a, b in self._needed if age + dt_s <= KEPT_S)
-        self._needed.append((0.0, needed - margin, needed + margin))
+        self._needed.append((0.0, np.minimum(needed, bias) - margin, np.maximum(needed, bias) + margin))
         return np.stack(
             (np.min([a for _, a, _ in self._needed], axis=0), np.max([b for _, _, b in self._needed], axis=0))
         )

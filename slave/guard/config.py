@@ -90,7 +90,7 @@ class GuardConfig(Section):
     """Share of the acceleration limits that is used."""
     joints: dict[str, JointLimits] = Field(default_factory=dict)
     """Tighter limits of single joints, by name."""
-    max_blind_cm: float | None = Field(None, gt=0.0, le=200.0)
+    max_blind_cm: float | None = Field(None, ge=1.0, le=200.0)
     """No hand goes farther than this if the line dies, braking included: they are slowed so that it holds.
     Unset: how far is told, and nothing slowed."""
     max_step_s: float = Field(0.025, gt=0.0, le=0.1)

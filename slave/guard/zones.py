@@ -38,9 +38,10 @@ class _Zone(Section):
     """The greatest force of a part that presses there, as the motors' torques tell it: beyond it, a
     protective stop. Counts within the margin, or inside of the zone itself where the robot may enter."""
 
-    max_blind_cm: float | None = Field(None, gt=0.0, le=200.0)
+    max_blind_cm: float | None = Field(None, ge=1.0, le=200.0)
     """Should the line die, no hand's end goes farther than this within the margin (or inside of the zone
-    itself where the robot may enter), wherever it comes from: hands are slowed so that it holds."""
+    itself where the robot may enter), wherever it comes from: hands are slowed so that it holds. With less
+    than 1 cm a hand could hardly move there, not even out."""
 
     @property
     def margin_m(self) -> float:

@@ -5,20 +5,23 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
 
+from common.clock import to_ns
+from common.clock_sync import Offset
 from common.link.config import LinkConfig
 from common.metrics.slave import ServoMetrics, SlaveMetrics
 from common.process.notify import Notifier
 from common.process.pacing import DueTick, TickGrid
 from common.quaternion import Array
 from common.wire.codec import decode
-from common.wire.messages import Statistics
+from common.wire.messages import Command, CommandStamps, Statistics
 from common.wire.topics import Topic
 from slave import app
+from slave.camera.config import CameraConfig
 from slave.config import SlaveConfig
 from slave.contact.config import ContactConfig
 from slave.limit.limit import Setpoint
@@ -222,3 +225,50 @@ def test_the_servo_loop_feeds_the_watchdog_at_the_end_of_each_tick(
         asyncio.run(slave._drive())
     assert stuck.read_after == [0, 1, 2]
     assert len(beats) == 2  # the tick that hung did not count
+
+
+def camera_slave(source: Literal["off", "robot"]) -> app.Slave:
+    link: Any = FakeLink()
+    servos: Any = StillServos()
+    config = SlaveConfig(
+        robot="robot-1",
+        link=LinkConfig(listen=["tcp/127.0.0.1:7447"]),
+        camera=CameraConfig(source=source),
+    )
+    return app.Slave(config, link, servos)
+
+
+def command(seen_frame: int, lease: int = 1) -> Command:
+    none, zero = np.ones(25, np.bool_), np.zeros(25)
+    return Command("robot-1", lease, 1, 1, CommandStamps(0, 0, 0, 0), True, none, zero, zero, seen_frame, 0)
+
+
+def test_the_age_of_the_picture_that_the_operator_has_reaches_the_guard(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now_ns = to_ns(1000.0)
+    monkeypatch.setattr(app, "monotonic_ns", lambda: now_ns)
+    slave = camera_slave("robot")
+    most_s = slave._config.guard.max_video_age_s
+    camera, accepted = slave._camera, slave._pipeline.on_accepted
+    assert camera is not None
+    assert accepted is not None
+    offset = Offset(0, 0, trusted=True)
+    camera.sight.sent(7, now_ns, now_ns)
+    accepted(command(0), now_ns, offset)
+    now_ns += to_ns(2.0 * most_s)
+    assert slave._body().video is None, "no picture has come to the operator"
+    camera.sight.sent(8, now_ns, now_ns)
+    accepted(command(8), now_ns, offset)
+    now_ns += to_ns(most_s)
+    assert slave._body().video is None
+    now_ns += 1
+    assert "picture" in (slave._body().first_fault or "")
+    accepted(command(0, lease=2), now_ns, offset)
+    assert slave._body().video is None, "another operator, who has none"
+
+
+def test_a_robot_without_a_camera_waits_for_no_picture() -> None:
+    slave = camera_slave("off")
+    assert slave._pipeline.on_accepted is None
+    assert slave._body().video is None

@@ -26,6 +26,7 @@ def test_the_example_is_right() -> None:
         ("guard.command_timeout_s=0.0", ["guard.command_timeout_s = 0.0", "greater than 0"]),
         ("guard.joints.left_tail.upper_deg=3.0", ["guard.joints.left_tail", "a joint of nursing"]),
         ("guard.joints.neck_yaw.upper_deg=75.0", ["guard.joints.neck_yaw.upper_deg = 75.0", "skeleton's"]),
+        ("guard.max_blind_cm=0.9", ["guard.max_blind_cm = 0.9", "greater than or equal to 1"]),
         ("guard.velocity_scale=1.5", ["guard.velocity_scale = 1.5", "less than or equal to 1"]),
         ("encoders.zero_counts.tail=1", ["encoders.zero_counts", "joint"]),
         ("track.strategy='guess'", ["track.strategy = 'guess'", "'latest'"]),
@@ -47,3 +48,20 @@ def test_a_file_that_leaves_out_a_drive_names_the_joint() -> None:
     overrides = ['servos.backend="canopen"', 'servos.canopen.drives.neck_yaw={id=1, bus="left"}']
     with pytest.raises(ConfigError, match=r"servos\.canopen\.drives\.neck_pitch = .*a drive for each joint"):
         load_config(example("slave", NURSING), SlaveConfig, overrides)
+
+
+@pytest.mark.parametrize(
+    ("source", "limit_s", "refused"),
+    [("robot", 3.99, True), ("robot", 4.0, False), ("robot", 0.0, False), ("off", 0.5, False)],
+)
+def test_pictures_may_be_as_old_as_a_camera_on_a_poor_link_makes_them(
+    source: str, limit_s: float, refused: bool
+) -> None:
+    overrides = [
+        f'camera.source="{source}"', "camera.least_rate_hz=0.5", f"guard.max_video_age_s={limit_s}"
+    ]  # fmt: skip
+    if not refused:
+        assert load_config(EXAMPLE, SlaveConfig, overrides).guard.max_video_age_s == limit_s
+        return
+    with pytest.raises(ConfigError, match=r"guard\.max_video_age_s = 3\.99.*at least 4: two pictures"):
+        load_config(EXAMPLE, SlaveConfig, overrides)

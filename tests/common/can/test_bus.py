@@ -169,6 +169,23 @@ def test_an_error_of_receiving_reopens_the_bus(error: Exception) -> None:
     run(test())
 
 
+def test_frames_before_a_bus_off_in_one_batch_do_not_bring_the_bus_up_again() -> None:
+    async def test() -> None:
+        scene = Scene()
+        scene.bus.open()
+        changes: list[bool] = []
+        scene.bus._on_change = lambda _, up: changes.append(up)
+        bus_off = 0x2000_0000 | 0x40, bytes(8), 1
+        scene.bus._on_batch([(0x105, b"before", 1), bus_off, (0x105, b"after", 1)])
+        assert scene.frames == [("suit", 0x105, b"before")]
+        assert changes == [False]
+        assert scene.bus._doubtful, "only what comes after it is opened again shows that it works"
+        assert scene.bus.counters.received == 1
+        await scene.bus.close()
+
+    run(test())
+
+
 def test_bus_off_reopens_the_bus_and_says_what_to_set() -> None:
     async def test() -> None:
         scene = Scene()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import stat
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -14,7 +15,7 @@ from common.config.load import load_config
 from common.config.section import Section
 from common.errors import CodecError, ConfigError, ConfigMistake, TandemError
 from common.tap.config import TapConfig
-from common.tap.message import GREETING, TapMessage, decode, encode
+from common.tap.message import GREETING, TapMessage, decode, encode, encode_choice
 from common.tap.reader import TapReader
 from common.tap.sender import READERS, TapSender, open_tap
 
@@ -214,6 +215,47 @@ def test_a_reader_that_chose_its_topics_gets_those_and_is_owed_no_snapshot(tmp_p
                 assert sender.read
                 sender.put("suit/frames", b"frames")
                 assert [(await other.read()).topic for _ in range(2)] == [GREETING, "suit/frames"]
+
+    run(tmp_path / "tap", story)
+
+
+def test_a_reader_that_chose_topics_which_never_come_is_let_go_when_it_dies(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        with TapReader(sender.path, ["never/"]) as reader:
+            await accepted(sender, 1)
+            await reader.read()
+        for _ in range(1000):
+            if not sender.count:
+                return
+            await asyncio.sleep(0)
+        raise AssertionError("it keeps its place for ever")
+
+    run(tmp_path / "tap", story)
+
+
+def test_a_reader_that_is_gone_before_it_is_let_in_changes_nothing(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        raised: list[object] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: raised.append(context))
+        TapReader(sender.path).close()
+        for _ in range(100):
+            await asyncio.sleep(0)
+        assert (sender.count, raised) == (0, [])
+
+    run(tmp_path / "tap", story)
+
+
+def test_a_reader_that_goes_on_sending_is_let_go(tmp_path: Path) -> None:
+    async def story(sender: TapSender) -> None:
+        with TapReader(sender.path, ["a"]) as reader:
+            await accepted(sender, 1)
+            for _ in range(1000):
+                with contextlib.suppress(OSError):
+                    reader._socket.send(encode_choice(["b"]))
+                if not sender.count:
+                    return
+                await asyncio.sleep(0)
+        raise AssertionError("its floods would keep the loop")
 
     run(tmp_path / "tap", story)
 

@@ -102,3 +102,27 @@ def test_the_line_comes_down_to_an_earlier_arrival_at_once() -> None:
         node.arrive(index, at_s=float(node.true_s(np.array(index))) + 0.008)
     true_s = float(node.true_s(np.array(20)))
     assert node.arrive(20, at_s=true_s + 2e-4) == pytest.approx(true_s + 2e-4, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", [NONE, COUNT])
+def test_samples_that_were_held_back_until_one_instant_teach_no_period(kind: str) -> None:
+    """They taught a period of 0, by which the next sample was divided."""
+    node = Node(kind, 256.0)
+    held = np.arange(30.0)
+    node.lines.take(np.zeros(30, np.intp), np.full(30, 5.0), held, held)
+    assert np.isnan(node.lines.period_s[0])
+    node.run(30, 200)
+    assert node.lines.period_s[0] == pytest.approx(0.01, rel=0.02)
+
+
+@pytest.mark.parametrize(("kind", "wrap"), [(STAMP, np.inf), (COUNT, 2.0**32)])
+@pytest.mark.parametrize("garbage", [np.nan, np.inf])
+def test_an_own_time_that_is_no_number_spoils_its_sample_alone(
+    kind: str, wrap: float, garbage: float
+) -> None:
+    node = Node(kind, wrap, rate_hz=100.0)
+    node.run(0, 300)
+    true_s, bad = float(node.true_s(np.array(300))), np.array([garbage])
+    found = node.lines.take(np.array([0]), np.array([true_s + 2e-4]), bad, bad)
+    assert found[0] == pytest.approx(true_s, abs=5e-3)
+    assert np.abs(node.run(301, 1500)[600:]).max() <= 1e-3

@@ -31,12 +31,13 @@ class Capture:
             yield frame
 
 
-def test_each_picture_is_had_once_with_the_driver_s_time() -> None:
+def test_each_picture_is_had_once_with_the_driver_s_time_on_the_slave_s_clock() -> None:
+    """By the driver's own clock each picture would seem 3 s older after a day, and the robot would hold."""
     capture = Capture()
-    camera = V4l2Camera("/dev/video9", 320, 240, lambda _: capture)
+    camera = V4l2Camera("/dev/video9", 320, 240, lambda _: capture, lambda at_ns: at_ns + 3_000_000_000)
     assert capture.asked == (320, 240, "MJPG")
     capture.frames.put(SimpleNamespace(timestamp=12.5, data=b"jpeg"))
-    assert camera.newest() == (12_500_000_000, b"jpeg")
+    assert camera.newest() == (15_500_000_000, b"jpeg")
     capture.frames.put(None)
     with pytest.raises(RobotError, match="has failed: it ended"):
         camera.newest()

@@ -121,6 +121,26 @@ def test_what_it_needs_to_stand_is_gravity() -> None:
     assert 0.5 * (low + high) == pytest.approx(robot.effort_nm[~FINGERS], abs=0.05)
 
 
+def test_what_it_needs_to_stand_is_allowed_while_the_arm_speeds_up_downwards() -> None:
+    """A drive whose slave dies in that moment has to hold the arm with what it was told last."""
+    one = limit(drive_hz=100.0, model_error=0.0)
+    still(one)
+    stands_nm = 0.5 * still(limit(model_error=0.0))[:, SHOULDER].sum()
+    margin_nm = MARGIN * FLOOR_NM[SHOULDER]
+    assert abs(stands_nm) > 5.0
+    falls = -np.sign(stands_nm)
+    for step in range(20):
+        torque = one.step(
+            0.005, raised(1.0), raised(1.0 + falls * 0.5 * 20.0 * (0.005 * step) ** 2), FLOOR_NM
+        )
+    assert torque is not None
+    low, high = torque[:, SHOULDER]
+    assert low <= stands_nm - 0.5 * margin_nm
+    assert high >= stands_nm + 0.5 * margin_nm
+    # and the motion needs less than that, or the test would tell nothing
+    assert (high - low) > 2.0 * margin_nm + 2.0
+
+
 def test_fingers_are_not_limited() -> None:
     low, high = still(limit())[:, FINGERS]
     assert (low == -np.inf).all()
