@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+TOO_MANY_SKIPPED = 10
+"""Status of a run where too many tests skipped: none of pytest's own, so that .ci/tests can tell."""
+
 
 @dataclass(frozen=True, slots=True)
 class Allowed:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from .skips import Allowed, counted, read_allowed, too_many
+from .skips import TOO_MANY_SKIPPED, Allowed, counted, read_allowed, too_many
 
 TESTS = Path(__file__).parent
 RULES = (
@@ -70,9 +70,14 @@ def run(folder: Path, reason: str, *arguments: str, ci: bool) -> tuple[int, str]
 @pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["one process", "two workers"])
 def test_ci_fails_for_a_reason_that_is_not_listed(tmp_path: Path, workers: list[str]) -> None:
     status, said = run(tmp_path, "somebody was lazy", *workers, ci=True)
-    assert status == 1, said
+    assert status == TOO_MANY_SKIPPED, said
     assert "1 skipped for a reason that is not listed: somebody was lazy" in said
     assert "tests/skips.toml" in said
+
+
+def test_it_also_fails_for_skips_beside_a_test_that_failed(tmp_path: Path) -> None:
+    (tmp_path / "test_two.py").write_text("def test_two():\n    raise AssertionError\n")
+    assert run(tmp_path, "somebody was lazy", ci=True)[0] == TOO_MANY_SKIPPED
 
 
 def test_a_part_of_the_suite_or_a_listed_reason_passes(tmp_path: Path) -> None:
