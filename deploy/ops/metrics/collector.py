@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,8 +38,14 @@ class StatisticsCollector:
     """Takes statistics in the event loop; scraped by the server's thread, which sees whole entries only."""
 
     def __init__(
-        self, recordings: Path | None = None, clock: Clock = monotonic_ns, wall: Clock = wall_ns
+        self,
+        recordings: Path | None = None,
+        clock: Clock = monotonic_ns,
+        wall: Clock = wall_ns,
+        robots: Sequence[str] = (),
     ) -> None:
+        """`robots`: whose slaves are to speak, also where none of them was ever heard."""
+        self._robots = tuple(robots)
         self._newest: dict[tuple[str, str], HeardStatistics] = {}
         self._recordings = recordings
         self._clock, self._wall = clock, wall
@@ -57,7 +65,12 @@ class StatisticsCollector:
         """What is known now. A process that has been silent for 5 s has `tandem_up` 0 and no other value."""
         heard, now_ns = list(self._newest.values()), self._clock()
         fresh = [one for one in heard if is_fresh(one, now_ns)]
-        yield self._beside(UP, [({"robot": h.robot, "role": h.role}, float(h in fresh)) for h in heard])
+        # a slave that never spoke is silent too: this process may have begun after it failed
+        up = {(robot, "slave"): 0.0 for robot in self._robots}
+        up |= {(one.robot, one.role): float(one in fresh) for one in heard}
+        yield self._beside(
+            UP, [({"robot": robot, "role": role}, value) for (robot, role), value in up.items()]
+        )
         for metric in TABLE:
             yield _family(metric, fresh)
         if self._recordings is not None:
@@ -72,14 +85,15 @@ class StatisticsCollector:
         return family
 
     def _of_recordings(self, folder: Path) -> Iterator[Metric]:
-        try:
-            newest_ns = max((path.stat().st_mtime_ns for path in folder.glob("*.mcap")), default=None)
-            free = shutil.disk_usage(folder).free
-        except OSError:  # the disk has gone: no value, and the alert's `absent` says so
-            return
-        if newest_ns is not None:
-            yield self._beside(RECORDING_AGE, [({}, to_s(self._wall() - newest_ns))])
-        yield self._beside(RECORDING_FREE, [({}, float(free))])
+        times_ns = []
+        for path in folder.glob("*.mcap"):
+            with suppress(OSError):  # it has been removed meanwhile
+                times_ns.append(path.stat().st_mtime_ns)
+        # without a recording, or without its disk, an alert on the age must still fire
+        age_s = to_s(self._wall() - max(times_ns)) if times_ns else math.inf
+        yield self._beside(RECORDING_AGE, [({}, age_s)])
+        with suppress(OSError):  # the disk has gone
+            yield self._beside(RECORDING_FREE, [({}, float(shutil.disk_usage(folder).free))])
 
 
 def _family(metric: ServedMetric, heard: list[HeardStatistics]) -> Metric:
@@ -89,11 +103,11 @@ def _family(metric: ServedMetric, heard: list[HeardStatistics]) -> Metric:
     done: set[tuple[str, ...]] = set()
     for one in heard:
         labels = {"role": one.role}
-        if metric.by_robot:
+        if metric.by_robot or one.role == "slave":
             labels["robot"] = one.robot
         for sample in metric.take(one.metrics):
             of_sample = {**labels, **sample.labels}
-            # one master sends each robot the same figures of itself
+            # one master sends each robot the same figures of itself; each robot has a slave of its own
             key = tuple(of_sample.values())
             if key not in done:
                 done.add(key)

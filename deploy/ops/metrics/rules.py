@@ -32,6 +32,9 @@ ALERTS = (
         "{{ $labels.role }} of {{ $labels.robot }} is silent",
     ),
     AlertRule(
+        "TandemMetricsSilent", f"absent({UP})", "30s", "critical", "`tandem metrics` itself is not scraped"
+    ),
+    AlertRule(
         "TandemRobotSilent", "tandem_robot_silent == 1", "5s", "critical",
         "the master does not hear {{ $labels.robot }}",
     ),
@@ -45,7 +48,7 @@ ALERTS = (
     ),
     AlertRule(
         "TandemLate", 'tandem_latency_seconds{stage="one way",quantile="0.99"} > 0.15', "1m", "warning",
-        "1 % of the commands to {{ $labels.robot }} arrive later than 150 ms",
+        "of all commands to {{ $labels.robot }} since its slave started, 1 % came later than 150 ms",
     ),
     AlertRule(
         "TandemHolds", "increase(tandem_holds_total[10m]) > 3", "0s", "warning",
@@ -106,8 +109,7 @@ def dashboard() -> str:
                     "refId": "A",
                     "expr": metric.drawn.format(name=metric.full_name),
                     "legendFormat": " ".join(
-                        f"{{{{{label}}}}}"
-                        for label in (*(["robot"] if metric.by_robot else []), "role", *metric.labels)
+                        f"{{{{{label}}}}}" for label in ("robot", "role", *metric.labels)
                     ),
                 }
             ],

@@ -35,7 +35,7 @@ async def serve_metrics(options: MetricsOptions, stop: asyncio.Event, ready: Cal
     """
     from prometheus_client import CollectorRegistry, start_http_server
 
-    collector = StatisticsCollector(options.recordings)
+    collector = StatisticsCollector(options.recordings, robots=options.robots)
     registry = CollectorRegistry(auto_describe=False)
     registry.register(collector)
     async with AsyncExitStack() as links:

@@ -66,7 +66,7 @@ class ServedMetric:
     drawn: str = ""
     """PromQL of its panel, with {name} for the full name; empty: it has none."""
     by_robot: bool = True
-    """False: of the process, whatever robot its statistics were sent to."""
+    """False: of the process. A master sends each robot the same, so its figures have no label `robot`."""
 
     @property
     def full_name(self) -> str:
@@ -218,12 +218,12 @@ TABLE: tuple[ServedMetric, ...] = (
     ),
 )  # fmt: skip
 UP = "tandem_up"
-"""1 for each process that was heard within 5 s, 0 for one that was heard before; served beside the table."""
+"""1 for a process that was heard within 5 s, else 0: each robot's slave, and a master that was ever heard."""
 RECORDING_AGE, RECORDING_FREE = "tandem_recording_age_seconds", "tandem_recording_free_bytes"
-"""With --recordings: time since the newest recording was written to; room on its disk."""
+"""With --recordings: time since the newest recording was written to, +Inf without one; room on its disk."""
 BESIDE = {
     UP: "1 while a process's statistics come.",
-    RECORDING_AGE: "Time since the newest recording in the folder was written to.",
+    RECORDING_AGE: "Time since the newest recording in the folder was written to; +Inf without one.",
     RECORDING_FREE: "Room on the disk of the recordings.",
 }
 

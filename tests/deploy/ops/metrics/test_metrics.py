@@ -123,9 +123,30 @@ def test_figures_of_one_master_that_commands_two_robots_are_served_once() -> Non
     assert made.unreadable == 1
 
 
+def test_two_robots_slaves_are_served_both() -> None:
+    made = StatisticsCollector(clock=lambda: 0)
+    for robot, missed in (("robot-1", 3), ("robot-2", 700)):
+        late = replace(slave(), ticks=replace(slave().ticks, missed=missed))
+        made.take(robot, encode(Statistics(1, late)), 0)
+    scraped = Scraped(made)
+    assert scraped.value("tandem_ticks_missed_total", robot="robot-1") == 3
+    assert scraped.value("tandem_ticks_missed_total", robot="robot-2") == 700
+
+
+def test_a_robot_that_never_spoke_is_silent() -> None:
+    made = StatisticsCollector(clock=lambda: 0, robots=("robot-1", "robot-2"))
+    made.take("robot-2", encode(Statistics(1, slave())), 0)
+    scraped = Scraped(made)
+    assert scraped.value(UP, robot="robot-1", role="slave") == 0
+    assert scraped.value(UP, robot="robot-2", role="slave") == 1
+
+
 def test_the_folder_of_recordings_is_watched(tmp_path: Path) -> None:
     made = StatisticsCollector(tmp_path, wall=lambda: 0)
-    assert "tandem_recording_age_seconds" not in Scraped(made).names()
+    assert Scraped(made).value("tandem_recording_age_seconds") == math.inf
+    gone = Scraped(StatisticsCollector(tmp_path / "unmounted", wall=lambda: 0))
+    assert gone.value("tandem_recording_age_seconds") == math.inf
+    assert "tandem_recording_free_bytes" not in gone.names()
     file = tmp_path / "a.mcap"
     file.write_bytes(b"x")
     changed_ns = file.stat().st_mtime_ns
@@ -156,9 +177,10 @@ def test_what_the_table_says_is_what_is_served(collector: StatisticsCollector) -
     kinds = {family.name: family.type for family in scraped.families}
     for metric in TABLE:
         assert kinds[metric.name] == metric.type.value
-        expected = {"role", *metric.labels, *(["robot"] if metric.by_robot else [])}
         for sample in scraped.samples:
             if sample.name == metric.full_name:
+                of_robot = metric.by_robot or sample.labels["role"] == "slave"
+                expected = {"role", *metric.labels, *(["robot"] if of_robot else [])}
                 assert sample.labels.keys() - {"quantile"} == expected
 
 
