@@ -7,6 +7,7 @@ import os
 import secrets
 from collections.abc import Sequence
 from pathlib import Path
+from urllib.parse import unquote
 
 from common.errors import RecordingError, TandemError
 from common.recording import RecordingStream
@@ -15,7 +16,9 @@ LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 """Without those that look alike."""
 CODE_LENGTH = 4
 SHORTEST = 3
-"""Characters of a name that is searched for: shorter ones are in every file by chance."""
+"""Letters of a name that is searched for: shorter ones are in every file by chance. Of other scripts, 2."""
+_APART = str.maketrans(dict.fromkeys(" _-.,", ""))
+"""What may stand between the parts of a name."""
 
 
 class Pseudonyms:
@@ -72,12 +75,29 @@ def _draw(known: dict[str, str]) -> str:
             return code
 
 
+def _written(name: str) -> set[str]:
+    """How a name may stand in a file, without what is between its parts; empty where it is too short."""
+    parts = name.casefold().translate(str.maketrans("_-.,", "    ")).split()
+    joined = "".join(parts)
+    return (
+        {joined, "".join(reversed(parts))} if len(joined) >= (SHORTEST if joined.isascii() else 2) else set()
+    )
+
+
+def too_short(names: Sequence[str]) -> int:
+    """How many names are not searched for."""
+    return sum(not _written(name) for name in names)
+
+
 def names_in(folder: Path, names: Sequence[str]) -> list[str]:
-    """Where in a folder's files a name stands, in words: file, and in a recording the topic."""
-    wanted = [name.casefold() for name in names if len(name) >= SHORTEST]
+    """Where in a folder's files a name stands, in words: file, and in a recording the topic.
+
+    A name is found in large and small letters, with its parts in both orders: Li Mei, mei_li, LIMEI.
+    """
+    wanted = sorted({form for name in names for form in _written(name)})
     found = []
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-        if any(name in path.name.casefold() for name in wanted):
+        if _in(path.relative_to(folder).as_posix().encode(errors="ignore"), wanted):
             found.append(f"{path}: its own name")
         if path.suffix == ".mcap":
             found += _in_recording(path, wanted)
@@ -91,7 +111,8 @@ def _in_recording(path: Path, wanted: Sequence[str]) -> list[str]:
     stream = RecordingStream(path)
     try:
         for entry in stream:
-            said = entry.topic.encode() + b" " + entry.payload
+            # an operator's name is a part of the key of each command
+            said = unquote(entry.topic).encode() + b" " + entry.payload
             if entry.topic not in topics and _in(said, wanted):
                 topics[entry.topic] = None
     except RecordingError as error:
@@ -102,5 +123,5 @@ def _in_recording(path: Path, wanted: Sequence[str]) -> list[str]:
 
 
 def _in(data: bytes, wanted: Sequence[str]) -> bool:
-    text = data.decode("utf-8", "ignore").casefold()
+    text = data.decode("utf-8", "ignore").casefold().translate(_APART)
     return any(name in text for name in wanted)

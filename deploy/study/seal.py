@@ -1,6 +1,6 @@
 """A seal over a folder: a chain of SHA-256 over its files. It names the file and the part that was changed.
 
-    h₀ = SHA-256("tandem seal 1");   hₖ = SHA-256(hₖ₋₁ ‖ name ‖ 0 ‖ size ‖ 0 ‖ the blocks)
+    h₀ = SHA-256("tandem seal 1 " ‖ time);   hₖ = SHA-256(hₖ₋₁ ‖ name ‖ 0 ‖ size ‖ 0 ‖ the blocks)
 
 The last h, the head, stands for everything. Whoever can write the folder can seal it anew, so the head is to
 be kept elsewhere too: on paper, or by the other side.
@@ -22,7 +22,7 @@ from deploy.study.signature import sign, signer_of
 
 SEAL = "seal.json"
 VERSION = 1
-_FIRST = b"tandem seal 1"
+_FIRST = "tandem seal 1 "
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,15 +49,15 @@ class SealBroken:
 def seal(folder: Path, wall: Clock = wall_ns, key: Path | None = None) -> str:
     """Write the seal, signed where a `key` is given; returns its head.
 
-    Raises TandemError where there is one already, nothing to seal, or a key that cannot sign.
+    Raises TandemError where there is one already, nothing to seal, a link, or a key that cannot sign.
     """
     if (folder / SEAL).exists():
         raise TandemError(f"{folder}: it is sealed already; `tandem session verify {folder}`")
     files = tuple(_sealed(folder, name) for name in _names(folder))
     if not files:
         raise TandemError(f"{folder}: there are no files to seal")
-    head = head_of(files)
     sealed = datetime.fromtimestamp(wall() / NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    head = head_of(sealed, files)
     tree: dict[str, object] = {"version": VERSION, "sealed": sealed, "head": head}
     if key is not None:
         tree["signature"], tree["certificate"] = sign(head, key)
@@ -68,15 +68,20 @@ def seal(folder: Path, wall: Clock = wall_ns, key: Path | None = None) -> str:
 
 def _sealed(folder: Path, name: str) -> SealedFile:
     path = folder / name
+    if path.is_symlink():
+        raise TandemError(f"{path}: it is a link, and a seal is over files: copy here what it leads to")
     return SealedFile(name, path.stat().st_size, tuple(blocks_of(path)))
 
 
-def head_of(files: Sequence[SealedFile]) -> str:
-    """The last hash of the chain."""
-    value = hashlib.sha256(_FIRST).digest()
+def head_of(sealed: str, files: Sequence[SealedFile]) -> str:
+    """The last hash of the chain; `sealed`: when, as it is written."""
+    value = hashlib.sha256((_FIRST + sealed).encode()).digest()
     for file in files:
-        digests = "".join(f"{block.offset} {block.length} {block.sha256} " for block in file.blocks)
-        value = hashlib.sha256(value + f"{file.name}\0{file.size}\0{digests}".encode()).digest()
+        digests = "".join(
+            f"{block.offset} {block.length} {block.sha256} {block.times_ns} " for block in file.blocks
+        )
+        told = f"{file.name}\0{file.size}\0{digests}".encode(errors="surrogateescape")
+        value = hashlib.sha256(value + told).digest()
     return value.hex()
 
 
@@ -85,12 +90,12 @@ def verify(folder: Path, head: str | None = None) -> tuple[str, list[SealBroken]
 
     `head`: as it was noted elsewhere when it was sealed. Raises TandemError without a seal that can be read.
     """
-    files, written = _read(folder)
+    sealed_at, files, written = _read(folder)
     broken = []
     if signer(folder) is None:
         broken.append(SealBroken(SEAL, "its signature is not of this head, or of another certificate"))
-    if head_of(files) != written:
-        broken.append(SealBroken(SEAL, "the seal was changed: its files do not give its head"))
+    if head_of(sealed_at, files) != written:
+        broken.append(SealBroken(SEAL, "the seal was changed: its time and files do not give its head"))
     if head is not None and head != written:
         broken.append(SealBroken(SEAL, f"it is another seal: its head is {written}, not {head}"))
     sealed = {file.name: file for file in files}
@@ -116,6 +121,8 @@ def signer(folder: Path) -> str | None:
 
 
 def _compare(path: Path, file: SealedFile) -> list[SealBroken]:
+    if path.is_symlink():
+        return [SealBroken(file.name, "is a link now, and was a file")]
     size, found = path.stat().st_size, []
     if size != file.size:
         found.append(SealBroken(file.name, f"has {size} bytes, was sealed with {file.size}"))
@@ -136,18 +143,19 @@ def _span(times_ns: tuple[int, int]) -> str:
 
 
 def _names(folder: Path) -> list[str]:
-    """All files but the seal itself and hidden ones, by name."""
+    """All files but the seal itself, by name: hidden ones and links too."""
     return sorted(
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
-        if path.is_file() and path.name != SEAL and not path.name.startswith(".")
+        if (path.is_file() or path.is_symlink()) and path != folder / SEAL
     )
 
 
-def _read(folder: Path) -> tuple[list[SealedFile], str]:
+def _read(folder: Path) -> tuple[str, list[SealedFile], str]:
+    """When it was sealed, the files, and the head."""
     tree = _tree(folder)
     try:
-        return [_file(file) for file in _list(tree["files"])], str(tree["head"])
+        return str(tree["sealed"]), [_file(file) for file in _list(tree["files"])], str(tree["head"])
     except (ValueError, KeyError, TypeError) as error:
         raise TandemError(f"{folder / SEAL}: cannot be read as a seal ({error})") from None
 

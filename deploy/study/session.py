@@ -106,8 +106,9 @@ class Session:
         path = self.path / MARKS
         if not path.exists():
             return []
-        found = []
-        for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
+        found, text = [], path.read_text("utf-8").removesuffix("\n")
+        # not splitlines: a mark's text may hold what Unicode counts as the end of a line
+        for number, line in enumerate(text.split("\n") if text else (), start=1):
             try:
                 tree = json.loads(line)
                 found.append(

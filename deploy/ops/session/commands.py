@@ -58,7 +58,8 @@ def start(
 
     begun = begin(root, protocol, subject, session, consent, tuple(scope or ("motion",)))
     console = Console()
-    console.print(f"{begun.path}: begun", highlight=False, markup=False)
+    recorded = "begun" if tap else "begun; nothing is recorded without --tap"
+    console.print(f"{begun.path}: {recorded}", highlight=False, markup=False)
 
     async def work(stop: asyncio.Event) -> None:
         await lead(
@@ -110,13 +111,22 @@ def seal_folder(
 
     Example: `tandem session seal study/sub-k7pd/ses-01`
     """
-    from deploy.study.pseudonyms import Pseudonyms, names_in
+    from deploy.study.pseudonyms import Pseudonyms, names_in, too_short
     from deploy.study.seal import seal
+    from deploy.study.session import SESSION, Session
 
+    if (folder / SESSION).exists() and not Session(folder).ended:
+        raise TandemError(
+            f"{folder}: the session has not ended, and what is recorded after the seal would break it: "
+            f"`tandem session mark {folder} --end`"
+        )
     if people is not None:
-        found = names_in(folder, list(Pseudonyms(people, folder).names().values()))
+        names = list(Pseudonyms(people, folder).names().values())
+        found = names_in(folder, names)
         if found:
             raise TandemError("a name stands in " + "; in ".join(found) + ": use codes as operators' names")
+        if short := too_short(names):
+            typer.echo(f"{short} names of {people} are too short to be searched for", err=True)
     typer.echo(f"{folder}: sealed; head {seal(folder, key=key)}")
 
 
@@ -142,7 +152,8 @@ def verify_folder(
         raise TandemError(f"{folder}: {len(broken)} things are not as they were sealed")
     if not as_json:
         by = signer(folder)
-        typer.echo(f"{folder}: as it was sealed{f' and signed by {by}' if by else ''}; head {written}")
+        signed = f", signed with a certificate of the name {by}" if by else ""
+        typer.echo(f"{folder}: as it was sealed{signed}; head {written}")
 
 
 @app.command()
@@ -166,7 +177,7 @@ def export_all(
     out: Annotated[Path, typer.Option(help="New zip file.", dir_okay=False, callback=in_a_folder)],
     root: Root = Path(),
 ) -> None:
-    """Write everything of one subject into a zip file, for that person.
+    """Write everything of one subject into a zip file outside of the study's folder, for that person.
 
     Example: `tandem session export --subject k7pd --out k7pd.zip --root study`
     """

@@ -27,8 +27,7 @@ async def lead(
                 show("space: next step   m: mark an event   q: end")
             failed = await _until_over(session, recorders, stop, show, language)
     finally:
-        if not session.ended:
-            session.mark(MarkKind.END, failed or "stopped")
+        _end(session, failed or "stopped", show)
         said = await recorders.stop()
         for name, words in said.items():
             show(f"{name}: {words}")
@@ -36,6 +35,15 @@ async def lead(
         raise TandemError(
             f"{session.path}: the recorder of {failed} ended: {said[failed]}; the session is kept"
         )
+
+
+def _end(session: Session, why: str, show: Callable[[str], None]) -> None:
+    """Mark the end; where the disk takes no mark, say so, as recorders are still to be ended."""
+    try:
+        if not session.ended:
+            session.mark(MarkKind.END, why)
+    except (OSError, TandemError) as error:
+        show(f"{session.path}: its end is not marked: {error}")
 
 
 async def _until_over(

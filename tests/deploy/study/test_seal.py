@@ -92,6 +92,63 @@ def test_what_is_missing_added_cut_or_grown_is_named(folder: Path) -> None:
     assert "bytes, was sealed with" in found["master.mcap"]
 
 
+@pytest.mark.parametrize("name", [".hidden", "deep/.hidden", "deep/seal.json", ".kept/notes.txt"])
+def test_hidden_files_and_inner_seals_are_sealed(folder: Path, name: str) -> None:
+    (folder / ".kept").mkdir()
+    (folder / name).write_text("a")
+    seal(folder)
+    (folder / name).write_text("b")
+    assert [broken.name for broken in verify(folder)[1]] == [name]
+    (folder / name).unlink()
+    assert [(broken.name, broken.words) for broken in verify(folder)[1]] == [(name, "is missing")]
+
+
+def test_a_hidden_file_or_a_link_that_was_added_is_named(folder: Path) -> None:
+    seal(folder)
+    (folder / ".more").write_text("later")
+    (folder / "link").symlink_to("nowhere")
+    (folder / "other").symlink_to(folder.parent)
+    assert [broken.name for broken in verify(folder)[1]] == [".more", "link", "other"]
+
+
+def test_a_renamed_file_is_missing_and_added(folder: Path) -> None:
+    seal(folder)
+    (folder / "session.json").rename(folder / "another.json")
+    assert [broken.name for broken in verify(folder)[1]] == ["another.json", "session.json"]
+
+
+def test_a_link_is_not_sealed_and_none_stands_for_a_file(folder: Path, tmp_path: Path) -> None:
+    (folder / "link").symlink_to(folder / "session.json")
+    with pytest.raises(TandemError, match="is a link"):
+        seal(folder)
+    (folder / "link").unlink()
+    seal(folder)
+    (folder / "session.json").rename(tmp_path / "moved.json")
+    (folder / "session.json").symlink_to(tmp_path / "moved.json")
+    assert [broken.words for broken in verify(folder)[1]] == ["is a link now, and was a file"]
+
+
+@pytest.mark.parametrize("what", ["sealed", "times"])
+def test_the_time_of_the_seal_and_of_each_chunk_are_sealed(folder: Path, what: str) -> None:
+    seal(folder)
+    tree = json.loads((folder / SEAL).read_text())
+    if what == "sealed":
+        tree["sealed"] = "2020-01-01T00:00:00Z"
+    else:
+        blocks = next(file for file in tree["files"] if file["name"] == "master.mcap")["blocks"]
+        next(block for block in blocks if block["times_ns"])["times_ns"][0] += 1
+    (folder / SEAL).write_text(json.dumps(tree))
+    assert [broken.name for broken in verify(folder)[1]] == [SEAL]
+
+
+def test_a_name_that_is_no_text_is_sealed(folder: Path) -> None:
+    (folder / "\udcff.bin").write_bytes(b"a")
+    seal(folder)
+    assert verify(folder)[1] == []
+    (folder / "\udcff.bin").write_bytes(b"b")
+    assert len(verify(folder)[1]) == 1
+
+
 def test_a_changed_seal_and_a_new_seal_are_seen(folder: Path) -> None:
     head = seal(folder)
     tree = json.loads((folder / SEAL).read_text())

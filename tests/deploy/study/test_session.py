@@ -10,8 +10,9 @@ import pytest
 
 from common.errors import ConfigError, TandemError
 from common.recording import McapRecorder
+from common.wire.sender import operator_chunk
 from deploy.examples import profiles
-from deploy.study.pseudonyms import Pseudonyms, names_in
+from deploy.study.pseudonyms import Pseudonyms, names_in, too_short
 from deploy.study.seal import seal
 from deploy.study.session import MARKS, MarkKind, Session, begin
 from deploy.study.subject import RECEIPTS, delete_subject, export_subject
@@ -59,6 +60,13 @@ def test_steps_come_in_order_and_the_end_takes_no_more(tmp_path: Path) -> None:
         session.marks()
 
 
+@pytest.mark.parametrize("text", ["a\u2028b", "a\x85b", "a\nb", "杯子"])
+def test_any_text_may_be_marked(tmp_path: Path, text: str) -> None:
+    session = begin(tmp_path, CUP, "k7pd")
+    session.mark(MarkKind.EVENT, text)
+    assert [mark.text for mark in session.marks()] == [text]
+
+
 def test_without_consent_for_it_no_video_is_recorded(tmp_path: Path) -> None:
     motion = begin(tmp_path, CUP, "k7pd")
     both = begin(tmp_path, CUP, "k7pd", scope=("motion", "video"))
@@ -98,6 +106,46 @@ def test_a_name_in_any_file_is_found(tmp_path: Path) -> None:
     with McapRecorder(session.path / "head.mcap", {"operator": "Anna Möller"}) as recorder:
         recorder.put("t", b"", 1)
     assert names_in(session.path, ["anna möller"]) == [f"{session.path / 'head.mcap'}: its head"]
+
+
+@pytest.mark.parametrize(
+    ("name", "written", "found"),
+    [
+        ("Li Mei", "li_mei", True), ("Li Mei", "Mei Li", True), ("Li Mei", "LIMEI", True),
+        ("李梅", "护士李梅来了", True), ("李 梅", "李梅", True), ("李", "李", False),
+        ("Bo", "Bobo", False), ("Bob", "bob", True), ("Li Mei", "Li saw Mei", False),
+    ],
+)  # fmt: skip
+def test_a_name_is_found_however_it_is_written(tmp_path: Path, name: str, written: str, found: bool) -> None:
+    (tmp_path / "notes.txt").write_text(f"- {written} -", "utf-8")
+    assert bool(names_in(tmp_path, [name])) == found
+    assert too_short([name]) == (name in ("李", "Bo"))
+
+
+def test_a_name_in_the_key_of_a_command_is_found(tmp_path: Path) -> None:
+    topic = f"tandem/robot-1/operator/{operator_chunk('李 梅')}/command"
+    with McapRecorder(tmp_path / "link.mcap", {}) as recorder:
+        recorder.put(topic, b"\x01", 1)
+    assert names_in(tmp_path, ["李梅"]) == [f"{tmp_path / 'link.mcap'}: {topic}"]
+
+
+def test_a_damaged_seal_does_not_keep_a_subject(tmp_path: Path) -> None:
+    sealed, damaged = begin(tmp_path, CUP, "k7pd"), begin(tmp_path, CUP, "k7pd")
+    head = seal(sealed.path)
+    (damaged.path / "seal.json").write_text("{")
+    assert delete_subject(tmp_path, "k7pd").heads == (head,)
+    assert not (tmp_path / "sub-k7pd").exists()
+
+
+def test_a_deleted_subject_is_no_participant_and_no_zip_file_stays_in_the_study(tmp_path: Path) -> None:
+    begin(tmp_path, CUP, "k7pd")
+    (tmp_path / "participants.tsv").write_text("participant_id\tage\nsub-k7pd\t40\nsub-k7pd2\t50\n")
+    with pytest.raises(TandemError, match="outside of it"):
+        export_subject(tmp_path, "k7pd", tmp_path / "deep" / "k7pd.zip")
+    delete_subject(tmp_path, "k7pd")
+    assert (tmp_path / "participants.tsv").read_text() == "participant_id\tage\nsub-k7pd2\t50\n"
+    left = [path for path in tmp_path.rglob("*") if path.is_file() and path.name != RECEIPTS]
+    assert [path.name for path in left] == ["participants.tsv"]
 
 
 def test_one_subject_is_handed_out_and_deleted_and_the_others_stay(tmp_path: Path) -> None:

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import msgpack
 import pytest
+from typer.testing import CliRunner
 
 from common.errors import TandemError
 from common.recording import McapRecording, read_recording
 from common.tap.sender import TapSender
+from deploy import cli
 from deploy.examples import profiles
 from deploy.ops.session.run import lead
 from deploy.study.session import MARK_TOPIC, MarkKind, Session, begin
@@ -78,6 +80,45 @@ def test_marks_steps_and_consent_are_in_the_recording(tmp_path: Path) -> None:
 def test_with_consent_there_is_video(tmp_path: Path) -> None:
     _, recording, _ = played(tmp_path, ("motion", "video"))
     assert VIDEO in {entry.topic for entry in recording.entries}
+
+
+def test_recorders_are_ended_where_the_disk_takes_no_mark(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Recorders:
+        stopped = False
+
+        def __init__(self, *_: object) -> None: ...
+
+        async def start(self) -> None: ...
+
+        async def ended(self) -> str:
+            await asyncio.Event().wait()
+            return ""
+
+        async def stop(self) -> dict[str, str]:
+            Recorders.stopped = True
+            return {}
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    session, stop, shown = begin(tmp_path, CUP, "k7pd"), asyncio.Event(), list[str]()
+    monkeypatch.setattr("deploy.ops.session.run.SessionRecorders", Recorders)
+    monkeypatch.setattr(Session, "mark", full)
+    stop.set()
+    asyncio.run(lead(session, [], stop, shown.append, "en"))
+    assert Recorders.stopped
+    assert "its end is not marked" in shown[-1]
+
+
+def test_a_session_is_sealed_only_once_it_has_ended(tmp_path: Path) -> None:
+    session = begin(tmp_path, CUP, "k7pd")
+    early = CliRunner().invoke(cli.app, ["session", "seal", str(session.path)])
+    assert "has not ended" in str(early.exception)
+    session.mark(MarkKind.END, "done")
+    assert CliRunner().invoke(cli.app, ["session", "seal", str(session.path)]).exit_code == 0
+    assert CliRunner().invoke(cli.app, ["session", "verify", str(session.path)]).exit_code == 0
 
 
 def test_a_process_that_ends_ends_the_session_with_an_error(tmp_path: Path) -> None:
