@@ -20,7 +20,7 @@ from common.wire.messages import Command, RobotState
 from common.wire.video import VideoFrame, decode_frame
 
 FRESH_S = 0.5
-"""A state that is older says nothing about now."""
+"""A state or command that is older says nothing about now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,18 +32,19 @@ class HeldFrame:
     wall_ns: int
     """ns since 1970."""
     guard: str
+    """Its state; empty while the robot is silent."""
     encoder_rad: Array
-    """(J,) NaN where an encoder was not valid."""
+    """(J,) NaN where an encoder was not valid, and while the robot is silent."""
     setpoint_rad: Array
-    """(J,)."""
+    """(J,) NaN while the robot is silent."""
     operator_rad: Array
-    """(J,) of the newest command; NaN where there was none, or not valid."""
+    """(J,) of the newest command; NaN where there was none within 0.5 s, or not valid."""
     effort_nm: Array
-    """(J,) NaN where none is told."""
+    """(J,) NaN where none is told, and while the robot is silent."""
     pictures: dict[str, VideoFrame]
     """By camera; each frame bears its number."""
     fresh: bool
-    """Whether the state is younger than 0.5 s."""
+    """Whether the state is younger than 0.5 s; else the robot is silent."""
 
 
 @dataclass(slots=True)
@@ -54,6 +55,7 @@ class _Newest:
     state: RobotState | None = None
     state_ns: int = 0
     command: Command | None = None
+    command_ns: int = 0
     pictures: dict[str, VideoFrame] = field(default_factory=dict)
 
     def take(self, entry: Entry) -> bool:
@@ -63,7 +65,10 @@ class _Newest:
             if parts[-1] == "state":
                 self.state, self.state_ns = decode(entry.payload, RobotState, self.joints), entry.monotonic_ns
             elif parts[-1] == "command":
-                self.command = decode(entry.payload, Command, self.joints)
+                self.command, self.command_ns = (
+                    decode(entry.payload, Command, self.joints),
+                    entry.monotonic_ns,
+                )
             elif len(parts) > 2 and parts[-2] == "video":
                 self.pictures[parts[-1]] = decode_frame(entry.payload)
         except CodecError:
@@ -96,17 +101,19 @@ class HeldFrames:
     def _frame(
         self, newest: _Newest, state: RobotState, due_ns: int, began_ns: int, wall_less_ns: int
     ) -> HeldFrame:
-        command, nothing = newest.command, np.full(len(self._skeleton.joints), np.nan)
+        nothing, oldest_ns = np.full(len(self._skeleton.joints), np.nan), due_ns - to_ns(FRESH_S)
+        command = newest.command if newest.command_ns >= oldest_ns else None
+        fresh = newest.state_ns >= oldest_ns
         return HeldFrame(
             time_s=to_s(due_ns - began_ns),
             wall_ns=due_ns + wall_less_ns,
-            guard=state.guard,
-            encoder_rad=np.where(state.encoder_valid, state.position_rad, np.nan),
-            setpoint_rad=state.setpoint_rad,
+            guard=state.guard if fresh else "",
+            encoder_rad=np.where(state.encoder_valid & fresh, state.position_rad, np.nan),
+            setpoint_rad=state.setpoint_rad if fresh else nothing,
             operator_rad=nothing
             if command is None
             else np.where(command.valid, command.position_rad, np.nan),
-            effort_nm=nothing if state.effort_nm is None else state.effort_nm,
+            effort_nm=nothing if state.effort_nm is None or not fresh else state.effort_nm,
             pictures=dict(newest.pictures),
-            fresh=due_ns - newest.state_ns <= to_ns(FRESH_S),
+            fresh=fresh,
         )

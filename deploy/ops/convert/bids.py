@@ -49,7 +49,7 @@ class BidsNames:
 def write_bids(root: Path, source: Path, skeleton: Skeleton, fps: float, names: BidsNames) -> str:
     """Write or extend a dataset; returns what is in it, in words. Raises RecordingError."""
     frames = HeldFrames(skeleton, fps)
-    rows = [frame for frame in frames.of(RecordingStream(source)) if frame.fresh]
+    rows = list(frames.of(RecordingStream(source)))
     if len(rows) < 2:
         raise RecordingError(f"{source}: holds no states of the profile {skeleton.name}; see --profile")
     folder = root / f"sub-{names.subject}" / f"ses-{names.session}" / "motion"
@@ -124,12 +124,13 @@ def _cell(value: float) -> str:
 
 
 def _write_events(folder: Path, names: BidsNames, rows: Sequence[HeldFrame], began_s: float) -> None:
-    """Each stay in a state of the guard."""
+    """Each stay in a state of the guard, and each time without a state."""
     lines, since = ["onset\tduration\ttrial_type"], 0
     for number in range(1, len(rows) + 1):
         if number == len(rows) or rows[number].guard != rows[since].guard:
             onset, end = rows[since].time_s - began_s, rows[min(number, len(rows) - 1)].time_s - began_s
-            lines.append(f"{onset:.6f}\t{end - onset:.6f}\tguard_{rows[since].guard}")
+            told = f"guard_{rows[since].guard}" if rows[since].guard else "robot_silent"
+            lines.append(f"{onset:.6f}\t{end - onset:.6f}\t{told}")
             since = number
     (folder / names.file("events.tsv")).write_text("\n".join(lines) + "\n", "utf-8")
 

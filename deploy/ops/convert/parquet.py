@@ -71,7 +71,7 @@ def _columns(frames: Sequence[HeldFrame], joints: Sequence[str]) -> dict[str, ob
         "wall_time": pa.array(
             np.repeat([frame.wall_ns for frame in frames], len(joints)).astype("datetime64[ns]")
         ),
-        "guard": pa.array(each([frame.guard for frame in frames])).dictionary_encode(),
+        "guard": pa.array(each([frame.guard or None for frame in frames]), pa.string()).dictionary_encode(),
         "joint": pa.array([name for _ in frames for name in joints]).dictionary_encode(),
         **{name: angles(name) for name in ("encoder_rad", "setpoint_rad", "operator_rad", "effort_nm")},
     }

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.errors import TandemError
+from common.errors import RecordingError, TandemError
+from common.recording import RecordingStream
 from common.skeleton import Skeleton
+from common.wire.topics import COMMAND, STATE
 
 TABLE_HZ, LEARNING_HZ = 50.0, 25.0
 TASK = "follow the operator"
@@ -29,6 +32,7 @@ class WholeOptions:
 def write_whole(kind: str, options: WholeOptions) -> str:
     """Write one format; returns what is in it, in words. Raises TandemError, ModuleNotFoundError."""
     source, out, skeleton = options.source, options.out, options.skeleton
+    _check_one_sender(source, (STATE.name,) if kind == "foxglove" else (STATE.name, COMMAND.name))
     if kind == "foxglove":
         from deploy.ops.convert.foxglove import write_foxglove
 
@@ -50,3 +54,17 @@ def write_whole(kind: str, options: WholeOptions) -> str:
 
     names = BidsNames(options.subject, options.session, options.task or TASK_WORD)
     return write_bids(out, source, skeleton, options.rate_hz or TABLE_HZ, names)
+
+
+def _check_one_sender(source: Path, names: Sequence[str]) -> None:
+    """Raise RecordingError where two robots, or two operators, speak: their messages would be mixed."""
+    heard: dict[str, set[str]] = {name: set() for name in names}
+    for entry in RecordingStream(source):
+        name = entry.topic.rpartition("/")[2]
+        if name in heard:
+            heard[name].add(entry.topic)
+    for name, keys in heard.items():
+        if len(keys) > 1:
+            raise RecordingError(
+                f"{source}: holds {name}s of {', '.join(sorted(keys))}: record one at a time"
+            )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
@@ -42,6 +43,7 @@ def write_lerobot(root: Path, source: Path, skeleton: Skeleton, fps: int, task: 
             maker.add(episode)
         maker.finish(task)
     if not maker.episodes:
+        shutil.rmtree(root)
         raise RecordingError(
             f"{source}: the robot follows nobody in it for {LEAST_FRAMES / fps:.1f} s, so there is no episode"
         )

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from common.errors import TandemError
-from common.recording import Entry
+from common.errors import RecordingError, TandemError
+from common.recording import Entry, McapRecorder
 from common.skeleton import load_skeleton
 from common.wire.codec import decode
 from common.wire.messages import RobotState
 from deploy import cli
+from deploy.ops.convert.whole import WholeOptions, write_whole
 from deploy.recorded.held import HeldFrames
 from deploy.sim.world.world import VirtualWorld
 from tests.deploy.recorded.virtual import RecordedRun, record_run
@@ -78,6 +79,57 @@ def test_each_instant_holds_the_newest_that_had_arrived_and_nothing_later(run: R
         newest = heard[int(np.searchsorted(arrived_ns, at_ns, side="right")) - 1][1]
         np.testing.assert_array_equal(frame.encoder_rad, newest.position_rad)
         assert frame.guard == newest.guard
+
+
+def test_what_fell_silent_has_no_values(run: RecordedRun) -> None:
+    """From 0.5 s after its last message; the newest before that would be taken for a standing robot."""
+    from common.recording import RecordingStream
+
+    entries = list(RecordingStream(run.slave))
+    begun_ns = entries[0].monotonic_ns
+    gap_ns = (begun_ns + 1_000_000_000, begun_ns + 3_000_000_000)
+    spoken = [
+        entry
+        for entry in entries
+        if entry.topic.rpartition("/")[2] not in ("state", "command")
+        or not gap_ns[0] < entry.monotonic_ns < gap_ns[1]
+    ]
+    frames = list(HeldFrames(NURSING, FPS).of(spoken))
+    before = [frame for frame in frames if 1.0 < frame.time_s < 1.4]
+    during = [frame for frame in frames if 1.55 < frame.time_s < 2.95]
+    assert before
+    assert during
+    for frame in before:
+        assert frame.fresh
+        assert frame.guard
+        assert np.isfinite(frame.setpoint_rad).all()
+    for frame in during:
+        assert not frame.fresh
+        assert not frame.guard
+        for values in (frame.encoder_rad, frame.setpoint_rad, frame.operator_rad, frame.effort_nm):
+            assert np.isnan(values).all()
+
+
+@pytest.mark.parametrize(
+    ("topics", "refuses"),
+    [
+        (("tandem/a/state", "tandem/b/state"), ("foxglove", "parquet", "lerobot", "bids")),
+        (("tandem/a/operator/x/command", "tandem/a/operator/y/command"), ("parquet", "lerobot", "bids")),
+    ],
+)
+def test_two_robots_or_operators_are_not_mixed(
+    tmp_path: Path, topics: tuple[str, str], refuses: tuple[str, ...]
+) -> None:
+    with McapRecorder(tmp_path / "two.mcap", {}) as recorder:
+        for number, topic in enumerate(topics):
+            recorder.put(topic, b"x", number)
+    for kind in refuses:
+        with pytest.raises(RecordingError, match="record one at a time"):
+            write_whole(
+                kind,
+                WholeOptions(tmp_path / "two.mcap", tmp_path / kind, NURSING, None, None, "01", "1"),
+            )
+        assert not (tmp_path / kind).exists()
 
 
 def test_parquet_has_a_row_for_each_joint_and_instant(run: RecordedRun, tmp_path: Path) -> None:
@@ -195,5 +247,6 @@ def test_a_recording_in_which_nobody_follows_is_no_dataset(tmp_path: Path) -> No
     still = record_run(tmp_path, lambda world: world.run(1.0))
     with pytest.raises(TandemError, match="no episode"):
         export(still, tmp_path / "x", "--to", "lerobot")
+    assert not (tmp_path / "x").exists()
     with pytest.raises(TandemError, match="whole number"):
         export(still, tmp_path / "y", "--to", "lerobot", "--rate", "12.5")
