@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from common.clock import to_s
 from common.recording.config import RecordingConfig
 
 log = logging.getLogger(__name__)
+WRITTEN = r"\d{8}T\d{6}\.\d{3}Z(-\d+)?\.mcap"
+"""How the name of a file goes on after its side's: when it was begun; from the second hour on, its number."""
 SEAL = "seal.json"
 """A folder with this file is sealed (`tandem session seal`): nothing in it is ever removed."""
 
@@ -42,11 +45,15 @@ def to_remove(files: Sequence[KeptFile], config: RecordingConfig, now_ns: int) -
 
 
 def remove(folder: Path, name: str, config: RecordingConfig, now_ns: int) -> list[Path]:
-    """Remove what is too old or too much of the files NAME-*.mcap; returns what has gone."""
+    """Remove what is too old or too much of the files that NAME's recorder wrote; returns what has gone."""
     if (folder / SEAL).exists():
         return []
     files = []
-    for path in folder.glob(f"{name}-*.mcap"):
+    # another side may be called NAME-2
+    own = re.compile(rf"{re.escape(name)}-{WRITTEN}")
+    for path in folder.glob("*.mcap"):
+        if not own.fullmatch(path.name):
+            continue
         with suppress(OSError):  # it may have been moved meanwhile
             status = path.stat()
             files.append(KeptFile(path, status.st_size, status.st_mtime_ns))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -15,8 +16,8 @@ from common.errors import ConfigError, TandemError
 from common.recording import read_recording
 from common.recording.config import RecordingConfig
 from common.tap.sender import TapSender
-from deploy.ops.record.retention import SEAL, KeptFile, remove, to_remove
-from deploy.ops.record.steady import ROOM_BYTES, SteadyOptions, record_steadily, steady_options
+from deploy.ops.record.retention import SEAL, WRITTEN, KeptFile, remove, to_remove
+from deploy.ops.record.steady import ROOM_BYTES, SteadyOptions, _name, record_steadily, steady_options
 from master.config import MasterConfig
 
 EXAMPLES = Path(__file__).parents[4] / "deploy/examples"
@@ -46,14 +47,20 @@ def test_the_oldest_go_and_the_newest_always_stays(config: RecordingConfig, gone
 
 
 def test_only_its_own_files_go_and_none_of_a_sealed_folder(tmp_path: Path) -> None:
-    for name in ("operator-1.mcap", "operator-2.mcap", "robot-1.mcap", "operator-1.toml"):
+    begun = "20261130T081500.123Z"
+    others = (
+        f"robot-{begun}.mcap", f"operator-2-{begun}.mcap", f"operator-{begun}.toml", "operator-kept.mcap",
+    )  # fmt: skip
+    for name in (f"operator-{begun}.mcap", f"operator-{begun}-2.mcap", *others):
         (tmp_path / name).write_bytes(b"x" * 1000)
     config = RecordingConfig(keep_gb=1e-9)
     (tmp_path / SEAL).write_text("{}")
     assert remove(tmp_path, "operator", config, 0) == []
     (tmp_path / SEAL).unlink()
     assert len(remove(tmp_path, "operator", config, 0)) == 1
-    assert {path.name for path in tmp_path.iterdir()} >= {"robot-1.mcap", "operator-1.toml"}
+    assert {path.name for path in tmp_path.iterdir()} >= set(others)
+    options = SteadyOptions(tmp_path / "s.sock", tmp_path, "operator", config)
+    assert re.fullmatch(rf"operator-{WRITTEN}", _name(options, 1_700_000_000_000_000_000).name)
 
 
 def test_the_file_is_read_and_what_is_missing_is_said(tmp_path: Path) -> None:
