@@ -110,9 +110,11 @@ def _print(console: Console, found: FileFindings) -> None:
     table = plain_table(
         "what the guard did", "s", "commands before", "silence s", "furthest off", title="guard"
     )
+    several = len({event.robot for event in found.events}) > 1
     for event in found.events[:EVENTS_SHOWN]:
         off = f"{event.off_joint} {event.off_deg:.2f}°" if event.off_joint else UNKNOWN
         words = f"{event.state}: {event.reason}" if event.reason else event.state
+        words = f"{event.robot}: {words}" if several else words
         silence = f"{event.silence_s:.2f}" if event.commands else UNKNOWN
         table.add_row(words, f"{event.at_s:.1f}", str(event.commands), silence, off)
     console.print(table)

@@ -17,6 +17,7 @@ from deploy.ops.inspect.pictures import draw_events, draw_joints, make_folder
 from deploy.ops.inspect.thinned import ThinnedJoints
 from deploy.recorded.contents import Contents, Survey
 from deploy.recorded.profile import recorded_skeleton
+from deploy.recorded.robots import robot_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,18 +58,26 @@ def look_into(
     contents = [(path, RecordingStream(path)) for path in files]
     skeleton = recorded_skeleton(files, profile)
     for number, (path, stream) in enumerate(contents):
-        survey, events = Survey(), GuardChanges(skeleton.joint_names)
-        thinned = ThinnedJoints(skeleton)
+        survey, guards, thinned = Survey(), dict[str, GuardChanges](), ThinnedJoints(skeleton)
+        began: Entry | None = None
         for entry in _each(stream):
+            began = began or entry
             survey.take(entry)
-            events.take(entry)
+            # a slave's own recording is of one robot, and has topics without its name
+            robot = "" if (stream.metadata or {}).get("role") == "slave" else robot_of(entry.topic)
+            if robot not in guards:
+                guards[robot] = GuardChanges(skeleton.joint_names, began, robot)
+            guards[robot].take(entry)
             thinned.take(entry)
-        events.end()
-        found.append(FileFindings(path, survey.contents(stream), events.found, events.more))
+        for guard in guards.values():
+            guard.end()
+        events = sorted((event for guard in guards.values() for event in guard.found), key=lambda e: e.at_ns)
+        more = sum(guard.more for guard in guards.values())
+        found.append(FileFindings(path, survey.contents(stream), events, more))
         if plots is not None:
             folder = plots if number == 0 else plots / path.stem
             make_folder(folder)
-            draw_events(folder, events.found, skeleton.joint_names)
+            draw_events(folder, events, skeleton.joint_names)
             if len(thinned.time_s) > 1:
                 draw_joints(
                     folder / "joints.png", np.array(thinned.time_s), np.array(thinned.position_rad),

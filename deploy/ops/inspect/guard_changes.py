@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -46,6 +45,8 @@ class GuardChange:
     """The state before; empty where the recording begins."""
     state: str
     reason: str
+    robot: str = ""
+    """Its name; empty in a slave's own recording."""
     commands: int = 0
     """In the seconds before."""
     silence_s: float = 0.0
@@ -64,6 +65,7 @@ class GuardChange:
             "before",
             "state",
             "reason",
+            "robot",
             "commands",
             "silence_s",
             "off_deg",
@@ -73,47 +75,44 @@ class GuardChange:
 
 
 class GuardChanges:
-    """Takes a recording's messages in order; `found` are the events, complete once all have been taken."""
+    """Takes one robot's messages in order; `found` are the events, complete once all have been taken."""
 
-    def __init__(self, joints: tuple[str, ...]) -> None:
+    def __init__(self, joints: tuple[str, ...], began: Entry, robot: str = "") -> None:
+        """`began`: the first message of the recording, whichever robot it is of."""
+        self._robot = robot
+        # the time of day may be set while it is recorded: it is read once, and the monotonic clock counts on
+        self._day_less_ns = began.wall_ns - began.monotonic_ns
+        self._began_ns = began.wall_ns
         self.found: list[GuardChange] = []
         self.more = 0
         """Events beyond those kept."""
         self._joints = joints
         self._known: tuple[str, str] = "", ""
         self._tapped = False
-        self._began_ns: int | None = None
         self._recent: deque[Moment] = deque()
         self._commands: deque[int] = deque()
         self._open: list[GuardChange] = []
 
-    def take_all(self, entries: Iterable[Entry]) -> None:
-        """All messages of a recording."""
-        for entry in entries:
-            self.take(entry)
-        self.end()
-
     def take(self, entry: Entry) -> None:
         """One message. States of another profile are left out."""
-        if self._began_ns is None:
-            self._began_ns = entry.wall_ns
+        at_ns = entry.monotonic_ns + self._day_less_ns
         name = entry.topic.rpartition("/")[2]
         if entry.topic == GUARD:
             self._tapped = True
             _, state, reason = decode_guard(entry.payload)
-            self._changed(entry.wall_ns, state, reason)
+            self._changed(at_ns, state, reason)
         elif entry.topic == TICK:
             tick = decode_tick(entry.payload)
-            self._moment(entry.wall_ns, tick.setpoint_rad, tick.position_rad)
+            self._moment(at_ns, tick.setpoint_rad, tick.position_rad)
         elif name == "command":
-            self._commands.append(entry.wall_ns)
+            self._commands.append(at_ns)
         elif name == "state" and not self._tapped:
             try:
                 state_ = decode(entry.payload, RobotState, len(self._joints))
             except CodecError:
                 return
-            self._changed(entry.wall_ns, state_.guard, state_.reason)
-            self._moment(entry.wall_ns, state_.setpoint_rad, state_.position_rad)
+            self._changed(at_ns, state_.guard, state_.reason)
+            self._moment(at_ns, state_.setpoint_rad, state_.position_rad)
 
     def end(self) -> None:
         """The recording ends: what is open is complete."""
@@ -143,7 +142,7 @@ class GuardChanges:
         if len(self.found) >= MOST_EVENTS:
             self.more += 1
             return
-        event = GuardChange(at_ns, to_s(at_ns - (self._began_ns or at_ns)), before, state, reason)
+        event = GuardChange(at_ns, to_s(at_ns - self._began_ns), before, state, reason, self._robot)
         recent = [at for at in self._commands if at_ns - at <= to_ns(AROUND_S)]
         event.commands = len(recent)
         if recent:

@@ -16,7 +16,7 @@ MOST = 8000
 
 
 class ThinnedJoints:
-    """Takes states and ticks; keeps at most 8000 of them, evenly spread."""
+    """Takes states and ticks; keeps at most 8000 of them, evenly spread. Of several robots the first."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         self._joints = len(skeleton.joints)
@@ -28,6 +28,8 @@ class ThinnedJoints:
         self._every = 1
         self._seen = 0
         self._ticked = False
+        self._states = ""
+        """The topic of the first robot's states."""
 
     def take(self, entry: Entry) -> None:
         """One message; states of another profile are left out."""
@@ -37,6 +39,10 @@ class ThinnedJoints:
             self._ticked = True
         elif self._ticked or not entry.topic.endswith("/state"):
             return
+        else:
+            self._states = self._states or entry.topic
+            if entry.topic != self._states:
+                return
         self._seen += 1
         if self._seen % self._every:
             return

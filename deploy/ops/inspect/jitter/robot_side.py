@@ -17,6 +17,7 @@ from common.wire.codec import decode
 from common.wire.messages import Command, Mask, RobotState
 from deploy.ops.inspect.jitter.bands import Signal
 from deploy.ops.inspect.jitter.sound import sound
+from deploy.recorded.robots import robot_of
 from slave.tap import GUARD, TICK, decode_guard, decode_tick
 
 FOLLOWS = "track"
@@ -51,11 +52,15 @@ class _StageRows:
 
 
 class RobotSide:
-    """Takes the messages of one recording; what was measured tick by tick comes before what states said."""
+    """Takes the messages of one recording; what was measured tick by tick comes before what states said.
+
+    Of several robots the first counts: the postures of two, one after the other, would look like jitter.
+    """
 
     def __init__(self, skeleton: Skeleton) -> None:
         self._skeleton = skeleton
         self._guard = ""
+        self._robot = ""
         names = ("received", "tracked", "limited", "encoders", "limited by states", "encoders by states")
         self._rows = {name: _StageRows() for name in names}
 
@@ -67,6 +72,9 @@ class RobotSide:
         elif entry.topic == GUARD:
             self._guard = decode_guard(entry.payload)[1]
         elif name in ("command", "state"):
+            self._robot = self._robot or robot_of(entry.topic)
+            if robot_of(entry.topic) != self._robot:
+                return
             try:
                 (self._command if name == "command" else self._state)(entry)
             except CodecError:

@@ -118,3 +118,39 @@ def test_jitter_planted_in_the_robot_is_found(
     jitter = inspected(out, "--jitter")["jitter"]
     assert isinstance(jitter, dict)
     assert jitter["first"] == stage, jitter["words"]
+
+
+def test_two_robots_are_told_apart_and_a_clock_that_is_set_changes_nothing(
+    run: RecordedRun, tmp_path: Path
+) -> None:
+    """As two robots of one master are recorded: the second does the same half a second later."""
+    recording = read_recording(run.master)
+    [state] = {entry.topic for entry in recording.entries if entry.topic.endswith("/state")}
+    robot = state.split("/")[1]
+    later = [
+        entry._replace(
+            topic=entry.topic.replace(f"/{robot}/", "/robot-9/"),
+            monotonic_ns=entry.monotonic_ns + 500_000_000,
+            wall_ns=entry.wall_ns + 500_000_000,
+        )
+        for entry in recording.entries
+        if entry.topic.startswith(f"tandem/{robot}/")
+    ]
+    entries = sorted([*recording.entries, *later], key=lambda entry: entry.monotonic_ns)
+    set_ns = entries[len(entries) // 2].monotonic_ns
+    wall_ns, out = 0, tmp_path / "two.mcap"
+    with McapRecorder(out, recording.metadata, capacity=200_000, wall=lambda: wall_ns) as recorder:
+        for entry in entries:
+            # an hour back in the middle
+            wall_ns = entry.wall_ns - (3600 * 10**9 if entry.monotonic_ns >= set_ns else 0)
+            assert recorder.put(entry.topic, entry.payload, entry.monotonic_ns)
+
+    def of(tree: dict[str, object], name: str) -> list[tuple[object, ...]]:
+        guard = tree["guard"]
+        assert isinstance(guard, list)
+        told = ("before", "state", "reason", "commands", "silence_s", "off_joint")
+        return [tuple(event[key] for key in told) for event in guard if event["robot"] == name]
+
+    alone, both = inspected(run.master), inspected(out)
+    assert len(of(alone, robot)) > 3
+    assert of(both, robot) == of(both, "robot-9") == of(alone, robot)
