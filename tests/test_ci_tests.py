@@ -18,7 +18,7 @@ case "$*" in
 esac
 [ "${0##*/}" = mypy ] && part=types
 echo "$part" >> ran
-eval "exit \\"\\${$part:-0}\\""
+eval "exit \\"\\${status_$part:-0}\\""
 """
 """Stands for mypy and for python: ends with the status that its part's variable says."""
 
@@ -56,9 +56,10 @@ def checkout(tmp_path: Path) -> Path:
 def test_each_part_that_fails_fails_all(
     checkout: Path, statuses: dict[str, str], passes: bool, again: bool
 ) -> None:
+    environment = os.environ | {f"status_{part}": status for part, status in statuses.items()}
     ended = subprocess.run(
         ["bash", ".ci/tests"],
-        cwd=checkout, env=os.environ | statuses, capture_output=True, text=True, timeout=60, check=False,
+        cwd=checkout, env=environment, capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     ran = (checkout / "ran").read_text().split()
     assert (ended.returncode == 0) == passes, ended.stdout + ended.stderr
