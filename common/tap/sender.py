@@ -16,6 +16,7 @@ import msgpack
 
 from common.clock import monotonic_ns
 from common.errors import CodecError, TandemError
+from common.process.stale_socket import remove_stale
 from common.tap.config import TapConfig
 from common.tap.message import GREETING, LONGEST, MOST_CHOSEN, TapMessage, decode_choice, encode
 
@@ -58,7 +59,7 @@ class TapSender:
 
     def open(self) -> None:
         """Begin to listen, in the running loop. Raises TandemError."""
-        _remove_stale(self.path)
+        remove_stale(self.path, socket.SOCK_SEQPACKET, "[tap] socket")
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
         try:
             before = os.umask(0o117)  # 0660: the owner and its group
@@ -182,23 +183,6 @@ class TapSender:
         asyncio.get_running_loop().remove_reader(reader.socket)
         reader.socket.close()
         log.info("%s: process %d has gone%s; %d messages refused", self.path, reader.pid, why, reader.refused)
-
-
-def _remove_stale(path: Path) -> None:
-    """Remove the socket of a process that was killed; one that is listened at is left, and refused."""
-    if not path.is_socket():
-        if path.exists():
-            raise TandemError(f"{path}: a file lies there that is no socket; name another [tap] socket")
-        return
-    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as trial:
-        try:
-            trial.connect(str(path))
-        except ConnectionRefusedError:
-            path.unlink()
-        except OSError:
-            return
-        else:
-            raise TandemError(f"{path}: another process listens there; name another [tap] socket")
 
 
 def open_tap(config: TapConfig, greeting: Mapping[str, str]) -> TapSender | None:

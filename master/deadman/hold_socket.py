@@ -12,13 +12,13 @@ from pathlib import Path
 
 from common.clock import Clock, monotonic_ns, to_s
 from common.inputs.device import InputError
+from common.process.stale_socket import remove_stale
 from master.deadman.held_elsewhere import HeldElsewhere
 
 _MOST = 64
 """Datagrams taken at a time: a flood must not keep the loop."""
 _LONGEST = 256
 _ROUNDING_S = 0.001
-_ANOTHER = "name another [operator.deadman] socket"
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ class HoldSocket:
 
     def open(self, on_change: Callable[[], None]) -> None:
         """Begin to listen, in the running loop. Raises InputError."""
-        _remove_stale(self.path)
+        remove_stale(self.path, socket.SOCK_DGRAM, "[operator.deadman] socket", InputError)
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         try:
             before = os.umask(0o117)  # 0660: the owner and its group
@@ -96,22 +96,3 @@ class HoldSocket:
             return
         loop = asyncio.get_running_loop()
         self._timer = loop.call_later(to_s(left_ns) + _ROUNDING_S, self._watch)
-
-
-def _remove_stale(path: Path) -> None:
-    """Remove the socket of a process that was killed; one that is listened at is left, and refused."""
-    if not path.is_socket():
-        if path.exists():
-            raise InputError(
-                f"{path}: a file lies there that is no socket; name another [operator.deadman] socket"
-            )
-        return
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as trial:
-        try:
-            trial.connect(str(path))
-        except ConnectionRefusedError:
-            path.unlink()
-        except OSError:
-            return
-        else:
-            raise InputError(f"{path}: another process listens there; {_ANOTHER}")

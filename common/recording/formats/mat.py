@@ -83,7 +83,7 @@ def _variables(path: Path) -> Variables:
 
     try:
         found = loadmat(path)
-    except NotImplementedError:
+    except NotImplementedError:  # scipy's word for version 7.3
         raise RecordingError(f"{path}: is of version 7.3 (HDF5); save it again by save(…, '-v7')") from None
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from None
