@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
 from common.process.runtime import run as run_until_stopped
+from deploy.report.options import ConnectTo, LinkFile
 
 
 def lsl(
     robot: Annotated[str, typer.Option(help="Name of the robot.")],
-    connect: Annotated[
-        list[str] | None,
-        typer.Option(help="Endpoint to connect to, such as tcp/192.168.7.2:7447; repeat for more."),
-    ] = None,
-    link: Annotated[
-        Path | None,
-        typer.Option(
-            help="Take endpoints and keys from the section [link] of this TOML file.", dir_okay=False
-        ),
-    ] = None,
+    connect: ConnectTo = None,
+    link: LinkFile = None,
     profile: Annotated[str, typer.Option(help="Profile of the robot.")] = "nursing",
 ) -> None:
     """Publish joints, targets, latency and events to Lab Streaming Layer, beside EMG, EEG, optical capture.

@@ -9,20 +9,13 @@ import typer
 from rich.console import Console
 
 from common.process.runtime import run as run_until_stopped
+from deploy.report.options import ConnectTo, LinkFile
 
 
 def metrics(
     robot: Annotated[list[str], typer.Option(help="Name of a robot; repeat for more.")],
-    connect: Annotated[
-        list[str] | None,
-        typer.Option(help="Endpoint to connect to, such as tcp/192.168.7.2:7447; repeat for more."),
-    ] = None,
-    link: Annotated[
-        Path | None,
-        typer.Option(
-            help="Take endpoints and keys from the section [link] of this TOML file.", dir_okay=False
-        ),
-    ] = None,
+    connect: ConnectTo = None,
+    link: LinkFile = None,
     listen: Annotated[str, typer.Option(help="Where Prometheus scrapes: HOST:PORT.")] = "127.0.0.1:9464",
     recordings: Annotated[
         Path | None,
