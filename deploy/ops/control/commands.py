@@ -208,7 +208,8 @@ def status(
 
     Example: `tandem status --connect tcp/192.168.7.2:7447 --robot robot-1 --json`
     """
-    from deploy.client.status import ask_status, status_table
+    from deploy.client.status import ask_status
+    from deploy.client.status_table import status_table
 
     where = _named(destination(connect, robot, master=master, certificate=certificate))
 

@@ -74,7 +74,9 @@ def test_every_command_s_table_comes_out_on_an_ascii_terminal() -> None:
     body = (
         "from rich.console import Console\n"
         "from deploy.client.answer import RobotAnswer\n"
-        "from deploy.client.status import Heard, robot_status, status_table\n"
+        "from deploy.client.heard import Heard\n"
+        "from deploy.client.status import robot_status\n"
+        "from deploy.client.status_table import status_table\n"
         "one = robot_status(RobotAnswer('r', True, 'turns at 3°/s'), Heard())\n"
         "Console().print(status_table({'r': one}))\n"
     )

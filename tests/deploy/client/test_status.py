@@ -24,15 +24,9 @@ from common.wire.messages import BaseAttitude, RobotState
 from common.wire.topics import Topic
 from deploy.client.answer import RobotAnswer
 from deploy.client.efforts import by_joint
-from deploy.client.status import (
-    Heard,
-    HeardOfAll,
-    OffsetStatus,
-    RobotStatus,
-    decode_state,
-    robot_status,
-    status_table,
-)
+from deploy.client.heard import Heard, HeardOfAll, decode_state
+from deploy.client.status import OffsetStatus, RobotStatus, robot_status
+from deploy.client.status_table import status_table
 from tests.link_times import times_over
 from tests.published import master_metrics, slave_metrics
 

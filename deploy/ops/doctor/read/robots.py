@@ -21,7 +21,7 @@ from common.wire.presence import several_bear
 from common.wire.topics import CLOCK
 from deploy.client.ask import ask
 from deploy.client.destination import ROUTER_S, Destination
-from deploy.client.status import HeardOfAll
+from deploy.client.heard import HeardOfAll
 
 EXCHANGES = 20
 PAUSE_S = 0.02
