@@ -28,7 +28,7 @@ ORDER: Sequence[Sequence[str]] = [
     ["slave/encoders", "slave/model"],
     ["common/link", "common/tap"],
     ["common/latency", "common/reach"],
-    ["common/clock_sync", "common/recording"],
+    ["common/clock_sync", "common/recording", "common/picture_code"],
     ["common/wire", "common/process", "common/can", "common/skeleton", "common/inputs"],
     ["common/config", "common/metrics", "common/log"],
     ["common"],
