@@ -65,7 +65,8 @@ def newest_ns(codes: list[FoundCode], near_ns: int) -> int | None:
 
 def _luma(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
     weights = np.array([77, 150, 29], np.uint16)
-    return ((rgb.astype(np.uint16) * weights).sum(axis=2) >> 8).astype(np.uint8)
+    luma: NDArray[np.uint8] = ((rgb.astype(np.uint16) * weights).sum(axis=2) >> 8).astype(np.uint8)
+    return luma
 
 
 def _frames(dark: NDArray[np.bool_]) -> Iterator[Array]:
@@ -84,8 +85,9 @@ def _frames(dark: NDArray[np.bool_]) -> Iterator[Array]:
 def _corners(x: NDArray[np.int64], y: NDArray[np.int64]) -> Array:
     """Outer corners of a region that is upright within 45°. Pixels reach half a pixel beyond their middle."""
     picks = [int(np.argmin(x + y)), int(np.argmax(x - y)), int(np.argmax(x + y)), int(np.argmin(x - y))]
-    out: Array = np.array([(x[i], y[i]) for i in picks], dtype=np.float64)
-    return out + np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+    outward = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+    out: Array = np.array([(x[i], y[i]) for i in picks], dtype=np.float64) + outward
+    return out
 
 
 def _read(luma: NDArray[np.uint8], corners: Array) -> int | None:
