@@ -34,6 +34,7 @@ _OF_THE_GUARD = {
     "hold at a drive's fault": "watch drive",
     "hold at a tilt": "watch base",
     "hold with a namesake": "watch namesake",
+    "hold without fresh pictures": "watch video",
     "position limits": "rule position",
     "velocity limits": "rule velocity",
     "acceleration limits": "rule acceleration",
@@ -215,5 +216,6 @@ RISKS: dict[str, RiskEntry] = {
     "contact, fast": RiskEntry("F80", "H9", ("contact noticed",)),
     "contact, clamped": RiskEntry("F81", "H9", ("contact noticed",)),
     "payload wrong": RiskEntry("F82", "H9", ("contact noticed",)),
+    "camera gives no picture any more": RiskEntry("F85", "H2", ("hold without fresh pictures",)),
 }
 """The entry of each row of the table, by the row's name."""

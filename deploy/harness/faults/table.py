@@ -8,6 +8,7 @@ from dataclasses import replace
 from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING
 from deploy.harness.faults.begun import BegunScenes
+from deploy.harness.faults.camera import CAMERA
 from deploy.harness.faults.clocks import CLOCKS, ESTOPS
 from deploy.harness.faults.contact import CONTACT
 from deploy.harness.faults.deadman import DEADMAN
@@ -39,6 +40,7 @@ VIRTUAL: tuple[VirtualFault, ...] = (
     *ROBOT,
     *EFFORT,
     *CONTACT,
+    *CAMERA,
     *CLOCKS,
     *ESTOPS,
     *STOP_INPUTS,

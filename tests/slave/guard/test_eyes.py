@@ -7,7 +7,7 @@ from typing import Any
 from common.clock import to_ns
 from slave.guard.body import WELL, Body
 from slave.guard.config import GuardConfig
-from slave.guard.eyes import video_loss
+from slave.guard.eyes import REMEDY, video_loss
 from slave.guard.states import State
 from slave.guard.watchdog import BODY_WATCHES
 
@@ -20,7 +20,7 @@ def test_a_picture_may_be_as_old_as_the_limit_and_no_older() -> None:
     assert CONFIG.max_video_age_s == LIMIT_S
     assert video_loss(0, to_ns(LIMIT_S), CONFIG) is None
     words = video_loss(0, to_ns(LIMIT_S) + 1, CONFIG)
-    assert words == "the operator's newest picture is 3.0 s old, limit 3 s"
+    assert words == f"the operator's newest picture is 3.0 s old, limit 3 s; {REMEDY}"
 
 
 def test_an_own_clock_that_went_back_keeps_no_picture_fresh() -> None:
