@@ -255,6 +255,7 @@ class Master:
         watch = self._pipeline.estimator.heading_watch
         return MasterMetrics(
             software=software(),
+            operator=self._config.operator.name,
             heap=heap_in_use(),
             ticks=Ticks(self._ticks_expected, self._ticks_missed),
             stages_ms=self._stages.summary(),

@@ -114,5 +114,7 @@ class MasterMetrics(Metrics):
     zero_pose_again: ZeroPoseTaken | None = None
     arm_load: dict[str, ArmLoad] = field(default_factory=dict)
     """By arm."""
+    operator: str = ""
+    """Whose master it is: two may speak to one robot."""
     headings_deg: dict[str, tuple[float, float]] = field(default_factory=dict)
     """By segment, how far its heading is off against its neighbour's, and the standard deviation, °."""

@@ -22,7 +22,9 @@ from deploy.console.session import SESSION_S, Person, RateLimit
 from deploy.console.viewers import REQUESTS_PER_S, OpenPage, pack
 
 COOKIE = "tandem_console"
+"""Cookies know no ports: the port is added, or two consoles on one host would log each other out."""
 STOP_PATH = "/api/stop"
+NOT_KEPT = "the stop is asked for, but nobody would go on with it if this console died"
 LONGEST = 4096
 """Bytes of a message or a body."""
 READS_PER_S = 200.0
@@ -58,6 +60,7 @@ class ConsoleApp:
         setup: Callable[[str], Mapping[str, object]],
         *,
         secure: bool = False,
+        port: int = 0,
         on_login: Callable[[Person], None] = lambda _: None,
         files: PageFiles | None = None,
     ) -> None:
@@ -67,6 +70,7 @@ class ConsoleApp:
         self._session = session
         self._setup = setup
         self._secure = secure
+        self._cookie = f"{COOKIE}_{port}"
         self._on_login = on_login
         self._files = files or PageFiles()
         self._robots = tuple(hub.models)
@@ -168,7 +172,7 @@ class ConsoleApp:
         self._on_login(person)
         response = _answer({"role": person.role.value, "person": person.name})
         response.set_cookie(
-            COOKIE,
+            self._cookie,
             secret,
             max_age=int(SESSION_S),
             httponly=True,
@@ -183,7 +187,7 @@ class ConsoleApp:
         self._hub.access.log_out(secret)
         self._hub.refresh(monotonic_ns())
         response = _answer({})
-        response.del_cookie(COOKIE, path="/")
+        response.del_cookie(self._cookie, path="/")
         return response
 
     async def _act(self, request: web.Request) -> web.StreamResponse:
@@ -217,10 +221,13 @@ class ConsoleApp:
             return _error(400, f"no such robot here: expected one of {', '.join(self._robots)}")
         _, person = self._person(request)
         shown = self._hub.stoppers[robot].stop(f"console: {person.name or person.role}")
+        if not shown.kept and shown.robot_ns is None:
+            # it is asked all the same; the page asks again until the robot has acknowledged it
+            return _error(503, f"{NOT_KEPT}: use the switch at the robot")
         return _answer({"id": shown.number}, status=202)
 
     def _person(self, request: web.Request) -> tuple[str, Person]:
-        secret = request.cookies.get(COOKIE, "")
+        secret = request.cookies.get(self._cookie, "")
         return secret, self._hub.access.person(secret, monotonic_ns())
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
@@ -290,7 +297,9 @@ class ConsoleApp:
         elif kind == "stop":
             page.asked_stop |= robot == page.model.robot
             shown = self._hub.stoppers[str(robot)].stop(f"console: {page.name}")
-            page.say({"kind": "answer", "to": "stop", "done": True, "text": "asked", "id": shown.number})
+            sure = shown.kept or shown.robot_ns is not None
+            text = "asked" if sure else NOT_KEPT
+            page.say({"kind": "answer", "to": "stop", "done": sure, "text": text, "id": shown.number})
         elif kind == "robot":
             page.turn_to(self._hub.models[str(robot)])
             self._hub.greet(page)

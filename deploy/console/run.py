@@ -21,6 +21,7 @@ from common.skeleton import Skeleton
 from common.wire.version import software
 from deploy.client.destination import Destination
 from deploy.console.app import ConsoleApp
+from deploy.console.backup import StopBackup
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.hearing import Hearing
 from deploy.console.hub import VIEW_HZ, Hub, person_of, stranger
@@ -79,8 +80,11 @@ async def _run(options: ConsoleOptions, door: _Door) -> None:
         # the robot's own tap has its figures; the master's has those of the master alone
         if options.side is not Side.ROBOT or options.tap is None:
             hearing.listen(session, states=options.tap is None)
+        backup = StopBackup(where.link, where.operator)
+        backup.start()
         stoppers = {
-            robot: RobotStopper(session.link(robot), model, where.operator) for robot, model in models.items()
+            robot: RobotStopper(session.link(robot), model, where.operator, backup)
+            for robot, model in models.items()
         }
         for stopper in stoppers.values():
             stopper.watch(session)
@@ -94,6 +98,7 @@ async def _run(options: ConsoleOptions, door: _Door) -> None:
         finally:
             for stopper in stoppers.values():
                 await stopper.close()
+            backup.close()
             if relay is not None:
                 relay.close()
 
@@ -121,7 +126,13 @@ async def _serve(
         options.on_ready(f"{person.role}: {address}{page}#token={token}")
 
     app = ConsoleApp(
-        hub, options.where, session, lambda robot: _setup(options), secure=tls is not None, on_login=offer
+        hub,
+        options.where,
+        session,
+        lambda robot: _setup(options),
+        secure=tls is not None,
+        port=port,
+        on_login=offer,
     )
     runner = web.AppRunner(app.make(), access_log=None, shutdown_timeout=1.0, handle_signals=False)
     await runner.setup()

@@ -13,6 +13,7 @@ from common.wire.topics import STOP
 from deploy.client.answer import RobotAnswer
 from deploy.client.stop import OnAnswer, repeat_until_stopped
 from deploy.client.stop_count import StopCount
+from deploy.console.backup import StopBackup
 from deploy.console.model.robot import RobotModel
 from deploy.console.model.stopped import StopShown
 
@@ -29,10 +30,14 @@ log = logging.getLogger(__name__)
 class RobotStopper:
     """The stops of one robot's name. Who asks needs no role."""
 
-    def __init__(self, link: Link, model: RobotModel, operator: str) -> None:
+    def __init__(
+        self, link: Link, model: RobotModel, operator: str, backup: StopBackup | None = None
+    ) -> None:
+        """`backup`: goes on asking where this process dies."""
         self._link = link
         self._model = model
         self._operator = operator
+        self._backup = backup
         self._here: dict[int, ProcessPresence] = {}
         self._task: asyncio.Task[None] | None = None
         self._count = StopCount(model.robot, GIVE_UP_S)
@@ -48,6 +53,7 @@ class RobotStopper:
         """Ask for a stop. A stop under way goes on, and a robot that is stopped already is asked again."""
         self._number += 1
         under_way = self._task is not None and not self._task.done()
+        kept = self._backup is None or self._backup.keep(self._model.robot)
         shown = self._model.asked_to_stop(self._number, by, monotonic_ns(), under_way)
         if not under_way or shown is not self._shown:
             if self._task is not None:
@@ -58,6 +64,7 @@ class RobotStopper:
             for presence in self._here.values():
                 self._count.expect(presence)
             self._task = asyncio.create_task(self._repeat(self._count))
+        shown.kept = kept
         return shown
 
     async def close(self) -> None:
@@ -86,10 +93,16 @@ class RobotStopper:
         try:
             async with asyncio.timeout(GIVE_UP_S):
                 await repeat_until_stopped(ask_all, count, payload, known, self._on_answer)
+            self._done_with()
         except TimeoutError:
             self._fail(GIVEN_UP)
+            self._done_with()
         finally:
             unanswered.cancel()
+
+    def _done_with(self) -> None:
+        if self._backup is not None:
+            self._backup.done(self._model.robot)
 
     def _on_answer(self, answer: RobotAnswer) -> None:
         stop = self._model.stop

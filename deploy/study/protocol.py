@@ -30,6 +30,8 @@ class StudyProtocol(Section):
 
     name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")
     version: str
+    signed: bool = False
+    """Whether a session's seal must bear a signature, so that one without it fails."""
     step: list[ProtocolStep] = Field(min_length=1)
 
     def mistakes(self) -> list[ConfigMistake]:

@@ -85,14 +85,22 @@ def head_of(sealed: str, files: Sequence[SealedFile]) -> str:
     return value.hex()
 
 
-def verify(folder: Path, head: str | None = None) -> tuple[str, list[SealBroken]]:
+def verify(
+    folder: Path, head: str | None = None, signed: bool = False, by: str | None = None
+) -> tuple[str, list[SealBroken]]:
     """The seal's head, and all that is not as it was sealed; empty where everything is.
 
-    `head`: as it was noted elsewhere when it was sealed. Raises TandemError without a seal that can be read.
+    `head`: as it was noted elsewhere when it was sealed. `signed`: a signature is expected, so that a seal
+    whose signature was taken away fails; `by`: the name in its certificate. Raises TandemError without a seal that can be read.
     """
     sealed_at, files, written = _read(folder)
     broken = []
-    if signer(folder) is None:
+    signed_by = signer(folder)
+    if not signed_by and signed_by is not None and (signed or by is not None):
+        broken.append(SealBroken(SEAL, "unsigned, and a signature is expected"))
+    elif by is not None and signed_by not in (None, by):
+        broken.append(SealBroken(SEAL, f"signed by {signed_by}, and {by} is expected"))
+    if signed_by is None:
         broken.append(SealBroken(SEAL, "its signature is not of this head, or of another certificate"))
     if head_of(sealed_at, files) != written:
         broken.append(SealBroken(SEAL, "the seal was changed: its time and files do not give its head"))

@@ -133,6 +133,11 @@ class Session:
         return left[0]
 
 
+def expects_signature(folder: Path) -> bool:
+    """Whether the protocol of the session in this folder wants its seal signed; False without a session."""
+    return (folder / PROTOCOL).exists() and load_protocol(folder / PROTOCOL)[0].signed
+
+
 def begin(
     root: Path,
     protocol: Path,

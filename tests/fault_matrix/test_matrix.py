@@ -32,7 +32,8 @@ BARED = (
     "link cut", "packets duplicated", "yesterday's recording replayed", "second operator", "wrong robot",
     "operator of the same robot without the lease", "certificate revoked while tracking",
     "values that are not numbers", "drive fault", "encoder silent", "base tilted",
-    "master's clock an hour back", "camera gives no picture any more", "pedal released", "link lost while the clutch is released",
+    "master's clock an hour back", "camera gives no picture any more", "pedal released",
+    "link lost while the clutch is released",
 )  # fmt: skip
 """Of the rows with a protection to take away; more would say no more, and each takes a second."""
 SCENES = BegunScenes()

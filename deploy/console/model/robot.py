@@ -83,7 +83,8 @@ class RobotModel:
         """A state came, from the tap or from the link."""
         self._state, self._state_ns, self._source = state, arrived_ns, source
         read_anew = self._still.add(state.encoder_ns, state.position_rad, state.encoder_valid)
-        self.lateness.on_state(state, arrived_ns, self.whose.side is Side.OPERATOR and source == TAP)
+        masters_clock = self.whose.side is Side.OPERATOR and source == TAP and self._commands(state)
+        self.lateness.on_state(state, arrived_ns, masters_clock)
         self._was_silent = False
         if (state.guard, state.reason) != self._said:
             self._said = state.guard, state.reason
@@ -101,7 +102,9 @@ class RobotModel:
         return self.pictures.add(camera, frame, arrived_ns)
 
     def on_master(self, metrics: MasterMetrics, now_ns: int) -> None:
-        """The master's figures of a second."""
+        """The figures of a second of this operator's master; another operator's are not shown as them."""
+        if self.whose.operator and metrics.operator not in ("", self.whose.operator):
+            return
         self.figures.on_master(metrics, now_ns)
 
     def on_robot(self, metrics: SlaveMetrics, now_ns: int) -> None:
@@ -135,10 +138,16 @@ class RobotModel:
         return self._command is not None and now_ns - self._command_ns <= to_ns(COMMAND_SILENT_S)
 
     def offset(self, now_ns: int) -> Offset | None:
-        """The clock of this host minus the robot's; None where it is not known."""
+        """The clock of this host minus the robot's; None where it is not known.
+
+        A robot measures the clock of the master that holds its lease. Another operator's runs on another
+        host, so that its offset says nothing of this one.
+        """
         if self.whose.side is Side.ROBOT:
             return Offset(0, 0, trusted=True)
         if self._state is None or self.whose.side is Side.ELSEWHERE or self.silent(now_ns):
+            return None
+        if not self._commands(self._state):
             return None
         return master_offset(self._state)
 
@@ -236,6 +245,11 @@ class RobotModel:
         word = _SITUATIONS.get(state.guard, "holds")
         others = bool(self.whose.operator) and state.operator not in ("", self.whose.operator)
         return "other_operator" if others and word not in ("stopped", "starting") else word
+
+    def _commands(self, state: RobotState) -> bool:
+        """Whether the robot's lease is that of this host's master, by the commands that it sends."""
+        lease = 0 if self._command is None else self._command.lease
+        return bool(lease) and lease_id(lease) == state.lease_id
 
     def _lease(self, state: RobotState) -> str:
         if not state.operator:

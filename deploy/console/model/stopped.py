@@ -24,6 +24,8 @@ class StopShown:
     in_state: bool = False
     """Whether a state of the robot said since the asking that it is stopped."""
     text: str = ""
+    kept: bool = True
+    """Whether another process goes on asking, should the console die before the robot has acknowledged."""
     failed: str = ""
     """Why nobody knows that it stopped, in words."""
 

@@ -31,8 +31,8 @@ CAMERA = (
     holds(
         name="camera gives no picture any more",
         done="The operator's newest picture is 2.5 s old, and none comes after it.",
-        robot="Brakes all joints and stands, once the picture is older than `max_video_age_s` (3 s). Says how "
-        "old it is, and refuses to engage.",
+        robot="Brakes all joints and stands, once the picture is older than `max_video_age_s` (3 s). Says "
+        "how old it is, and refuses to engage.",
         person="Repair the camera or its link, then engage. To go on without pictures, restart the master "
         "first: it then relies on none.",
         act=_no_more_pictures,

@@ -13,10 +13,13 @@ from common.clock import Clock, monotonic_ns, to_s, wall_ns
 from common.errors import CodecError
 from common.metrics.master import MasterMetrics
 from common.metrics.parts import Summary
+from common.metrics.slave import SlaveMetrics
 from common.wire.codec import decode
 from common.wire.messages import Statistics
+from deploy.ops.metrics.one_way import OneWayBuckets
 from deploy.ops.metrics.table import (
     BESIDE,
+    ONE_WAY,
     RECORDING_AGE,
     RECORDING_FREE,
     TABLE,
@@ -46,7 +49,9 @@ class StatisticsCollector:
     ) -> None:
         """`robots`: whose slaves are to speak, also where none of them was ever heard."""
         self._robots = tuple(robots)
-        self._newest: dict[tuple[str, str], HeardStatistics] = {}
+        self._newest: dict[tuple[str, str, str], HeardStatistics] = {}
+        self._one_way: dict[str, OneWayBuckets] = {}
+        """By robot, since this process began."""
         self._recordings = recordings
         self._clock, self._wall = clock, wall
         self.unreadable = 0
@@ -59,22 +64,39 @@ class StatisticsCollector:
             self.unreadable += 1
             return
         role = "master" if isinstance(metrics, MasterMetrics) else "slave"
-        self._newest[robot, role] = HeardStatistics(robot, role, metrics, arrived_ns)
+        if isinstance(metrics, SlaveMetrics):
+            recent = (*metrics.one_way_recent_us, *metrics.one_way_missing_recent_us)
+            # another object each time, as the server's thread may be reading the last one
+            self._one_way[robot] = self._one_way.get(robot, OneWayBuckets()).with_more(recent)
+        one = HeardStatistics(robot, role, metrics, arrived_ns)
+        self._newest[robot, role, one.operator] = one
 
     def collect(self) -> Iterator[Metric]:
         """What is known now. A process that has been silent for 5 s has `tandem_up` 0 and no other value."""
         heard, now_ns = list(self._newest.values()), self._clock()
         fresh = [one for one in heard if is_fresh(one, now_ns)]
         # a slave that never spoke is silent too: this process may have begun after it failed
-        up = {(robot, "slave"): 0.0 for robot in self._robots}
-        up |= {(one.robot, one.role): float(one in fresh) for one in heard}
-        yield self._beside(
-            UP, [({"robot": robot, "role": role}, value) for (robot, role), value in up.items()]
-        )
+        spoke = {one.robot for one in heard if one.role == "slave"}
+        up = [({"robot": robot, "role": "slave"}, 0.0) for robot in self._robots if robot not in spoke]
+        up += [({"robot": one.robot, **one.labels}, float(one in fresh)) for one in heard]
+        yield self._beside(UP, up)
         for metric in TABLE:
             yield _family(metric, fresh)
+        yield self._one_way_family([one.robot for one in fresh if one.role == "slave"])
         if self._recordings is not None:
             yield from self._of_recordings(self._recordings)
+
+    def _one_way_family(self, robots: list[str]) -> Metric:
+        from prometheus_client.core import Metric
+
+        family = Metric(ONE_WAY, BESIDE[ONE_WAY], "histogram")
+        for robot in robots:
+            labels, buckets = {"robot": robot, "role": "slave"}, self._one_way[robot]
+            for edge, count in buckets.cumulative():
+                family.add_sample(f"{ONE_WAY}_bucket", {**labels, "le": edge}, count)
+            family.add_sample(f"{ONE_WAY}_count", labels, buckets.count)
+            family.add_sample(f"{ONE_WAY}_sum", labels, buckets.sum_s)
+        return family
 
     def _beside(self, name: str, samples: list[tuple[dict[str, str], float]]) -> Metric:
         from prometheus_client.core import Metric
@@ -102,7 +124,7 @@ def _family(metric: ServedMetric, heard: list[HeardStatistics]) -> Metric:
     family = Metric(metric.name, metric.help, metric.type.value)
     done: set[tuple[str, ...]] = set()
     for one in heard:
-        labels = {"role": one.role}
+        labels = one.labels
         if metric.by_robot or one.role == "slave":
             labels["robot"] = one.robot
         for sample in metric.take(one.metrics):

@@ -47,8 +47,9 @@ ALERTS = (
         "one-way latencies of {{ $labels.robot }} are not known: the clock offset is not",
     ),
     AlertRule(
-        "TandemLate", 'tandem_latency_seconds{stage="one way",quantile="0.99"} > 0.15', "1m", "warning",
-        "of all commands to {{ $labels.robot }} since its slave started, 1 % came later than 150 ms",
+        "TandemLate",
+        "histogram_quantile(0.99, rate(tandem_one_way_seconds_bucket[1m])) > 0.15", "1m", "warning",
+        "of the commands to {{ $labels.robot }} in the last minute 1 % came later than 150 ms",
     ),
     AlertRule(
         "TandemHolds", "increase(tandem_holds_total[10m]) > 3", "0s", "warning",

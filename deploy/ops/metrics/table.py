@@ -39,6 +39,18 @@ class HeardStatistics:
     heard_ns: int
     """This host's monotonic clock."""
 
+    @property
+    def operator(self) -> str:
+        """Whose master it is; empty for a slave."""
+        return self.metrics.operator if isinstance(self.metrics, MasterMetrics) else ""
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Of the process, whatever the robot is: two masters may speak to one robot."""
+        return (
+            {"role": self.role, "operator": self.operator} if self.role == "master" else {"role": self.role}
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class ServedSample:
@@ -221,7 +233,11 @@ UP = "tandem_up"
 """1 for a process that was heard within 5 s, else 0: each robot's slave, and a master that was ever heard."""
 RECORDING_AGE, RECORDING_FREE = "tandem_recording_age_seconds", "tandem_recording_free_bytes"
 """With --recordings: time since the newest recording was written to, +Inf without one; room on its disk."""
+ONE_WAY = "tandem_one_way_seconds"
+BUCKETS_S = (0.005, 0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, float("inf"))
+"""Upper edges. The alert's limit is among them, so that it is not interpolated."""
 BESIDE = {
+    ONE_WAY: "From put to received; of a command that did not come, how long the robot went without it.",
     UP: "1 while a process's statistics come.",
     RECORDING_AGE: "Time since the newest recording in the folder was written to; +Inf without one.",
     RECORDING_FREE: "Room on the disk of the recordings.",
@@ -239,4 +255,5 @@ def served_names() -> frozenset[str]:
     for metric in TABLE:
         if metric.type is MetricType.SUMMARY:
             names |= {f"{metric.name}_count", f"{metric.name}_sum"}
+    names |= {f"{ONE_WAY}_{part}" for part in ("bucket", "count", "sum")}
     return frozenset(names)

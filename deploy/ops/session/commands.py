@@ -113,13 +113,15 @@ def seal_folder(
     """
     from deploy.study.pseudonyms import Pseudonyms, names_in, too_short
     from deploy.study.seal import seal
-    from deploy.study.session import SESSION, Session
+    from deploy.study.session import SESSION, Session, expects_signature
 
     if (folder / SESSION).exists() and not Session(folder).ended:
         raise TandemError(
             f"{folder}: the session has not ended, and what is recorded after the seal would break it: "
             f"`tandem session mark {folder} --end`"
         )
+    if key is None and expects_signature(folder):
+        raise TandemError(f"{folder}: its protocol says signed = true: name this host's key by --key")
     if people is not None:
         names = list(Pseudonyms(people, folder).names().values())
         found = names_in(folder, names)
@@ -134,15 +136,24 @@ def seal_folder(
 def verify_folder(
     folder: Folder,
     head: Annotated[str | None, typer.Option(help="The head as it was noted when it was sealed.")] = None,
+    signed: Annotated[
+        bool,
+        typer.Option("--signed", help="A seal without a signature fails; so where its protocol says so."),
+    ] = False,
+    signer: Annotated[
+        str | None, typer.Option(help="Who must have signed, such as operator:nurse-1.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Check a sealed session; ends with status 1 and names the file and the bytes that were changed.
 
     Example: `tandem session verify study/sub-k7pd/ses-01`
     """
-    from deploy.study.seal import signer, verify
+    from deploy.study.seal import signer as signer_in
+    from deploy.study.seal import verify
+    from deploy.study.session import expects_signature
 
-    written, broken = verify(folder, head)
+    written, broken = verify(folder, head, signed or expects_signature(folder), signer)
     if as_json:
         typer.echo(json.dumps({"head": written, "broken": [asdict(one) for one in broken]}, indent=2))
     else:
@@ -151,9 +162,9 @@ def verify_folder(
     if broken:
         raise TandemError(f"{folder}: {len(broken)} things are not as they were sealed")
     if not as_json:
-        by = signer(folder)
-        signed = f", signed with a certificate of the name {by}" if by else ""
-        typer.echo(f"{folder}: as it was sealed{signed}; head {written}")
+        by = signer_in(folder)
+        words = f"signed with a certificate of the name {by}" if by else "unsigned"
+        typer.echo(f"{folder}: as it was sealed, {words}; head {written}")
 
 
 @app.command()

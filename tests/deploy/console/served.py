@@ -32,10 +32,19 @@ class HeardStops:
     def __init__(self, of: RobotModel) -> None:
         self.model = of
         self.by: list[str] = []
+        self.kept = True
+        """Whether a stop outlives the console."""
 
     def stop(self, by: str) -> StopShown:
         self.by.append(by)
-        return self.model.asked_to_stop(len(self.by), by, monotonic_ns())
+        shown = self.model.asked_to_stop(len(self.by), by, monotonic_ns())
+        shown.kept = self.kept
+        return shown
+
+
+def cookie_jar() -> aiohttp.CookieJar:
+    """Of a browser; a cookie of an address is taken only by a jar that is told so."""
+    return aiohttp.CookieJar(unsafe=True)
 
 
 class Served:
@@ -50,7 +59,7 @@ class Served:
         stoppers: Any = self.stops
         self.hub = Hub(self.models, self.access, stoppers)
         where = Destination(LinkConfig(connect=["tcp/127.0.0.1:1"]), tuple(self.models), OPERATOR)
-        self.app = ConsoleApp(self.hub, where, None, lambda _: scene(SKELETON))
+        self.app = ConsoleApp(self.hub, where, None, lambda _: scene(SKELETON), port=port)
         self.http: aiohttp.ClientSession
 
     def relay(self, relay: DeadmanRelay) -> None:
@@ -109,14 +118,15 @@ class OpenedPage:
 
 
 @asynccontextmanager
-async def served(stranger: PageRole = PageRole.VIEWER) -> AsyncIterator[Served]:
+async def served(
+    stranger: PageRole = PageRole.VIEWER, jar: aiohttp.CookieJar | None = None
+) -> AsyncIterator[Served]:
     port = unused_port()
     console = Served(port, stranger)
     runner = web.AppRunner(console.app.make(), shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", port).start()
-    # a cookie of an address is taken only by a jar that is told so
-    async with aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True)) as http:
+    async with aiohttp.ClientSession(cookie_jar=jar or cookie_jar()) as http:
         console.http = http
         try:
             yield console

@@ -15,7 +15,7 @@ from deploy.console.model.robot import TAP
 from deploy.console.session import SESSION_S, PageRole, Person
 from deploy.console.viewers import KEPT, MESSAGES_PER_S, MOST
 from tests.deploy.console.robots import ROBOT, frame, state
-from tests.deploy.console.served import Served, served
+from tests.deploy.console.served import Served, cookie_jar, served
 
 Story = Callable[[Served], Awaitable[None]]
 
@@ -117,7 +117,7 @@ def test_a_token_logs_in_once_and_the_cookie_is_not_for_scripts() -> None:
         async with console.http.post(f"{console.url}/api/login", **sent) as response:  # type: ignore[arg-type]  # one call's arguments, used twice
             assert await response.json() == {"role": "operator", "person": "nurse-1"}
             cookie = response.headers["Set-Cookie"]
-        assert cookie.startswith(f"{COOKIE}=")
+        assert cookie.startswith(f"{COOKIE}_{console.host.partition(':')[2]}=")
         assert "HttpOnly" in cookie
         assert "SameSite=Strict" in cookie
         for wrong in (token, "guessed", ""):
@@ -467,5 +467,39 @@ def test_a_page_that_stands_still_gets_no_past_and_delays_no_other() -> None:
             past.append(view["n"])
         assert 0 < len(past) <= 8, past
         showing.cancel()
+
+    run(story)
+
+
+def test_two_consoles_on_one_host_do_not_log_each_other_out() -> None:
+    async def story() -> None:
+        jar = cookie_jar()
+        async with served(jar=jar) as one, served(jar=jar) as other:
+            await one.log_in()
+            await other.log_in()
+            for console in (one, other):
+                status, said = await console.post("/api/act", {"act": "mark", "robot": ROBOT})
+                assert status == 200, said
+            await other.post("/api/logout", {})
+            assert (await one.post("/api/act", {"act": "mark", "robot": ROBOT}))[0] == 200
+            assert (await other.post("/api/act", {"act": "mark", "robot": ROBOT}))[0] == 401
+
+    asyncio.run(story())
+
+
+def test_a_stop_that_would_end_with_the_console_is_not_called_certain() -> None:
+    async def story(console: Served) -> None:
+        console.stops[ROBOT].kept = False
+        status, said = await console.post("/api/stop", {"robot": ROBOT})
+        assert status == 503
+        assert "use the switch at the robot" in said["error"]
+        assert console.stops[ROBOT].by == ["console: viewer"], "it is asked for all the same"
+        page = await console.page()
+        await page.say(kind="stop")
+        assert not (await page.hear("answer"))["done"]
+        stop = console.models[ROBOT].stop
+        assert stop is not None
+        stop.robot_ns = monotonic_ns()
+        assert (await console.post("/api/stop", {"robot": ROBOT}))[0] == 202, "the robot has acknowledged"
 
     run(story)

@@ -193,7 +193,16 @@ def test_a_signature_is_the_host_s_and_of_this_head(
     seal(folder, key=keys / "operator-nurse-1.key")
     assert signer(folder) == "operator:nurse-1"
     assert verify(folder)[1] == []
+    assert verify(folder, by="operator:nurse-1")[1] == []
+    [other] = verify(folder, by="operator:other")[1]
+    assert other.words == "signed by operator:nurse-1, and operator:other is expected"
     written = json.loads((folder / SEAL).read_text())
+    stripped = {key: value for key, value in written.items() if key not in ("signature", "certificate")}
+    (folder / SEAL).write_text(json.dumps(stripped))
+    assert verify(folder)[1] == [], "nobody expects a signature"
+    for expected in ({"signed": True}, {"by": "operator:nurse-1"}):
+        [unsigned] = verify(folder, **expected)[1]  # type: ignore[arg-type]  # one of two keywords
+        assert unsigned.words == "unsigned, and a signature is expected"
     for forged in (
         {**written, "certificate": (keys / "operator-other.pem").read_text()},
         {**written, "signature": "00" + written["signature"][2:]},

@@ -12,11 +12,24 @@ import pytest
 from common.clock import to_ns
 from common.metrics.parts import Summary
 from common.metrics.slave import CameraMetrics, DueMetrics
+from common.wire.lease import lease_id
 from common.wire.video import VideoFrame
 from deploy.console.model.robot import LINK, SILENT_S, TAP, RobotModel, Side
 from deploy.console.model.stopped import CONFIRM_S
 from deploy.console.viewers import pack
-from tests.deploy.console.robots import BOUND_NS, JPEG, J, command, echo, frame, heard, model, state
+from tests.deploy.console.robots import (
+    BOUND_NS,
+    JPEG,
+    LEASE,
+    OPERATOR,
+    J,
+    command,
+    echo,
+    frame,
+    heard,
+    model,
+    state,
+)
 from tests.published import NOTHING, guard_metrics, master_metrics, slave_metrics
 
 CAMERA = CameraMetrics(0, 0.0, 0.0, 0.0, 0, 0.0, 0, 0, 0, NOTHING, NOTHING, NOTHING, "no OpenGL")
@@ -132,6 +145,7 @@ def test_the_last_minute_is_the_median_of_each_second() -> None:
 
 def test_a_picture_is_as_old_as_its_capture_by_the_robots_clock() -> None:
     robot = heard(201.0)
+    robot.on_command(command(1, 200.9, 200.9), to_ns(200.9))
     assert robot.on_picture("head", frame(1, 200.9), to_ns(201.0))
     assert not robot.on_picture("head", frame(1, 200.9), to_ns(201.0)), "twice"
     assert robot.pictures.newest["head"].frame.jpeg == JPEG
@@ -367,3 +381,27 @@ def test_beside_the_robot_both_read_one_clock() -> None:
     shown = json.loads(pack(robot.view(own.sent_ns)))
     assert (shown["situation"], shown["video"]["head"]["age_ms"]) == ("follows", 100.0)
     assert shown["video"]["head"]["bound_ms"] == 0.0
+
+
+def test_another_operators_clock_dates_nothing_here() -> None:
+    robot = heard(201.0)
+    robot.on_picture("head", frame(1, 200.9), to_ns(201.0))
+    assert robot.offset(to_ns(201.0)) is None, "whose clock it is was not heard yet"
+    robot.on_command(command(1, 200.9, 200.9), to_ns(200.9))
+    assert robot.offset(to_ns(201.0)) is not None
+    others = {"operator": "nurse-2", "lease_id": lease_id(LEASE + 1), "master_offset_ns": to_ns(5000.0)}
+    late = echo(7, 201.0, 201.0, 201.0)
+    robot.on_state(state(2, 201.02, echo=late, **others), to_ns(201.02), TAP)
+    assert robot.offset(to_ns(201.02)) is None
+    seen = view(robot, 201.02)
+    assert seen["video"]["head"]["age_ms"] is None
+    assert seen["latency"]["round_trip_ms"] is None
+    robot.on_state(state(3, 201.04, operator=OPERATOR, lease_id=0), to_ns(201.04), TAP)
+    assert robot.offset(to_ns(201.04)) is None, "nobody holds the lease: whose clock is it?"
+
+
+def test_the_robots_own_console_needs_no_offset() -> None:
+    robot = model(Side.ROBOT)
+    offset = robot.offset(to_ns(1.0))
+    assert offset is not None
+    assert offset.offset_ns == 0

@@ -28,7 +28,7 @@ from common.wire.topics import STATISTICS
 from deploy.ops.metrics import rules
 from deploy.ops.metrics.collector import StatisticsCollector
 from deploy.ops.metrics.run import MetricsOptions, address, serve_metrics
-from deploy.ops.metrics.table import GUARD_STATES, TABLE, UP, MetricType, served_names
+from deploy.ops.metrics.table import BUCKETS_S, GUARD_STATES, TABLE, UP, MetricType, served_names
 from slave.guard.states import State
 from tests.deploy.ops.record.test_record import free_endpoint
 from tests.published import guard_metrics, master_metrics, slave_metrics
@@ -180,7 +180,9 @@ def test_what_the_table_says_is_what_is_served(collector: StatisticsCollector) -
         for sample in scraped.samples:
             if sample.name == metric.full_name:
                 of_robot = metric.by_robot or sample.labels["role"] == "slave"
+                master = sample.labels["role"] == "master"
                 expected = {"role", *metric.labels, *(["robot"] if of_robot else [])}
+                expected |= {"operator"} if master else set()
                 assert sample.labels.keys() - {"quantile"} == expected
 
 
@@ -273,3 +275,40 @@ def test_an_address_that_is_none_is_refused(listen: str) -> None:
         address(listen)
     assert address("[::1]:9464") == ("::1", 9464)
     assert not math.isnan(address("127.0.0.1:9464")[1])
+
+
+def test_two_masters_of_one_robot_do_not_overwrite_each_other() -> None:
+    made = StatisticsCollector(clock=lambda: 0)
+    for operator, lost in (("nurse-1", 7), ("nurse-2", 11)):
+        of = replace(master(), operator=operator, nodes={"left_hand": {"lost": lost}})
+        made.take(ROBOT, encode(Statistics(1, of)), 0)
+    scraped = Scraped(made)
+    for operator, lost in (("nurse-1", 7), ("nurse-2", 11)):
+        assert scraped.value("tandem_node_windows_total", operator=operator, event="lost") == lost
+        assert scraped.value(UP, operator=operator, robot=ROBOT) == 1
+
+
+def test_one_way_times_are_a_histogram_of_which_any_window_has_its_percentile() -> None:
+    made = StatisticsCollector(clock=lambda: 0)
+    early = replace(slave(), one_way_recent_us=(400_000,) * 100)
+    made.take(ROBOT, encode(Statistics(1, early)), 0)
+    before = Scraped(made)
+    assert before.value("tandem_one_way_seconds_bucket", le="0.3") == 0
+    assert before.value("tandem_one_way_seconds_bucket", le="0.5") == 100
+    later = replace(slave(), one_way_recent_us=(20_000, 20_001), one_way_missing_recent_us=(160_000,))
+    made.take(ROBOT, encode(Statistics(1, later)), 0)
+    after = Scraped(made)
+    grown = {
+        le: after.value("tandem_one_way_seconds_bucket", le=le)
+        - before.value("tandem_one_way_seconds_bucket", le=le)
+        for le in ("0.01", "0.02", "0.035", "0.15", "0.2", "+Inf")
+    }
+    assert grown == {"0.01": 0, "0.02": 1, "0.035": 2, "0.15": 2, "0.2": 3, "+Inf": 3}
+    assert after.value("tandem_one_way_seconds_count") == 103
+    assert after.value("tandem_one_way_seconds_sum") == pytest.approx(40.0 + 0.200001)
+
+
+def test_the_alert_of_late_commands_looks_at_a_window_and_its_limit_is_an_edge() -> None:
+    [late] = [rule for rule in rules.ALERTS if rule.name == "TandemLate"]
+    assert "rate(tandem_one_way_seconds_bucket[1m])" in late.expression
+    assert float(late.expression.rpartition(" ")[2]) in BUCKETS_S
