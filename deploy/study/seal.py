@@ -91,7 +91,8 @@ def verify(
     """The seal's head, and all that is not as it was sealed; empty where everything is.
 
     `head`: as it was noted elsewhere when it was sealed. `signed`: a signature is expected, so that a seal
-    whose signature was taken away fails; `by`: the name in its certificate. Raises TandemError without a seal that can be read.
+    whose signature was taken away fails; `by`: the name in its certificate. Raises TandemError without a
+    seal that can be read.
     """
     sealed_at, files, written = _read(folder)
     broken = []
