@@ -200,8 +200,8 @@ def test_a_signature_is_the_host_s_and_of_this_head(
     stripped = {key: value for key, value in written.items() if key not in ("signature", "certificate")}
     (folder / SEAL).write_text(json.dumps(stripped))
     assert verify(folder)[1] == [], "nobody expects a signature"
-    for expected in ({"signed": True}, {"by": "operator:nurse-1"}):
-        [unsigned] = verify(folder, **expected)[1]  # type: ignore[arg-type]  # one of two keywords
+    for found in (verify(folder, signed=True)[1], verify(folder, by="operator:nurse-1")[1]):
+        [unsigned] = found
         assert unsigned.words == "unsigned, and a signature is expected"
     for forged in (
         {**written, "certificate": (keys / "operator-other.pem").read_text()},
