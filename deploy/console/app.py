@@ -10,7 +10,7 @@ from contextlib import suppress
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from common.clock import monotonic_ns
+from common.clock import monotonic_ns, to_ms
 from common.link import LinkSession
 from common.log.throttle import LogThrottle
 from common.wire.messages import Action
@@ -84,7 +84,9 @@ class ConsoleApp:
         app.router.add_get("/engineer", self._engineer)
         for folder in ("page", "vendor"):
             app.router.add_get(f"/{folder}/{{name:.+}}", self._named_file)
+        app.router.add_get("/code", self._code)
         app.router.add_get("/api/setup", self._get_setup)
+        app.router.add_get("/api/clock", self._clock)
         app.router.add_get("/ws", self._socket)
         app.router.add_post("/api/login", self._log_in)
         app.router.add_post("/api/logout", self._log_out)
@@ -133,6 +135,14 @@ class ConsoleApp:
 
     async def _engineer(self, request: web.Request) -> web.StreamResponse:
         return self._file(request, "page", "engineer.html")
+
+    async def _code(self, request: web.Request) -> web.StreamResponse:
+        """A screen for a real camera to look at: it shows the time of this host as codes."""
+        return self._file(request, "page", "code.html")
+
+    async def _clock(self, request: web.Request) -> web.StreamResponse:
+        """The clock of this host: a page takes half of the way there and back as the bound."""
+        return _answer({"here_ms": to_ms(monotonic_ns())})
 
     async def _named_file(self, request: web.Request) -> web.StreamResponse:
         return self._file(request, request.path.split("/")[1], request.match_info["name"])
@@ -285,6 +295,8 @@ class ConsoleApp:
             elif kind != "stop" and not page.requests.passes(now_ns):
                 access.count_refusal("rate")
                 return f"more than {REQUESTS_PER_S:g} requests a second"
+            elif kind == "shown":
+                page.saw_code(body, now_ns)
             elif kind != "stop":
                 self._request(page, kind, body.get("robot", page.model.robot))
         return ""

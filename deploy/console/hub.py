@@ -166,7 +166,7 @@ class Hub:
                     {"person": other.name, "robot": other.model.robot, "this": other is page}
                     for other in self.pages
                 ]
-                page.show("facts", body, {"viewers": viewers})
+                page.show("facts", body, {"viewers": viewers, "glass": page.glass.shown(now_ns)})
 
     def _watch_deadman(self, now_ns: int) -> None:
         """A page that fell silent holds no more; while none holds, the master is told so again and again."""

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from common.clock import monotonic_ns, to_ns
+from deploy.console.model.glass import GlassWatch, read_shown
 from deploy.console.model.robot import RobotModel
 from deploy.console.outbox import Outbox
 from deploy.console.session import Person, RateLimit
@@ -48,6 +49,7 @@ class OpenPage:
         self.secret = secret
         self.person = person
         self.outbox = Outbox()
+        self.glass = GlassWatch()
         self.messages = RateLimit(MESSAGES_PER_S)
         self.requests = RateLimit(REQUESTS_PER_S)
         self.holds = False
@@ -109,6 +111,13 @@ class OpenPage:
             since_s = None if stop is None else stop.shown(now_ns)["since_s"]
             self.say({"kind": "stop", "stop": None if told is None else {**told, "since_s": since_s}})
 
+    def saw_code(self, body: Mapping[str, object], now_ns: int) -> None:
+        """The page read the time that a picture on its screen shows."""
+        shown = read_shown(body, now_ns)
+        if shown is not None and shown.camera in self.model.pictures.newest:
+            stamp_ns = self.model.pictures.captured_ns(shown.camera, shown.number)
+            self.glass.add(shown, self.model.offset(now_ns), stamp_ns)
+
     def acknowledge(self, number: object) -> None:
         """The page has processed all up to this number."""
         if type(number) is int and self.outbox.acknowledge(number, monotonic_ns()):
@@ -124,6 +133,7 @@ class OpenPage:
         self.model = model
         self.asked_stop, self._stop_told = False, None
         self.outbox.clear()
+        self.glass.clear()
 
     async def write(self) -> None:
         """Send until cancelled. A socket that stands still stops only this page's own writer."""

@@ -62,7 +62,8 @@ def open_camera(profile: str, config: CameraConfig) -> Make:
     drawn.draw(np.zeros(drawn.joints))  # the first one takes the longest
 
     def make(request: PictureRequest) -> PictureReply:
-        jpeg, width, height = fitter.fit(drawn.draw(request.position_rad), request.most_bytes)
+        card_ns = request.read_ns if config.time_card else None
+        jpeg, width, height = fitter.fit(drawn.draw(request.position_rad, card_ns), request.most_bytes)
         return PictureReply(ReplyKind.PICTURE, request.read_ns, width, height, jpeg)
 
     return make

@@ -30,3 +30,5 @@ class CameraConfig(Section):
     """How long a picture may keep the link busy: what is sent beside it waits for no longer."""
     most_kb: float = Field(40.0, ge=4.0, le=1000.0)
     """Size of one picture at best, kB."""
+    time_card: bool = False
+    """With `robot`: a card before the lens shows the time, by which the latency to the eye is measured."""

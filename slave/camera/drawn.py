@@ -6,6 +6,7 @@ import os
 
 from common.errors import RobotError
 from common.quaternion import Array
+from slave.camera.card import hold_card
 from slave.camera.jpeg import Pixels
 from slave.camera.room import furnish
 
@@ -40,18 +41,21 @@ class DrawnCamera:
         self._hinges_per_joint = unit_rates(skeleton, model)
         named = [model.camera(i).name for i in range(model.ncam)]
         self._camera: str | int = camera if camera in named else -1
+        self._aspect = width / height
 
     @property
     def joints(self) -> int:
         """How many angles it takes."""
         return len(self._hinges_per_joint)
 
-    def draw(self, position_rad: Array) -> Pixels:
-        """(height, width, 3) RGB of the robot with these joint angles (J,)."""
+    def draw(self, position_rad: Array, card_ns: int | None = None) -> Pixels:
+        """(height, width, 3) RGB of the robot with joint angles (J,); a card shows `card_ns` where given."""
         self._data.qpos[:] = position_rad @ self._hinges_per_joint
         for step in self._kinematics:
             step(self._model, self._data)
         self._renderer.update_scene(self._data, self._camera)
         furnish(self._renderer.scene)
+        if card_ns is not None:
+            hold_card(self._renderer.scene, card_ns, self._aspect)
         pixels: Pixels = self._renderer.render()
         return pixels

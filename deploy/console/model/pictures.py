@@ -29,6 +29,8 @@ class CameraFeeds:
     def __init__(self) -> None:
         self.newest: dict[str, CameraPicture] = {}
         self._arrivals: dict[str, deque[int]] = {}
+        self._captured: dict[str, deque[tuple[int, int]]] = {}
+        """Number and capture of the last pictures."""
 
     def add(self, camera: str, frame: VideoFrame, arrived_ns: int) -> bool:
         """Take a picture; False where one that is as new or newer is here already."""
@@ -37,7 +39,12 @@ class CameraFeeds:
             return False
         self.newest[camera] = CameraPicture(frame, arrived_ns)
         self._arrivals.setdefault(camera, deque(maxlen=128)).append(arrived_ns)
+        self._captured.setdefault(camera, deque(maxlen=128)).append((frame.number, frame.captured_ns))
         return True
+
+    def captured_ns(self, camera: str, number: int) -> int | None:
+        """When a picture was taken, as its stamp says, robot's clock; None where it is not known any more."""
+        return dict(self._captured.get(camera, ())).get(number)
 
     def header(self, camera: str, offset: Offset | None, now_ns: int) -> dict[str, object]:
         """What the page is told with a picture. `offset`: this host's clock minus the robot's.

@@ -5,6 +5,7 @@ import { choose, chosen, LANGUAGES, load, nameOf, other, t, translate } from "./
 import {
   attention, BodyFigure, Cameras, Events, JointTable, latencyNow, link as linkFacts, make, Minute, shape,
 } from "./facts.js";
+import { Glass, worst } from "./glass.js";
 
 const $ = (id) => document.getElementById(id);
 const ENGAGE_MS = 1000;
@@ -23,6 +24,7 @@ const link = new Link({
   bye: (bye) => tell(bye.why, false),
 }, new URLSearchParams(location.search).get("robot"));
 let stopConfirmed = () => {};
+const glass = new Glass(link);
 
 function stop(event) {
   event?.preventDefault();
@@ -228,6 +230,8 @@ function facts(message) {
   if ($("nodes")) attention(message, parts.figure);
   parts.events?.show(message.events ?? []);
   if (message.latency?.minute) parts.minute?.show(message.latency.minute);
+  const eye = worst(message.glass);
+  put($("glass"), eye ? t("picture.glass", { ms: eye.ms.toFixed(0), bound: Math.ceil(eye.bound_ms) }) : "");
   parts.more?.facts(message);
 }
 
@@ -240,7 +244,8 @@ function cameras(names) {
 
 function gotPicture(header) {
   cameras([header.camera]);
-  parts.cameras?.take(header);
+  const shown = parts.cameras?.take(header);
+  if (shown) glass.drawn(header.camera, header.number, shown);
   showPictures();
 }
 

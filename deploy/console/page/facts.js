@@ -283,6 +283,7 @@ export class Cameras {
     return [...this.cameras.keys()].filter(Boolean);
   }
 
+  /** Draw a picture; the canvas that shows it now. */
   take(header) {
     const camera = this.cameras.get(header.camera);
     if (camera) {
@@ -293,6 +294,7 @@ export class Cameras {
       camera.header = header;
     }
     header.bitmap.close();
+    return camera?.canvas;
   }
 
   /** Say how old each picture is now, and in `line` how old the oldest is. */

@@ -15,6 +15,8 @@ import numpy as np
 import simplejpeg
 from aiohttp import WSMsgType, web
 
+from common.clock import monotonic_ns, to_ms
+from common.picture_code import paste_code
 from common.skeleton import load_skeleton
 from deploy.console.model.scene import scene
 from slave.guard.states import TRANSITIONS, State
@@ -47,6 +49,8 @@ class FakeConsole:
         """What a page that may not look is told of its stop."""
         self.pictures = True
         self.picture: bytes | None = None
+        self.coded = False
+        """Each picture shows the time of this host as a code."""
         self.still = False
         """The robot and its operator do not move."""
         self.received: list[dict[str, Any]] = []
@@ -98,7 +102,9 @@ class FakeConsole:
         app = web.Application(middlewares=[_headers])
         app.router.add_get("/", self._file("page/index.html"))
         app.router.add_get("/engineer", self._file("page/engineer.html"))
+        app.router.add_get("/code", self._file("page/code.html"))
         app.router.add_get("/api/setup", self._setup)
+        app.router.add_get("/api/clock", self._clock)
         app.router.add_get("/ws", self._socket)
         app.router.add_post("/api/{what}", self._post)
         app.router.add_static("/page", CONSOLE / "page")
@@ -127,6 +133,9 @@ class FakeConsole:
             "zones_known": True, "cameras": ["head"], "stale_picture_s": 0.5, "silent_s": 0.5, "rate_hz": 25,
             "window": WINDOW, **self.shape, **self.setup,
         })  # fmt: skip
+
+    async def _clock(self, _: web.Request) -> web.Response:
+        return web.json_response({"here_ms": to_ms(monotonic_ns())})
 
     async def _post(self, request: web.Request) -> web.Response:
         if self.silent:
@@ -241,7 +250,7 @@ class FakeConsole:
     def _frame(self, n: int) -> bytes:
         about = {"camera": "head", "number": n, "age_ms": 92.1, "bound_ms": 1.0, "width": 320, "height": 240}
         header = json.dumps({"kind": "picture", "n": n, **about}).encode()
-        return struct.pack("<I", len(header)) + header + (self.picture or _jpeg())
+        return struct.pack("<I", len(header)) + header + (self.picture or _jpeg(self.coded))
 
 
 @web.middleware
@@ -252,7 +261,7 @@ async def _headers(request: web.Request, handler: Any) -> web.StreamResponse:
     return response
 
 
-def _jpeg() -> bytes:
+def _jpeg(coded: bool = False) -> bytes:
     """A room: wall, floor, bed and a lamp that moves."""
     picture = np.empty((240, 320, 3), dtype=np.uint8)
     picture[:150], picture[150:] = (200, 205, 198), (120, 100, 84)
@@ -260,6 +269,8 @@ def _jpeg() -> bytes:
     picture[105:135, 70:120] = (250, 250, 250)
     x = int(250 + 30 * math.sin(time.monotonic()))
     picture[40:70, x : x + 24] = (250, 230, 150)
+    if coded:
+        paste_code(picture, monotonic_ns(), (150, 20), 6)
     return bytes(simplejpeg.encode_jpeg(picture, quality=80))
 
 
