@@ -53,7 +53,7 @@ class _Place:
     def __init__(self, scene: Any, aspect: float) -> None:
         self._scene = scene
         eyes = scene.camera[0], scene.camera[1]
-        self._eye: Array = 0.5 * sum(np.array(eye.pos, dtype=np.float64) for eye in eyes)
+        self._eye: Array = 0.5 * (np.array(eyes[0].pos, dtype=np.float64) + np.array(eyes[1].pos))
         self._forward: Array = np.array(eyes[0].forward, dtype=np.float64)
         self._up: Array = np.array(eyes[0].up, dtype=np.float64)
         self._right: Array = np.cross(self._forward, self._up)
