@@ -13,6 +13,7 @@ ADAPTERS = {
     "deploy/sim/drives/server.py": "canopen",
     "deploy/sim/drives/wire.py": "canopen",
     "master/alarms/player.py": "sounddevice",
+    "slave/camera/card.py": "mujoco",
     "slave/camera/room.py": "mujoco",
     "slave/camera/v4l2.py": "linuxpy",
     "slave/servos/dynamixel/bus.py": "dynamixel_sdk",
