@@ -54,8 +54,8 @@ def test_every_part_of_a_name_has_words(profile: str) -> None:
     assert {part for part in parts if f"name.{part}" not in WORDS["zh"]} == set()
 
 
-def test_at_most_eight_modules_and_no_address_of_another_host() -> None:
-    assert len(list(PAGE.glob("*.js"))) <= 8
+def test_at_most_sixteen_modules_and_no_address_of_another_host() -> None:
+    assert len(list(PAGE.glob("*.js"))) <= 16
     for path in (*PAGE.iterdir(), *(CONSOLE / "vendor").glob("*.css")):
         addresses = re.findall(r"https?://[^\s\"'`)]+", path.read_text("utf-8"))
         assert [a for a in addresses if not a.startswith("http://www.w3.org/")] == [], path.name
