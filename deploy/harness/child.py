@@ -59,9 +59,14 @@ class Child:
         self.lifetime = 0
         """How often it has been started."""
 
-    async def start(self, config: Path, overrides: Sequence[str], through: Sequence[str] = ()) -> None:
-        """Start it; its output goes to the log. `through`: a command that becomes it, such as `unshare`."""
-        arguments = [str(config), "--metrics", str(self.metrics_file)]
+    async def start(
+        self, config: Path, overrides: Sequence[str], through: Sequence[str] = (), options: Sequence[str] = ()
+    ) -> None:
+        """Start it; its output goes to the log. `through`: a command that becomes it, such as `unshare`.
+
+        `options`: of its command line, besides.
+        """
+        arguments = [str(config), "--metrics", str(self.metrics_file), *options]
         for override in overrides:
             arguments += ["--set", override]
         await self.run(arguments, through)

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 from common.clock import monotonic_ns, to_ns
 from common.errors import TandemError
@@ -52,7 +53,9 @@ class Rig:
         session: LinkSession,
         profile: str = NURSING,
         network: Network | None = None,
+        options: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ) -> None:
+        self._options = options
         self.network = network
         """The hosts on which the processes run; None: this machine itself."""
         self._profile = profile
@@ -94,7 +97,8 @@ class Rig:
         `through`: a command that becomes it, such as `unshare`.
         """
         role = self.children[name].role
-        await self.children[name].start(self.file(role), self.overrides(name), [*self._host(role), *through])
+        before, options = [*self._host(role), *through], self._options.get(role, ())
+        await self.children[name].start(self.file(role), self.overrides(name), before, options)
 
     def file(self, role: str) -> Path:
         """The example file that the processes of a role run on."""
@@ -170,12 +174,14 @@ async def open_rig(
     robots: int = 1,
     routed: bool = False,
     network: Network | None = None,
+    options: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> AsyncIterator[Rig]:
     """Open a rig on free endpoints. No process runs yet but the router; all are stopped at the end.
 
     `routed`: master and robots meet at a router, which is started at once. A secure transport gets new keys.
     `network`: suit, master and router run on its operator's host, the slaves on its robot's host.
     `overrides`: of the example files, by role or by the process's name.
+    `options`: of the processes' command lines, by role.
     Raises ConfigError for an unknown transport or profile.
     """
     load_skeleton(profile)
@@ -186,7 +192,7 @@ async def open_rig(
         else:
             endpoints = network_endpoints(transport, network, folder, robots, routed)
         session = await stack.enter_async_context(open_session(endpoints.observing))
-        rig = Rig(folder, endpoints, overrides or {}, session, profile, network)
+        rig = Rig(folder, endpoints, overrides or {}, session, profile, network, options)
         stack.push_async_callback(rig.stop)
         if routed:
             await rig.start(ROUTER)

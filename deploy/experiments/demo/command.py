@@ -53,10 +53,10 @@ RobotCount = Annotated[
     ),
 ]
 ServoBackend = Annotated[
-    Literal["mujoco", "canopen"],
+    Literal["mujoco", "canopen", "makers"],
     typer.Option(
         help="Servo backend: mujoco simulates the robot inside the slave, canopen "
-        "simulates drives on CAN buses."
+        "simulates drives on CAN buses, makers builds these as five makers do."
     ),
 ]
 Camera = Annotated[bool, typer.Option(help="Send video from the robot's camera.")]

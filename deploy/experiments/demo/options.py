@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,9 +11,13 @@ from common.config.load import load_config
 from common.errors import TandemError
 from common.skeleton import load_skeleton
 from deploy.examples.profiles import NURSING, example
+from deploy.sim.drives.mixture import mixture
 from deploy.sim.suit.config import SuitConfig
 from master.config import MasterConfig
 from slave.config import SlaveConfig
+
+HOME_KEY = "demo-posture"
+"""The reset key of a demo's robot whose posture a person has to confirm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +35,8 @@ class DemoOptions:
     seed: int = 1
     robots: int = 1
     """How many robots follow the one operator; several show no pictures of their cameras."""
-    servos: Literal["mujoco", "canopen"] = "mujoco"
-    """`canopen`: simulated drives in a process of their own, on two CAN buses."""
+    servos: Literal["mujoco", "canopen", "makers"] = "mujoco"
+    """`canopen`: simulated drives in a process of their own, on two CAN buses; `makers`: of five makers."""
     camera: bool = True
     """Whether the robot shows what it sees."""
     console: bool = False
@@ -58,10 +63,24 @@ class DemoOptions:
             # robots have hosts of their own; here, with priority, they would starve the processes that watch
             slave.append("process.realtime_priority=0")
         overrides = {"slave": slave, "suit": suit, "master": master}
-        if self.servos == "canopen":
+        if self.servos != "mujoco":
             slave.append('servos.backend="canopen"')
             overrides["drives"] = []
+        if self.servos == "makers":
+            # drives without an encoder at the joint: a person confirms where the robot stands
+            override = mixture(load_skeleton(self.profile)).override
+            slave += [override, f'guard.reset_key="{HOME_KEY}"']
+            overrides["drives"].append(override)
         return overrides
+
+    def command_options(self) -> dict[str, Sequence[str]]:
+        """What it adds to the processes' command lines."""
+        return {"drives": mixture(load_skeleton(self.profile)).arguments} if self.servos == "makers" else {}
+
+    @property
+    def home_key(self) -> str:
+        """With which the robot's posture is confirmed; empty: nobody needs to."""
+        return HOME_KEY if self.servos == "makers" else ""
 
     def _begins_in_the_zero_pose(self) -> bool:
         """A simulated operator moves as the robot can: where its elbow is never straight, hers is not."""

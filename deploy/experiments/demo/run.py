@@ -83,11 +83,14 @@ async def _started(
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-tap-"))
         overrides["master"] += [f'tap.socket="{folder}/master.sock"']
     host = await stack.enter_async_context(watch_host())
-    rigging = open_rig(options.transport, overrides, options.profile, options.robots)
+    rigging = open_rig(
+        options.transport, overrides, options.profile, options.robots, options=options.command_options()
+    )
     rig = await stack.enter_async_context(rigging)
     live = stack.enter_context(Live(console=console, refresh_per_second=4, transient=True))
     show = _Show(rig, host, stop, live)
-    await start_all(rig, START_S + START_EACH_S * options.robots, show.look)
+    start_s = START_S + START_EACH_S * options.robots
+    await start_all(rig, start_s, show.look, home_key=options.home_key)
     if options.console:
         page = ConsoleChild(rig)
         await page.start(options.listen)

@@ -60,4 +60,4 @@ CANOPEN = (
 
 def of_demo(profile: str, servos: str) -> tuple[ReportTarget, ...]:
     """The limits for a profile and its servo backend."""
-    return BY_PROFILE.get(profile, OWN) + (CANOPEN if servos == "canopen" else ())
+    return BY_PROFILE.get(profile, OWN) + (CANOPEN if servos != "mujoco" else ())

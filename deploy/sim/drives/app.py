@@ -69,6 +69,7 @@ async def run(
     peer = DrivePeer(canopen, share.skeleton, share.encoders, send, monotonic_ns(), faults)
     for joint, maker in makers.items():
         peer.build(joint, maker)
+    logging.getLogger("canopen").setLevel(logging.WARNING)  # a line for each transfer else
     enter_real_time(config.process.realtime_priority)
 
     async def move() -> None:

@@ -278,4 +278,4 @@ def test_canopen_drives_are_judged_by_answers_and_the_robot_s_core(
     found = {v.name: v.passed for v in judge_targets(tree, of_demo("nursing", "canopen"))}
     assert found["SYNC → all positions, p99"] is met
     assert found["robot, of one core"] is met
-    assert of_demo("nursing", "simulated") == DEMO
+    assert of_demo("nursing", "mujoco") == DEMO

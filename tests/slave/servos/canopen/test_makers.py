@@ -21,20 +21,13 @@ from deploy.sim.drives.makers import (
     maker_of,
     without_position_mode,
 )
+from deploy.sim.drives.mixture import SAYS
 from slave.servos.canopen.cia402 import Power
 from slave.servos.canopen.config import CanopenConfig
 from slave.servos.canopen.drive_config import DriveConfig
 from tests.slave.servos.canopen.conftest import Wired
 
 NURSING = load_skeleton("nursing")
-SAYS: Mapping[str, dict[str, object]] = {
-    "epos": {},
-    "interpolating": {"holds_itself": True},
-    "fixed": {"holds_itself": True},
-    "segmented": {"holds_itself": True},
-    "reserved-bits": {"unused_status_bits": [9]},
-}
-"""What a robot's file must say of each."""
 JOINT = "left_elbow_pitch"
 
 
