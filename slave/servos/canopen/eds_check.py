@@ -53,11 +53,14 @@ def checked(settings: DriveSettings, eds: Eds) -> SetupPlan:
                 lacks[transfer.part_of] = refusal
             elif refusal and not optional:
                 raise SetupRefusedError(f"refuses its configuration: {refusal}")
-            elif isinstance(transfer, Read) and (value := eds.value(place)) is not None:
+            elif isinstance(transfer, Read) and (value := eds.value(place, settings.drive.id)) is not None:
                 held[place] = value
         transfers = plan.then(held, lacks)
-    target = TARGETS[plan.mode]
-    for (index, sub), name in {**_NEEDED, (target >> 16, target >> 8 & 0xFF): "target of its mode"}.items():
+    target, encoder = TARGETS[plan.mode], settings.drive.encoder
+    needed = {**_NEEDED, (target >> 16, target >> 8 & 0xFF): "target of its mode"}
+    if encoder is not None:
+        needed[encoder, 0] = "encoder at the joint, as this file names it"
+    for (index, sub), name in needed.items():
         if (index, sub) not in eds.entries:
             raise SetupRefusedError(f"has no {name} ({index:04X}h:{sub}): name the drive's own EDS")
     return plan
