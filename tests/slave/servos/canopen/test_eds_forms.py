@@ -2,7 +2,7 @@
 
 The forms are those of public files and their readers' bug reports: carriage returns, Latin-1, UTF-8 and
 UTF-16 marks, indented lines, comments behind values, quotes, keys and sections in another case, sections that
-come twice, lines that are none, `$NodeId` on either side, DCF values, compact arrays and PDOs. None is copied.
+come twice, lines that are none, `$NodeId` on either side, DCF values, compact arrays and PDOs.
 """
 
 from __future__ import annotations
