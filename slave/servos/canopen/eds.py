@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from slave.servos.canopen.eds_text import EdsError, Section, number, sections
+from slave.servos.canopen.eds_text import EdsError, EdsSection, number, sections
 from slave.servos.canopen.sdo import Read, Transfer, Write
 
 __all__ = ["Eds", "EdsEntry", "EdsError", "read_eds"]
@@ -87,7 +87,7 @@ class Eds:
 def read_eds(path: Path) -> Eds:
     """Read a file. Raises EdsError."""
     read = sections(path)
-    device = read.get("deviceinfo", Section("deviceinfo", {}))
+    device = read.get("deviceinfo", EdsSection("deviceinfo", {}))
     entries = _compact_pdos(device)
     for name, section in read.items():
         place = section.place
@@ -104,7 +104,7 @@ def read_eds(path: Path) -> Eds:
     return Eds(path.name, vendor or None, product or None, entries)
 
 
-def _entry(section: Section) -> EdsEntry:
+def _entry(section: EdsSection) -> EdsEntry:
     text = section.text("parametervalue") or section.text("defaultvalue")
     bits = _BITS.get(section.number("datatype") or 0)
     mappable = section.number("pdomapping") != 0
@@ -113,7 +113,7 @@ def _entry(section: Section) -> EdsEntry:
     )
 
 
-def _compact(index: int, section: Section, values: Section | None, count: int) -> dict[Place, EdsEntry]:
+def _compact(index: int, section: EdsSection, values: EdsSection | None, count: int) -> dict[Place, EdsEntry]:
     """`CompactSubObj`: subindices of one kind, whose values stand in a section of their own."""
     each = _entry(section)
     mapping = any(index in one for one in _MAPPINGS)
@@ -128,7 +128,7 @@ def _compact(index: int, section: Section, values: Section | None, count: int) -
     return entries
 
 
-def _compact_pdos(device: Section) -> dict[Place, EdsEntry]:
+def _compact_pdos(device: EdsSection) -> dict[Place, EdsEntry]:
     """`CompactPDO`: which parameters each PDO has, where the file has no sections for them."""
     mask, entries = device.number("compactpdo") or 0, {}
     for key, first in _COMMUNICATION.items() if mask else ():

@@ -15,7 +15,7 @@ class EdsError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class EdsSection:
     """One section: its name and its keys, both in lower case."""
 
     name: str
@@ -36,7 +36,7 @@ class Section:
         return number(self.text(key))
 
 
-def sections(path: Path) -> dict[str, Section]:
+def sections(path: Path) -> dict[str, EdsSection]:
     """The sections of a file by name. Of a key or a section that comes twice the later one counts.
 
     Raises EdsError.
@@ -52,12 +52,12 @@ def sections(path: Path) -> dict[str, Section]:
         raise EdsError(
             "an EDS or DCF file, which begins with a section in brackets; this is XML (XDD): export an EDS"
         )
-    out: dict[str, Section] = {}
-    section = Section("", {})
+    out: dict[str, EdsSection] = {}
+    section = EdsSection("", {})
     for line in map(str.strip, text.splitlines()):
         if line.startswith("[") and "]" in line:
             name = line[1 : line.index("]")].strip().lower()
-            section = out.setdefault(name, Section(name, {}))
+            section = out.setdefault(name, EdsSection(name, {}))
         elif "=" in line and not line.startswith((";", "#")):
             key, _, value = line.partition("=")
             section.keys[key.strip().lower()] = value.strip()
