@@ -26,6 +26,7 @@ from deploy.log_options import Debug, Quiet, add_log_options, debugging, start_c
 from deploy.ops.alarms import alarms
 from deploy.ops.attitude.command import attitude
 from deploy.ops.audit import audit
+from deploy.ops.call import call
 from deploy.ops.control.commands import COMMANDS as OPERATORS_ACTS
 from deploy.ops.control.printer import acted
 from deploy.ops.convert.export_command import export_joints
@@ -40,6 +41,7 @@ from deploy.ops.network.command import app as network_app
 from deploy.ops.profile.command import app as profile_app
 from deploy.ops.record.command import record
 from deploy.ops.replay.command import replay
+from deploy.ops.robots import robots
 from deploy.ops.ros.command import ros
 from deploy.ops.router.command import router
 from deploy.ops.servos import servos
@@ -70,8 +72,8 @@ for _name, _group in {
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, console, drives, router, demo, soak, faults, collisions, contact, bench, audit,
-    *OPERATORS_ACTS, attitude, video, ros, doctor, servos, stops, inputs, alarms, record, inspect,
-    replay, metrics, lsl,
+    robots, *OPERATORS_ACTS, call, attitude, video, ros, doctor, servos, stops, inputs, alarms, record,
+    inspect, replay, metrics, lsl,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

@@ -11,6 +11,7 @@ from dataclasses import replace
 from common.can.bus import CanBus
 from common.clock import monotonic_ns, to_ns
 from common.inputs.key_state import KeyState
+from common.inputs.pressed import PressedKey
 from common.latency.budget import StageTimes
 from common.latency.durations import Durations
 from common.link import LinkSession, open_session
@@ -33,17 +34,15 @@ from common.wire.version import software
 from master.alarms.operator import OperatorAlarms
 from master.alarms.player import TonePlayer
 from master.capture.source import with_extended
-from master.comfort.pressed import PressedKey
-from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
 from master.deadman.grip import Grip
 from master.deadman.switches import Switches
+from master.fleet import Fleet
 from master.joint_angles.sample import JointAngleSample
 from master.journal.calls import Pipeline
 from master.journal.context import describe
 from master.journal.tap import MasterTap
 from master.pipeline import MasterPipeline
-from master.robot import CommandedRobot
 from master.suit.doubt import DoubtLog, as_figures
 from master.suit.protocol import SuitProtocol
 from master.suit.silence import BusSigns, SilenceWatch
@@ -97,19 +96,10 @@ class Master:
             )
             for bus in config.capture.buses
         ]
-        joints = len(self._pipeline.skeleton.joints)
-        endpoints = own_endpoints(config.link)
-        self._robots = [
-            CommandedRobot(
-                name, config.operator.name, joints, link=session.link(name), endpoints=endpoints,
-                scaling=MotionScaling(config.operator.scaling, self._pipeline.skeleton),
-            )
-            for name in config.commanded
-        ]  # fmt: skip
+        self._fleet = Fleet(config, session, self._pipeline.skeleton)
         self._pressed = PressedKey()
-        self._given_up: set[str] = set()
         self._silence = SilenceWatch()
-        self._alarms = OperatorAlarms(config.commanded)
+        self._alarms = OperatorAlarms()
         self._player = TonePlayer(config.alarms)
         self._doubt_log = DoubtLog()
 
@@ -130,26 +120,12 @@ class Master:
                 if not self._config.alarms.off:
                     self._player.start()
                     tasks.create_task(self._sound())
-                for robot in self._robots:
-                    tasks.create_task(self._serve(robot))
+                self._fleet.start(tasks)
         finally:
             self._switches.close()
             await asyncio.to_thread(self._player.stop)
             for bus in self._buses:
                 await bus.close()
-
-    async def _serve(self, robot: CommandedRobot) -> None:
-        """Keep one robot. An unforeseen error stops the commands to this robot only."""
-        try:
-            await robot.run()
-        except Exception:
-            self._given_up.add(robot.name)
-            if len(self._given_up) == len(self._robots):
-                raise
-            log.exception(
-                "%s: unexpected error: it gets no more commands, so its guard holds; other robots continue",
-                robot.name,
-            )
 
     async def _capture(self) -> None:
         period_ns = round(1e9 / self._config.capture.rate_hz)
@@ -172,7 +148,7 @@ class Master:
     async def _sound(self) -> None:
         """Play the tone that is due."""
         async for _ in ticks(TickGrid(monotonic_ns(), ALARM_PERIOD_NS)):
-            pipeline, signs = self._pipeline, {robot.name: robot.sign for robot in self._robots}
+            pipeline, signs = self._pipeline, {robot.name: robot.sign for robot in self._fleet}
             far, doubts = pipeline.beyond_reach.far, bool(pipeline.doubts)
             alarm = self._alarms.step(monotonic_ns(), signs, beyond_reach=far, doubts=doubts)
             if alarm is not None:
@@ -204,13 +180,9 @@ class Master:
 
     def _send_at_once(self, grip: Grip) -> None:
         """The operator let go: no robot waits for the next posture to hear of it."""
-        for robot in self._commanded:
-            if self._newest is not None:
-                robot.send(self._newest, grip, monotonic_ns())
-
-    @property
-    def _commanded(self) -> list[CommandedRobot]:
-        return [robot for robot in self._robots if robot.name not in self._given_up]
+        if self._newest is not None:
+            for _ in self._fleet.send(self._newest, grip, monotonic_ns()):
+                pass
 
     def _send(self, angles: JointAngleSample) -> None:
         angles_ns = monotonic_ns()
@@ -219,8 +191,7 @@ class Master:
         for line in self._pipeline.said:
             log.warning("%s", line, extra=BELL)
         self._newest, grip = angles, self._switches.take()
-        for robot in self._commanded:
-            robot.send(angles, grip, angles_ns)
+        for _ in self._fleet.send(angles, grip, angles_ns):
             done_ns = monotonic_ns()
             self._stages.record(
                 angles.frames_in_ns - angles.sampled_ns, angles_ns - angles.frames_in_ns, done_ns - angles_ns
@@ -232,7 +203,7 @@ class Master:
     async def _publish_metrics(self) -> None:
         async for due in ticks(TickGrid(monotonic_ns(), round(1e9 / STATISTICS.rate_hz))):
             shared = self._shared_metrics()
-            for robot in self._robots:
+            for robot in self._fleet:
                 robot.publish_metrics(due.scheduled_ns, shared)
             for line in self._silence.lines(self._bus_signs(), due.scheduled_ns):
                 log.warning("%s", line)
@@ -241,7 +212,7 @@ class Master:
                 f"{name}: {words}" for name, words in self._switches.words.items() if "held" not in words
             ]
             waiting = [f"waiting for bus {bus.name}: {bus.last_error}" for bus in away]
-            self._notifier.status("; ".join([*waiting, *let_go, *(robot.standing for robot in self._robots)]))
+            self._notifier.status("; ".join([*waiting, *let_go, *(robot.standing for robot in self._fleet)]))
 
     def _bus_signs(self) -> dict[str, BusSigns]:
         poll = self._pipeline.poll
@@ -273,7 +244,7 @@ class Master:
 
     def metrics(self) -> MasterMetrics:
         """Counters and percentiles of the whole process, for tables and reports."""
-        return replace(self._shared_metrics(), robots={robot.name: robot.metrics() for robot in self._robots})
+        return replace(self._shared_metrics(), robots={robot.name: robot.metrics() for robot in self._fleet})
 
 
 async def run(config: MasterConfig, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
@@ -293,7 +264,8 @@ async def _run(config: MasterConfig, write_metrics: WriteMetrics) -> None:
         tap = open_tap(config.tap, describe(config))
         master = Master(config, session, notifier, tap)
         where = ", ".join(config.link.connect or config.link.listen)
-        robots = ", ".join(config.commanded)
+        session.declare_operator(config.operator.name, own_endpoints(config.link))
+        robots = ", ".join(config.commanded + [f"watches {pattern}" for pattern in config.watched])
         log.info("%s: %d nodes polled, commands go to %s", robots, len(config.nodes), where)
         freeze_heap()  # now that all is built: a full collection took 80 ms
         reserve_heap()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from common.can.config import BusConfig
 from common.config.console import ConsoleConfig
@@ -30,6 +30,13 @@ from master.suit.plausibility_config import PlausibilityConfig
 from master.suit.protocol import SHIPPED_DBC
 
 RobotName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
+RobotPattern = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.*-]{1,64}$")]
+"""A robot's name, or a pattern of names such as `*` or `ward-*`."""
+
+
+def _one_or_more(value: object) -> object:
+    """`robots = "*"` is short for `robots = ["*"]`."""
+    return [value] if isinstance(value, str) else value
 
 
 class CaptureConfig(Section):
@@ -80,8 +87,10 @@ class OperatorConfig(Section):
 class MasterConfig(Section):
     """The whole file."""
 
-    robots: list[RobotName] = Field(default_factory=list)
-    """Robots to command, by the names in the slaves' files. Each has its own lease and guard."""
+    robots: Annotated[list[RobotPattern], BeforeValidator(_one_or_more)] = Field(default_factory=list)
+    """Robots to command, by the names in the slaves' files. Each has its own lease and guard. Robots of a
+    pattern, such as "*", are watched, and commanded once `tandem take` asks for them; whom an operator may
+    command is what [link.access] says."""
     robot: RobotName | None = None
     """Short for `robots` with one name."""
     profile: ProfileName = "nursing"
@@ -100,7 +109,16 @@ class MasterConfig(Section):
 
     @property
     def commanded(self) -> list[str]:
-        """The names of the robots to command."""
+        """The names of the robots to command from the start."""
+        return [name for name in self._named if "*" not in name]
+
+    @property
+    def watched(self) -> list[str]:
+        """Patterns of the robots to watch, and to command when they are taken."""
+        return [name for name in self._named if "*" in name]
+
+    @property
+    def _named(self) -> list[str]:
         return self.robots if self.robot is None else [self.robot]
 
     @property
@@ -143,9 +161,9 @@ class MasterConfig(Section):
     def _robot_mistakes(self) -> list[ConfigMistake]:
         if self.robot is not None and self.robots:
             return [ConfigMistake("robot", self.robot, "only one of robot and robots")]
-        if not self.commanded:
-            return [ConfigMistake("robots", self.robots, "the name of at least one robot")]
-        twice = [name for i, name in enumerate(self.robots) if name in self.robots[:i]]
+        if not self._named:
+            return [ConfigMistake("robots", self.robots, "the name of at least one robot, or a pattern")]
+        twice = [name for i, name in enumerate(self._named) if name in self._named[:i]]
         return [ConfigMistake("robots", name, "each robot once") for name in twice]
 
 

@@ -23,6 +23,8 @@ class LeaseKeeper:
         self._next_claim_ns = 0
         self._granted_ns = 0
         self.token = 0
+        self.lost_ns = 0
+        """When the lease was lost last; 0: never."""
         self.instance = 0
         """Which of the processes of that name granted the lease."""
         self.answer = "the robot has not been asked yet"
@@ -49,7 +51,7 @@ class LeaseKeeper:
         """Notice a lease that was lost: it is claimed anew, but only a person engages again."""
         settled = now_ns - self._granted_ns > to_ns(GRACE_S)
         if self.token and settled and not self.holds(state):
-            self.token = 0
+            self.token, self.lost_ns = 0, now_ns
             self.answer = f"the lease was lost to {self._other(state.operator)}"
 
     def _other(self, operator: str) -> str:

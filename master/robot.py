@@ -31,6 +31,11 @@ from master.lease import LeaseKeeper
 from master.picture import VideoWatch
 from master.pipeline import CommandWriter
 from master.robot_watch import RobotWatch
+from master.watched import TakenRobot
+
+ENGAGED = ("align", "track", "clutch")
+MOVES_S = 5.0
+"""A robot that followed when it was heard last counts as following for so long."""
 
 log = logging.getLogger(__name__)
 
@@ -47,8 +52,13 @@ class CommandedRobot:
         link: Link,
         endpoints: Sequence[str] = (),
         scaling: MotionScaling | None = None,
+        may_claim: Callable[[int, int], bool] = lambda now_ns, lost_ns: True,
     ) -> None:
-        """`endpoints`: where this master is reached; shown where two masters have the same operator."""
+        """`endpoints`: where this master is reached; shown where two masters have the same operator.
+
+        `may_claim(now_ns, lost_ns)`: whether the lease may be claimed now; `lost_ns`: when it was lost last.
+        """
+        self._may_claim = may_claim
         self.name = name
         self._instance = draw_instance()
         self._endpoints = endpoints
@@ -80,8 +90,13 @@ class CommandedRobot:
             tasks.create_task(self._keep_lease())
             tasks.create_task(self._keep_clock())
 
-    def send(self, angles: JointAngleSample, grip: Grip, angles_ns: int) -> None:
-        """Put the posture on this robot's topic. It never blocks."""
+    def send(self, angles: JointAngleSample, grip: Grip, angles_ns: int, beside: str = "") -> None:
+        """Put the posture on this robot's topic. It never blocks.
+
+        `beside`: what speaks against moving this robot too (`common.wire.together`).
+        """
+        if beside and not angles.doubt:
+            angles = replace(angles, doubt=beside)
         seen = self.video.seen_by(angles.sampled_ns)
         command = self._writer.write(angles, self._lease.token, grip, angles_ns, monotonic_ns(), seen)
         self._put_command(encode(command))
@@ -117,8 +132,11 @@ class CommandedRobot:
                 log.warning("%s: %s", self.name, change)
             if await self._two_answer(monotonic_ns()):
                 continue
-            request = self._lease.request(monotonic_ns())
-            if request is None or self._watch.silent(monotonic_ns()):
+            now_ns = monotonic_ns()
+            if self._watch.silent(now_ns) or not self._may_claim(now_ns, self._lease.lost_ns):
+                continue
+            request = self._lease.request(now_ns)
+            if request is None:
                 continue
             try:
                 reply = decode(await self._link.ask(self._control, encode(request)), ControlReply)
@@ -161,6 +179,19 @@ class CommandedRobot:
                     self._clock.on_reply(reply, arrived_ns)
             except (LinkError, CodecError):
                 continue
+
+    @property
+    def taken(self) -> TakenRobot:
+        """Whether this master holds the lease, and when it lost it."""
+        return TakenRobot(bool(self._lease.token), self._lease.lost_ns)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the robot follows this operator, as far as is known: a silent one may still hear."""
+        state = self._watch.state
+        if state is None or state.guard not in ENGAGED or not self._lease.holds(state):
+            return False
+        return not self._watch.silent(monotonic_ns(), MOVES_S)
 
     @property
     def sign(self) -> RobotSign:

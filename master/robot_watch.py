@@ -36,9 +36,9 @@ class RobotWatch:
             self._echoed = echo.sequence
             self.round_trip.record(round_trip_ns(state, echo, arrived_ns))
 
-    def silent(self, now_ns: int) -> bool:
-        """Whether the robot has not been heard within the state topic's time-out."""
-        return self.state is None or now_ns - self._heard_ns > to_ns(STATE.timeout_s)
+    def silent(self, now_ns: int, for_s: float = STATE.timeout_s) -> bool:
+        """Whether the robot has not been heard for so long, by default the state topic's time-out."""
+        return self.state is None or now_ns - self._heard_ns > to_ns(for_s)
 
     def change(self, now_ns: int) -> str | None:
         """A line for the log when the robot falls silent or is heard again."""

@@ -28,10 +28,11 @@ from common.wire.messages import Statistics
 from common.wire.path_probe import answer_probe
 from common.wire.presence import ProcessPresence, place
 from common.wire.sender import operator_of
-from common.wire.topics import CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, video
+from common.wire.topics import CALL, CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, SUMMARY, video
 from common.wire.version import software
 from slave.attitude.open import open_base
 from slave.attitude.sensor import BaseSensor
+from slave.call_button import CallButton
 from slave.camera.feed import CameraFeed, open_feed
 from slave.config import SlaveConfig
 from slave.guard.body import Body
@@ -89,6 +90,8 @@ class Slave:
         self._ticks_missed = 0
         self._put_state: Callable[[bytes], None] = link.publish(STATE)
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
+        self._put_summary: Callable[[bytes], None] = link.publish(SUMMARY)
+        self._button = None if config.call.button is None else CallButton(config.call.button, self._on_button)
         self._camera: CameraFeed | None = None
         if config.camera.source != "off":
             self._camera = open_feed(config.camera, config.profile, link.publish(video(config.camera.name)))
@@ -98,6 +101,7 @@ class Slave:
         link.answer(STOP, self._on_stop)
         link.answer(CLOCK, self._on_clock)
         link.answer(PATH, lambda question, _: answer_probe(question))
+        link.answer(CALL, self._on_call)
         link.watch_presence(self._on_presence)
 
     def on_revoked(self, names: frozenset[str]) -> None:
@@ -107,8 +111,9 @@ class Slave:
     async def run(self) -> None:
         """Run the servo loop and publish statistics until cancelled."""
         endpoints = own_endpoints(self._config.link)
-        self._link.declare_alive("slave", self._pipeline.instance, endpoints)
-        with self._camera or nullcontext():
+        profile = self._config.skeleton.name
+        self._link.declare_alive("slave", self._pipeline.instance, endpoints, profile)
+        with self._camera or nullcontext(), self._button or nullcontext():
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._drive())
                 tasks.create_task(self._publish_statistics())
@@ -153,6 +158,9 @@ class Slave:
             if due.tick // loop.state_every != published:
                 published = due.tick // loop.state_every
                 self._put_state(self._pipeline.state(monotonic_ns()))
+                summary = self._pipeline.summary(monotonic_ns())
+                if summary is not None:
+                    self._put_summary(summary)
             guard = self._pipeline.guard
             if namesake != self._pipeline.namesake:
                 namesake = self._pipeline.namesake
@@ -200,6 +208,13 @@ class Slave:
 
     def _on_stop(self, payload: bytes, _: int) -> bytes:
         return self._pipeline.on_stop(payload, monotonic_ns())
+
+    def _on_call(self, payload: bytes, _: int) -> bytes:
+        return self._pipeline.announcer.on_call(payload, self._pipeline.guard, monotonic_ns())
+
+    def _on_button(self) -> None:
+        words = self._pipeline.announcer.pressed(self._pipeline.guard, monotonic_ns())
+        log.info("%s: call button: %s", self._config.robot, words)
 
     def _on_clock(self, payload: bytes, received_ns: int) -> bytes:
         return self._pipeline.on_clock(payload, received_ns, monotonic_ns())

@@ -7,6 +7,7 @@ from pydantic import Field
 from common.config.console import ConsoleConfig
 from common.config.section import Section
 from common.errors import ConfigError, ConfigMistake
+from common.inputs.config import KeyConfig
 from common.link.config import LinkConfig
 from common.process.realtime import ProcessConfig
 from common.recording.config import RecordingConfig
@@ -33,6 +34,13 @@ class LoopConfig(Section):
     """Ticks from one published state to the next: 200 / 4 = 50 Hz."""
 
 
+class CallConfig(Section):
+    """`[call]`: how somebody at the robot asks for an operator, beside `tandem call`."""
+
+    button: KeyConfig | None = None
+    """A key of a Linux input device at the robot. Pressing it again changes nothing."""
+
+
 class SlaveConfig(Section):
     """The whole file."""
 
@@ -41,6 +49,7 @@ class SlaveConfig(Section):
     loop: LoopConfig = LoopConfig()
     guard: GuardConfig = GuardConfig()
     estop: EstopConfig = EstopConfig()
+    call: CallConfig = CallConfig()
     contact: ContactConfig = ContactConfig()
     track: TrackConfig = TrackConfig()
     servos: ServosConfig = ServosConfig()

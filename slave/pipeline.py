@@ -28,6 +28,7 @@ from common.wire.messages import (
     Mask,
     RobotState,
 )
+from slave.announce import Announcer
 from slave.config import SlaveConfig
 from slave.contact.reflex import ContactReflex
 from slave.contact.torque_limit import TorqueLimit
@@ -73,6 +74,7 @@ class SlavePipeline:
         self.instance = instance or draw_instance()
         self.unread = UnreadMessages(config.robot)
         self.namesakes = Namesakes(self.instance)
+        self.announcer = Announcer(config.robot, self.instance)
         self.skeleton = config.skeleton
         self.encoders = Encoders(self.skeleton, config.encoders)
         single = config.servos.single_reading(self.skeleton)
@@ -324,6 +326,10 @@ class SlavePipeline:
                 blind_s=self.blind.after_s,
             )
         )
+
+    def summary(self, now_ns: int) -> bytes | None:
+        """The summary for lists of robots, if one is due."""
+        return self.announcer.summary(now_ns, self.guard, self._faults(now_ns))
 
     @property
     def namesake(self) -> str | None:

@@ -3,7 +3,8 @@
 Flows are named from this host's side: `ingress` comes from the subject, `egress` goes to it. A publisher of a
 key must also receive its subscribers' declarations, or it would send nothing. Subjects are common names of
 certificates. A robot hears every operator's key by one declaration with a wildcard, which each operator
-receives; what an operator sends is allowed on the operator's own keys alone.
+receives; what an operator sends is allowed on the operator's own keys alone. Likewise a list of robots hears
+all summaries by one declaration; each listener is sent those of its own robots alone.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from typing import TypedDict
 
 from common.link.config import AccessConfig
 from common.link.roles import Role, common_name
+from common.wire.presence import operator_alive_key
 from common.wire.topics import (
     ALIVE,
+    CALL,
     CLOCK,
     COMMAND,
     CONTROL,
@@ -22,16 +25,18 @@ from common.wire.topics import (
     STATE,
     STATISTICS,
     STOP,
+    SUMMARY,
     TRUTH,
     VIDEO,
     Topic,
 )
 
-HEARD = (COMMAND, STATE, STATISTICS, TRUTH)
+HEARD = (COMMAND, STATE, STATISTICS, SUMMARY, TRUTH)
 """Topics that an observer of a robot receives; viewers and operators receive the video too."""
 _WAYS = {
     "put": ((("put", "delete"), "ingress"),),
     "hears": ((("declare_subscriber",), "egress"),),
+    "may hear": ((("declare_subscriber",), "ingress"),),
     "hear": ((("declare_subscriber",), "ingress"), (("put", "delete"), "egress")),
     "query": ((("query",), "ingress"), (("reply",), "egress")),
     "answers": ((("declare_queryable",), "egress"),),
@@ -104,11 +109,14 @@ def access_control(access: AccessConfig, revoked: frozenset[str] = frozenset()) 
     table = _AccessRules(revoked)
     for router in access.routers:
         table.allow([common_name(Role.ROUTER, router)], _ALL, ["tandem/**"])
-    for robot in access.robots:
+    for robot in access.all_robots:
         _robot(table, access, robot)
     everyone = sorted(named(access))
     # every named host may see who is present, and may stop a robot
-    table.allow(everyone, ("watch", "watched"), [_alive("*", "**")])
+    table.allow(everyone, ("watch", "watched"), [_alive("*", "**"), f"{operator_alive_key('*')}/**"])
+    table.allow(everyone, ("hears", "may hear"), [SUMMARY.key_for("*")])
+    for name in access.operators:
+        table.allow([common_name(Role.OPERATOR, name)], ("live",), [f"{operator_alive_key(name)}/**"])
     table.allow(everyone, _ASK, [STOP.key_for("*")])
     return table.zenoh()
 
@@ -117,31 +125,32 @@ def named(access: AccessConfig) -> set[str]:
     """The common name of every host in [link.access]."""
     people = [(Role.OPERATOR, access.operators), (Role.OBSERVER, access.observers | access.viewers)]
     of_people = {common_name(role, name) for role, table in people for name in table}
-    robots = {common_name(Role.ROBOT, robot) for robot in access.robots}
+    robots = {common_name(Role.ROBOT, robot) for robot in access.all_robots}
     return of_people | robots | {common_name(Role.ROUTER, router) for router in access.routers}
 
 
 def operators_of(access: AccessConfig | None, robot: str) -> frozenset[str] | None:
     """The operators who may command a robot; None: there are no rules, so whoever reaches it."""
-    return None if access is None else frozenset(_names(access.operators, robot))
+    return None if access is None else frozenset(access.names(access.operators, robot))
 
 
 def _robot(table: _AccessRules, access: AccessConfig, robot: str) -> None:
     me = [common_name(Role.ROBOT, robot)]
-    operators = _named(Role.OPERATOR, access.operators, robot)
-    viewers = _named(Role.OBSERVER, access.viewers, robot)
-    observers = _named(Role.OBSERVER, access.observers, robot)
+    commanding = access.names(access.operators, robot)
+    operators = [common_name(Role.OPERATOR, name) for name in commanding]
+    viewers = [common_name(Role.OBSERVER, name) for name in access.names(access.viewers, robot)]
+    observers = [common_name(Role.OBSERVER, name) for name in access.names(access.observers, robot)]
     video = _key(VIDEO, robot).rpartition("/")[0] + "/*"
-    table.allow(me, _PUBLISH, [_key(STATE, robot), _key(STATISTICS, robot), video])
+    table.allow(me, _PUBLISH, [*(_key(topic, robot) for topic in (STATE, STATISTICS, SUMMARY)), video])
     table.allow(me, ("hear",), [_key(COMMAND, robot)])
-    table.allow(
-        me, ("answer",), [_key(CONTROL, robot), _key(STOP, robot), _key(CLOCK, robot), _key(PATH, robot)]
-    )
+    table.allow(me, ("answer",), [_key(topic, robot) for topic in (CONTROL, STOP, CLOCK, PATH, CALL)])
+    # a person at the robot calls from the robot's own host, by the robot's certificate
+    table.allow(me, _ASK, [_key(CALL, robot)])
     table.allow(me, ("live",), [_alive(robot, "slave/**")])
     table.allow(operators, _PUBLISH, [_key(STATISTICS, robot), _key(TRUTH, robot)])
     table.allow(operators, ("hears",), [_key(COMMAND, robot)])
     table.allow(operators, ("answers",), [_key(CONTROL, robot)])
-    for name in _names(access.operators, robot):
+    for name in commanding:
         operator = [common_name(Role.OPERATOR, name)]
         table.allow(operator, ("put",), [_key(COMMAND.of(name), robot)])
         table.allow(operator, ("query",), [_key(CONTROL.of(name), robot)])
@@ -150,14 +159,6 @@ def _robot(table: _AccessRules, access: AccessConfig, robot: str) -> None:
     table.allow(operators, ("live",), [_alive(robot, "master/**")])
     table.allow([*observers, *viewers], ("hear",), [_key(topic, robot) for topic in HEARD])
     table.allow(viewers, ("hear",), [video])
-
-
-def _named(role: Role, table: dict[str, list[str]], robot: str) -> list[str]:
-    return [common_name(role, name) for name in _names(table, robot)]
-
-
-def _names(table: dict[str, list[str]], robot: str) -> list[str]:
-    return [name for name, robots in table.items() if robot in robots]
 
 
 def _key(topic: Topic, robot: str) -> str:

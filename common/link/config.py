@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -26,23 +28,47 @@ class TlsConfig(Section):
     key: RelativePath
 
 
+PATTERN = r"^[A-Za-z0-9*][A-Za-z0-9_.*-]{0,47}$"
+Pattern = Annotated[str, Field(pattern=PATTERN)]
+"""A robot's name, or a pattern of names of the list `robots`, such as `ward-*`."""
+
+
 class AccessConfig(Section):
     """`[link.access]`: who may do what, by the names in the certificates. The same lines fit every host."""
 
-    operators: dict[Name, list[Name]] = Field(default_factory=dict)
+    robots: list[Name] = Field(default_factory=list)
+    """The robots that patterns in the tables stand for. Each robot proves its own name by its certificate, so
+    each is listed; a robot that a table names itself need not be."""
+    operators: dict[Name, list[Pattern]] = Field(default_factory=dict)
     """The robots that each operator may command, and whose video the operator receives."""
-    observers: dict[Name, list[Name]] = Field(default_factory=dict)
+    observers: dict[Name, list[Pattern]] = Field(default_factory=dict)
     """The robots whose commands, states and statistics each observer receives, but not their video."""
-    viewers: dict[Name, list[Name]] = Field(default_factory=dict)
+    viewers: dict[Name, list[Pattern]] = Field(default_factory=dict)
     """The robots of which each viewer receives what an observer does, and their video."""
     routers: list[Name] = Field(default_factory=list)
     """Routers that may forward all of this. A router enforces these rules towards all other hosts."""
 
     @property
-    def robots(self) -> list[str]:
-        """Every robot that the tables name, in the order of the file."""
+    def all_robots(self) -> list[str]:
+        """Every robot that is listed or that the tables name, in the order of the file."""
         tables = (self.operators, self.observers, self.viewers)
-        return list(dict.fromkeys(robot for table in tables for robots in table.values() for robot in robots))
+        named = [one for table in tables for robots in table.values() for one in robots if "*" not in one]
+        return list(dict.fromkeys([*self.robots, *named]))
+
+    def names(self, table: Mapping[str, Sequence[str]], robot: str) -> list[str]:
+        """Those of a table to whom it gives the robot."""
+        return [name for name, robots in table.items() if any(fnmatchcase(robot, one) for one in robots)]
+
+    def mistakes(self) -> list[ConfigMistake]:
+        """Patterns that stand for no robot: whoever wrote them expects them to permit something."""
+        known = self.all_robots
+        return [
+            ConfigMistake(f"link.access.{key}.{name}", one, "a pattern of a robot in link.access.robots")
+            for key in ("operators", "observers", "viewers")
+            for name, robots in getattr(self, key).items()
+            for one in robots
+            if "*" in one and not any(fnmatchcase(robot, one) for robot in known)
+        ]
 
 
 class TopicConfig(Section):
@@ -124,7 +150,10 @@ class LinkConfig(Section):
             return [ConfigMistake("link.access", "…", what)]
         if self.access is not None:
             what = f"one of {', '.join(SECURE)}, as there is [link.access]: others do not prove who connects"
-            return [ConfigMistake(f"link.{key}", end, what) for key, end in open_ends]
+            return [
+                *(ConfigMistake(f"link.{key}", end, what) for key, end in open_ends),
+                *self.access.mistakes(),
+            ]
         return []
 
     def _topic_mistakes(self) -> list[ConfigMistake]:

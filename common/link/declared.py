@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import logging
 from collections.abc import Callable
 
 import zenoh
@@ -9,21 +11,42 @@ import zenoh
 Declare = Callable[[zenoh.Session], object]
 """Declares something in a session and returns what keeps it declared."""
 
+log = logging.getLogger(__name__)
+
 
 class Declarations:
     """One Zenoh session and all that is declared in it."""
 
     def __init__(self, session: zenoh.Session) -> None:
         self.session = session
-        self._makers: list[Declare] = []
-        self._held: list[object] = []
+        self._numbers = itertools.count()
+        self._makers: dict[int, Declare] = {}
+        self._held: dict[int, object] = {}
 
-    def add(self, declare: Declare) -> None:
-        """Declare it now, and in every session to come."""
-        self._held.append(declare(self.session))
-        self._makers.append(declare)
+    def add(self, declare: Declare) -> int:
+        """Declare it now, and in every session to come; its number, for `remove`."""
+        number = next(self._numbers)
+        self._held[number] = declare(self.session)
+        self._makers[number] = declare
+        return number
+
+    def remove(self, number: int) -> None:
+        """Declare it no more: the other sides need not send what nobody hears."""
+        self._makers.pop(number, None)
+        _undeclare(self._held.pop(number, None))
 
     def move(self, session: zenoh.Session) -> None:
         """Declare everything in another session; the old one is closed already."""
         self.session = session
-        self._held = [declare(session) for declare in self._makers]
+        self._held = {number: declare(session) for number, declare in self._makers.items()}
+
+
+def _undeclare(held: object) -> None:
+    for each in held if isinstance(held, list | tuple) else (held,):
+        undeclare = getattr(each, "undeclare", None)
+        if undeclare is None:
+            continue
+        try:
+            undeclare()
+        except zenoh.ZError as error:  # the session is closed already
+            log.debug("not undeclared: %s", error)

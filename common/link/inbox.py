@@ -10,7 +10,7 @@ import zenoh
 
 from common.clock import monotonic_ns
 from common.errors import CodecError
-from common.link.mailbox import Mailbox
+from common.link.mailbox import MOST_KEYS, Mailbox
 from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
 
@@ -26,12 +26,14 @@ class Inbox:
         on_payload: Callable[[str, bytes, int], None],
         loop: asyncio.AbstractEventLoop,
         counters: TopicCounters,
+        most_keys: int = MOST_KEYS,
     ) -> None:
+        """`most_keys`: senders whose newest values are kept apart until the loop takes them."""
         self._key = key
         self._on_payload = on_payload
         self._loop = loop
         self._counters = counters
-        self._mailbox: Mailbox[tuple[bytes, int]] = Mailbox()
+        self._mailbox: Mailbox[tuple[bytes, int]] = Mailbox(most_keys)
         self._throttle = LogThrottle()
         self._closed = False
 

@@ -11,11 +11,11 @@ import zenoh
 from zenoh.handlers import Callback
 
 from common.clock import monotonic_ns
-from common.link.declared import Declarations
+from common.link.declared import Declarations, Declare
 from common.link.inbox import Inbox
 from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
-from common.link.waiting import count_peers, wait_for_peer
+from common.link.waiting import count_peers, is_matching, wait_for_peer
 from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
 from common.wire.presence import ProcessPresence, present
@@ -56,10 +56,17 @@ class Link:
         self._counters: dict[str, TopicCounters] = {}
         self._receivers: list[Inbox | Answerer] = []
         self._roles: set[str] = set()
+        self._declarations: list[int] = []
         self._closed = False
 
-    def publish(self, topic: Topic) -> Callable[[bytes], None]:
-        """A function that puts a payload on the topic. It never blocks and never raises: failures count."""
+    def publish(
+        self, topic: Topic, on_wanted: Callable[[bool], None] | None = None
+    ) -> Callable[[bytes], None]:
+        """A function that puts a payload on the topic. It never blocks and never raises: failures count.
+
+        `on_wanted(wanted)` is told, in Zenoh's thread, when the first subscriber appears and the last one
+        goes: what nobody hears need not be made.
+        """
         if not topic.drop:
             raise ValueError(f"{topic.name} would block under congestion, and stall the loop")
         topic = self._quality(topic)
@@ -79,7 +86,14 @@ class Link:
                 allowed_destination=zenoh.Locality.REMOTE,
             )
             put = publisher.put
-            return publisher
+            if on_wanted is None:
+                return publisher
+            on_wanted(is_matching(publisher.matching_status))
+            changed: Callback[zenoh.MatchingStatus] = Callback(
+                lambda status: on_wanted(is_matching(status)), indirect=False
+            )
+            listener = publisher.declare_matching_listener(changed)
+            return [listener, publisher]
 
         def publish(payload: bytes) -> None:
             try:
@@ -93,7 +107,7 @@ class Link:
                 if overheard is not None:
                     overheard(key, payload, monotonic_ns())
 
-        self._declared.add(declare)
+        self._declare(declare)
         return publish
 
     def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
@@ -114,7 +128,7 @@ class Link:
 
         inbox = Inbox(key, on_payload if overheard is None else overhear, self._loop, self._count(topic))
         self._receivers.append(inbox)
-        self._declared.add(lambda s: s.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
+        self._declare(lambda s: s.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
 
     def answer(self, topic: Topic, handler: Callable[[bytes, int], bytes]) -> None:
         """Answer other sessions' questions with `handler(payload, arrived_ns)`, run on the loop.
@@ -128,7 +142,7 @@ class Link:
         key = topic.key_for(self.robot)
         answerer = Answerer(key, handler, self._loop, self._count(topic), self._quality(topic).express)
         self._receivers.append(answerer)
-        self._declared.add(
+        self._declare(
             lambda s: s.declare_queryable(key, Callback(answerer.on_query, indirect=False), complete=True)
         )
 
@@ -161,23 +175,25 @@ class Link:
         asking = Asking(self._declared.session, topic, self._own_key(topic), self._count(topic))
         return await asking.all(payload, on_answer)
 
-    def declare_alive(self, role: str, instance: int = 0, endpoints: Sequence[str] = ()) -> None:
+    def declare_alive(
+        self, role: str, instance: int = 0, endpoints: Sequence[str] = (), profile: str = ""
+    ) -> None:
         """Show other sessions that this role lives, until the session closes or dies.
 
-        With an instance number also which process it is, of which version, and where.
+        With an instance number also which process it is, of which version, where, and a robot's profile.
         """
         self._roles.add(role)
         keys = [self._alive_key(role)]
         if instance:
-            keys.append(present(self.robot, role, instance, endpoints).key)
-        self._declared.add(lambda s: [s.liveliness().declare_token(key) for key in keys])
+            keys.append(present(self.robot, role, instance, endpoints, profile).key)
+        self._declare(lambda s: [s.liveliness().declare_token(key) for key in keys])
 
     def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None]) -> None:
         """Call `on_change(presence, alive)` on the loop as processes of this robot's name come and go.
 
         Those already alive are reported at once, this session's own among them.
         """
-        watch_presence(self._declared, self._loop, self.robot, on_change)
+        self._declarations.append(watch_presence(self._declared, self._loop, self.robot, on_change))
 
     def counters(self) -> dict[str, TopicCounters]:
         """A copy of the counters, by topic name."""
@@ -193,6 +209,16 @@ class Link:
         self._closed = True
         for receiver in self._receivers:
             receiver.close()
+
+    def withdraw(self) -> None:
+        """Close the link for good while the session goes on: nothing of this robot crosses the line then."""
+        self.close()
+        for number in reversed(self._declarations):
+            self._declared.remove(number)
+        self._declarations.clear()
+
+    def _declare(self, declare: Declare) -> None:
+        self._declarations.append(self._declared.add(declare))
 
     def _own_key(self, topic: Topic) -> str:
         """The key on which this session sends. Raises ValueError for a topic that lacks the operator."""

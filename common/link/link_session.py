@@ -6,19 +6,24 @@ import asyncio
 import logging
 import re
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 
 import zenoh
 from zenoh.handlers import Callback
 
+from common.clock import monotonic_ns
 from common.errors import LinkError
 from common.link.declared import Declarations
-from common.link.inbox import wake
+from common.link.inbox import Inbox, wake
 from common.link.link import Link, Overheard
-from common.link.presence import watch_presence
+from common.link.presence import watch_operators, watch_presence
+from common.link.roster import MOST_ROBOTS, Roster
 from common.link.waiting import count_peers
-from common.wire.presence import ProcessPresence
-from common.wire.topics import Topic
+from common.metrics.link import TopicCounters
+from common.wire.instance import draw_instance
+from common.wire.presence import OperatorPresence, ProcessPresence, place
+from common.wire.topics import SUMMARY, Topic
+from common.wire.version import installed
 
 CLOSE_TIMEOUT_S = 1.0
 REOPEN_S = 0.5
@@ -70,6 +75,27 @@ class LinkSession:
     def watch_presence(self, on_change: Callable[[ProcessPresence, bool], None], robot: str = "*") -> None:
         """Call `on_change(presence, alive)` on the loop as processes come and go, of every robot's name."""
         watch_presence(self._declared, self._loop, robot, on_change)
+
+    def drop(self, robot: str) -> None:
+        """Close the link of that robot and withdraw all that it declared; `link` makes a new one."""
+        link = self._links.pop(robot, None)
+        if link is not None:
+            link.withdraw()
+
+    def watch_roster(self, roster: Roster) -> None:
+        """Keep a roster of the robots and operators that are there, wherever routers lead."""
+        watch_presence(
+            self._declared, self._loop, "*", lambda one, here: roster.on_presence(one, here, monotonic_ns())
+        )
+        watch_operators(self._declared, self._loop, roster.on_operator)
+        key = SUMMARY.key_for("*")
+        inbox = Inbox(key, roster.on_summary, self._loop, TopicCounters(), most_keys=MOST_ROBOTS)
+        self._declared.add(lambda s: s.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
+
+    def declare_operator(self, operator: str, endpoints: Sequence[str]) -> None:
+        """Show that this operator's master lives, until the session closes or dies."""
+        presence = OperatorPresence(operator, draw_instance(), installed("tandem"), place(endpoints))
+        self._declared.add(lambda s: s.liveliness().declare_token(presence.key))
 
     def watch_peers(self, on_change: Callable[[str, str, bool], None]) -> None:
         """Call `on_change(session_id, name, connected)` on the loop, for those already there at once.

@@ -16,7 +16,8 @@ class Mailbox(Generic[Value]):
     One sender's values never overwrite another's, so that a flood on one key does not silence the others.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most_keys: int = MOST_KEYS) -> None:
+        self._most_keys = most_keys
         self._lock = threading.Lock()
         self._slots: dict[str, Value] = {}
         self.overwritten = 0
@@ -29,7 +30,7 @@ class Mailbox(Generic[Value]):
             if key in self._slots:
                 self.overwritten += 1
                 del self._slots[key]  # the newest comes last
-            elif len(self._slots) >= MOST_KEYS:
+            elif len(self._slots) >= self._most_keys:
                 self.overwritten += 1
                 return False
             self._slots[key] = value

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from typing import TypeVar
 
 import zenoh
 from zenoh.handlers import Callback
 
 from common.link.declared import Declarations
 from common.link.inbox import wake
-from common.wire.presence import ProcessPresence, read_presence
+from common.wire.presence import (
+    OperatorPresence,
+    ProcessPresence,
+    operator_alive_key,
+    read_operator_presence,
+    read_presence,
+)
 from common.wire.topics import ALIVE
+
+Shown = TypeVar("Shown")
 
 
 def watch_presence(
@@ -19,16 +28,36 @@ def watch_presence(
     loop: asyncio.AbstractEventLoop,
     robot: str,
     on_change: Callable[[ProcessPresence, bool], None],
-) -> None:
+) -> int:
     """Call `on_change(presence, alive)` on the loop; those already there at once. `robot` may be `*`.
 
-    A key that is no token of tandem is ignored. In a new session all have gone first, and come anew.
+    A key that is no token of tandem is ignored. In a new session all have gone first, and come anew. Returns
+    the declaration's number.
     """
-    here: dict[str, ProcessPresence] = {}
+    return _watch(declared, loop, f"{ALIVE.key_for(robot)}/**", read_presence, on_change)
+
+
+def watch_operators(
+    declared: Declarations,
+    loop: asyncio.AbstractEventLoop,
+    on_change: Callable[[OperatorPresence, bool], None],
+) -> int:
+    """As `watch_presence`, of the masters of all operators."""
+    return _watch(declared, loop, f"{operator_alive_key('*')}/**", read_operator_presence, on_change)
+
+
+def _watch(
+    declared: Declarations,
+    loop: asyncio.AbstractEventLoop,
+    keys: str,
+    read: Callable[[str], Shown | None],
+    on_change: Callable[[Shown, bool], None],
+) -> int:
+    here: dict[str, Shown] = {}
 
     def on_sample(sample: zenoh.Sample) -> None:
         key, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-        presence = read_presence(key)
+        presence = read(key)
         if presence is None:
             return
         if alive:
@@ -42,7 +71,7 @@ def watch_presence(
             wake(loop, on_change, presence, False)
         here.clear()
         return session.liveliness().declare_subscriber(
-            f"{ALIVE.key_for(robot)}/**", Callback(on_sample, indirect=False), history=True
+            keys, Callback(on_sample, indirect=False), history=True
         )
 
-    declared.add(declare)
+    return declared.add(declare)

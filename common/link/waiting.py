@@ -41,7 +41,7 @@ async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: floa
             querier = session.declare_querier(key, allowed_destination=zenoh.Locality.REMOTE)
             try:
                 querier.declare_matching_listener(handler)
-                while not _matching(querier):
+                while not is_matching(querier.matching_status):
                     there.clear()
                     await there.wait()
             finally:
@@ -51,7 +51,7 @@ async def wait_for_peer(session: zenoh.Session, key: str | None, timeout_s: floa
         raise LinkTimeoutError(f"no link to {what} within {timeout_s:g} s") from None
 
 
-def _matching(querier: zenoh.Querier) -> bool:
+def is_matching(status: object) -> bool:
+    """Whether a publisher has subscribers, or a querier somebody who answers."""
     # declared as a flag, but an object that holds one comes
-    status = querier.matching_status
     return bool(getattr(status, "matching", status))

@@ -12,7 +12,9 @@ from common.wire.presence import several_bear
 from common.wire.stop import pack_stop, read_stop_answer
 from common.wire.topics import CONTROL, STOP, Topic
 
-CHALLENGED = frozenset({Action.ENGAGE, Action.RESET, Action.HOME, Action.TAKE_UP, Action.HANDOVER})
+CHALLENGED = frozenset(
+    {Action.ENGAGE, Action.RESET, Action.HOME, Action.TAKE_UP, Action.HANDOVER, Action.TAKE}
+)
 """Requests that must not take effect late. To stop, claim, release or ask is harmless at any time."""
 OPEN = frozenset({Action.ESTOP, Action.STATUS})
 """Requests allowed to every host with a certificate; all others are for the robot's operators."""

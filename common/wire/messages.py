@@ -148,6 +148,8 @@ class Action(StrEnum):
     """Another robot of this name answers too: its holder of the lease says so, and the robot holds."""
     HOME = "home"
     """Confirm, with the key, that the robot stands as it says, where nothing else can."""
+    TAKE = "take"
+    """The operator's own master shall claim the robot. Nothing moves before an engage."""
     HANDOVER = "handover"
     """The holder of the lease offers it to another operator; the robot holds."""
     REST = "rest"
@@ -165,7 +167,8 @@ class ControlRequest:
     operator: str
     """Who asks; `engage` and `disengage` are for the lease holder's name only."""
     key: str = ""
-    """The reset key, for `reset` and `home`; where the other is, for `namesake`; to whom, for `handover`."""
+    """The reset key, for `reset` and `home`; where the other is, for `namesake`; to whom, for `handover`;
+    `together` for an `engage` that shall move this robot beside others (`common.wire.together`)."""
     clock: int = 0
     """For `claim`: the asker of the clock queries that measure the clock of this master's stamps."""
     challenge: int = 0

@@ -71,15 +71,22 @@ CLOCK = Topic("clock", "tandem/{robot}/clock", 4.0, 1.0, Priority.REAL_TIME, Tru
 PATH = Topic("path", "tandem/{robot}/path", 0.0, 1.0, Priority.DATA_LOW, True, True, True)
 """Questions of any size, answered by any size (`common.wire.path_probe`): which does the way carry?"""
 STATISTICS = Topic("statistics", "tandem/{robot}/statistics", 1.0, 5.0, Priority.DATA_LOW, False, True, False)
+SUMMARY = Topic("summary", "tandem/{robot}/summary", 1.0, 3.0, Priority.DATA_LOW, False, True, False)
+"""`common.wire.summary`: what a list of robots shows. Who commands or opens a robot hears its state too."""
+CALL = Topic("call", "tandem/{robot}/call", 0.0, 1.0, Priority.DATA, True, True, True)
+"""A person at the robot asks for an operator, or does not need one any more (`common.wire.call`)."""
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
 VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUND, False, True, False)
 TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
 FAULTS = Topic("faults", "tandem/{robot}/test/faults", 0.0, 1.0, Priority.DATA, True, True, False)
 
 TOPICS = {
-    t.name: t for t in (COMMAND, STATE, CONTROL, STOP, CLOCK, PATH, STATISTICS, ALIVE, VIDEO, TRUTH, FAULTS)
-}
-QUESTIONS = (CONTROL.name, STOP.name, CLOCK.name, PATH.name, FAULTS.name)
+    t.name: t
+    for t in (
+        COMMAND, STATE, CONTROL, STOP, CLOCK, PATH, STATISTICS, SUMMARY, CALL, ALIVE, VIDEO, TRUTH, FAULTS,
+    )
+}  # fmt: skip
+QUESTIONS = (CONTROL.name, STOP.name, CLOCK.name, PATH.name, CALL.name, FAULTS.name)
 """Topics that are asked and answered; all others are published."""
 
 VIDEO_NAME = r"^[A-Za-z0-9_-]{1,32}$"

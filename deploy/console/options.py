@@ -9,15 +9,13 @@ from pathlib import Path
 from common.config.console import ConsoleConfig
 from common.config.load import check_config, load_config
 from common.errors import TandemError
-from common.link.config import LinkConfig
 from common.skeleton import load_skeleton
-from deploy.client.destination import Destination, destination
+from deploy.client.destination import destination
+from deploy.client.own_door import own_doors
 from deploy.console.model.robot import Side
 from deploy.console.run import ConsoleOptions
 from master.config import MasterConfig
 from master.deadman.config import ConsoleHold
-
-_EVERYWHERE = {"0.0.0.0": "127.0.0.1", "[::]": "[::1]", "*": "127.0.0.1"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,24 +84,15 @@ def _at_the_robot(chosen: ConsoleChoices) -> ConsoleOptions:
 
     assert chosen.slave is not None
     file = load_config(chosen.slave, SlaveConfig, chosen.overrides)
-    kept = file.link.model_dump(exclude={"listen", "access", "revoked"})
-    doors = file.link.connect if file.link.mode == "client" else map(_own_door, file.link.listen)
-    link = check_config(chosen.slave, {**kept, "connect": list(doors)}, LinkConfig)
+    where = own_doors(chosen.slave, file.link, file.robot, chosen.operator)
     tap = chosen.tap or file.tap.socket
-    if tap is None and not link.connect:
+    if tap is None and not where.link.connect:
         raise TandemError(f"{chosen.slave}: name [tap] socket, so that the console can hear the robot")
     return ConsoleOptions(
-        Destination(link, (file.robot,), chosen.operator, chosen.operator),
+        where,
         file.skeleton,
         file.console,
         side=Side.ROBOT,
         tap=tap,
         zones=[zone.model_dump() for zone in file.guard.zones],
     )
-
-
-def _own_door(endpoint: str) -> str:
-    """Where this host itself reaches what listens at an endpoint."""
-    transport, _, address = endpoint.partition("/")
-    host, colon, port = address.rpartition(":")
-    return f"{transport}/{_EVERYWHERE.get(host, host)}{colon}{port}"

@@ -16,6 +16,7 @@ from common.link.roles import Role
 from common.skeleton import load_skeleton
 from common.wire.control import ask_control, topic_for
 from common.wire.messages import Action, ControlReply, ControlRequest
+from common.wire.together import TOGETHER
 from deploy.examples.profiles import NURSING, example
 from deploy.harness.child import Child
 from deploy.harness.endpoints import Endpoints, local_endpoints, network_endpoints
@@ -140,6 +141,8 @@ class Rig:
     ) -> ControlReply:
         """Ask a robot."""
         link = self.link(robot)
+        if action is Action.ENGAGE and len(self.slaves) > 1:
+            key = key or TOGETHER
         request = ControlRequest(robot, action, operator, key)
         return await ask_control(lambda payload: link.ask(topic_for(action, operator), payload), request)
 

@@ -7,8 +7,8 @@ import typer
 PANELS = {
     "Run": ("demo", "master", "slave", "console", "suit", "router", "drives"),
     "People": (
-        "engage", "handover", "disengage", "rest", "take-up", "estop", "reset", "home", "status", "attitude",
-        "video", "ros",
+        "robots", "take", "engage", "disengage", "let-go", "handover", "rest", "take-up", "estop", "reset",
+        "home", "status", "call", "attitude", "video", "ros",
     ),
     "Set up": (
         "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record",

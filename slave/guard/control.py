@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 
 from common.wire.messages import Action, ControlReply, ControlRequest
+from common.wire.together import TOGETHER
 from slave.guard.admit import revocation
 from slave.guard.challenge import Challenges
 from slave.guard.engage import holder_only
@@ -48,7 +49,15 @@ class Control:
             case Action.RELEASE:
                 why, done = holder_only(operator, guard.operator), "the lease is free"
                 if why is None:
+                    guard.lease.let_go_by = operator
                     guard.release(now_ns, f"{operator} released the lease")
+            case Action.TAKE:
+                why = self._late(request, now_ns) or _not_free(guard, operator)
+                if why is None and guard.operator != operator:
+                    guard.lease.want(operator, now_ns)
+                done = f"the master of {operator} may claim it; then {operator} engages"
+                if guard.operator == operator:
+                    done = f"{operator} commands it already"
             case Action.DISENGAGE:
                 why = holder_only(operator, guard.operator)
                 if why is None:
@@ -61,7 +70,8 @@ class Control:
                     guard.offer(request.key, now_ns)
                 done = f"holds; {request.key} may take over now, or {operator} engages again"
             case Action.ENGAGE:
-                why = self._late(request, now_ns) or guard.engage(operator, now_ns)
+                why = self._late(request, now_ns)
+                why = why or guard.engage(operator, now_ns, request.key == TOGETHER)
                 done = "moves slowly to the operator's posture" + guard.resting.words
             case Action.REST:
                 why = holder_only(operator, guard.operator) or guard.resting.rest(request.groups)
@@ -118,6 +128,16 @@ def not_on_own_key(named: str, sender: str | None) -> str | None:
     if named == sender:
         return None
     return f"the request is in the name of {named or 'nobody'}, but came from {sender or 'nobody'}"
+
+
+def _not_free(guard: Guard, operator: str) -> str | None:
+    """Why an operator's master could not claim the robot, or None."""
+    if not operator:
+        return "an operator needs a name"
+    lease = guard.lease
+    if guard.operator in ("", operator) or lease.offered_to == operator:
+        return None
+    return f"{guard.operator} holds the lease: ask for a hand-over (tandem handover --to {operator})"
 
 
 def _claim(guard: Guard, operator: str, now_ns: int) -> ControlReply:

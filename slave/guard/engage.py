@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from common.wire.together import only_beside
 from slave.guard.admit import CommandGate
 from slave.guard.joints import JointReadings
 from slave.guard.states import MOVING, State
@@ -30,6 +31,8 @@ class Readiness:
     """The last accepted command."""
     joints: JointReadings
     """Where the joints are, and are held."""
+    together: bool = False
+    """Whether the operator means to move this robot beside others."""
 
 
 Condition = Callable[[Readiness], str | None]
@@ -61,7 +64,8 @@ def _command(at: Readiness) -> str | None:
 
 
 def _operator_side(at: Readiness) -> str | None:
-    return at.commands.operator_doubt or None
+    doubt = at.commands.operator_doubt
+    return None if at.together and only_beside(doubt) else doubt or None
 
 
 def _clutch(at: Readiness) -> str | None:

@@ -234,9 +234,9 @@ class Guard:
         self.lease.drop()
         self._change(now_ns, GuardEvent.LOSS, reason)
 
-    def engage(self, operator: str, now_ns: int) -> str | None:
-        """Begin to move to the operator's posture; or why not."""
-        why = self._refusal(operator, self.state, now_ns)
+    def engage(self, operator: str, now_ns: int, together: bool = False) -> str | None:
+        """Begin to move to the operator's posture; or why not. `together`: on purpose beside others."""
+        why = self._refusal(operator, self.state, now_ns, together)
         if why is None:
             self._joints.plausible.trust()
             self._progress.begin(now_ns)
@@ -296,13 +296,14 @@ class Guard:
             self._progress.begin(now_ns)
             self._change(now_ns, GuardEvent.CLUTCH_IN, f"clutch pressed by {self.operator}")
 
-    def _refusal(self, operator: str, state: State, now_ns: int) -> str | None:
+    def _refusal(self, operator: str, state: State, now_ns: int, together: bool = False) -> str | None:
         """Why the robot may not begin to move for this operator, were it in that state; None where it may."""
         arrival = first_loss(self._arrival_watches, self._signs(now_ns))
         return refusal(
             Readiness(
                 state, self.reason, operator, self.operator, arrival[1] if arrival else None,
                 self._joints.life.silence(now_ns), self._body.first_fault, self._commands, self._joints,
+                together,
             )
         )  # fmt: skip
 

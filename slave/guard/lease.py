@@ -5,10 +5,12 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 
-from common.clock import NS_PER_S, to_s
+from common.clock import NS_PER_S, to_ns, to_s
 from common.metrics.slave import LeaseMetrics
 from common.wire.lease import lease_id
 
+WANTED_S = 10.0
+"""For so long an operator's wish to command the robot counts. The operator's master claims it at once."""
 DrawToken = Callable[[], int]
 """Draws a new unpredictable token, 1 to 2⁶³ - 1. Tests pass a counter."""
 
@@ -35,6 +37,10 @@ class Lease:
         """The holder's name; empty: none."""
         self.token = 0
         """The holder's token; 0: none."""
+        self.let_go_by = ""
+        """Who gave it back last; empty once it was claimed again."""
+        self._wanted_by = ""
+        self._wanted_ns = 0
 
     def claim(self, operator: str, now_ns: int) -> int:
         """The new token, or 0 if an operator, even of the same name, holds a lease and does not offer it.
@@ -46,6 +52,7 @@ class Lease:
         if not operator or (self.token and operator != self.offered_to):
             return 0
         self.drop()
+        self.let_go_by = self._wanted_by = ""
         self.operator, self.token = operator, self._draw_token()
         self._granted_ns = self._renewed_ns = now_ns
         return self.token
@@ -68,6 +75,14 @@ class Lease:
     def drop(self) -> None:
         """End the lease, and with it an offer."""
         self.operator, self.token, self.offered_to = "", 0, ""
+
+    def want(self, operator: str, now_ns: int) -> None:
+        """An operator asks that the own master claim it. It gives no right, and lapses after WANTED_S."""
+        self._wanted_by, self._wanted_ns = operator, now_ns
+
+    def wanted_by(self, now_ns: int) -> str:
+        """Who has asked for it lately; empty: nobody."""
+        return self._wanted_by if 0 <= now_ns - self._wanted_ns <= to_ns(WANTED_S) else ""
 
     def offer(self, operator: str, now_ns: int) -> None:
         """Offer it to another operator, in place of an earlier offer. Until it is taken its holder has it."""

@@ -41,7 +41,7 @@ IMPURE = [
     "common/link/*", "common/tap/*", "common/log/handler.py", "common/log/streams.py",
     "common/process/*", "common/recording/recorder.py",
     "master/__main__.py", "master/app.py", "master/deadman/switches.py",
-    "master/deadman/hold_socket.py", "master/robot.py",
+    "master/deadman/hold_socket.py", "master/fleet.py", "master/robot.py",
     "master/alarms/player.py", "master/journal/tap.py",
     "slave/__main__.py", "slave/app.py", "slave/attitude/port.py", "slave/camera/*", "slave/servos/*",
     "slave/stop_inputs/gpio.py",

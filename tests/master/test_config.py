@@ -31,6 +31,13 @@ def test_robots_are_named_in_a_list_or_one_alone() -> None:
     assert load_config(EXAMPLE, MasterConfig, ["robots=[]", "robot='b'"]).commanded == ["b"]
 
 
+def test_robots_of_a_pattern_are_watched() -> None:
+    everybody = load_config(EXAMPLE, MasterConfig, ["robots='*'"])
+    assert (everybody.commanded, everybody.watched) == ([], ["*"])
+    some = load_config(EXAMPLE, MasterConfig, ["robots=['a', 'ward-*']"])
+    assert (some.commanded, some.watched) == (["a"], ["ward-*"])
+
+
 @pytest.mark.parametrize(
     ("override", "expected"),
     [

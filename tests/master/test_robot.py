@@ -118,7 +118,7 @@ def master_of(**links: FakeLink) -> Master:
 
 async def served(master: Master, until: Callable[[], bool]) -> None:
     """Run the robots' parts of a master, without its buses, until something is so."""
-    tasks = [asyncio.create_task(master._serve(robot)) for robot in master._robots]
+    tasks = [asyncio.create_task(master._fleet._serve(robot)) for robot in master._fleet]
     try:
         async with asyncio.timeout(10.0):
             while not until():  # noqa: ASYNC110
@@ -161,7 +161,7 @@ def test_what_fails_unforeseen_at_one_robot_ends_that_one_alone(fails: type[Exce
 
     def until() -> bool:
         links["a"].state(monotonic_ns())
-        return bool(links["a"].asked) and master._given_up == {"b"}
+        return bool(links["a"].asked) and master._fleet._given_up == {"b"}
 
     asyncio.run(served(master, until))
     master._send(solved())
@@ -172,7 +172,7 @@ def test_what_fails_unforeseen_at_one_robot_ends_that_one_alone(fails: type[Exce
 def test_a_master_with_no_robot_left_ends() -> None:
     master = master_of(a=FakeLink(fails=ValueError))
     with pytest.raises(ExceptionGroup):
-        asyncio.run(served(master, lambda: bool(master._given_up)))
+        asyncio.run(served(master, lambda: bool(master._fleet._given_up)))
 
 
 def test_a_state_that_is_garbage_is_counted_at_its_robot() -> None:
@@ -214,7 +214,7 @@ def test_while_two_bear_the_name_both_are_told_and_neither_is_claimed() -> None:
     assert link.asked == []
     assert {request.action for request in link.told} == {Action.NAMESAKE}
     assert "room 1 (instance 00000001) and room 2 (instance 00000002)" in link.told[0].key
-    (robot,) = master._robots
+    (robot,) = master._fleet
     assert "2 robots have the name a" in robot.standing
 
 

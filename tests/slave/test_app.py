@@ -71,7 +71,7 @@ def test_a_loop_that_misses_every_second_tick_still_sends_the_state(
     servos: Any = StillServos()
     config = SlaveConfig(robot="robot-1", link=LinkConfig(listen=["tcp/127.0.0.1:7447"]))
     asyncio.run(app.Slave(config, link, servos)._drive())
-    assert link.put == {"state": 40 // config.loop.state_every}
+    assert link.put == {"state": 40 // config.loop.state_every, "summary": 1}
 
 
 def test_a_button_that_is_pressed_at_the_start_stops_the_drives_in_the_first_tick(

@@ -15,6 +15,7 @@ from common.errors import LinkError, TandemError
 from common.metrics.tree import to_tree
 from common.process.runtime import run as run_until_stopped
 from common.wire.messages import Action
+from common.wire.together import TOGETHER
 from deploy.client.certificate import Certificate
 from deploy.client.destination import Destination, destination
 from deploy.ops.control.printer import PrintLine, line_printer
@@ -40,12 +41,23 @@ def engage(
     operator: Operator = "",
     master: MasterFile = None,
     certificate: Certificate = None,
+    together: Annotated[
+        bool,
+        typer.Option("--together", help="Move several robots at once, on purpose."),
+    ] = False,
 ) -> None:
-    """Let robots follow the operator: each moves slowly to the operator's posture, then tracks it.
+    """Let a robot follow the operator: it moves slowly to the operator's posture, then tracks it.
+
+    Several robots at once only with --together: each makes every motion of the operator.
 
     Example: `tandem engage --connect tcp/192.168.7.2:7447 --robot robot-1 --operator nurse-1`
     """
-    _act(Action.ENGAGE, _holder(connect, robot, operator, master, certificate))
+    where = _holder(connect, robot, operator, master, certificate)
+    if len(where.robots) > 1 and not together:
+        raise TandemError(
+            f"{', '.join(where.robots)}: name one robot by --robot, or move them all at once by --together"
+        )
+    _act(Action.ENGAGE, where, TOGETHER if together else "")
 
 
 def disengage(
@@ -96,6 +108,38 @@ def take_up(
     Example: `tandem take-up left_arm --master /etc/tandem/master.toml`
     """
     _act(Action.TAKE_UP, _holder(connect, robot, operator, master, certificate), groups=groups)
+
+
+def take(
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """Take robots that your master watches: it claims them. Nothing moves before you engage.
+
+    This answers a robot's call. A robot that another operator commands is handed over by `tandem handover`.
+
+    Example: `tandem take --robot robot-17 --master /etc/tandem/operator.toml`
+    """
+    _act(Action.TAKE, _holder(connect, robot, operator, master, certificate))
+
+
+def let_go(
+    connect: Connect = None,
+    robot: Robot = None,
+    operator: Operator = "",
+    master: MasterFile = None,
+    certificate: Certificate = None,
+) -> None:
+    """Give back robots that you took: each holds, and your master only watches it from then on.
+
+    A robot that the master's file names, rather than a pattern, is claimed again at once.
+
+    Example: `tandem let-go --robot robot-17 --master /etc/tandem/operator.toml`
+    """
+    _act(Action.RELEASE, _holder(connect, robot, operator, master, certificate))
 
 
 def handover(
@@ -236,6 +280,8 @@ def status(
 COMMANDS: Sequence[Callable[..., None]] = (
     engage,
     disengage,
+    take,
+    let_go,
     handover,
     rest,
     take_up,

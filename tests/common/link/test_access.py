@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import zenoh
 
-from common.link.access import AccessControl, access_control, named
+from common.link.access import AccessControl, access_control, named, operators_of
 from common.link.config import AccessConfig
 from common.wire.presence import ProcessPresence
 
@@ -71,6 +71,17 @@ def test_the_table(who: str, robot: str) -> None:
     assert may(who, "liveliness_token", f"{key}/alive/slave") == (itself or router)
     assert may(who, "liveliness_token", f"{key}/alive/master") == (operator or router)
     assert may(who, "declare_liveliness_subscriber", "tandem/*/alive/slave") == (who in EVERYBODY)
+    assert may(who, "declare_subscriber", "tandem/*/summary") == (who in EVERYBODY)
+    assert may(who, "put", f"{key}/summary") == (itself or router)
+    assert may(who, "put", f"{key}/summary", "egress") == (operator or observer or router), (
+        "a list hears of its own robots alone"
+    )
+    assert may(who, "query", f"{key}/call") == (itself or router)
+    assert may(who, "declare_queryable", f"{key}/call") == (itself or router)
+    for name in ("anna", "ben"):
+        shown = f"tandem/-/operator/{name}/alive/1/4-1/here"
+        assert may(who, "liveliness_token", shown) == (who == f"operator:{name}" or router)
+        assert may(who, "liveliness_token", shown, "egress") == (who in EVERYBODY)
     assert not may(who, "declare_subscriber", "tandem/**") or router
     assert not may(who, "put", f"{key}/operator/{own or 'anna'}/control") or router
     assert not may(who, "put", f"{key}/command") or router, "the key of versions before 4"
@@ -93,3 +104,21 @@ def test_each_shows_itself_in_both_forms_and_everybody_may_see_it() -> None:
     for who in EVERYBODY:
         assert may(who, "declare_liveliness_subscriber", "tandem/*/alive/**")
         assert may(who, "liveliness_token", ProcessPresence("r1", "slave", 7, 3, "1.0", "host").key, "egress")
+
+
+def test_a_pattern_stands_for_the_listed_robots() -> None:
+    access = AccessConfig(robots=["ward-1", "ward-2", "home-1"], operators={"anna": ["ward-*"], "ben": ["*"]})
+    rules = access_control(access)
+    for robot, by in (("ward-1", {"anna", "ben"}), ("ward-2", {"anna", "ben"}), ("home-1", {"ben"})):
+        assert may(f"robot:{robot}", "put", f"tandem/{robot}/state", table=rules)
+        for name in ("anna", "ben"):
+            key = f"tandem/{robot}/operator/{name}/command"
+            assert may(f"operator:{name}", "put", key, table=rules) == (name in by)
+    assert not may("operator:ben", "put", "tandem/other/operator/ben/command", table=rules)
+    assert operators_of(access, "ward-2") == {"anna", "ben"}
+    assert access.mistakes() == []
+
+
+def test_a_pattern_of_no_listed_robot_is_a_mistake() -> None:
+    (mistake,) = AccessConfig(robots=["home-1"], operators={"anna": ["ward-*", "home-*"]}).mistakes()
+    assert (mistake.key, mistake.value) == ("link.access.operators.anna", "ward-*")

@@ -66,7 +66,7 @@ def test_every_robot_that_somebody_has_to_do_with_is_known(tmp_path: Path) -> No
     text = TLS + '[link.access]\noperators = { a = ["r1", "r2"], b = ["r2"] }\nviewers = { c = ["r3"] }'
     access = link(tmp_path, text).access
     assert access is not None
-    assert access.robots == ["r1", "r2", "r3"]
+    assert access.all_robots == ["r1", "r2", "r3"]
 
 
 def test_a_topic_travels_as_the_file_says_and_else_as_the_table_does(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def _rules(needs: Needs, own: str) -> Finding:
 
 
 def _operators(access: AccessConfig, robot: str) -> list[str]:
-    return [f"{Role.OPERATOR}:{name}" for name, robots in access.operators.items() if robot in robots]
+    return [f"{Role.OPERATOR}:{name}" for name in access.names(access.operators, robot)]
 
 
 def _list(own: str, revoked: RevocationFacts | None) -> Finding:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from common.inputs.key_state import DOWN, UP, KeyState
-from master.comfort.pressed import PressedKey
+from common.inputs.pressed import PressedKey
 
 
 class Pedal:
