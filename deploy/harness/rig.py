@@ -29,6 +29,8 @@ ROBOT, OPERATOR = "robot-1", "nurse-1"
 ROLES = ("slave", "suit", "master")
 ROUTER = "router"
 """The role of the router, of a run whose processes reach each other through one."""
+RECORD = "record"
+"""The role of a recorder beside a process of the run."""
 DRIVES = "drives"
 """The role of the simulated drives, of a run whose overrides name them."""
 
@@ -162,8 +164,12 @@ class Rig:
             await at_most(self.observer.news(), 0.25)
 
     async def stop(self) -> dict[str, int | None]:
-        """Stop all, the master first, so that the robot holds by itself; their exit statuses."""
-        first = ("master", "suit", *self.slaves)
+        """Stop all, the master before the robot, which then holds by itself; their exit statuses.
+
+        The recorders come first: one whose process ends would end by itself meanwhile.
+        """
+        recorders = [child.name for child in self.children.values() if child.role == RECORD]
+        first = (*recorders, "master", "suit", *self.slaves)
         others = [name for name in self.children if name not in (*first, ROUTER)]
         last = [ROUTER] if ROUTER in self.children else []
         return {name: await self.children[name].stop() for name in (*first, *others, *last)}

@@ -71,6 +71,14 @@ Keep = Annotated[
     bool, typer.Option("--keep", help="Go on until Ctrl-C, for the web page: nothing is judged then.")
 ]
 
+RecordFolder = Annotated[
+    Path | None,
+    typer.Option(
+        help="Record master and robot into this folder, for tandem replay, inspect and export.",
+        file_okay=False,
+    ),
+]
+
 
 def demo(
     seconds: Seconds = 20.0,
@@ -88,6 +96,7 @@ def demo(
     console_: WithConsole = True,
     listen: Listen = None,
     keep: Keep = False,
+    record: RecordFolder = None,
     plots: PlotsFile = None,
 ) -> None:
     """Run simulated suit, master and robot on this machine, and judge how well the robot follows.
@@ -105,6 +114,7 @@ def demo(
         profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
         strategy=strategy, filter=filter_, seed=seed, robots=robots, servos=servos, camera=camera,
         console=console_ and find_spec("aiohttp") is not None, listen=listen, keep=keep,
+        record=record,
     )  # fmt: skip
 
     async def run_and_report(stop: asyncio.Event) -> None:

@@ -18,6 +18,8 @@ from slave.config import SlaveConfig
 
 HOME_KEY = "demo-posture"
 """The reset key of a demo's robot whose posture a person has to confirm."""
+RECORDED = ("master", "slave")
+"""The processes whose taps are recorded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,8 @@ class DemoOptions:
     """Where it serves its page; None: at its usual port if that is free, else at any."""
     keep: bool = False
     """Whether all goes on until Ctrl-C; nothing is judged then."""
+    record: Path | None = None
+    """The folder into which master and first robot are recorded; None: they are not."""
 
     def overrides(self) -> dict[str, list[str]]:
         """What it changes in the processes' files."""
@@ -89,12 +93,21 @@ class DemoOptions:
 
     def check(self) -> None:
         """Read the files as the processes will. Raises TandemError for what cannot be run."""
-        if self.robots > 1 and (self.replay is not None or self.servos != "mujoco"):
-            expected = "the simulated operator and MuJoCo: omit --replay and --servos"
+        if self.robots > 1 and (self.replay or self.record or self.servos != "mujoco"):
+            expected = "the simulated operator and MuJoCo, unrecorded: omit --replay, --record and --servos"
             raise TandemError(f"--robots {self.robots}: several robots need {expected}")
+        taken = self.recordings_there()
+        if taken:
+            expected = "a folder without recordings of an earlier demo"
+            raise TandemError(f"--record {self.record}: {taken[0].name} is there; expected {expected}")
         overrides = self.overrides()
         for role, model in (("suit", SuitConfig), ("slave", SlaveConfig), ("master", MasterConfig)):
             load_config(example(role, self.profile), model, overrides[role])
+
+    def recordings_there(self) -> list[Path]:
+        """What a recording of this demo would overwrite."""
+        files = [] if self.record is None else [self.record / f"{name}.mcap" for name in RECORDED]
+        return [file for file in files if file.exists()]
 
     def tree(self) -> dict[str, object]:
         """A report's `options`."""

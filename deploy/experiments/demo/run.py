@@ -15,12 +15,13 @@ from common.errors import TandemError
 from common.skeleton import load_skeleton
 from deploy.experiments.demo.alignment import align
 from deploy.experiments.demo.operators import DemoOperators
-from deploy.experiments.demo.options import DemoOptions
+from deploy.experiments.demo.options import RECORDED, DemoOptions
 from deploy.experiments.demo.report import DemoReport, RunNotes, make_report
 from deploy.experiments.demo.view import draw
 from deploy.harness.console import ConsoleChild
 from deploy.harness.engage import until_tracking
 from deploy.harness.host import HostWatch, watch_host
+from deploy.harness.recorders import start_recorders
 from deploy.harness.rig import Rig, open_rig
 from deploy.harness.start import start_all
 
@@ -79,9 +80,7 @@ async def _started(
     if options.replay is not None:
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-alignment-"))
         overrides["master"] += await _align(options, options.replay, Path(folder), console)
-    if options.console:
-        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-tap-"))
-        overrides["master"] += [f'tap.socket="{folder}/master.sock"']
+    taps = _taps(options, overrides, stack)
     host = await stack.enter_async_context(watch_host())
     rigging = open_rig(
         options.transport, overrides, options.profile, options.robots, options=options.command_options()
@@ -91,12 +90,28 @@ async def _started(
     show = _Show(rig, host, stop, live)
     start_s = START_S + START_EACH_S * options.robots
     await start_all(rig, start_s, show.look, home_key=options.home_key)
+    if options.record is not None:
+        options.record.mkdir(parents=True, exist_ok=True)
+        for file in await start_recorders(rig, taps, options.record):
+            console.print(f"recorded into {file}", highlight=False, soft_wrap=True)
     if options.console:
         page = ConsoleChild(rig)
         await page.start(options.listen)
         for line in (f"web page: {page.operator_address}", f"for engineers: {page.engineer_address}"):
             console.print(line, style="bold", highlight=False, soft_wrap=True)
     return host, rig, show
+
+
+def _taps(options: DemoOptions, overrides: dict[str, list[str]], stack: AsyncExitStack) -> dict[str, Path]:
+    """Where each process hands on what it does, by name: only where a page or a recorder reads it."""
+    read = RECORDED if options.record is not None else ("master",) if options.console else ()
+    if not read:
+        return {}
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tandem-tap-")))
+    taps = {name: folder / f"{name}.sock" for name in read}
+    for name, tap in taps.items():
+        overrides[name] += [f'tap.socket="{tap}"']
+    return taps
 
 
 async def _story(options: DemoOptions, stop: asyncio.Event, console: Console) -> DemoReport:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
@@ -128,3 +129,12 @@ def test_several_robots_follow_the_simulated_operator_only() -> None:
     assert 'camera.source="robot"' in DemoOptions().overrides()["slave"]
     with pytest.raises(TandemError, match="--robots 2: several robots need the simulated operator"):
         DemoOptions(robots=2, servos="canopen").check()
+    with pytest.raises(TandemError, match="omit --replay, --record and --servos"):
+        DemoOptions(robots=2, record=Path("first-run")).check()
+
+
+def test_a_demo_does_not_write_over_an_earlier_ones_recordings(tmp_path: Path) -> None:
+    DemoOptions(record=tmp_path).check()
+    (tmp_path / "slave.mcap").touch()
+    with pytest.raises(TandemError, match=r"slave\.mcap is there; expected a folder without recordings"):
+        DemoOptions(record=tmp_path).check()
