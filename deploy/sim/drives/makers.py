@@ -36,8 +36,9 @@ def _mapped(index: int, cob_id: int, *entries: int) -> dict[tuple[int, int], int
 def epos(node_id: int) -> Traits:
     """In the manner of maxon EPOS4: modes 1, 3, 6, 8, 9, 10; no time of the following error, no 1006h."""
     return Traits(
-        lacks=_OF_TANDEM | GUARDING | INTERPOLATED | {0x1006, 0x6066, 0x6078, 0x607E},
+        lacks=_OF_TANDEM | GUARDING | INTERPOLATED | {0x1006, 0x1019, 0x6066, 0x6078, 0x607E},
         presets=_presets(0x0002_0192, 0xFB, 0x6050_0000, 0x3A5),
+        always_set=1 << 15,  # "position referenced to home position"
     )
 
 
@@ -64,7 +65,7 @@ def interpolating(node_id: int) -> Traits:
 def fixed(node_id: int) -> Traits:
     """With the static mapping of CiA DSP 402, as ERL's PCS drives: PDO 3 has target and position.
 
-    An older firmware, without 6502h, 607Dh, 6085h and torque.
+    An older firmware, without 6502h, 607Dh, 6085h and torque. A tool has stored a time-out of its RPDO.
     """
     parameters = {
         **_mapped(0x1400, 0x200 + node_id, _CONTROLWORD),
@@ -80,28 +81,33 @@ def fixed(node_id: int) -> Traits:
         lacks=_OF_TANDEM | GUARDING | INTERPOLATED
         | {0x1006, 0x6007, 0x6065, 0x6066, 0x607D, 0x607E, 0x6085, 0x60C2, 0x6076, 0x6077, 0x6078, 0x6502},
         read_only=frozenset(range(0x1600, 0x1604)) | frozenset(range(0x1A00, 0x1A04)),
-        presets={**_presets(0x0192, 0x2A, 0x64, None), **parameters},
+        presets={**_presets(0x0192, 0x2A, 0x64, None), **parameters, (0x1402, 5): 10},
         knows_16=False,
     )  # fmt: skip
 
 
 def segmented(node_id: int) -> Traits:
-    """Slow at SDO, and segmented however short the answer; modes 1 to 8; up three seconds late."""
+    """Slow at SDO, and segmented however short the answer; modes 1 to 8; up 3 s late, and says so twice."""
     return Traits(
         lacks=_OF_TANDEM | {0x1006, 0x605A, 0x6078},
         presets=_presets(0x0004_0192, 0x26C, 0x1, 0xEF),
         read_form=ReadForm.SEGMENTED,
         answers_after_ns=30 * NS_PER_MS,
         boots_after_ns=3000 * NS_PER_MS,
+        boots_again_after_ns=400 * NS_PER_MS,
     )
 
 
 def reserved_bits(node_id: int) -> Traits:
-    """Bits 8 and 9 of the statusword are reserved, as in Beckhoff's EL72x1; a type of 0; not homed."""
+    """Bits 8 and 9 of the statusword are reserved, as in Beckhoff's EL72x1; a type of 0; not homed.
+
+    Its makers' bits 14 and 15 are set, and another master has left it waiting for a SYNC with a counter.
+    """
     return Traits(
         lacks=_OF_TANDEM | GUARDING | INTERPOLATED | MORE_PDOS | {0x1006, 0x607D, 0x607E},
-        presets=_presets(0, 0x2, 0x1C20_3052, 0x780),
+        presets={**_presets(0, 0x2, 0x1C20_3052, 0x780), (0x1019, 0): 240},
         never_set=1 << 9,
+        always_set=3 << 14,
         homed=False,
     )
 

@@ -14,7 +14,7 @@ SAYS: Mapping[str, Mapping[str, object]] = {
     "epos": {},
     "interpolating": {"holds_itself": True},
     "fixed": {"holds_itself": True},
-    "segmented": {"holds_itself": True},
+    "segmented": {"holds_itself": True, "boots_twice": True},
     "reserved-bits": {"unused_status_bits": [9]},
 }
 """What a robot's file must say of each kind, in its drive's section."""

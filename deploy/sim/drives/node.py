@@ -16,14 +16,16 @@ from deploy.sim.drives.mapping import TAKEN, MappedPdos
 from deploy.sim.drives.server import ObjectServer
 from deploy.sim.drives.torque_off import DROPS, STO_EMERGENCY, inputs, without_torque
 from deploy.sim.drives.traits import Traits
-from deploy.sim.drives.watched import MasterWatch
+from deploy.sim.drives.watched import MasterWatch, RpdoTimers
 from deploy.sim.drives.wire import Send
 from slave.servos.canopen import pdo
 from slave.servos.canopen.cia402 import CYCLIC_SYNCHRONOUS_POSITION, INTERPOLATED_POSITION, Power
 from slave.servos.canopen.mapping import RPDOS, TPDOS
 from slave.servos.canopen.status_bits import FOLLOWS, LIMITED
 
-_PRESENT_STATE, _OUT_OF_RANGE = 0x0800_0022, 0x0609_0030
+_PRESENT_STATE, _OUT_OF_RANGE, _TOO_HIGH = 0x0800_0022, 0x0609_0030, 0x0609_0031
+_SYNC_LENGTH, _PDO_MISSED, _COMMUNICATION = 0x8240, 0x8250, 0x11
+"""Emergency codes of a SYNC without the counter asked for, and of an RPDO's event timer; the register."""
 _BOOT = 0x00
 _RESET_NODE, _RESET_COMMUNICATION = 0x81, 0x82
 _PROFILE_POSITION, _HOMING = 1, 6
@@ -75,6 +77,10 @@ class SimulatedDrive:
         # fetched where they are written, as they are needed hundreds of times a second
         self._beat_ns = self._mode = self._mode_after = 0
         self._controlword, self.torque_limits = 0, {}
+        self._counted_syncs = self.traits.presets.get((0x1019, 0), 0)
+        self._timers = RpdoTimers({index: self.traits.presets.get((index, 5), 0) for index in RPDOS})
+        self._booted_ns = self._now_ns
+        self._boots_again = self.traits.boots_again_after_ns > 0
         for index in (*RPDOS, *TPDOS):
             if (index + _MAPPINGS, 0) in self.traits.presets and index not in self.traits.lacks:
                 self._pdos.activate(index, self.value(index, 1))
@@ -102,7 +108,10 @@ class SimulatedDrive:
     def on_frame(self, frame_id: int, data: bytes, now_ns: int) -> None:
         """NMT, SDO, the targets, and the master's heartbeat."""
         self._now_ns = now_ns
-        if self._powered_ns is not None or self._pdos.take(frame_id, data):
+        if self._powered_ns is not None:
+            return
+        if self._pdos.take(frame_id, data):
+            self._timers.heard(now_ns)
             return
         if frame_id == pdo.NMT:
             self._on_nmt(data)
@@ -127,6 +136,9 @@ class SimulatedDrive:
         self._mode_after = max(0, self._mode_after - 1)
         if not self.server.operational:
             return
+        if self._counted_syncs:
+            self._emergency(_SYNC_LENGTH, _COMMUNICATION)
+            return
         taken = self._pdos.taken()
         if taken is None:
             self._emergency(0x8210, 0x11)
@@ -147,8 +159,14 @@ class SimulatedDrive:
         if self._powered_ns is not None:
             if now_ns - self._powered_ns < self.traits.boots_after_ns:
                 return
-            self._powered_ns = None
+            self._powered_ns, self._booted_ns = None, now_ns
             self._send(pdo.HEARTBEAT + self.id, bytes([_BOOT]))
+        if self._boots_again and now_ns - self._booted_ns >= self.traits.boots_again_after_ns:
+            self._boots_again = False
+            self._send(pdo.HEARTBEAT + self.id, bytes([_BOOT]))
+        if self._timers.expired(now_ns, self._pdos.on):
+            self._emergency(_PDO_MISSED, _COMMUNICATION)
+            self._lose_connection()
         self.server.release(now_ns)
         if self._beat_ns and now_ns - self._beaten_ns >= self._beat_ns:
             self._beaten_ns = now_ns
@@ -195,7 +213,7 @@ class SimulatedDrive:
             word = word & ~FOLLOWS | (FOLLOWS if self.traits.homed else 0)
         elif not self._interpolates:
             word &= ~FOLLOWS
-        return (word & ~clear | set_) & ~self.traits.never_set
+        return (word & ~clear | set_) & ~self.traits.never_set | self.traits.always_set
 
     @property
     def follows(self) -> bool:
@@ -298,6 +316,8 @@ class SimulatedDrive:
         if index in (*RPDOS, *TPDOS) and subindex == 1:
             self._pdos.activate(index, value)
             return
+        if index in RPDOS and subindex == 5:
+            self._timers.ms[index] = value
         if parameters in self.traits.fixed_ids:
             if subindex == 0:
                 self._pdos.activate(parameters, self.value(parameters, 1), value)
@@ -313,6 +333,10 @@ class SimulatedDrive:
                 self._master.guard_ns = value * NS_PER_MS
             case 0x100D:
                 self._master.life_factor = value
+            case 0x1019:
+                self._counted_syncs = value
+            case 0x60C2 if subindex == 1 and 0 < self.traits.longest_period_ms < value:
+                raise SdoAbortedError(_TOO_HIGH)
             case 0x6040:
                 self._command(value)
             case _ if index in _LIMITS:

@@ -14,7 +14,10 @@ _SEGMENT_BYTES = 7
 GUARDING = frozenset({0x100C, 0x100D})
 INTERPOLATED = frozenset({0x60C0, 0x60C1})
 MORE_PDOS = frozenset({0x1401, 0x1402, 0x1403, 0x1601, 0x1602, 0x1603, 0x1803, 0x1A03})
-NOT_TANDEMS = frozenset({0x1006, *GUARDING, *INTERPOLATED, *MORE_PDOS, 0x606C, 0x60FF}) - {0x1401, 0x1601}
+NOT_TANDEMS = frozenset({0x1006, 0x1019, *GUARDING, *INTERPOLATED, *MORE_PDOS, 0x606C, 0x60FF}) - {
+    0x1401,
+    0x1601,
+}
 """Objects of `drive.eds` that makers' drives have, and tandem's own does not."""
 
 
@@ -46,6 +49,12 @@ class Traits:
     """What entries hold after a start, by index and subindex."""
     never_set: int = 0
     """Bits of the statusword that it does not have."""
+    always_set: int = 0
+    """Bits of the statusword, such as a maker's own 14 and 15, that it always shows."""
+    boots_again_after_ns: int = 0
+    """How long after its boot-up message it sends a second one; 0: it sends one."""
+    longest_period_ms: int = 0
+    """The longest that 60C2h:1 takes; 0: any."""
     wide_period: bool = False
     """Whether 60C2h:1 has 16 bits."""
     boots_after_ns: int = 0

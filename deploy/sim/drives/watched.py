@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from common.clock import NS_PER_MS
@@ -46,3 +47,26 @@ class MasterWatch:
         if unasked:
             self._asked_ns = None
         return silent or unasked
+
+
+@dataclass(slots=True)
+class RpdoTimers:
+    """The event timers of a drive's RPDOs (1400h:5, …): it misses those that do not come in time."""
+
+    ms: dict[int, int]
+    """By the index of their communication parameters; 0: not watched for."""
+    _heard_ns: int | None = None
+
+    def heard(self, now_ns: int) -> None:
+        """An RPDO has come."""
+        self._heard_ns = now_ns
+
+    def expired(self, now_ns: int, on: Callable[[int], bool]) -> bool:
+        """Whether one that is on, and has come before, is overdue; told once."""
+        if self._heard_ns is None:
+            return False
+        late_ns = now_ns - self._heard_ns
+        late = any(ms and late_ns > ms * NS_PER_MS and on(index) for index, ms in self.ms.items())
+        if late:
+            self._heard_ns = None
+        return late

@@ -27,6 +27,7 @@ Until then it has also braked: "disable voltage" lets the joint go for some SYNC
 _WITHOUT_FAULT = (Power.SWITCH_ON_DISABLED, Power.READY, Power.SWITCHED_ON)
 _BOOTS_APART_NS = 1000 * NS_PER_MS
 """Two boot-ups of one id closer together are of two drives."""
+_BY_ITS_MANUAL = ", or it reports each start twice by its manual: then set boots_twice = true"
 
 
 class Phase(Enum):
@@ -60,6 +61,8 @@ class DriveState:
     """When it said last that safe torque off is active, or behaved as if it were; 0: never."""
     torque_off: str = ""
     """What it said."""
+    boots_twice: bool = False
+    """Whether it reports its start twice, as the robot's file says."""
     torqueless: bool = False
     """It is well, but cannot be enabled: as if its safe torque off input were open."""
     _controlword: int = SHUTDOWN
@@ -109,11 +112,24 @@ class DriveState:
 
     def on_boot(self, now_ns: int) -> bool:
         """It reports its start. False: two did so at once, so two drives have its id, and it has failed."""
-        before_ns, self._booted_ns = self._booted_ns, now_ns
-        if before_ns is not None and now_ns - before_ns < _BOOTS_APART_NS:
-            self.fail("has reported two starts within one second: two drives have its id", True)
+        again = self.booted_just_now(now_ns)
+        self._booted_ns = now_ns
+        if again and not self.boots_twice:
+            self.fail(
+                f"has reported two starts within one second: two drives have its id{_BY_ITS_MANUAL}", True
+            )
             return False
         return True
+
+    def booted_just_now(self, now_ns: int) -> bool:
+        """Whether it reported a start within the last second."""
+        return self._booted_ns is not None and now_ns - self._booted_ns < _BOOTS_APART_NS
+
+    def restart(self, now_ns: int) -> None:
+        """It reports a start although it is configured."""
+        self.fail(
+            "has restarted" + (_BY_ITS_MANUAL if self.booted_just_now(now_ns) else ""), reconfigure=True
+        )
 
     def on_emergency(self, message: Emergency, now_ns: int) -> None:
         """An emergency message: an error, or that all errors are gone."""

@@ -72,6 +72,8 @@ class DriveConfig(Section):
     """Mode of operation: 8 cyclic synchronous, 7 interpolated position. None: by 6502h, 8 if it has both."""
     homed: bool = False
     """True: its encoder is not absolute. It must say that it has been homed since it was switched on."""
+    boots_twice: bool = False
+    """True: it reports its start twice, by its manual. Else that shows that two drives have its id."""
     holds_itself: bool = False
     """True: a brake or the gear holds the joint without torque, as a drive without 605Ah or 6007h needs."""
     unused_status_bits: list[Literal[4, 7, 9, 11, 12]] = Field(default_factory=list)

@@ -56,6 +56,7 @@ class Drives:
             DriveState(
                 SetupRun(SetupPlan(settings, None if settings.eds is None else eds_of(settings.eds))),
                 sto_codes=config.sto_codes,
+                boots_twice=settings.drive.boots_twice,
             )
             for settings in config.settings(skeleton)
         ]

@@ -122,6 +122,9 @@ class SetupPlan:
         self.pdos = mapped(drive.id, self.mode, drive.encoder)
         yield Write(0x1016, 1, 4, times.node_id << 16 | times.dead_ms, BEAT)
         yield Write(0x1017, 0, 2, times.drive_heartbeat_ms, BEAT)
+        # what another master may have stored: a SYNC with a counter, and a time-out of the targets' PDO
+        yield Write(0x1019, 0, 1, 0, "1019h")
+        yield Write(0x1400, 5, 2, 0, "1400h:5")
         # some drives interpolate by it instead of 60C2h
         yield Write(0x1006, 0, 4, 1000 * times.period_ms, "1006h")
         yield from _pdo(0x1400, RPDO1 + drive.id, rpdo_mapping(self.mode), part_of=MAPPING)
@@ -193,7 +196,7 @@ class SetupPlan:
 
     def _fixed(self, held: Held, lacks: Mapping[str, str]) -> Iterator[Transfer]:
         checks.check_life(lacks)
-        checks.check_period(lacks, self.mode)
+        checks.check_period(lacks, self.mode, self._settings.times.period_ms)
         self.guarded = BEAT in lacks
         if MAPPING not in lacks:
             return
@@ -216,6 +219,7 @@ class SetupPlan:
             if one.cob_id & INVALID:
                 yield Write(one.index, 1, 4, one.cob_id & ~INVALID)
         yield Write(rpdo.index, 2, 1, _EVERY_SYNC, "target at SYNC")
+        yield Write(rpdo.index, 5, 2, 0, "time-out of its RPDO")
         yield Write(tpdo.index, 2, 1, _EVERY_SYNC, ANSWER)
         for one in tpdos:
             if one.frame_id in told and one.index != tpdo.index:

@@ -13,6 +13,8 @@ LIMIT = "torque limit"
 BEAT, GUARDING, MAPPING, ANSWER = "heartbeat", "node guarding", "mapping", "answer at each SYNC"
 LOSS, QUICK_STOP, PERIOD, WIDE_PERIOD = "6007h", "605Ah", "60C2h", "60C2h of 16 bits"
 WRONG_LENGTH = "wrong length"
+_OF_VALUE = ("value out of range", "value too high", "value too low")
+"""Refusals of a value by a drive that has the object."""
 
 _LEFT_OUT = {
     LOSS: "6007h: what it does when the slave dies is its maker's choice",
@@ -88,8 +90,14 @@ def check_life(lacks: Lacks) -> None:
         )
 
 
-def check_period(lacks: Lacks, mode: int) -> None:
+def check_period(lacks: Lacks, mode: int, period_ms: int) -> None:
     """A drive that interpolates knows the SYNC period. Raises SetupRefusedError."""
+    refused = lacks.get(WIDE_PERIOD) or lacks.get(PERIOD, "")
+    if any(words in refused for words in _OF_VALUE):
+        raise SetupRefusedError(
+            f"does not take a SYNC period of {period_ms} ms ({refused}), and would go to each "
+            "target by jerks: set sync_hz in [servos.canopen] to what its manual permits"
+        )
     if mode == 7 and _period_refused(lacks):
         raise SetupRefusedError(
             f"cannot interpolate: it does not take the SYNC period ({lacks[PERIOD]}), which interpolated "

@@ -8,7 +8,7 @@ from slave.servos.canopen.drive import DriveState, Phase
 from slave.servos.canopen.readings import DriveReadings
 from slave.servos.canopen.second_master import SecondMaster
 from slave.servos.canopen.silence import DriveSilence
-from slave.servos.canopen.supervision import Supervision
+from slave.servos.canopen.supervision import LISTENED, Supervision
 from slave.servos.canopen.torque_limits import DriveTorqueLimits
 from slave.servos.canopen.watch import DriveWatch
 from slave.servos.canopen.wiring import (
@@ -80,7 +80,8 @@ class DriveStarts:
         if self._commands and self._second_master.buses and state == OPERATIONAL:
             self.outbox.append(self._wiring.nmt(i, STOP))  # the other has started it again
             return False
-        if drive.phase is Phase.CONFIGURING and state == BOOTED:
+        second = drive.boots_twice and drive.booted_just_now(now_ns) and drive.phase is not Phase.RUNNING
+        if state == BOOTED and (drive.phase is Phase.CONFIGURING or (second and drive.phase in LISTENED)):
             # what it was told before is forgotten, the slave's heartbeat that it shall watch for among it
             if drive.on_boot(now_ns):
                 self._start(i, now_ns, configure=True)
@@ -88,8 +89,10 @@ class DriveStarts:
         # while it is enabled, a heartbeat from before NMT's start may still be on its way
         left = drive.phase is Phase.RUNNING and state != OPERATIONAL
         changed = left or (drive.phase in (Phase.CHECKING, Phase.ENABLING) and state == BOOTED)
-        if changed:
-            drive.fail("has restarted" if state == BOOTED else "is not operational", reconfigure=True)
+        if changed and state == BOOTED:
+            drive.restart(now_ns)
+        elif changed:
+            drive.fail("is not operational", reconfigure=True)
         return changed
 
     def stop_by_nmt(self) -> None:

@@ -60,7 +60,8 @@ class Supervision:
 
     def _check(self, now_ns: int, seen: DriveAnswers) -> None:
         for i, drive in enumerate(self._drives):
-            if drive.phase is Phase.CHECKING and seen.fresh[i] and not self.stopping:
+            waits = drive.boots_twice and drive.booted_just_now(now_ns)  # for the second report of its start
+            if drive.phase is Phase.CHECKING and seen.fresh[i] and not self.stopping and not waits:
                 passed, why = self._watch.check(i, seen)
                 if why:
                     self.fail(i, why)
