@@ -16,7 +16,7 @@ from slave.servos.canopen.cia402 import (
     power,
     towards_enabled,
 )
-from slave.servos.canopen.emergency import HEARTBEAT_MISSED, SAFE_TORQUE_OFF, Emergency
+from slave.servos.canopen.emergency import HEARTBEAT_MISSED, PDO_MISSED, SAFE_TORQUE_OFF, Emergency
 from slave.servos.canopen.setup_run import SetupRun
 from slave.servos.canopen.status_bits import wrong_bits
 
@@ -137,7 +137,7 @@ class DriveState:
         self._told_sto = message.code in self.sto_codes
         if self._told_sto:
             self.torque_off_ns, self.torque_off = now_ns, f"says: {message.words}"
-        if message.code == HEARTBEAT_MISSED and self.phase is Phase.RUNNING:
+        if message.code in (HEARTBEAT_MISSED, PDO_MISSED) and self.phase is Phase.RUNNING:
             # told "enable" right after, it would go on as if nothing had been
             self.fail("has stopped by itself")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-NO_ERROR, HEARTBEAT_MISSED = 0x0000, 0x8130
+NO_ERROR, HEARTBEAT_MISSED, PDO_MISSED = 0x0000, 0x8130, 0x8250
 SAFE_TORQUE_OFF = 0x8A88
 """maxon EPOS4 ("STO error"). CiA 402 names no code for it, so each maker has another."""
 
@@ -46,7 +46,8 @@ CODES = {
     0x8150: "two nodes send one identifier",
     0x8210: "a PDO was too short",
     0x8220: "a PDO was too long",
-    0x8250: "it missed its PDO",
+    0x8240: "it waits for a SYNC of another length",
+    PDO_MISSED: "it missed its PDO",
     0x8480: "its speed controller failed",
     0x8500: "its position controller failed",
     0x8611: "following error",

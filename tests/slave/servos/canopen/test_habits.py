@@ -78,6 +78,17 @@ def test_a_time_out_of_the_targets_that_is_shorter_than_a_sync_period_is_switche
     come_up(one(maker, holds_itself=True))
 
 
+def test_a_drive_that_missed_its_targets_and_stopped_is_not_sent_on() -> None:
+    """Told "enable" with the next SYNC it would go on, having braked, and do so again and again."""
+    wired = one(epos)
+    come_up(wired)
+    drive = wired.peer.drives[wired.index(JOINT)]
+    drive._timers.ms[0x1400] = 5
+    wired.run(0.1)
+    assert "has stopped by itself; it missed its PDO" in wired.drives.faults[JOINT]
+    assert drive.state is not Power.ENABLED
+
+
 def test_a_drive_that_waits_for_counted_syncs_is_told_that_there_are_none() -> None:
     with_counter = like(
         epos, lambda t: replace(t, lacks=t.lacks - {0x1019}, presets={**t.presets, (0x1019, 0): 10})
