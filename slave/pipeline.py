@@ -102,6 +102,8 @@ class SlavePipeline:
             self.skeleton, limits, config.guard.max_blind_cm, 1.0 / config.loop.rate_hz, config.guard.zones
         )
         self.limiter.slowed = self.blind.slowed
+        self._clamped: Mask = np.zeros(len(self.skeleton.joints), np.bool_)
+        """(J,) since the newest state."""
         self._episode = 0
         """The guard's episode when the tracker was reset last."""
         self.clock = SlaveExchange()
@@ -272,6 +274,7 @@ class SlavePipeline:
             now_ns, permission.dt_s, target.position_rad, target.velocity_rad_s, ~permission.free, *most
         )
         self.guard.clamped(clamps)
+        self._clamped |= self.limiter.clamped | self.nearest.moved
         course = Course(self.limiter.position_rad, self.limiter.velocity_rad_s, ~permission.free, *most)
         self.blind.look(now_ns, self.guard.stand_rad, course, self._looked_up)
         if self.damper.overdue:
@@ -300,6 +303,7 @@ class SlavePipeline:
         self._states_sent += 1
         offset = self.clock.estimator.estimate(now_ns)
         reading = self._reading
+        clamped, self._clamped = self._clamped, np.zeros_like(self._clamped)
         return encode(
             RobotState(
                 robot=self.robot,
@@ -324,6 +328,7 @@ class SlavePipeline:
                 external_nm=self.contact.external_nm,
                 blind_m=self.blind.way_m,
                 blind_s=self.blind.after_s,
+                clamped=clamped if clamped.any() else None,
             )
         )
 

@@ -2,8 +2,8 @@
 
 `put` only hands over: it never waits for the disk. What the thread cannot keep up with is dropped and
 counted; a disk that fails ends the recording, says so once, and leaves the process alone. Every `flush_s`
-what came is closed into a chunk and handed to the kernel, so that a process that is killed loses no more
-than that; a host that loses its power may lose more. The file gets its name once its head is in it: a
+what came is closed into a chunk and handed to the kernel, with a link of the file's chain of hashes
+(`chain.py`), so that a process that is killed loses no more than that; a host that loses its power may lose more. The file gets its name once its head is in it: a
 process that is killed, or a disk that is full, at the very beginning leaves no file that cannot be read.
 """
 
@@ -19,12 +19,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from secrets import token_hex
 from types import TracebackType
-from typing import BinaryIO, NamedTuple, Self
+from typing import BinaryIO, NamedTuple, Self, cast
 
 from mcap.writer import Writer
 
 from common.clock import Clock, monotonic_ns, to_ns, wall_ns
 from common.errors import RecordingError
+from common.recording.chain import CHAIN, RunningChain
 
 METADATA = "tandem"
 """Name of the MCAP metadata record that says what was recorded."""
@@ -43,6 +44,31 @@ class _Item(NamedTuple):
     payload: bytes
     wall_ns: int
     monotonic_ns: int
+
+
+class _HashedStream:
+    """The file, of which each byte that is written goes into the chain too."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self.chain = RunningChain()
+        self._stream = stream
+
+    def write(self, data: bytes) -> int:
+        """As of the file."""
+        self.chain.take(data)
+        return self._stream.write(data)
+
+    def tell(self) -> int:
+        """As of the file."""
+        return self._stream.tell()
+
+    def flush(self) -> None:
+        """As of the file."""
+        self._stream.flush()
+
+    def close(self) -> None:
+        """As of the file."""
+        self._stream.close()
 
 
 @dataclass(slots=True)
@@ -83,13 +109,13 @@ class McapRecorder:
         self._flush_ns = to_ns(flush_s)
         self._queue: queue.Queue[_Item | None] = queue.Queue(capacity)
         hidden = path.with_name(f".{path.name}.{token_hex(4)}")
-        self._stream = create(hidden, path) if stream is None else stream
+        self._stream = _HashedStream(create(hidden, path) if stream is None else stream)
         self._whole = 0
         self._unflushed = 0
         self._channels: dict[str, int] = {}
         self._sequence: dict[str, int] = {}
         try:
-            self._writer = Writer(self._stream)
+            self._writer = Writer(cast(BinaryIO, self._stream))
             self._writer.start(library="tandem")
             self._writer.add_metadata(METADATA, dict(metadata))
             self._flush()
@@ -182,6 +208,10 @@ class McapRecorder:
 
     def _flush(self) -> None:
         self._writer.flush()
+        # after each chunk, and at the head: nothing else is written by this writer before its end
+        if self._unflushed or not self._whole:
+            self._writer.add_metadata(CHAIN, self._stream.chain.link().record())
+            self._stream.flush()
         self._whole = self._stream.tell()
         self.counters.written += self._unflushed
         self._unflushed = 0

@@ -33,7 +33,9 @@ from common.wire.messages import (
     Truth,
 )
 
-VERSION = 4
+VERSION = 5
+READABLE = (4, VERSION)
+"""In version 4 a state told no clamped joints; all else was as now."""
 CONTROL_BYTES = 1100
 """Of a command, a state, and whatever else the robot is controlled by. With the headers of IPv6, TCP, TLS and
 Zenoh a packet stays below 1280 bytes, which every path carries; many VPNs swallow larger ones silently."""
@@ -80,12 +82,14 @@ def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
         raise CodecError("not an array")
     if array[0] != name:
         raise CodecError(f"kind {fields.short(array[0])}, expected {name}")
-    if type(array[1]) is not int or array[1] != VERSION:
+    if type(array[1]) is not int or array[1] not in READABLE:
         raise CodecError(
             f"schema version {fields.short(array[1])}, expected {VERSION}: the other side runs another "
             "version of tandem, install the same on both hosts"
         )
-    message = unpack(array[2:], joints)
+    # a state of version 4 ends before the clamped joints
+    newer = (b"",) if kind is RobotState and array[1] < VERSION else ()
+    message = unpack((*array[2:], *newer), joints)
     assert isinstance(message, kind)
     return message
 
@@ -140,17 +144,18 @@ def _pack_state(m: RobotState) -> tuple[object, ...]:
     mask, angles = fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad)
     torques = fields.pack_torques(m.effort_nm), fields.pack_torques(m.external_nm)
     named = (m.robot, m.guard, reason, m.operator, *m.resting)
-    blocks = (mask, angles, *(block or b"" for block in torques), *(name.encode("utf-8") for name in named))
+    blocks = (mask, angles, mask[::8], *(block or b"" for block in torques), *(name.encode("utf-8") for name in named))
     taken = _STATE_NUMBERS_BYTES + sum(map(len, blocks)) + _NUMBER_BYTES * (2 + len(m.blind_m))
     return (
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
         m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
         _pack_base(m.base), m.lease_id, m.instance, m.resting, *torques, m.blind_m, m.blind_s,
+        b"" if m.clamped is None else fields.pack_bits(m.clamped),
     )  # fmt: skip
 
 
 def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
-    fields.array(f, 21)
+    fields.array(f, 22)
     sequence, sent_ns, encoder_ns = fields.counts(f[1:4])
     position_rad, setpoint_rad = fields.floats(f[8], joints, _ANGLES)
     return RobotState(
@@ -176,6 +181,7 @@ def _unpack_state(f: tuple[object, ...], joints: int) -> RobotState:
         external_nm=fields.torques(f[18], joints),
         blind_m=fields.numbers(f[19], 0.0, MAX_WAY_M),
         blind_s=fields.number(f[20], 0.0, MAX_WAY_S),
+        clamped=fields.bits(f[21], joints),
     )
 
 

@@ -85,6 +85,20 @@ def mask(value: object, count: int) -> Mask:
     return np.frombuffer(value, np.bool_)
 
 
+def pack_bits(mask: Mask) -> bytes:
+    """One bit an entry: for what is sent often and read seldom. No bytes where no entry is set."""
+    return np.packbits(mask).tobytes() if mask.any() else b""
+
+
+def bits(value: object, count: int) -> Mask | None:
+    """A mask of `count` entries, None where none is set."""
+    if value == b"":
+        return None
+    if type(value) is not bytes or len(value) != (count + 7) // 8:
+        raise CodecError(f"not {count} bits")
+    return np.unpackbits(np.frombuffer(value, np.uint8), count=count).astype(np.bool_)
+
+
 def counts(values: tuple[object, ...]) -> tuple[int, ...]:
     """Integers of 0 to 2**63 - 1: counters, ticks and stamps in ns."""
     return tuple(map(count, values))

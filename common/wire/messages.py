@@ -132,6 +132,8 @@ class RobotState:
     () while the robot follows nobody."""
     blind_s: float = 0.0
     """When all would stand, from that command on."""
+    clamped: Mask | None = None
+    """(J,) joints that a limit has held back since the state before; None where it was none."""
 
 
 class Action(StrEnum):

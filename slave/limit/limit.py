@@ -159,6 +159,11 @@ class SetpointLimiter:
         return Setpoint(self.position_rad, self.velocity_rad_s)
 
     @property
+    def clamped(self) -> Mask:
+        """(J,) joints that some rule held back in the newest step."""
+        return np.logical_or.reduce(tuple(self._clamped.values())) if self._clamping else self._none
+
+    @property
     def at_rest(self) -> bool:
         """Whether no joint's setpoint moves."""
         return not self.velocity_rad_s.any()

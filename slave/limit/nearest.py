@@ -59,6 +59,11 @@ class NearestPosture:
         use = self._concerned & np.isfinite(found)
         return np.where(use, found, position_rad), np.where(use, velocity, velocity_rad_s)
 
+    @property
+    def moved(self) -> Mask:
+        """(J,) joints that the newest command wants elsewhere than they may go."""
+        return self._moved
+
     def clamps(self, now_ns: int, asked_rad: Array, given_rad: Array) -> list[Clamp]:
         """The joints that are from now on elsewhere than asked."""
         if not self._any:

@@ -15,6 +15,7 @@ from deploy.report.options import AsJson
 from deploy.report.output import in_a_folder
 
 if TYPE_CHECKING:
+    from common.recording import ChainCheck
     from deploy.ops.inspect.findings import FileFindings
     from deploy.ops.inspect.jitter.judge import JitterFindings
 
@@ -105,6 +106,10 @@ def _print(console: Console, found: FileFindings) -> None:
         console.print(f"{key}: {shown}", highlight=False, markup=False)
     if contents.cut:
         console.print(f"[yellow]{contents.cut}: only the part before it is shown", highlight=False)
+    console.print(_chain_words(found.chain), highlight=False, markup=False)
+    if found.limited_s:
+        held = ", ".join(f"{joint} {seconds:.1f} s" for joint, seconds in found.limited_s.items())
+        console.print(f"held back by a limit: {held}", highlight=False)
     if not found.events:
         return
     table = plain_table(
@@ -121,6 +126,14 @@ def _print(console: Console, found: FileFindings) -> None:
     rest = len(found.events) - EVENTS_SHOWN + found.more_events
     if rest > 0:
         console.print(f"and {rest} more; --json has them", highlight=False)
+
+
+def _chain_words(chain: ChainCheck) -> str:
+    if not chain.links:
+        return "no chain of hashes: it was recorded by an earlier version, or changed"
+    kept = f"chain of hashes: {chain.links} links, bytes 0 to {chain.sealed - 1} of {chain.size}"
+    broken = f"; {chain.broken.upper()}" if chain.broken else ""
+    return f"{kept} as they were written, head {chain.head[:16]}…{broken}"
 
 
 def _print_jitter(console: Console, judged: JitterFindings) -> None:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from common.clock import to_s
-from common.recording import Entry, RecordingStream
+from common.recording import ChainCheck, Entry, RecordingStream, check_recording
 from common.skeleton import Skeleton
 from deploy.ops.inspect.guard_changes import GuardChange, GuardChanges
 from deploy.ops.inspect.jitter.robot_side import FOLLOWS
+from deploy.ops.inspect.limited import LimitedJoints
 from deploy.ops.inspect.pictures import draw_events, draw_joints, make_folder
 from deploy.ops.inspect.thinned import ThinnedJoints
 from deploy.recorded.contents import Contents, Survey
@@ -28,6 +29,10 @@ class FileFindings:
     contents: Contents
     events: Sequence[GuardChange]
     more_events: int
+    chain: ChainCheck
+    """What the hashes in it say."""
+    limited_s: dict[str, float] = field(default_factory=dict)
+    """By joint, for how long a limit held it back."""
 
     @property
     def span_s(self) -> float:
@@ -47,7 +52,14 @@ class FileFindings:
     def tree(self) -> dict[str, object]:
         """Plain values for JSON."""
         guard = [event.tree() for event in self.events]
-        return {**self.contents.tree(), "span_s": self.span_s, "guard": guard, "more_guard": self.more_events}
+        return {
+            **self.contents.tree(),
+            "span_s": self.span_s,
+            "guard": guard,
+            "more_guard": self.more_events,
+            "limited_s": self.limited_s,
+            "chain": asdict(self.chain),
+        }
 
 
 def look_into(
@@ -59,6 +71,7 @@ def look_into(
     skeleton = recorded_skeleton(files, profile)
     for number, (path, stream) in enumerate(contents):
         survey, guards, thinned = Survey(), dict[str, GuardChanges](), ThinnedJoints(skeleton)
+        limited = LimitedJoints(skeleton.joint_names)
         began: Entry | None = None
         for entry in _each(stream):
             began = began or entry
@@ -69,11 +82,13 @@ def look_into(
                 guards[robot] = GuardChanges(skeleton.joint_names, began, robot)
             guards[robot].take(entry)
             thinned.take(entry)
+            limited.take(entry)
         for guard in guards.values():
             guard.end()
         events = sorted((event for guard in guards.values() for event in guard.found), key=lambda e: e.at_ns)
         more = sum(guard.more for guard in guards.values())
-        found.append(FileFindings(path, survey.contents(stream), events, more))
+        chain, held_s = check_recording(path), limited.seconds()
+        found.append(FileFindings(path, survey.contents(stream), events, more, chain, held_s))
         if plots is not None:
             folder = plots if number == 0 else plots / path.stem
             make_folder(folder)

@@ -18,6 +18,9 @@ from common.recording import McapRecorder, read_recording
 
 METADATA = {"profile": "nursing", "rate_hz": "200"}
 
+ZSTD = b"\x28\xb5\x2f\xfd"
+"""How a compressed chunk begins."""
+
 
 def test_what_is_put_is_read_back_in_order_with_both_times(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
@@ -121,7 +124,7 @@ def test_a_file_cut_anywhere_gives_a_whole_beginning_or_is_refused(
 
 def test_a_damaged_chunk_ends_the_recording_before_it(chunks: tuple[bytes, int], tmp_path: Path) -> None:
     content = bytearray(chunks[0])
-    content[len(content) // 3] ^= 0xFF
+    content[content.index(ZSTD, len(content) // 3) + 20] ^= 0xFF
     path = tmp_path / "bad.mcap"
     path.write_bytes(content)
     recording = read_recording(path)

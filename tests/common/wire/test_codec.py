@@ -1,6 +1,6 @@
 import math
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace, replace
 from typing import Any
 
 import msgpack
@@ -115,6 +115,7 @@ def states(draw: st.DrawFn, joints: int = 25) -> RobotState:
         external_nm=draw(torques(joints)),
         blind_m=tuple(draw(st.lists(st.floats(0.0, 100.0), max_size=5))),
         blind_s=draw(st.floats(0.0, 100.0)),
+        clamped=(lambda mask: mask if mask.any() else None)(draw(masks(joints))),
     )
 
 
@@ -403,10 +404,29 @@ def test_a_state_fits_in_a_packet_of_every_path(faults: dict[str, str], reason: 
         name, most, most, most, "estop", reason, name, mask, zeros, zeros,
         CommandEcho(most, most, most, most, most), -most, most, faults,
         BaseAttitude(most, 1.0, 1.0, 1.0, 1.0), most, most, effort_nm=zeros, external_nm=zeros,
-        blind_m=(1.5,) * 5, blind_s=0.5,
+        blind_m=(1.5,) * 5, blind_s=0.5, clamped=mask,
     )  # fmt: skip
     payload = encode(state)
     assert len(payload) <= CONTROL_BYTES
     told = decode(payload, RobotState, 25).faults
     if len(told) < len(faults) or "others" in told:
         assert "more" in told["others"] or "others" in faults
+
+
+def test_a_state_of_version_4_is_read_and_tells_no_clamped_joints() -> None:
+    def older(array: list[object]) -> None:
+        array[1] = 4
+        array.pop()
+
+    assert same(decode(tampered(STATE, older), RobotState, 3), STATE)
+    with pytest.raises(CodecError, match="22 fields"):
+        decode(tampered(STATE, put(1, 4)), RobotState, 3)
+
+
+@pytest.mark.parametrize("bits", [bytes(2), b"\x80\x00", 5, None])
+def test_clamped_joints_are_as_many_bits_as_joints(bits: object) -> None:
+    with pytest.raises(CodecError, match="3 bits"):
+        decode(tampered(STATE, put(23, bits)), RobotState, 3)
+    clamped = replace(STATE, clamped=np.array([False, True, False]))
+    assert len(encode(clamped)) == len(encode(STATE)) + 1
+    assert same(decode(encode(clamped), RobotState, 3), clamped)
