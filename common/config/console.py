@@ -34,6 +34,9 @@ class ConsoleConfig(Section):
     losing_page: Literal["nothing", "stop"] = "nothing"
     """`stop`: when the page of the person who engaged the robot is lost, the robot is stopped."""
 
+    study: RelativePath | None = None
+    """The folder of a study: the page leads through the session that is under way there."""
+
     @property
     def host(self) -> str:
         """The address, without brackets."""

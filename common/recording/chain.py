@@ -2,9 +2,10 @@
 
     h₀ = SHA-256("tandem chain 1");   hₖ = SHA-256(hₖ₋₁ ‖ the file's bytes since the link before)
 
-Each link is a metadata record that names where its bytes end, and hₖ. The bytes of a link's own record belong
-to the next one. So a file that was cut off can be checked up to its last link, and a changed byte before it is
-found. Whoever can write the file can write another chain: a head that was noted elsewhere is what proves it.
+Each link is a metadata record that names where its bytes end, and hₖ. The bytes of a link's own record
+belong to the next one. So a file that was cut off can be checked up to its last link, and a changed byte
+before it is found. Whoever can write the file can write another chain: a head that was noted elsewhere is
+what proves it.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 `put` only hands over: it never waits for the disk. What the thread cannot keep up with is dropped and
 counted; a disk that fails ends the recording, says so once, and leaves the process alone. Every `flush_s`
 what came is closed into a chunk and handed to the kernel, with a link of the file's chain of hashes
-(`chain.py`), so that a process that is killed loses no more than that; a host that loses its power may lose more. The file gets its name once its head is in it: a
+(`chain.py`), so that a process that is killed loses no more than that; a host that loses its power may lose
+more. The file gets its name once its head is in it: a
 process that is killed, or a disk that is full, at the very beginning leaves no file that cannot be read.
 """
 

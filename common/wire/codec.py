@@ -144,13 +144,15 @@ def _pack_state(m: RobotState) -> tuple[object, ...]:
     mask, angles = fields.pack_mask(m.encoder_valid), fields.pack_floats(m.position_rad, m.setpoint_rad)
     torques = fields.pack_torques(m.effort_nm), fields.pack_torques(m.external_nm)
     named = (m.robot, m.guard, reason, m.operator, *m.resting)
-    blocks = (mask, angles, mask[::8], *(block or b"" for block in torques), *(name.encode("utf-8") for name in named))
+    clamped = b"" if m.clamped is None else fields.pack_bits(m.clamped)
+    texts = (name.encode("utf-8") for name in named)
+    blocks = (mask, angles, clamped, *(block or b"" for block in torques), *texts)
     taken = _STATE_NUMBERS_BYTES + sum(map(len, blocks)) + _NUMBER_BYTES * (2 + len(m.blind_m))
     return (
         m.robot, m.sequence, m.sent_ns, m.encoder_ns, m.guard, reason, m.operator, mask, angles, echo,
         m.master_offset_ns, m.offset_bound_ns, fields.fit_texts(m.faults, CONTROL_BYTES - taken),
         _pack_base(m.base), m.lease_id, m.instance, m.resting, *torques, m.blind_m, m.blind_s,
-        b"" if m.clamped is None else fields.pack_bits(m.clamped),
+        clamped,
     )  # fmt: skip
 
 

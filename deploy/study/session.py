@@ -6,43 +6,19 @@ ROOT/sub-03/ses-02/session.json   protocol.toml   marks.jsonl   master.mcap   se
 from __future__ import annotations
 
 import json
-import os
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from enum import StrEnum
 from pathlib import Path
 
 from common.clock import NS_PER_S, Clock, monotonic_ns, wall_ns
 from common.errors import TandemError
 from common.wire.version import software
-from deploy.study.protocol import StudyProtocol, check_code, load_protocol
+from deploy.study.marks import Mark, MarkKind, read_marks, write_mark
+from deploy.study.protocol import ProtocolStep, StudyProtocol, check_code, load_protocol
 
-SESSION, PROTOCOL, MARKS = "session.json", "protocol.toml", "marks.jsonl"
-MARK_TOPIC = "session/mark"
-"""Under which a recording holds the marks, each a line of JSON."""
-
-
-class MarkKind(StrEnum):
-    """What a mark says."""
-
-    STEP = "step"
-    """A step of the protocol begins."""
-    EVENT = "event"
-    END = "end"
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """One line of `marks.jsonl`."""
-
-    wall_ns: int
-    """ns since 1970."""
-    monotonic_ns: int
-    """This host's monotonic clock, as in the recordings."""
-    kind: MarkKind
-    text: str
+SESSION, PROTOCOL = "session.json", "protocol.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,46 +67,38 @@ class Session:
         """Write a mark down, for whoever records to find. Raises TandemError after the end."""
         if self.ended:
             raise TandemError(f"{self.path}: the session has ended; it takes no more marks")
-        mark = Mark(wall(), clock(), kind, text)
-        line = json.dumps(asdict(mark), ensure_ascii=False) + "\n"
-        # one write, so that two who mark at once never mix their lines
-        descriptor = os.open(self.path / MARKS, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o640)
-        try:
-            os.write(descriptor, line.encode())
-        finally:
-            os.close(descriptor)
-        return mark
+        return write_mark(self.path, kind, text, wall, clock)
 
     def marks(self) -> list[Mark]:
         """All, in order. Raises TandemError where a line is none."""
-        path = self.path / MARKS
-        if not path.exists():
-            return []
-        found, text = [], path.read_text("utf-8").removesuffix("\n")
-        # not splitlines: a mark's text may hold what Unicode counts as the end of a line
-        for number, line in enumerate(text.split("\n") if text else (), start=1):
-            try:
-                tree = json.loads(line)
-                found.append(
-                    Mark(tree["wall_ns"], tree["monotonic_ns"], MarkKind(tree["kind"]), tree["text"])
-                )
-            except (ValueError, KeyError, TypeError):
-                raise TandemError(f"{path}: line {number} is no mark") from None
-        return found
+        return read_marks(self.path)
 
     @property
     def ended(self) -> bool:
         """Whether its end is marked."""
         return any(mark.kind is MarkKind.END for mark in self.marks())
 
+    @property
+    def step(self) -> str:
+        """The step that is under way; empty before the first."""
+        return self._begun()[-1] if self._begun() else ""
+
+    @property
+    def steps_left(self) -> list[ProtocolStep]:
+        """Those that have not begun."""
+        begun = self._begun()
+        return [step for step in self.protocol.step if step.name not in begun]
+
     def next_step(self) -> str | None:
         """Begin the next step; its name, None where all are done."""
-        begun = [mark.text for mark in self.marks() if mark.kind is MarkKind.STEP]
-        left = [step.name for step in self.protocol.step if step.name not in begun]
+        left = self.steps_left
         if not left:
             return None
-        self.mark(MarkKind.STEP, left[0])
-        return left[0]
+        self.mark(MarkKind.STEP, left[0].name)
+        return left[0].name
+
+    def _begun(self) -> list[str]:
+        return [mark.text for mark in self.marks() if mark.kind is MarkKind.STEP]
 
 
 def expects_signature(folder: Path) -> bool:

@@ -203,7 +203,9 @@ def test_a_stolen_token_is_worth_nothing_on_another_key(pipeline: SlavePipeline)
     )
 
 
-def test_a_state_names_the_joints_that_a_limit_held_back_since_the_one_before(pipeline: SlavePipeline) -> None:
+def test_a_state_names_the_joints_that_a_limit_held_back_since_the_one_before(
+    pipeline: SlavePipeline,
+) -> None:
     joints = len(pipeline.skeleton.joints)
     pipeline._clamped[3] = True
     told = decode(pipeline.state(NS_PER_S), RobotState, joints).clamped

@@ -5,18 +5,19 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 
 import msgpack
 
-from common.clock import monotonic_ns, to_s
+from common.clock import NS_PER_S, monotonic_ns, to_s
 from common.errors import TandemError
 from common.process.runtime import until_stopped
 from common.tap.message import GREETING, TapMessage
 from common.tap.reader import TapReader
 from deploy.ops.record.tape import Tape
-from deploy.study.session import MARK_TOPIC, Session
+from deploy.study.marks import MARK_TOPIC, NOW_TOPIC, NewMarks
+from deploy.study.session import Session
+from deploy.study.under_way import session_under_way
 from master.journal.calls import MISSING
 
 GREETED_S = 5.0
@@ -32,11 +33,13 @@ async def record_tap(
     each_s: float | None = None,
     ends_when_failed: bool = False,
     session: Session | None = None,
+    study: Path | None = None,
 ) -> str:
     """Record until `stop` is set, the time is over or the process ends. Returns a summary for people.
 
     `ends_when_failed`: also once the disk takes nothing any more. `session`: of a study; its marks are
-    recorded, and nothing that its subject has not consented to.
+    recorded, and nothing that its subject has not consented to. `study`: its folder, where no session is
+    named: whichever session is under way counts. Marks in the folder of `out` are recorded too.
     Raises TandemError where there is no tap, the disk failed, or this process was too slow for the tap.
     """
     with TapReader(path) as reader:
@@ -45,7 +48,8 @@ async def record_tap(
         except TimeoutError:
             raise TandemError(f"{path}: it says nothing; is it a tap of tandem?") from None
         head = {**_greeting(path, first), **(session.metadata() if session is not None else {})}
-        taking = _Taking(reader, Tape(out, head, each_s), report, ends_when_failed, session)
+        marking = _Marking(out.parent, session, study)
+        taking = _Taking(reader, Tape(out, head, each_s), report, ends_when_failed, marking)
         try:
             await until_stopped(stop, taking.run(seconds))
         finally:
@@ -63,6 +67,45 @@ def _greeting(path: Path, message: TapMessage) -> dict[str, str]:
     return dict(table)
 
 
+class _Marking:
+    """What is recorded of the study: marks as they come, and once a second which session and step it is."""
+
+    def __init__(self, folder: Path, session: Session | None, study: Path | None) -> None:
+        """`folder`: of the recording; marks are written there where no session is under way."""
+        self._named = session
+        self._session = session
+        self._study = study
+        self._marks = NewMarks(folder if session is None else session.path, session is not None)
+        self._of_session: NewMarks | None = None
+        self._now_ns = -NS_PER_S
+
+    def may_record(self, topic: str) -> bool:
+        """Whether the subject has consented to what a topic holds; True without a session."""
+        return self._session is None or self._session.may_record(topic)
+
+    def take(self, now_ns: int) -> list[tuple[str, bytes, int]]:
+        """Topic, content and time of what is new."""
+        if self._named is None and self._study is not None:
+            self._turn_to(session_under_way(self._study))
+        out = [
+            (MARK_TOPIC, mark.line().encode(), mark.monotonic_ns)
+            for source in (self._marks, self._of_session)
+            if source is not None
+            for mark in source.take()
+        ]
+        if self._session is not None and now_ns - self._now_ns >= NS_PER_S:
+            self._now_ns = now_ns
+            head = self._session.head
+            now = {"subject": head.subject, "session": head.session, "step": self._session.step}
+            out.append((NOW_TOPIC, json.dumps(now).encode(), now_ns))
+        return out
+
+    def _turn_to(self, session: Session | None) -> None:
+        if (session and session.path) != (self._session and self._session.path):
+            self._session = session
+            self._of_session = None if session is None else NewMarks(session.path, all_of_them=True)
+
+
 class _Taking:
     """One recording under way."""
 
@@ -72,10 +115,9 @@ class _Taking:
         tape: Tape,
         report: Callable[[str], None],
         ends_when_failed: bool,
-        session: Session | None,
+        marking: _Marking,
     ) -> None:
-        self._session = session
-        self._marks = 0
+        self._marking = marking
         self._ends_when_failed = ends_when_failed
         self.tape = tape
         self._reader = reader
@@ -104,7 +146,7 @@ class _Taking:
         if self._reader.missed > self._missed:
             self._missed = self._reader.missed
             self.tape.put(MISSING, b"", message.stamp_ns)
-        if self._session is not None and not self._session.may_record(message.topic):
+        if not self._marking.may_record(message.topic):
             return
         self._counts[message.topic] = self._counts.get(message.topic, 0) + 1
         self.tape.put(message.topic, message.payload, message.stamp_ns)
@@ -117,12 +159,8 @@ class _Taking:
             await asyncio.sleep(PROGRESS_S)
 
     def _take_marks(self) -> None:
-        """Record what has been marked since the last time."""
-        if self._session is None:
-            return
-        for mark in self._session.marks()[self._marks :]:
-            self._marks += 1
-            self.tape.put(MARK_TOPIC, json.dumps(asdict(mark)).encode(), mark.monotonic_ns)
+        for topic, payload, at_ns in self._marking.take(monotonic_ns()):
+            self.tape.put(topic, payload, at_ns)
 
     def _words(self) -> str:
         elapsed_s = max(1e-3, to_s(monotonic_ns() - self._since_ns))

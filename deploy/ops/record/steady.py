@@ -17,6 +17,7 @@ from pathlib import Path
 from pydantic import ConfigDict
 
 from common.clock import NS_PER_S, Clock, wall_ns
+from common.config.console import ConsoleConfig
 from common.config.load import load_config
 from common.config.section import Section
 from common.errors import ConfigError, ConfigMistake, TandemError
@@ -44,6 +45,7 @@ class RecordedSide(Section):
     model_config = ConfigDict(extra="ignore")
     tap: TapConfig = TapConfig()
     recording: RecordingConfig = RecordingConfig()
+    console: ConsoleConfig = ConsoleConfig()
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +57,8 @@ class SteadyOptions:
     name: str
     """Begins the name of each file."""
     config: RecordingConfig
+    study: Path | None = None
+    """The folder of a study (`[console] study`): its sessions' marks are recorded, within their consent."""
 
 
 def steady_options(file: Path) -> SteadyOptions:
@@ -67,7 +71,9 @@ def steady_options(file: Path) -> SteadyOptions:
     if not side.recording.folder.is_dir():
         wrong = ConfigMistake("recording.folder", str(side.recording.folder), "a folder that exists")
         raise ConfigError(file, [wrong])
-    return SteadyOptions(side.tap.socket, side.recording.folder, file.stem, side.recording)
+    return SteadyOptions(
+        side.tap.socket, side.recording.folder, file.stem, side.recording, side.console.study
+    )
 
 
 async def record_steadily(
@@ -105,6 +111,7 @@ async def _again_and_again(
             words = await record_tap(
                 options.socket, _name(options, clock()), stop, report,
                 each_s=60.0 * options.config.minutes_per_file, ends_when_failed=True,
+                study=options.study,
             )  # fmt: skip
             log.info("%s", words)
         except TandemError as error:

@@ -80,7 +80,8 @@ def mark(
 
     Example: `tandem session mark study/sub-k7pd/ses-01 "cup dropped"`
     """
-    from deploy.study.session import MarkKind, Session
+    from deploy.study.marks import MarkKind
+    from deploy.study.session import Session
 
     session = Session(folder)
     if step:

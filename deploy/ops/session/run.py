@@ -9,7 +9,9 @@ from pathlib import Path
 from common.errors import TandemError
 from deploy.ops.session.keys import END, EVENT, NEXT, single_keys
 from deploy.ops.session.recorders import SessionRecorders
-from deploy.study.session import MarkKind, Session
+from deploy.study.marks import MarkKind
+from deploy.study.session import Session
+from deploy.study.under_way import say_over, say_under_way
 
 LOOK_S = 0.2
 
@@ -20,6 +22,7 @@ async def lead(
     """Until the end is marked, `stop` is set, or a recorder ends. Raises TandemError for the last."""
     recorders = SessionRecorders(session.path, taps)
     await recorders.start()
+    say_under_way(session)
     failed = ""
     try:
         with single_keys(lambda key: _take(session, key)) as keys:
@@ -28,6 +31,7 @@ async def lead(
             failed = await _until_over(session, recorders, stop, show, language)
     finally:
         _end(session, failed or "stopped", show)
+        say_over(session)
         said = await recorders.stop()
         for name, words in said.items():
             show(f"{name}: {words}")

@@ -1,4 +1,4 @@
-"""The chain that a recorder writes as it goes: it vouches for all up to the last link, and for no changed byte."""
+"""The chain that a recorder writes as it goes vouches for all up to its last link, but no changed byte."""
 
 from __future__ import annotations
 
@@ -38,7 +38,9 @@ def test_a_whole_file_is_vouched_for_up_to_its_index(whole: Path) -> None:
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(st.data())
-def test_any_changed_byte_before_the_last_link_is_found(whole: Path, tmp_path: Path, data: st.DataObject) -> None:
+def test_any_changed_byte_before_the_last_link_is_found(
+    whole: Path, tmp_path: Path, data: st.DataObject
+) -> None:
     sound = check_recording(whole)
     at = data.draw(st.integers(8, sound.sealed - 1))
     changed = bytearray(whole.read_bytes())
@@ -69,7 +71,7 @@ def test_a_killed_recorders_file_is_sealed_up_to_its_last_flush(tmp_path: Path) 
         pass
     recorder._flush()
     recorder.put("topic", b"lost" * 100, 2)
-    killed = shutil.copy(recorder.path, tmp_path / "killed.mcap")
+    killed = Path(shutil.copy(recorder.path, tmp_path / "killed.mcap"))
     recorder.close()
     found = check_recording(killed)
     assert (found.broken, found.links) == ("", 2)

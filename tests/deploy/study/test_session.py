@@ -12,10 +12,12 @@ from common.errors import ConfigError, TandemError
 from common.recording import McapRecorder
 from common.wire.sender import operator_chunk
 from deploy.examples import profiles
+from deploy.study.marks import MARKS, MarkKind
 from deploy.study.pseudonyms import Pseudonyms, names_in, too_short
 from deploy.study.seal import seal
-from deploy.study.session import MARKS, MarkKind, Session, begin
+from deploy.study.session import Session, begin
 from deploy.study.subject import RECEIPTS, delete_subject, export_subject
+from deploy.study.under_way import UNDER_WAY, say_over, say_under_way, session_under_way
 
 CUP = Path(profiles.__file__).parent / "study" / "cup.toml"
 
@@ -58,6 +60,37 @@ def test_steps_come_in_order_and_the_end_takes_no_more(tmp_path: Path) -> None:
         stream.write("not a mark\n")
     with pytest.raises(TandemError, match="line 6 is no mark"):
         session.marks()
+
+
+def test_marks_are_taken_once_each_as_they_come(tmp_path: Path) -> None:
+    write_mark(tmp_path, MarkKind.EVENT, "before")
+    late, everything = NewMarks(tmp_path, all_of_them=False), NewMarks(tmp_path, all_of_them=True)
+    assert [mark.text for mark in everything.take()] == ["before"]
+    assert list(late.take()) == []
+    write_mark(tmp_path, MarkKind.EVENT, "now")
+    assert [[mark.text for mark in one.take()] for one in (late, everything)] == [["now"], ["now"]]
+    assert list(late.take()) == []
+    assert list(NewMarks(tmp_path / "none", all_of_them=True).take()) == []
+
+
+def test_the_session_that_is_under_way_is_found_until_it_ends(tmp_path: Path) -> None:
+    assert session_under_way(tmp_path) is None
+    session = begin(tmp_path, CUP, "k7pd")
+    say_under_way(session)
+    found = session_under_way(tmp_path)
+    assert found is not None
+    assert found.path == session.path.resolve()
+    assert (found.step, [step.name for step in found.steps_left]) == ("", ["rest", "reach", "questions"])
+    found.next_step()
+    assert (session.step, len(session.steps_left)) == ("rest", 2)
+    other = begin(tmp_path, CUP, "k7pd")
+    say_under_way(other)
+    say_over(session)
+    assert session_under_way(tmp_path) is not None, "another one began meanwhile"
+    other.mark(MarkKind.END, "done")
+    assert session_under_way(tmp_path) is None, "ended, though nobody said that it is over"
+    (tmp_path / UNDER_WAY).write_text("../elsewhere")
+    assert session_under_way(tmp_path) is None
 
 
 @pytest.mark.parametrize("text", ["a\u2028b", "a\x85b", "a\nb", "杯子"])

@@ -353,8 +353,11 @@ def test_braking_of_held_joints_is_not_a_clamp() -> None:
     for _ in range(20):
         watched.step(LIMITS.upper_rad)
     told = len(watched.clamps)
+    assert told
+    assert watched.limiter.clamped.any()
     for _ in range(20):
         watched.step(LIMITS.upper_rad, held=~NONE)
+    assert not watched.limiter.clamped.any()
     assert len(watched.clamps) == told
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -18,9 +19,13 @@ from common.recording.config import RecordingConfig
 from common.tap.sender import TapSender
 from deploy.ops.record.retention import SEAL, WRITTEN, KeptFile, remove, to_remove
 from deploy.ops.record.steady import ROOM_BYTES, SteadyOptions, _name, record_steadily, steady_options
+from deploy.study.marks import MARK_TOPIC, NOW_TOPIC, MarkKind, write_mark
+from deploy.study.session import begin
+from deploy.study.under_way import say_under_way
 from master.config import MasterConfig
 
 EXAMPLES = Path(__file__).parents[4] / "deploy/examples"
+CUP = EXAMPLES / "study" / "cup.toml"
 HOUR_NS = 3600 * NS_PER_S
 
 
@@ -206,3 +211,41 @@ def test_a_disk_that_fails_in_the_middle_ends_the_file_and_not_the_recorder(
     assert len(found) == 2
     assert read_recording(found[0]).metadata == {"role": "master"}, "it can be read as far as it goes"
     assert len(read_recording(found[1]).entries) >= 20
+
+
+def test_marks_in_the_folder_and_of_the_session_under_way_are_recorded_within_its_consent(
+    tmp_path: Path,
+) -> None:
+    """As a page's F4 writes them; the subject has not consented to video."""
+    study = tmp_path / "study"
+    session = begin(study, CUP, "k7pd")
+    say_under_way(session)
+    options = SteadyOptions(tmp_path / "m.sock", tmp_path, "m", RecordingConfig(), study)
+
+    async def story() -> None:
+        sender, stop = TapSender(options.socket, lambda: msgpack.packb({"role": "master"})), asyncio.Event()
+        sender.open()
+        recording = asyncio.create_task(record_steadily(options, stop, lambda _: None))
+        async with asyncio.timeout(30.0):
+            while not list(tmp_path.glob("*.mcap")):  # noqa: ASYNC110, ASYNC240  # a file, in a test
+                await asyncio.sleep(0.02)
+            write_mark(tmp_path, MarkKind.EVENT, "page")
+            session.next_step()
+            for _ in range(80):
+                sender.put("suit/frames", b"frame")
+                sender.put("tandem/robot-1/video/head", b"picture")
+                await asyncio.sleep(0.02)
+        stop.set()
+        await recording
+        sender.close()
+
+    asyncio.run(story())
+    [file] = tmp_path.glob("*.mcap")
+    entries = read_recording(file).entries
+    marks = [json.loads(entry.payload) for entry in entries if entry.topic == MARK_TOPIC]
+    assert {(mark["kind"], mark["text"]) for mark in marks} == {("event", "page"), ("step", "rest")}
+    now = [json.loads(entry.payload) for entry in entries if entry.topic == NOW_TOPIC]
+    assert now[-1] == {"subject": "k7pd", "session": "01", "step": "rest"}
+    topics = [entry.topic for entry in entries]
+    last = len(topics) - 1 - topics[::-1].index("suit/frames")
+    assert "tandem/robot-1/video/head" not in topics[topics.index(NOW_TOPIC) : last]

@@ -16,7 +16,8 @@ from common.tap.sender import TapSender
 from deploy import cli
 from deploy.examples import profiles
 from deploy.ops.session.run import lead
-from deploy.study.session import MARK_TOPIC, MarkKind, Session, begin
+from deploy.study.marks import MARK_TOPIC, MarkKind
+from deploy.study.session import Session, begin
 
 CUP = Path(profiles.__file__).parent / "study" / "cup.toml"
 VIDEO = "tandem/robot-1/video/head"
@@ -72,6 +73,10 @@ def test_marks_steps_and_consent_are_in_the_recording(tmp_path: Path) -> None:
     topics = {entry.topic for entry in recording.entries}
     assert "suit/frames" in topics
     assert VIDEO not in topics
+    now = [json.loads(entry.payload) for entry in recording.entries if entry.topic == NOW_TOPIC]
+    assert {(one["subject"], one["session"]) for one in now} == {("k7pd", "01")}
+    assert now[-1]["step"] in ("", "rest")
+    assert session_under_way(tmp_path) is None, "it is over"
     assert not recording.cut
     assert any("请站立不动" in line for line in shown)
     assert session.ended
