@@ -12,7 +12,7 @@ from common.errors import ConfigError, TandemError
 from common.recording import McapRecorder
 from common.wire.sender import operator_chunk
 from deploy.examples import profiles
-from deploy.study.marks import MARKS, MarkKind
+from deploy.study.marks import MARKS, MarkKind, NewMarks, write_mark
 from deploy.study.pseudonyms import Pseudonyms, names_in, too_short
 from deploy.study.seal import seal
 from deploy.study.session import Session, begin

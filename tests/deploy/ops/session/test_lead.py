@@ -16,8 +16,9 @@ from common.tap.sender import TapSender
 from deploy import cli
 from deploy.examples import profiles
 from deploy.ops.session.run import lead
-from deploy.study.marks import MARK_TOPIC, MarkKind
+from deploy.study.marks import MARK_TOPIC, NOW_TOPIC, MarkKind
 from deploy.study.session import Session, begin
+from deploy.study.under_way import session_under_way
 
 CUP = Path(profiles.__file__).parent / "study" / "cup.toml"
 VIDEO = "tandem/robot-1/video/head"
