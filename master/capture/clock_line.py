@@ -8,6 +8,9 @@ the node's own step, comes down to an arrival that is earlier at once, and follo
 
 Δ is the step of the node's own time or count, or, without either, the number of periods since the last
 arrival; b is the length of a step, learnt over some seconds: 100 ppm of drift are then 0.2 ms of error.
+
+A node that counts, and from some time on samples slower or faster (it is throttled, or was set anew), is
+learnt again once two windows of arrivals agree on that: by its count alone its samples would seem ever older.
 """
 
 from __future__ import annotations
@@ -31,6 +34,10 @@ _RESET_S = 0.25
 """Own time and arrivals that differ by more: the node has begun anew, or its clock was set."""
 _LARGEST_DRIFT = 0.01
 _SMOOTH = 0.05
+_WINDOW, _CHANGED = 24.0, 0.05
+"""Counts, of which two windows in a row must tell another rate by this share, and agree within half of it."""
+_BACK = 8.0
+"""A sample that is older than the last one by at most so many steps was overtaken by it."""
 
 
 class NodeLine:
@@ -40,13 +47,16 @@ class NodeLine:
         self._stamped = stamp_wrap_s > 0.0
         self._counted = not self._stamped and counter_wrap > 0.0
         self._wrap = stamp_wrap_s if self._stamped else counter_wrap
+        self._far = _RESET_S if self._stamped else _BACK
         self._step_s = 1.0 if self._stamped else period_s
         self.period_s = period_s
         self._learning: list[tuple[float, float]] = []
         self._own = self._last_s = self._anchor_s = self._anchor_steps = math.nan
         self._steps = 0.0
         self.jitter_s = 0.0
-        self.missing = self.duplicates = self.resets = 0
+        self.missing = self.duplicates = self.resets = self.overtaken = self.rate_changes = 0
+        self._strayed = self._mark_s = self._window_step_s = math.nan
+        self._marked = 0.0
 
     def take(self, arrival_s: float, own: float, newest_s: float, left: int) -> float:
         """When a sample was taken; NaN if it was seen before.
@@ -55,6 +65,9 @@ class NodeLine:
         """
         before, step_s = self._last_s, self._step_s
         delta = self._delta(own, newest_s, left)
+        if delta > self._far and self._overtook(own):
+            self.overtaken += 1
+            return math.nan
         self._own = own
         if math.isnan(before):
             return self._at(arrival_s)
@@ -66,6 +79,10 @@ class NodeLine:
             return self._at(arrival_s)
         expected = before + step_s * delta
         late = arrival_s - expected
+        if self._counted and self._changed_rate(arrival_s, delta):
+            self.rate_changes += 1
+            self._anchor_s = math.nan
+            return self._at(arrival_s)
         if abs(late) > _RESET_S:
             self.resets += 1
             self._anchor_s = math.nan
@@ -84,6 +101,30 @@ class NodeLine:
             self._learn()
         self._tune()
         return time_s
+
+    def _overtook(self, own: float) -> bool:
+        """Whether the last sample overtook this one. Where another follows this one, the node began anew."""
+        unit = 1.0 if self._counted else self.period_s
+        if not self._wrap > 0.0 or not (self._own - own) % self._wrap <= _BACK * unit:
+            return False
+        follows = (own - self._strayed) % self._wrap <= 1.5 * unit
+        self._strayed = math.nan if follows else own
+        return not follows
+
+    def _changed_rate(self, arrival_s: float, delta: float) -> bool:
+        """Whether arrivals tell another rate than the node's count did; then it is taken over."""
+        self._marked += delta
+        if math.isnan(self._mark_s) or delta > _WINDOW:
+            self._mark_s, self._marked = arrival_s, 0.0
+        if self._marked < _WINDOW:
+            return False
+        step_s, before_s = (arrival_s - self._mark_s) / self._marked, self._window_step_s
+        self._mark_s, self._marked, self._window_step_s = arrival_s, 0.0, step_s
+        slower, alike = step_s / self._step_s - 1.0, step_s / before_s - 1.0
+        if not (abs(slower) > _CHANGED and abs(alike) < 0.5 * _CHANGED):
+            return False
+        self._step_s = self.period_s = 0.5 * (step_s + before_s)
+        return True
 
     def _at(self, arrival_s: float) -> float:
         """A sample of which only its arrival tells the time."""
@@ -149,7 +190,7 @@ class NodeLine:
 
     def lose(self) -> None:
         """Forget when it sampled last; its step's length stays."""
-        self._last_s = self._own = self._anchor_s = math.nan
+        self._last_s = self._own = self._anchor_s = self._mark_s = self._strayed = math.nan
 
 
 class ClockLines:
@@ -200,6 +241,16 @@ class ClockLines:
     def resets(self) -> NDArray[np.int64]:
         """(N,) times that a node began anew."""
         return np.array([node.resets for node in self._nodes], np.int64)
+
+    @property
+    def overtaken(self) -> NDArray[np.int64]:
+        """(N,) samples that came after a newer one, and were left out."""
+        return np.array([node.overtaken for node in self._nodes], np.int64)
+
+    @property
+    def rate_changes(self) -> NDArray[np.int64]:
+        """(N,) times that a node went on at another rate."""
+        return np.array([node.rate_changes for node in self._nodes], np.int64)
 
     def lose(self, nodes: Mask) -> None:
         """Forget when nodes (N,) sampled last, as their bus has failed; their steps' length stays."""

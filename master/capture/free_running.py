@@ -160,7 +160,8 @@ class FreeNodes:
         """All counters of the nodes, in their order."""
         counters, clock, free = self.each_tick, self._clock, slice(0, len(self.rows))
         counters.missing, counters.resets = clock.missing[free], clock.resets[free]
-        counters.duplicates = clock.duplicates[free]
+        counters.duplicates, counters.overtaken = clock.duplicates[free], clock.overtaken[free]
+        counters.rate_changes = clock.rate_changes[free]
         for decoder in self._decoders:
             counters.incomplete[decoder.nodes] = decoder.incomplete
             counters.bad_length[decoder.nodes] = decoder.short

@@ -40,6 +40,10 @@ class NodeHealth:
     """Samples of which a frame was missing."""
     resets: int = 0
     """How often its own time or count began anew."""
+    overtaken: int = 0
+    """Samples that came after a newer one, and were left out."""
+    rate_changes: int = 0
+    """How often it went on at another rate than before."""
 
 
 @dataclass(slots=True)
@@ -71,6 +75,8 @@ class NodeCounters:
         self.missing: Counts = np.zeros(count, dtype=np.int64)
         self.incomplete: Counts = np.zeros(count, dtype=np.int64)
         self.resets: Counts = np.zeros(count, dtype=np.int64)
+        self.overtaken: Counts = np.zeros(count, dtype=np.int64)
+        self.rate_changes: Counts = np.zeros(count, dtype=np.int64)
 
     def node(self, index: int) -> NodeHealth:
         """The counters of one node."""

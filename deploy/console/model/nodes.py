@@ -16,6 +16,7 @@ _TROUBLES = {
     "faults": "said {} times that its sensor is faulty",
     "saturated": "{} readings at the end of the range",
     "resets": "its own count began anew {} times",
+    "rate_changes": "its rate changed {} times",
 }
 """Counters that must not grow, and the words where one did."""
 

@@ -126,3 +126,66 @@ def test_an_own_time_that_is_no_number_spoils_its_sample_alone(
     found = node.lines.take(np.array([0]), np.array([true_s + 2e-4]), bad, bad)
     assert found[0] == pytest.approx(true_s, abs=5e-3)
     assert np.abs(node.run(301, 1500)[600:]).max() <= 1e-3
+
+
+def throttled(rate_hz: float, kind: str = COUNT, wrap: float = 256.0) -> tuple[Node, Array]:
+    """100 Hz for 10 s, then another rate; errors of the sample times from then on."""
+    node, errors, true_s = Node(kind, wrap, ppm=0.0), [], 5.0
+    for index in range(1000 + round(10 * rate_hz)):
+        at_s = true_s + 2e-4 + node.random.exponential(3e-4)
+        errors.append(node.arrive(index, at_s) - true_s)
+        true_s += 0.01 if index < 1000 else 1.0 / rate_hz
+    return node, np.array(errors[1000:])
+
+
+@pytest.mark.parametrize("wrap", [256.0, 65536.0])
+@pytest.mark.parametrize("rate_hz", [20.0, 50.0, 80.0, 93.0, 120.0, 200.0])
+def test_a_node_that_counts_and_changes_its_rate_is_learnt_again(rate_hz: float, wrap: float) -> None:
+    """An IMU that is throttled; by its count alone its samples would seem up to 0.25 s older."""
+    node, error = throttled(rate_hz, wrap=wrap)
+    assert np.abs(error).max() <= 0.25, "for a while they do"
+    assert np.abs(error[100:]).max() < 2e-3
+    assert node.lines.rate_changes[0] + node.lines.resets[0] >= (rate_hz < 100.0)
+    assert node.lines.period_s[0] == pytest.approx(1.0 / rate_hz, rel=0.02)
+
+
+def test_no_jitter_stall_or_loss_is_a_change_of_rate() -> None:
+    node = Node(COUNT, 256.0)
+    node.run(0, 1000, lose=0.05)
+    for first in range(1000, 4000, 100):
+        # every second something stands still for 120 ms, and gives all at once
+        end_s = float(node.true_s(np.array(first + 12))) + 3e-4
+        for index in range(first, first + 12):
+            node.arrive(index, end_s)
+        node.run(first + 12, first + 100)
+    assert node.lines.rate_changes[0] == 0
+    assert node.lines.resets[0] == 0
+
+
+@pytest.mark.parametrize(("kind", "wrap"), [(COUNT, 256.0), (COUNT, 65536.0), (STAMP, 6.4), (STAMP, np.inf)])
+def test_a_sample_that_was_overtaken_is_left_out_and_no_reset(kind: str, wrap: float) -> None:
+    """Some CAN controllers hand over frames of two mailboxes in the wrong order."""
+    node = Node(kind, wrap)
+    node.run(0, 500)
+    both_s = float(node.true_s(np.array(501))) + 3e-4
+    assert np.isfinite(node.arrive(501, both_s))
+    assert np.isnan(node.arrive(500, both_s))
+    error = node.run(502, 1000)
+    assert error.max() <= 1e-3
+    assert node.lines.overtaken[0] == 1
+    assert node.lines.resets[0] == 0
+
+
+@pytest.mark.parametrize(("kind", "wrap"), [(STAMP, 4.2e9), (COUNT, 65536.0)])
+@pytest.mark.parametrize("last", [3, 7])
+def test_a_node_that_begins_anew_twice_in_a_row_loses_one_sample(kind: str, wrap: float, last: int) -> None:
+    """Its supply dips: what it counted is so near to 0 that its first new sample looks overtaken."""
+    node = Node(kind, wrap)
+    node.run(0, 500)
+    for index in range(500, 500 + last + 1):
+        node.arrive(index, own=index - 500)
+    again = 501 + last
+    found = [node.arrive(index, own=index - again) for index in range(again, again + 50)]
+    true_s = node.true_s(np.arange(again, again + 50, dtype=np.float64))
+    assert np.isnan(found).sum() <= 2
+    assert np.nanmax(np.abs(np.array(found) - true_s)[5:]) < 2e-3
