@@ -8,6 +8,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, Field
 
 from common.can.config import BusConfig
+from common.clock_sync.config import ClockConfig
 from common.config.console import ConsoleConfig
 from common.config.section import RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
@@ -101,6 +102,7 @@ class MasterConfig(Section):
     nodes: dict[str, NodeConfig]
     suit: SuitSection = SuitSection()
     link: LinkConfig
+    clock: ClockConfig = ClockConfig()
     process: ProcessConfig = ProcessConfig()
     alarms: AlarmsConfig = AlarmsConfig()
     tap: TapConfig = TapConfig()

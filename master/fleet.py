@@ -8,11 +8,13 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from common.clock import monotonic_ns, to_ns
+from common.clock_sync.services import keep_reference
 from common.link import LinkSession
 from common.link.place import own_endpoints
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from common.skeleton import Skeleton
+from common.wire.messages import ClockReference
 from common.wire.together import beside
 from master.comfort.scaling import MotionScaling
 from master.config import MasterConfig
@@ -49,6 +51,11 @@ class Fleet:
             tasks.create_task(self._serve(robot))
         if self._config.watched:
             tasks.create_task(self._watch(tasks))
+        tasks.create_task(keep_reference(self._config.clock, self._tell_reference))
+
+    def _tell_reference(self, reference: ClockReference | None, steps: int) -> None:
+        for robot in self.robots:
+            robot.clock.tell(reference, steps)
 
     def send(self, angles: JointAngleSample, grip: Grip, angles_ns: int) -> Iterator[CommandedRobot]:
         """Put the posture on each robot's topic; yields each robot after that."""

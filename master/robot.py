@@ -69,7 +69,7 @@ class CommandedRobot:
         self._writer = CommandWriter(name, scaling)
         self._control = CONTROL.of(operator)
         self._last_claim = ""
-        self._clock = MasterExchange(asker)
+        self.clock = MasterExchange(asker)
         self._lease = LeaseKeeper(name, operator, asker)
         self._watch = RobotWatch()
         self._homonyms = Homonyms(name, operator)
@@ -170,13 +170,13 @@ class CommandedRobot:
 
     async def _keep_clock(self) -> None:
         async for _ in ticks(TickGrid(monotonic_ns(), round(1e9 / CLOCK.rate_hz))):
-            query = self._clock.query(monotonic_ns())
+            query = self.clock.query(monotonic_ns())
             try:
                 payload, arrived_ns = await self._link.ask_stamped(CLOCK, encode(query))
                 reply = decode(payload, ClockReply)
                 # another robot of that name has another clock
                 if not self._lease.token or reply.instance == self._lease.instance:
-                    self._clock.on_reply(reply, arrived_ns)
+                    self.clock.on_reply(reply, arrived_ns)
             except (LinkError, CodecError):
                 continue
 

@@ -10,6 +10,8 @@ from contextlib import nullcontext
 from dataclasses import replace
 
 from common.clock import monotonic_ns, to_ms
+from common.clock_sync import SlaveExchange
+from common.clock_sync.services import keep_reference
 from common.link import Link, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
@@ -117,6 +119,7 @@ class Slave:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._drive())
                 tasks.create_task(self._publish_statistics())
+                tasks.create_task(keep_reference(self._config.clock, self._pipeline.clock.tell))
                 if self._last_known is not None:
                     tasks.create_task(self._remember(self._last_known))
 
@@ -231,7 +234,6 @@ class Slave:
     def metrics(self) -> SlaveMetrics:
         """Counters and percentiles for tables and reports."""
         pipeline = self._pipeline
-        offset = pipeline.clock.estimator.estimate(monotonic_ns())
         guard = pipeline.guard
         return SlaveMetrics(
             software=software(),
@@ -248,7 +250,7 @@ class Slave:
             due=pipeline.traffic.due.metrics(),
             early=pipeline.traffic.one_way.clamped,
             unmoved=pipeline.traffic.journeys.unmoved,
-            offset=OffsetMetrics(to_ms(offset.offset_ns), to_ms(offset.bound_ns), offset.trusted),
+            offset=_offset(pipeline.clock, monotonic_ns()),
             undecodable=dict(pipeline.unread.counts),
             base=self._base.counters() if self._base else {},
             servos=self._servo_metrics(),
@@ -273,6 +275,20 @@ async def run(config: SlaveConfig, stop: asyncio.Event, write_metrics: WriteMetr
     """Run a slave until `stop` is set; the servos are left holding. Raises LinkError or RobotError."""
     await until_stopped(stop, _run(config, write_metrics))
     log.info("slave stopped; the servos hold their position")
+
+
+def _offset(clock: SlaveExchange, now_ns: int) -> OffsetMetrics:
+    best, round_trip = clock.estimate(now_ns), clock.estimator.estimate(now_ns)
+    return OffsetMetrics(
+        to_ms(best.offset_ns),
+        to_ms(best.bound_ns),
+        best.trusted,
+        source=clock.best.source,
+        words=clock.best.words,
+        round_trip_bound_ms=to_ms(round_trip.bound_ns),
+        contradictions=clock.best.contradictions,
+        clock_steps=clock.own_steps,
+    )
 
 
 async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from common.clock_sync.config import ClockConfig
 from common.config.console import ConsoleConfig
 from common.config.section import Section
 from common.errors import ConfigError, ConfigMistake
@@ -57,6 +58,7 @@ class SlaveConfig(Section):
     base: BaseConfig = BaseConfig()
     camera: CameraConfig = CameraConfig()
     link: LinkConfig
+    clock: ClockConfig = ClockConfig()
     process: ProcessConfig = ProcessConfig()
     tap: TapConfig = TapConfig()
     console: ConsoleConfig = ConsoleConfig()

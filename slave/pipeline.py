@@ -138,17 +138,28 @@ class SlavePipeline:
             self.unread.count("command", error, now_ns)
             return
         offset = self.clock.estimator.estimate(now_ns)
+        best = self.clock.estimate(now_ns)
         # another operator's stamps are of another clock
         if command.lease and command.lease == self.guard.lease.token and sender == self.guard.operator:
-            self.traffic.received(command, received_ns, offset)
-        if self.take(command, received_ns, now_ns, offset).accepted:
-            self.traffic.journeys.accepted(command, received_ns, now_ns, offset, self.guard.state in MOVING)
+            self.traffic.received(command, received_ns, best)
+        if self.take(command, received_ns, now_ns, offset, best=best).accepted:
+            self.traffic.journeys.accepted(command, received_ns, now_ns, best, self.guard.state in MOVING)
             if self.on_accepted is not None:
                 self.on_accepted(command, now_ns, offset)
 
-    def take(self, command: Command, received_ns: int, now_ns: int, offset: Offset) -> Admission:
+    def take(
+        self,
+        command: Command,
+        received_ns: int,
+        now_ns: int,
+        offset: Offset,
+        *,
+        best: Offset | None = None,
+    ) -> Admission:
         """Take a command: gate ▸ nearest posture within the site's limits ▸ tracker.
 
+        `offset`: as the round trip proves it, for the gate. `best`: as the hosts' time services may know it
+        better, for the tracker.
         A joint without a servo stays where it stands, as one of which the operator's angle is not known.
         """
         # what is no mask of the joints goes to the gate as it came, and is refused there
@@ -164,7 +175,7 @@ class SlavePipeline:
             )
             self.guard.clamped(self.nearest.clamps(now_ns, asked, position_rad))
             self.blind.heard(received_ns)
-            sampled_ns = offset.local_ns(command.stamps.sampled_ns)
+            sampled_ns = (best or offset).local_ns(command.stamps.sampled_ns)
             self.tracker.accept(sampled_ns, now_ns, position_rad, velocity_rad_s)
         return admission
 
@@ -301,7 +312,7 @@ class SlavePipeline:
     def state(self, now_ns: int) -> bytes:
         """Encode what the robot does now."""
         self._states_sent += 1
-        offset = self.clock.estimator.estimate(now_ns)
+        offset = self.clock.estimate(now_ns)
         reading = self._reading
         clamped, self._clamped = self._clamped, np.zeros_like(self._clamped)
         return encode(

@@ -1,5 +1,6 @@
 """How far another host's clock is from ours: the estimate (estimator), the talk it rests on (exchange)."""
 
+from common.clock_sync.best import ROUND_TRIP, BestOffset
 from common.clock_sync.estimator import (
     ANY_CLOCKS,
     NEVER_MEASURED,
@@ -15,7 +16,9 @@ __all__ = [
     "ANY_CLOCKS",
     "NEVER_MEASURED",
     "RAW_CLOCKS",
+    "ROUND_TRIP",
     "UNKNOWN_NS",
+    "BestOffset",
     "MasterExchange",
     "Offset",
     "OffsetEstimator",

@@ -8,8 +8,9 @@ next query left at t1' and arrived at t2'.
 from __future__ import annotations
 
 from common.clock import NS_PER_S
-from common.clock_sync.estimator import RAW_CLOCKS, OffsetEstimator
-from common.wire.messages import ClockQuery, ClockReply
+from common.clock_sync.best import BestOffset
+from common.clock_sync.estimator import RAW_CLOCKS, Offset, OffsetEstimator
+from common.wire.messages import ClockQuery, ClockReference, ClockReply
 
 REMEMBERED = 16
 """Exchanges that may be under way, or lost, before one is forgotten."""
@@ -28,6 +29,11 @@ class MasterExchange:
     def __init__(self, asker: int = 0) -> None:
         self.asker = asker
         self.estimator = OffsetEstimator(RAW_CLOCKS)
+        self.best = BestOffset()
+        self.own: ClockReference | None = None
+        """What this host's time service states."""
+        self.own_steps = 0
+        """Times that its reference was set, or jumped."""
         self.foreign = 0
         """Replies to questions that were not asked, or answered before."""
         self._asked: dict[int, None] = {}
@@ -38,7 +44,15 @@ class MasterExchange:
         self._asked[now_ns] = None
         _forget_oldest(self._asked)
         asked_ns, heard_ns = self._last
-        return ClockQuery(now_ns, asked_ns, heard_ns, self.asker)
+        return ClockQuery(now_ns, asked_ns, heard_ns, self.asker, self.own)
+
+    def estimate(self, now_ns: int) -> Offset:
+        """The offset by the better of the round trip and what the hosts' time services state."""
+        return self.best.estimate(now_ns, self.estimator.estimate(now_ns), self.own)
+
+    def tell(self, own: ClockReference | None, steps: int) -> None:
+        """What this host's time service states now."""
+        self.own, self.own_steps = own, steps
 
     def on_reply(self, reply: ClockReply, arrived_ns: int) -> bool:
         """Take a reply; False if it answers no question of this side, or its stamps are impossible."""
@@ -49,6 +63,7 @@ class MasterExchange:
         if not self.estimator.add(reply.asked_ns, reply.received_ns, reply.replied_ns, arrived_ns):
             return False
         self._last = (reply.asked_ns, arrived_ns)
+        self.best.heard(reply.reference, arrived_ns)
         return True
 
 
@@ -63,6 +78,10 @@ class SlaveExchange:
     def __init__(self) -> None:
         self.foreign = 0
         """Queries of others than the asker that is followed."""
+        self.own: ClockReference | None = None
+        """What this host's time service states."""
+        self.own_steps = 0
+        """Times that its reference was set, or jumped."""
         self._followed = 0
         self._askers = {0: _Asker()}
 
@@ -70,6 +89,22 @@ class SlaveExchange:
     def estimator(self) -> OffsetEstimator:
         """Of the asker that is followed."""
         return self._askers[self._followed].estimator
+
+    @property
+    def best(self) -> BestOffset:
+        """What bounds the offset of the asker that is followed, and why."""
+        return self._askers[self._followed].best
+
+    def estimate(self, now_ns: int) -> Offset:
+        """The offset by the better of the round trip and what the hosts' time services state.
+
+        For figures and prediction. A gate of the guard takes `estimator`: that is proved, this is believed.
+        """
+        return self.best.estimate(now_ns, self.estimator.estimate(now_ns), self.own)
+
+    def tell(self, own: ClockReference | None, steps: int) -> None:
+        """What this host's time service states now."""
+        self.own, self.own_steps = own, steps
 
     def follow(self, asker: int) -> None:
         """From now on commands bear the stamps of this asker's clock."""
@@ -81,7 +116,7 @@ class SlaveExchange:
         taken = self._heard(query.asker).on_query(query, received_ns, now_ns)
         if not taken or query.asker != self._followed:
             self.foreign += 1
-        return ClockReply(query.asked_ns, received_ns, now_ns)
+        return ClockReply(query.asked_ns, received_ns, now_ns, reference=self.own)
 
     def _heard(self, asker: int) -> _Asker:
         known = self._askers.pop(asker, None) or _Asker()
@@ -101,6 +136,7 @@ class _Asker:
 
     def __init__(self) -> None:
         self.estimator = OffsetEstimator(RAW_CLOCKS)
+        self.best = BestOffset()
         self._replied: dict[int, int] = {}
         self._measured_ns: int | None = None
 
@@ -115,6 +151,7 @@ class _Asker:
         else:
             return False
         self._measured_ns = received_ns
+        self.best.heard(query.reference, received_ns)
         # a query that the network doubled is replied to twice, and the first reply is the one that counts
         self._replied.setdefault(query.asked_ns, now_ns)
         _forget_oldest(self._replied)

@@ -94,6 +94,16 @@ class OffsetMetrics(Metrics):
     offset_ms: float
     bound_ms: float
     trusted: bool
+    source: str = "round trip"
+    """Whose bound it is: `round trip`, `chrony`, `ptp`, `chrony and ptp`."""
+    words: str = ""
+    """Which bound is in use, and why."""
+    round_trip_bound_ms: float = 0.0
+    """Half the round trip: what the guard goes by."""
+    contradictions: int = 0
+    """Statements of a time service that the round trip refuted."""
+    clock_steps: int = 0
+    """Times that this host's own reference clock was set, or jumped by a leap second."""
 
 
 @dataclass(frozen=True, slots=True)

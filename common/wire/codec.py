@@ -21,6 +21,7 @@ from common.wire.messages import (
     Action,
     BaseAttitude,
     ClockQuery,
+    ClockReference,
     ClockReply,
     Command,
     CommandEcho,
@@ -35,7 +36,9 @@ from common.wire.messages import (
 
 VERSION = 5
 READABLE = (4, VERSION)
-"""In version 4 a state told no clamped joints; all else was as now."""
+"""In version 4 a state told no clamped joints, and clock messages no reference; all else was as now."""
+_NEWER: dict[type, tuple[object, ...]] = {RobotState: (b"",), ClockQuery: (None,), ClockReply: (None,)}
+"""What stands for the fields that a message of version 4 does not have."""
 CONTROL_BYTES = 1100
 """Of a command, a state, and whatever else the robot is controlled by. With the headers of IPv6, TCP, TLS and
 Zenoh a packet stays below 1280 bytes, which every path carries; many VPNs swallow larger ones silently."""
@@ -87,8 +90,7 @@ def decode(payload: bytes, kind: type[_Decoded], joints: int = 0) -> _Decoded:
             f"schema version {fields.short(array[1])}, expected {VERSION}: the other side runs another "
             "version of tandem, install the same on both hosts"
         )
-    # a state of version 4 ends before the clamped joints
-    newer = (b"",) if kind is RobotState and array[1] < VERSION else ()
+    newer = _NEWER.get(kind, ()) if array[1] < VERSION else ()
     message = unpack((*array[2:], *newer), joints)
     assert isinstance(message, kind)
     return message
@@ -238,6 +240,39 @@ def _unpack_control_reply(f: tuple[object, ...], _: int) -> ControlReply:
     return ControlReply(fields.flag(f[0]), guard, text, lease, challenge, instance=instance, place=place)
 
 
+def _pack_reference(r: ClockReference | None) -> tuple[object, ...] | None:
+    if r is None:
+        return None
+    return (r.at_ns, r.ahead_ns, r.error_ns, r.rate_ppb, r.rate_error_ppb, r.source, r.scale)
+
+
+def _unpack_reference(value: object) -> ClockReference | None:
+    if value is None:
+        return None
+    at_ns, ahead_ns, error_ns, rate_ppb, rate_error_ppb, source, scale = fields.array(value, 7)
+    return ClockReference(
+        fields.count(at_ns),
+        fields.signed(ahead_ns),
+        fields.count(error_ns),
+        fields.signed(rate_ppb),
+        fields.count(rate_error_ppb),
+        fields.text(source, MAX_NAME),
+        fields.text(scale, MAX_NAME),
+    )
+
+
+def _unpack_clock_query(f: tuple[object, ...], _: int) -> ClockQuery:
+    fields.array(f, 5)
+    asked_ns, last_asked_ns, last_heard_ns, asker = fields.counts(f[:4])
+    return ClockQuery(asked_ns, last_asked_ns, last_heard_ns, asker, _unpack_reference(f[4]))
+
+
+def _unpack_clock_reply(f: tuple[object, ...], _: int) -> ClockReply:
+    fields.array(f, 5)
+    asked_ns, received_ns, replied_ns, instance = fields.counts(f[:4])
+    return ClockReply(asked_ns, received_ns, replied_ns, instance, _unpack_reference(f[4]))
+
+
 def _pack_statistics(m: Statistics) -> tuple[object, ...]:
     return (_ROLES[type(m.metrics)], m.sent_ns, to_tree(m.metrics))
 
@@ -276,9 +311,11 @@ def _packed(m: Message) -> tuple[object, ...]:
         case ControlReply():
             return ("controlled", VERSION, *_pack_control_reply(m))
         case ClockQuery():
-            return ("clock", VERSION, m.asked_ns, m.last_asked_ns, m.last_heard_ns, m.asker)
+            reference = _pack_reference(m.reference)
+            return ("clock", VERSION, m.asked_ns, m.last_asked_ns, m.last_heard_ns, m.asker, reference)
         case ClockReply():
-            return ("clocked", VERSION, m.asked_ns, m.received_ns, m.replied_ns, m.instance)
+            reference = _pack_reference(m.reference)
+            return ("clocked", VERSION, m.asked_ns, m.received_ns, m.replied_ns, m.instance, reference)
         case Statistics():
             return ("statistics", VERSION, *_pack_statistics(m))
         case Truth():
@@ -291,8 +328,8 @@ _DECODERS: dict[type, tuple[str, Callable[[tuple[object, ...], int], object]]] =
     RobotState: ("state", _unpack_state),
     ControlRequest: ("control", _unpack_control_request),
     ControlReply: ("controlled", _unpack_control_reply),
-    ClockQuery: ("clock", lambda f, _: ClockQuery(*fields.counts(fields.array(f, 4)))),
-    ClockReply: ("clocked", lambda f, _: ClockReply(*fields.counts(fields.array(f, 4)))),
+    ClockQuery: ("clock", _unpack_clock_query),
+    ClockReply: ("clocked", _unpack_clock_reply),
     Statistics: ("statistics", _unpack_statistics),
     Truth: ("truth", _unpack_truth),
 }

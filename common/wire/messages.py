@@ -197,6 +197,26 @@ class ControlReply:
 
 
 @dataclass(frozen=True, slots=True)
+class ClockReference:
+    """What a time service states of its host's clock: reference minus clock, and how wrong that may be."""
+
+    at_ns: int
+    """When, by the sender's clock."""
+    ahead_ns: int
+    """Reference minus the sender's clock at that moment."""
+    error_ns: int
+    """Half-width of what the service states, and of reading the clocks."""
+    rate_ppb: int
+    """By how much `ahead_ns` grows, ns a second."""
+    rate_error_ppb: int
+    """Half-width of that."""
+    source: str
+    """`chrony` or `ptp`."""
+    scale: str
+    """What the reference counts: `utc`, or one PTP grandmaster. Only equal ones compare."""
+
+
+@dataclass(frozen=True, slots=True)
 class ClockQuery:
     """Master → slave. Carries the end of the last exchange, so that the slave can measure too."""
 
@@ -208,6 +228,8 @@ class ClockQuery:
     """t4 of the exchange before."""
     asker: int = 0
     """A number that only this asker uses; 0 where it has none."""
+    reference: ClockReference | None = None
+    """What the master's time service states; None where none does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,6 +244,8 @@ class ClockReply:
     """t3, slave's clock."""
     instance: int = 0
     """Whose clock it is."""
+    reference: ClockReference | None = None
+    """What the slave's time service states; None where none does."""
 
 
 @dataclass(frozen=True, slots=True)

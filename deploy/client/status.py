@@ -11,7 +11,7 @@ from common.clock import to_ms
 from common.latency.one_way import master_offset
 from common.link import Link, open_session
 from common.metrics.parts import Summary, Ticks
-from common.metrics.slave import DueMetrics, GuardTimes, LeaseMetrics
+from common.metrics.slave import DueMetrics, GuardTimes, LeaseMetrics, OffsetMetrics
 from common.skeleton import load_skeleton
 from common.skeleton.load import profile_names
 from common.wire.messages import Action, RobotState
@@ -104,6 +104,8 @@ class RobotStatus:
     blind: str | None
     """How far each hand would go if the line died now; None while the robot follows nobody."""
     due: DueMetrics | None
+    clocks: OffsetMetrics | None
+    """What bounds one-way times, and why."""
     times: GuardTimes | None
     """The guard's times in force, and why."""
     ticks: Ticks | None
@@ -160,6 +162,7 @@ def robot_status(answer: RobotAnswer, heard: Heard, namesakes: int = 0) -> Robot
         else LatencyStatus(),
         blind=_blind(state),
         due=metrics.due if metrics else None,
+        clocks=metrics.offset if metrics else None,
         times=metrics.times if metrics else None,
         ticks=metrics.ticks if metrics else None,
         resting=state.resting if state else (),

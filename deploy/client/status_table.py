@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common.metrics.parts import Summary
+from deploy.client.clocks import clock_words
 from deploy.client.efforts import largest, without_detection, without_torque_limit
 from deploy.client.status import RobotStatus
 from deploy.report.tables import GUARD_STYLE, UNKNOWN, plain_table
@@ -56,6 +57,7 @@ def _words(one: RobotStatus) -> Sequence[tuple[str, str]]:
         missing = f"{due.missing} of {due.expected} commands were not there when they were due"
         p99, corrected = (_number(_p99(of), 1) for of in (latency.one_way, latency.one_way_corrected))
         words.append((f"{missing} (one way p99 {p99} ms, {corrected} ms with them)", "yellow"))
+    words += clock_words(one.clocks)
     if one.blind is not None:
         words.append((one.blind, ""))
     if one.times is not None:

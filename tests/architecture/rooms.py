@@ -37,7 +37,8 @@ ORDER: Sequence[Sequence[str]] = [
 Rooms on one line do not import each other."""
 
 IMPURE = [
-    "common/clock.py", "common/can/*", "common/inputs/device.py", "common/inputs/reader.py",
+    "common/clock.py", "common/clock_sync/services.py",
+    "common/can/*", "common/inputs/device.py", "common/inputs/reader.py",
     "common/link/*", "common/tap/*", "common/log/handler.py", "common/log/streams.py",
     "common/process/*", "common/recording/recorder.py",
     "master/__main__.py", "master/app.py", "master/deadman/switches.py",

@@ -35,7 +35,8 @@ def latency_table(slave: SlaveMetrics | None) -> RenderableType:
     table.add_row("total", *stage_cells(total), style="bold")
     notes = [Text(MOVED_IS, "dim")] if "written→moved" in slave.stages_ms else []
     if slave.offset.trusted:
-        known = Text(f"one-way times are uncertain by ± {slave.offset.bound_ms:.3f} ms", "dim")
+        words = f"one-way times are uncertain by ± {slave.offset.bound_ms:.3f} ms"
+        known = Text(f"{words}: {slave.offset.words}" if slave.offset.words else words, "dim")
     else:
         known = Text("one-way times are not trusted: the clock offset is stale", "yellow")
     return Group(table, *notes, known, _due_note(slave))

@@ -22,6 +22,7 @@ from deploy.ops.doctor.judge.machine import (
     judge_disk,
     judge_machine,
     judge_receive_buffer,
+    judge_services,
     judge_tcp,
 )
 from deploy.ops.doctor.judge.needs import GENERAL, Needs
@@ -31,7 +32,7 @@ from deploy.ops.doctor.judge.robots import judge_robot
 from deploy.ops.doctor.judge.stops import judge_stops
 from deploy.ops.doctor.judge.switches import judge_switch
 from deploy.ops.doctor.read.can import ask_ip, read_can
-from deploy.ops.doctor.read.clock import clock_is_synchronised
+from deploy.ops.doctor.read.clock import clock_is_synchronised, read_services
 from deploy.ops.doctor.read.devices import egl_is_there, free_bytes, read_device, v4l2_is_there
 from deploy.ops.doctor.read.endpoints import knock, try_to_listen
 from deploy.ops.doctor.read.keys import read_keys
@@ -92,6 +93,7 @@ def host(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
         *judge_receive_buffer(needs.buses, machine),
         *judge_tcp(machine),
         judge_clock(clock_is_synchronised()),
+        *judge_services(read_services(needs.clock)),
         judge_disk(str(options.recordings.absolute()), free_bytes(options.recordings)),
         *([judge_networks(process)] if needs.role == GENERAL else []),
     ]
@@ -134,7 +136,7 @@ async def others(needs: Needs) -> Sequence[Finding]:
     if not needs.robots:
         return found
     try:
-        robots = await read_robots(needs.link, needs.robots, needs.operator)
+        robots = await read_robots(needs.link, needs.robots, needs.operator, needs.clock)
     except LinkError as error:
         return [*found, fail("link", str(error), "mend [link] first")]
     found += [finding for facts in robots for finding in judge_robot(facts, software())]

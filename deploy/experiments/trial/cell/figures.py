@@ -35,7 +35,7 @@ FIGURES = (
            "long the robot went without what they had to say (correction for coordinated omission)"),
     CellMetric("one_way_bound_ms", "bound ±", "ms", 1, LATENCY,
            "how wrong the clock offset can make a one-way figure at most: half the least round trip, "
-           "plus drift"),
+           "plus drift; or what both hosts' time services state, where that is narrower"),
     CellMetric("true_one_way_p50_ms", "true p50", "ms", 1, LATENCY,
            "one-way of accepted commands by the one clock that both namespaces share: a check of the "
            "bound that two real hosts do not have"),

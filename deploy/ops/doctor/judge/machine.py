@@ -55,6 +55,16 @@ def judge_clock(synchronised: bool | None) -> Finding:
     return warn(check, "nothing sets this host's clock", advice)
 
 
+def judge_services(read: tuple[bool, str] | None) -> list[Finding]:
+    """What this host's time services state. Without one the round trip bounds one-way times."""
+    if read is None:
+        return []
+    states, words = read
+    if states:
+        return [ok("clock", f"{words}; used where it is narrower than half the round trip")]
+    return [ok("clock", f"half the round trip bounds one-way times ({words})")]
+
+
 def judge_tcp(facts: MachineFacts) -> list[Finding]:
     """How tcp shares a line, and whether it copes with a path that swallows large packets."""
     if not facts.congestion_control:

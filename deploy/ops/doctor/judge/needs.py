@@ -10,6 +10,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from common.can.config import BusConfig
+from common.clock_sync.config import ClockConfig
 from common.config.load import load_config
 from common.errors import TandemError
 from common.link.config import LinkConfig
@@ -70,6 +71,7 @@ class Needs:
     camera: CameraNeed = CameraNeed.OFF
     camera_device: str = ""
     link: LinkConfig = field(default_factory=LinkConfig)
+    clock: ClockConfig | None = None
     estop: EstopConfig | None = None
     """A slave's emergency stop inputs."""
     simulated: bool = False
@@ -114,6 +116,7 @@ def _of_master(config: MasterConfig) -> Needs:
         buses=tuple(BusNeed(bus, nodes[bus.name], config.capture.rate_hz) for bus in config.capture.buses),
         realtime_priority=config.process.realtime_priority,
         link=config.link,
+        clock=config.clock,
         robots=tuple(config.commanded),
         operator=config.operator.name,
         switches={"deadman": config.operator.deadman}
@@ -144,6 +147,7 @@ def _of_slave(config: SlaveConfig) -> Needs:
         camera=CameraNeed(config.camera.source),
         camera_device=config.camera.device,
         link=config.link,
+        clock=config.clock,
         certified_as=common_name(Role.ROBOT, config.robot),
     )
 

@@ -65,8 +65,14 @@ def _times(facts: RobotFacts) -> list[Finding]:
 def _clock(facts: RobotFacts) -> list[Finding]:
     if not facts.round_trips_ms:
         return []
+    check = f"{facts.name}: clock"
     words = f"offset {facts.offset_ms:+.3f} ms ± {facts.bound_ms:.3f} ms: measured, so the two need not agree"
-    return [ok(f"{facts.name}: clock", words)]
+    words += f"; {facts.clock_words}" if facts.clock_words else ""
+    if facts.clock_refuted:
+        return [
+            warn(check, words, "`chronyc tracking` and `chronyc sources` on both hosts: one of them is wrong")
+        ]
+    return [ok(check, words)]
 
 
 def _versions(facts: RobotFacts, ours: Software) -> Finding:

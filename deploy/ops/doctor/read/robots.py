@@ -10,13 +10,15 @@ from dataclasses import dataclass
 
 from common.clock import monotonic_ns, to_ms
 from common.clock_sync import MasterExchange
+from common.clock_sync.config import ClockConfig
+from common.clock_sync.services import TimeServices
 from common.errors import CodecError, LinkError
 from common.link import Link, open_session
 from common.link.config import LinkConfig
 from common.metrics.parts import Software
 from common.metrics.slave import GuardTimes
 from common.wire.codec import decode, encode
-from common.wire.messages import Action, ClockReply
+from common.wire.messages import Action, ClockReference, ClockReply
 from common.wire.presence import several_bear
 from common.wire.topics import CLOCK
 from deploy.client.ask import ask
@@ -45,13 +47,19 @@ class RobotFacts:
     offset_ms: float = 0.0
     """Its clock minus ours."""
     bound_ms: float = 0.0
+    clock_words: str = ""
+    """What bounds that, and why."""
+    clock_refuted: bool = False
+    """Whether a time service contradicted the round trip."""
     software: Software | None = None
     """None where it did not tell."""
     times: GuardTimes | None = None
     """Its guard's times in force."""
 
 
-async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) -> list[RobotFacts]:
+async def read_robots(
+    link: LinkConfig, robots: Sequence[str], operator: str, clock: ClockConfig | None = None
+) -> list[RobotFacts]:
     """Ask each, side by side. Raises LinkError where no session can be opened at all.
 
     It only asks: it claims nothing, and listens at no endpoint, so a running master is not disturbed.
@@ -60,10 +68,13 @@ async def read_robots(link: LinkConfig, robots: Sequence[str], operator: str) ->
         link.model_copy(update={"listen": [], "access": None, "revoked": None}), tuple(robots), operator
     )
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
-        return await asyncio.gather(*(_read(session.link(robot), where) for robot in robots))
+        services = TimeServices(clock or ClockConfig(source="round_trip"))
+        await asyncio.to_thread(services.read)
+        own = services.track.reference(monotonic_ns())
+        return await asyncio.gather(*(_read(session.link(robot), where, own) for robot in robots))
 
 
-async def _read(link: Link, where: Destination) -> RobotFacts:
+async def _read(link: Link, where: Destination, own: ClockReference | None) -> RobotFacts:
     all_heard = HeardOfAll(link)
     answers = await ask(link, where, Action.STATUS)
     if len(answers) > 1:
@@ -74,10 +85,11 @@ async def _read(link: Link, where: Destination) -> RobotFacts:
     if not answer.guard:
         return RobotFacts(link.robot, "", answer.text)
     exchange = MasterExchange(asker=1 + secrets.randbelow((1 << 63) - 1))
+    exchange.tell(own, 0)
     round_trips = [trip async for trip in _exchanges(link, exchange)]
     with suppress(TimeoutError):
         await asyncio.wait_for(heard.all.wait(), LISTEN_S)
-    offset = exchange.estimator.estimate(monotonic_ns())
+    offset = exchange.estimate(monotonic_ns())
     return RobotFacts(
         link.robot,
         answer.guard,
@@ -86,6 +98,8 @@ async def _read(link: Link, where: Destination) -> RobotFacts:
         EXCHANGES,
         to_ms(offset.offset_ns) if round_trips else 0.0,
         to_ms(offset.bound_ns) if round_trips else 0.0,
+        exchange.best.words,
+        exchange.best.contradictions > 0,
         heard.metrics.software if heard.metrics else None,
         heard.metrics.times if heard.metrics else None,
     )
