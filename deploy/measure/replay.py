@@ -61,7 +61,11 @@ class Comparison:
 
 
 def compare(
-    truth: TruthSeries, moved: MovedSeries, accepted: Sequence[Arrival], config: SlaveConfig
+    truth: TruthSeries,
+    moved: MovedSeries,
+    accepted: Sequence[Arrival],
+    config: SlaveConfig,
+    strategies: Iterable[str] = STRATEGIES,
 ) -> Comparison | None:
     """Replay the end of the run with each strategy; None where there is too little to judge."""
     if not accepted or not moved.tracking.any():
@@ -72,7 +76,7 @@ def compare(
     if as_run is None:
         return None
     replayed: dict[str, FollowedMotion] = {}
-    for strategy in STRATEGIES:
+    for strategy in strategies:
         judged = motion(truth, replay(accepted, moved, strategy, config), names)
         if judged is None:
             return None

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.quaternion import Array, from_rotation_vector, multiply, rotate
+from common.quaternion import Array, from_rotation_vector, multiply, rotate, to_matrix
 from master.calibrate.carried import confusion, signed_permutations
 from master.calibrate.evidence import CrossCheck, at_most, not_judged
 
@@ -208,18 +208,35 @@ def _guesses() -> Array:
 
 def _scatter(force: Array, turn_rad: Array, guesses: Array) -> Array:
     """(G, K) of windows (K, n, 3): how far each third's mean force is from one vector of length 1."""
-    count, length = force.shape[:2]
-    q = np.zeros((len(guesses), count, 4))
-    q[..., 0] = 1.0
-    means = np.zeros((_BLOCKS, len(guesses), count, 3))
-    for k in range(length):
-        # the force is felt half-way through the sample's turn
-        half = from_rotation_vector(0.5 * np.einsum("gij,kj->gki", guesses, turn_rad[:, k]))
-        q = multiply(q, half)
-        means[k * _BLOCKS // length] += rotate(q, np.broadcast_to(force[:, k], (len(guesses), count, 3)))
-        q = multiply(q, half)
-    means *= _BLOCKS / length
+    means = _mean_forces(force, turn_rad, guesses)
     mean = means.mean(axis=0)
     spread = np.mean(np.sum((means - mean) ** 2, axis=-1), axis=0)
     out: Array = np.sqrt(spread + (np.linalg.norm(mean, axis=-1) - 1.0) ** 2)
     return out
+
+
+def _mean_forces(force: Array, turn_rad: Array, guesses: Array) -> Array:
+    """(3, G, K, 3): the mean force of each third of each window, turned back by the guessed gyroscope.
+
+    A guess is a rotation P times a factor u, which is negative for a mirror image. Turning by P u ω is P
+    times turning by u ω times Pᵀ, so turns are summed up once for each factor, not for each of the guesses.
+    """
+    factors = np.sign(np.linalg.det(guesses)) * np.abs(guesses).max(axis=(1, 2))
+    unlike, of_guess = np.unique(factors, return_inverse=True)
+    rotations = guesses / factors[:, None, None]
+    count, length = force.shape[:2]
+    q = np.zeros((len(unlike), count, 4))
+    q[..., 0] = 1.0
+    # sums of R_ab f_c: with them P R Pᵀ f is known for each P
+    sums = np.zeros((_BLOCKS, len(unlike), count, 3, 3, 3))
+    for k in range(length):
+        # the force is felt half-way through the sample's turn
+        half = from_rotation_vector(0.5 * unlike[:, None, None] * turn_rad[:, k])
+        q = multiply(q, half)
+        sums[k * _BLOCKS // length] += to_matrix(q)[..., None] * force[:, k, None, None, :]
+        q = multiply(q, half)
+    means = np.empty((_BLOCKS, len(guesses), count, 3))
+    for guess, (factor, rotation) in enumerate(zip(of_guess, rotations, strict=True)):
+        means[:, guess] = np.einsum("tkabc,ia,cb->tki", sums[:, factor], rotation, rotation)
+    means *= _BLOCKS / length
+    return means

@@ -15,7 +15,8 @@ from common.quaternion import Array
 Parameters = tuple[Array, Array]
 """S (3, 3) and c (3,)."""
 _ROWS, _COLUMNS = np.triu_indices(3)
-_DIAGONAL = _ROWS == _COLUMNS
+_BESIDE = _ROWS != _COLUMNS
+"""Of the upper triangle, beside the diagonal."""
 _STEPS = 60
 _TUKEY = 4.685
 _SETTLED = 1e-10
@@ -31,9 +32,10 @@ class RunsAwayError(ValueError):
 def distances(parameters: Parameters, m: Array) -> Array:
     """Distances (K,) of readings (K, 3) from the surface, in their unit; positive outside."""
     shape, centre = parameters
-    mapped = (m - centre) @ shape
-    r = np.linalg.norm(mapped, axis=1)
-    out: Array = (r - 1.0) * r / np.maximum(np.linalg.norm(mapped @ shape, axis=1), 1e-300)
+    # a row an axis: sums over rows take a fifth of the time of sums over three columns
+    mapped = shape @ (m - centre).T
+    r, q = _lengths(mapped), np.maximum(_lengths(shape @ mapped), 1e-300)
+    out: Array = (r - 1.0) * r / q
     return out
 
 
@@ -45,25 +47,26 @@ def weights(left: Array) -> Array:
 def slopes_of_norm(parameters: Parameters, m: Array) -> Array:
     """Derivatives (K, 9) of ‖S (m - c)‖ by S's upper triangle and c."""
     shape, centre = parameters
-    x = m - centre
-    mapped = x @ shape
-    unit = mapped / np.linalg.norm(mapped, axis=1, keepdims=True)
-    return np.hstack([_by_symmetric(unit, x), -unit @ shape])
+    x = (m - centre).T
+    mapped = shape @ x
+    return _by_norm(shape, x, mapped / _lengths(mapped)).T
 
 
 def slopes(parameters: Parameters, m: Array) -> Array:
     """Derivatives (K, 9) of `distances` by S's upper triangle and c."""
     shape, centre = parameters
-    x = m - centre
-    mapped = x @ shape
-    r = np.linalg.norm(mapped, axis=1)[:, None]
-    p = mapped @ shape
-    q = np.maximum(np.linalg.norm(p, axis=1), 1e-300)[:, None]
+    x = (m - centre).T
+    mapped = shape @ x
+    r, p = _lengths(mapped), shape @ mapped
+    q = np.maximum(_lengths(p), 1e-300)
     way = p / q
     # d = (r² - r) / q with q = ‖S S x‖
-    by_q = np.hstack([_by_symmetric(way, mapped) + _by_symmetric(way @ shape, x), -way @ (shape @ shape)])
-    out: Array = (2.0 * r - 1.0) / q * slopes_of_norm(parameters, m) - (r**2 - r) / q**2 * by_q
-    return out
+    by_r = _by_norm(shape, x, mapped / r)
+    by_q = np.vstack([_by_symmetric(way, mapped) + _by_symmetric(shape @ way, x), -shape @ shape @ way])
+    by_r *= (2.0 * r - 1.0) / q
+    by_q *= (r**2 - r) / q**2
+    by_r -= by_q
+    return by_r.T
 
 
 def refined(first: Parameters, m: Array) -> Parameters:
@@ -86,7 +89,7 @@ def _descended(found: Parameters, m: Array, scale: float) -> Parameters:
     loss, damping = _loss(left, scale), _FIRST_DAMPING
     for _ in range(_STEPS):
         weight, slope = _weights(left, scale), slopes(found, m)
-        normal, gradient = (slope * weight[:, None]).T @ slope, slope.T @ (weight * left)
+        normal, gradient = (slope.T * weight) @ slope, slope.T @ (weight * left)
         while damping < _MOST_DAMPING:
             damped = normal + np.diag(damping * np.diag(normal) + 1e-300)
             step = np.linalg.solve(damped, -gradient).astype(np.float64)
@@ -114,10 +117,21 @@ def _stepped(found: Parameters, step: Array) -> Parameters:
     return found[0] + change, found[1] + step[6:]
 
 
+def _lengths(columns: Array) -> Array:
+    """Length (K,) of each column of (3, K)."""
+    out: Array = np.sqrt(np.einsum("ik,ik->k", columns, columns))
+    return out
+
+
+def _by_norm(shape: Array, x: Array, unit: Array) -> Array:
+    """Derivatives (9, K) of ‖S x‖, which points along `unit` (3, K), by S's upper triangle and by c."""
+    return np.vstack([_by_symmetric(unit, x), -shape @ unit])
+
+
 def _by_symmetric(a: Array, b: Array) -> Array:
-    """Derivatives (K, 6) of a · (S b) by the upper triangle of a symmetric S."""
-    out: Array = a[:, _ROWS] * b[:, _COLUMNS]
-    out += np.where(_DIAGONAL, 0.0, a[:, _COLUMNS] * b[:, _ROWS])
+    """Derivatives (6, K) of a · (S b) by the upper triangle of a symmetric S; a and b (3, K)."""
+    out: Array = a[_ROWS] * b[_COLUMNS]
+    out[_BESIDE] += a[_COLUMNS[_BESIDE]] * b[_ROWS[_BESIDE]]
     return out
 
 

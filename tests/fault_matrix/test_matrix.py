@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -41,15 +42,20 @@ SCENES = BegunScenes()
 RULES = {str(rule) for rule, _ in slave.limit.limit.RULES}
 
 
-def rows() -> list[object]:
+LONG = {"iron at a magnetometer while it is worn", "gyro with a gross bias"}
+"""Rows of more than 3 s."""
+
+
+def rows() -> Iterator[object]:
     """All, those that the table itself says are missed as expected failures."""
-    return [
-        pytest.param(f.name, marks=pytest.mark.xfail(strict=True, reason=f.missed)) if f.missed else f.name
-        for f in FAULTS
-    ]
+    for f in FAULTS:
+        marks = [pytest.mark.long] * (f.name in LONG)
+        if f.missed:
+            marks.append(pytest.mark.xfail(strict=True, reason=f.missed))
+        yield pytest.param(f.name, marks=marks, id=f.name)
 
 
-@pytest.mark.parametrize("name", rows())
+@pytest.mark.parametrize("name", list(rows()))
 def test_the_robot_does_what_the_table_says(name: str) -> None:
     outcome = try_on_virtual_clock(TABLE[name], scenes=SCENES)
     assert not outcome.wrong, f"{outcome.state}: {outcome.reason}"
@@ -126,7 +132,11 @@ def test_an_operator_s_row_fails_without_what_holds_it(
     [
         ("zero pose of somebody who leans", "estimation.zero_pose_lean_deg=80.0"),
         ("gyro with a gross bias", "estimation.vqf.rest_bias=false"),
-        ("iron at a magnetometer while it is worn", "estimation.vqf.field_change=0.0"),
+        pytest.param(
+            "iron at a magnetometer while it is worn",
+            "estimation.vqf.field_change=0.0",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_row_of_the_estimate_fails_without_its_setting(name: str, without: str) -> None:

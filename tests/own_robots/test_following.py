@@ -47,6 +47,7 @@ def test_the_robot_follows_the_operators_postures(file: str) -> None:
     assert run.beyond_reach() == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("file", FILES)
 @pytest.mark.parametrize("row", ROWS)
 def test_a_fault_does_to_it_what_the_table_says(file: str, row: str) -> None:

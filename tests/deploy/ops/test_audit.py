@@ -7,8 +7,6 @@ import json
 from pathlib import Path
 
 import pytest
-from cyclonedx.schema import SchemaVersion
-from cyclonedx.validation.json import JsonStrictValidator
 
 from common.errors import TandemError
 from deploy.ops import audit as room
@@ -23,7 +21,12 @@ VULNERABLE = {
 }
 
 
+@pytest.mark.long
 def test_the_bill_of_materials_keeps_its_schema_and_names_what_runs_here(tmp_path: Path) -> None:
+    # here: at each start of pytest it would compile grammars for 2 s
+    from cyclonedx.schema import SchemaVersion
+    from cyclonedx.validation.json import JsonStrictValidator
+
     file = tmp_path / "sbom.json"
     count = write_sbom(file)
     tree = json.loads(file.read_text("utf-8"))

@@ -17,6 +17,7 @@ from master.calibrate.recording import load_recordings
 from master.joint_angles.decomposition import JointAngles
 from master.orientation.hinge_angle import HingeAngle, HingeAngleConfig, hinge_of
 
+pytestmark = pytest.mark.long
 LEGS = load_skeleton("lower_limb")
 SIDES = ("left", "right")
 
@@ -70,7 +71,6 @@ def person(real_person: Path) -> Person:
 
 
 @pytest.mark.parametrize("joint", POSSIBLE)
-@pytest.mark.long
 def test_every_angle_is_one_that_a_person_has(person: Person, joint: str) -> None:
     lower, upper = POSSIBLE[joint]
     for side in SIDES:

@@ -76,6 +76,7 @@ def apart_deg(sweeps: list[Sweep], readings: list[Reading], configs: list[NodeCo
 
 
 @pytest.mark.timeout(600)
+@pytest.mark.long
 def test_orientations_are_those_of_the_suit_on_sync(
     load: Callable[..., MappedLayout], swing: Callable[..., Reading]
 ) -> None:

@@ -105,6 +105,7 @@ def test_a_group_that_is_none_is_named() -> None:
     assert "trunk, head, left_arm" in mistake.expected
 
 
+@pytest.mark.long
 def test_the_whole_way_the_robot_s_arm_makes_half_of_the_operator_s_motion() -> None:
     overrides = {"master": ["operator.scaling={right_arm=0.5}"]}
     run = engaged(replace(WorldSettings(), overrides=overrides))

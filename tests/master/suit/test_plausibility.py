@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import tomllib
 from functools import cache
 
 import numpy as np
 import pytest
 
 from common.quaternion import Array
+from deploy.sim.suit.faults import FaultsConfig
 from deploy.sim.suit.wrong_readings import WrongReadingKind
+from deploy.sim.world.copy import copied
 from master.suit.doubt import Weight
 from master.suit.plausibility import PlausibilityWatch
 from master.suit.plausibility_config import PlausibilityConfig
@@ -19,15 +22,25 @@ JOINTS = {"right_elbow_pitch", "right_elbow_roll", "right_wrist_yaw"}
 BEGINS_S = 3.0
 
 
+@cache
+def sound(motion: str) -> Bench:
+    """Sound nodes until the tick before the wrong readings begin; to be copied."""
+    bench = Bench(f'motion="{motion}"')
+    bench.run(round(200 * BEGINS_S))
+    return bench
+
+
 def lying(kind: str, motion: str, more: str = "") -> Bench:
-    wrong = f'faults.wrong_reading=[{{node="{NODE}",kind="{kind}",from_s={BEGINS_S}{more}}}]'
-    return Bench(f'motion="{motion}"', wrong)
+    bench = copied(sound(motion))
+    wrong = tomllib.loads(f'wrong_reading=[{{node="{NODE}",kind="{kind}",from_s={BEGINS_S}{more}}}]')
+    bench.suit.faults.config = FaultsConfig.model_validate(wrong)
+    return bench
 
 
 def invalid_after_s(bench: Bench, begins_s: float = BEGINS_S, most_s: float = 5.0) -> float | None:
     """From the wrong reading until a command says so; every other joint must stay valid."""
     names = bench.pipeline.skeleton.joint_names
-    bench.run(round(200 * begins_s))
+    bench.run(round(200 * begins_s) - bench.tick)
     while bench.tick < 200 * (begins_s + most_s):
         for solved in bench.run(1):
             gone = {name for name, valid in zip(names, solved.valid, strict=True) if not valid}
@@ -114,7 +127,7 @@ def test_a_magnetometer_that_hangs_is_left_out_and_joints_stay_valid() -> None:
 @pytest.mark.parametrize("kind", ["zero", "ones", "overflow_mag"])
 def test_what_no_magnetometer_can_read_is_no_reading(kind: WrongReadingKind) -> None:
     bench = lying(kind, "calibration_pose")
-    bench.run(round(200 * BEGINS_S) + 20)
+    bench.run(20)
     node = bench.pipeline.skeleton.segment_names.index(NODE)
     assert np.isnan(bench.pipeline.poll.readings[node, 6:]).all()
 

@@ -306,7 +306,11 @@ class Delayed(Prepared):
         self.know()
 
 
-@pytest.mark.parametrize("machine", [Machine, Prepared, Doubtful, Delayed])
+LONG = [pytest.param(machine, marks=pytest.mark.long) for machine in (Machine, Doubtful, Delayed)]
+"""Each takes 5 s, as does the one that every `make test` runs."""
+
+
+@pytest.mark.parametrize("machine", [Prepared, *LONG])
 def test_any_sequence_keeps_what_must_hold(machine: type[Machine], make_rig: Callable[..., Any]) -> None:
     run(machine, make_rig)
 

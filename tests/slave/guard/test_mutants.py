@@ -201,7 +201,15 @@ def notices(mutant: Mutant, make_rig: Callable[..., Any], monkeypatch: pytest.Mo
     return None
 
 
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+LONG = {"GuardConfig.timeout_ceiling_s"}
+"""Stories of more than 3 s: the link must become slower and slower."""
+
+
+def marked(value: Mutant | str, name: str) -> object:
+    return pytest.param(value, id=name, marks=[pytest.mark.long] * (name in LONG))
+
+
+@pytest.mark.parametrize("mutant", [marked(m, m.name) for m in MUTANTS])
 def test_a_guard_that_lacks_it_is_noticed(
     mutant: Mutant, make_rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -210,7 +218,7 @@ def test_a_guard_that_lacks_it_is_noticed(
     assert noticed == mutant.name, "the story named after it should be the one"
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", [marked(name, name) for name in SCENARIOS])
 def test_the_guard_as_it_is_passes_every_story(name: str, make_rig: Callable[..., Any]) -> None:
     SCENARIOS[name](make_rig)
 

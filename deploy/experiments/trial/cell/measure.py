@@ -194,7 +194,7 @@ def _motion(judged: CellMessages, config: SlaveConfig) -> dict[str, float | None
 def _over_latest(
     judged: CellMessages, truth: TruthSeries, moved: MovedSeries, config: SlaveConfig
 ) -> float | None:
-    compared = compare(truth, moved, arrivals(judged.commands, judged.states), config)
+    compared = compare(truth, moved, arrivals(judged.commands, judged.states), config, ["latest"])
     return None if compared is None else compared.rmse_over_latest
 
 

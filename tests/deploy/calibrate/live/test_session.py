@@ -145,6 +145,7 @@ def test_it_comes_to_the_end_and_refuses_nothing(done: Done) -> None:
     assert all(r["put"] == r["written"] and not r["failed"] for r in recordings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("sensor", "strength", "left", "share"),
     [(0, 9.80665, 0.06, 0.1), (1, 2.0, 0.01, 0.05), (2, 50.0, 0.5, 0.05)],
@@ -158,6 +159,7 @@ def test_calibrated_units_err_far_less_than_raw_ones(
     assert after < share * before
 
 
+@pytest.mark.long
 def test_the_alignment_is_found(done: Done) -> None:
     """Against how the simulated units really sit."""
     from common.quaternion import angle_between, conjugate
@@ -170,6 +172,7 @@ def test_the_alignment_is_found(done: Done) -> None:
         assert error_deg < 5.0, f"{name}: {error_deg:.1f}°"
 
 
+@pytest.mark.long
 def test_every_part_says_how_it_came_about(done: Done) -> None:
     for name in done.config.skeleton.segment_names:
         made = tomllib.loads((done.folder / f"{name}.toml").read_text("utf-8"))["made"]
@@ -182,6 +185,7 @@ def test_every_part_says_how_it_came_about(done: Done) -> None:
     assert "left_shank" in done.said
 
 
+@pytest.mark.long
 def test_the_recordings_serve_the_offline_commands(done: Done, tmp_path: Path) -> None:
     from typer.testing import CliRunner
 
@@ -196,6 +200,7 @@ def test_the_recordings_serve_the_offline_commands(done: Done, tmp_path: Path) -
     assert again.accelerometer == file(done, "left_foot").accelerometer
 
 
+@pytest.mark.long
 def test_bad_data_leave_a_node_s_file_as_it_was(done: Done, tmp_path: Path) -> None:
     """Here nobody ever laid the tray down: each node is refused by name, and nothing is written."""
     suit = loaded("suit").model_copy(update={"motion": "calibration_pose", "grade": "raw", "seed": SEED})
@@ -215,6 +220,7 @@ def test_bad_data_leave_a_node_s_file_as_it_was(done: Done, tmp_path: Path) -> N
     assert list(tmp_path.glob("*.toml")) == []
 
 
+@pytest.mark.long
 def test_parts_that_are_not_calibrated_now_are_kept(done: Done, tmp_path: Path) -> None:
     old = tmp_path / "old.toml"
     old.write_text("gyroscope = [[2.0, 0, 0, 0], [0, 2.0, 0, 0], [0, 0, 2.0, 0]]  # by hand\n")
@@ -229,6 +235,7 @@ def test_parts_that_are_not_calibrated_now_are_kept(done: Done, tmp_path: Path) 
     assert (new / "left_foot.toml").read_text("utf-8") == "# newer\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [60, 80, 200])
 def test_the_screen_tells_every_node(done: Done, width: int) -> None:
     led = LiveSession(done.config, OPTIONS, done.folder, Console(file=io.StringIO()))

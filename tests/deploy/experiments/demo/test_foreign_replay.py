@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -44,6 +45,7 @@ def both_files(person: Path, folder: Path) -> tuple[Path, Path]:
     return folder / "legs.npz", path
 
 
+@pytest.mark.long
 def test_a_bag_moves_the_robot_as_tandems_own_recording_does(tmp_path: Path, real_person: Path) -> None:
     knees = []
     for file in both_files(real_person, tmp_path):

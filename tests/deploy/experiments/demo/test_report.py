@@ -190,6 +190,7 @@ def test_holds_and_what_the_host_missed_stand_beside_our_own_ticks(report: DemoR
     assert "robot-1 held at 6.3 s for 1.7 s: no encoder (the host kept its time)" in shown
 
 
+@pytest.mark.long
 def test_a_hand_s_report_has_five_joints_curves_and_paper_b_s_targets() -> None:
     report = reported("hand")
     tree = json.loads(json.dumps(tree_of(report), allow_nan=False))
@@ -207,7 +208,11 @@ def test_a_hand_s_report_has_five_joints_curves_and_paper_b_s_targets() -> None:
         assert words not in shown
 
 
-@pytest.mark.parametrize("profile", sorted(BY_PROFILE))
+@pytest.mark.parametrize(
+    "profile",
+    # of the others a run of their own must be made first
+    [p if p == "nursing" else pytest.param(p, marks=pytest.mark.long) for p in sorted(BY_PROFILE)],
+)
 def test_every_target_s_path_leads_to_a_figure_in_a_real_report(profile: str) -> None:
     """A renamed figure would not be missed otherwise: its target would only not be judged."""
     tree = json.loads(json.dumps(tree_of(reported(profile)), allow_nan=False))
@@ -246,6 +251,7 @@ def test_a_run_in_which_no_command_was_observed_failed(tracked: VirtualWorld) ->
     ]
 
 
+@pytest.mark.long
 def test_both_sides_still_for_5_s_miss_a_target_and_are_said(tracked: VirtualWorld) -> None:
     run = copied(tracked)
     run.stand_still(5.0)

@@ -20,6 +20,7 @@ from deploy.recorded.held import HeldFrames
 from deploy.sim.world.world import VirtualWorld
 from tests.deploy.recorded.virtual import RecordedRun, record_run
 
+pytestmark = pytest.mark.long  # all of them stand on one run that takes 8 s
 pytest.importorskip("pyarrow")
 pytest.importorskip("av")
 NURSING = load_skeleton("nursing")

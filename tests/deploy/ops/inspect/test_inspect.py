@@ -73,6 +73,7 @@ def test_pictures_are_drawn_of_joints_and_events(run: RecordedRun, tmp_path: Pat
     assert any(name.startswith("guard-") and name.endswith("-hold.png") for name in names)
 
 
+@pytest.mark.long
 def test_a_calm_run_has_no_stage_that_adds_jitter(run: RecordedRun, tmp_path: Path) -> None:
     tree = inspected(run.master, run.slave, "--jitter", "--plots", tmp_path)
     jitter = tree["jitter"]

@@ -36,6 +36,7 @@ def test_two_copies_and_their_origin_go_on_alike_one_after_the_other() -> None:
     assert sent(first) == sent(origin) == sent(second)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["link cut", "contact, fast", "second operator", "encoder silent"])
 def test_a_trial_on_a_copied_scene_ends_as_one_on_a_scene_of_its_own(name: str) -> None:
     fault, scenes = ROWS[name], BegunScenes()

@@ -20,6 +20,7 @@ from master.orientation.config import EstimationConfig
 from master.orientation.estimator import Estimator
 from tests.master.orientation.perfect import Node, Readings
 
+pytestmark = pytest.mark.long
 CONFIG = EstimationConfig.model_validate(
     {"constraints": "online", "zero_pose_s": 1.0}
     | {f"{sensor}_cutoff_hz": 0.0 for sensor in ("accelerometer", "gyroscope", "magnetometer")}
@@ -74,7 +75,6 @@ def by_kind(person: Person) -> list[tuple[str, str, Array]]:
     ]
 
 
-@pytest.mark.long
 def test_every_angle_is_one_that_a_person_has(
     person: Person, possible_deg: Mapping[str, tuple[float, float]]
 ) -> None:

@@ -34,7 +34,7 @@ def outstretched(wired: Wired) -> Array:
     posture = wired.read_rad().copy()
     posture[wired.index(ROLL)] = posture[wired.index("right_shoulder_roll")] = 1.0
     wired.setpoint = posture
-    wired.run(8.0)
+    wired.run(5.0)
     return newest(wired)
 
 

@@ -117,6 +117,11 @@ def recording(lost: Iterable[int] = (), guards: dict[int, str] | None = None) ->
     )  # fmt: skip
 
 
+def unmoved(heard: CellMessages) -> CellMessages:
+    """Without the operator's truth, so that no motion is judged: that takes 0.6 s."""
+    return replace(heard, truth=[])
+
+
 @pytest.fixture(scope="module")
 def figures() -> dict[str, float | None]:
     course = CellCourse(
@@ -142,7 +147,9 @@ def test_one_way_and_round_trip_are_of_the_judged_time() -> None:
     for n, us in enumerate(of_seconds):
         at_ns = BEGIN_NS + n * S
         words += [Statistics(at_ns, slave_metrics(one_way_recent_us=tuple(us))), master_told(at_ns, us)]
-    figures = measure(CellCourse(replace(recording(), statistics=words), 0.3, shared_clock=True), CONFIG)
+    figures = measure(
+        CellCourse(unmoved(replace(recording(), statistics=words)), 0.3, shared_clock=True), CONFIG
+    )
     assert figures["one_way_p50_ms"] == figures["round_trip_p50_ms"] == pytest.approx(41.5)
     # one that the guard refuses for its age has taken its time all the same
     assert figures["one_way_p99_ms"] == figures["round_trip_p99_ms"] == pytest.approx(400.0, abs=11.0)
@@ -162,7 +169,9 @@ def test_commands_that_were_due_and_never_came_are_in_the_figures() -> None:
             ),
         ),
     ]
-    figures = measure(CellCourse(replace(recording(), statistics=told), 0.3, shared_clock=True), CONFIG)
+    figures = measure(
+        CellCourse(unmoved(replace(recording(), statistics=told)), 0.3, shared_clock=True), CONFIG
+    )
     assert figures["delivered"] == pytest.approx(100.0 * 63 / 125)
     assert figures["one_way_p99_ms"] == pytest.approx(40.0)
     corrected = figures["one_way_corrected_p99_ms"]
@@ -179,10 +188,10 @@ def test_a_cell_without_a_single_command_failed(without: str) -> None:
         else replace(heard, states=[replace(s, echo=None) for s in heard.states])
     )
     key = CellKey(Setup("tcp", "lan", "predict"), 0)
-    cell = judged(key, CellCourse(heard, 0.3, shared_clock=True), CONFIG, {}, ())
+    cell = judged(key, CellCourse(unmoved(heard), 0.3, shared_clock=True), CONFIG, {}, ())
     assert cell.status is CellStatus.FAILED
     assert "no command was" in cell.why
-    whole = judged(key, CellCourse(recording(), 0.3, shared_clock=True), CONFIG, {}, ())
+    whole = judged(key, CellCourse(unmoved(recording()), 0.3, shared_clock=True), CONFIG, {}, ())
     assert whole.status is CellStatus.DONE
 
 
@@ -191,7 +200,7 @@ def test_a_robot_unheard_after_the_outage_is_not_called_safe() -> None:
     deaf = aftermath(replace(after(0.6), states=[]), outage, 0.3)
     assert (deaf["moved_alone"], deaf["stale_accepted"]) == (None, None)
     course = CellCourse(
-        recording(), 0.3, shared_clock=True, after=replace(after(0.6), states=[]), outage=outage
+        unmoved(recording()), 0.3, shared_clock=True, after=replace(after(0.6), states=[]), outage=outage
     )
     cell = judged(CellKey(Setup("tcp", "lan", "predict"), 0), course, CONFIG, {}, ())
     assert cell.status is CellStatus.FAILED
@@ -206,12 +215,14 @@ def test_ages_that_nobody_knows_are_not_fresh() -> None:
 
 
 def test_what_the_slave_did_not_tell_is_no_zero() -> None:
-    figures = measure(CellCourse(replace(recording(), statistics=[]), 0.3, shared_clock=True), CONFIG)
+    figures = measure(
+        CellCourse(unmoved(replace(recording(), statistics=[])), 0.3, shared_clock=True), CONFIG
+    )
     assert (figures["refused"], figures["clamps"], figures["delivered"]) == (None, None, None)
 
 
 def test_without_a_shared_clock_nothing_is_called_true() -> None:
-    figures = measure(CellCourse(recording(), max_age_s=0.3, shared_clock=False), CONFIG)
+    figures = measure(CellCourse(unmoved(recording()), max_age_s=0.3, shared_clock=False), CONFIG)
     assert figures.get("true_one_way_p50_ms") is None
     assert figures["one_way_p50_ms"] == pytest.approx(40.0)
 
@@ -235,7 +246,9 @@ def test_what_was_delivered_is_counted_between_the_slaves_words(figures: dict[st
 
 
 def test_a_lost_command_is_not_accepted_and_one_under_way_is_not_lost() -> None:
-    figures = measure(CellCourse(recording(lost=range(50, 65)), max_age_s=0.3, shared_clock=True), CONFIG)
+    figures = measure(
+        CellCourse(unmoved(recording(lost=range(50, 65))), max_age_s=0.3, shared_clock=True), CONFIG
+    )
     # the last of 150 are still on their way when the recording ends
     assert figures["accepted"] == pytest.approx(100.0 * (1 - 15 / 150), abs=0.5)
 
@@ -244,7 +257,7 @@ def test_each_time_that_the_guard_leaves_track_counts_once() -> None:
     guards = dict.fromkeys((*range(200, 220), *range(400, 410)), "hold") | dict.fromkeys(
         range(410, 430), "align"
     )
-    figures = measure(CellCourse(recording(guards=guards), max_age_s=0.3, shared_clock=True), CONFIG)
+    figures = measure(CellCourse(unmoved(recording(guards=guards)), max_age_s=0.3, shared_clock=True), CONFIG)
     assert figures["holds"] == 2.0
     assert figures["tracked"] == pytest.approx(100.0 * (1 - 50 / 600))
 
