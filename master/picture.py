@@ -7,14 +7,19 @@ from collections import deque
 from common.clock import to_ns
 from common.errors import CodecError
 from common.metrics.master import VideoReceived
-from common.wire.video import VideoFrame, decode_frame
+from common.wire.video import FrameChain, VideoFrame, decode_frame
 
 _SILENT_S = 2.0
 """After so long any number is believed again: the robot may have started anew."""
+_ASK_AGAIN_S = 0.3
+"""A request for a picture that stands alone may be lost, or on its way."""
 
 
 class VideoWatch:
-    """Keeps the newest frame. What comes twice or late is counted, and changes nothing."""
+    """Keeps the newest frame that can be shown. What comes twice or late is counted, and changes nothing.
+
+    A picture of H.264 whose predecessor was lost is not one that the operator has: it is not acknowledged.
+    """
 
     def __init__(self) -> None:
         self.frame: VideoFrame | None = None
@@ -22,6 +27,9 @@ class VideoWatch:
         self.undecodable = 0
         self.late = 0
         self._arrivals: deque[tuple[int, int]] = deque(maxlen=32)
+        self._heard_ns: int | None = None
+        self._chain = FrameChain()
+        self._asked_ns: int | None = None
 
     def on_payload(self, payload: bytes, arrived_ns: int) -> None:
         """Take what came on the video topic, ns of this host's clock."""
@@ -31,9 +39,12 @@ class VideoWatch:
             self.undecodable += 1
             return
         self.received += 1
-        silent = not self._arrivals or arrived_ns - self._arrivals[-1][1] > to_ns(_SILENT_S)
+        silent = self._heard_ns is None or arrived_ns - self._heard_ns > to_ns(_SILENT_S)
         if self.frame is not None and frame.number <= self.frame.number and not silent:
             self.late += 1
+            return
+        self._heard_ns = arrived_ns
+        if not self._chain.take(frame):
             return
         self.frame = frame
         self._arrivals.append((frame.number, arrived_ns))
@@ -45,6 +56,16 @@ class VideoWatch:
                 return number, arrived_ns
         return 0, 0
 
+    def asks_for_key(self, now_ns: int) -> bool:
+        """Whether to ask now for a picture that stands alone; True once, and again while none has come."""
+        if not self._chain.wants_key:
+            self._asked_ns = None
+            return False
+        if self._asked_ns is not None and now_ns - self._asked_ns < to_ns(_ASK_AGAIN_S):
+            return False
+        self._asked_ns = now_ns
+        return True
+
     def metrics(self) -> VideoReceived:
         """Counters."""
-        return VideoReceived(self.received, self.late, self.undecodable)
+        return VideoReceived(self.received, self.late, self.undecodable, self._chain.broken)

@@ -21,7 +21,7 @@ from common.wire.codec import decode, encode
 from common.wire.instance import draw_instance
 from common.wire.messages import ClockReply, ControlReply, RobotState, Statistics
 from common.wire.presence import ProcessPresence
-from common.wire.topics import CLOCK, COMMAND, CONTROL, STATE, STATISTICS, VIDEO
+from common.wire.topics import CLOCK, COMMAND, CONTROL, KEYFRAME, LOST, STATE, STATISTICS, VIDEO
 from master.alarms.situation import RobotSign
 from master.comfort.scaling import MotionScaling
 from master.deadman.grip import Grip
@@ -78,6 +78,7 @@ class CommandedRobot:
         self._throttle = LogThrottle()
         self._put_command: Callable[[bytes], None] = link.publish(COMMAND.of(operator))
         self._put_statistics: Callable[[bytes], None] = link.publish(STATISTICS)
+        self._put_keyframe: Callable[[bytes], None] = link.publish(KEYFRAME)
         self.video = VideoWatch()
         link.subscribe(STATE, self._on_state)
         link.subscribe(VIDEO, self.video.on_payload)
@@ -100,6 +101,8 @@ class CommandedRobot:
         seen = self.video.seen_by(angles.sampled_ns)
         command = self._writer.write(angles, self._lease.token, grip, angles_ns, monotonic_ns(), seen)
         self._put_command(encode(command))
+        if self.video.asks_for_key(monotonic_ns()):
+            self._put_keyframe(LOST)
 
     def publish_metrics(self, now_ns: int, shared: MasterMetrics) -> None:
         """Publish what the master counted, with what it counted of this robot alone."""

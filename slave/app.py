@@ -30,7 +30,9 @@ from common.wire.messages import Statistics
 from common.wire.path_probe import answer_probe
 from common.wire.presence import ProcessPresence, place
 from common.wire.sender import operator_of
-from common.wire.topics import CALL, CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, SUMMARY, video
+from common.wire.topics import (
+    CALL, CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, SUMMARY, keyframe, video,
+)  # fmt: skip
 from common.wire.version import software
 from slave.attitude.open import open_base
 from slave.attitude.sensor import BaseSensor
@@ -98,6 +100,8 @@ class Slave:
         if config.camera.source != "off":
             self._camera = open_feed(config.camera, config.profile, link.publish(video(config.camera.name)))
             self._pipeline.on_accepted = self._camera.on_command
+            camera = self._camera
+            link.subscribe(keyframe(config.camera.name), lambda payload, _: camera.on_keyframe(payload))
         link.subscribe_keys(COMMAND, self._on_command)
         link.answer_keys(CONTROL, self._on_control)
         link.answer(STOP, self._on_stop)

@@ -21,6 +21,7 @@ from common.wire.topics import (
     CLOCK,
     COMMAND,
     CONTROL,
+    KEYFRAME,
     PATH,
     STATE,
     STATISTICS,
@@ -141,11 +142,14 @@ def _robot(table: _AccessRules, access: AccessConfig, robot: str) -> None:
     viewers = [common_name(Role.OBSERVER, name) for name in access.names(access.viewers, robot)]
     observers = [common_name(Role.OBSERVER, name) for name in access.names(access.observers, robot)]
     video = _key(VIDEO, robot).rpartition("/")[0] + "/*"
+    keyframe = _key(KEYFRAME, robot).rpartition("/")[0] + "/*"
     table.allow(me, _PUBLISH, [*(_key(topic, robot) for topic in (STATE, STATISTICS, SUMMARY)), video])
-    table.allow(me, ("hear",), [_key(COMMAND, robot)])
+    table.allow(me, ("hear",), [_key(COMMAND, robot), keyframe])
     table.allow(me, ("answer",), [_key(topic, robot) for topic in (CONTROL, STOP, CLOCK, PATH, CALL)])
     # a person at the robot calls from the robot's own host, by the robot's certificate
     table.allow(me, _ASK, [_key(CALL, robot)])
+    # who may see the pictures may ask for one that stands alone
+    table.allow([*operators, *viewers], _PUBLISH, [keyframe])
     table.allow(me, ("live",), [_alive(robot, "slave/**")])
     table.allow(operators, _PUBLISH, [_key(STATISTICS, robot), _key(TRUTH, robot)])
     table.allow(operators, ("hears",), [_key(COMMAND, robot)])

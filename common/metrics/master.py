@@ -70,6 +70,8 @@ class VideoReceived(Metrics):
     received: int
     late: int
     undecodable: int
+    not_shown: int = 0
+    """Pictures of H.264 that could not be shown because one before them was lost."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,13 +77,16 @@ CALL = Topic("call", "tandem/{robot}/call", 0.0, 1.0, Priority.DATA, True, True,
 """A person at the robot asks for an operator, or does not need one any more (`common.wire.call`)."""
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
 VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUND, False, True, False)
+KEYFRAME = Topic("keyframe", "tandem/{robot}/keyframe/head", 0.0, 0.0, Priority.DATA, True, True, False)
+"""From who receives pictures: the camera's next one shall stand alone. The payload is `LOST` or `JOINED`."""
 TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
 FAULTS = Topic("faults", "tandem/{robot}/test/faults", 0.0, 1.0, Priority.DATA, True, True, False)
 
 TOPICS = {
     t.name: t
     for t in (
-        COMMAND, STATE, CONTROL, STOP, CLOCK, PATH, STATISTICS, SUMMARY, CALL, ALIVE, VIDEO, TRUTH, FAULTS,
+        COMMAND, STATE, CONTROL, STOP, CLOCK, PATH, STATISTICS, SUMMARY, CALL, ALIVE, VIDEO, KEYFRAME, TRUTH,
+        FAULTS,
     )
 }  # fmt: skip
 QUESTIONS = (CONTROL.name, STOP.name, CLOCK.name, PATH.name, CALL.name, FAULTS.name)
@@ -96,3 +99,12 @@ VIDEO_NAME = r"^[A-Za-z0-9_-]{1,32}$"
 def video(camera: str) -> Topic:
     """The pictures of one camera; its rate is whatever the link bears."""
     return replace(VIDEO, key=f"tandem/{{robot}}/video/{camera}")
+
+
+LOST, JOINED = b"lost", b"joined"
+"""Why a picture that stands alone is asked for: one before it was lost, or somebody has begun to look."""
+
+
+def keyframe(camera: str) -> Topic:
+    """Requests for a picture of one camera that stands alone."""
+    return replace(KEYFRAME, key=f"tandem/{{robot}}/keyframe/{camera}")

@@ -297,6 +297,8 @@ class ConsoleApp:
                 return f"more than {REQUESTS_PER_S:g} requests a second"
             elif kind == "shown":
                 page.saw_code(body, now_ns)
+            elif kind == "keyframe" and isinstance(camera := body.get("camera"), str):
+                self._hub.ask_for_key(page.model.robot, camera)
             elif kind != "stop":
                 self._request(page, kind, body.get("robot", page.model.robot))
         return ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import psutil
@@ -13,10 +13,11 @@ import psutil
 from common.clock import monotonic_ns, to_ns
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
+from common.wire.video import JPEG
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.model.guard_table import ENGAGED
 from deploy.console.model.robot import RobotModel
-from deploy.console.session import Access, PageRole, Person
+from deploy.console.session import Access, PageRole, Person, RateLimit
 from deploy.console.stopping import RobotStopper
 from deploy.console.viewers import KEPT, LOST_S, MOST, OpenPage, pack
 
@@ -24,6 +25,7 @@ VIEW_HZ = 25
 FACTS_EVERY = VIEW_HZ
 BEAT_S = 0.3
 """A page that holds the deadman and says nothing for so long does not hold it any more."""
+KEYS_PER_S = 1.0
 SEEN_S = 0.5
 """A beat of the deadman from a page that has seen nothing newer does not hold."""
 
@@ -42,8 +44,11 @@ class Hub:
     pages: list[OpenPage] = field(default_factory=list)
     session: str = field(default_factory=lambda: secrets.token_hex(4))
     """Another one with each process."""
+    put_key: Callable[[str, str], None] = lambda robot, camera: None
+    """Asks a robot's camera for a picture that stands alone."""
     engaged: dict[str, str] = field(default_factory=dict)
     """By robot, the log-in of the page that engaged it."""
+    _key_rates: dict[tuple[str, str], RateLimit] = field(default_factory=dict)
     _gone_ns: dict[str, int] = field(default_factory=dict)
     _lapsed: set[str] = field(default_factory=set)
     """Log-ins of pages that were lost while they held: where they come back, they must let go first."""
@@ -72,6 +77,8 @@ class Hub:
     def greet(self, page: OpenPage) -> None:
         """Tell a page who it is taken for."""
         role = page.person.role
+        for camera in page.model.pictures.newest:
+            self.ask_for_key(page.model.robot, camera)
         page.say({
             "kind": "hello",
             "role": role.value,
@@ -89,10 +96,18 @@ class Hub:
 
     def on_picture(self, model: RobotModel, camera: str) -> None:
         """A newer picture came."""
-        jpeg = model.pictures.newest[camera].frame.jpeg
-        for page in self.pages:
-            if page.model is model:
-                page.show_picture(camera, jpeg)
+        frame = model.pictures.newest[camera].frame
+        shown = [page.show_picture(camera, frame) for page in self.pages if page.model is model]
+        if not all(shown):
+            self.ask_for_key(model.robot, camera)
+
+    def ask_for_key(self, robot: str, camera: str) -> None:
+        """A page needs a picture of H.264 that stands alone. Asked seldom: it costs all who receive it."""
+        newest = self.models[robot].pictures.newest.get(camera)
+        if newest is None or newest.frame.codec == JPEG:
+            return
+        if self._key_rates.setdefault((robot, camera), RateLimit(KEYS_PER_S)).passes(monotonic_ns()):
+            self.put_key(robot, camera)
 
     async def show(self) -> None:
         """Show every page its robot until cancelled."""

@@ -11,6 +11,8 @@ from common.clock import to_ms
 
 WINDOW = 8
 """Messages that a page may owe an acknowledgement for."""
+MOST_IN_ORDER = 4
+"""Messages of one slot that may wait where each needs the one before it."""
 _SMOOTH = 0.2
 _REMEMBERED = 128
 """Messages of which it is known when they left."""
@@ -31,12 +33,32 @@ class Outbox:
         self.page_ns: float | None = None
         """Half of the time from a message to its acknowledgement, smoothed."""
         self._waiting: dict[str, Make] = {}
+        self._broken: set[str] = set()
+        """Slots in order of which messages were dropped since one that begins."""
         self._left_ns: dict[int, int] = {}
 
     def offer(self, slot: str, make: Make) -> None:
         """Put a message in a slot, in place of the one that waits there."""
         self.replaced += slot in self._waiting
         self._waiting[slot] = make
+
+    def offer_in_order(self, slot: str, number: int, make: Make, begins: bool) -> bool:
+        """Put a message behind those of its slot: each needs the one before, but for one that begins.
+
+        Where too many wait, all are dropped, and False says that nothing helps but one that begins.
+        """
+        waiting = [name for name in self._waiting if name.startswith(f"{slot} ")]
+        if begins or len(waiting) >= MOST_IN_ORDER:
+            for name in waiting:
+                del self._waiting[name]
+            self.replaced += len(waiting)
+            self._broken.discard(slot)
+        if not begins and (len(waiting) >= MOST_IN_ORDER or slot in self._broken):
+            self._broken.add(slot)
+            self.replaced += 1
+            return False
+        self._waiting[f"{slot} {number}"] = make
+        return True
 
     def take(self, now_ns: int) -> str | bytes | None:
         """The next message to send now; None where none waits or the window is full."""
@@ -72,6 +94,7 @@ class Outbox:
     def clear(self) -> None:
         """Forget what waits."""
         self._waiting.clear()
+        self._broken.clear()
 
     @property
     def page_ms(self) -> float | None:

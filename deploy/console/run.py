@@ -25,6 +25,7 @@ from deploy.console.backup import StopBackup
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.hearing import Hearing
 from deploy.console.hub import VIEW_HZ, Hub, person_of, stranger
+from deploy.console.keyframes import KeyframeRequests
 from deploy.console.model.guard_table import STATES, TRANSITIONS
 from deploy.console.model.pictures import STALE_S
 from deploy.console.model.robot import SILENT_S, RobotModel, Side, Whose
@@ -118,6 +119,7 @@ async def _serve(
     models = hearing.models
     hub = Hub(models, access, stoppers, relay, losing_page_stops=config.losing_page == "stop")
     hearing.on_picture = hub.on_picture
+    hub.put_key = KeyframeRequests(session).put
     address = f"{'https' if tls else 'http'}://{_shown_host(config)}:{port}/"
 
     def offer(person: Person) -> None:

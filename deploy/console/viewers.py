@@ -10,7 +10,9 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from common.clock import monotonic_ns, to_ns
+from common.wire.video import JPEG, VideoFrame
 from deploy.console.model.glass import GlassWatch, read_shown
+from deploy.console.model.pictures import picture_header
 from deploy.console.model.robot import RobotModel
 from deploy.console.outbox import Outbox
 from deploy.console.session import Person, RateLimit
@@ -86,19 +88,28 @@ class OpenPage:
         self.outbox.offer(kind, make)
         self._ready.set()
 
-    def show_picture(self, camera: str, jpeg: bytes) -> None:
-        """Offer a picture; its age is that of the moment at which it leaves."""
+    def show_picture(self, camera: str, frame: VideoFrame) -> bool:
+        """Offer a picture; its age is that of the moment at which it leaves.
+
+        False: this page cannot show it, and needs one that stands alone.
+        """
         if not self.person.role.sees:
-            return
+            return True
 
         def make(number: int) -> bytes:
             now_ns = monotonic_ns()
-            header = self.model.pictures.header(camera, self.model.offset(now_ns), now_ns)
+            header = picture_header(camera, frame, self.model.offset(now_ns), now_ns)
             text = pack({"kind": "picture", "n": number, **header}).encode()
-            return _LENGTH.pack(len(text)) + text + jpeg
+            return _LENGTH.pack(len(text)) + text + frame.body
 
-        self.outbox.offer(f"picture {camera}", make)
+        shown = True
+        if frame.codec == JPEG:
+            self.outbox.offer(f"picture {camera}", make)
+        else:
+            begins = frame.after == 0
+            shown = self.outbox.offer_in_order(f"picture {camera}", frame.number, make, begins)
         self._ready.set()
+        return shown
 
     def tell_stop(self, now_ns: int) -> None:
         """What became of the stop that this page asked for, where no view tells it: not who else asked."""

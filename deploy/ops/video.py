@@ -16,10 +16,12 @@ from common.clock import monotonic_ns, to_s
 from common.errors import LinkTimeoutError, TandemError
 from common.link import open_link
 from common.process.runtime import run as run_until_stopped
+from common.wire.topics import JOINED, keyframe
 from common.wire.topics import video as video_topic
 from common.wire.video import VideoFrame
 from deploy.client.certificate import Certificate
 from deploy.client.destination import destination
+from deploy.recorded.pictures import PictureDecoder, as_jpeg
 from master.picture import VideoWatch
 
 NOTHING_S = 5.0
@@ -56,9 +58,13 @@ def video(
                     f"no robot answers at {', '.join(connect)}: is the slave running?"
                 ) from None
             link.subscribe(video_topic(camera), seen.on_payload)
+            ask = link.publish(keyframe(camera))
+            ask(JOINED)
             with Live(console=Console(), refresh_per_second=4) as live:
                 while not stop.is_set() and not (seconds and seen.elapsed_s > seconds):
                     live.update(Text(seen.words()))
+                    if seen.watch.asks_for_key(monotonic_ns()):
+                        ask(JOINED)
                     with suppress(TimeoutError):
                         await asyncio.wait_for(stop.wait(), 0.25)
                 live.update(Text(seen.words()))
@@ -72,6 +78,7 @@ class _ReceivedVideo:
     def __init__(self, save: Path | None) -> None:
         self.watch = VideoWatch()
         self._save = save
+        self._decoder = PictureDecoder()
         self._bytes = 0
         self._began_ns = monotonic_ns()
         self._kept: VideoFrame | None = None
@@ -85,7 +92,9 @@ class _ReceivedVideo:
         self.watch.on_payload(payload, arrived_ns)
         frame = self.watch.frame
         if self._save is not None and frame is not None and frame is not self._kept:
-            (self._save / f"{frame.number}.jpg").write_bytes(frame.jpeg)
+            pixels = self._decoder.decode(frame)
+            if pixels is not None:
+                (self._save / f"{frame.number}.jpg").write_bytes(as_jpeg(frame, pixels))
         self._kept = frame
 
     def words(self) -> str:
@@ -93,6 +102,7 @@ class _ReceivedVideo:
         if frame is None:
             return "no picture yet"
         rate_hz, kb_s = counted.received / self.elapsed_s, self._bytes / self.elapsed_s / 1000
-        newest = f"picture {frame.number}: {frame.width}×{frame.height}, {len(frame.jpeg)} bytes"
-        wrong = f"{counted.late} late, {counted.undecodable} broken"
+        size = f"{frame.width}×{frame.height}, {len(frame.body)} bytes of {frame.codec}"
+        newest = f"picture {frame.number}: {size}"
+        wrong = f"{counted.late} late, {counted.undecodable} broken, {counted.not_shown} not decodable"
         return f"{newest}; {rate_hz:.1f} Hz, {kb_s:.1f} kB/s; {wrong}"

@@ -6,7 +6,7 @@ So a model that learns from it sees no more than the operator's or the robot's s
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from common.recording import Entry
 from common.skeleton import Skeleton
 from common.wire.codec import decode
 from common.wire.messages import Command, RobotState
-from common.wire.video import VideoFrame, decode_frame
+from common.wire.video import JPEG, VideoFrame, decode_frame
+from deploy.recorded.pictures import PictureDecoder, as_jpeg
 
 FRESH_S = 0.5
 """A state or command that is older says nothing about now."""
@@ -42,7 +43,7 @@ class HeldFrame:
     effort_nm: Array
     """(J,) NaN where none is told, and while the robot is silent."""
     pictures: dict[str, VideoFrame]
-    """By camera; each frame bears its number."""
+    """By camera, as JPEG; each frame bears its number."""
     fresh: bool
     """Whether the state is younger than 0.5 s; else the robot is silent."""
 
@@ -57,6 +58,7 @@ class _Newest:
     command: Command | None = None
     command_ns: int = 0
     pictures: dict[str, VideoFrame] = field(default_factory=dict)
+    decoders: dict[str, PictureDecoder] = field(default_factory=dict)
 
     def take(self, entry: Entry) -> bool:
         """Keep one message; False where it cannot be read as this robot's."""
@@ -70,10 +72,19 @@ class _Newest:
                     entry.monotonic_ns,
                 )
             elif len(parts) > 2 and parts[-2] == "video":
-                self.pictures[parts[-1]] = decode_frame(entry.payload)
+                self._picture(parts[-1], decode_frame(entry.payload))
         except CodecError:
             return False
         return True
+
+    def _picture(self, camera: str, frame: VideoFrame) -> None:
+        """H.264 becomes JPEG as it comes: a picture builds on the one before, and pixels take memory."""
+        if frame.codec != JPEG:
+            pixels = self.decoders.setdefault(camera, PictureDecoder()).decode(frame)
+            if pixels is None:
+                return
+            frame = replace(frame, body=as_jpeg(frame, pixels, quality=95), codec=JPEG, after=0)
+        self.pictures[camera] = frame
 
 
 class HeldFrames:

@@ -131,7 +131,7 @@ class Translator:
 
     def picture(self, camera: str, frame: VideoFrame) -> Published:
         """A picture, stamped when it was taken."""
-        image = compressed_image(frame.jpeg, f"{self._frame}/{camera}", self._wall.of(frame.captured_ns))
+        image = compressed_image(frame.body, f"{self._frame}/{camera}", self._wall.of(frame.captured_ns))
         return self.topics.camera(camera), image
 
     def _transforms(self, position_rad: Array) -> list[Transform]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from common.clock import NS_PER_S
 from common.quaternion import Array
+from common.wire.video import H264, VideoFrame
 from deploy.viewer.frames import FrameEdge
 
 if TYPE_CHECKING:
@@ -63,11 +64,14 @@ def joint_states(
     return message
 
 
-def compressed_image(jpeg: bytes, frame: str, at_ns: int) -> Message:
-    """A JPEG."""
+def picture(taken: VideoFrame, frame: str, at_ns: int) -> Message:
+    """A JPEG; or H.264 as the schema asks: Annex B, no B-frames, parameters with each that stands alone."""
     from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+    from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 
-    return CompressedImage(timestamp=stamp(at_ns), frame_id=frame, data=jpeg, format="jpeg")
+    make = CompressedVideo if taken.codec == H264 else CompressedImage
+    message: Message = make(timestamp=stamp(at_ns), frame_id=frame, data=taken.body, format=taken.codec)
+    return message
 
 
 def camera_calibration(width: int, height: int, fovy_rad: float, frame: str, at_ns: int) -> Message:

@@ -15,6 +15,10 @@ class CameraConfig(Section):
 
     source: Literal["off", "robot", "v4l2"] = "off"
     """`robot`: through the eyes of the simulated robot, drawn from the encoders; `v4l2`: a real camera."""
+    codec: Literal["jpeg", "h264"] = "jpeg"
+    """`h264` shows more over a thin link, and needs PyAV (extra `h264`); `jpeg` takes less CPU time."""
+    keyframe_s: float = Field(4.0, ge=0.5, le=60.0)
+    """With `h264`: a picture that stands alone at least so often, s: for recordings."""
     name: str = Field("head", pattern=VIDEO_NAME)
     """Names the topic, and with `robot` the model's camera; where it has none the whole robot is shown."""
     device: str = "/dev/video0"

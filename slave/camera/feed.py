@@ -19,9 +19,10 @@ from common.latency.durations import Durations
 from common.metrics.slave import CameraMetrics
 from common.quaternion import Array
 from common.wire.messages import Command
+from common.wire.topics import LOST
 from common.wire.video import VideoFrame, encode_frame
 from slave.camera.config import CameraConfig
-from slave.camera.pipe import PictureReply, PictureRequest
+from slave.camera.pipe import PictureReply, PictureRequest, ReplyKind
 from slave.camera.process import CameraProcess, NeverError
 from slave.camera.rate import RateControl, RateLimits
 from slave.camera.sight import SeenPicture, Sight
@@ -29,6 +30,8 @@ from slave.camera.sight import SeenPicture, Sight
 _FIRST_BACK_OFF_S, _LONGEST_BACK_OFF_S = 0.5, 30.0
 _WELL_AFTER = 20
 """Pictures after which a restarted process counts as well."""
+_KEY_AGAIN_NS = 300 * NS_PER_MS
+"""Requests so soon after a picture that stands alone get no other: they may have been made before it came."""
 _IDLE_S = 0.25
 _JOIN_S = 1.0
 _BUSY_SHARE = 0.5
@@ -91,6 +94,15 @@ class CameraFeed:
         # above any number of an earlier run since this host started, which the master may still acknowledge
         self._number = clock() // NS_PER_MS
         self._count = _Count(clock())
+        self._codec = config.codec
+        self._keyframe_ns = to_ns(config.keyframe_s)
+        self._sent_number = 0
+        """Of the newest picture."""
+        self._alone_ns: int | None = None
+        """When the newest picture that stands alone was sent."""
+        self._wants_alone = False
+        self._lost_before = 0
+        self._asked: deque[bytes] = deque(maxlen=16)
         self._make = Durations()
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
 
@@ -111,6 +123,12 @@ class CameraFeed:
     def look(self, position_rad: Array, read_ns: int) -> None:
         """The newest joint angles (J,), and when they were read."""
         self._angles = position_rad, read_ns
+
+    def on_keyframe(self, why: bytes) -> None:
+        """Somebody who receives the pictures asks for one that stands alone."""
+        if self._codec != "jpeg":
+            self._asked.append(why)
+            self._wake.set()
 
     def on_command(self, command: Command, now_ns: int, offset: Offset) -> None:
         """Take an accepted command's acknowledgement of a picture."""
@@ -171,6 +189,7 @@ class CameraFeed:
                 seen = self._seen.popleft()
                 self._rate.seen(seen.number, seen.known_ns, seen.delay_ns)
             now_ns = self._clock()
+            alone = self._must_stand_alone(now_ns)
             due_ns, angles = self._rate.due_ns(now_ns), self._angles
             if due_ns is None or angles is None:
                 self._wake.wait(_IDLE_S)
@@ -179,21 +198,45 @@ class CameraFeed:
             if wait_ns > 0:
                 self._wake.wait(to_s(wait_ns))
                 continue
-            reply = camera.ask(PictureRequest(angles[1], self._rate.budget_bytes, angles[0]))
+            reply = camera.ask(PictureRequest(angles[1], self._rate.budget_bytes, angles[0], alone))
             made_ns = self._clock()
             rest_until_ns = now_ns + round((made_ns - now_ns) / _BUSY_SHARE)
             self._make.record(made_ns - now_ns)
             self._send(reply)
             self.fault = ""
 
+    def _must_stand_alone(self, now_ns: int) -> bool:
+        """Whether the next one must: at first, when asked, when one was not acknowledged, now and then."""
+        if self._codec == "jpeg":
+            return False
+        lost = self._rate.lost
+        fresh = self._alone_ns is not None and now_ns - self._alone_ns < _KEY_AGAIN_NS
+        while self._asked:
+            why = self._asked.popleft()
+            if fresh:
+                continue
+            if why == LOST:
+                self._rate.lost_on_way(now_ns)
+            self._wants_alone = True
+        if lost != self._lost_before or self._rate.lost != lost:
+            self._lost_before, self._wants_alone = self._rate.lost, True
+        old = self._alone_ns is None or now_ns - self._alone_ns >= self._keyframe_ns
+        return self._wants_alone or old
+
     def _send(self, reply: PictureReply) -> None:
         self._number += 1
         now_ns = self._clock()
-        frame = VideoFrame(self._number, reply.captured_ns, now_ns, reply.width, reply.height, reply.body)
+        alone = reply.answer is ReplyKind.PICTURE
+        after = 0 if alone else self._sent_number
+        size = reply.width, reply.height
+        frame = VideoFrame(self._number, reply.captured_ns, now_ns, *size, reply.body, self._codec, after)
         try:
             payload = encode_frame(frame)
         except CodecError as error:
             raise RobotError(f"the camera made no picture: {error}") from None
+        self._sent_number = self._number
+        if alone:
+            self._alone_ns, self._wants_alone = now_ns, False
         # before it is put: its acknowledgement may be quicker than this thread
         self.sight.sent(self._number, reply.captured_ns, now_ns)
         self._rate.sent(self._number, len(payload), now_ns)

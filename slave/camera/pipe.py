@@ -14,9 +14,9 @@ import numpy as np
 
 from common.errors import CodecError
 from common.quaternion import Array
-from common.wire.video import MAX_JPEG
+from common.wire.video import MAX_PICTURE
 
-REQUEST = struct.Struct("<QII")
+REQUEST = struct.Struct("<QIIB")
 REPLY = struct.Struct("<BQHHI")
 MOST_JOINTS = 1024
 
@@ -27,10 +27,13 @@ class ReplyKind(IntEnum):
     READY = 1
     """Open, and waiting to be asked."""
     PICTURE = 2
+    """A picture that stands alone."""
     TROUBLE = 3
     """The camera failed, with the reason as text; another try may succeed."""
     NEVER = 4
     """This machine cannot open a camera, with the reason as text; another try cannot succeed."""
+    NEXT_PICTURE = 5
+    """A picture of H.264 that builds on the one before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,8 @@ class PictureRequest:
     most_bytes: int
     position_rad: Array
     """(J,)"""
+    alone: bool = False
+    """Whether the picture must stand alone; a JPEG always does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +58,7 @@ class PictureReply:
     width: int = 0
     height: int = 0
     body: bytes = b""
-    """JPEG, or UTF-8."""
+    """JPEG or H.264, or UTF-8."""
 
     @property
     def words(self) -> str:
@@ -64,7 +69,9 @@ class PictureReply:
 def pack_request(request: PictureRequest) -> bytes:
     """The request's bytes."""
     angles = np.ascontiguousarray(request.position_rad, "<f8").tobytes()
-    return REQUEST.pack(request.read_ns, request.most_bytes, len(request.position_rad)) + angles
+    return (
+        REQUEST.pack(request.read_ns, request.most_bytes, len(request.position_rad), request.alone) + angles
+    )
 
 
 def pack_reply(reply: PictureReply) -> bytes:
@@ -73,18 +80,18 @@ def pack_reply(reply: PictureReply) -> bytes:
     return REPLY.pack(*head) + reply.body
 
 
-def request_of(head: bytes) -> tuple[int, int, int]:
-    """`read_ns`, `most_bytes` and how many bytes of angles follow. Raises CodecError."""
-    read_ns, most_bytes, joints = REQUEST.unpack(head)
+def request_of(head: bytes) -> tuple[int, int, int, bool]:
+    """`read_ns`, `most_bytes`, how many bytes of angles follow, and `alone`. Raises CodecError."""
+    read_ns, most_bytes, joints, alone = REQUEST.unpack(head)
     if joints > MOST_JOINTS:
         raise CodecError(f"{joints} joints")
-    return read_ns, most_bytes, 8 * joints
+    return read_ns, most_bytes, 8 * joints, bool(alone)
 
 
 def reply_of(head: bytes) -> tuple[PictureReply, int]:
     """A reply without its body, and how many bytes of it follow. Raises CodecError."""
     answer, captured_ns, width, height, length = REPLY.unpack(head)
-    if length > MAX_JPEG:
+    if length > MAX_PICTURE:
         raise CodecError(f"{length} bytes from the camera's process")
     try:
         return PictureReply(ReplyKind(answer), captured_ns, width, height), length

@@ -54,7 +54,7 @@ class CameraProcess:
         except OSError:
             raise RobotError(GONE) from None
         reply = self._receive(ANSWER_S)
-        if reply.answer is not ReplyKind.PICTURE:
+        if reply.answer not in (ReplyKind.PICTURE, ReplyKind.NEXT_PICTURE):
             raise RobotError(reply.words)
         return reply
 

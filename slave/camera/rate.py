@@ -96,6 +96,13 @@ class RateControl:
         if sent.size > _USED * sent.budget:
             self._budget = min(self._budget + _MORE_BYTES, float(self._limits.most_bytes))
 
+    def lost_on_way(self, now_ns: int) -> None:
+        """The operator's side says that a picture was lost: none that is under way will be acknowledged."""
+        if self._under_way:
+            self.lost += len(self._under_way)
+            self._under_way.clear()
+            self._lower(now_ns)
+
     def _give_up(self, now_ns: int) -> None:
         lost = [n for n, s in self._under_way.items() if now_ns - s.sent_ns > _LOST_NS]
         for number in lost:

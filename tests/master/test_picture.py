@@ -31,6 +31,38 @@ def test_late_repeated_and_broken_ones_are_counted_and_change_nothing() -> None:
     assert watch.metrics() == VideoReceived(received=3, late=2, undecodable=2)
 
 
+def h264(number: int, after: int) -> bytes:
+    return encode_frame(VideoFrame(number, number, number, 320, 240, b"\0\0\0\1", "h264", after))
+
+
+def test_a_picture_that_cannot_be_shown_is_not_acknowledged_and_another_is_asked_for() -> None:
+    watch = VideoWatch()
+    watch.on_payload(h264(5, 0), 100 * MS)
+    assert not watch.asks_for_key(100 * MS)
+    watch.on_payload(h264(7, 6), 200 * MS)  # 6 was lost
+    assert watch.seen_by(300 * MS) == (5, 100 * MS)
+    assert watch.frame is not None
+    assert watch.frame.number == 5
+    assert watch.asks_for_key(200 * MS)
+    assert not watch.asks_for_key(499 * MS)
+    assert watch.asks_for_key(500 * MS)
+    watch.on_payload(h264(8, 0), 510 * MS)
+    assert not watch.asks_for_key(900 * MS)
+    watch.on_payload(h264(9, 8), 600 * MS)
+    assert watch.seen_by(700 * MS) == (9, 600 * MS)
+    assert watch.metrics() == VideoReceived(received=4, late=0, undecodable=0, not_shown=1)
+
+
+def test_a_stream_that_is_never_whole_is_not_taken_for_a_robot_that_started_anew() -> None:
+    watch = VideoWatch()
+    watch.on_payload(h264(500, 0), 0)
+    for i in range(30):
+        watch.on_payload(h264(502 + i, 501 + i), 100 * (i + 1) * MS)
+    watch.on_payload(h264(3, 0), 3100 * MS)
+    assert watch.seen_by(4000 * MS) == (500, 0)
+    assert watch.metrics().late == 1
+
+
 def test_a_robot_that_started_anew_may_count_from_below() -> None:
     watch = VideoWatch()
     watch.on_payload(payload(500), 0)

@@ -46,22 +46,6 @@ class CameraFeeds:
         """When a picture was taken, as its stamp says, robot's clock; None where it is not known any more."""
         return dict(self._captured.get(camera, ())).get(number)
 
-    def header(self, camera: str, offset: Offset | None, now_ns: int) -> dict[str, object]:
-        """What the page is told with a picture. `offset`: this host's clock minus the robot's.
-
-        Raises KeyError for a camera of which nothing came.
-        """
-        frame = self.newest[camera].frame
-        age_ns = _age_ns(frame, offset, now_ns)
-        return {
-            "camera": camera,
-            "number": frame.number,
-            "age_ms": ms(age_ns, 1),
-            "bound_ms": ms(None if age_ns is None or offset is None else offset.bound_ns, 1),
-            "width": frame.width,
-            "height": frame.height,
-        }
-
     def shown(self, offset: Offset | None, now_ns: int) -> dict[str, dict[str, object]]:
         """Age and rate of each camera, by name. A picture whose age is not known is judged by its arrival."""
         out: dict[str, dict[str, object]] = {}
@@ -76,6 +60,21 @@ class CameraFeeds:
                 "stale": to_s(since_ns if age_ns is None else age_ns) > STALE_S,
             }
         return out
+
+
+def picture_header(camera: str, frame: VideoFrame, offset: Offset | None, now_ns: int) -> dict[str, object]:
+    """What the page is told with a picture. `offset`: this host's clock minus the robot's."""
+    age_ns = _age_ns(frame, offset, now_ns)
+    return {
+        "camera": camera,
+        "number": frame.number,
+        "codec": frame.codec,
+        "after": frame.after,
+        "age_ms": ms(age_ns, 1),
+        "bound_ms": ms(None if age_ns is None or offset is None else offset.bound_ns, 1),
+        "width": frame.width,
+        "height": frame.height,
+    }
 
 
 def _age_ns(frame: VideoFrame, offset: Offset | None, now_ns: int) -> int | None:

@@ -22,6 +22,7 @@ const link = new Link({
   answer: (answer) => (answer.to === "stop" ? answer.done && stopConfirmed() : tell(answer.text, answer.done)),
   stop: ({ stop: told }) => ((seen.stop = told), showStop()), // to a page that is shown nothing else
   bye: (bye) => tell(bye.why, false),
+  undecodable: () => tell(t("picture.no_decoder"), false),
 }, new URLSearchParams(location.search).get("robot"));
 let stopConfirmed = () => {};
 const glass = new Glass(link);

@@ -2,6 +2,8 @@
 // A frame is acknowledged soon after it was handed over: a page that stands still acknowledges nothing, is sent
 // nothing, and so it never replays the past.
 
+import { Pictures } from "./video.js";
+
 const ACKNOWLEDGE_MS = 15;
 const BEAT_MS = 50; // the held deadman
 const LOOK_MS = 250;
@@ -24,6 +26,8 @@ export class Link {
     this.quiet = false; // nothing is sent to a page that may not look
     this.beat = null;
     this.stopping = null;
+    const keyframe = (camera) => this.send({ kind: "keyframe", camera });
+    this.pictures = new Pictures(keyframe, () => this.heard.undecodable?.());
     this.open();
     setInterval(() => this.watch(), LOOK_MS);
   }
@@ -34,6 +38,7 @@ export class Link {
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     this.processed = this.acknowledged = this.drawnView = 0;
+    this.pictures.clear();
     socket.onmessage = (event) => {
       if (socket !== this.socket) return;
       this.failures = 0;
@@ -79,8 +84,7 @@ export class Link {
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
     const arrived_ms = performance.now();
     try {
-      const bitmap = await createImageBitmap(new Blob([new Uint8Array(data, 4 + length)], { type: "image/jpeg" }));
-      this.heard.picture?.({ ...header, arrived_ms, bitmap });
+      await this.pictures.take({ ...header, arrived_ms }, new Uint8Array(data, 4 + length), (shown) => this.heard.picture?.(shown));
     } catch {
       this.heard.broken?.(header);
     }

@@ -150,7 +150,7 @@ class _Viewer:
         camera = entry.topic.rpartition("/")[2]
         self._cameras.add(camera)
         frame, at_ns = _camera_frame(camera), entry.wall_ns
-        self._out.put(f"/camera/{camera}", protobuf.compressed_image(picture.jpeg, frame, at_ns), at_ns)
+        self._out.put(f"/camera/{camera}", protobuf.picture(picture, frame, at_ns), at_ns)
         calibration = protobuf.camera_calibration(picture.width, picture.height, FOVY_RAD, frame, at_ns)
         self._out.put(f"/camera/{camera}/calibration", calibration, at_ns)
 

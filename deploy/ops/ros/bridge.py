@@ -23,7 +23,7 @@ from common.skeleton import Skeleton
 from common.wire.codec import decode
 from common.wire.messages import RobotState
 from common.wire.topics import STATE, video
-from common.wire.video import decode_frame
+from common.wire.video import JPEG, decode_frame
 from deploy.ops.ros.publishers import KeyFormat, RosPublishers
 from deploy.ros.translate import Published, Translator
 
@@ -97,6 +97,10 @@ async def _tell(
         except CodecError as error:
             if wrong.passes(monotonic_ns(), camera):
                 log.warning("%s: a picture of %s cannot be read: %s", options.robot, camera, error)
+            return
+        if frame.codec != JPEG:
+            if wrong.passes(monotonic_ns(), camera):
+                log.warning("%s: %s sends H.264; only JPEG is passed on to ROS", options.robot, camera)
             return
         publish([translator.picture(camera, frame)], wall_ns())
 

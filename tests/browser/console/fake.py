@@ -49,6 +49,10 @@ class FakeConsole:
         """What a page that may not look is told of its stop."""
         self.pictures = True
         self.picture: bytes | None = None
+        self.h264: Any = None
+        """Makes (bytes, alone) of pixels and whether the picture must stand alone: they are H.264."""
+        self.loses = 0
+        """So many of the next pictures do not arrive."""
         self.coded = False
         """Each picture shows the time of this host as a code."""
         self.still = False
@@ -59,6 +63,7 @@ class FakeConsole:
         self.most_unacknowledged = 0
         self.stop: dict[str, Any] | None = None
         self.shape: dict[str, Any] = scene(load_skeleton("nursing"))
+        self._number, self._wants_key = 0, True
         self._stopped_s = 0.0
         self._sockets: set[web.WebSocketResponse] = set()
         self._ready = threading.Event()
@@ -176,6 +181,7 @@ class FakeConsole:
             acknowledged["n"] = message["n"]
             return
         self.received.append(message)
+        self._wants_key |= message["kind"] == "keyframe"
         if message["kind"] == "stop" and not self.silent:
             self._stop()
 
@@ -200,7 +206,7 @@ class FakeConsole:
                 await socket.send_json(self._facts(n))
             if turn % 2 and self.pictures:
                 n += 1
-                await socket.send_bytes(self._frame(n))
+                await self._send_picture(socket, n)
 
     def _view(self, n: int) -> dict[str, Any]:
         now_s = 0.0 if self.still else time.monotonic()
@@ -247,6 +253,22 @@ class FakeConsole:
             )
         return {"nodes": nodes}
 
+    async def _send_picture(self, socket: web.WebSocketResponse, n: int) -> None:
+        if self.h264 is None:
+            await socket.send_bytes(self._frame(n))
+            return
+        number, self._number = self._number + 1, self._number + 1
+        body, alone = self.h264(_pixels(self.coded), self._wants_key)
+        after = 0 if alone else number - 1
+        self._wants_key = False
+        if self.loses and not alone:
+            self.loses -= 1
+            return
+        about = {"camera": "head", "number": number, "codec": "h264", "after": after, "age_ms": 92.1,
+                 "bound_ms": 1.0, "width": 320, "height": 240}  # fmt: skip
+        header = json.dumps({"kind": "picture", "n": n, **about}).encode()
+        await socket.send_bytes(struct.pack("<I", len(header)) + header + body)
+
     def _frame(self, n: int) -> bytes:
         about = {"camera": "head", "number": n, "age_ms": 92.1, "bound_ms": 1.0, "width": 320, "height": 240}
         header = json.dumps({"kind": "picture", "n": n, **about}).encode()
@@ -262,6 +284,10 @@ async def _headers(request: web.Request, handler: Any) -> web.StreamResponse:
 
 
 def _jpeg(coded: bool = False) -> bytes:
+    return bytes(simplejpeg.encode_jpeg(_pixels(coded), quality=80))
+
+
+def _pixels(coded: bool = False) -> Any:
     """A room: wall, floor, bed and a lamp that moves."""
     picture = np.empty((240, 320, 3), dtype=np.uint8)
     picture[:150], picture[150:] = (200, 205, 198), (120, 100, 84)
@@ -271,7 +297,7 @@ def _jpeg(coded: bool = False) -> bytes:
     picture[40:70, x : x + 24] = (250, 230, 150)
     if coded:
         paste_code(picture, monotonic_ns(), (150, 20), 6)
-    return bytes(simplejpeg.encode_jpeg(picture, quality=80))
+    return picture
 
 
 _BASE = {"shoulder_pitch": 0.7, "elbow_pitch": 0.9}

@@ -60,6 +60,9 @@ def test_the_table(who: str, robot: str) -> None:
     assert may(who, "put", f"{key}/video/head") == (itself or router)
     assert may(who, "declare_subscriber", f"{key}/video/head") == (operator or viewer or router)
     assert may(who, "put", f"{key}/video/head", "egress") == (operator or viewer or router)
+    for camera in ("head", "wrist"):
+        assert may(who, "put", f"{key}/keyframe/{camera}") == (operator or viewer or router)
+        assert may(who, "declare_subscriber", f"{key}/keyframe/{camera}") == (itself or router)
     assert may(who, "declare_subscriber", f"{key}/state") == (operator or observer or router)
     assert may(who, "declare_subscriber", f"{key}/operator/*/command") == (
         operator or observer or itself or router

@@ -259,7 +259,7 @@ def test_a_picture_has_its_header_before_it() -> None:
         length = int.from_bytes(data[:4], "little")
         header = json.loads(data[4 : 4 + length])
         assert (header["kind"], header["camera"], header["number"], header["n"]) == ("picture", "head", 7, 1)
-        assert data[4 + length :] == robot.pictures.newest["head"].frame.jpeg
+        assert data[4 + length :] == robot.pictures.newest["head"].frame.body
 
     run(story)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from common.clock import to_ns
-from deploy.console.outbox import WINDOW, Outbox
+from deploy.console.outbox import MOST_IN_ORDER, WINDOW, Outbox
 
 
 def fill(outbox: Outbox, states: int, slot: str = "view", first: int = 0) -> list[str | bytes]:
@@ -64,3 +64,29 @@ def test_it_knows_since_when_the_page_owes() -> None:
     assert outbox.owes_since_ns() == to_ns(0.08)
     outbox.acknowledge(3, to_ns(1.0))
     assert outbox.owes_since_ns() is None
+
+
+def test_what_builds_on_the_one_before_waits_in_order_and_is_dropped_whole() -> None:
+    box = Outbox()
+
+    def offer(number: int, begins: bool = False) -> bool:
+        return box.offer_in_order("picture head", number, lambda n: f"{number}", begins)
+
+    assert offer(1, begins=True)
+    assert all(offer(number) for number in range(2, MOST_IN_ORDER + 1))
+    assert not offer(MOST_IN_ORDER + 1)  # one more than may wait: all go
+    assert box.take(0) is None
+    assert not offer(MOST_IN_ORDER + 2)  # builds on one that was dropped
+    assert box.replaced == MOST_IN_ORDER + 2
+    assert offer(20, begins=True)
+    assert offer(21)
+    assert [box.take(0), box.take(0), box.take(0)] == ["20", "21", None]
+
+
+def test_one_that_begins_replaces_those_that_wait_and_no_other_camera_s() -> None:
+    box = Outbox()
+    for number in (1, 2, 3):
+        box.offer_in_order("picture head", number, lambda n: f"head {n}", number == 1)
+    box.offer_in_order("picture wrist", 1, lambda n: "wrist 1", True)
+    box.offer_in_order("picture head", 4, lambda n: "newest head", True)
+    assert [box.take(0), box.take(0), box.take(0)] == ["wrist 1", "newest head", None]

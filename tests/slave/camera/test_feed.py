@@ -9,18 +9,21 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from common.clock import monotonic_ns
 from common.errors import RobotError
+from common.wire.topics import JOINED, LOST
 from common.wire.video import VideoFrame, decode_frame
 from slave.camera import feed as feed_module
 from slave.camera.config import CameraConfig
 from slave.camera.feed import CameraFeed
 from slave.camera.pipe import PictureReply, PictureRequest, ReplyKind
 from slave.camera.process import CameraProcess, NeverError
+from slave.camera.sight import SeenPicture
 
 CONFIG = CameraConfig(source="robot", most_rate_hz=60.0)
 JOINTS = 25
@@ -32,7 +35,7 @@ def say(reply):
     out.write(pack_reply(reply)); out.flush()
 say(PictureReply(ReplyKind.READY))
 while head := sys.stdin.buffer.read(REQUEST.size):
-    read_ns, most, length = request_of(head)
+    read_ns, most, length, alone = request_of(head)
     sys.stdin.buffer.read(length)
     say(PictureReply(ReplyKind.PICTURE, read_ns, 320, 240, b"\\xff\\xd8 picture \\xff\\xd9"))
 """
@@ -61,9 +64,11 @@ class Link:
 
 
 @contextmanager
-def running(open_camera: Callable[[], CameraProcess]) -> Iterator[tuple[CameraFeed, Link]]:
+def running(
+    open_camera: Callable[[], CameraProcess], config: CameraConfig = CONFIG
+) -> Iterator[tuple[CameraFeed, Link]]:
     link = Link()
-    feed = CameraFeed(CONFIG, link.put, open_camera)
+    feed = CameraFeed(config, link.put, open_camera)
     feed.look(np.zeros(JOINTS), 12345)
     with feed:
         yield feed, link
@@ -101,6 +106,63 @@ def test_a_camera_killed_is_told_and_started_anew(monkeypatch: pytest.MonkeyPatc
         seen = len(link.frames)
         assert link.wait(seen + 1)[-1].number > last
         until(lambda: feed.fault == "")
+
+
+SERVE_H264 = SERVE.replace(
+    'say(PictureReply(ReplyKind.PICTURE, read_ns, 320, 240, b"\\xff\\xd8 picture \\xff\\xd9"))',
+    "kind = ReplyKind.PICTURE if alone else ReplyKind.NEXT_PICTURE\n"
+    "    say(PictureReply(kind, read_ns, 320, 240, bytes((0, 0, 0, 1, 9))))",
+)
+H264 = CameraConfig(source="robot", codec="h264", most_rate_hz=60.0, keyframe_s=60.0)
+
+
+def acknowledge(feed: CameraFeed, number: int) -> None:
+    """As the operator's command does."""
+    feed._seen.append(SeenPicture(number, monotonic_ns(), 0))
+    feed._wake.set()
+
+
+@pytest.mark.parametrize("why", [LOST, JOINED])
+def test_the_first_picture_and_an_asked_one_stand_alone_the_others_name_the_one_before(
+    why: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(feed_module, "_KEY_AGAIN_NS", 0)
+    with running(lambda: process(SERVE_H264), H264) as (feed, link):
+        for count in range(1, 5):
+            acknowledge(feed, link.wait(count)[-1].number)
+        before = len(link.frames)
+        feed.on_keyframe(why)
+        for count in range(before, before + 4):
+            acknowledge(feed, link.wait(count)[-1].number)
+        frames = list(link.frames)
+    assert [frame.codec for frame in frames] == ["h264"] * len(frames)
+    assert frames[0].after == 0
+    alone = [i for i, frame in enumerate(frames) if frame.after == 0]
+    assert len(alone) == 2
+    for one, following in pairwise(frames):
+        assert following.after in (0, one.number)
+
+
+def test_requests_right_after_a_picture_that_stands_alone_get_no_other() -> None:
+    with running(lambda: process(SERVE_H264), H264) as (feed, link):
+        for count in range(1, 6):
+            feed.on_keyframe(JOINED)
+            acknowledge(feed, link.wait(count)[-1].number)
+        frames, lost = list(link.frames), feed.metrics().not_acknowledged
+    took_ns = frames[4].sent_ns - frames[0].sent_ns
+    if took_ns < 300_000_000:
+        assert [frame.after == 0 for frame in frames[:5]] == [True] + [False] * 4
+    assert lost == 0
+
+
+def test_after_a_loss_the_window_is_free_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(feed_module, "_KEY_AGAIN_NS", 0)
+    monkeypatch.setattr("slave.camera.rate._LOST_NS", 10**15)
+    with running(lambda: process(SERVE_H264), H264) as (feed, link):
+        link.wait(2)  # both are lost: as many as may be are under way
+        feed.on_keyframe(LOST)
+        assert link.wait(3)[2].after == 0
+        assert feed.metrics().not_acknowledged == 2
 
 
 def test_a_machine_that_cannot_says_so_once_and_is_not_asked_again() -> None:

@@ -93,7 +93,7 @@ class _Maker:
                 if key not in self._videos:
                     path = self._root / tables.at(tables.VIDEO, video_key=key)
                     self._videos[key] = VideoOut(path, self._fps, picture.width, picture.height)
-                rgb = self._videos[key].put(picture.jpeg)
+                rgb = self._videos[key].put(picture.body)
                 own[key].take(rgb)
                 self._pictures[key].take(rgb)
         begin = sum(map(len, self.episodes))

@@ -148,7 +148,7 @@ def test_a_picture_is_as_old_as_its_capture_by_the_robots_clock() -> None:
     robot.on_command(command(1, 200.9, 200.9), to_ns(200.9))
     assert robot.on_picture("head", frame(1, 200.9), to_ns(201.0))
     assert not robot.on_picture("head", frame(1, 200.9), to_ns(201.0)), "twice"
-    assert robot.pictures.newest["head"].frame.jpeg == JPEG
+    assert robot.pictures.newest["head"].frame.body == JPEG
     assert view(robot, 201.0)["video"]["head"]["age_ms"] == pytest.approx(100.0)
     assert view(robot, 201.0)["video"]["head"]["bound_ms"] == pytest.approx(BOUND_NS / 1e6)
     assert not view(robot, 201.4)["video"]["head"]["stale"]
