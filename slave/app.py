@@ -31,7 +31,17 @@ from common.wire.path_probe import answer_probe
 from common.wire.presence import ProcessPresence, place
 from common.wire.sender import operator_of
 from common.wire.topics import (
-    CALL, CLOCK, COMMAND, CONTROL, PATH, STATE, STATISTICS, STOP, SUMMARY, keyframe, video,
+    CALL,
+    CLOCK,
+    COMMAND,
+    CONTROL,
+    PATH,
+    STATE,
+    STATISTICS,
+    STOP,
+    SUMMARY,
+    keyframe,
+    video,
 )  # fmt: skip
 from common.wire.version import software
 from slave.attitude.open import open_base
