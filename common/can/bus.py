@@ -5,6 +5,7 @@ Nothing that happens on the bus is raised into the session once `open` has retur
 
 from __future__ import annotations
 
+import asyncio
 import errno
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -14,6 +15,7 @@ import can
 from common.can.batch import BatchReader, can_batch
 from common.can.config import BusConfig
 from common.can.controller import RESTARTED, Controller, error_words, of_error_frame
+from common.can.datagrams import DatagramReader, sends_datagrams
 from common.can.echo import SentFrames
 from common.can.frame import EXTENDED, CanFrame
 from common.can.interface import descriptor, error_number, open_bus
@@ -123,10 +125,13 @@ class CanBus(KeptOpenBus):
         self._attempt = 0
 
     def _reader_of(self, bus: can.BusABC) -> Reader:
-        number = descriptor(bus) if self._in_batches else None
-        if number is None:
-            return super()._reader_of(bus)
-        return BatchReader(number, self._on_batch, self._on_receive_error)
+        number = descriptor(bus)
+        if number is not None and self._in_batches:
+            return BatchReader(number, self._on_batch, self._on_receive_error)
+        if number is not None and self._arrived is read_now and sends_datagrams(bus):
+            loop, fd = asyncio.get_running_loop(), self._config.fd
+            return DatagramReader(number, loop, fd, self._on_batch, self._on_message, self._on_receive_error)
+        return super()._reader_of(bus)
 
     def _on_batch(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
         """Data frames go on at once; what is rare takes the way of a python-can message."""

@@ -16,7 +16,7 @@ from typing import Protocol
 
 import can
 
-_FRAMES_A_WAKE_UP = 64
+FRAMES_A_WAKE_UP = 64
 """A bus that never falls silent must not keep the loop from its timers."""
 _THREAD_WAIT_S = 0.05
 
@@ -58,7 +58,7 @@ class DescriptorReader:
         """Call back for each message that waits, but not for ever."""
         if self._stopped:
             return
-        for _ in range(_FRAMES_A_WAKE_UP):
+        for _ in range(FRAMES_A_WAKE_UP):
             try:
                 message = self._bus.recv(0)
             except Exception as error:  # whatever a driver raises, the session goes on

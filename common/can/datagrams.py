@@ -1,0 +1,116 @@
+"""Frames of python-can's udp_multicast, read from its socket without python-can.
+
+python-can takes 12 µs a frame: select, recvmsg with a time stamp, a checked Message. Here a plain data frame
+takes a third of that. Whatever else a datagram holds is left to python-can, which knows what it is.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+from collections.abc import Callable
+
+import can
+import msgpack
+from can.interfaces.udp_multicast import UdpMulticastBus
+from can.interfaces.udp_multicast.utils import unpack_message
+
+from common.can.reader import FRAMES_A_WAKE_UP, OnError, OnMessage
+from common.clock import monotonic_ns
+
+_LONGEST = 4096
+"""Bytes of a datagram, as in python-can."""
+_FIELDS = 11
+"""That python-can packs of a Message."""
+_STANDARD_IDS = 0x800
+
+OnFrames = Callable[[list[tuple[int, bytes, int]]], None]
+"""Takes data frames: identifier of 11 bits, data, when it was read in monotonic ns."""
+
+
+def sends_datagrams(bus: can.BusABC) -> bool:
+    """Whether a bus can be read so."""
+    return isinstance(bus, UdpMulticastBus)
+
+
+def data_frame(datagram: bytes) -> tuple[int, bytes, bool] | None:
+    """Identifier, data and whether it is CAN FD, of a sound data frame of 11 bits; None for all else."""
+    try:
+        fields = msgpack.unpackb(datagram)
+        frame_id, data, fd = fields["arbitration_id"], fields["data"], fields["is_fd"]
+        if (
+            type(frame_id) is int
+            and 0 <= frame_id < _STANDARD_IDS
+            and type(data) is bytes
+            and fields["dlc"] == len(data) <= (64 if fd else 8)
+            and fields["is_extended_id"] is fields["is_remote_frame"] is fields["is_error_frame"] is False
+            and (fd is True or fd is fields["bitrate_switch"] is fields["error_state_indicator"] is False)
+            and len(fields) == _FIELDS
+        ):
+            return frame_id, data, fd
+    except Exception:  # msgpack raises its own family; python-can says what is wrong
+        pass
+    return None
+
+
+class DatagramReader:
+    """Reads when the loop says that the bus can be read, as `reader.DescriptorReader` does."""
+
+    def __init__(
+        self,
+        number: int,
+        loop: asyncio.AbstractEventLoop,
+        fd: bool,
+        on_frames: OnFrames,
+        on_message: OnMessage,
+        on_error: OnError,
+    ) -> None:
+        """`number`: the socket's descriptor. `fd`: False drops frames of CAN FD, as python-can does."""
+        self._number, self._loop, self._fd = number, loop, fd
+        self._on_frames, self._on_message, self._on_failure = on_frames, on_message, on_error
+        self._stopped = False
+        self._wire = socket.socket(fileno=os.dup(number))
+        self._wire.setblocking(False)
+        loop.add_reader(number, self.read)
+
+    def read(self) -> None:
+        """Call back for each frame that waits, but not for ever."""
+        for _ in range(FRAMES_A_WAKE_UP):
+            if self._stopped:
+                return
+            try:
+                datagram = self._wire.recv(_LONGEST)
+            except BlockingIOError:
+                return
+            except OSError as error:
+                failed = can.CanOperationError(f"failed to read the socket: {error}", error.errno)
+                if not self._on_failure(failed):
+                    return
+                continue
+            frame = data_frame(datagram)
+            if frame is None:
+                self._take_other(datagram)
+            elif self._fd or not frame[2]:
+                self._on_frames([(frame[0], frame[1], monotonic_ns())])
+
+    def _take_other(self, datagram: bytes) -> None:
+        try:
+            message = unpack_message(datagram, check=True)
+        except Exception as cause:  # whatever it raises, the datagram is no frame
+            error = can.CanOperationError("could not unpack received message")
+            error.__cause__ = cause
+            self._on_failure(error)
+            return
+        if self._fd or not message.is_fd:
+            self._on_message(message)
+
+    def stop(self) -> None:
+        """Let go of the descriptor; it may be closed after this."""
+        if not self._stopped:
+            self._stopped = True
+            self._loop.remove_reader(self._number)
+            self._wire.close()
+
+    def join(self) -> None:
+        """There is nothing to wait for."""
