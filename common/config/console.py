@@ -34,6 +34,8 @@ class ConsoleConfig(Section):
     losing_page: Literal["nothing", "stop"] = "nothing"
     """`stop`: when the page of the person who engaged the robot is lost, the robot is stopped."""
 
+    reports: RelativePath | None = None
+    """A folder whose reports can be opened from the page, such as that of `tandem trial --out`."""
     study: RelativePath | None = None
     """The folder of a study: the page leads through the session that is under way there."""
 

@@ -54,7 +54,7 @@ def read_act(body: object, robots: tuple[str, ...], person: Person) -> ActReques
     if action is None:
         raise ActRefusedError(400, f"no such act: expected one of {', '.join(ACTS)}")
     robot = _robot(body, robots)
-    _may_act(person)
+    may_act(person)
     key = _text(body, "to" if action is Action.HANDOVER else "key")
     if not key and action in (Action.RESET, Action.HOME, Action.HANDOVER):
         raise ActRefusedError(400, "to whom?" if action is Action.HANDOVER else "the robot's key is missing")
@@ -69,7 +69,7 @@ def read_act(body: object, robots: tuple[str, ...], person: Person) -> ActReques
 def read_mark(body: dict[str, object], robots: tuple[str, ...], person: Person) -> tuple[str, str]:
     """Robot and words of a mark. Raises ActRefusedError."""
     robot = _robot(body, robots)
-    _may_act(person)
+    may_act(person)
     return robot, _text(body, "text") or "mark"
 
 
@@ -80,7 +80,8 @@ def _robot(body: Mapping[str, object], robots: tuple[str, ...]) -> str:
     return robot
 
 
-def _may_act(person: Person) -> None:
+def may_act(person: Person) -> None:
+    """Raises ActRefusedError where this person may do no more than stop."""
     if not person.role.acts:
         status = 403 if person.name else 401
         raise ActRefusedError(status, "log in first: this is for an operator or an engineer. Anyone may stop")

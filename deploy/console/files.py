@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,8 @@ TYPES = {
     ".txt": "text/plain",
     ".map": "application/json",
 }
+_PART = re.compile(rb"<!-- part of (\S+): page=(\w+) modules=([\w,]*) vendor=([\w,]*) -->\n")
+"""The first line of a page that is shown in the shell: banner, stop and keys are the same on each."""
 _COMPRESSED = {".html", ".css", ".js", ".mjs", ".json", ".svg", ".txt", ".map"}
 
 
@@ -51,12 +54,28 @@ class PageFiles:
         path = (root / name).resolve()
         if not path.is_relative_to(root.resolve()) or path.suffix not in TYPES or not path.is_file():
             return None
-        changed_ns = path.stat().st_mtime_ns
+        changed_ns = max(each.stat().st_mtime_ns for each in (path, *path.parent.glob("shell.html")))
         known = self._read.get(path)
         if known is None or known[0] != changed_ns:
-            plain = path.read_bytes()
+            plain = _whole(path)
             etag = hashlib.sha256(plain).hexdigest()[:32]
             packed = gzip.compress(plain, 6, mtime=0) if path.suffix in _COMPRESSED else None
             known = changed_ns, PageFile(TYPES[path.suffix], plain, packed, etag)
             self._read[path] = known
         return known[1]
+
+
+def _whole(path: Path) -> bytes:
+    """A file's bytes; of a part, within its shell."""
+    plain = path.read_bytes()
+    found = _PART.match(plain)
+    if found is None:
+        return plain
+    shell, page, modules, vendor = (group.decode() for group in found.groups())
+    named = {"page": modules, "vendor": vendor}
+    wanted = [(folder, name) for folder, names in named.items() for name in names.split(",")]
+    preload = "\n".join(
+        f'<link rel="modulepreload" href="/{folder}/{name}.js">' for folder, name in wanted if name
+    )
+    text = (path.parent / shell).read_text("utf-8").replace("{page}", page).replace("{preload}", preload)
+    return text.replace("{main}", plain[found.end() :].decode()).encode()

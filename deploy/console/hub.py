@@ -17,8 +17,10 @@ from common.wire.video import JPEG
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.model.guard_table import ENGAGED
 from deploy.console.model.robot import RobotModel
+from deploy.console.reports import ReportFolder
 from deploy.console.session import Access, PageRole, Person, RateLimit
 from deploy.console.stopping import RobotStopper
+from deploy.console.study import StudyDesk
 from deploy.console.viewers import KEPT, LOST_S, MOST, OpenPage, pack
 
 VIEW_HZ = 25
@@ -41,6 +43,8 @@ class Hub:
     stoppers: Mapping[str, RobotStopper]
     deadman: DeadmanRelay | None = None
     losing_page_stops: bool = False
+    desk: StudyDesk = field(default_factory=StudyDesk)
+    reports: ReportFolder = field(default_factory=ReportFolder)
     pages: list[OpenPage] = field(default_factory=list)
     session: str = field(default_factory=lambda: secrets.token_hex(4))
     """Another one with each process."""
@@ -174,7 +178,7 @@ class Hub:
     def _show_facts(self, model: RobotModel, now_ns: int) -> None:
         if not any(page.model is model for page in self.pages):
             return
-        body = pack({**model.facts(now_ns), "console": self._figures()})
+        body = pack({**model.facts(now_ns), "console": self._figures(), "study": self.desk.shown(now_ns)})
         for page in self.pages:
             if page.model is model:
                 viewers = [

@@ -75,6 +75,7 @@ def _at_the_operator(chosen: ConsoleChoices) -> ConsoleOptions:
         deadman=None if hold is None else hold.source,
         deadman_socket=hold.socket if isinstance(hold, ConsoleHold) else None,
         zones=zones,
+        recordings=None if file is None else file.recording.folder,
     )
 
 
@@ -95,4 +96,5 @@ def _at_the_robot(chosen: ConsoleChoices) -> ConsoleOptions:
         side=Side.ROBOT,
         tap=tap,
         zones=[zone.model_dump() for zone in file.guard.zones],
+        recordings=file.recording.folder,
     )

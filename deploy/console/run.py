@@ -31,8 +31,10 @@ from deploy.console.model.pictures import STALE_S
 from deploy.console.model.robot import SILENT_S, RobotModel, Side, Whose
 from deploy.console.model.scene import scene
 from deploy.console.outbox import WINDOW
+from deploy.console.reports import ReportFolder
 from deploy.console.session import TOKEN_S, Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
+from deploy.console.study import StudyDesk
 
 log = logging.getLogger(__name__)
 
@@ -53,6 +55,8 @@ class ConsoleOptions:
     """Where the master hears a deadman that a page holds."""
     zones: Sequence[Mapping[str, object]] | None = None
     """The robot's zones; None: not known here."""
+    recordings: Path | None = None
+    """`[recording] folder` of this host: where marks go while no session is under way."""
     on_ready: Callable[[str], None] = field(default=lambda line: None)
     """Takes each line for the person who started it: addresses with their tokens."""
 
@@ -118,6 +122,8 @@ async def _serve(
     access = Access(_names(config, port), tls is not None, stranger(config.on_this_host_only))
     models = hearing.models
     hub = Hub(models, access, stoppers, relay, losing_page_stops=config.losing_page == "stop")
+    hub.desk = StudyDesk(config.study, options.recordings)
+    hub.reports = ReportFolder(config.reports)
     hearing.on_picture = hub.on_picture
     hub.put_key = KeyframeRequests(session).put
     address = f"{'https' if tls else 'http'}://{_shown_host(config)}:{port}/"

@@ -11,6 +11,7 @@ from pydantic import Field
 from common.config.load import load_config
 from common.config.section import Section
 from common.errors import ConfigMistake, TandemError
+from deploy.study.questionnaire import questionnaire_names
 
 CODE = re.compile(r"[A-Za-z0-9]{2,16}")
 
@@ -23,6 +24,8 @@ class ProtocolStep(Section):
     """What the person is told, by language: en, zh."""
     seconds: float | None = Field(default=None, gt=0.0)
     """How long it is meant to last; None: as long as it takes."""
+    questionnaire: str | None = None
+    """What the subject answers on the page in this step: nasa-tlx, sus."""
 
 
 class StudyProtocol(Section):
@@ -35,10 +38,15 @@ class StudyProtocol(Section):
     step: list[ProtocolStep] = Field(min_length=1)
 
     def mistakes(self) -> list[ConfigMistake]:
-        """Each step's name once."""
+        """Each step's name once; questionnaires that there are."""
         names = [step.name for step in self.step]
         twice = sorted({name for name in names if names.count(name) > 1})
-        return [ConfigMistake("step.name", name, "a name that no other step has") for name in twice]
+        wrong = [ConfigMistake("step.name", name, "a name that no other step has") for name in twice]
+        expected = f"one of {', '.join(questionnaire_names())}"
+        for asked in (step.questionnaire for step in self.step):
+            if asked is not None and asked not in questionnaire_names():
+                wrong.append(ConfigMistake("step.questionnaire", asked, expected))
+        return wrong
 
 
 def load_protocol(path: Path) -> tuple[StudyProtocol, str]:

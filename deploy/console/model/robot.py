@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from common.clock import NS_PER_S, to_ns, to_s
 from common.clock_sync import Offset
 from common.latency.one_way import master_offset
@@ -177,6 +179,7 @@ class RobotModel:
                 "operator": state.operator,
                 "lease": self._lease(state),
                 "resting": list(state.resting),
+                "limited": [] if state.clamped is None else np.flatnonzero(state.clamped).tolist(),
                 "encoder": rounded(state.position_rad, state.encoder_valid),
                 "setpoint": rounded(state.setpoint_rad),
                 "external_nm": None if state.external_nm is None else rounded(state.external_nm, digits=2),

@@ -11,6 +11,7 @@ const $ = (id) => document.getElementById(id);
 const ENGAGE_MS = 1000;
 const OFF_DEG = 5;
 const engineer = document.body.dataset.page === "engineer";
+const MORE = { engineer: "./engineer.js", study: "./study.js" };
 const seen = { hello: null, view: null, facts: null, setup: null, opened_ms: performance.now(), stopAsked: null, holdKey: "F9" };
 const parts = {};
 const robotOf = () => seen.view?.robot ?? seen.hello?.robot ?? seen.setup?.robot ?? link.robot ?? undefined;
@@ -187,7 +188,7 @@ async function prepare(robot) {
   $("hold").hidden = found.deadman !== "console";
   $("hold-key").textContent = seen.holdKey;
   parts.figure = found.nodes?.length && $("figure") ? new BodyFigure($("figure"), found.nodes) : null;
-  parts.table = new JointTable($("joints"), found.joints, engineer);
+  parts.table = $("joints") ? new JointTable($("joints"), found.joints, engineer) : null;
   parts.cameras = $("cameras") ? new Cameras($("cameras"), found.cameras ?? []) : null;
   cameras(Object.keys(seen.view?.video ?? {}));
   if (parts.more) parts.more.prepare(found);
@@ -215,9 +216,10 @@ function view(message) {
   const known = seen.setup && message.encoder?.length === seen.setup.joints.length;
   if (known && message.heard !== "none") {
     parts.robot?.show(message);
-    if (!$("joints")?.hidden) parts.table?.show(message, { ...seen.facts?.drives, effort_nm: seen.facts?.effort_nm });
+    if ($("joints") && !$("joints").hidden) parts.table?.show(message, { ...seen.facts?.drives, effort_nm: seen.facts?.effort_nm });
     const off = joints_off(message, OFF_DEG).slice(0, 3);
-    if ($("off")) $("off").textContent = off.map(({ joint, off_deg }) => t("off", { joint: nameOf(seen.setup.joints[joint].name), degrees: off_deg.toFixed(0) })).join(" · ");
+    const held = (joint) => (message.limited?.includes(joint) ? ` (${t("limited")})` : "");
+    if ($("off")) $("off").textContent = off.map(({ joint, off_deg }) => t("off", { joint: nameOf(seen.setup.joints[joint].name), degrees: off_deg.toFixed(0) }) + held(joint)).join(" · ");
   }
   cameras(Object.keys(message.video ?? {}));
   latencyNow(message.latency);
@@ -282,6 +284,7 @@ function show() {
   showBadges();
   showStop(found.id);
   const may = Boolean(seen.hello?.may?.act) && found.id !== "no_contact";
+  document.body.dataset.may = may;
   for (const id of ["engage", "disengage", "mark"]) $(id).disabled = !may;
   $("reset").hidden = found.id === "no_contact" || seen.view?.guard !== "estop" || !seen.hello?.may?.reset;
   $("login").hidden = found.id === "no_contact" || Boolean(seen.hello?.may?.act) || !seen.hello;
@@ -403,8 +406,9 @@ async function start() {
   await load();
   speak(localStorage.getItem("language") ?? navigator.language.slice(0, 2));
   parts.spoken = Boolean(localStorage.getItem("language"));
-  if (engineer) {
-    parts.more = await import("./engineer.js");
+  if (MORE[document.body.dataset.page]) {
+    parts.more = await import(MORE[document.body.dataset.page]);
+    parts.more.wire?.({ post: (path, body) => link.post(path, body), tell });
     if (seen.setup) parts.more.prepare(seen.setup);
   }
   const token = new URLSearchParams(location.hash.slice(1)).get("token");

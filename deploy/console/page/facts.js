@@ -249,6 +249,8 @@ export class JointTable {
         if (row.children[i + 1].textContent !== words) row.children[i + 1].textContent = words;
       });
       const [measured, aimed] = [values.encoder?.[j], values.target?.[j]];
+      row.classList.toggle("limited", view.limited?.includes(j) ?? false);
+      row.title = view.limited?.includes(j) ? t("limited") : "";
       row.classList.toggle("off", typeof measured === "number" && typeof aimed === "number" && Math.abs(measured - aimed) > 5);
     });
   }

@@ -93,6 +93,30 @@ def mark(
     session.mark(MarkKind.END if end else MarkKind.EVENT, text)
 
 
+@app.command("answers")
+def all_answers(
+    root: Root = Path(),
+    out: Annotated[
+        Path | None, typer.Option(help="New CSV file; else they are printed.", callback=in_a_folder)
+    ] = None,
+) -> None:
+    """Show every answer to a questionnaire in a study, with scores, as a table.
+
+    Example: `tandem session answers --root study --out answers.csv`
+    """
+    from deploy.study.answers import answers_in, as_table
+
+    table = as_table(answers_in(root))
+    if out is None:
+        typer.echo(table, nl=False)
+        return
+    try:
+        with out.open("x", encoding="utf-8") as stream:
+            stream.write(table)
+    except OSError as error:
+        raise TandemError(f"{out}: cannot be written ({error.strerror or error})") from None
+
+
 @app.command("seal")
 def seal_folder(
     folder: Folder,

@@ -18,7 +18,10 @@ from aiohttp import WSMsgType, web
 from common.clock import monotonic_ns, to_ms
 from common.picture_code import paste_code
 from common.skeleton import load_skeleton
+from deploy.console.app import PAGES
+from deploy.console.files import PageFiles
 from deploy.console.model.scene import scene
+from deploy.console.study import questionnaires
 from slave.guard.states import TRANSITIONS, State
 
 CONSOLE = Path(__file__).parents[3] / "deploy" / "console"
@@ -55,6 +58,7 @@ class FakeConsole:
         """So many of the next pictures do not arrive."""
         self.coded = False
         """Each picture shows the time of this host as a code."""
+        self.reports: list[dict[str, str]] = []
         self.still = False
         """The robot and its operator do not move."""
         self.received: list[dict[str, Any]] = []
@@ -105,9 +109,10 @@ class FakeConsole:
 
     async def _start(self) -> web.AppRunner:
         app = web.Application(middlewares=[_headers])
-        app.router.add_get("/", self._file("page/index.html"))
-        app.router.add_get("/engineer", self._file("page/engineer.html"))
-        app.router.add_get("/code", self._file("page/code.html"))
+        for path in PAGES:
+            app.router.add_get(path, self._page)
+        app.router.add_get("/api/questionnaires", self._questionnaires)
+        app.router.add_get("/api/reports", self._reports)
         app.router.add_get("/api/setup", self._setup)
         app.router.add_get("/api/clock", self._clock)
         app.router.add_get("/ws", self._socket)
@@ -121,11 +126,17 @@ class FakeConsole:
         self.port = runner.addresses[0][1]
         return runner
 
-    def _file(self, name: str) -> Any:
-        async def serve(_: web.Request) -> web.FileResponse:
-            return web.FileResponse(CONSOLE / name)
+    async def _page(self, request: web.Request) -> web.Response:
+        """As the console puts it together."""
+        file = PageFiles().find("page", PAGES[request.path])
+        assert file is not None
+        return web.Response(body=file.plain, content_type="text/html", charset="utf-8")
 
-        return serve
+    async def _questionnaires(self, _: web.Request) -> web.Response:
+        return web.json_response(questionnaires())
+
+    async def _reports(self, _: web.Request) -> web.Response:
+        return web.json_response({"reports": self.reports})
 
     async def _setup(self, _: web.Request) -> web.Response:
         return web.json_response({

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from typing import Any
 
@@ -320,3 +321,58 @@ def test_a_frozen_page_shows_the_present_when_it_goes_on(page: Any, fake: FakeCo
     devtools.send("Page.setWebLifecycleState", {"state": "active"})
     until(page, lambda: state(page) == "holds")
     assert fake.most_unacknowledged <= 10
+
+
+STUDY = {
+    "subject": "k7pd", "session": "01", "protocol": "cup", "done": 1, "steps": 2, "since_s": 12.0,
+    "step": {"name": "questions", "text": {"en": "Answer.", "zh": "请填写。"}, "seconds": 60.0,
+             "questionnaire": "nasa-tlx"},
+    "next": {"name": "rest", "text": {"en": "Stand."}, "seconds": None, "questionnaire": None},
+    "answered": [],
+}  # fmt: skip
+
+
+def test_the_study_page_leads_through_steps_and_sends_answers_to_each_question(
+    page: Any, fake: FakeConsole
+) -> None:
+    fake.facts = {"study": STUDY}
+    fake.reports = [{"name": "trial/report.html", "path": "/reports/trial/report.html", "words": "today"}]
+    page.goto(f"{fake.address}/study")
+    until(page, lambda: page.inner_text("#step-name") == "questions")
+    assert page.inner_text("#step-text") == "Answer."
+    until(page, lambda: re.fullmatch(r"4[5-8] s left", page.inner_text("#step-left")) is not None)
+    until(page, lambda: page.locator("#questions fieldset").count() == 6)
+    assert page.get_attribute("#report-list a", "href") == "/reports/trial/report.html"
+    page.click("#questions [type=submit]")
+    until(page, lambda: page.locator("#questions .missing").count() == 1)
+    assert not [what for what, _ in fake.posted if what == "study"], "no slider was touched"
+    for slider in page.locator("#questions [type=range]").all():
+        slider.focus()
+        page.keyboard.press("ArrowRight")
+    page.click("#questions [type=submit]")
+    given = {"do": "answers", "questionnaire": "nasa-tlx"}
+    answers = dict.fromkeys(("mental", "physical", "temporal", "performance", "effort", "frustration"), 55)
+    until(page, lambda: ("study", {**given, "answers": answers}) in fake.posted)
+    page.click("#step-next")
+    until(page, lambda: ("study", {"do": "next"}) in fake.posted)
+    page.click("#step-end")
+    page.click("#step-end")
+    until(page, lambda: ("study", {"do": "end"}) in fake.posted)
+    page.keyboard.press("F7")
+    until(page, lambda: page.inner_text("#step-text") == "请填写。")
+
+
+def test_a_joint_that_a_limit_holds_back_is_named(page: Any, fake: FakeConsole) -> None:
+    page.wait_for_selector("#scene canvas")
+    fake.view = {"limited": [3]}
+    page.click("#show-joints")
+    until(page, lambda: page.locator("#joints tr.limited").count() == 1)
+
+
+@pytest.mark.parametrize("path", ["/", "/engineer", "/study"])
+def test_every_page_has_the_banner_the_stop_and_the_keys(page: Any, fake: FakeConsole, path: str) -> None:
+    page.goto(fake.address + path)
+    until(page, lambda: state(page) == "follows")
+    assert page.locator("#pages a:visible").count() == 2
+    page.keyboard.press("Escape")
+    until(page, lambda: ("stop", {"robot": "robot-1"}) in fake.posted)

@@ -5,18 +5,28 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 import aiohttp
 import pytest
 
 from common.clock import monotonic_ns, to_ns
-from deploy.console.app import COOKIE, LONGEST
 from deploy.console.model.robot import TAP
+from deploy.console.page_socket import LONGEST
+from deploy.console.replies import COOKIE
+from deploy.console.reports import ReportFolder
 from deploy.console.session import SESSION_S, PageRole, Person
+from deploy.console.study import StudyDesk
 from deploy.console.viewers import KEPT, MESSAGES_PER_S, MOST
+from deploy.examples import profiles
+from deploy.study.marks import read_marks
+from deploy.study.session import begin
+from deploy.study.under_way import say_under_way
 from tests.deploy.console.robots import ROBOT, frame, state
 from tests.deploy.console.served import Served, cookie_jar, served
 
+CUP = Path(profiles.__file__).parent / "study" / "cup.toml"
+TLX = ("mental", "physical", "temporal", "performance", "effort", "frustration")
 Story = Callable[[Served], Awaitable[None]]
 
 
@@ -32,12 +42,13 @@ def run(story: Story, stranger: PageRole = PageRole.VIEWER) -> None:
 def still(monkeypatch: pytest.MonkeyPatch) -> None:
     """The console's clock stands: rates do not depend on how fast this host is."""
     now_ns = monotonic_ns()
-    monkeypatch.setattr("deploy.console.app.monotonic_ns", lambda: now_ns)
+    for module in ("app", "page_socket"):
+        monkeypatch.setattr(f"deploy.console.{module}.monotonic_ns", lambda: now_ns)
 
 
 def test_the_pages_and_their_files_are_served_with_a_policy() -> None:
     async def story(console: Served) -> None:
-        for path in ("/", "/engineer"):
+        for path in ("/", "/engineer", "/study"):
             async with console.http.get(console.url + path) as response:
                 assert response.status == 200
                 assert response.content_type == "text/html"
@@ -503,3 +514,92 @@ def test_a_stop_that_would_end_with_the_console_is_not_called_certain() -> None:
         assert (await console.post("/api/stop", {"robot": ROBOT}))[0] == 202, "the robot has acknowledged"
 
     run(story)
+
+
+def test_a_study_is_led_by_who_may_act_and_its_marks_are_the_sessions(tmp_path: Path) -> None:
+    async def story(console: Served) -> None:
+        console.hub.desk = StudyDesk(tmp_path)
+        await console.log_in()
+        status, said = await console.post("/api/study", {"do": "next"})
+        assert (status, "no session is under way" in said["error"]) == (409, True)
+        session = begin(tmp_path, CUP, "k7pd")
+        say_under_way(session)
+        assert (await console.post("/api/study", {"do": "next"}))[1]["text"] == "step rest"
+        said = (await console.post("/api/act", {"act": "mark", "robot": ROBOT, "text": "cup dropped"}))[1]
+        assert said["text"] == "noted in session 01 of k7pd"
+        given = {"do": "answers", "questionnaire": "nasa-tlx", "answers": {"mental": 50}}
+        status, said = await console.post("/api/study", given)
+        assert (status, "nasa-tlx, physical" in said["error"]) == (409, True)
+        given["answers"] = dict.fromkeys(TLX, 30)
+        assert (await console.post("/api/study", given))[1]["text"] == "kept; score 30"
+        assert (await console.post("/api/study", {"do": "dance"}))[0] == 409
+        page = await console.page()
+        console.models[ROBOT].on_state(state(), monotonic_ns(), TAP)
+        showing = asyncio.create_task(console.hub.show())
+        shown = (await page.hear("facts"))["study"]
+        showing.cancel()
+        assert (shown["subject"], shown["step"]["name"], shown["next"]["name"]) == ("k7pd", "rest", "reach")
+        assert shown["answered"] == [["rest", "nasa-tlx"]]
+        assert (await console.post("/api/study", {"do": "end"}))[1]["done"]
+        assert [mark.kind for mark in session.marks()] == ["step", "event", "answers", "end"]
+        await console.post("/api/logout", {})
+        assert (await console.post("/api/study", {"do": "next"}))[0] == 401
+
+    run(story)
+
+
+def test_a_mark_without_a_session_goes_to_this_hosts_recordings(tmp_path: Path) -> None:
+    async def story(console: Served) -> None:
+        await console.log_in()
+        said = (await console.post("/api/act", {"act": "mark", "robot": ROBOT}))[1]
+        assert "in no recording" in said["text"]
+        console.hub.desk = StudyDesk(None, tmp_path)
+        said = (await console.post("/api/act", {"act": "mark", "robot": ROBOT, "text": "x" * 128}))[1]
+        assert said["text"] == "noted in this host's recordings"
+        assert [mark.text for mark in read_marks(tmp_path)] == ["x" * 128]
+        console.hub.desk = StudyDesk(None, tmp_path / "gone")
+        assert (await console.post("/api/act", {"act": "mark", "robot": ROBOT}))[0] == 409
+
+    run(story)
+
+
+def test_reports_are_opened_from_the_page_without_their_scripts_and_nothing_beside_them(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "reports"
+    (folder / "trial").mkdir(parents=True)
+    (folder / "trial" / "report.html").write_text("<script>1</script>")
+    (folder / "trial" / "lag.png").write_bytes(b"png")
+    (folder / "secret.key").write_text("key")
+    (tmp_path / "outside.html").write_text("outside")
+    (folder / "link.html").symlink_to(tmp_path / "outside.html")
+
+    async def story(console: Served) -> None:
+        async with console.http.get(f"{console.url}/api/reports") as response:
+            assert (await response.json())["reports"] == []
+        console.hub.reports = ReportFolder(folder)
+        async with console.http.get(f"{console.url}/api/reports") as response:
+            found = (await response.json())["reports"]
+        assert [one["path"] for one in found] == ["/reports/trial/report.html"]
+        async with console.http.get(console.url + found[0]["path"]) as response:
+            assert response.status == 200
+            policy = response.headers["Content-Security-Policy"]
+            assert "sandbox" in policy
+            assert "default-src 'none'" in policy
+        async with console.http.get(f"{console.url}/reports/trial/lag.png") as response:
+            assert response.content_type == "image/png"
+        for name in ("secret.key", "link.html", "../outside.html", "%2e%2e/outside.html", "trial", "none.md"):
+            async with console.http.get(f"{console.url}/reports/{name}") as response:
+                assert response.status == 404, name
+
+    run(story)
+
+
+def test_a_stranger_beyond_this_host_sees_no_report_and_no_question(tmp_path: Path) -> None:
+    async def story(console: Served) -> None:
+        console.hub.reports = ReportFolder(tmp_path)
+        for path in ("/api/reports", "/reports/a.html", "/api/questionnaires"):
+            async with console.http.get(console.url + path) as response:
+                assert response.status == 401, path
+
+    run(story, PageRole.NOBODY)
