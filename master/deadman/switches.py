@@ -83,6 +83,8 @@ class Switches:
 
     def frame(self, bus: str, frame_id: int, data: bytes, now_ns: int) -> bool:
         """Take a frame of a bus; False where it is none of a button."""
+        if not self._buttons:
+            return False
         took = [button.frame(bus, frame_id, data, now_ns) for button in self._buttons.values()]
         if any(took):
             self._changed()

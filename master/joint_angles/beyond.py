@@ -37,7 +37,7 @@ class BeyondReach:
     def note(self, now_ns: int, short_rad: Array) -> list[str]:
         """Take what each segment (N,) lacks of its posture; returns what to tell the operator."""
         self._computed += 1
-        self._now_rad = short = np.nan_to_num(short_rad)
+        self._now_rad = short = np.where(np.isnan(short_rad), 0.0, short_rad)
         beyond = short > COUNTED_RAD
         if not beyond.any() and not self._since_ns:
             return []

@@ -12,7 +12,7 @@ from can.interfaces.udp_multicast.utils import pack_message, unpack_message
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.can.datagrams import DatagramReader, data_frame
+from common.can.datagrams import DatagramReader, Likeness, data_frame
 
 NODE = can.Message(
     arbitration_id=0x6A5, is_extended_id=False, is_fd=True, bitrate_switch=True, data=bytes(24)
@@ -37,12 +37,48 @@ def test_a_frame_is_taken_only_where_python_can_reads_the_same(
     datagram: bytes = msgpack.packb(fields)
     taken = data_frame(datagram)
     if taken is not None:
-        message = unpack_message(datagram, check=True)
+        message = unpack_message(datagram, replace={"timestamp": 0.0}, check=True)
         assert taken == (message.arbitration_id, message.data, message.is_fd)
         assert not any((message.is_extended_id, message.is_remote_frame, message.is_error_frame))
     elif not odd:
         with pytest.raises(ValueError, match=r"data|dlc|DLC"):
-            unpack_message(datagram, check=True)
+            unpack_message(datagram, replace={"timestamp": 0.0}, check=True)
+
+
+@given(
+    st.integers(0x100, 0x7FF),
+    st.integers(0, 0x7FF),
+    st.binary(max_size=64),
+    st.floats(allow_nan=False),
+    st.lists(st.tuples(st.integers(0, 250), st.integers(1, 255)), max_size=2),
+)
+def test_a_frame_like_one_before_is_read_as_it_would_be_unpacked(
+    before: int, frame_id: int, data: bytes, stamp: float, flipped: list[tuple[int, int]]
+) -> None:
+    def packed(number: int, at: float, content: bytes) -> bytes:
+        message = can.Message(
+            timestamp=at, arbitration_id=number, is_extended_id=False, is_fd=True, data=content
+        )
+        return pack_message(message)
+
+    like = Likeness(packed(before, 0.0, bytes(len(data))), bytes(len(data)), True)
+    datagram = packed(frame_id, stamp, data)
+    if not flipped and frame_id >= 0x100:
+        assert like.frame(datagram) == (frame_id, data, True)
+    changed = bytearray(datagram)
+    for place, bits in flipped:
+        changed[place % len(changed)] ^= bits
+    taken = like.frame(bytes(changed).ljust(len(packed(before, 0.0, data)), b"\0"))
+    if taken is not None:
+        assert taken == data_frame(bytes(changed))
+
+
+def test_what_is_laid_out_otherwise_is_like_nothing() -> None:
+    fields = msgpack.unpackb(pack_message(NODE))
+    turned = msgpack.packb(dict(reversed(fields.items())))
+    assert data_frame(turned) == (NODE.arbitration_id, NODE.data, True)
+    with pytest.raises(ValueError, match=r"not found|order"):
+        Likeness(turned, bytes(NODE.data), True)
 
 
 @given(st.binary(max_size=40))
