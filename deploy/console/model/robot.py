@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -25,6 +25,7 @@ from deploy.console.model.pictures import CameraFeeds
 from deploy.console.model.standstill import Standstill
 from deploy.console.model.stopped import StopShown
 from deploy.console.model.values import ms, rounded
+from deploy.measure.ahead import RobotAhead
 
 SILENT_S = 0.5
 """Without a state for so long this console does not know what the robot does."""
@@ -69,6 +70,7 @@ class RobotModel:
         self.events = EventList()
         self.lateness = LatenessLog()
         self.pictures = CameraFeeds()
+        self.ahead = RobotAhead(skeleton)
         self.figures = RobotFigures(NodeWatch(skeleton.segment_names), self.events)
         self.stop: StopShown | None = None
         self._still = Standstill()
@@ -87,6 +89,8 @@ class RobotModel:
         read_anew = self._still.add(state.encoder_ns, state.position_rad, state.encoder_valid)
         masters_clock = self.whose.side is Side.OPERATOR and source == TAP and self._commands(state)
         self.lateness.on_state(state, arrived_ns, masters_clock)
+        if self._foretells:
+            self.ahead.on_state(state, arrived_ns)
         self._was_silent = False
         if (state.guard, state.reason) != self._said:
             self._said = state.guard, state.reason
@@ -98,6 +102,7 @@ class RobotModel:
         """The master sent a command."""
         self._command, self._command_ns = command, sent_ns
         self.lateness.on_command(command)
+        self.ahead.on_command(command)
 
     def on_picture(self, camera: str, frame: VideoFrame, arrived_ns: int) -> bool:
         """A picture came; False where it is not newer."""
@@ -168,6 +173,7 @@ class RobotModel:
             "stop": None if self.stop is None else self.stop.shown(now_ns),
             "latency": self._latency(now_ns),
             "video": self._video(now_ns),
+            "ahead": self._ahead(now_ns),
             **self._commanded(now_ns),
         }
         if state is not None:
@@ -201,6 +207,7 @@ class RobotModel:
                 "stages": self.figures.stages(now_ns),
                 "creep": None if creep is None else creep.shown(),
             },
+            "ahead": None if (score := self.ahead.score()) is None else asdict(score),
             "effort_nm": efforts,
             "faults": {} if state is None else state.faults,
             "events": self.events.shown(now_ns),
@@ -215,6 +222,21 @@ class RobotModel:
         if shown or not self.figures.has_camera:
             return shown
         return {CAMERA: {"age_ms": None, "bound_ms": None, "fps": 0.0, "stale": True}}
+
+    @property
+    def _foretells(self) -> bool:
+        """Whether commands and states are heard on the master's own clock."""
+        return self.whose.side is Side.OPERATOR and self._source == TAP
+
+    def _ahead(self, now_ns: int) -> dict[str, object] | None:
+        """Where the robot is by now; None where it cannot be foretold."""
+        if not self._foretells or self.silent(now_ns) or not self.master_heard(now_ns):
+            return None
+        found = self.ahead.foretell(now_ns)
+        if found is None:
+            return None
+        position, tube = rounded(found.position_rad), rounded(found.tube_rad)
+        return {"position": position, "tube": tube, "ahead_ms": ms(found.ahead_ns, 1)}
 
     def _look_for_creep(self, now_ns: int) -> None:
         creep = self.lateness.creep.look(now_ns)

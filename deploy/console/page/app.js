@@ -233,6 +233,9 @@ function facts(message) {
   if ($("nodes")) attention(message, parts.figure);
   parts.events?.show(message.events ?? []);
   if (message.latency?.minute) parts.minute?.show(message.latency.minute);
+  const foretold = message.ahead;
+  const figures = foretold && { ms: foretold.ahead_ms.toFixed(0), rms: foretold.rms_deg.toFixed(1), held: foretold.held_rms_deg.toFixed(1), inside: foretold.inside_percent.toFixed(0) };
+  if ($("scene")) $("scene").title = figures ? t("ahead.score", figures) : "";
   const eye = worst(message.glass);
   put($("glass"), eye ? t("picture.glass", { ms: eye.ms.toFixed(0), bound: Math.ceil(eye.bound_ms) }) : "");
   parts.more?.facts(message);

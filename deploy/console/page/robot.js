@@ -6,6 +6,7 @@ import {
 } from "/vendor/three.js";
 import { jointsOfLinks, placeLinks } from "./kinematics.js";
 import { push } from "./state.js";
+import { tubes } from "./ahead.js";
 
 const FULL_NM = 20; // the torque from outside at which a link is wholly red, where the robot tells no threshold
 const NOTHING = 0.25; // what moving itself makes: this share of it has no colour
@@ -43,10 +44,21 @@ class Figure {
   }
 
   place(positions) {
-    placeLinks(this.links, positions).forEach(({ origin, q }, i) => {
+    const placed = placeLinks(this.links, positions);
+    placed.forEach(({ origin, q }, i) => {
       this.groups[i].position.set(...origin);
       this.groups[i].quaternion.set(q[1], q[2], q[3], q[0]);
     });
+    return placed;
+  }
+
+  /** Make each link thicker by so many m. */
+  widen(more_m) {
+    this.groups.forEach((group, i) => group.children.forEach((mesh, k) => {
+      const radius = this.links[i].capsules[k].radius_m;
+      const scale = (radius + more_m[i]) / radius;
+      mesh.scale.set(scale, 1, scale);
+    }));
   }
 }
 
@@ -129,6 +141,9 @@ export class RobotView {
     const outline = new MeshBasicMaterial({ color: "#56b4e9", side: BackSide, transparent: true, opacity: 0.6, depthWrite: false });
     this.ghost = new Figure(links, () => outline, OUTLINE_M);
     this.ghost.whole.visible = false;
+    const mist = new MeshBasicMaterial({ color: "#00b386", transparent: true, opacity: 0.22, depthWrite: false });
+    this.will = new Figure(links, () => mist);
+    this.will.whole.visible = false;
     this.zones = new Group();
     for (const each of zones ?? []) {
       const mesh = zone(each);
@@ -136,7 +151,7 @@ export class RobotView {
     }
     this.zones.visible = false;
     this.solid.place(this.setup.joints.map(() => 0));
-    this.scene.add(this.solid.whole, this.ghost.whole, this.zones);
+    this.scene.add(this.solid.whole, this.will.whole, this.ghost.whole, this.zones);
   }
 
   /** From where all of the robot is seen, from ahead and its left. */
@@ -213,6 +228,11 @@ export class RobotView {
     const aimed = Boolean(view.target?.some((angle) => angle !== null));
     this.ghost.whole.visible = aimed;
     if (aimed) this.ghost.place(this.last.map((angle, j) => view.target[j] ?? angle));
+    this.will.whole.visible = Boolean(view.ahead);
+    if (view.ahead) {
+      const placed = this.will.place(this.last.map((angle, j) => view.ahead.position[j] ?? angle));
+      this.will.widen(tubes(this.setup.links, placed, view.ahead.tube));
+    }
     this.draw();
   }
 

@@ -16,6 +16,7 @@ from deploy.report.output import in_a_folder
 
 if TYPE_CHECKING:
     from common.recording import ChainCheck
+    from deploy.measure.ahead import AheadScore
     from deploy.ops.inspect.findings import FileFindings
     from deploy.ops.inspect.jitter.judge import JitterFindings
 
@@ -110,6 +111,8 @@ def _print(console: Console, found: FileFindings) -> None:
     if found.limited_s:
         held = ", ".join(f"{joint} {seconds:.1f} s" for joint, seconds in found.limited_s.items())
         console.print(f"held back by a limit: {held}", highlight=False)
+    for robot, score in found.foretold.items():
+        console.print(_foretold_words(robot, score), highlight=False, markup=False)
     if not found.events:
         return
     table = plain_table(
@@ -126,6 +129,14 @@ def _print(console: Console, found: FileFindings) -> None:
     rest = len(found.events) - EVENTS_SHOWN + found.more_events
     if rest > 0:
         console.print(f"and {rest} more; --json has them", highlight=False)
+
+
+def _foretold_words(robot: str, score: AheadScore) -> str:
+    return (
+        f"{robot or 'robot'}: foretold {score.ahead_ms:.0f} ms ahead, off by {score.rms_deg:.2f}° RMS "
+        f"(the newest state as it is: {score.held_rms_deg:.2f}°), {score.inside_percent:.0f} % within its "
+        f"tube ({score.count} readings)"
+    )
 
 
 def _chain_words(chain: ChainCheck) -> str:

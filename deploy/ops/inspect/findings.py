@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -11,6 +11,8 @@ import numpy as np
 from common.clock import to_s
 from common.recording import ChainCheck, Entry, RecordingStream, check_recording
 from common.skeleton import Skeleton
+from deploy.measure.ahead import AheadScore
+from deploy.ops.inspect.foretold import ForetoldRobot
 from deploy.ops.inspect.guard_changes import GuardChange, GuardChanges
 from deploy.ops.inspect.jitter.robot_side import FOLLOWS
 from deploy.ops.inspect.limited import LimitedJoints
@@ -33,6 +35,8 @@ class FileFindings:
     """What the hashes in it say."""
     limited_s: dict[str, float] = field(default_factory=dict)
     """By joint, for how long a limit held it back."""
+    foretold: dict[str, AheadScore] = field(default_factory=dict)
+    """By robot, how well the page foretold where it is by now."""
 
     @property
     def span_s(self) -> float:
@@ -59,6 +63,7 @@ class FileFindings:
             "more_guard": self.more_events,
             "limited_s": self.limited_s,
             "chain": asdict(self.chain),
+            "foretold": {robot: asdict(score) for robot, score in self.foretold.items()},
         }
 
 
@@ -72,23 +77,27 @@ def look_into(
     for number, (path, stream) in enumerate(contents):
         survey, guards, thinned = Survey(), dict[str, GuardChanges](), ThinnedJoints(skeleton)
         limited = LimitedJoints(skeleton.joint_names)
+        foretold: dict[str, ForetoldRobot] = {}
         began: Entry | None = None
         for entry in _each(stream):
             began = began or entry
             survey.take(entry)
             # a slave's own recording is of one robot, and has topics without its name
-            robot = "" if (stream.metadata or {}).get("role") == "slave" else robot_of(entry.topic)
+            role = (stream.metadata or {}).get("role")
+            robot = "" if role == "slave" else robot_of(entry.topic)
             if robot not in guards:
                 guards[robot] = GuardChanges(skeleton.joint_names, began, robot)
             guards[robot].take(entry)
             thinned.take(entry)
             limited.take(entry)
+            if role == "master":
+                foretold.setdefault(robot, ForetoldRobot(skeleton)).take(entry)
         for guard in guards.values():
             guard.end()
         events = sorted((event for guard in guards.values() for event in guard.found), key=lambda e: e.at_ns)
         more = sum(guard.more for guard in guards.values())
-        chain, held_s = check_recording(path), limited.seconds()
-        found.append(FileFindings(path, survey.contents(stream), events, more, chain, held_s))
+        chain, held_s, scores = check_recording(path), limited.seconds(), _scores(foretold)
+        found.append(FileFindings(path, survey.contents(stream), events, more, chain, held_s, scores))
         if plots is not None:
             folder = plots if number == 0 else plots / path.stem
             make_folder(folder)
@@ -99,6 +108,11 @@ def look_into(
                     np.array(thinned.setpoint_rad), skeleton.joint_names,
                 )  # fmt: skip
     return found, skeleton
+
+
+def _scores(foretold: Mapping[str, ForetoldRobot]) -> dict[str, AheadScore]:
+    scores = {robot: one.score() for robot, one in foretold.items()}
+    return {robot: score for robot, score in scores.items() if score is not None}
 
 
 def _each(stream: RecordingStream) -> Iterator[Entry]:

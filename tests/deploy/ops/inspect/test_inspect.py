@@ -155,3 +155,14 @@ def test_two_robots_are_told_apart_and_a_clock_that_is_set_changes_nothing(
     alone, both = inspected(run.master), inspected(out)
     assert len(of(alone, robot)) == 3
     assert of(both, robot) == of(both, "robot-9") == of(alone, robot)
+
+
+def test_it_says_how_well_the_page_foretold_the_robot(run: RecordedRun) -> None:
+    foretold = inspected(run.master)["foretold"]
+    assert isinstance(foretold, dict)
+    (score,) = foretold.values()
+    assert score["count"] > 50
+    assert score["rms_deg"] < score["held_rms_deg"] + 0.1
+    assert inspected(run.slave)["foretold"] == {}
+    words = CliRunner().invoke(cli.app, ["inspect", str(run.master)]).output
+    assert "ms ahead, off by" in words
