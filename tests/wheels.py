@@ -21,8 +21,8 @@ PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 GLIBC = (28, 27, 26, 24, 17)
 """manylinux_2_N: Debian 12, Ubuntu 22.04 and the Jetson's have at least 2.35."""
 EXTRAS = (
-    "simulation", "dynamixel", "gpio", "ros", "sound", "v4l2", "h264", "console", "metrics", "viewer", "export",
-    "lsl",
+    "simulation", "dynamixel", "gpio", "ros", "sound", "v4l2", "h264", "console", "metrics", "viewer",
+    "export", "lsl",
 )  # fmt: skip
 """What is installed beside the core. `input` and `vqf` are built on the host, and the page says so."""
 
