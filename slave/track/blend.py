@@ -10,9 +10,9 @@ from common.quaternion import Array
 Course = Array
 """(2, J): position, rad, and velocity, rad/s, of a motion at one instant."""
 
-_LARGE_RAD = 0.25
+LARGE_RAD = 0.25
 """A joint's difference larger than this, as after a loss, takes longer in proportion: nothing rushes it."""
-_JUMP_RAD = 0.7
+JUMP_RAD = 0.7
 """A difference larger than this is no correction. It is worked off as soon as a small one, so that the guard
 behind sees it (its `jump_window_rad`) and leads the robot there slowly: spread out it would go unnoticed."""
 
@@ -41,7 +41,7 @@ class Blend:
         self._began_ns = now_ns
         self._difference = old - new
         far = np.abs(self._difference[0])
-        times = np.where(far > _JUMP_RAD, 1.0, np.maximum(far / _LARGE_RAD, 1.0))
+        times = np.where(far > JUMP_RAD, 1.0, np.maximum(far / LARGE_RAD, 1.0))
         self._total_s = self._duration_s * times
         self._longest_s = float(self._total_s.max())
 

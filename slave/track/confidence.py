@@ -9,7 +9,7 @@ import numpy as np
 
 from common.clock import to_ns, to_s
 from common.quaternion import Array
-from slave.track.estimate import Estimate, relaxed
+from slave.track.continuation import Continuation
 
 _MEMORY_S = 2.0
 _DOUBT_RAD = math.radians(2.0)
@@ -32,9 +32,10 @@ class Confidence:
     """
 
     def __init__(self) -> None:
-        self._past: deque[Estimate] = deque(maxlen=_KEPT)
+        self._past: deque[tuple[int, Continuation]] = deque(maxlen=_KEPT)
         self._agreed: Array | float = 0.0
         self._foretold: Array | float = 0.0
+        self._newest_ns = 0
 
     def reset(self) -> None:
         """Forget what was proved: full confidence."""
@@ -46,16 +47,19 @@ class Confidence:
         if not self._past:
             return
         wanted_ns = sampled_ns - to_ns(horizon_s)
-        then = min(self._past, key=lambda estimate: abs(estimate.sampled_ns - wanted_ns))
-        foretold = relaxed(to_s(sampled_ns - then.sampled_ns))[0, 1:] @ then.motion[1:]
-        fade = math.exp(-to_s(sampled_ns - self._past[-1].sampled_ns) / _MEMORY_S)
+        then_ns, then = min(self._past, key=lambda past: abs(past[0] - wanted_ns))
+        foretold = then.way(to_s(sampled_ns - then_ns))
+        fade = math.exp(-to_s(sampled_ns - self._newest_ns) / _MEMORY_S)
+        self._newest_ns = sampled_ns
         self._agreed = fade * self._agreed + foretold * (position_rad - then.motion[0])
         self._foretold = fade * self._foretold + foretold**2
 
-    def note(self, estimate: Estimate) -> None:
-        """Remember what is foretold now."""
-        if not self._past or estimate.sampled_ns - self._past[-1].sampled_ns >= _APART_NS:
-            self._past.append(estimate)
+    def note(self, sampled_ns: int, foretold: Continuation) -> None:
+        """Remember what is foretold now, before its share is taken."""
+        if not self._past:
+            self._newest_ns = sampled_ns
+        if not self._past or sampled_ns - self._past[-1][0] >= _APART_NS:
+            self._past.append((sampled_ns, foretold))
 
     @property
     def share(self) -> Array:

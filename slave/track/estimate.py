@@ -67,23 +67,6 @@ def relaxed(span_s: float) -> Array:
     )
 
 
-def farthest(motion: Array, span_s: float) -> Array:
-    """(J,) rad: how far a motion (3, J), left to itself, gets away from where it is within `span_s`.
-
-    At the end; or, of one that turns back, where v(s) = 0, at s = -v / (λ v + a).
-    """
-    _, v, a = motion
-    towards = RELAX_PER_S * v + a
-    # with no acceleration against it, it never turns
-    turns_s = np.divide(-v, towards, out=np.full_like(v, span_s), where=towards != 0.0)
-    x = RELAX_PER_S * np.where((turns_s > 0.0) & (turns_s < span_s), turns_s, span_s)
-    fade = np.exp(-x)
-    at_turn = v * (2.0 - fade * (2.0 + x)) / RELAX_PER_S + a * (1.0 - fade * (1.0 + x)) / RELAX_PER_S**2
-    at_end = relaxed(span_s)[0, 1:] @ motion[1:]
-    out: Array = np.maximum(np.abs(at_turn), np.abs(at_end))
-    return out
-
-
 def first(sampled_ns: int, position_rad: Array, velocity_rad_s: Array) -> Estimate:
     """The motion of one sample (J,): what is known from it alone."""
     spread_rad_s = _VELOCITY_NOISE_RAD_S if velocity_rad_s.any() else _UNKNOWN_RAD_S

@@ -8,10 +8,13 @@ import numpy as np
 
 from common.clock import to_s
 from common.quaternion import Array
-from slave.track.blend import Blend, Course, coast
+from slave.track.blend import Course, coast
 from slave.track.confidence import Confidence
-from slave.track.estimate import Estimate, corrected, farthest, first, relaxed
+from slave.track.continuation import Continuation
+from slave.track.correction import Correction
+from slave.track.estimate import Estimate, corrected, first
 from slave.track.lateness import Lateness
+from slave.track.persistence import Persistence, steadiness
 from slave.track.tracker import TrackTarget
 
 _LEAST_FULL_S = 0.15
@@ -21,25 +24,33 @@ _BRAKE_S = 0.15
 _FARTHEST_RAD = 0.68
 """No joint is foretold to go farther than this, coasting included, whatever its velocity: within the guard's
 `jump_window_rad`, beyond which all joints come back slowly."""
+_PERIOD_S = 0.08
+_DECAY, _EVEN_DECAY = 1.8, 6.0
+"""A correction decays at 1.8 / blend_s at 12.5 Hz, on an even movement at 6 / blend_s: there it is small."""
+_RATE_POWER = 0.415
+"""At 25 Hz corrections are smaller: a third faster. At 50 Hz again a third."""
 
 
 class Predict:
     """A `Tracker` that is where the operator is by now.
 
-    The newest estimate is carried on (`estimate.py`) over s = age of the sample + servo lag, as far as its
-    kind has come true (`confidence.py`). The horizon, up to which that is done at full rate, follows the
+    The newest estimate (`estimate.py`) is carried on over s = age of the sample + servo lag for as long as
+    the joint's own movement has lately kept its direction (`persistence.py`, `continuation.py`), and as far
+    as that has come true (`confidence.py`). The horizon, up to which that is done at full rate, follows the
     ages that samples usually reach on this link (`lateness.py`): older ones mean a loss, and slow the
     robot to rest, `max_horizon_s` after the sample at the latest.
     """
 
     def __init__(self, blend_s: float, servo_lag_s: float, max_horizon_s: float) -> None:
-        self._blend = Blend(blend_s)
+        self._blend_s = blend_s
         self._servo_lag_s = servo_lag_s
         self._max_horizon_s = max_horizon_s
+        self._correction = Correction()
         self._lateness = Lateness()
+        self._persistence = Persistence()
         self._confidence = Confidence()
         self._estimate: Estimate | None = None
-        self._believed: Array = np.zeros((3, 0))
+        self._believed = Continuation(np.zeros((3, 0)), np.zeros(0))
 
     @property
     def horizon_s(self) -> float:
@@ -51,50 +62,61 @@ class Predict:
         """Forget every sample, and what was learnt of the link."""
         self._estimate = None
         self._lateness.reset()
+        self._persistence.reset()
         self._confidence.reset()
-        self._blend.reset()
+        self._correction.reset()
 
     def accept(self, sampled_ns: int, now_ns: int, position_rad: Array, velocity_rad_s: Array) -> None:
         """Change to the course that this sample (J,) makes likely, if it is newer than the last."""
         before = self._estimate
         if before is None:
-            self._believe(first(sampled_ns, position_rad, velocity_rad_s))
+            self._believe(first(sampled_ns, position_rad, velocity_rad_s), velocity_rad_s)
             return
         if sampled_ns <= before.sampled_ns:
             return
-        old = self._blend.applied(now_ns, self._course(before, now_ns))
+        old = self._correction.applied(now_ns, self._course(before, now_ns))
         self._lateness.note(to_s(now_ns - before.sampled_ns))
         elapsed_s = to_s(sampled_ns - before.sampled_ns)
         if elapsed_s > self._max_horizon_s:
             self._confidence.reset()
+            self._persistence.reset()
             after = first(sampled_ns, position_rad, velocity_rad_s)
         else:
             mean_age_s = to_s(now_ns - sampled_ns) + 0.5 * elapsed_s + self._servo_lag_s
             self._confidence.prove(sampled_ns, position_rad, mean_age_s)
             after = corrected(before, sampled_ns, position_rad, velocity_rad_s)
-        self._believe(after)
-        self._blend.begin(now_ns, old, self._course(after, now_ns))
+        self._believe(after, velocity_rad_s)
+        self._correct(now_ns, old, self._course(after, now_ns), elapsed_s)
 
     def target(self, now_ns: int) -> TrackTarget | None:
         """The course at `now_ns`."""
         if self._estimate is None:
             return None
-        course = self._blend.applied(now_ns, self._course(self._estimate, now_ns))
+        course = self._correction.applied(now_ns, self._course(self._estimate, now_ns))
         return TrackTarget(course[0], course[1])
 
-    def _believe(self, estimate: Estimate) -> None:
+    def _believe(self, estimate: Estimate, velocity_rad_s: Array) -> None:
         self._estimate = estimate
-        self._confidence.note(estimate)
-        self._believed = estimate.motion.copy()
-        self._believed[1:] *= self._confidence.share
+        # without velocities by those of the estimate
+        seen_rad_s = velocity_rad_s if velocity_rad_s.any() else estimate.motion[1]
+        self._persistence.note(estimate.sampled_ns, seen_rad_s)
+        foretold = Continuation.of(estimate, self._persistence.lasts_s)
+        self._confidence.note(estimate.sampled_ns, foretold)
+        foretold = foretold.scaled(self._confidence.share)
         span_s, _ = self._coasted(math.inf)
-        foretold = farthest(self._believed, span_s)
-        self._believed[1:] *= _FARTHEST_RAD / np.maximum(foretold, _FARTHEST_RAD)
+        self._believed = foretold.scaled(_FARTHEST_RAD / np.maximum(foretold.farthest(span_s), _FARTHEST_RAD))
+
+    def _correct(self, now_ns: int, old: Course, new: Course, elapsed_s: float) -> None:
+        rate = min(max(_PERIOD_S / elapsed_s, 1.0), 4.0)
+        decay = _DECAY / self._blend_s * rate**_RATE_POWER
+        faster = max(_EVEN_DECAY / self._blend_s - decay, 0.0)
+        even = decay + faster * steadiness(self._believed.lasts_s)
+        self._correction.begin(now_ns, old, new, decay, even)
 
     def _course(self, estimate: Estimate, now_ns: int) -> Course:
         age_s = to_s(now_ns - estimate.sampled_ns) + self._servo_lag_s
         span_s, rate = self._coasted(age_s)
-        course: Course = relaxed(max(span_s, 0.0))[:2] @ self._believed
+        course = self._believed.course(max(span_s, 0.0))
         course[1] *= rate
         return course
 

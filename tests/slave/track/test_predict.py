@@ -3,13 +3,28 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.quaternion import Array
 from slave.guard import GuardConfig
-from slave.track.estimate import Estimate, relaxed
+from slave.track.continuation import Continuation
+from slave.track.estimate import Estimate, first
+from slave.track.persistence import MOST_S, Persistence
 from slave.track.predict import Predict
 
 from .samples import MS, PERIOD, TRANSIT, course, feed
 
 LAG_S, HORIZON_S, BLEND_S = 0.031, 0.3, 0.08
+
+
+class Lasting(Persistence):
+    """Of a movement whose τ is known."""
+
+    def __init__(self, known_s: float) -> None:
+        super().__init__()
+        self._known_s = known_s
+
+    @property
+    def lasts_s(self) -> Array:
+        return np.array(self._known_s)
 
 
 def fresh() -> Predict:
@@ -41,19 +56,25 @@ def test_constant_velocity_is_followed_and_aimed_ahead(
             assert 0.75 * abs(speed) <= abs(float(velocity[0])) + 1e-9
 
 
-def test_a_reach_is_followed_better_than_by_velocity_alone() -> None:
-    tracker = fresh()
-    reach_s, by = 1.0, 1.0
+def test_a_reach_like_the_one_before_is_followed_better_than_by_velocity_alone() -> None:
+    tracker, by = fresh(), 1.0
+
+    def reach(t_s: float) -> tuple[float, float]:
+        """There in 1 s, a rest of 1 s, and back."""
+        x = min(max(t_s, 0.0), 1.0) - min(max(t_s - 2.0, 0.0), 1.0)
+        rate = 1.0 if 0.0 < t_s < 1.0 else -1.0 if 2.0 < t_s < 3.0 else 0.0
+        return by * x**3 * (10 + x * (6 * x - 15)), rate * 30 * by * (x * (1 - x)) ** 2
+
     errors, plain = [], []
-    for k in range(13):
-        x = PERIOD * k / 1e3 / reach_s
-        p, v = (by * x**3 * (10 + x * (6 * x - 15)), 30 * by * (x * (1 - x)) ** 2) if x < 1 else (by, 0.0)
+    for k in range(38):
+        p, v = reach(PERIOD * k / 1e3)
         feed(tracker, k, p, v)
         for ms in range(PERIOD * k + TRANSIT, PERIOD * (k + 1) + TRANSIT, 5):
-            y = min((ms / 1e3 + LAG_S) / reach_s, 1.0)
-            true = by * y**3 * (10 + y * (6 * y - 15))
-            errors.append(float(course(tracker, ms)[0][0]) - true)
-            plain.append(p + v * ((ms - PERIOD * k) / 1e3 + LAG_S) - true)
+            ahead_s = (ms - PERIOD * k) / 1e3 + LAG_S
+            true, _ = reach(ms / 1e3 + LAG_S)
+            if k >= 25:
+                errors.append(float(course(tracker, ms)[0][0]) - true)
+                plain.append(p + v * ahead_s - true)
     assert np.std(errors) < 0.9 * np.std(plain)
 
 
@@ -94,19 +115,26 @@ def test_without_samples_it_is_at_rest_from_the_horizon_on() -> None:
     stood, velocity = course(tracker, rest_ms)
     assert velocity == pytest.approx(0.0, abs=1e-9)
     # full rate for half of the horizon, then the mean of a smooth descent
-    assert stood == pytest.approx(2.0 * relaxed(0.75 * HORIZON_S)[0, 1])
+    foretold = Continuation.of(first(0, np.zeros(1), np.full(1, 2.0)), Persistence().lasts_s)
+    assert stood == pytest.approx(foretold.way(0.75 * HORIZON_S))
     assert course(tracker, 60_000.0)[0] == pytest.approx(stood)
 
 
 @settings(deadline=None)
-@given(st.floats(-60.0, 60.0), st.floats(-800.0, 800.0), st.sampled_from([0.3, 0.5, 1.0]))
+@given(
+    st.floats(-60.0, 60.0),
+    st.floats(-800.0, 800.0),
+    st.floats(0.03, MOST_S),
+    st.sampled_from([0.3, 0.5, 1.0]),
+)
 def test_no_joint_is_foretold_farther_than_the_guard_takes_for_a_jump(
-    velocity: float, acceleration: float, horizon_s: float
+    velocity: float, acceleration: float, lasts_s: float, horizon_s: float
 ) -> None:
-    """Coasting included, and also where velocity and acceleration cancel at the end."""
+    """Coasting included, for any τ, and also where velocity and acceleration cancel at the end."""
     tracker = Predict(BLEND_S, LAG_S, horizon_s)
+    tracker._persistence = Lasting(lasts_s)
     motion = np.array([[1.0], [velocity], [acceleration]])
-    tracker._believe(Estimate(0, motion, np.eye(3)))
+    tracker._believe(Estimate(0, motion, np.eye(3)), motion[1])
     farthest = max(abs(float(course(tracker, ms)[0][0]) - 1.0) for ms in range(0, 1200, 10))
     assert farthest <= 0.68 + 1e-9
     assert farthest < GuardConfig().jump_window_rad
@@ -128,8 +156,8 @@ def test_after_a_long_silence_the_estimate_restarts_without_a_jump() -> None:
     stood, _ = course(tracker, 999.0)
     feed(tracker, 12, -1.0, 0.0)
     assert course(tracker, 12 * PERIOD + TRANSIT)[0] == pytest.approx(stood)
-    # a large difference takes up to five blends
-    settled = 12 * PERIOD + TRANSIT + 5e3 * BLEND_S
+    # what is left of a difference fades
+    settled = 12 * PERIOD + TRANSIT + 20e3 * BLEND_S
     # no memory of the old motion: all of the new position, none of the old acceleration
     assert course(tracker, settled)[0] == pytest.approx(-1.0)
 
@@ -142,6 +170,29 @@ def test_without_velocities_it_goes_by_the_positions() -> None:
     position, velocity = course(tracker, 8 * PERIOD + TRANSIT - 1)
     assert velocity == pytest.approx(0.8, abs=0.1)
     assert position == pytest.approx((8 * PERIOD + TRANSIT - 1) / 1e3 + LAG_S, rel=0.05)
+
+
+def test_the_same_samples_give_the_same_course_and_asking_changes_nothing() -> None:
+    one, two = fresh(), fresh()
+    for k in range(30):
+        for tracker in (one, two):
+            feed(tracker, k, np.sin(0.3 * k), np.cos(0.3 * k) * 3.75)
+        for ms in range(5):
+            one.target((PERIOD * k + TRANSIT + 40 * ms) * MS)
+        at_ms = PERIOD * k + TRANSIT + 3
+        np.testing.assert_array_equal(course(one, at_ms), course(two, at_ms))
+
+
+def test_nothing_of_the_movement_is_kept_over_a_reset() -> None:
+    used, new = fresh(), fresh()
+    for k in range(30):
+        feed(used, k, np.sin(2.0 * k), np.cos(2.0 * k) * 25.0)
+    used.reset()
+    for k in range(30, 40):
+        for tracker in (used, new):
+            feed(tracker, k, 0.05 * k, 0.6)
+        at_ms = PERIOD * k + TRANSIT + 30
+        np.testing.assert_array_equal(course(used, at_ms), course(new, at_ms))
 
 
 def test_two_samples_at_nearly_one_instant_cause_no_acceleration() -> None:
