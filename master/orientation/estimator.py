@@ -147,7 +147,9 @@ class Estimator:
         self.standing_again: ZeroPoseAgain | None = None
         """The zero pose that is being taken again; see `stand_again`."""
         self._gyr_rad_s = np.zeros((count, 3))
+        self._gyr_before_rad_s = np.zeros((count, 3))
         self._rate_hz = rate_hz
+        self._late_ticks = self._lowpass.delays_s[GYR] * rate_hz
         # the filters hold each reading for the period before it, which leads by half of it on average
         self._advance_s: Array = np.full((count, 1), self._lowpass.delays_s[GYR] - 0.5 / rate_hz)
         if fused is not None:
@@ -172,6 +174,7 @@ class Estimator:
         if changes.came.any():
             self._lowpass.restart(changes.came)
             self._bank.restart(changes.came)
+        np.copyto(self._gyr_before_rad_s, self._gyr_rad_s)  # the low-pass writes into the same memory again
         # absurd readings may overflow here; the filters leave them out
         with np.errstate(over="ignore", invalid="ignore"):
             filtered = self._lowpass.update(apply(self.affine, samples))
@@ -182,6 +185,7 @@ class Estimator:
             # a low-pass would pass it on for a long time
             self._lowpass.restart(spoilt)
             self._gyr_rad_s = np.where(spoilt[:, None], self._bank.bias_rad_s(), self._gyr_rad_s)
+            self._gyr_before_rad_s[spoilt] = self._gyr_rad_s[spoilt]
         if changes.settled.any():
             self._find(changes.settled, np.isfinite(filtered[MAG, :, 0]))
         if not self._zero_pose.known.all():
@@ -276,12 +280,16 @@ class Estimator:
         return {**drifted, **joints, **filters, **self._zero_pose.doubts(asked)}
 
     def posture(self) -> Posture:
-        """The segments at the instant the newest tick sampled."""
+        """The segments at the instant the newest tick sampled.
+
+        The low-pass's delay is made good: in the orientations by the rate, in the rate by its slope.
+        """
         rate = self._rate_of_sensors()
+        now_rad_s = rate + self._late_ticks * (self._gyr_rad_s - self._gyr_before_rad_s)
         alignment = self._zero_pose.q_sensor_from_segment
         return Posture(
             q_world_from_segment=multiply(self._oriented(rate), alignment),
-            rate_rad_s=rotate(conjugate(alignment), rate),
+            rate_rad_s=rotate(conjugate(alignment), now_rad_s),
             valid=self._liveness.settled & self._zero_pose.known,
         )
 
