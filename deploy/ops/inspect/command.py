@@ -108,6 +108,8 @@ def _print(console: Console, found: FileFindings) -> None:
     if contents.cut:
         console.print(f"[yellow]{contents.cut}: only the part before it is shown", highlight=False)
     console.print(_chain_words(found.chain), highlight=False, markup=False)
+    if found.unread:
+        console.print(found.unread, style="yellow", highlight=False, markup=False)
     if found.limited_s:
         held = ", ".join(f"{joint} {seconds:.1f} s" for joint, seconds in found.limited_s.items())
         console.print(f"held back by a limit: {held}", highlight=False)

@@ -33,6 +33,8 @@ class FileFindings:
     more_events: int
     chain: ChainCheck
     """What the hashes in it say."""
+    unread: str = ""
+    """Why the joints of its states could not be read; empty where they could."""
     limited_s: dict[str, float] = field(default_factory=dict)
     """By joint, for how long a limit held it back."""
     foretold: dict[str, AheadScore] = field(default_factory=dict)
@@ -61,6 +63,7 @@ class FileFindings:
             "span_s": self.span_s,
             "guard": guard,
             "more_guard": self.more_events,
+            "unread": self.unread,
             "limited_s": self.limited_s,
             "chain": asdict(self.chain),
             "foretold": {robot: asdict(score) for robot, score in self.foretold.items()},
@@ -97,7 +100,8 @@ def look_into(
         events = sorted((event for guard in guards.values() for event in guard.found), key=lambda e: e.at_ns)
         more = sum(guard.more for guard in guards.values())
         chain, held_s, scores = check_recording(path), limited.seconds(), _scores(foretold)
-        found.append(FileFindings(path, survey.contents(stream), events, more, chain, held_s, scores))
+        unread = _unread(thinned, skeleton)
+        found.append(FileFindings(path, survey.contents(stream), events, more, chain, unread, held_s, scores))
         if plots is not None:
             folder = plots if number == 0 else plots / path.stem
             make_folder(folder)
@@ -108,6 +112,15 @@ def look_into(
                     np.array(thinned.setpoint_rad), skeleton.joint_names,
                 )  # fmt: skip
     return found, skeleton
+
+
+def _unread(thinned: ThinnedJoints, skeleton: Skeleton) -> str:
+    if thinned.read or not thinned.other:
+        return ""
+    return (
+        f"its states have other joints than the profile {skeleton.name} ({len(skeleton.joints)}): "
+        "give the robot's own as --profile FOLDER"
+    )
 
 
 def _scores(foretold: Mapping[str, ForetoldRobot]) -> dict[str, AheadScore]:

@@ -25,6 +25,8 @@ class ThinnedJoints:
         self.position_rad: list[Array] = []
         self.setpoint_rad: list[Array] = []
         self._began_ns: int | None = None
+        self.read = self.other = 0
+        """States with the profile's joints, and with others."""
         self._every = 1
         self._seen = 0
         self._ticked = False
@@ -49,7 +51,9 @@ class ThinnedJoints:
         try:
             angles = self._angles(entry)
         except CodecError:
+            self.other += 1
             return
+        self.read += 1
         self.time_s.append(to_s(entry.monotonic_ns - self._began_ns))
         self.position_rad.append(angles[0])
         self.setpoint_rad.append(angles[1])
