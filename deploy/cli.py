@@ -15,7 +15,7 @@ from deploy.calibrate.commands import app as calibrate_app
 from deploy.calibrate.live.command import live
 from deploy.console.command import console
 from deploy.experiments.accuracy.commands import app as accuracy_app
-from deploy.experiments.bench.command import bench
+from deploy.experiments.bench.command import app as bench_app
 from deploy.experiments.collisions.command import collisions
 from deploy.experiments.contact.command import contact
 from deploy.experiments.demo.command import demo
@@ -67,11 +67,11 @@ suit_app.command("check")(check)
 for _name, _group in {
     "calibrate": calibrate_app, "accuracy": accuracy_app, "keys": keys_app,
     "network": network_app, "profile": profile_app, "trial": trial_app, "suit": suit_app,
-    "session": session_app,
+    "session": session_app, "bench": bench_app,
 }.items():  # fmt: skip
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
-    master, slave, console, drives, router, demo, soak, faults, collisions, contact, bench, audit,
+    master, slave, console, drives, router, demo, soak, faults, collisions, contact, audit,
     robots, *OPERATORS_ACTS, call, attitude, video, ros, doctor, servos, stops, inputs, alarms, record,
     inspect, replay, metrics, lsl,
 )  # fmt: skip

@@ -38,6 +38,8 @@ class Fleet:
         self._endpoints = own_endpoints(config.link)
         self.robots = [self._robot(name) for name in config.commanded]
         self.watched = WatchedRobots(config.operator.name, config.watched, config.profile)
+        self.tasks: list[asyncio.Task[None]] = []
+        """Of the robots that the file names, and of the watch."""
         self._serving: dict[str, asyncio.Task[None]] = {}
         """Of the robots that were taken: the file names a pattern of them at most."""
         self._given_up: set[str] = set()
@@ -47,11 +49,11 @@ class Fleet:
 
     def start(self, tasks: asyncio.TaskGroup) -> None:
         """Keep the lease and clock of each robot, and heed what the operator takes."""
-        for robot in self.robots:
-            tasks.create_task(self._serve(robot))
+        self.tasks = [tasks.create_task(self._serve(robot)) for robot in self.robots]
         if self._config.watched:
-            tasks.create_task(self._watch(tasks))
-        tasks.create_task(keep_reference(self._config.clock, self._tell_reference))
+            self.tasks.append(tasks.create_task(self._watch(tasks)))
+        telling = keep_reference(self._config.clock, self._tell_reference)
+        self.tasks.append(tasks.create_task(telling))
 
     def _tell_reference(self, reference: ClockReference | None, steps: int) -> None:
         for robot in self.robots:

@@ -35,6 +35,8 @@ class Homonyms:
 
     def words(self, now_ns: int) -> str | None:
         """Names the robots that share the name; None where there is only one."""
+        if len(self._heard) < 2:
+            return None
         recent = [number for number, heard in self._heard.items() if abs(now_ns - heard) <= to_ns(HEARD_S)]
         self._heard = {number: self._heard[number] for number in recent}
         if len(recent) < 2:

@@ -16,7 +16,7 @@ from common.link import Link
 from common.log.throttle import LogThrottle
 from common.metrics.master import CommandedMetrics, LeaseHeld, MasterMetrics, RobotHeard
 from common.process.pacing import TickGrid
-from common.process.ticker import ticks
+from common.process.ticker import coarse_ticks
 from common.wire.codec import decode, encode
 from common.wire.instance import draw_instance
 from common.wire.messages import ClockReply, ControlReply, RobotState, Statistics
@@ -129,7 +129,7 @@ class CommandedRobot:
         self._watch.on_state(state, arrived_ns, ours=self._lease.holds(state))
 
     async def _keep_lease(self) -> None:
-        async for due in ticks(TickGrid(monotonic_ns(), to_ns(0.05))):
+        async for due in coarse_ticks(TickGrid(monotonic_ns(), to_ns(0.05))):
             change = self._watch.change(due.scheduled_ns)
             if change:
                 log.warning("%s: %s", self.name, change)
@@ -172,7 +172,7 @@ class CommandedRobot:
             log.warning("%s: %s", self.name, presence.other_version)
 
     async def _keep_clock(self) -> None:
-        async for _ in ticks(TickGrid(monotonic_ns(), round(1e9 / CLOCK.rate_hz))):
+        async for _ in coarse_ticks(TickGrid(monotonic_ns(), round(1e9 / CLOCK.rate_hz))):
             query = self.clock.query(monotonic_ns())
             try:
                 payload, arrived_ns = await self._link.ask_stamped(CLOCK, encode(query))
@@ -187,6 +187,11 @@ class CommandedRobot:
     def taken(self) -> TakenRobot:
         """Whether this master holds the lease, and when it lost it."""
         return TakenRobot(bool(self._lease.token), self._lease.lost_ns)
+
+    @property
+    def states(self) -> int:
+        """States that came."""
+        return self._watch.arrivals.arrived
 
     @property
     def moves(self) -> bool:

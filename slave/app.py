@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import threading
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
@@ -108,7 +109,14 @@ class Slave:
         self._button = None if config.call.button is None else CallButton(config.call.button, self._on_button)
         self._camera: CameraFeed | None = None
         if config.camera.source != "off":
-            self._camera = open_feed(config.camera, config.profile, link.publish(video(config.camera.name)))
+            looked_at = threading.Event()
+
+            def look(wanted: bool) -> None:
+                # a recorder at the tap hears what the link would send
+                (looked_at.set if wanted or tap is not None else looked_at.clear)()
+
+            put = link.publish(video(config.camera.name), look)
+            self._camera = open_feed(config.camera, config.profile, put, looked_at.is_set)
             self._pipeline.on_accepted = self._camera.on_command
             camera = self._camera
             link.subscribe(keyframe(config.camera.name), lambda payload, _: camera.on_keyframe(payload))

@@ -36,8 +36,9 @@ class Arrivals:
             self._missing.clear()
         elif sequence > self._newest:
             self.lost += sequence - self._newest - 1
-            self._missing.update(range(max(self._newest + 1, sequence - REMEMBERED), sequence))
-            self._missing = {number for number in self._missing if number >= sequence - REMEMBERED}
+            if self._missing or sequence != self._newest + 1:
+                self._missing.update(range(max(self._newest + 1, sequence - REMEMBERED), sequence))
+                self._missing = {number for number in self._missing if number >= sequence - REMEMBERED}
             self._newest = sequence
         elif sequence in self._missing:
             self._missing.remove(sequence)

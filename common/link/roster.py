@@ -55,7 +55,7 @@ class Roster:
         self._robots: dict[str, ListedRobot] = {}
         self.operators: dict[str, set[int]] = {}
         """The masters that live, by operator."""
-        self.undecodable = 0
+        self.received = self.undecodable = 0
         self.late = 0
         """Summaries that were older than one that had come before."""
         self.beyond = 0
@@ -105,6 +105,7 @@ class Roster:
         if before is not None and before.instance == summary.instance and summary.sequence <= before.sequence:
             self.late += 1
             return
+        self.received += 1
         listed.summary, listed.heard_ns = summary, arrived_ns
 
     def __contains__(self, robot: object) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import Field, asdict
+from dataclasses import Field
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
@@ -37,7 +37,8 @@ _Part = TypeVar("_Part")
 
 def to_tree(metrics: DataclassInstance) -> dict[str, object]:
     """Plain values, for msgpack and JSON. A number that is not finite becomes None."""
-    return {name: _plain(value) for name, value in asdict(metrics).items()}
+    # not `asdict`, which copies deeply what is copied here again: a third of the time
+    return {name: _plain(getattr(metrics, name)) for name in metrics.__dataclass_fields__}
 
 
 def from_tree(kind: type[_Part], tree: object) -> _Part:
@@ -63,6 +64,11 @@ def _adapter(kind: type) -> TypeAdapter[object]:
 
 
 def _plain(value: object) -> object:
+    kind = type(value)
+    if kind is int or kind is str or kind is bool or value is None:
+        return value
+    if isinstance(value, Metrics):
+        return to_tree(value)
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

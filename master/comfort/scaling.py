@@ -48,6 +48,8 @@ class MotionScaling:
 
     def on_state(self, guard: str, resting: Sequence[str]) -> None:
         """Take what the robot says of itself: its guard's state, and the groups that rest."""
+        if not self.factors:
+            return
         following = np.full(len(self._factor), guard in FOLLOWING)
         for name in resting:
             if name in self._groups:

@@ -70,8 +70,13 @@ class CameraFeed:
         open_camera: Callable[[], CameraSource],
         clock: Clock = monotonic_ns,
         make_rate: Callable[[RateLimits], RateControl] = RateControl,
+        wanted: Callable[[], bool] = lambda: True,
     ) -> None:
-        """`put` must be safe in another thread than the loop's, and must not block."""
+        """`put` must be safe in another thread than the loop's, and must not block.
+
+        `wanted`: whether somebody receives the pictures; while nobody does, none is made.
+        """
+        self._wanted = wanted
         self.sight = Sight()
         self.fault = ""
         """The camera's fault as text; empty if there is none."""
@@ -191,7 +196,7 @@ class CameraFeed:
             now_ns = self._clock()
             alone = self._must_stand_alone(now_ns)
             due_ns, angles = self._rate.due_ns(now_ns), self._angles
-            if due_ns is None or angles is None:
+            if due_ns is None or angles is None or not self._wanted():
                 self._wake.wait(_IDLE_S)
                 continue
             wait_ns = max(due_ns, rest_until_ns) - now_ns
@@ -255,9 +260,11 @@ class CameraFeed:
             self._wake.wait(to_s(left_ns))
 
 
-def open_feed(config: CameraConfig, profile: str, put: Callable[[bytes], None]) -> CameraFeed:
+def open_feed(
+    config: CameraConfig, profile: str, put: Callable[[bytes], None], wanted: Callable[[], bool]
+) -> CameraFeed:
     """The configured camera's feed, not yet started."""
-    return CameraFeed(config, put, lambda: CameraProcess(profile, config))
+    return CameraFeed(config, put, lambda: CameraProcess(profile, config), wanted=wanted)
 
 
 class _Count:

@@ -7,11 +7,17 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from deploy.experiments.bench.fleet.command import fleet
 from deploy.report.options import ReportFile
 from deploy.report.output import write_json
 
+app = typer.Typer(no_args_is_help=False)
+app.command()(fleet)
 
+
+@app.callback(invoke_without_command=True)
 def bench(
+    context: typer.Context,
     report: ReportFile = None,
     quick: Annotated[
         bool, typer.Option(help="Measure for a few seconds only; the results are less precise.")
@@ -21,6 +27,8 @@ def bench(
 
     Example: `tandem bench --report bench.json`
     """
+    if context.invoked_subcommand is not None:
+        return
     from deploy.experiments.bench.run import bench as measure
 
     figures = measure(quick=quick, console=Console())

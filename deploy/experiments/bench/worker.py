@@ -49,10 +49,10 @@ def in_worker(function: Callable[..., Result], seconds: float, **arguments: obje
 
 
 @contextlib.contextmanager
-def beside(function: Callable[..., None], **arguments: object) -> Iterator[None]:
-    """Keep a function running in another process meanwhile."""
-    with _process(function, arguments):
-        yield
+def beside(function: Callable[..., None], **arguments: object) -> Iterator[int]:
+    """Keep a function running in another process meanwhile; gives that process's id."""
+    with _process(function, arguments) as process:
+        yield process.pid
 
 
 def command_of(function: Callable[..., object], arguments: dict[str, object]) -> list[str]:

@@ -264,3 +264,33 @@ def test_a_camera_s_process_ends_when_the_slave_does() -> None:
     assert camera._process.wait(10) == 0
     camera.close()
     assert PictureReply(ReplyKind.TROUBLE, body=b"x").words == "x"
+
+
+def test_no_picture_is_made_while_nobody_looks() -> None:
+    asked: list[int] = []
+
+    class Counting(CameraProcess):
+        def ask(self, request: PictureRequest) -> PictureReply:
+            asked.append(request.read_ns)
+            return super().ask(request)
+
+    wanted = threading.Event()
+    link = Link()
+    feed = CameraFeed(
+        CONFIG,
+        link.put,
+        lambda: Counting("nursing", CONFIG, (sys.executable, "-c", SERVE)),
+        wanted=wanted.is_set,
+    )
+    feed.look(np.zeros(JOINTS), 12345)
+    with feed:
+        until(lambda: feed._camera is not None)
+        time.sleep(3 * feed_module._IDLE_S)
+        assert asked == []
+        wanted.set()
+        link.wait(2)
+        wanted.clear()
+        until(lambda: len(asked) == len(link.frames))
+        before = len(asked)
+        time.sleep(3 * feed_module._IDLE_S)
+        assert len(asked) <= before + 1
