@@ -67,8 +67,8 @@ def _plain(value: object) -> object:
     kind = type(value)
     if kind is int or kind is str or kind is bool or value is None:
         return value
-    if isinstance(value, Metrics):
-        return to_tree(value)
+    if hasattr(kind, "__dataclass_fields__"):
+        return {name: _plain(getattr(value, name)) for name in kind.__dataclass_fields__}
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -31,7 +31,7 @@ ENOUGH = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class FleetCell:
     """One fleet to measure: `commanded` robots for each of `nurses` nurses, who watch all or none."""
 
     name: str
@@ -45,7 +45,7 @@ class Cell:
 class MeasuredCell:
     """What a cell cost. Percent are of one core."""
 
-    cell: Cell
+    cell: FleetCell
     sessions: int
     """Of the robots, together."""
     core_percent: float
@@ -95,18 +95,18 @@ class FleetReport:
         }
 
 
-def cells(options: FleetOptions) -> list[Cell]:
+def cells(options: FleetOptions) -> list[FleetCell]:
     """What is measured."""
     most, nurses = options.robots, options.nurses
     few = min(most, 100)
     steps = [n for n in (10, 30, 100, 300, 1000, 3000) if n < most]
     return [
-        Cell("nobody watched", 0, 0),
-        *(Cell(f"{n} watched", n, 0) for n in [*steps, most]),
-        Cell("1 commanded", 1, 1, watches=False),
-        Cell(f"1 commanded + {few - 1} watched", few, 1),
-        Cell(f"{few} commanded", few, few),
-        *([Cell(f"{most} robots, {nurses} nurses", most, 1, nurses)] if nurses > 1 else []),
+        FleetCell("nobody watched", 0, 0),
+        *(FleetCell(f"{n} watched", n, 0) for n in [*steps, most]),
+        FleetCell("1 commanded", 1, 1, watches=False),
+        FleetCell(f"1 commanded + {few - 1} watched", few, 1),
+        FleetCell(f"{few} commanded", few, few),
+        *([FleetCell(f"{most} robots, {nurses} nurses", most, 1, nurses)] if nurses > 1 else []),
     ]
 
 
@@ -129,7 +129,7 @@ def _middle(runs: Sequence[MeasuredCell]) -> MeasuredCell:
     return replace(chosen, core_percent_runs=costs)
 
 
-def _measure(cell: Cell, options: FleetOptions, folder: Path) -> MeasuredCell:
+def _measure(cell: FleetCell, options: FleetOptions, folder: Path) -> MeasuredCell:
     endpoint = local_endpoints(options.transport, folder, routed=True).router
     with ExitStack() as stack:
         pids = [stack.enter_context(beside(router, endpoint=endpoint))]
@@ -158,12 +158,12 @@ def _measure(cell: Cell, options: FleetOptions, folder: Path) -> MeasuredCell:
     )
 
 
-def _task(cell: Cell, number: int, endpoint: str) -> NurseTask:
+def _task(cell: FleetCell, number: int, endpoint: str) -> NurseTask:
     own = tuple(robot_name(number * cell.commanded + i) for i in range(cell.commanded))
     return NurseTask(endpoint, number, own, cell.robots if cell.watches else 0)
 
 
-def _robots(cell: Cell, endpoint: str) -> Iterator[AbstractContextManager[int]]:
+def _robots(cell: FleetCell, endpoint: str) -> Iterator[AbstractContextManager[int]]:
     most = COMMANDED_PER_PROCESS if cell.commanded > 1 else PER_PROCESS
     for first in range(0, cell.robots, most):
         count = min(most, cell.robots - first)
@@ -180,7 +180,7 @@ def _cpu_s(pid: int) -> float:
     return times.user + times.system
 
 
-def _enough(cell: Cell, figures: Mapping[str, float]) -> bool:
+def _enough(cell: FleetCell, figures: Mapping[str, float]) -> bool:
     expected = {"states_hz": 50.0 * cell.commanded, "summaries_hz": float(cell.robots * cell.watches)}
     return all(figures[key] >= ENOUGH * rate for key, rate in expected.items())
 

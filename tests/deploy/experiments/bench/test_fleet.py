@@ -9,7 +9,7 @@ import pytest
 
 from deploy.experiments.bench.fleet import run as fleet_run
 from deploy.experiments.bench.fleet.run import (
-    Cell,
+    FleetCell,
     FleetOptions,
     MeasuredCell,
     cells,
@@ -20,14 +20,26 @@ from deploy.experiments.bench.fleet.run import (
 from deploy.measure.verdict import Outcome
 
 ONE = MeasuredCell(
-    Cell("", 0, 0), 1, 0.0, [], 100.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, measured=True, core_percent_runs=[0.0]
+    FleetCell("", 0, 0),
+    1,
+    0.0,
+    [],
+    100.0,
+    0.0,
+    0.0,
+    0.0,
+    1.0,
+    0.0,
+    0.0,
+    measured=True,
+    core_percent_runs=[0.0],
 )
 
 
 def measured(
     name: str, cost: float, robots: int = 0, commanded: int = 0, enough: bool = True
 ) -> MeasuredCell:
-    return replace(ONE, cell=Cell(name, robots, commanded), core_percent=cost, measured=enough)
+    return replace(ONE, cell=FleetCell(name, robots, commanded), core_percent=cost, measured=enough)
 
 
 def test_the_targets() -> None:
@@ -63,7 +75,7 @@ def test_the_cells_grow_to_the_fleet_that_was_asked_for() -> None:
 
 @pytest.mark.live
 def test_a_small_fleet_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    cell = Cell("4 robots, 2 nurses", 4, 1, 2)
+    cell = FleetCell("4 robots, 2 nurses", 4, 1, 2)
     monkeypatch.setattr(fleet_run, "cells", lambda _: [cell])
     report = measure_fleet(FleetOptions(4, 2, 3.0), tmp_path, lambda _: None)
     (one,) = report.cells
