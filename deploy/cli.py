@@ -16,6 +16,7 @@ from deploy.calibrate.live.command import live
 from deploy.console.command import console
 from deploy.experiments.accuracy.commands import app as accuracy_app
 from deploy.experiments.bench.command import app as bench_app
+from deploy.experiments.bench.fleet.command import fleet
 from deploy.experiments.collisions.command import collisions
 from deploy.experiments.contact.command import contact
 from deploy.experiments.demo.command import demo
@@ -62,6 +63,7 @@ app = typer.Typer(
     "\n\nThe master reads the sensors that an operator wears and sends joint angles; "
     "the slave checks them and drives the robot.\n\nStart with `tandem demo`: it needs no hardware.",
 )
+bench_app.command("fleet")(fleet)
 calibrate_app.command("live")(live)
 suit_app.command("check")(check)
 for _name, _group in {

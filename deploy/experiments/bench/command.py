@@ -7,12 +7,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from deploy.experiments.bench.fleet.command import fleet
 from deploy.report.options import ReportFile
 from deploy.report.output import write_json
 
 app = typer.Typer(no_args_is_help=False)
-app.command()(fleet)
 
 
 @app.callback(invoke_without_command=True)
