@@ -44,10 +44,10 @@ class WatchedRobots:
     def to_take(self, now_ns: int, taken: Collection[str]) -> list[str]:
         """The robots to command from now on."""
         self.said = []
+        # few ask, of the many that are there
+        asking = (self.roster.get(robot) for robot in sorted(self.roster.asking) if robot not in taken)
         return [
-            listed.robot
-            for listed in self.roster.robots()
-            if listed.robot not in taken and self._wants(listed, now_ns) and self._fits(listed)
+            one.robot for one in asking if one is not None and self._wants(one, now_ns) and self._fits(one)
         ]
 
     def to_let_go(self, now_ns: int, taken: Mapping[str, TakenRobot]) -> dict[str, str]:

@@ -25,6 +25,8 @@ class Announcer:
         self.call = Call()
         self._sequence = 0
         self._sent_ns: int | None = None
+        self._next_ns = 0
+        """When the next one falls due, whatever happens in between."""
         self._shown: tuple[object, ...] | None = None
 
     def on_call(self, payload: bytes, guard: Guard, now_ns: int) -> bytes:
@@ -41,6 +43,10 @@ class Announcer:
         shown = _shown(now_ns, guard, self.call)
         if not self._due(now_ns, shown):
             return None
+        if self._fell_due(now_ns):
+            # one a second over any time, though each is sent by the turn after it fell due
+            late = not self._next_ns <= now_ns < self._next_ns + _PERIOD_NS
+            self._next_ns = _PERIOD_NS + (now_ns if late else self._next_ns)
         self._sent_ns, self._shown = now_ns, shown
         self._sequence += 1
         lease = guard.lease
@@ -63,10 +69,13 @@ class Announcer:
     def _due(self, now_ns: int, shown: tuple[object, ...]) -> bool:
         if self._sent_ns is None:
             return True
-        elapsed_ns = now_ns - self._sent_ns
-        if not 0 <= elapsed_ns < _PERIOD_NS:
+        if self._fell_due(now_ns):
             return True
-        return elapsed_ns >= _SOONEST_NS and shown != self._shown
+        return now_ns - self._sent_ns >= _SOONEST_NS and shown != self._shown
+
+    def _fell_due(self, now_ns: int) -> bool:
+        # a clock that went back begins anew
+        return not self._next_ns - _PERIOD_NS <= now_ns < self._next_ns
 
 
 def _shown(now_ns: int, guard: Guard, call: Call) -> tuple[object, ...]:

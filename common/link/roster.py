@@ -53,6 +53,8 @@ class Roster:
     def __init__(self, *patterns: str) -> None:
         self._patterns = patterns or ("*",)
         self._robots: dict[str, ListedRobot] = {}
+        self.asking: set[str] = set()
+        """Robots whose newest summary names an operator who has asked for it, or to whom it is offered."""
         self.operators: dict[str, set[int]] = {}
         """The masters that live, by operator."""
         self.received = self.undecodable = 0
@@ -71,6 +73,7 @@ class Roster:
                 listed.processes.pop(presence.instance, None)
                 if not listed.processes:
                     del self._robots[presence.robot]
+                    self.asking.discard(presence.robot)
             return
         listed = self._listed(presence.robot, now_ns)
         if listed is not None:
@@ -106,6 +109,7 @@ class Roster:
             self.late += 1
             return
         self.received += 1
+        (self.asking.add if summary.wanted_by or summary.offered_to else self.asking.discard)(summary.robot)
         listed.summary, listed.heard_ns = summary, arrived_ns
 
     def __contains__(self, robot: object) -> bool:

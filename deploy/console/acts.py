@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from common.link import Link
 from common.wire.messages import Action
+from common.wire.together import TOGETHER
 from deploy.client.answer import RobotAnswer
 from deploy.client.ask import ask
 from deploy.client.destination import Destination
@@ -16,12 +17,14 @@ ACTS = {
     action.value: action
     for action in (
         Action.ENGAGE, Action.DISENGAGE, Action.REST, Action.TAKE_UP, Action.HANDOVER, Action.RESET,
-        Action.HOME,
+        Action.HOME, Action.TAKE, Action.RELEASE,
     )
 }  # fmt: skip
 """What `/api/act` takes; the stop goes its own way, without a role."""
 MARK = "mark"
 """A line that a person adds to the events: no request to a robot."""
+OF_THE_LIST = (Action.TAKE, Action.RELEASE)
+"""What may be asked of a robot that this console only lists."""
 _MOST_GROUPS = 16
 _LONGEST = 128
 
@@ -46,18 +49,27 @@ class ActRequest:
     groups: tuple[str, ...] = ()
 
 
-def read_act(body: object, robots: tuple[str, ...], person: Person) -> ActRequest:
-    """The act of a request's body. Raises ActRefusedError with the words for the person."""
+def read_act(
+    body: object, robots: tuple[str, ...], person: Person, lists: Callable[[str], bool] = lambda _: False
+) -> ActRequest:
+    """The act of a request's body. Raises ActRefusedError with the words for the person.
+
+    `lists`: whether the console's list has a robot that it has not opened.
+    """
     if not isinstance(body, dict):
         raise ActRefusedError(400, "expected an object")
     action = ACTS.get(_text(body, "act"))
     if action is None:
         raise ActRefusedError(400, f"no such act: expected one of {', '.join(ACTS)}")
-    robot = _robot(body, robots)
+    robot = _text(body, "robot")
+    if action not in OF_THE_LIST or not lists(robot):
+        robot = _robot(body, robots)
     may_act(person)
     key = _text(body, "to" if action is Action.HANDOVER else "key")
     if not key and action in (Action.RESET, Action.HOME, Action.HANDOVER):
         raise ActRefusedError(400, "to whom?" if action is Action.HANDOVER else "the robot's key is missing")
+    if action is Action.ENGAGE:
+        key = TOGETHER if body.get("together") is True else ""
     groups = body.get("groups", [])
     if not isinstance(groups, list) or not all(isinstance(each, str) for each in groups):
         raise ActRefusedError(400, "groups: expected a list of joint groups")

@@ -54,7 +54,6 @@ class ConsoleApp:
         self._visitors = Visitors(hub.access, port)
         self._posts = PostHandlers(hub, self._visitors, where, session, on_login, secure)
         self._files = files or PageFiles()
-        self._robots = tuple(hub.models)
         self._throttle = LogThrottle()
         self._rates: dict[tuple[str, float], RateLimit] = {}
 
@@ -157,7 +156,7 @@ class ConsoleApp:
 
     async def _get_setup(self, request: web.Request) -> web.StreamResponse:
         self._must_see(request)
-        robot = request.query.get("robot", self._robots[0])
+        robot = request.query.get("robot", self._hub.robots[0])
         if robot not in self._hub.models:
-            return error_answer(404, f"no such robot here: expected one of {', '.join(self._robots)}")
-        return answer({**self._setup(robot), "robots": list(self._robots), "robot": robot})
+            return error_answer(404, f"no such robot here: expected one of {', '.join(self._hub.robots)}")
+        return answer({**self._setup(robot), "robots": list(self._hub.robots), "robot": robot})

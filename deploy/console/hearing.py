@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 from common.clock import monotonic_ns, to_ns
@@ -26,7 +26,8 @@ AGAIN_S = 0.5
 LOOK_S = 0.25
 TOPICS = ("tandem/",)
 """What is wanted of the tap: the link's messages."""
-Models = Mapping[str, RobotModel]
+Models = dict[str, RobotModel]
+"""By robot; those that pages open come and go."""
 
 log = logging.getLogger(__name__)
 
@@ -71,6 +72,17 @@ class Hearing:
             topics = (STATISTICS, STATE, VIDEO) if states else (STATISTICS,)
             for topic in topics:
                 link.subscribe_keys(topic, lambda key, payload, at_ns: self._take(key, payload, at_ns, LINK))
+
+    def open(self, session: LinkSession, model: RobotModel) -> None:
+        """Hear one more robot over the link, in full."""
+        self.models[model.robot] = model
+        link = session.link(model.robot)
+        for topic in (STATISTICS, STATE, VIDEO):
+            link.subscribe_keys(topic, lambda key, payload, at_ns: self._take(key, payload, at_ns, LINK))
+
+    def close(self, robot: str) -> None:
+        """Hear it no more; the caller withdraws its link."""
+        self.models.pop(robot, None)
 
     async def stand_in(self, config: LinkConfig) -> None:
         """While the tap is silent, hear the robots' states from themselves, until cancelled.

@@ -6,17 +6,19 @@ import json
 import logging
 import secrets
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import psutil
 
 from common.clock import monotonic_ns, to_ns
+from common.metrics.tree import to_tree
 from common.process.pacing import TickGrid
 from common.process.ticker import ticks
 from common.wire.video import JPEG
 from deploy.console.deadman import DeadmanRelay
 from deploy.console.model.guard_table import ENGAGED
 from deploy.console.model.robot import RobotModel
+from deploy.console.opened import OpenedRobots
 from deploy.console.reports import ReportFolder
 from deploy.console.session import Access, PageRole, Person, RateLimit
 from deploy.console.stopping import RobotStopper
@@ -30,6 +32,9 @@ BEAT_S = 0.3
 KEYS_PER_S = 1.0
 SEEN_S = 0.5
 """A beat of the deadman from a page that has seen nothing newer does not hold."""
+
+MOST_LISTED = 100
+"""Robots in the page's list; who waits for an operator comes first."""
 
 log = logging.getLogger(__name__)
 
@@ -45,6 +50,8 @@ class Hub:
     losing_page_stops: bool = False
     desk: StudyDesk = field(default_factory=StudyDesk)
     reports: ReportFolder = field(default_factory=ReportFolder)
+    opened: OpenedRobots | None = None
+    """The list of all robots that are there, of which a page may open others; None: there is no list."""
     pages: list[OpenPage] = field(default_factory=list)
     session: str = field(default_factory=lambda: secrets.token_hex(4))
     """Another one with each process."""
@@ -57,6 +64,23 @@ class Hub:
     _lapsed: set[str] = field(default_factory=set)
     """Log-ins of pages that were lost while they held: where they come back, they must let go first."""
     _process: psutil.Process = field(default_factory=psutil.Process)
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots that pages can show now, the file's own first."""
+        return tuple(self.models)
+
+    def turn(self, page: OpenPage, robot: str) -> str:
+        """Let a page show another robot, opened if need be; why not, else empty."""
+        if robot not in self.models and self.opened is not None and page.person.role.sees:
+            why = self.opened.open(robot)
+            if why:
+                return why
+        if robot not in self.models:
+            return f"no such robot here: expected one of {', '.join(self.robots)}"
+        page.turn_to(self.models[robot])
+        self.greet(page)
+        return ""
 
     def full(self, person: Person) -> bool:
         """Whether one more page, of this person, would be too many."""
@@ -124,8 +148,9 @@ class Hub:
                 self._show_view(self.models[robot], now_ns)
             if due.tick % FACTS_EVERY == 0:
                 self.refresh(now_ns)
-                for model in self.models.values():
+                for model in list(self.models.values()):
                     self._show_facts(model, now_ns)
+                await self._list_robots(now_ns)
             self._watch_pages(now_ns)
             self._watch_deadman(now_ns)
             for page in self.pages:
@@ -186,6 +211,18 @@ class Hub:
                     for other in self.pages
                 ]
                 page.show("facts", body, {"viewers": viewers, "glass": page.glass.shown(now_ns)})
+
+    async def _list_robots(self, now_ns: int) -> None:
+        """Show who is there, and close what no page shows."""
+        if self.opened is None:
+            return
+        await self.opened.close_unseen({page.model.robot for page in self.pages} | set(self.engaged), now_ns)
+        if self.pages:
+            rows = self.opened.rows(now_ns)
+            shown = replace(rows, robots=rows.robots[:MOST_LISTED])
+            body = pack({**to_tree(shown), "there": len(rows.robots)})
+            for page in self.pages:
+                page.show("fleet", body, {})
 
     def _watch_deadman(self, now_ns: int) -> None:
         """A page that fell silent holds no more; while none holds, the master is told so again and again."""

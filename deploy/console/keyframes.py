@@ -27,3 +27,7 @@ class KeyframeRequests:
                 return
             self._puts[key] = self._session.link(robot).publish(keyframe(camera))
         self._puts[key](JOINED)
+
+    def forget(self, robot: str) -> None:
+        """The robot's link is withdrawn."""
+        self._puts = {key: put for key, put in self._puts.items() if key[0] != robot}

@@ -56,9 +56,9 @@ def _at_the_operator(chosen: ConsoleChoices) -> ConsoleOptions:
         chosen.certificate,
         overrides=chosen.overrides,
     )
-    if not where.robots:
-        raise TandemError("which robot? Name it by --robot, or the master's file by --master")
     file = None if chosen.master is None else load_config(chosen.master, MasterConfig, chosen.overrides)
+    if not where.robots and not (file is not None and file.watched):
+        raise TandemError("which robot? Name it by --robot, or the master's file by --master")
     hold = file.operator.deadman if file is not None else None
     tap = chosen.tap or (file.tap.socket if file is not None else None)
     zones = None

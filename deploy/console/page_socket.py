@@ -28,7 +28,6 @@ class PageSockets:
     def __init__(self, hub: Hub, visitors: Visitors) -> None:
         self._hub = hub
         self._visitors = visitors
-        self._robots = tuple(hub.models)
 
     async def serve(self, request: web.Request) -> web.StreamResponse:
         """One page, until it goes."""
@@ -42,7 +41,7 @@ class PageSockets:
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER)
             return socket
         robot = request.query.get("robot", "")
-        model = self._hub.models.get(robot, self._hub.models[self._robots[0]])
+        model = self._hub.models.get(robot, self._hub.models[self._hub.robots[0]])
         page = OpenPage(socket, model, secret, person)
         self._hub.enter(page)
         writing = asyncio.create_task(page.write())
@@ -96,8 +95,12 @@ class PageSockets:
 
     def _request(self, page: OpenPage, kind: object, robot: object) -> None:
         known = isinstance(robot, str) and robot in self._hub.models
-        if not known:
-            text = f"no such robot here: expected one of {', '.join(self._robots)}"
+        if kind == "robot" and isinstance(robot, str):
+            why = self._hub.turn(page, robot)
+            if why:
+                page.say({"kind": "answer", "to": "robot", "done": False, "text": why})
+        elif not known:
+            text = f"no such robot here: expected one of {', '.join(self._hub.robots)}"
             page.say({"kind": "answer", "to": str(kind)[:20], "done": False, "text": text})
         elif kind == "stop":
             page.asked_stop |= robot == page.model.robot
@@ -105,8 +108,5 @@ class PageSockets:
             sure = shown.kept or shown.robot_ns is not None
             text = "asked" if sure else NOT_KEPT
             page.say({"kind": "answer", "to": "stop", "done": sure, "text": text, "id": shown.number})
-        elif kind == "robot":
-            page.turn_to(self._hub.models[str(robot)])
-            self._hub.greet(page)
         else:
             page.say({"kind": "answer", "to": str(kind)[:20], "done": False, "text": "no such message"})

@@ -40,7 +40,6 @@ class PostHandlers:
         self._session = session
         self._on_login = on_login
         self._secure = secure
-        self._robots = tuple(hub.models)
 
     def routes(self) -> list[web.RouteDef]:
         """Path by path."""
@@ -91,22 +90,27 @@ class PostHandlers:
             return self._stopped(request, body)
         secret, person = self._visitors.of(request)
         if body.get("act") == MARK:
-            robot, text = read_mark(body, self._robots, person)
+            robot, text = read_mark(body, self._hub.robots, person)
             words = self._hub.desk.mark(text)
             self._hub.models[robot].events.add(MARK, f"{person.name}: {text}", monotonic_ns())
             return answer({"done": True, "text": words, "guard": ""})
-        act = read_act(body, self._robots, person)
+        act = read_act(body, self._hub.robots, person, self._lists)
         if self._session is None:
             return error_answer(503, "there is no link to the robot")
         log.warning("%s: %s asks for %s", act.robot, person.name, act.action)
         said = await carry_out(act, self._session.link(act.robot), self._where)
-        model = self._hub.models[act.robot]
-        model.events.add("act", f"{person.name}: {act.action}: {said.text}", monotonic_ns())
+        model = self._hub.models.get(act.robot)
+        if model is not None:
+            model.events.add("act", f"{person.name}: {act.action}: {said.text}", monotonic_ns())
         if said.done and act.action is Action.ENGAGE:
             self._hub.engaged[act.robot] = secret
         elif said.done and act.action is Action.DISENGAGE:
             self._hub.engaged.pop(act.robot, None)
         return answer({"done": said.done, "text": said.text, "guard": said.guard})
+
+    def _lists(self, robot: str) -> bool:
+        opened = self._hub.opened
+        return opened is not None and opened.lists(robot)
 
     async def _study(self, request: web.Request) -> web.StreamResponse:
         body = await body_of(request)
@@ -117,9 +121,9 @@ class PostHandlers:
         return self._stopped(request, await body_of(request))
 
     def _stopped(self, request: web.Request, body: Mapping[str, object]) -> web.StreamResponse:
-        robot = body.get("robot") or self._robots[0]
+        robot = body.get("robot") or self._hub.robots[0]
         if not isinstance(robot, str) or robot not in self._hub.stoppers:
-            return error_answer(400, f"no such robot here: expected one of {', '.join(self._robots)}")
+            return error_answer(400, f"no such robot here: expected one of {', '.join(self._hub.robots)}")
         _, person = self._visitors.of(request)
         shown = self._hub.stoppers[robot].stop(f"console: {person.name or person.role}")
         if not shown.kept and shown.robot_ns is None:

@@ -16,6 +16,7 @@ from common.clock import monotonic_ns
 from common.config.console import ConsoleConfig
 from common.errors import TandemError
 from common.link import LinkSession, open_session
+from common.link.roster import Roster
 from common.process.runtime import until_stopped
 from common.skeleton import Skeleton
 from common.wire.version import software
@@ -30,11 +31,15 @@ from deploy.console.model.guard_table import STATES, TRANSITIONS
 from deploy.console.model.pictures import STALE_S
 from deploy.console.model.robot import SILENT_S, RobotModel, Side, Whose
 from deploy.console.model.scene import scene
+from deploy.console.opened import OpenedRobots
 from deploy.console.outbox import WINDOW
 from deploy.console.reports import ReportFolder
 from deploy.console.session import TOKEN_S, Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
 from deploy.console.study import StudyDesk
+
+FIRST_S = 0.5
+"""Between two looks for a robot to begin with."""
 
 log = logging.getLogger(__name__)
 
@@ -87,19 +92,31 @@ async def _run(options: ConsoleOptions, door: _Door) -> None:
             hearing.listen(session, states=options.tap is None)
         backup = StopBackup(where.link, where.operator)
         backup.start()
-        stoppers = {
-            robot: RobotStopper(session.link(robot), model, where.operator, backup)
-            for robot, model in models.items()
-        }
+
+        def stopper_of(model: RobotModel) -> RobotStopper:
+            return RobotStopper(session.link(model.robot), model, where.operator, backup)
+
+        def make(robot: str) -> tuple[RobotModel, RobotStopper]:
+            model = RobotModel(robot, options.skeleton, whose)
+            return model, stopper_of(model)
+
+        stoppers = {robot: stopper_of(model) for robot, model in models.items()}
         for stopper in stoppers.values():
-            stopper.watch(session)
+            stopper.watch()
+        roster = Roster()
+        session.watch_roster(roster)
+        opened = OpenedRobots(
+            roster, hearing, stoppers, session=session, profile=options.skeleton.name, make=make
+        )
+        if not models:
+            await _first(opened)
         relay = DeadmanRelay(options.deadman_socket) if options.deadman_socket else None
         try:
             async with asyncio.TaskGroup() as tasks:
                 if options.tap is not None:
                     tasks.create_task(hearing.read_tap(options.tap))
                     tasks.create_task(hearing.stand_in(where.link))
-                await _serve(options, door, session, hearing, stoppers, relay)
+                await _serve(options, door, session, hearing, stoppers, relay, opened)
         finally:
             for stopper in stoppers.values():
                 await stopper.close()
@@ -115,6 +132,7 @@ async def _serve(
     hearing: Hearing,
     stoppers: Mapping[str, RobotStopper],
     relay: DeadmanRelay | None,
+    opened: OpenedRobots,
 ) -> None:
     config = options.config
     tls = door.tls
@@ -122,10 +140,12 @@ async def _serve(
     access = Access(_names(config, port), tls is not None, stranger(config.on_this_host_only))
     models = hearing.models
     hub = Hub(models, access, stoppers, relay, losing_page_stops=config.losing_page == "stop")
+    hub.opened = opened
     hub.desk = StudyDesk(config.study, options.recordings)
     hub.reports = ReportFolder(config.reports)
     hearing.on_picture = hub.on_picture
-    hub.put_key = KeyframeRequests(session).put
+    keyframes = KeyframeRequests(session)
+    hub.put_key, opened.on_close = keyframes.put, keyframes.forget
     address = f"{'https' if tls else 'http'}://{_shown_host(config)}:{port}/"
 
     def offer(person: Person) -> None:
@@ -152,6 +172,16 @@ async def _serve(
             await hub.show()
     finally:
         await runner.cleanup()
+
+
+async def _first(opened: OpenedRobots) -> None:
+    """Open a robot, where the file names none: one that waits for an operator, or the first of the list."""
+    log.info("waiting for a robot to show itself")
+    while True:
+        await asyncio.sleep(FIRST_S)
+        for row in opened.rows(monotonic_ns()).robots:
+            if not opened.open(row.robot):
+                return
 
 
 async def _offer_again(offer: Callable[[Person], None], operator: str) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import logging
 
 from common.clock import monotonic_ns
-from common.link import Link, LinkSession
+from common.link import Link
 from common.wire.presence import ProcessPresence
 from common.wire.stop import STOPPED, pack_stop
 from common.wire.topics import STOP
@@ -45,14 +45,19 @@ class RobotStopper:
         """What the questions under way are for."""
         self._number = 0
 
-    def watch(self, session: LinkSession) -> None:
+    def watch(self) -> None:
         """Learn which processes bear the name: each must acknowledge."""
-        session.watch_presence(self._on_presence, self._model.robot)
+        self._link.watch_presence(self._on_presence)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether the robot is being asked to stop."""
+        return self._task is not None and not self._task.done()
 
     def stop(self, by: str) -> StopShown:
         """Ask for a stop. A stop under way goes on, and a robot that is stopped already is asked again."""
         self._number += 1
-        under_way = self._task is not None and not self._task.done()
+        under_way = self.under_way
         kept = self._backup is None or self._backup.keep(self._model.robot)
         shown = self._model.asked_to_stop(self._number, by, monotonic_ns(), under_way)
         if not under_way or shown is not self._shown:

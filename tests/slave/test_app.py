@@ -34,7 +34,9 @@ class FakeLink:
     def __init__(self) -> None:
         self.put: dict[str, int] = {}
 
-    def publish(self, topic: Topic) -> Callable[[bytes], None]:
+    def publish(
+        self, topic: Topic, on_wanted: Callable[[bool], None] | None = None
+    ) -> Callable[[bytes], None]:
         def put(_: bytes) -> None:
             self.put[topic.name] = self.put.get(topic.name, 0) + 1
 
@@ -107,7 +109,9 @@ def test_each_one_way_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
     words: list[Any] = []
 
     class Keeping(FakeLink):
-        def publish(self, topic: Topic) -> Callable[[bytes], None]:
+        def publish(
+            self, topic: Topic, on_wanted: Callable[[bool], None] | None = None
+        ) -> Callable[[bytes], None]:
             def keep(payload: bytes) -> None:
                 metrics = decode(payload, Statistics).metrics
                 assert isinstance(metrics, SlaveMetrics)

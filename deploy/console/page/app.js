@@ -5,6 +5,7 @@ import { choose, chosen, LANGUAGES, load, nameOf, other, t, translate } from "./
 import {
   attention, BodyFigure, Cameras, Events, JointTable, latencyNow, link as linkFacts, make, Minute, shape,
 } from "./facts.js";
+import { Fleet } from "./fleet.js";
 import { Glass, worst } from "./glass.js";
 
 const $ = (id) => document.getElementById(id);
@@ -19,7 +20,7 @@ const robotOf = () => seen.view?.robot ?? seen.hello?.robot ?? seen.setup?.robot
 // ---- stop: first, so that nothing that fails below can take it away
 
 const link = new Link({
-  hello, view, facts, picture: gotPicture,
+  hello, view, facts, fleet, picture: gotPicture,
   answer: (answer) => (answer.to === "stop" ? answer.done && stopConfirmed() : tell(answer.text, answer.done)),
   stop: ({ stop: told }) => ((seen.stop = told), showStop()), // to a page that is shown nothing else
   bye: (bye) => tell(bye.why, false),
@@ -45,7 +46,7 @@ addEventListener("keydown", keyDown, { capture: true });
 addEventListener("keyup", keyUp, { capture: true });
 
 const KEYS = {
-  F2: { down: () => engaging(true), up: () => engaging(false) },
+  F2: { down: (event) => engaging(true, event.shiftKey), up: () => engaging(false) },
   F3: { down: () => act("disengage") },
   F4: { down: mark },
   F6: { down: fullScreen },
@@ -68,7 +69,7 @@ function keyDown(event) {
   }
   if (!KEYS[event.key] || event.ctrlKey || event.altKey || event.metaKey) return;
   event.preventDefault();
-  if (!event.repeat) KEYS[event.key].down();
+  if (!event.repeat) KEYS[event.key].down(event);
 }
 
 function keyUp(event) {
@@ -83,20 +84,20 @@ function keyUp(event) {
 let engage = null;
 
 /** The request is made after a second of holding, whether or not a frame could be drawn meanwhile. */
-function engaging(down) {
+function engaging(down, together = false) {
   clearTimeout(engage);
   engage = null;
   $("engage").classList.toggle("down", down && Boolean(seen.hello?.may?.act));
   if (!down) return;
-  if (seen.hello?.may?.act) engage = setTimeout(() => (blind() ? tell(t("told.no_contact"), false) : act("engage")), ENGAGE_MS);
+  if (seen.hello?.may?.act) engage = setTimeout(() => (blind() ? tell(t("told.no_contact"), false) : act("engage", { together })), ENGAGE_MS);
   else tell(t("may.not"), false);
 }
 
 const blind = () => situation(now()).id === "no_contact";
 
-async function act(name, more = {}) {
+async function act(name, more = {}, robot = robotOf()) {
   if (!seen.hello?.may?.act && name !== "reset") return tell(t("may.not"), false);
-  const answer = await link.act(name, robotOf(), more);
+  const answer = await link.act(name, robot, more);
   tell(answer.text || t(answer.done ? "told.done" : `told.${answer.status}`, { status: answer.status }), answer.done);
   return answer;
 }
@@ -225,6 +226,17 @@ function view(message) {
   latencyNow(message.latency);
   parts.more?.view(message);
   show();
+}
+
+function openRobot(robot) {
+  hold(false);
+  link.robot = robot;
+  link.send({ kind: "robot", robot });
+}
+
+function fleet(message) {
+  parts.fleet ??= $("fleet") && new Fleet($("fleet"), { open: openRobot, act: (name, robot) => act(name, {}, robot) });
+  parts.fleet?.show(message, robotOf(), seen.setup?.operator, Boolean(seen.hello?.may?.act));
 }
 
 function facts(message) {
@@ -374,12 +386,12 @@ function wire() {
   press("sheet-close", () => ($("sheet").hidden = true));
   $("sheet").addEventListener("submit", sendSheet);
   const held = (id, does) => {
-    $(id).addEventListener("pointerdown", (event) => does(event.isPrimary));
+    $(id).addEventListener("pointerdown", (event) => does(event.isPrimary, event.shiftKey));
     for (const end of ["pointerup", "pointerleave", "pointercancel"]) $(id).addEventListener(end, () => does(false));
   };
   held("engage", engaging);
   held("hold", hold);
-  $("engage").addEventListener("keydown", (event) => event.key === "Enter" && !event.repeat && engaging(true));
+  $("engage").addEventListener("keydown", (event) => event.key === "Enter" && !event.repeat && engaging(true, event.shiftKey));
   $("engage").addEventListener("keyup", (event) => event.key === "Enter" && engaging(false));
   const toggle = (id, does) => press(id, () => {
     const on = $(id).getAttribute("aria-pressed") !== "true";
@@ -391,11 +403,7 @@ function wire() {
     $("joints").hidden = !on;
     if (on && seen.view && seen.setup) parts.table?.show(seen.view);
   });
-  $("robot").addEventListener("change", () => {
-    hold(false);
-    link.robot = $("robot").value;
-    link.send({ kind: "robot", robot: link.robot });
-  });
+  $("robot").addEventListener("change", () => openRobot($("robot").value));
   document.addEventListener("fullscreenchange", leftFullScreen);
   addEventListener("blur", () => (hold(false), engaging(false)));
   document.addEventListener("visibilitychange", () => document.hidden && (hold(false), engaging(false)));

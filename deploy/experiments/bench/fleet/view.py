@@ -13,7 +13,7 @@ from deploy.report.tables import plain_table
 def fleet_table(report: FleetReport) -> RenderableType:
     """One line a fleet: what it costs its operator's host, the router and the robots' host."""
     table = plain_table(
-        "fleet", "master %", "least–most", "MB", "in/s", "out/s", "router %", "robots %",
+        "fleet", "master", "least–most", "MB", "in/s", "out/s", "router", "robots",
         title="percent of one core, by CPU time",
     )  # fmt: skip
     for cell in report.cells:
