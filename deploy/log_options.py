@@ -28,6 +28,10 @@ def add_log_options(app: typer.Typer) -> None:
             command.callback = _logged(command.callback)
     for group in app.registered_groups:
         if group.typer_instance is not None:
+            own = group.typer_instance.registered_callback
+            # a group that is a command too, such as `tandem bench`
+            if own is not None and own.callback is not None and own.invoke_without_command is True:
+                own.callback = _logged(own.callback)
             add_log_options(group.typer_instance)
 
 
