@@ -21,6 +21,7 @@ from deploy.experiments.collisions.command import collisions
 from deploy.experiments.contact.command import contact
 from deploy.experiments.demo.command import demo
 from deploy.experiments.faults.command import faults
+from deploy.experiments.prove.command import prove_motion
 from deploy.experiments.soak.command import soak
 from deploy.experiments.trial.command import app as trial_app
 from deploy.log_options import Debug, Quiet, add_log_options, debugging, start_chosen_log
@@ -79,6 +80,7 @@ _COMMANDS: tuple[Callable[..., None], ...] = (
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)
+app.command("prove")(prove_motion)
 app.command("import")(import_recording)
 app.command("export")(export_joints)
 EXIT_FAULT = 70

@@ -16,7 +16,8 @@ PANELS = {
         "metrics", "lsl",
     ),
     "Judge": (
-        "replay", "trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network", "audit",
+        "prove", "replay", "trial", "soak", "faults", "collisions", "contact", "bench", "accuracy", "network",
+        "audit",
     ),
 }  # fmt: skip
 """In the order of the help."""

@@ -114,6 +114,13 @@ class VirtualWorld:
         self._tick = 0
 
     @property
+    def simulated(self) -> SimulatedRobot:
+        """The robot's physics. TypeError where it is one that a patient may touch."""
+        if not isinstance(self._robot, SimulatedRobot):
+            raise TypeError("expected a world without a patient")
+        return self._robot
+
+    @property
     def master_ns(self) -> int:
         """The master's clock now."""
         return self.now_ns + self.inject.master_stepped_ns

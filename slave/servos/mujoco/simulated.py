@@ -108,6 +108,17 @@ class SimulatedRobot:
         out: Array = self._data.qvel[self._leaders] * self._joint_per_hinge
         return out
 
+    def rate_rad_s(self, link: str) -> Array:
+        """(3,) angular velocity of a body, in its own frame, at the end of the newest cycle."""
+        model, at_end, out = self._model, mujoco.MjData(self._model), np.zeros(6)
+        # a step ends with positions and rates, but leaves the bodies' velocities of its beginning
+        at_end.qpos[:], at_end.qvel[:] = self._data.qpos, self._data.qvel
+        mujoco.mj_kinematics(model, at_end)
+        mujoco.mj_comPos(model, at_end)
+        mujoco.mj_comVel(model, at_end)
+        mujoco.mj_objectVelocity(model, at_end, mujoco.mjtObj.mjOBJ_BODY, model.body(link).id, out, 1)
+        return out[:3]
+
     @property
     def effort_nm(self) -> Array:
         """(J,) torque of each motor at its joint in the newest cycle."""
