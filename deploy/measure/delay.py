@@ -48,7 +48,7 @@ Nanoseconds = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Speed:
+class AngularSpeed:
     """An angular speed over time."""
 
     at_ns: Nanoseconds
@@ -58,7 +58,7 @@ class Speed:
 
 
 @dataclass(frozen=True, slots=True)
-class Delay:
+class MotionDelay:
     """How much later the second series is."""
 
     delay_ns: int
@@ -68,7 +68,7 @@ class Delay:
     segments: int
 
 
-def speed_of(at_ns: Nanoseconds, rotation: Array) -> Speed:
+def speed_of(at_ns: Nanoseconds, rotation: Array) -> AngularSpeed:
     """The angular speed of orientations (T, 3, 3), at the middle between each two."""
     order = np.flatnonzero(np.diff(at_ns, prepend=at_ns[0] - 1) > 0)
     at_ns, rotation = at_ns[order], rotation[order]
@@ -76,10 +76,12 @@ def speed_of(at_ns: Nanoseconds, rotation: Array) -> Speed:
     traces = np.einsum("tij,tij->t", rotation[:-1], rotation[1:])
     angle = np.arccos(np.clip((traces - 1.0) / 2.0, -1.0, 1.0))
     step_ns = np.diff(at_ns)
-    return Speed(at_ns[:-1] + step_ns // 2, angle / (step_ns / NS_PER_S))
+    return AngularSpeed(at_ns[:-1] + step_ns // 2, angle / (step_ns / NS_PER_S))
 
 
-def find_delay(first: Speed, second: Speed, search_s: tuple[float, float] = SEARCH_S) -> Delay | str:
+def find_delay(
+    first: AngularSpeed, second: AngularSpeed, search_s: tuple[float, float] = SEARCH_S
+) -> MotionDelay | str:
     """By how much `second` follows `first`; or why that cannot be said. Both stamps are of one clock."""
     lags = np.arange(to_ns(search_s[0]) // STEP_NS, to_ns(search_s[1]) // STEP_NS + 1)
     grid = _grid(first, second, lags)
@@ -91,7 +93,7 @@ def find_delay(first: Speed, second: Speed, search_s: tuple[float, float] = SEAR
         return (
             f"{len(found)} of at least {LEAST_SEGMENTS} segments of {SEGMENT_S:g} s moved enough to be judged"
         )
-    whole = np.mean([each.curve for each in found], axis=0)
+    whole = np.mean(found, axis=0)
     top = _top(whole)
     if top is None:
         return f"the best fit lies at the end of the search, {search_s[0]:g} to {search_s[1]:g} s"
@@ -101,17 +103,11 @@ def find_delay(first: Speed, second: Speed, search_s: tuple[float, float] = SEAR
         return "the motion repeats itself, so the delay is ambiguous: move less regularly"
     delay_ns = (lags[0] + top) * STEP_NS
     bound_ns = max(_by_curvature(whole, top, len(found)), _by_repetition(found, lags, top), FLOOR_NS)
-    return Delay(round(delay_ns), round(bound_ns), float(whole[round(top)]), len(found))
-
-
-@dataclass(frozen=True, slots=True)
-class _Segment:
-    curve: Array
-    """(L,) the correlation at each lag."""
+    return MotionDelay(round(delay_ns), round(bound_ns), float(whole[round(top)]), len(found))
 
 
 def _grid(
-    first: Speed, second: Speed, lags: NDArray[np.int64]
+    first: AngularSpeed, second: AngularSpeed, lags: NDArray[np.int64]
 ) -> tuple[Array, Array, NDArray[np.bool_]] | None:
     """Both on one grid, and where both were heard; the second reaches beyond the first by the lags."""
     if len(first.at_ns) < 2 or len(second.at_ns) < 2:
@@ -128,7 +124,7 @@ def _grid(
     return x, y, heard_x & heard_y[-lags[0] : -lags[0] + count]
 
 
-def _at(speed: Speed, at_ns: Nanoseconds) -> tuple[Array, NDArray[np.bool_]]:
+def _at(speed: AngularSpeed, at_ns: Nanoseconds) -> tuple[Array, NDArray[np.bool_]]:
     """The speed at those times, smoothed; and where it was heard."""
     origin = at_ns[0]
     value = np.interp((at_ns - origin).astype(float), (speed.at_ns - origin).astype(float), speed.rad_s)
@@ -140,9 +136,7 @@ def _at(speed: Speed, at_ns: Nanoseconds) -> tuple[Array, NDArray[np.bool_]]:
     return np.convolve(padded, kernel / kernel.sum(), mode="valid"), heard
 
 
-def _segments(
-    x: Array, y: Array, usable: NDArray[np.bool_], lags: NDArray[np.int64]
-) -> list[_Segment | None]:
+def _segments(x: Array, y: Array, usable: NDArray[np.bool_], lags: NDArray[np.int64]) -> list[Array | None]:
     length = int(SEGMENT_S * NS_PER_S) // STEP_NS
     return [
         _segment(x[at : at + length], y[at : at + length + len(lags) - 1])
@@ -152,7 +146,7 @@ def _segments(
     ]
 
 
-def _segment(x: Array, y: Array) -> _Segment | None:
+def _segment(x: Array, y: Array) -> Array | None:
     """The correlation of a window of the first with each window of the second."""
     if x.std() < LEAST_SPEED:
         return None
@@ -160,7 +154,8 @@ def _segment(x: Array, y: Array) -> _Segment | None:
     centred = windows - windows.mean(axis=1, keepdims=True)
     norms = np.sqrt(np.einsum("lt,lt->l", centred, centred))
     own = x - x.mean()
-    return _Segment(centred @ own / np.maximum(norms * np.linalg.norm(own), 1e-12))
+    out: Array = centred @ own / np.maximum(norms * np.linalg.norm(own), 1e-12)
+    return out
 
 
 def _top(curve: Array) -> float | None:
@@ -189,11 +184,11 @@ def _by_curvature(curve: Array, top: float, segments: int) -> float:
     return float(SIGMAS * np.sqrt(residual / (max(curvature, 1e-30) * independent)))
 
 
-def _by_repetition(found: list[_Segment], lags: NDArray[np.int64], top: float) -> float:
+def _by_repetition(found: list[Array], lags: NDArray[np.int64], top: float) -> float:
     """From the spread of the segments' own delays; each is looked for near the whole's."""
     reach = round(APART_S * NS_PER_S / STEP_NS)
     low, high = max(round(top) - reach, 0), min(round(top) + reach + 1, len(lags))
-    tops = [_top(each.curve[low:high]) for each in found]
+    tops = [_top(each[low:high]) for each in found]
     own_ns = np.array([np.nan if t is None else (t + low - top) * STEP_NS for t in tops])
     own_ns = own_ns[np.isfinite(own_ns)]
     if len(own_ns) < LEAST_SEGMENTS:

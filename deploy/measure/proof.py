@@ -19,7 +19,7 @@ import numpy as np
 
 from common.clock import to_ms
 from common.clock_sync import Offset
-from deploy.measure.delay import Delay, Speed, find_delay
+from deploy.measure.delay import AngularSpeed, MotionDelay, find_delay
 
 HAND_TO_HAND = "hand → hand"
 HAND_TO_SETPOINT = "operator's hand → setpoint"
@@ -51,12 +51,12 @@ class SeenCode:
 class Motions:
     """One run, recorded."""
 
-    operator_hand: Speed
+    operator_hand: AngularSpeed
     """By the suit's node, operator's clock."""
-    setpoint: Speed
+    setpoint: AngularSpeed
     """Of the hand by the setpoints, robot's clock, as all that follow."""
-    encoder: Speed
-    robot_hand: Speed
+    encoder: AngularSpeed
+    robot_hand: AngularSpeed
     """By the node that is taped to it."""
     offset: Offset
     """The robot's clock minus the operator's."""
@@ -91,7 +91,7 @@ def prove(motions: Motions, claims: Claims) -> list[ProofRow]:
     """Every row, in the order in which they are printed."""
     ours = motions.operator_hand
     # on the robot's clock
-    operator = Speed(ours.at_ns + motions.offset.offset_ns, ours.rad_s)
+    operator = AngularSpeed(ours.at_ns + motions.offset.offset_ns, ours.rad_s)
     clock_ms = to_ms(motions.offset.bound_ns)
     hand = _row(HAND_TO_HAND, find_delay(operator, motions.robot_hand), clock_ms, claims.hand_to_hand_ms)
     servo = find_delay(motions.setpoint, motions.robot_hand, NEAR_S)
@@ -105,17 +105,17 @@ def prove(motions: Motions, claims: Claims) -> list[ProofRow]:
             CAMERA, _pictures(CAMERA, [one.stamp_ns - one.scene_ns for one in motions.pictures], 0.0, 0.0)
         ),
         eye,
-        _loop(hand, eye, claims),
+        _loop(hand, eye, clock_ms, claims),
     ]
 
 
-def _row(name: str, found: Delay | str, clock_ms: float, claimed_ms: float | None) -> ProofRow:
+def _row(name: str, found: MotionDelay | str, clock_ms: float, claimed_ms: float | None) -> ProofRow:
     if isinstance(found, str):
         return ProofRow(name, None, None, claimed_ms, found)
     return ProofRow(name, to_ms(found.delay_ns), to_ms(found.bound_ns) + clock_ms, claimed_ms)
 
 
-def _stamp_late(found: Delay | str) -> ProofRow:
+def _stamp_late(found: MotionDelay | str) -> ProofRow:
     return _row(ENCODER, found, 0.0, 0.0)
 
 
@@ -144,7 +144,7 @@ def _scene_to_eye(motions: Motions, clock_ms: float, claims: Claims) -> ProofRow
     return _pictures(SCENE_TO_EYE, late_ns, clock_ms, claims.scene_to_eye_ms)
 
 
-def _loop(hand: ProofRow, eye: ProofRow, claims: Claims) -> ProofRow:
+def _loop(hand: ProofRow, eye: ProofRow, clock_ms: float, claims: Claims) -> ProofRow:
     """From the scene to the eye, and from the operator's hand to the robot's: not the person between them.
 
     What the clocks' offset is wrong by cancels: one way is the longer by it, the other the shorter.
@@ -154,4 +154,5 @@ def _loop(hand: ProofRow, eye: ProofRow, claims: Claims) -> ProofRow:
     if hand.found_ms is None or eye.found_ms is None or hand.bound_ms is None or eye.bound_ms is None:
         missing = hand.name if hand.found_ms is None else eye.name
         return ProofRow(LOOP, None, None, claimed_ms, f"{missing} is not known")
-    return ProofRow(LOOP, hand.found_ms + eye.found_ms, hand.bound_ms + eye.bound_ms, claimed_ms)
+    bound_ms = hand.bound_ms + eye.bound_ms - 2.0 * clock_ms
+    return ProofRow(LOOP, hand.found_ms + eye.found_ms, bound_ms, claimed_ms)

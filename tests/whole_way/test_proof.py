@@ -9,7 +9,7 @@ import pytest
 
 from common.clock import NS_PER_MS
 from deploy.experiments.prove.simulated import judge, simulate
-from deploy.measure.delay import Speed
+from deploy.measure.delay import AngularSpeed
 from deploy.measure.proof import (
     CAMERA,
     ENCODER,
@@ -22,6 +22,7 @@ from deploy.measure.proof import (
 )
 
 SECONDS = 22.0
+pytestmark = pytest.mark.timeout(400)
 NEAR_MS = 2.0
 PLANTED_MS = 20
 
@@ -33,7 +34,7 @@ def proof(network: str, *plant: str) -> tuple[dict[str, ProofRow], float]:
     return {row.name: row for row in judge(proved)}, true_delay_ms(*proved.truth())
 
 
-def true_delay_ms(operator: Speed, robot: Speed) -> float:
+def true_delay_ms(operator: AngularSpeed, robot: AngularSpeed) -> float:
     """By another way than the estimator's: the shift of least squares of the noise-free speeds."""
     origin = operator.at_ns[0]
     at_ms, seen_ms = ((one.at_ns - origin) / NS_PER_MS for one in (operator, robot))

@@ -18,7 +18,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.codec import decode
 from common.wire.messages import RobotState, Statistics
-from deploy.measure.delay import Speed, speed_of
+from deploy.measure.delay import AngularSpeed, speed_of
 from deploy.measure.proof import Claims, Motions
 from deploy.recorded.recompute import Recorded
 from master.journal.calls import FRAME, FRAMES, TICK, decode_calls
@@ -63,12 +63,14 @@ class NodeRates:
                 self._at_ns.append(sync_ns)
                 self._rate_rad_s.append(read.raw[0, gyro] * scale)
 
-    def speed(self) -> Speed:
+    def speed(self) -> AngularSpeed:
         """How fast it turned. A gyroscope's bias is the mean of a motion that comes back."""
         if not self._rate_rad_s:
-            return Speed(np.zeros(0, np.int64), np.zeros(0))
+            return AngularSpeed(np.zeros(0, np.int64), np.zeros(0))
         rates = np.array(self._rate_rad_s)
-        return Speed(np.array(self._at_ns, np.int64), np.linalg.norm(rates - rates.mean(axis=0), axis=1))
+        return AngularSpeed(
+            np.array(self._at_ns, np.int64), np.linalg.norm(rates - rates.mean(axis=0), axis=1)
+        )
 
 
 class RecordedRun:
@@ -116,7 +118,9 @@ class RecordedRun:
         """What the robot's stamps said at last."""
         return Claims() if self._metrics is None else Claims(self._metrics.end_to_end_ms.mean)
 
-    def motions(self, operator_hand: Speed, robot_hand: Speed, *, on_robots_clock: bool) -> Motions:
+    def motions(
+        self, operator_hand: AngularSpeed, robot_hand: AngularSpeed, *, on_robots_clock: bool
+    ) -> Motions:
         """Both hands, setpoint and encoder. Raises TandemError where the robot never followed."""
         if self._offset is None or len(self._states) < 2:
             raise TandemError(
@@ -124,7 +128,7 @@ class RecordedRun:
             )
         ahead = self._offset.reversed()
         if not on_robots_clock:
-            robot_hand = Speed(robot_hand.at_ns + ahead.offset_ns, robot_hand.rad_s)
+            robot_hand = AngularSpeed(robot_hand.at_ns + ahead.offset_ns, robot_hand.rad_s)
         return Motions(
             operator_hand,
             self._hand([s.sent_ns for s in self._states], [s.setpoint_rad for s in self._states]),
@@ -133,6 +137,6 @@ class RecordedRun:
             ahead,
         )
 
-    def _hand(self, at_ns: list[int], position_rad: list[Array]) -> Speed:
+    def _hand(self, at_ns: list[int], position_rad: list[Array]) -> AngularSpeed:
         turned = [self._body.at(each).r_base_from_segment[self._segment] for each in position_rad]
         return speed_of(np.array(at_ns, np.int64), np.array(turned))

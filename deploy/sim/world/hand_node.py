@@ -15,7 +15,7 @@ from common.clock import NS_PER_MS
 from common.picture_code import paste_code, read_codes, resolve_ns
 from common.quaternion import Array
 from common.wire.messages import RobotState
-from deploy.measure.delay import Speed, speed_of
+from deploy.measure.delay import AngularSpeed, speed_of
 from deploy.measure.proof import Motions, SeenCode
 from deploy.sim.suit.chain import Chain
 from deploy.sim.suit.imperfections import Imperfections
@@ -25,6 +25,7 @@ from deploy.sim.world.injection import Traffic
 from deploy.sim.world.world import PERIOD_NS, VirtualWorld
 from slave.limit.limit import Setpoint
 from slave.model.body import BodyModel
+from slave.servos.mujoco.simulated import CYCLE_NS
 from slave.servos.servos import EncoderReading
 
 PLACES = ("servo", "encoder", "camera")
@@ -93,10 +94,10 @@ class ProvedWorld:
 
     def _watch(self, reading: EncoderReading, _: Setpoint) -> None:
         rate = self.world.simulated.rate_rad_s(self._link)
-        # the physics stands at the end of its last cycle, which is when the encoders were latched
-        late_ns = self.world.slave_ns - reading.read_ns
+        # the encoders were latched at the end of the physics' last cycle, its rates are of the cycle's middle
+        late_ns = self.world.slave_ns - reading.read_ns + CYCLE_NS // 2
         self.true_robot.append((self.world.now_ns - late_ns, float(np.linalg.norm(rate))))
-        self._robot.append((reading.read_ns, self._felt(1, rate)))
+        self._robot.append((self.world.slave_ns - late_ns, self._felt(1, rate)))
         self._turn += 1
         if self._turn % PICTURE_TICKS == 0:
             self._take_picture()
@@ -136,14 +137,14 @@ class ProvedWorld:
             pictures=tuple(self._pictures),
         )
 
-    def _hand(self, at_ns: list[int], states: list[RobotState], of: str) -> Speed:
+    def _hand(self, at_ns: list[int], states: list[RobotState], of: str) -> AngularSpeed:
         turned = [self._body.at(getattr(s, of)).r_base_from_segment[self._segment] for s in states]
         return speed_of(np.array(at_ns, np.int64), np.array(turned))
 
-    def truth(self) -> tuple[Speed, Speed]:
+    def truth(self) -> tuple[AngularSpeed, AngularSpeed]:
         """Both hands without any error, on one true clock."""
         return _speed(self.true_operator), _speed(self.true_robot)
 
 
-def _speed(rows: list[tuple[int, float]]) -> Speed:
-    return Speed(np.array([at for at, _ in rows], np.int64), np.array([rate for _, rate in rows]))
+def _speed(rows: list[tuple[int, float]]) -> AngularSpeed:
+    return AngularSpeed(np.array([at for at, _ in rows], np.int64), np.array([rate for _, rate in rows]))

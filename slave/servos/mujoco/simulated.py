@@ -42,6 +42,8 @@ class SimulatedRobot:
         self._encoders = Encoders(skeleton, encoders)
         self._model = build_model(skeleton)
         self._data = mujoco.MjData(self._model)
+        self._at_end = mujoco.MjData(self._model)
+        """What is computed of the newest state without disturbing it."""
         if position_rad is None:
             position_rad = skeleton.zero_rad
         self._setpoint = np.clip(position_rad, skeleton.lower_rad, skeleton.upper_rad)
@@ -109,8 +111,11 @@ class SimulatedRobot:
         return out
 
     def rate_rad_s(self, link: str) -> Array:
-        """(3,) angular velocity of a body, in its own frame, at the end of the newest cycle."""
-        model, at_end, out = self._model, mujoco.MjData(self._model), np.zeros(6)
+        """(3,) angular velocity of a body, in its own frame, half a cycle before the end of the newest one.
+
+        The step is semi-implicit: positions go on by the rates of its end, which so are the cycle's mean.
+        """
+        model, at_end, out = self._model, self._at_end, np.zeros(6)
         # a step ends with positions and rates, but leaves the bodies' velocities of its beginning
         at_end.qpos[:], at_end.qvel[:] = self._data.qpos, self._data.qvel
         mujoco.mj_kinematics(model, at_end)

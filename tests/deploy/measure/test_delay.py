@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.clock import NS_PER_MS, NS_PER_S
-from deploy.measure.delay import FLOOR_NS, Delay, Speed, find_delay, speed_of
+from deploy.measure.delay import FLOOR_NS, AngularSpeed, MotionDelay, find_delay, speed_of
 
 BEGIN_NS = 7_000 * NS_PER_S
 
@@ -24,12 +24,12 @@ def motion(seed: int, slow_s: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     return at_s, np.abs(rate)
 
 
-def sampled(seed: int, late_s: float, rate_hz: float, noise: float, slow_s: float = 0.0) -> Speed:
+def sampled(seed: int, late_s: float, rate_hz: float, noise: float, slow_s: float = 0.0) -> AngularSpeed:
     at_s, speed = motion(seed, slow_s)
     random = np.random.default_rng([seed, round(rate_hz)])
     when_s = np.arange(random.uniform(0.0, 0.02), 29.9, 1.0 / rate_hz)
     value = np.interp(when_s, at_s, speed) + noise * random.standard_normal(len(when_s))
-    return Speed(BEGIN_NS + np.round((when_s + late_s) * NS_PER_S).astype(np.int64), value)
+    return AngularSpeed(BEGIN_NS + np.round((when_s + late_s) * NS_PER_S).astype(np.int64), value)
 
 
 @settings(max_examples=60, deadline=None)
@@ -45,7 +45,7 @@ def test_a_pure_delay_is_found_within_its_bound(
     found = find_delay(
         sampled(seed, 0.0, rates_hz[0], noise), sampled(seed, late_ms / 1e3, rates_hz[1], noise)
     )
-    assert isinstance(found, Delay), found
+    assert isinstance(found, MotionDelay), found
     assert abs(found.delay_ns / NS_PER_MS - late_ms) <= found.bound_ns / NS_PER_MS
     assert found.bound_ns >= FLOOR_NS
     if noise < 0.05:
@@ -58,15 +58,15 @@ def test_it_moves_with_the_stamps_and_is_the_same_backwards(
     seed: int, late_ms: float, shift_ms: float
 ) -> None:
     first, second = sampled(seed, 0.0, 200.0, 0.02), sampled(seed, late_ms / 1e3, 200.0, 0.02)
-    shifted = Speed(second.at_ns + round(shift_ms * NS_PER_MS), second.rad_s)
+    shifted = AngularSpeed(second.at_ns + round(shift_ms * NS_PER_MS), second.rad_s)
     whole, moved, back = (
         find_delay(first, second),
         find_delay(first, shifted),
         find_delay(second, first, (-1.5, 0.3)),
     )
-    assert isinstance(whole, Delay)
-    assert isinstance(moved, Delay)
-    assert isinstance(back, Delay)
+    assert isinstance(whole, MotionDelay)
+    assert isinstance(moved, MotionDelay)
+    assert isinstance(back, MotionDelay)
     assert moved.delay_ns - whole.delay_ns == pytest.approx(shift_ms * NS_PER_MS, abs=NS_PER_MS / 2)
     assert back.delay_ns == pytest.approx(-whole.delay_ns, abs=NS_PER_MS)
 
@@ -74,17 +74,17 @@ def test_it_moves_with_the_stamps_and_is_the_same_backwards(
 @pytest.mark.parametrize("slow_s", [0.01, 0.02, 0.05])
 def test_a_low_pass_counts_about_its_time_constant(slow_s: float) -> None:
     found = find_delay(sampled(3, 0.0, 200.0, 0.02), sampled(3, 0.1, 200.0, 0.02, slow_s))
-    assert isinstance(found, Delay)
+    assert isinstance(found, MotionDelay)
     assert found.delay_ns / NS_PER_S - 0.1 == pytest.approx(slow_s, rel=0.25)
 
 
 def test_what_cannot_be_said_is_not_said() -> None:
     first = sampled(1, 0.0, 200.0, 0.02)
     other = sampled(2, 0.0, 200.0, 0.02)
-    still = Speed(first.at_ns, np.full_like(first.rad_s, 0.01))
-    short = Speed(first.at_ns[:1000], first.rad_s[:1000])
-    far = Speed(first.at_ns + 2 * NS_PER_S, first.rad_s)
-    wave = Speed(first.at_ns, 2.0 + np.sin(2 * np.pi * (first.at_ns - BEGIN_NS) / NS_PER_S))
+    still = AngularSpeed(first.at_ns, np.full_like(first.rad_s, 0.01))
+    short = AngularSpeed(first.at_ns[:1000], first.rad_s[:1000])
+    far = AngularSpeed(first.at_ns + 2 * NS_PER_S, first.rad_s)
+    wave = AngularSpeed(first.at_ns, 2.0 + np.sin(2 * np.pi * (first.at_ns - BEGIN_NS) / NS_PER_S))
     for pair, why in (
         ((first, other), "not alike"),
         ((still, first), "0 of at least 3 segments"),
@@ -100,10 +100,10 @@ def test_what_cannot_be_said_is_not_said() -> None:
 def test_a_gap_is_in_no_segment() -> None:
     first, second = sampled(5, 0.0, 200.0, 0.0), sampled(5, 0.05, 200.0, 0.0)
     heard = (second.at_ns < BEGIN_NS + 9 * NS_PER_S) | (second.at_ns > BEGIN_NS + 11 * NS_PER_S)
-    found = find_delay(first, Speed(second.at_ns[heard], second.rad_s[heard]))
+    found = find_delay(first, AngularSpeed(second.at_ns[heard], second.rad_s[heard]))
     whole = find_delay(first, second)
-    assert isinstance(found, Delay)
-    assert isinstance(whole, Delay)
+    assert isinstance(found, MotionDelay)
+    assert isinstance(whole, MotionDelay)
     assert found.segments < whole.segments
     assert found.delay_ns == pytest.approx(50 * NS_PER_MS, abs=found.bound_ns)
 

@@ -10,6 +10,7 @@ import pytest
 
 from common.clock import NS_PER_MS, NS_PER_S
 from common.errors import TandemError
+from common.quaternion import Array
 from common.skeleton import load_skeleton
 from common.wire.codec import encode
 from common.wire.messages import RobotState, Statistics
@@ -30,16 +31,18 @@ LATE_S, SERVO_S = 0.08, 0.03
 SECONDS = 26.0
 
 
-def angle(t_s: np.ndarray) -> np.ndarray:
+def angle(t_s: Array) -> Array:
     """Irregular, as a person is asked to move."""
     waves = ((0.41, 0.5), (0.83, 0.35), (1.27, 0.2), (0.63, 0.3))
-    return np.sum([size * np.sin(2 * np.pi * hz * t_s + 3 * hz) for hz, size in waves], axis=0)
+    out: Array = np.sum([size * np.sin(2 * np.pi * hz * t_s + 3 * hz) for hz, size in waves], axis=0)
+    return out
 
 
-def rate(t_s: float) -> np.ndarray:
+def rate(t_s: float) -> Array:
     """About an axis askew, with a bias, as of a node that sits anyhow and was never calibrated."""
     speed = float(angle(np.array(t_s + 1e-4)) - angle(np.array(t_s - 1e-4))) / 2e-4
-    return speed * np.array([0.6, 0.0, 0.8]) + np.array([0.02, -0.03, 0.01])
+    out: Array = speed * np.array([0.6, 0.0, 0.8]) + np.array([0.02, -0.03, 0.01])
+    return out
 
 
 def frames(fd: bool, by_robots_clock: bool = False, nodes: tuple[int, ...] = (WORN, TAPED)) -> list[Recorded]:
