@@ -98,7 +98,7 @@ class Slave:
             config, place=place(endpoints), last_known_rad=last_known.before_rad if last_known else None
         )
         self._last_known = last_known
-        self._pipeline.damper.clock = monotonic_ns
+        self._pipeline.motion.damper.clock = monotonic_ns
         self._pipeline.unread.warn = log.warning
         self._stopped = False
         self._ticks_expected = 0
@@ -199,7 +199,7 @@ class Slave:
     def _hand_on(self, tap: SlaveTap, reading: EncoderReading, setpoint: Setpoint) -> None:
         guard = self._pipeline.guard
         written, read = setpoint.position_rad, self._pipeline.position_rad
-        target = self._pipeline.target
+        target = self._pipeline.motion.target
         asked = None if target is None else target.position_rad
         tick = RobotTick(monotonic_ns(), reading.read_ns, setpoint.ready, written, read, reading.valid, asked)
         tap.tick(tick, str(guard.state), guard.reason)

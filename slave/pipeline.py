@@ -1,7 +1,7 @@
-"""The slave's pipeline, without a clock, a link or a servo: gate ▸ track ▸ limit ▸ write.
+"""The slave's pipeline, without a clock, a link or a servo: gate ▸ motion ▸ write.
 
-`on_command` takes a command through the gates to the tracker. `tick` asks the guard what may move, the
-tracker where to, and the limits how far; the caller writes the setpoint to the servos.
+`on_command` takes a command through the gates to the robot's motion. `tick` asks the guard what may move, and
+the motion where to; the caller writes the setpoint to the servos.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from common.clock import to_s
 from common.clock_sync import Offset, SlaveExchange
 from common.errors import CodecError
 from common.link.access import operators_of
@@ -30,30 +29,24 @@ from common.wire.messages import (
 )
 from slave.announce import Announcer
 from slave.config import SlaveConfig
-from slave.contact.reflex import ContactReflex
-from slave.contact.torque_limit import TorqueLimit
 from slave.contact.watch import ContactWatch
 from slave.contact.zone_force import ZoneForces
 from slave.encoders.counts import Encoders
-from slave.guard import Admission, Guard, Permission
+from slave.guard import Admission, Guard
 from slave.guard.body import WELL, Body
 from slave.guard.control import Control
 from slave.guard.lease import DrawToken, random_token
-from slave.guard.states import MOVING, State
-from slave.limit.blind import BlindDistance, Course
-from slave.limit.damper import DistanceDamper
-from slave.limit.limit import Setpoint, SetpointLimiter
-from slave.limit.nearest import NearestPosture
-from slave.limit.pace import Pace
+from slave.guard.states import MOVING
+from slave.limit.limit import Setpoint
+from slave.motion import RobotMotion
 from slave.requests import Requests, UnreadMessages
 from slave.servos.servos import EncoderReading
-from slave.track import Tracker, TrackTarget
-from slave.track.config import make_tracker
+from slave.track import Tracker
 from slave.traffic import CommandTraffic
 
 
 class SlavePipeline:
-    """Guard, tracker and counters between ticks. `draw_token` makes the tokens of its leases."""
+    """Guard, motion and counters between ticks. `draw_token` makes the tokens of its leases."""
 
     def __init__(
         self,
@@ -88,24 +81,9 @@ class SlavePipeline:
             draw_token=draw_token,
         )
         self.control = Control(config.guard.reset_key, operators_of(config.link.access, config.robot))
-        limits = config.guard.limits(self.skeleton)
-        self.nearest = NearestPosture(self.skeleton, limits)
-        self.tracker = tracker or make_tracker(config.track, config.servos.bus_lag_s)
-        self.pace = Pace(limits, config.guard)
-        self.damper = DistanceDamper(self.skeleton, config.guard.self_margin_cm, config.guard.zones)
-        self.limiter = SetpointLimiter(self.skeleton.joint_names, limits, self.damper)
         self.contact = ContactWatch(self.skeleton, config.contact, config.servos.payload)
         self.zone_forces = ZoneForces(self.skeleton, config.guard.zones)
-        self.reflex = ContactReflex(config.contact, self.contact, self.skeleton.joint_names)
-        self.torque_limit = TorqueLimit(self.skeleton, config.contact, self.contact.observer.model)
-        self.blind = BlindDistance(
-            self.skeleton, limits, config.guard.max_blind_cm, 1.0 / config.loop.rate_hz, config.guard.zones
-        )
-        self.limiter.slowed = self.blind.slowed
-        self._clamped: Mask = np.zeros(len(self.skeleton.joints), np.bool_)
-        """(J,) since the newest state."""
-        self._episode = 0
-        """The guard's episode when the tracker was reset last."""
+        self.motion = RobotMotion(config, self.contact, tracker)
         self.clock = SlaveExchange()
         self.traffic = CommandTraffic()
         self._requests = Requests(
@@ -123,8 +101,6 @@ class SlavePipeline:
         """The base's attitude, if it carries a sensor; `Body.base` has what is wrong with it."""
         self._position_rad = np.zeros(len(self.skeleton.joints))
         self._setpoint = Setpoint(self._position_rad, np.zeros_like(self._position_rad), ready=False)
-        self.target: TrackTarget | None = None
-        """Where the tracker saw the operator at the newest tick; None while the robot follows nobody."""
 
     def on_command(self, payload: bytes, received_ns: int, now_ns: int, *, sender: str | None) -> None:
         """Take a command from the link; whatever is wrong with it is counted and changes nothing.
@@ -156,7 +132,7 @@ class SlavePipeline:
         *,
         best: Offset | None = None,
     ) -> Admission:
-        """Take a command: gate ▸ nearest posture within the site's limits ▸ tracker.
+        """Take a command: gate ▸ the robot's motion.
 
         `offset`: as the round trip proves it, for the gate. `best`: as the hosts' time services may know it
         better, for the tracker.
@@ -167,16 +143,7 @@ class SlavePipeline:
             command = replace(command, valid=command.valid & self._driven)
         admission = self.guard.admit(command, received_ns, now_ns, offset)
         if admission.accepted:
-            self._begin_anew()
-            asked = command.position_rad
-            # by the master's own stamps: what is thought of its clock may step
-            position_rad, velocity_rad_s = self.nearest.of(
-                command.stamps.sampled_ns, asked, command.velocity_rad_s, command.valid
-            )
-            self.guard.clamped(self.nearest.clamps(now_ns, asked, position_rad))
-            self.blind.heard(received_ns)
-            sampled_ns = (best or offset).local_ns(command.stamps.sampled_ns)
-            self.tracker.accept(sampled_ns, now_ns, position_rad, velocity_rad_s)
+            self.motion.accept(self.guard, command, received_ns, now_ns, best or offset)
         return admission
 
     def on_stop(self, payload: bytes, now_ns: int) -> bytes:
@@ -225,84 +192,13 @@ class SlavePipeline:
         *,
         drive_rad: Array | None = None,
     ) -> Setpoint:
-        """Gate ▸ track ▸ limit, for joint angles (J,) as read at `read_ns`."""
+        """Gate ▸ motion, for joint angles (J,) as read at `read_ns`."""
         permission = self.guard.step(now_ns, position_rad, valid, read_ns, body, drive_rad=drive_rad)
-        self._begin_anew()
-        self.target = None
-        if permission.seat_rad is not None:
-            self.limiter.seat(permission.seat_rad)
-        if not permission.ready:
+        setpoint = self.motion.step(self.guard, now_ns, permission)
+        if setpoint is None:
             return Setpoint(position_rad.copy(), np.zeros_like(position_rad), ready=False)
-        target = self.target = self._track(now_ns, permission)
-        if target is None:
-            self.blind.forget()
-            # to stop and to hold takes what it takes
-            self.torque_limit.forget()
-            self._stop(now_ns, permission)
-        else:
-            self._limit(now_ns, permission, target)
-            self.reflex.followed(now_ns, self.guard.stand_rad)
-        setpoint = self.limiter.setpoint
-        if target is not None:
-            torque_nm = self.torque_limit.step(
-                permission.dt_s, self.guard.stand_rad, setpoint.position_rad, self.contact.floor_nm
-            )
-            setpoint = replace(setpoint, torque_nm=torque_nm)
         self.guard.written(now_ns, setpoint.position_rad, setpoint.velocity_rad_s)
         return setpoint
-
-    def _track(self, now_ns: int, permission: Permission) -> TrackTarget | None:
-        """Where the operator is now; None: nowhere that the robot may go."""
-        target = self.tracker.target(now_ns) if permission.moving else None
-        if target is not None and not target.finite:
-            self.guard.lose(now_ns, "target", "the tracker's target is not finite")
-            return None
-        return target
-
-    def _stop(self, now_ns: int, permission: Permission) -> None:
-        """Brake as hard as the joints may, or yield to who touches the robot."""
-        guard = self.guard
-        if permission.state is State.ESTOP or not guard.may_yield(now_ns):
-            self.reflex.cancel()
-        elif permission.state is State.HOLD and self.reflex.step(
-            now_ns, permission.dt_s, guard.stand_rad, self.limiter, guard.doubted
-        ):
-            return
-        self.limiter.stop(permission.dt_s)
-
-    def _limit(self, now_ns: int, permission: Permission, target: TrackTarget) -> None:
-        """Move the setpoint towards the target, as far and as fast as each joint may in this step.
-
-        After a command, foretell how far that would lead if no more came.
-        """
-        error_rad = self.limiter.limits.reachable(target.position_rad) - self.limiter.position_rad
-        if permission.state is State.ALIGN:
-            most = self.pace.aligning(now_ns, permission.free)
-        else:
-            most = self.pace.tracking(now_ns, error_rad, permission.free, self.damper.held_back)
-        self.blind.allow(to_s(self.guard.times.command_timeout_ns))
-        clamps = self.limiter.step(
-            now_ns, permission.dt_s, target.position_rad, target.velocity_rad_s, ~permission.free, *most
-        )
-        self.guard.clamped(clamps)
-        self._clamped |= self.limiter.clamped | self.nearest.moved
-        course = Course(self.limiter.position_rad, self.limiter.velocity_rad_s, ~permission.free, *most)
-        self.blind.look(now_ns, self.guard.stand_rad, course, self._looked_up)
-        if self.damper.overdue:
-            self.guard.lose(now_ns, "distance", self.damper.overdue)
-        # a joint that is held back is as near to the operator as it can come
-        self.guard.approached(now_ns, np.where(self.damper.held_back, 0.0, error_rad))
-
-    def _looked_up(self, at_ns: int) -> tuple[Array, Array] | None:
-        target = self.tracker.target(at_ns)
-        return None if target is None else (target.position_rad, target.velocity_rad_s)
-
-    def _begin_anew(self) -> None:
-        """After a loss, a stop or an engage: what the operator did before must not move the robot."""
-        if self._episode != self.guard.episode:
-            self._episode = self.guard.episode
-            self.tracker.reset()
-            self.nearest.forget()
 
     def written(self, now_ns: int) -> None:
         """Note that the setpoint of this turn has reached the servos."""
@@ -314,7 +210,7 @@ class SlavePipeline:
         self._states_sent += 1
         offset = self.clock.estimate(now_ns)
         reading = self._reading
-        clamped, self._clamped = self._clamped, np.zeros_like(self._clamped)
+        clamped = self.motion.take_clamped()
         return encode(
             RobotState(
                 robot=self.robot,
@@ -337,8 +233,8 @@ class SlavePipeline:
                 resting=self.guard.resting.names,
                 effort_nm=reading.effort_nm if reading else None,
                 external_nm=self.contact.external_nm,
-                blind_m=self.blind.way_m,
-                blind_s=self.blind.after_s,
+                blind_m=self.motion.blind.way_m,
+                blind_s=self.motion.blind.after_s,
                 clamped=clamped if clamped.any() else None,
             )
         )
@@ -359,7 +255,7 @@ class SlavePipeline:
 
     def _faults(self, now_ns: int) -> dict[str, str]:
         named = {"base": self._body.base, "name": self._body.namesake, "camera": self.camera_fault}
-        named["distance"] = self.damper.words
+        named["distance"] = self.motion.damper.words
         named["contact"] = self._body.contact or self.contact.missing(now_ns)
         # a drive's own fault comes before the guard's doubt of its encoder
         others = {**self._body.stops, **self.guard.doubts, **self._body.drives}

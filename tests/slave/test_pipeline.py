@@ -207,7 +207,7 @@ def test_a_state_names_the_joints_that_a_limit_held_back_since_the_one_before(
     pipeline: SlavePipeline,
 ) -> None:
     joints = len(pipeline.skeleton.joints)
-    pipeline._clamped[3] = True
+    pipeline.motion._clamped[3] = True
     told = decode(pipeline.state(NS_PER_S), RobotState, joints).clamped
     assert told is not None
     assert np.flatnonzero(told).tolist() == [3]

@@ -86,7 +86,7 @@ class RecordedWorld(VirtualWorld):
 
     def _drive(self) -> None:
         super()._drive()
-        target, setpoint, reading = self.slave.target, self.slave._setpoint, self.slave._reading
+        target, setpoint, reading = self.slave.motion.target, self.slave._setpoint, self.slave._reading
         assert reading is not None
         asked = None if target is None else target.position_rad
         read = self.slave.position_rad

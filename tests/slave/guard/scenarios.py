@@ -453,7 +453,7 @@ def arms_crossed(make_rig: MakeRig) -> None:
 @about("DistanceDamper.overdue")
 def distances_too_late(make_rig: MakeRig) -> None:
     rig = make_rig().to_track()
-    rig.pipeline.damper.clock = itertools.count(0, damper.BUDGET_NS + 1).__next__
+    rig.pipeline.motion.damper.clock = itertools.count(0, damper.BUDGET_NS + 1).__next__
     rig.target = rig.target + 0.3
     rig.run(0.3)
     assert rig.guard.state is State.HOLD

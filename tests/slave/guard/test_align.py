@@ -230,13 +230,13 @@ def test_all_nodes_lost_stops_every_joint_before_the_robot_holds(rig: Any) -> No
     assert rig.guard.state is State.TRACK
     rig.run(0.2, valid=np.zeros(rig.joints, np.bool_))
     assert rig.guard.state is State.HOLD
-    assert rig.pipeline.limiter.at_rest
+    assert rig.pipeline.motion.limiter.at_rest
 
 
 @pytest.mark.parametrize("strategy", ["latest", "interpolate", "predict"])
 def test_a_target_that_sweeps_past_a_held_joint_does_not_let_it_go(rig: Any, strategy: str) -> None:
     # the master says 0 of a lost joint: on return the target comes from there, past where it is held
-    rig.pipeline.tracker = make_tracker(TrackConfig.model_validate({"strategy": strategy}))
+    rig.pipeline.motion.tracker = make_tracker(TrackConfig.model_validate({"strategy": strategy}))
     rig.target[6] = 0.4
     rig.measured = rig.measured.copy()
     rig.measured[6] = 0.4

@@ -39,7 +39,7 @@ def test_silent_encoders_end_it(make_rig: MakeRig) -> None:
     rig.pipeline.contact.finding = PUSHED
     rig.body = OTHER_FAULTS["nothing else"]
     rig.run(0.1)
-    assert rig.pipeline.reflex.active
+    assert rig.pipeline.motion.reflex.active
     rig.encoder_valid[SHOULDER] = False
     rig.run(0.1)
-    assert not rig.pipeline.reflex.active
+    assert not rig.pipeline.motion.reflex.active
