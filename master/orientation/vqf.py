@@ -11,6 +11,8 @@ from master.orientation.front import BehindFront, Front, FrontLimits, FrontSecti
 
 _REACH_RAD_S = np.radians(1.9)
 """Just below the package's `biasClip` of 2 °/s, beyond which it takes no rest for one."""
+_BIAS_TICKS = 16
+"""From one look at the biases to the next, where they only weigh what a period lacks or has too much."""
 
 
 class VqfConfig(FrontSection):
@@ -48,6 +50,8 @@ class VqfFilter(BehindFront):
         limit_deg_s = config.rest_bias_limit_deg_s if config.rest_bias else 0.0
         field_change = config.field_change if config.reject_disturbed_field else 0.0
         limits = FrontLimits(limit_deg_s, float(_REACH_RAD_S), field_change)
+        self._bias_rad_s: Array = np.zeros((count, 3))
+        self._bias_age = _BIAS_TICKS
         self._front = Front(limits, rate_hz, count, self.q_inertial_from_sensor)
         self._filters = [
             VQF(
@@ -67,7 +71,7 @@ class VqfFilter(BehindFront):
         if self._front.corrected is not None:
             self._begin_at_rest(self._front.corrected)
         if dt_s is not None and dt_s != self._period_s:
-            bias = self._own_bias_rad_s()
+            bias = self._lately_rad_s()
             # the package takes the bias off again: (gyr' - bias) period = (gyr - bias) dt
             gyr_rad_s = bias + (gyr_rad_s - bias) * (dt_s / self._period_s)
         if self._front.everybody:
@@ -97,11 +101,19 @@ class VqfFilter(BehindFront):
     def _own_bias_rad_s(self) -> Array:
         return np.concatenate([vqf.getBiasEstimate()[0] for vqf in self._filters]).reshape(-1, 3)
 
+    def _lately_rad_s(self) -> Array:
+        """The biases (n, 3) of the last few updates: they creep, and to ask each filter takes 15 µs."""
+        self._bias_age += 1
+        if self._bias_age >= _BIAS_TICKS:
+            self._bias_rad_s, self._bias_age = self._own_bias_rad_s(), 0
+        return self._bias_rad_s
+
     def _begin_at_rest(self, nodes: Mask) -> None:
         """Let gravity and field set the orientation anew, by which a gross bias has dragged it.
 
         Without a field the heading goes on from where it is.
         """
+        self._bias_age = _BIAS_TICKS
         for i in np.flatnonzero(nodes):
             vqf = self._filters[i]
             kept = vqf.state["gyrQuat"], vqf.state["accQuat"], vqf.state["delta"]
@@ -112,6 +124,7 @@ class VqfFilter(BehindFront):
 
     def restart(self, nodes: Mask) -> None:
         """Forget the past of some nodes, mask (n,)."""
+        self._bias_age = _BIAS_TICKS
         self._front.restart(nodes)
         for i in np.flatnonzero(nodes):
             self._filters[i].resetState()
