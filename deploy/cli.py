@@ -52,6 +52,7 @@ from deploy.ops.sides import master, slave
 from deploy.ops.stops import stops
 from deploy.ops.suit.command import check
 from deploy.ops.video import video
+from deploy.ops.voice.command import voice
 from deploy.report.panels import arrange
 from deploy.sim.drives.process import drives
 from deploy.sim.suit.command import app as suit_app
@@ -75,8 +76,8 @@ for _name, _group in {
     app.add_typer(_group, name=_name)
 _COMMANDS: tuple[Callable[..., None], ...] = (
     master, slave, console, drives, router, demo, soak, faults, collisions, contact, audit,
-    robots, *OPERATORS_ACTS, call, attitude, video, ros, doctor, servos, stops, inputs, alarms, record,
-    inspect, replay, metrics, lsl,
+    robots, *OPERATORS_ACTS, call, attitude, video, voice, ros, doctor, servos, stops, inputs, alarms,
+    record, inspect, replay, metrics, lsl,
 )  # fmt: skip
 for _command in _COMMANDS:
     app.command()(_command)

@@ -13,6 +13,7 @@ from common.config.console import ConsoleConfig
 from common.config.section import RelativePath, Section
 from common.errors import ConfigError, ConfigMistake
 from common.link.config import LinkConfig
+from common.link.voice_config import VoiceConfig
 from common.process.realtime import ProcessConfig
 from common.recording.config import RecordingConfig
 from common.skeleton import Skeleton, load_skeleton
@@ -107,6 +108,7 @@ class MasterConfig(Section):
     alarms: AlarmsConfig = AlarmsConfig()
     tap: TapConfig = TapConfig()
     recording: RecordingConfig = RecordingConfig()
+    voice: VoiceConfig = VoiceConfig()
     console: ConsoleConfig = ConsoleConfig()
 
     @property

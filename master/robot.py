@@ -21,7 +21,7 @@ from common.wire.codec import decode, encode
 from common.wire.instance import draw_instance
 from common.wire.messages import ClockReply, ControlReply, RobotState, Statistics
 from common.wire.presence import ProcessPresence
-from common.wire.topics import CLOCK, COMMAND, CONTROL, KEYFRAME, LOST, STATE, STATISTICS, VIDEO
+from common.wire.topics import CLOCK, COMMAND, CONTROL, IN_ORDER, KEYFRAME, LOST, STATE, STATISTICS, VIDEO
 from master.alarms.situation import RobotSign
 from master.comfort.scaling import MotionScaling
 from master.deadman.grip import Grip
@@ -81,7 +81,7 @@ class CommandedRobot:
         self._put_keyframe: Callable[[bytes], None] = link.publish(KEYFRAME)
         self.video = VideoWatch()
         link.subscribe(STATE, self._on_state)
-        link.subscribe(VIDEO, self.video.on_payload)
+        link.subscribe(VIDEO, self.video.on_payload, in_order=IN_ORDER)
         link.watch_presence(self._on_presence)
 
     async def run(self) -> None:

@@ -10,6 +10,7 @@ from common.config.section import Section
 from common.errors import ConfigError, ConfigMistake
 from common.inputs.config import KeyConfig
 from common.link.config import LinkConfig
+from common.link.voice_config import VoiceConfig
 from common.process.realtime import ProcessConfig
 from common.recording.config import RecordingConfig
 from common.skeleton import Skeleton, load_skeleton
@@ -63,6 +64,7 @@ class SlaveConfig(Section):
     tap: TapConfig = TapConfig()
     console: ConsoleConfig = ConsoleConfig()
     recording: RecordingConfig = RecordingConfig()
+    voice: VoiceConfig = VoiceConfig()
 
     @property
     def skeleton(self) -> Skeleton:

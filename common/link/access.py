@@ -22,6 +22,7 @@ from common.wire.topics import (
     COMMAND,
     CONTROL,
     KEYFRAME,
+    OPERATOR_VOICE,
     PATH,
     STATE,
     STATISTICS,
@@ -29,6 +30,7 @@ from common.wire.topics import (
     SUMMARY,
     TRUTH,
     VIDEO,
+    VOICE,
     Topic,
 )
 
@@ -148,6 +150,11 @@ def _robot(table: _AccessRules, access: AccessConfig, robot: str) -> None:
     table.allow(me, ("answer",), [_key(topic, robot) for topic in (CONTROL, STOP, CLOCK, PATH, CALL)])
     # a person at the robot calls from the robot's own host, by the robot's certificate
     table.allow(me, _ASK, [_key(CALL, robot)])
+    # the operators and the person at the robot talk; nobody else hears them
+    table.allow(me, _PUBLISH, [_key(VOICE, robot)])
+    table.allow(me, ("hear",), [_key(OPERATOR_VOICE, robot)])
+    table.allow(operators, ("hear",), [_key(VOICE, robot)])
+    table.allow(operators, ("hears",), [_key(OPERATOR_VOICE, robot)])
     # who may see the pictures may ask for one that stands alone
     table.allow([*operators, *viewers], _PUBLISH, [keyframe])
     table.allow(me, ("live",), [_alive(robot, "slave/**")])
@@ -156,7 +163,8 @@ def _robot(table: _AccessRules, access: AccessConfig, robot: str) -> None:
     table.allow(operators, ("answers",), [_key(CONTROL, robot)])
     for name in commanding:
         operator = [common_name(Role.OPERATOR, name)]
-        table.allow(operator, ("put",), [_key(COMMAND.of(name), robot)])
+        own = [_key(topic.of(name), robot) for topic in (COMMAND, OPERATOR_VOICE)]
+        table.allow(operator, ("put",), own)
         table.allow(operator, ("query",), [_key(CONTROL.of(name), robot)])
     table.allow(operators, ("hear",), [*(_key(topic, robot) for topic in HEARD), video])
     table.allow(operators, _ASK, [_key(CLOCK, robot), _key(PATH, robot)])

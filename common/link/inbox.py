@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import deque
 from collections.abc import Callable
 
 import zenoh
@@ -69,6 +70,36 @@ class Inbox:
             self._counters.handler_errors += 1
             if self._throttle.passes(monotonic_ns()):
                 log.exception("%s: the handler failed", self._key)
+
+
+class OrderedInbox(Inbox):
+    """Hands over each payload in turn, as voice and video need it; of those that wait, the newest few."""
+
+    def __init__(
+        self,
+        key: str,
+        on_payload: Callable[[str, bytes, int], None],
+        loop: asyncio.AbstractEventLoop,
+        counters: TopicCounters,
+        most: int,
+    ) -> None:
+        """`most`: payloads that wait for the loop; the oldest one goes where another comes."""
+        super().__init__(key, on_payload, loop, counters)
+        self._waiting: deque[tuple[str, bytes, int]] = deque(maxlen=most)
+
+    def on_sample(self, sample: zenoh.Sample) -> None:
+        """Called in Zenoh's thread."""
+        arrived_ns = monotonic_ns()
+        if self._closed:
+            return
+        self._counters.overwritten += len(self._waiting) == self._waiting.maxlen
+        self._waiting.append((str(sample.key_expr), sample.payload.to_bytes(), arrived_ns))
+        self._counters.received += 1
+        wake(self._loop, self._deliver)
+
+    def _deliver(self) -> None:
+        while self._waiting and not self._closed:
+            self._hand_over(*self._waiting.popleft())
 
 
 def wake(loop: asyncio.AbstractEventLoop, callback: Callable[..., None], *args: object) -> None:

@@ -12,7 +12,7 @@ from zenoh.handlers import Callback
 
 from common.clock import monotonic_ns
 from common.link.declared import Declarations, Declare
-from common.link.inbox import Inbox
+from common.link.inbox import Inbox, OrderedInbox
 from common.link.presence import watch_presence
 from common.link.queries import Answered, Answerer, Asking
 from common.link.waiting import count_peers, is_matching, wait_for_peer
@@ -110,15 +110,20 @@ class Link:
         self._declare(declare)
         return publish
 
-    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None]) -> None:
+    def subscribe(self, topic: Topic, on_payload: Callable[[bytes, int], None], in_order: int = 0) -> None:
         """Call `on_payload(payload, arrived_ns)` on the loop with the newest payload of other sessions.
 
         `arrived_ns` is stamped in Zenoh's thread, before the loop is woken.
         """
-        self.subscribe_keys(topic, lambda _, payload, arrived_ns: on_payload(payload, arrived_ns))
+        self.subscribe_keys(topic, lambda _, payload, arrived_ns: on_payload(payload, arrived_ns), in_order)
 
-    def subscribe_keys(self, topic: Topic, on_payload: Callable[[str, bytes, int], None]) -> None:
-        """As `subscribe`, with the key on which each payload came: the newest of each key is handed over."""
+    def subscribe_keys(
+        self, topic: Topic, on_payload: Callable[[str, bytes, int], None], in_order: int = 0
+    ) -> None:
+        """As `subscribe`, with the key on which each payload came: the newest of each key is handed over.
+
+        `in_order`: not the newest alone, but all, up to so many that wait; for voice and video.
+        """
         key, overheard = topic.key_for(self.robot), self._overheard
 
         def overhear(own_key: str, payload: bytes, arrived_ns: int) -> None:
@@ -126,7 +131,13 @@ class Link:
             if overheard is not None:
                 overheard(own_key, payload, arrived_ns)
 
-        inbox = Inbox(key, on_payload if overheard is None else overhear, self._loop, self._count(topic))
+        taken = on_payload if overheard is None else overhear
+        counters = self._count(topic)
+        inbox = (
+            OrderedInbox(key, taken, self._loop, counters, in_order)
+            if in_order
+            else Inbox(key, taken, self._loop, counters)
+        )
         self._receivers.append(inbox)
         self._declare(lambda s: s.declare_subscriber(key, Callback(inbox.on_sample, indirect=False)))
 

@@ -17,6 +17,7 @@ EXTRAS = {
     "google": "viewer",
     "pyarrow": "export",
     "av": "export",
+    "livekit": "voice",
     "prometheus_client": "metrics",
     "pylsl": "lsl",
     "vqf": "vqf",

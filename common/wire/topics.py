@@ -77,15 +77,25 @@ CALL = Topic("call", "tandem/{robot}/call", 0.0, 1.0, Priority.DATA, True, True,
 """A person at the robot asks for an operator, or does not need one any more (`common.wire.call`)."""
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
 VIDEO = Topic("video", "tandem/{robot}/video/head", 0.0, 0.0, Priority.BACKGROUND, False, True, False)
+IN_ORDER = 8
+"""Pictures, or frames of voice, that wait for a loop that is late: each may need the one before."""
 KEYFRAME = Topic("keyframe", "tandem/{robot}/keyframe/head", 0.0, 0.0, Priority.DATA, True, True, False)
 """From who receives pictures: the camera's next one shall stand alone. The payload is `LOST` or `JOINED`."""
+VOICE = Topic("voice", "tandem/{robot}/voice", 0.0, 0.0, Priority.DATA_LOW, False, True, True)
+"""20 ms of whoever speaks at the robot. Neither recorder nor tap hears voice: nothing of it is kept."""
+OPERATOR_VOICE = Topic(
+    "operator_voice", "tandem/{robot}/operator/{operator}/voice", 0.0, 0.0, Priority.DATA_LOW, False,
+    True, True,
+)  # fmt: skip
+"""As VOICE, on the operator's own key: only who holds the lease is heard at the robot."""
 TRUTH = Topic("truth", "tandem/{robot}/test/truth", 200.0, 0.0, Priority.DATA, False, True, False)
 FAULTS = Topic("faults", "tandem/{robot}/test/faults", 0.0, 1.0, Priority.DATA, True, True, False)
 
 TOPICS = {
     t.name: t
     for t in (
-        COMMAND, STATE, CONTROL, STOP, CLOCK, PATH, STATISTICS, SUMMARY, CALL, ALIVE, VIDEO, KEYFRAME, TRUTH,
+        COMMAND, STATE, CONTROL, STOP, CLOCK, PATH, STATISTICS, SUMMARY, CALL, ALIVE, VIDEO,
+        KEYFRAME, VOICE, OPERATOR_VOICE, TRUTH,
         FAULTS,
     )
 }  # fmt: skip

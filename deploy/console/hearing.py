@@ -17,7 +17,7 @@ from common.tap.message import TapMessage
 from common.tap.reader import TapReader
 from common.wire.codec import decode
 from common.wire.messages import Command, RobotState, Statistics
-from common.wire.topics import STATE, STATISTICS, VIDEO
+from common.wire.topics import IN_ORDER, STATE, STATISTICS, VIDEO
 from common.wire.video import decode_frame
 from deploy.console.model.robot import LINK, TAP, RobotModel
 
@@ -71,7 +71,11 @@ class Hearing:
             link = session.link(robot)
             topics = (STATISTICS, STATE, VIDEO) if states else (STATISTICS,)
             for topic in topics:
-                link.subscribe_keys(topic, lambda key, payload, at_ns: self._take(key, payload, at_ns, LINK))
+                link.subscribe_keys(
+                    topic,
+                    lambda key, payload, at_ns: self._take(key, payload, at_ns, LINK),
+                    in_order=IN_ORDER if topic is VIDEO else 0,
+                )
 
     def open(self, session: LinkSession, model: RobotModel) -> None:
         """Hear one more robot over the link, in full."""

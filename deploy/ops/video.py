@@ -16,7 +16,7 @@ from common.clock import monotonic_ns, to_s
 from common.errors import LinkTimeoutError, TandemError
 from common.link import open_link
 from common.process.runtime import run as run_until_stopped
-from common.wire.topics import JOINED, keyframe
+from common.wire.topics import IN_ORDER, JOINED, keyframe
 from common.wire.topics import video as video_topic
 from common.wire.video import VideoFrame
 from deploy.client.certificate import Certificate
@@ -57,7 +57,7 @@ def video(
                 raise TandemError(
                     f"no robot answers at {', '.join(connect)}: is the slave running?"
                 ) from None
-            link.subscribe(video_topic(camera), seen.on_payload)
+            link.subscribe(video_topic(camera), seen.on_payload, in_order=IN_ORDER)
             ask = link.publish(keyframe(camera))
             ask(JOINED)
             with Live(console=Console(), refresh_per_second=4) as live:

@@ -8,7 +8,7 @@ PANELS = {
     "Run": ("demo", "master", "slave", "console", "suit", "router", "drives"),
     "People": (
         "robots", "take", "engage", "disengage", "let-go", "handover", "rest", "take-up", "estop", "reset",
-        "home", "status", "call", "attitude", "video", "ros",
+        "home", "status", "call", "attitude", "video", "voice", "ros",
     ),
     "Set up": (
         "doctor", "servos", "inputs", "stops", "alarms", "calibrate", "profile", "keys", "record",

@@ -17,7 +17,6 @@ from common.wire.video import H264, VideoFrame
 from deploy.viewer.frames import FrameEdge
 
 if TYPE_CHECKING:
-    from google.protobuf.descriptor import FileDescriptor
     from google.protobuf.message import Message
     from google.protobuf.timestamp_pb2 import Timestamp
 
@@ -131,16 +130,13 @@ def schema_of(message: Message) -> tuple[str, bytes]:
     """Name and data of a message's schema: its file descriptors, each after those that it needs."""
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
+    files = [message.DESCRIPTOR.file]
+    for file in files:  # it grows: behind each file stand those that it needs
+        files.extend(file.dependencies)
     out = FileDescriptorSet()
     seen: set[str] = set()
-
-    def add(file: FileDescriptor) -> None:
-        if file.name in seen:
-            return
-        seen.add(file.name)
-        for needed in file.dependencies:
-            add(needed)
-        file.CopyToProto(out.file.add())
-
-    add(message.DESCRIPTOR.file)
+    for file in reversed(files):
+        if file.name not in seen:
+            seen.add(file.name)
+            file.CopyToProto(out.file.add())
     return message.DESCRIPTOR.full_name, out.SerializeToString()

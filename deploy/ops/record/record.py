@@ -15,7 +15,7 @@ from common.link.config import LinkConfig
 from common.metrics.recorder import RecorderMetrics
 from common.metrics.tree import WriteMetrics
 from common.process.runtime import until_stopped
-from common.wire.topics import COMMAND, STATE, STATISTICS, Topic, video
+from common.wire.topics import COMMAND, IN_ORDER, STATE, STATISTICS, VIDEO, Topic, video
 from deploy.ops.record.tape import Tape
 from deploy.recorded.missing import Missing, missing_in_words
 
@@ -104,7 +104,8 @@ async def record(
     try:
         async with open_link(options.link, options.robot) as link:
             for topic in options.topics:
-                link.subscribe_keys(topic, partial(_take, tape, taken, topic))
+                take = partial(_take, tape, taken, topic)
+                link.subscribe_keys(topic, take, in_order=IN_ORDER if topic.name == VIDEO.name else 0)
             await until_stopped(
                 stop, _wait(options.seconds, tape, lambda: _report_progress(tape, taken, report))
             )

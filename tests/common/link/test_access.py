@@ -60,6 +60,13 @@ def test_the_table(who: str, robot: str) -> None:
     assert may(who, "put", f"{key}/video/head") == (itself or router)
     assert may(who, "declare_subscriber", f"{key}/video/head") == (operator or viewer or router)
     assert may(who, "put", f"{key}/video/head", "egress") == (operator or viewer or router)
+    for name in ("anna", "ben", "-"):
+        assert may(who, "put", f"{key}/operator/{name}/voice") == (name == own or router)
+    assert may(who, "declare_subscriber", f"{key}/operator/*/voice") == (itself or router)
+    assert may(who, "put", f"{key}/voice") == (itself or router)
+    # what is said at the robot is for its operators: no viewer, no observer
+    assert may(who, "declare_subscriber", f"{key}/voice") == (operator or router)
+    assert may(who, "put", f"{key}/voice", "egress") == (operator or router)
     for camera in ("head", "wrist"):
         assert may(who, "put", f"{key}/keyframe/{camera}") == (operator or viewer or router)
         assert may(who, "declare_subscriber", f"{key}/keyframe/{camera}") == (itself or router)

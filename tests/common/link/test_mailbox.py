@@ -1,6 +1,12 @@
+import asyncio
 import threading
+from typing import cast
 
+import zenoh
+
+from common.link.inbox import OrderedInbox
 from common.link.mailbox import MOST_KEYS, Mailbox
+from common.metrics.link import TopicCounters
 
 
 def test_the_newest_value_is_taken_once() -> None:
@@ -63,3 +69,35 @@ def test_every_value_is_either_taken_or_counted_between_threads() -> None:
         thread.join(10)
     assert taken + box.overwritten == total * writers
     assert box.take() == {}
+
+
+class _Sample:
+    """As Zenoh hands it over."""
+
+    key_expr = "tandem/r/voice"
+
+    def __init__(self, body: bytes) -> None:
+        self.payload = self
+        self._body = body
+
+    def to_bytes(self) -> bytes:
+        return self._body
+
+
+def test_in_order_all_that_wait_are_handed_over_and_of_too_many_the_newest() -> None:
+    heard: list[bytes] = []
+    loop = asyncio.new_event_loop()
+    counters = TopicCounters()
+    inbox = OrderedInbox(
+        "tandem/r/voice", lambda key, body, at_ns: heard.append(body), loop, counters, most=3
+    )
+    for body in (b"1", b"2", b"3", b"4"):
+        inbox.on_sample(cast(zenoh.Sample, _Sample(body)))
+    loop.run_until_complete(asyncio.sleep(0))
+    assert heard == [b"2", b"3", b"4"]
+    assert (counters.received, counters.overwritten) == (4, 1)
+    inbox.close()
+    inbox.on_sample(cast(zenoh.Sample, _Sample(b"5")))
+    loop.run_until_complete(asyncio.sleep(0))
+    loop.close()
+    assert len(heard) == 3
