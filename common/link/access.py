@@ -111,7 +111,7 @@ def access_control(access: AccessConfig, revoked: frozenset[str] = frozenset()) 
     """Zenoh's `access_control`: rules, subjects and policies for [link.access], less the revoked."""
     table = _AccessRules(revoked)
     for router in access.routers:
-        table.allow([common_name(Role.ROUTER, router)], _ALL, ["tandem/**"])
+        table.allow([common_name(Role.ROUTER, router)], _ALL, ["tandem/**", SUMMARY.key_for("**")])
     for robot in access.all_robots:
         _robot(table, access, robot)
     everyone = sorted(named(access))

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from common.wire.codec import VERSION
 from common.wire.presence import ProcessPresence
 from common.wire.summary import HomeCall, RobotSummary, encode_summary
+from common.wire.topics import SUMMARY
 from master.watched import GONE_S, TakenRobot, WatchedRobots
 
 S = 1_000_000_000
@@ -32,7 +33,7 @@ class Desk:
         self.sequence += 1
         fields: dict[str, object] = {"guard": "hold", "reason": "", **changed}
         summary = RobotSummary("a", instance, self.sequence, **fields)  # type: ignore[arg-type]
-        self.watched.roster.on_summary("tandem/a/summary", encode_summary(summary), at_ns)
+        self.watched.roster.on_summary(SUMMARY.key_for("a"), encode_summary(summary), at_ns)
 
     def takes(self, now_ns: int) -> bool:
         return self.watched.to_take(now_ns, ()) == ["a"]

@@ -81,9 +81,9 @@ def test_the_table(who: str, robot: str) -> None:
     assert may(who, "liveliness_token", f"{key}/alive/slave") == (itself or router)
     assert may(who, "liveliness_token", f"{key}/alive/master") == (operator or router)
     assert may(who, "declare_liveliness_subscriber", "tandem/*/alive/slave") == (who in EVERYBODY)
-    assert may(who, "declare_subscriber", "tandem/*/summary") == (who in EVERYBODY)
-    assert may(who, "put", f"{key}/summary") == (itself or router)
-    assert may(who, "put", f"{key}/summary", "egress") == (operator or observer or router), (
+    assert may(who, "declare_subscriber", "tandem-summary/*") == (who in EVERYBODY)
+    assert may(who, "put", f"tandem-summary/{robot}") == (itself or router)
+    assert may(who, "put", f"tandem-summary/{robot}", "egress") == (operator or observer or router), (
         "a list hears of its own robots alone"
     )
     assert may(who, "query", f"{key}/call") == (itself or router)

@@ -25,7 +25,7 @@ def shown(robot: str = "a", instance: int = 1) -> ProcessPresence:
 def told(roster: Roster, at_ns: int, robot: str = "a", instance: int = 1, **changed: object) -> None:
     fields: dict[str, object] = {"sequence": at_ns, "guard": "hold", "reason": "", **changed}
     summary = RobotSummary(robot, instance, **fields)  # type: ignore[arg-type]
-    roster.on_summary(f"tandem/{robot}/summary", encode_summary(summary), at_ns)
+    roster.on_summary(f"tandem-summary/{robot}", encode_summary(summary), at_ns)
 
 
 def test_a_robot_is_listed_with_its_token_and_described_with_its_summary() -> None:
@@ -77,8 +77,8 @@ def test_an_older_summary_and_one_on_a_wrong_key_change_nothing() -> None:
     told(roster, 2 * S, sequence=5, guard="hold")
     told(roster, 2 * S, sequence=4, guard="hold")
     assert roster.late == 2
-    roster.on_summary("tandem/b/summary", encode_summary(RobotSummary("a", 1, 9, "hold", "")), 2 * S)
-    roster.on_summary("tandem/a/summary", b"garbage", 2 * S)
+    roster.on_summary("tandem-summary/b", encode_summary(RobotSummary("a", 1, 9, "hold", "")), 2 * S)
+    roster.on_summary("tandem-summary/a", b"garbage", 2 * S)
     assert roster.undecodable == 1
     summary = roster.robots()[0].fresh(2 * S)
     assert summary is not None

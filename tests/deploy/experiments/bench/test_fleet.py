@@ -13,9 +13,9 @@ from deploy.experiments.bench.fleet.run import (
     FleetOptions,
     MeasuredCell,
     cells,
+    growth_percent,
     judge,
     measure_fleet,
-    nonlinear_percent,
 )
 from deploy.measure.verdict import Outcome
 
@@ -62,7 +62,7 @@ def test_the_targets() -> None:
 def test_a_fleet_that_the_machine_could_not_serve_is_not_judged() -> None:
     rows = [measured("1 commanded", 2.0), measured("100 commanded", 1.0, enough=False)]
     assert {verdict.outcome for verdict in judge(rows)} == {Outcome.NOT_JUDGED}
-    assert nonlinear_percent([measured("100 watched", 1.0, 100)]) is None
+    assert growth_percent([measured("100 watched", 1.0, 100)]) is None
 
 
 def test_the_cells_grow_to_the_fleet_that_was_asked_for() -> None:
