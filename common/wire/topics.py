@@ -75,8 +75,8 @@ SUMMARY = Topic("summary", "tandem-summary/{robot}", 1.0, 3.0, Priority.DATA_LOW
 """`common.wire.summary`: what a list of robots shows. Who commands or opens a robot hears its state too.
 
 Its keys do not begin as the others do. A session that lists N robots knows 2 N tokens below `tandem/`, and
-Zenoh compares the key of a message that comes by a wildcard with each of them: 1000 robots cost 18 % of a core
-in that place, and 7 % in a tree of their own."""
+Zenoh compares the key of a message that comes by a wildcard with each of them: 1000 robots cost 18 % of a
+core in that place, and 7 % in a tree of their own."""
 CALL = Topic("call", "tandem/{robot}/call", 0.0, 1.0, Priority.DATA, True, True, True)
 """A person at the robot asks for an operator, or does not need one any more (`common.wire.call`)."""
 ALIVE = Topic("alive", "tandem/{robot}/alive", 0.0, 0.0, Priority.DATA, True, True, False)
