@@ -1,1 +1,1 @@
-"""Whether a worn suit's recording is that of a body: rates, axes, joints, symmetry, and which node is where."""
+"""Whether a worn suit's recording is a body's: rates, axes, joints, symmetry, and which node is where."""
