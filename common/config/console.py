@@ -26,6 +26,11 @@ class ConsoleConfig(Section):
     certificate: RelativePath | None = None
     """For HTTPS: made by `tandem keys make` with `--host`; its .key lies beside it. Needed beyond
     this host."""
+    authority: RelativePath | None = None
+    """The authority (ca.pem of `tandem keys`) whose certificates stand for a token."""
+    persons: dict[str, Literal["viewer", "operator", "engineer"]] = Field(default_factory=dict)
+    """The page's role by a certificate's common name, such as `operator:nurse-2`; this operator's own is one
+    already."""
     deadman_key: str = Field("F9", min_length=1, max_length=32)
     """The key that is held where the page is the deadman, as browsers name it (`KeyboardEvent.key`)."""
     language: Literal["en", "zh"] = "en"
@@ -64,6 +69,9 @@ class ConsoleConfig(Section):
         wrong = [name for name in self.names if not _HOST_NAME.fullmatch(name)]
         if wrong:
             return [ConfigMistake("console.names", wrong[0], "a host's name or address, without a port")]
+        if self.authority is not None and self.certificate is None:
+            expected = "a certificate: without HTTPS no browser shows its own"
+            return [ConfigMistake("console.certificate", None, expected)]
         if not self.on_this_host_only and self.certificate is None:
             return [
                 ConfigMistake(

@@ -121,3 +121,28 @@ def _write_new(path: Path, data: bytes, mode: int) -> None:
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
     with os.fdopen(handle, "wb") as file:
         file.write(data)
+
+
+def write_browser_pair(folder: Path, name: str, password: str) -> Path:
+    """Write NAME.p12 of NAME.pem and NAME.key, for a browser. Raises KeysError."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
+    from cryptography.hazmat.primitives.serialization import BestAvailableEncryption, load_pem_private_key
+    from cryptography.hazmat.primitives.serialization.pkcs12 import serialize_key_and_certificates
+
+    certificate, key, packed = (folder / f"{name}.{end}" for end in ("pem", "key", "p12"))
+    if packed.exists():
+        raise KeysError(f"{packed} exists already: nothing is overwritten; move it away first")
+    try:
+        shown = x509.load_pem_x509_certificate(certificate.read_bytes())
+        secret = load_pem_private_key(key.read_bytes(), None)
+        assert isinstance(secret, EllipticCurvePrivateKey)
+        content = serialize_key_and_certificates(
+            name.encode(), secret, shown, None, BestAvailableEncryption(password.encode())
+        )
+        _write_new(packed, content, 0o600)
+    except OSError as error:
+        raise KeysError(f"{error.filename}: cannot be read or written ({error.strerror})") from None
+    except ValueError as error:
+        raise KeysError(f"{certificate}: no certificate with its key ({error})") from None
+    return packed

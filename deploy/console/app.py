@@ -16,6 +16,7 @@ from deploy.console.acts import ActRefusedError
 from deploy.console.files import PageFiles
 from deploy.console.hub import Hub
 from deploy.console.page_socket import LONGEST, PageSockets
+from deploy.console.persons import Persons
 from deploy.console.posts import STOP_PATH, PostHandlers
 from deploy.console.replies import HEADERS, Visitors, answer, error_answer
 from deploy.console.reports import POLICY as REPORT_POLICY
@@ -47,11 +48,12 @@ class ConsoleApp:
         port: int = 0,
         on_login: Callable[[Person], None] = lambda _: None,
         files: PageFiles | None = None,
+        persons: Persons | None = None,
     ) -> None:
         """`session`: to the robots; None without a link. `setup`: what `/api/setup` says of a robot."""
         self._hub = hub
         self._setup = setup
-        self._visitors = Visitors(hub.access, port)
+        self._visitors = Visitors(hub.access, port, persons or Persons({}, ""))
         self._posts = PostHandlers(hub, self._visitors, where, session, on_login, secure)
         self._files = files or PageFiles()
         self._throttle = LogThrottle()

@@ -9,6 +9,7 @@ from aiohttp import web
 from common.clock import monotonic_ns
 from deploy.console.acts import ActRefusedError
 from deploy.console.hub import as_json
+from deploy.console.persons import Persons, common_name_of
 from deploy.console.session import Access, Person
 
 COOKIE = "tandem_console"
@@ -28,16 +29,30 @@ HEADERS = {
 
 
 class Visitors:
-    """Whose request it is, by the cookie of this console."""
+    """Whose request it is: by the cookie of this console, else by the certificate that the browser shows."""
 
-    def __init__(self, access: Access, port: int) -> None:
+    def __init__(self, access: Access, port: int, persons: Persons) -> None:
         self._access = access
+        self._persons = persons
         self.cookie = f"{COOKIE}_{port}"
 
     def of(self, request: web.Request) -> tuple[str, Person]:
         """The secret of the log-in, and the person."""
+        now_ns = monotonic_ns()
         secret = request.cookies.get(self.cookie, "")
-        return secret, self._access.person(secret, monotonic_ns())
+        if not self._access.lives(secret, now_ns) and (shown := _certificate(request)):
+            secret = self._persons.secret(
+                shown,
+                lambda known: self._access.lives(known, now_ns),
+                lambda person: self._access.enter(person, now_ns),
+            )
+        return secret, self._access.person(secret, now_ns)
+
+
+def _certificate(request: web.Request) -> str:
+    """The common name of the certificate that the connection was checked by; empty without one."""
+    tls = None if request.transport is None else request.transport.get_extra_info("ssl_object")
+    return "" if tls is None else common_name_of(tls.getpeercert())
 
 
 def parsed(text: str) -> dict[str, object] | None:

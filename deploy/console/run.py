@@ -33,6 +33,7 @@ from deploy.console.model.robot import SILENT_S, RobotModel, Side, Whose
 from deploy.console.model.scene import scene
 from deploy.console.opened import OpenedRobots
 from deploy.console.outbox import WINDOW
+from deploy.console.persons import Persons
 from deploy.console.reports import ReportFolder
 from deploy.console.session import TOKEN_S, Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
@@ -148,6 +149,15 @@ async def _serve(
     hub.put_key, opened.on_close = keyframes.put, keyframes.forget
     address = f"{'https' if tls else 'http'}://{_shown_host(config)}:{port}/"
 
+    persons = Persons(config.persons, options.where.operator)
+
+    def revoke(names: frozenset[str]) -> None:
+        for secret in persons.revoke(names):
+            access.log_out(secret)
+        hub.refresh(monotonic_ns())
+
+    session.watch_revoked(revoke)
+
     def offer(person: Person) -> None:
         token = access.issue(person, monotonic_ns())
         page = "engineer" if person.role is PageRole.ENGINEER else ""
@@ -161,6 +171,7 @@ async def _serve(
         secure=tls is not None,
         port=port,
         on_login=offer,
+        persons=persons,
     )
     runner = web.AppRunner(app.make(), access_log=None, shutdown_timeout=1.0, handle_signals=False)
     await runner.setup()
@@ -253,6 +264,12 @@ def _tls(config: ConsoleConfig) -> ssl.SSLContext | None:
         return None
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
+    if config.authority is not None:
+        context.verify_mode = ssl.CERT_OPTIONAL
+        try:
+            context.load_verify_locations(config.authority)
+        except (OSError, ssl.SSLError) as error:
+            raise TandemError(f"{config.authority}: no authority's certificate ({error})") from None
     key = config.certificate.with_suffix(".key")
     try:
         context.load_cert_chain(config.certificate, key)

@@ -89,11 +89,19 @@ class Access:
                 found = self._tokens.pop(known)
         if found is None or now_ns > found.until_ns:
             return None
+        return self.enter(found.person, now_ns), found.person
+
+    def enter(self, person: Person, now_ns: int) -> str:
+        """Begin a session of a person who is known otherwise; its secret."""
         while len(self._sessions) >= MOST_SESSIONS:
             self._sessions.pop(next(iter(self._sessions)))
         secret = self._draw()
-        self._sessions[secret] = _Ticket(found.person, now_ns + to_ns(SESSION_S))
-        return secret, found.person
+        self._sessions[secret] = _Ticket(person, now_ns + to_ns(SESSION_S))
+        return secret
+
+    def lives(self, secret: str, now_ns: int) -> bool:
+        """Whether it is a session's that has not expired."""
+        return self.person(secret, now_ns) is not self._stranger
 
     def log_out(self, secret: str) -> None:
         """End a session."""

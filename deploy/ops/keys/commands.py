@@ -119,6 +119,27 @@ def make(
 
 
 @app.command()
+def browser(
+    folder: Folder,
+    who: Annotated[str, typer.Argument(metavar="ROLE:NAME", help="Role and name in the certificate.")],
+) -> None:
+    """Pack a certificate and its key for a person's browser, as NAME.p12. The password is printed once.
+
+    A console whose file names [console] authority takes the person for whom the certificate says.
+
+    Example: `tandem keys browser keys operator:nurse-1`
+    """
+    import secrets
+
+    from deploy.certificates.folder import stem, write_browser_pair
+
+    role, name = _role_and_name(who)
+    password = secrets.token_urlsafe(9)
+    path = write_browser_pair(folder, stem(role, name), password)
+    Console().print(f"{path}: password {password}; import it in the browser, then delete the file")
+
+
+@app.command()
 def revoke(
     folder: Folder,
     who: Annotated[str, typer.Argument(metavar="ROLE:NAME", help="Role and name in the certificate.")],

@@ -21,7 +21,9 @@ from deploy.certificates.make import new_authority, new_identity
 from deploy.client.destination import Destination
 from deploy.console.model.robot import Side
 from deploy.console.options import ConsoleChoices, console_options
+from deploy.console.persons import Persons
 from deploy.console.run import ConsoleOptions, run_console
+from deploy.console.session import PageRole, Person
 from deploy.examples.profiles import example
 from deploy.harness.endpoints import free_port
 from tests.deploy.console.robots import OPERATOR, ROBOT, SKELETON
@@ -187,3 +189,68 @@ def test_beside_the_robot_the_slaves_file_is_enough(tmp_path: Path) -> None:
     assert found.where.link.connect == ["tcp/127.0.0.1:7447"]
     assert found.where.link.listen == []
     assert found.tap == tmp_path / "tap.sock"
+
+
+def test_a_persons_certificate_stands_for_the_token_until_it_is_revoked(tmp_path: Path) -> None:
+    now, valid = datetime.now(UTC), timedelta(days=1)
+    authority, foreign = new_authority("test", now, valid), new_authority("other", now, valid)
+    write_pair(tmp_path, "ca", authority)
+    for of, name in ((authority, "ward-3"), (authority, "eve"), (authority, OPERATOR), (foreign, "forged")):
+        host = ["127.0.0.1"] if name == "ward-3" else []
+        identity = new_identity(of, Role.OPERATOR, OPERATOR if of is foreign else name, host, now, valid)
+        write_pair(tmp_path, name, identity)
+    chosen = config(certificate=str(tmp_path / "ward-3.pem"), authority=str(tmp_path / "ca.pem"))
+
+    async def asks(url: str, shows: str | None) -> int:
+        trusted = ssl.create_default_context(cafile=str(tmp_path / "ca.pem"))
+        if shows is not None:
+            trusted.load_cert_chain(tmp_path / f"{shows}.pem", tmp_path / f"{shows}.key")
+        connector = aiohttp.TCPConnector(ssl=trusted)
+        async with aiohttp.ClientSession(connector=connector) as http:
+            body = {"act": "mark", "robot": "robot-1"}
+            headers = {"Origin": url}
+            async with http.post(f"{url}/api/act", json=body, headers=headers) as response:
+                status = response.status
+            async with http.post(f"{url}/api/act", json=body, headers={"Origin": "https://evil"}) as response:
+                assert response.status == 403, "a browser shows its certificate to pages of others too"
+            return status
+
+    async def story() -> None:
+        said: list[str] = []
+        stop = asyncio.Event()
+        running = asyncio.create_task(run_console(options(chosen, said), stop))
+        url = (await address(said, "console: ")).rstrip("/")
+        assert await asks(url, None) == 401
+        assert await asks(url, OPERATOR) == 200
+        assert await asks(url, OPERATOR) == 200
+        assert await asks(url, "eve") == 401, "another operator's certificate is none of this console's"
+        with pytest.raises((aiohttp.ClientError, ssl.SSLError, ConnectionError)):
+            await asks(url, "forged")
+        stop.set()
+        await running
+
+    asyncio.run(story())
+
+
+def test_a_revoked_certificate_ends_its_session_and_an_expired_session_begins_anew() -> None:
+    entered: list[Person] = []
+
+    def enter(person: Person) -> str:
+        entered.append(person)
+        return f"secret {len(entered)}"
+
+    persons = Persons({"observer:ward": "viewer", "operator:eng": "engineer"}, "nurse-1")
+    assert persons.of("operator:nurse-1") == Person(PageRole.OPERATOR, "nurse-1")
+    assert persons.of("observer:ward") == Person(PageRole.VIEWER, "ward")
+    assert persons.of("operator:nurse-2") is None
+    assert persons.secret("operator:nurse-2", lambda _: True, enter) == ""
+    assert persons.secret("operator:eng", lambda _: True, enter) == "secret 1"
+    assert persons.secret("operator:eng", lambda _: True, enter) == "secret 1"
+    assert persons.secret("operator:eng", lambda _: False, enter) == "secret 2"
+    assert persons.revoke(frozenset({"operator:eng"})) == ["secret 2"]
+    assert persons.secret("operator:eng", lambda _: True, enter) == ""
+
+
+def test_certificates_of_persons_need_https() -> None:
+    with pytest.raises(ConfigError, match=r"console\.certificate"):
+        config(authority="ca.pem")

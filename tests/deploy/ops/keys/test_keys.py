@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization.pkcs12 import load_key_and_certificates
 from cryptography.x509.oid import ExtendedKeyUsageOID
 from typer.testing import CliRunner
 
@@ -193,3 +194,18 @@ def test_a_name_is_revoked_once_and_gets_no_new_certificate(tmp_path: Path) -> N
     for command in ("revoke", "make"):
         error = tandem(command, keys, "operator:carl")[1]
         assert "line 1: expected role:name" in str(error)
+
+
+def test_a_person_gets_certificate_and_key_in_one_file_for_the_browser(tmp_path: Path) -> None:
+    for command in (("authority", tmp_path), ("make", tmp_path, "operator:nurse-1")):
+        assert CliRunner().invoke(app, ["keys", *map(str, command)]).exit_code == 0
+    result = CliRunner().invoke(app, ["keys", "browser", str(tmp_path), "operator:nurse-1"])
+    assert result.exit_code == 0, result.output
+    packed = tmp_path / "operator-nurse-1.p12"
+    assert packed.stat().st_mode & 0o777 == 0o600
+    password = result.output.replace("\n", "").partition("password ")[2].partition(";")[0].strip()
+    _, certificate, _ = load_key_and_certificates(packed.read_bytes(), password.encode())
+    assert certificate is not None
+    assert "operator:nurse-1" in certificate.subject.rfc4514_string()
+    assert CliRunner().invoke(app, ["keys", "browser", str(tmp_path), "operator:nurse-1"]).exit_code
+    assert CliRunner().invoke(app, ["keys", "browser", str(tmp_path), "operator:none"]).exit_code
