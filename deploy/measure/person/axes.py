@@ -53,7 +53,7 @@ def axis_scales(acc_m_s2: Array, gyr_rad_s: Array, rate_hz: float, answered: Mas
     dt_s, span = thin / rate_hz, round(WINDOW_S * RATE_HZ)
     rows = len(acc_m_s2) // thin * thin
     acc, gyr = (x[:rows].reshape(-1, thin, 3).mean(axis=1) for x in (acc_m_s2, gyr_rad_s))
-    whole = answered[:rows].reshape(-1, thin).all(axis=1)
+    whole: Mask = np.asarray(answered[:rows].reshape(-1, thin).all(axis=1))
     count = len(acc) // span
     if count < 4:
         return nothing
@@ -119,7 +119,8 @@ def _off(acc: Array, gyr: Array, dt_s: float) -> Array:
             frame = frame @ _rotation(rate)
             at += step
             turned[:, at] = np.einsum("wij,wj->wi", frame, acc[:, at])
-    return turned[:, half:].mean(axis=1) - turned[:, :half].mean(axis=1)
+    off: Array = turned[:, half:].mean(axis=1) - turned[:, :half].mean(axis=1)
+    return off
 
 
 def _rotation(vector: Array) -> Array:

@@ -71,7 +71,8 @@ def judge_person(
     unknown: list[str] = []
     windows = step_windows(min(node.rate_hz for node in nodes.values()), _samples(nodes)) if led else []
     for name, node in nodes.items():
-        answered = np.isfinite(node.gyr_rad_s).all(axis=1) & np.isfinite(node.acc_m_s2).all(axis=1)
+        answered = np.isfinite(np.hstack([node.gyr_rad_s, node.acc_m_s2])).all(axis=1)
+        assert isinstance(answered, np.ndarray)
         dead = _alive(name, node, answered)
         found += dead
         if not dead:
@@ -158,7 +159,7 @@ def _swapped(
     """Who moved when another should have: the best exchange of two nodes, or a node that never moved."""
     activity = {name: [_rms(nodes[name], window) for _, window in windows] for name in names}
     moving = [
-        np.mean([a[i] for name, a in activity.items() if expected(step, name) == 1.0] or [0.0])
+        float(np.mean([a[i] for name, a in activity.items() if expected(step, name) == 1.0] or [0.0]))
         for i, (step, _) in enumerate(windows)
     ]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ MASTER = EXAMPLES / "master.toml"
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("person") / "worn.npz"
-    arrays = {}
+    arrays: dict[str, Any] = {}
     for name, node in led_person().items():
         arrays[f"{name}_acc"], arrays[f"{name}_gyr"] = node.acc_m_s2, node.gyr_rad_s
     np.savez(path, t_s=np.arange(12000) / 100.0, **arrays)
@@ -36,7 +37,7 @@ def test_a_good_recording_is_accepted_and_a_mirrored_one_refused(recording: Path
     status, said = checked("--recording", recording)
     assert (status, said.strip().endswith("accepted")) == (0, True), said
     with np.load(recording) as file:
-        arrays = dict(file)
+        arrays: dict[str, Any] = dict(file)
     arrays["left_hand_gyr"] = arrays["left_hand_gyr"] * [1.0, -1.0, 1.0]
     np.savez(tmp_path / "bad.npz", **arrays)
     status, said = checked("--recording", tmp_path / "bad.npz", "--json")
