@@ -36,7 +36,7 @@ class SessionHead:
     consent: str
     """Number of the consent form; empty where none is named."""
     scope: tuple[str, ...]
-    """What the subject has consented to: `motion`, `video`."""
+    """What the subject has consented to: `motion`, `video`, `sharing`."""
     tandem: str
     machine: str
 
@@ -122,9 +122,9 @@ def begin(
     if session is None:
         session = f"{1 + len(list(of_subject.glob('ses-*'))):02}"
     check_code("--session", session)
-    unknown = sorted(set(scope) - {"motion", "video"})
+    unknown = sorted(set(scope) - {"motion", "video", "sharing"})
     if unknown:
-        raise TandemError(f"--scope {unknown[0]}: expected motion or video")
+        raise TandemError(f"--scope {unknown[0]}: expected motion, video or sharing")
     path = of_subject / f"ses-{session}"
     try:
         path.mkdir(parents=True)

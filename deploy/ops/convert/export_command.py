@@ -26,6 +26,7 @@ class ExportFormat(StrEnum):
     PARQUET = "parquet"
     LEROBOT = "lerobot"
     BIDS = "bids"
+    SHARE = "share"
 
 
 WHOLE = (ExportFormat.FOXGLOVE, ExportFormat.PARQUET, ExportFormat.LEROBOT, ExportFormat.BIDS)
@@ -36,6 +37,7 @@ ENDINGS = {
     ExportFormat.FOXGLOVE: "_foxglove.mcap",
     ExportFormat.LEROBOT: "_lerobot",
     ExportFormat.BIDS: "_bids",
+    ExportFormat.SHARE: "_shared.mcap",
 }
 """What a name gets where it is not the format's own."""
 
@@ -46,7 +48,8 @@ def export_joints(
         ExportFormat,
         typer.Option(
             help="csv; bvh; mot (OpenSim); bag or mcap (ROS 2 bag of JointState, sqlite3 or mcap); foxglove "
-            "(for viewers); parquet (one table); lerobot (a dataset to learn from); bids (BIDS-Motion)."
+            "(for viewers); parquet (one table); lerobot (a dataset to learn from); bids (BIDS-Motion); "
+            "share (a copy without names, dates, hosts and pictures)."
         ),
     ] = ExportFormat.CSV,
     out: Annotated[
@@ -69,6 +72,10 @@ def export_joints(
         str | None, typer.Option(help="lerobot: what the robot does, in words. bids: one word.")
     ] = None,
     subject: Annotated[str, typer.Option(help="bids: the subject's code, never a name.")] = "01",
+    key: Annotated[
+        Path | None,
+        typer.Option(help="share: file of the secret that gives codes; a new one is made.", dir_okay=False),
+    ] = None,
     session: Annotated[str, typer.Option(help="bids: which session of that subject.")] = "1",
 ) -> None:
     """Write the joint angles of a recording as CSV, BVH, OpenSim .mot or a ROS 2 bag.
@@ -78,6 +85,9 @@ def export_joints(
 
     --to foxglove writes a copy for viewers such as Foxglove and Rerun: the robot with its frames, joints,
     pictures, guard, latency and log. They open it with no set-up.
+
+    --to share writes a copy for others: sensors, commands, encoders and marks, each message made anew without
+    texts; codes in place of names, dates shifted by years, no pictures. Motion itself can identify a person.
 
     Example: `tandem export morning.mcap --to bvh --of encoders --out morning.bvh`
     """
@@ -91,6 +101,14 @@ def export_joints(
     if ending and path.suffix.lower() != ending:
         raise TandemError(f"--out {path}: expected a name that ends in {ending}")
     skeleton = recorded_skeleton([file], profile)
+    if to is ExportFormat.SHARE:
+        from deploy.ops.convert.share import ShareKey, write_share
+
+        if key is None:
+            raise TandemError("export --to share: name the secret's file by --key, outside of what you share")
+        said = write_share(file, path, skeleton, ShareKey(key))
+        Console().print(f"{path}: {said}", highlight=False, markup=False, soft_wrap=True)
+        return
     if to in WHOLE:
         from deploy.ops.convert.whole import WholeOptions, write_whole
 

@@ -43,7 +43,9 @@ def start(
     consent: Annotated[str, typer.Option(help="Number of the signed consent form.")] = "",
     scope: Annotated[
         list[str] | None,
-        typer.Option(help="What was consented to: motion, video; repeat. Without video none is recorded."),
+        typer.Option(
+            help="What was consented to: motion, video, sharing; repeat. No pictures without video."
+        ),
     ] = None,
     language: Annotated[str, typer.Option(help="Of the steps' texts: en, zh.")] = "en",
 ) -> None:

@@ -105,7 +105,7 @@ def test_without_consent_for_it_no_video_is_recorded(tmp_path: Path) -> None:
     both = begin(tmp_path, CUP, "k7pd", scope=("motion", "video"))
     assert [s.may_record("tandem/robot-1/video/head") for s in (motion, both)] == [False, True]
     assert motion.may_record("tandem/robot-1/state")
-    with pytest.raises(TandemError, match="motion or video"):
+    with pytest.raises(TandemError, match="motion, video or sharing"):
         begin(tmp_path, CUP, "k7pd", scope=("all",))
 
 
