@@ -31,12 +31,8 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = record_run(folder, lambda world: (world.engage(), world.run(1.0)))
     whole = read_recording(run.master)
     path = folder / "session.mcap"
-    head = {
-        **whole.metadata,
-        "study_subject": "k7pd",
-        "study_scope": "motion sharing",
-        "connect": "tcp/ward-3:1",
-    }
+    study = {"study_subject": "k7pd", "study_scope": "motion sharing", "connect": "tcp/ward-3:1"}
+    head = {**whole.metadata, **study}
     with McapRecorder(path, head, capacity=100_000) as recorder:
         for entry in whole.entries:
             recorder.put(entry.topic, entry.payload, entry.monotonic_ns)
