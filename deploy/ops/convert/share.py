@@ -120,9 +120,9 @@ class _Copier:
                 command = decode(entry.payload, Command, self._joints)
                 operator = operator_of(entry.topic) or ""
                 self.names |= {robot, command.robot, operator} - {""}
-                plain = replace(command, robot=self._key.code("robot", command.robot), doubt="", lease=1)
+                bare = replace(command, robot=self._key.code("robot", command.robot), doubt="", lease=1)
                 of = f"{self._key.code('robot', robot)}/operator/{self._key.code('operator', operator)}"
-                return f"tandem/{of}/command", encode(plain)
+                return f"tandem/{of}/command", encode(bare)
         return None
 
 

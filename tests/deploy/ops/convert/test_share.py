@@ -16,6 +16,7 @@ from common.wire.codec import decode
 from common.wire.messages import Command, RobotState
 from deploy import cli
 from deploy.ops.convert.share import DAY_NS, ShareKey, write_share
+from deploy.sim.world.world import VirtualWorld
 from deploy.study.marks import MARK_TOPIC, NOW_TOPIC, Mark, MarkKind
 from tests.deploy.recorded.virtual import record_run
 
@@ -24,11 +25,16 @@ J = len(SKELETON.joints)
 pytestmark = pytest.mark.timeout(300)
 
 
+def follow(world: VirtualWorld) -> None:
+    world.engage()
+    world.run(1.0)
+
+
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of a session, with marks and a picture."""
     folder = tmp_path_factory.mktemp("share")
-    run = record_run(folder, lambda world: (world.engage(), world.run(1.0)))
+    run = record_run(folder, follow)
     whole = read_recording(run.master)
     path = folder / "session.mcap"
     study = {"study_subject": "k7pd", "study_scope": "motion sharing", "connect": "tcp/ward-3:1"}
@@ -63,7 +69,8 @@ def test_motion_is_kept_and_names_dates_texts_and_pictures_are_not(source: Path,
         assert 365 <= shift_ns // DAY_NS <= 3650
     commands = [[e for e in r.entries if e.topic.endswith("/command")] for r in (before, after)]
     for one, other in zip(*commands, strict=True):
-        assert np.array_equal(*(decode(e.payload, Command, J).position_rad for e in (one, other)))
+        sent, shared = (decode(e.payload, Command, J).position_rad for e in (one, other))
+        assert np.array_equal(sent, shared)
     marks = [json.loads(e.payload) for e in after.entries if e.topic == MARK_TOPIC]
     assert [(mark["kind"], mark["text"]) for mark in marks] == [("step", "reach"), ("event", "")]
 
