@@ -15,13 +15,14 @@ import can
 from common.can.batch import BatchReader, can_batch
 from common.can.config import BusConfig
 from common.can.controller import RESTARTED, Controller, error_words, of_error_frame
-from common.can.datagrams import DatagramReader, sends_datagrams
+from common.can.datagrams import DatagramFrames, sends_datagrams
 from common.can.echo import SentFrames
 from common.can.frame import EXTENDED, CanFrame
 from common.can.interface import descriptor, error_number, open_bus
 from common.can.kept_open import KeptOpenBus, OnChange, Opener, StateOf
 from common.can.netlink import state_of
 from common.can.reader import Reader
+from common.can.socket_reader import KernelFrames, SocketReader, is_socketcan
 from common.clock import monotonic_ns
 from common.metrics.bus import BusMetrics
 
@@ -125,13 +126,18 @@ class CanBus(KeptOpenBus):
         self._attempt = 0
 
     def _reader_of(self, bus: can.BusABC) -> Reader:
-        number = descriptor(bus)
+        number, failed = descriptor(bus), self._on_receive_error
         if number is not None and self._in_batches:
-            return BatchReader(number, self._on_batch, self._on_receive_error)
-        if number is not None and self._arrived is read_now and sends_datagrams(bus):
-            loop, fd = asyncio.get_running_loop(), self._config.fd
-            return DatagramReader(number, loop, fd, self._on_batch, self._on_message, self._on_receive_error)
-        return super()._reader_of(bus)
+            return BatchReader(number, self._on_batch, failed)
+        take: Callable[[bytes], None] | None = None
+        if sends_datagrams(bus):
+            take = DatagramFrames(self._config.fd, self._on_batch, self._on_message, failed).take
+        elif is_socketcan(bus):
+            take = KernelFrames(self._on_batch).take
+        # python-can tells the kernel's stamps
+        if number is None or take is None or self._arrived is not read_now:
+            return super()._reader_of(bus)
+        return SocketReader(number, asyncio.get_running_loop(), take, failed)
 
     def _on_batch(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
         """Data frames go on at once; what is rare takes the way of a python-can message."""

@@ -8,10 +8,6 @@ Whatever else a datagram holds is left to python-can, which knows what it is.
 
 from __future__ import annotations
 
-import asyncio
-import os
-import socket
-from collections.abc import Callable
 from contextlib import suppress
 
 import can
@@ -19,11 +15,10 @@ import msgpack
 from can.interfaces.udp_multicast import UdpMulticastBus
 from can.interfaces.udp_multicast.utils import unpack_message
 
-from common.can.reader import FRAMES_A_WAKE_UP, OnError, OnMessage
+from common.can.reader import OnError, OnMessage
+from common.can.socket_reader import OnFrames
 from common.clock import monotonic_ns
 
-_LONGEST = 4096
-"""Bytes of a datagram, as in python-can."""
 _FIELDS = 11
 """That python-can packs of a Message."""
 _STANDARD_IDS = 0x800
@@ -37,9 +32,6 @@ _BEFORE_DATA = b"\xa4data\xc4"
 
 _MOST_LENGTHS = 200
 """A stranger on the bus must not fill the memory."""
-
-OnFrames = Callable[[list[tuple[int, bytes, int]]], None]
-"""Takes data frames: identifier of 11 bits, data, when it was read in monotonic ns."""
 
 
 def sends_datagrams(bus: can.BusABC) -> bool:
@@ -98,47 +90,24 @@ class Likeness:
         return frame_id, datagram[self._data_at : self._after], self._fd
 
 
-class DatagramReader:
-    """Reads when the loop says that the bus can be read, as `reader.DescriptorReader` does."""
+class DatagramFrames:
+    """Takes datagrams of one bus."""
 
-    def __init__(
-        self,
-        number: int,
-        loop: asyncio.AbstractEventLoop,
-        fd: bool,
-        on_frames: OnFrames,
-        on_message: OnMessage,
-        on_error: OnError,
-    ) -> None:
-        """`number`: the socket's descriptor. `fd`: False drops frames of CAN FD, as python-can does."""
-        self._number, self._loop, self._fd = number, loop, fd
+    def __init__(self, fd: bool, on_frames: OnFrames, on_message: OnMessage, on_error: OnError) -> None:
+        """`fd`: False drops frames of CAN FD, as python-can does."""
+        self._fd = fd
         self._on_frames, self._on_message, self._on_failure = on_frames, on_message, on_error
-        self._stopped = False
         self._alike: dict[int, Likeness] = {}
         """By length of the datagram."""
-        self._wire = socket.socket(fileno=os.dup(number))
-        self._wire.setblocking(False)
-        loop.add_reader(number, self.read)
 
-    def read(self) -> None:
-        """Call back for each frame that waits, but not for ever."""
-        for _ in range(FRAMES_A_WAKE_UP):
-            if self._stopped:
-                return
-            try:
-                datagram = self._wire.recv(_LONGEST)
-            except BlockingIOError:
-                return
-            except OSError as error:
-                if not self._on_failure(can.CanOperationError(f"cannot be read: {error}", error.errno)):
-                    return
-                continue
-            alike = self._alike.get(len(datagram))
-            frame = (alike and alike.frame(datagram)) or self._unpacked(datagram)
-            if frame is None:
-                self._take_other(datagram)
-            elif self._fd or not frame[2]:
-                self._on_frames([(frame[0], frame[1], monotonic_ns())])
+    def take(self, datagram: bytes) -> None:
+        """One datagram, whatever it holds."""
+        alike = self._alike.get(len(datagram))
+        frame = (alike and alike.frame(datagram)) or self._unpacked(datagram)
+        if frame is None:
+            self._take_other(datagram)
+        elif self._fd or not frame[2]:
+            self._on_frames([(frame[0], frame[1], monotonic_ns())])
 
     def _unpacked(self, datagram: bytes) -> tuple[int, bytes, bool] | None:
         frame = data_frame(datagram)
@@ -157,13 +126,3 @@ class DatagramReader:
             return
         if self._fd or not message.is_fd:
             self._on_message(message)
-
-    def stop(self) -> None:
-        """Let go of the descriptor; it may be closed after this."""
-        if not self._stopped:
-            self._stopped = True
-            self._loop.remove_reader(self._number)
-            self._wire.close()
-
-    def join(self) -> None:
-        """There is nothing to wait for."""

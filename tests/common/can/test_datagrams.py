@@ -12,7 +12,8 @@ from can.interfaces.udp_multicast.utils import pack_message, unpack_message
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.can.datagrams import DatagramReader, Likeness, data_frame
+from common.can.datagrams import DatagramFrames, Likeness, data_frame
+from common.can.socket_reader import SocketReader
 
 NODE = can.Message(
     arbitration_id=0x6A5, is_extended_id=False, is_fd=True, bitrate_switch=True, data=bytes(24)
@@ -93,7 +94,8 @@ def test_a_bus_of_classic_can_hears_no_fd_frame_and_one_that_is_stopped_nothing(
         others: list[can.Message] = []
         with near, far:
             loop = asyncio.get_running_loop()
-            reader = DatagramReader(near.fileno(), loop, False, heard.extend, others.append, lambda _: True)
+            frames = DatagramFrames(False, heard.extend, others.append, lambda _: True)
+            reader = SocketReader(near.fileno(), loop, frames.take, lambda _: True)
             classic = can.Message(arbitration_id=0x105, is_extended_id=False, data=b"12")
             extended = can.Message(arbitration_id=0x105, is_extended_id=True, data=b"12")
             for message in (NODE, classic, extended, classic):
