@@ -12,14 +12,11 @@ import typer
 from rich.console import Console
 
 from common.errors import TandemError
-from deploy.experiments.prove.recorded import NodeRates, RecordedRun
-from deploy.experiments.prove.simulated import judge, simulate
 from deploy.experiments.prove.table import proof_table
 from deploy.measure.proof import ProofRow, prove
 from deploy.recorded.files import entries_of, head_of
 from deploy.recorded.recorded_config import recorded_config
 from deploy.report.options import AsJson
-from deploy.sim.world.hand_node import PLACES
 from master.suit.protocol import SuitProtocol
 
 DEFAULT_NODE = 100
@@ -71,6 +68,9 @@ def prove_motion(
     Example: `tandem prove morning.mcap --hand right_hand --node 100`
     """
     if simulate_over is not None:
+        # here: MuJoCo and scipy would cost each `tandem` command their time and memory
+        from deploy.experiments.prove.simulated import judge, simulate
+
         rows = judge(simulate(simulate_over, seconds, _planted(plant or ())))
     elif files:
         rows = _of_recording(files, hand, node, node_recording)
@@ -85,6 +85,8 @@ def prove_motion(
 
 
 def _planted(words: Sequence[str]) -> dict[str, int]:
+    from deploy.sim.world.hand_node import PLACES
+
     found: dict[str, int] = {}
     for word in words:
         place, _, ms = word.partition("=")
@@ -98,6 +100,8 @@ def _planted(words: Sequence[str]) -> dict[str, int]:
 
 
 def _of_recording(files: list[Path], hand: str, node: int, node_recording: Path | None) -> list[ProofRow]:
+    from deploy.experiments.prove.recorded import NodeRates, RecordedRun
+
     with recorded_config(head_of(files[0]), files[0].name) as config:
         if hand not in config.nodes:
             raise TandemError(f"--hand {hand}: expected a segment with a node: {', '.join(config.nodes)}")
