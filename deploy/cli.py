@@ -1,16 +1,11 @@
-"""`tandem`: composes the commands of all rooms, and turns errors into one line and a status."""
+"""`tandem`: composes the commands of all rooms."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 
 import typer
 
-from common.errors import TandemError
-from common.log.handler import describe_exception, flush_log, print_error
-from common.log.streams import lost_output, secure
-from common.process.extras import missing_extra
 from deploy.calibrate.commands import app as calibrate_app
 from deploy.calibrate.live.command import live
 from deploy.console.command import console
@@ -24,7 +19,7 @@ from deploy.experiments.faults.command import faults
 from deploy.experiments.prove.command import prove_motion
 from deploy.experiments.soak.command import soak
 from deploy.experiments.trial.command import app as trial_app
-from deploy.log_options import Debug, Quiet, add_log_options, debugging, start_chosen_log
+from deploy.log_options import Debug, Quiet, add_log_options, start_chosen_log
 from deploy.ops.alarms import alarms
 from deploy.ops.attitude.command import attitude
 from deploy.ops.audit import audit
@@ -54,6 +49,7 @@ from deploy.ops.suit.command import check
 from deploy.ops.video import video
 from deploy.ops.voice.command import voice
 from deploy.report.panels import arrange
+from deploy.run_app import run_app
 from deploy.sim.drives.process import drives
 from deploy.sim.suit.command import app as suit_app
 
@@ -84,10 +80,6 @@ for _command in _COMMANDS:
 app.command("prove")(prove_motion)
 app.command("import")(import_recording)
 app.command("export")(export_joints)
-EXIT_FAULT = 70
-"""Status after a fault that no person caused (`EX_SOFTWARE`)."""
-EXIT_OUTPUT = 74
-"""Status of a report that could not be written (`EX_IOERR`); an act that was done keeps its own status."""
 
 
 @app.callback()
@@ -103,37 +95,8 @@ arrange(app)
 
 
 def main() -> None:
-    """Entry point: errors a person can cause are one clear line each, and status 1."""
-    secure()
-    status = _run()
-    flush_log()
-    if status == 0 and not acted() and (why := lost_output()) is not None:
-        print_error("tandem", f"not all of the output could be written: {why}")
-        status = EXIT_OUTPUT
-    sys.exit(status)
-
-
-def _run() -> int:
-    """The status: 1 for what a person can mend, EXIT_FAULT for a fault of tandem itself."""
-    try:
-        app()
-    except SystemExit as done:
-        return done.code if isinstance(done.code, int) else int(done.code is not None)
-    except TandemError as error:
-        if debugging():
-            raise
-        print_error("tandem", str(error))
-        return 1
-    except Exception as error:
-        if debugging():
-            raise
-        if isinstance(error, ModuleNotFoundError) and (missing := missing_extra(error)):
-            print_error("tandem", missing)
-            return 1
-        fault = f"a fault of tandem itself: {describe_exception(error)}; with --debug it shows the traceback"
-        print_error("tandem", fault)
-        return EXIT_FAULT
-    return 0
+    """Entry point."""
+    run_app(app, acted)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from common.picture_code.cells import COLUMNS, FRAME, ROWS, count_in, resolve_ns
 from common.quaternion import Array
@@ -71,6 +70,8 @@ def _luma(rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _frames(dark: NDArray[np.bool_]) -> Iterator[Array]:
     """(4, 2) corners of each region that may be a frame."""
+    from scipy import ndimage  # 20 MB, which a console that only receives has no use for
+
     labels, _ = ndimage.label(dark)
     for number, box in enumerate(ndimage.find_objects(labels), start=1):
         high, wide = (side.stop - side.start for side in box)
@@ -124,6 +125,8 @@ def _projection(corners: Array) -> Array | None:
 
 def _sample(luma: NDArray[np.uint8], plane: Array, columns: Array, rows: Array) -> Array | None:
     """Luma between the four pixels around each point; the margin may lie outside of the picture."""
+    from scipy import ndimage  # 20 MB, which a console that only receives has no use for
+
     x, y, scale = np.tensordot(plane, np.stack((columns, rows, np.ones_like(rows))), axes=1)
     if (scale <= 1e-6).any():
         return None
