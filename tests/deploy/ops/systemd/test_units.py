@@ -53,7 +53,9 @@ def instances(tmp_path: Path) -> list[Path]:
     """The units as they would be started, with a program that is there."""
     here = shutil.which("true") or sys.executable
     for unit, instance in INSTANCES.items():
-        text = (FOLDER / unit).read_text("utf-8").replace(INSTALLED, here)
+        text = (FOLDER / unit).read_text("utf-8")
+        for program in (f"{INSTALLED}-console", INSTALLED):
+            text = text.replace(program, here)
         (tmp_path / instance).write_text(text.replace("/bin/ip ", f"{here} "), "utf-8")
     return [tmp_path / instance for instance in INSTANCES.values()]
 
