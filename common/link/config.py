@@ -95,6 +95,16 @@ class TopicConfig(Section):
         return topic.with_quality(self.reliable, self.priority, self.express)
 
 
+class TwinConfig(Section):
+    """`[link.twin]`: a second path beside `[link]`'s, such as a cellular one beside Wi-Fi.
+
+    All is sent on both, and what comes first counts. Both hosts need it.
+    """
+
+    listen: list[Endpoint] = Field(default_factory=list)
+    connect: list[Endpoint] = Field(default_factory=list)
+
+
 class LinkConfig(Section):
     """`[link]`: Zenoh endpoints, such as `tcp/192.168.7.2:7447`, `tls/…`, `quic/…`, `unixsock-stream/…`."""
 
@@ -114,6 +124,7 @@ class LinkConfig(Section):
     revoked: RelativePath | None = None
     """A list of certificates' names that are refused before they expire; it is read again while running."""
     access: AccessConfig | None = None
+    twin: TwinConfig | None = None
     topics: dict[str, TopicConfig] = Field(default_factory=dict)
 
     def quality(self, topic: Topic) -> Topic:
@@ -123,7 +134,44 @@ class LinkConfig(Section):
 
     def mistakes(self) -> list[ConfigMistake]:
         """Keys that do not fit each other; what of the installed Zenoh cannot work as asked."""
-        return [*self._mode_mistakes(), *self._security_mistakes(), *self._topic_mistakes()]
+        return [
+            *self._mode_mistakes(), *self._security_mistakes(), *self._topic_mistakes(),
+            *self._twin_mistakes(),
+        ]  # fmt: skip
+
+    @property
+    def second(self) -> LinkConfig | None:
+        """The link of the second path; None where there is one path."""
+        if self.twin is None:
+            return None
+        ends = {"listen": self.twin.listen, "connect": self.twin.connect, "twin": None}
+        return self.model_copy(update=ends)
+
+    @property
+    def all_listen(self) -> list[str]:
+        """Where sessions may connect to, on every path."""
+        return [*self.listen, *(self.twin.listen if self.twin else ())]
+
+    @property
+    def all_connect(self) -> list[str]:
+        """What is connected to, on every path."""
+        return [*self.connect, *(self.twin.connect if self.twin else ())]
+
+    def _twin_mistakes(self) -> list[ConfigMistake]:
+        second = self.second
+        if second is None:
+            return []
+        if self.mode == "client":
+            return [ConfigMistake("link.twin", "…", 'mode = "peer": two paths lead straight to the robot')]
+        if not (second.listen or second.connect):
+            return [ConfigMistake("link.twin", "…", "an endpoint under listen or connect")]
+        shared = {*self.listen, *self.connect} & {*second.listen, *second.connect}
+        same = [ConfigMistake("link.twin", end, "an endpoint that [link] does not have") for end in shared]
+        return same + [
+            ConfigMistake(f"link.twin.{each.key.removeprefix('link.')}", each.value, each.expected)
+            for each in second._security_mistakes()
+            if each.key.startswith(("link.listen", "link.connect"))
+        ]
 
     def _mode_mistakes(self) -> list[ConfigMistake]:
         if self.mode == "client" and self.listen:

@@ -12,6 +12,7 @@ import zenoh
 from common.clock import monotonic_ns
 from common.errors import CodecError
 from common.link.mailbox import MOST_KEYS, Mailbox
+from common.link.twin import FirstArrivals
 from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
 
@@ -35,6 +36,7 @@ class Inbox:
         self._loop = loop
         self._counters = counters
         self._mailbox: Mailbox[tuple[bytes, int]] = Mailbox(most_keys)
+        self._firsts = FirstArrivals()
         self._throttle = LogThrottle()
         self._closed = False
 
@@ -42,6 +44,12 @@ class Inbox:
         """Called in Zenoh's thread: stamp, copy, hand over, nothing else."""
         arrived_ns = monotonic_ns()
         if self._closed:
+            return
+        attachment = sample.attachment
+        if not self._firsts.is_first(
+            str(sample.key_expr), None if attachment is None else attachment.to_bytes()
+        ):
+            self._counters.duplicates = self._firsts.dropped
             return
         if self._mailbox.put(str(sample.key_expr), (sample.payload.to_bytes(), arrived_ns)):
             wake(self._loop, self._deliver)

@@ -16,7 +16,7 @@ from common.link.config import LinkConfig
 from common.link.congestion import check_congestion_control, set_congestion_control
 from common.link.link import Link
 from common.link.link_session import LinkSession, check_robot_name
-from common.link.opening import open_zenoh
+from common.link.opening import open_paths
 from common.link.revoked import RevocationFile
 from common.link.revoking import heeding
 
@@ -42,14 +42,14 @@ async def open_session(
         check_congestion_control(algorithm)
     revocations = None if config.revoked is None else RevocationFile(config.revoked)
     revoked = revocations.names if revocations else frozenset()
-    opened = await open_zenoh(config, mode, router_within_s, waits, revoked)
+    opened = await open_paths(config, mode, router_within_s, waits, revoked)
     session = LinkSession(opened, asyncio.get_running_loop(), config.quality, revoked)
     if algorithm is not None:
         set_congestion_control(algorithm)  # what the listening sockets accept inherits it
         session.watch_peers(partial(_choose_congestion, algorithm))
 
     async def open_again(refused: frozenset[str]) -> zenoh.Session:
-        return await open_zenoh(config, mode, math.inf, waits, refused)
+        return await open_paths(config, mode, math.inf, waits, refused)
 
     try:
         async with heeding(session, revocations, open_again):

@@ -17,6 +17,8 @@ class TopicCounters(Metrics):
     """Payloads that Zenoh refused."""
     received: int = 0
     """Payloads and questions that arrived."""
+    duplicates: int = 0
+    """Payloads that the other of two paths had brought already, or a newer one; see `[link.twin]`."""
     overwritten: int = 0
     """Payloads that a newer one replaced before the loop came to them."""
     handler_errors: int = 0

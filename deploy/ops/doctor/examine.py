@@ -77,7 +77,7 @@ async def examine(needs: Needs, options: Options, tree: Tree) -> list[Finding]:
         found.append(judge_switch(name, switch, pedal))
     if needs.estop is not None:
         found += judge_stops(read_stops(needs.estop), not needs.simulated, needs.reset_key)
-    found += [judge_endpoint(try_to_listen(endpoint)) for endpoint in needs.link.listen]
+    found += [judge_endpoint(try_to_listen(endpoint)) for endpoint in needs.link.all_listen]
     if options.reach:
         found += await others(needs)
     return found
@@ -131,7 +131,7 @@ def keys(needs: Needs) -> list[Finding]:
 
 async def others(needs: Needs) -> Sequence[Finding]:
     """Whom this host connects to, and the robots that it commands."""
-    knocked = await asyncio.gather(*(knock(endpoint) for endpoint in needs.link.connect))
+    knocked = await asyncio.gather(*(knock(endpoint) for endpoint in needs.link.all_connect))
     found = [judge_endpoint(facts) for facts in knocked]
     if not needs.robots:
         return found
@@ -140,7 +140,7 @@ async def others(needs: Needs) -> Sequence[Finding]:
     except LinkError as error:
         return [*found, fail("link", str(error), "mend [link] first")]
     found += [finding for facts in robots for finding in judge_robot(facts, software())]
-    reach = needs.link.model_copy(update={"listen": [], "access": None, "revoked": None})
+    reach = needs.link.model_copy(update={"listen": [], "twin": None, "access": None, "revoked": None})
     for facts in robots:
         if facts.guard:
             found += judge_path(await read_path(reach, facts.name))

@@ -65,7 +65,9 @@ async def read_robots(
     It only asks: it claims nothing, and listens at no endpoint, so a running master is not disturbed.
     """
     where = Destination(
-        link.model_copy(update={"listen": [], "access": None, "revoked": None}), tuple(robots), operator
+        link.model_copy(update={"listen": [], "twin": None, "access": None, "revoked": None}),
+        tuple(robots),
+        operator,
     )
     async with open_session(where.link, router_within_s=ROUTER_S) as session:
         services = TimeServices(clock or ClockConfig(source="round_trip"))

@@ -1,0 +1,175 @@
+"""Two paths as one link: the first copy counts, a cut path costs nothing, a question is handled once."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from functools import partial
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.link import Link, open_session
+from common.link.config import LinkConfig, TwinConfig
+from common.link.twin import NUMBER, FirstArrivals
+from common.wire.topics import COMMAND, CONTROL, STATE
+from deploy.harness.endpoints import free_port
+from tests.tcp_path import TcpPath
+
+ROBOT = "robot-1"
+
+
+@given(st.lists(st.integers(0, 30), max_size=60), st.lists(st.integers(0, 30), max_size=60))
+def test_each_number_is_taken_once_and_only_upwards(first: list[int], second: list[int]) -> None:
+    arrivals, taken = FirstArrivals(), []
+    for pair in zip(first, second, strict=False):
+        for number in pair:
+            if arrivals.is_first("key", NUMBER.pack(7, number)):
+                taken.append(number)
+    assert taken == sorted(set(taken))
+    heard = [number for pair in zip(first, second, strict=False) for number in pair]
+    assert (max(heard) if heard else None) == (taken[-1] if taken else None)
+    assert arrivals.dropped == len(heard) - len(taken)
+
+
+def test_a_sender_with_one_path_is_always_taken_and_keys_are_apart() -> None:
+    arrivals = FirstArrivals()
+    for attachment in (None, b"other"):
+        assert arrivals.is_first("key", attachment)
+        assert arrivals.is_first("key", attachment)
+    assert arrivals.is_first("a", NUMBER.pack(1, 1))
+    assert arrivals.is_first("b", NUMBER.pack(1, 1))
+    assert arrivals.is_first("a", NUMBER.pack(2, 1))
+    assert not arrivals.is_first("a", NUMBER.pack(1, 1))
+
+
+def test_contradictions_are_named() -> None:
+    end = "tcp/127.0.0.1:7447"
+    for config, key in (
+        (LinkConfig(connect=[end], mode="client", twin=TwinConfig(connect=["tcp/1.2.3.4:1"])), "link.twin"),
+        (LinkConfig(connect=[end], twin=TwinConfig()), "link.twin"),
+        (LinkConfig(connect=[end], twin=TwinConfig(connect=[end])), "link.twin"),
+        (LinkConfig(connect=[end], twin=TwinConfig(connect=["tls/1.2.3.4:1"])), "link.twin.connect"),
+    ):
+        assert [mistake.key for mistake in config.mistakes()] == [key]
+    assert LinkConfig(connect=[end], twin=TwinConfig(connect=["tcp/1.2.3.4:1"])).mistakes() == []
+
+
+def ends_with(heard: list[bytes], number: int) -> bool:
+    return bool(heard) and heard[-1] == str(number).encode()
+
+
+@asynccontextmanager
+async def two_hosts(twin: bool = True) -> AsyncIterator[tuple[Link, Link, TcpPath, TcpPath]]:
+    """The operator's link, the robot's, and the paths between them."""
+    ports = free_port("tcp"), free_port("tcp")
+    listen = [f"tcp/127.0.0.1:{port}" for port in ports]
+    robot = LinkConfig(listen=listen[:1], twin=TwinConfig(listen=listen[1:]) if twin else None)
+    async with (
+        TcpPath(ports[0]).open() as first,
+        TcpPath(ports[1]).open() as second,
+        open_session(robot) as there,
+    ):
+        ends = [f"tcp/127.0.0.1:{path.port}" for path in (first, second)]
+        operator = LinkConfig(connect=ends[:1], twin=TwinConfig(connect=ends[1:]) if twin else None)
+        async with open_session(operator) as here:
+            await here.link(ROBOT).connected()
+            await there.link(ROBOT).connected()
+            yield here.link(ROBOT), there.link(ROBOT), first, second
+
+
+async def until(reached: Callable[[], object], timeout_s: float = 20.0) -> None:
+    async with asyncio.timeout(timeout_s):
+        while not reached():  # noqa: ASYNC110  # what is waited for comes from Zenoh's threads
+            await asyncio.sleep(0.01)
+
+
+def test_every_message_comes_once_and_goes_on_when_one_path_is_cut() -> None:
+    async def story() -> None:
+        async with two_hosts() as (operator, robot, first, second):
+            heard: list[bytes] = []
+            robot.subscribe(COMMAND, lambda payload, _: heard.append(payload))
+            put = operator.publish(COMMAND.of("nurse-1"))
+            await until(lambda: put(b"?") or heard)
+            heard.clear()
+            for number in range(60):
+                first.cut = 20 <= number < 40
+                second.cut = number >= 45
+                put(str(number).encode())
+                await until(partial(ends_with, heard, number))
+            first.cut = second.cut = False
+            assert [each for each in heard if each != b"?"] == [str(n).encode() for n in range(60)]
+            assert robot.counters()[COMMAND.name].duplicates > 20
+
+    asyncio.run(story())
+
+
+def test_a_single_path_that_is_cut_delivers_nothing() -> None:
+    async def story() -> None:
+        async with two_hosts(twin=False) as (operator, robot, first, _):
+            heard: list[bytes] = []
+            robot.subscribe(COMMAND, lambda payload, _: heard.append(payload))
+            put = operator.publish(COMMAND.of("nurse-1"))
+            await until(lambda: put(b"?") or heard)
+            first.cut = True
+            heard.clear()
+            put(b"0")
+            with pytest.raises(TimeoutError):
+                await until(lambda: heard, timeout_s=0.5)
+            first.cut = False
+
+    asyncio.run(story())
+
+
+def test_a_question_on_both_paths_is_handled_once_and_answered_over_what_is_left() -> None:
+    async def story() -> None:
+        async with two_hosts() as (operator, robot, first, second):
+            asked: list[bytes] = []
+
+            def answer(payload: bytes, _: int) -> bytes:
+                asked.append(payload)
+                return b"answer to " + payload
+
+            robot.answer(CONTROL, answer)
+            topic = CONTROL.of("nurse-1")
+            await operator.connected(topic)
+            for number in range(12):
+                first.cut, second.cut = number in (4, 5, 6), number in (8, 9)
+                question = str(number).encode()
+                assert await operator.ask(topic, question) == b"answer to " + question
+            first.cut = second.cut = False
+            assert asked == [str(number).encode() for number in range(12)]
+
+    asyncio.run(story())
+
+
+def test_a_process_is_there_while_either_path_shows_it() -> None:
+    async def story() -> None:
+        async with two_hosts() as (operator, robot, first, _):
+            seen: list[bool] = []
+            operator.watch_presence(lambda _, here: seen.append(here))
+            states: list[bytes] = []
+            operator.subscribe(STATE, lambda payload, _: states.append(payload))
+            robot.declare_alive("slave", 5, ["tcp/x"])
+            await until(lambda: seen)
+            assert all(seen)
+            first.cut = True
+            put, before = robot.publish(STATE), len(seen)
+            # longer than Zenoh takes to give up the path that is cut
+            for number in range(100):
+                put(str(number).encode())
+                await asyncio.sleep(0.03)
+            await until(partial(ends_with, states, 99))
+            assert seen[before:] == []
+            first.cut = False
+
+    asyncio.run(story())
+
+
+def test_both_paths_are_named() -> None:
+    twin = TwinConfig(listen=["tcp/1.2.3.4:1"], connect=["tcp/1.2.3.4:2"])
+    config = LinkConfig(listen=["tcp/1.2.3.5:1"], twin=twin)
+    assert config.all_listen == ["tcp/1.2.3.5:1", "tcp/1.2.3.4:1"]
+    assert config.all_connect == ["tcp/1.2.3.4:2"]
