@@ -119,8 +119,10 @@ def test_a_robot_that_does_not_fit_is_not_taken_and_that_is_said_once(schema: in
 def test_a_robot_that_was_let_go_is_not_claimed_again_by_itself() -> None:
     desk = Desk()
     desk.shows()
-    desk.heard(S, operator=ME)
+    desk.heard(S)
     assert not desk.watched.may_claim("a", 2 * S, 2 * S), "what came before the loss says nothing of it"
+    desk.heard(2 * S, operator=ME)
+    assert not desk.watched.may_claim("a", 2 * S, S), "its summary still names the lease that was lost"
     desk.heard(2 * S + 1, let_go_by=ME)
     assert not desk.watched.may_claim("a", 2 * S + 1, 2 * S)
     assert desk.lets_go(2 * S + 1, lost_ns=2 * S)
