@@ -44,7 +44,7 @@ class RobotMotion:
         self.damper = DistanceDamper(skeleton, config.guard.self_margin_cm, config.guard.zones)
         self.limiter = SetpointLimiter(skeleton.joint_names, limits, self.damper)
         self.reflex = ContactReflex(config.contact, contact, skeleton.joint_names)
-        self.torque_limit = TorqueLimit(skeleton, config.contact, contact.observer.model)
+        self.torque_limit = TorqueLimit(config.contact)
         self.blind = BlindDistance(
             skeleton, limits, config.guard.max_blind_cm, 1.0 / config.loop.rate_hz, config.guard.zones
         )
@@ -79,6 +79,7 @@ class RobotMotion:
         self.target = None
         if permission.seat_rad is not None:
             self.limiter.seat(permission.seat_rad)
+            self._contact.moved()
         if not permission.ready:
             return None
         target = self.target = self._track(guard, now_ns, permission)
@@ -91,10 +92,9 @@ class RobotMotion:
             self._limit(guard, now_ns, permission, target)
             self.reflex.followed(now_ns, guard.stand_rad)
         setpoint = self.limiter.setpoint
+        foretold = self._contact.wrote(permission.dt_s, guard.stand_rad, setpoint.position_rad)
         if target is not None:
-            torque_nm = self.torque_limit.step(
-                permission.dt_s, guard.stand_rad, setpoint.position_rad, self._contact.floor_nm
-            )
+            torque_nm = self.torque_limit.step(permission.dt_s, *foretold, self._contact.limit_floor_nm)
             setpoint = replace(setpoint, torque_nm=torque_nm)
         return setpoint
 

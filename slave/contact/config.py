@@ -38,8 +38,8 @@ class ContactConfig(Section):
     reflex: Reflex = Field(Reflex.RETREAT, strict=False)
     """What follows the protective stop."""
     time_constant_s: float | None = Field(None, ge=0.002, le=0.1)
-    """1/K of the observer: shorter is sooner, and raises the thresholds with its inverse square. Not set:
-    10 ms by the 12-bit output encoders, 4 ms where the drives tell their own, finer angles."""
+    """Shortest 1/K of the observer: shorter is sooner, and raises the thresholds with its inverse square. Not
+    set: 10 ms by the 12-bit output encoders, 4 ms where the drives tell their own, finer angles."""
     model_error: float = Field(0.15, ge=0.0, le=1.0)
     """Share of the torque that the model asks for by which it may be wrong: masses, payload, gears."""
     effort_late_s: float = Field(0.006, ge=0.0, le=0.05)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -13,6 +14,10 @@ from common.skeleton import Skeleton
 from slave.contact.stamps import SETTLED, StampNoise
 from slave.model.build import build_model, unit_rates
 
+ROWS = 6
+"""What passes the poles: the residual, two ways to tell the model's part, torques' rise, fall and jumps."""
+SUDDEN = 2.0 * 0.27
+"""Peak of s / (1 + s T)³ for a unit step, times T, and as much again: no drive is just as its model says."""
 LONGEST_S = 0.025
 """With more time than this between two readings it is not known what happened meanwhile: begin anew."""
 
@@ -27,16 +32,25 @@ class MomentumObserver:
     """
 
     def __init__(
-        self, skeleton: Skeleton, time_constant_s: float, model: mujoco.MjModel | None = None
+        self,
+        skeleton: Skeleton,
+        time_constants_s: Sequence[float],
+        model: mujoco.MjModel | None = None,
+        effort_late_s: float = 0.0,
     ) -> None:
-        """`time_constant_s`: 1/K. `model`: the robot's; None: that of the skeleton."""
+        """`time_constants_s` (T,): each 1/K, ascending. `model`: the robot's; None: that of the skeleton.
+
+        Motor torques may be `effort_late_s` older than the angles beside them.
+        """
+        self._late_s = effort_late_s
         self.model = build_model(skeleton) if model is None else model
         self.data = mujoco.MjData(self.model)
         # fetched once, as every access builds a new view
         self._hinge_rad, self._hinge_rad_s = self.data.qpos, self.data.qvel
         self.rates: Array = unit_rates(skeleton, self.model)
         """(J, hinges)"""
-        self._time_constant_s = time_constant_s
+        self._time_constants_s = tuple(time_constants_s)
+        self._by_constant = np.array(time_constants_s)[:, None, None]
         self._inertial, self._bias = np.empty(self.model.nv), np.empty(self.model.nv)
         self._inertia = np.empty((self.model.nv, self.model.nv))
         self._joint_rates = np.abs(self.rates)
@@ -49,45 +63,68 @@ class MomentumObserver:
         self._step_s = 0.0
         self._known_s = 0.0
         self._position_rad, self._velocity_rad_s, self._effort_nm = np.zeros((3, joints))
-        self._poles = np.zeros((3, 3, joints))
-        self._value = np.zeros((3, joints))
+        self._poles = np.zeros((3, len(self._time_constants_s), ROWS, joints))
+        self._value = np.zeros((ROWS, joints))
         self._unheard = False
         """Whether a torque was not known in the last reading."""
-        self._stamps: StampNoise | None = None
-        """None while all stamps are exact."""
+        self._stamps: list[StampNoise] = []
+        """By time constant; none while all stamps are exact."""
 
     @property
     def ready(self) -> bool:
-        """Whether the estimate no longer depends on how it began."""
-        return self._known_s > SETTLED * self._time_constant_s
+        """Whether no estimate depends any more on how it began."""
+        return self._known_s > SETTLED * self._time_constants_s[-1]
+
+    @property
+    def residuals_nm(self) -> Array:
+        """(T, J) the residual r by time constant, positive where it is pushed in a joint's direction."""
+        out: Array = self._poles[2, :, 0]
+        return out
 
     @property
     def external_nm(self) -> Array:
-        """(J,) the residual r, positive where the robot is pushed in a joint's positive direction."""
-        out: Array = self._poles[2, 0]
+        """(J,) the residual of the shortest time constant."""
+        out: Array = self._poles[2, 0, 0]
         return out
 
     @property
     def model_nm(self) -> Array:
-        """(J,) |M q̈| + |C q̇ + g| after the same poles: what an error of the model would be a share of."""
-        out: Array = self._poles[2, 1]
+        """(T, J) what an error of the model would be a share of, after the same poles.
+
+        |M q̈| + |C q̇ + g|, where |M q̈| = |τ - C q̇ - g| as long as nothing pushes: of both the lesser counts.
+        A robot that is brought to a stop by somebody is slowed by no torque of its motors.
+        """
+        out: Array = np.minimum(self._poles[2, :, 1], self._poles[2, :, 2])
         return out
 
     @property
-    def effort_rate_nm_s(self) -> Array:
-        """(J,) |dτ/dt| after the same poles: what a torque that comes late is wrong by for each second."""
-        out: Array = self._poles[2, 2]
-        return out
+    def late_nm(self) -> Array:
+        """(T, J) what torques that come late feign at most, in the residual's direction.
+
+        A torque that rises is told too small, which feigns a push in its direction, and none against it.
+        A jump by Δ that is told L late feigns at most the pulse's answer, 0.27 Δ L / T.
+        """
+        seen = self._poles[2]
+        signed_nm = self._late_s * np.where(seen[:, 0] < 0.0, seen[:, 4], seen[:, 3])
+        jumps_nm = SUDDEN * self._late_s / self._by_constant[:, 0] * seen[:, 5]
+        return np.asarray(np.maximum(signed_nm, jumps_nm))
 
     @property
     def stamp_nm(self) -> Array | float:
-        """(J,) what the errors of the readings' stamps can feign at most; 0 where stamps are exact."""
-        return 0.0 if self._stamps is None else self._stamps.feigned_nm
+        """(T, J) what the errors of the readings' stamps can feign at most; 0 where stamps are exact."""
+        return np.array([one.feigned_nm for one in self._stamps]) if self._stamps else 0.0
 
-    def update(self, read_ns: int, position_rad: Array, effort_nm: Array, stamp_error_s: float = 0.0) -> None:
+    def update(
+        self,
+        read_ns: int,
+        position_rad: Array,
+        effort_nm: Array,
+        stamp_error_s: float = 0.0,
+        sudden_nm: Array | float = 0.0,
+    ) -> None:
         """Take angles and motor torques (J,) read at one time, ns; NaN torques make NaN residuals.
 
-        The angles may have been taken `stamp_error_s` earlier or later.
+        The angles may have been taken `stamp_error_s` earlier or later. Torques may jump by `sudden_nm` (J,).
         """
         before_ns, self._read_ns = self._read_ns, read_ns
         if before_ns is None:
@@ -103,13 +140,19 @@ class MomentumObserver:
         if self._step_s > 0.0:
             between_s = 0.5 * (self._step_s + step_s)
             effort_rate = (effort_nm - self._effort_nm) / step_s
-            self._advance(velocity, between_s, 0.5 * (self._effort_nm + effort_nm), effort_rate)
+            efforts = 0.5 * (self._effort_nm + effort_nm), effort_rate, sudden_nm
+            self._advance(velocity, between_s, *efforts)
             self._doubt_stamp(step_s, stamp_error_s)
         self._position_rad, self._velocity_rad_s = position_rad, velocity
         self._effort_nm, self._step_s = effort_nm, step_s
 
     def _advance(
-        self, velocity_rad_s: Array, elapsed_s: float, effort_nm: Array, effort_rate_nm_s: Array
+        self,
+        velocity_rad_s: Array,
+        elapsed_s: float,
+        effort_nm: Array,
+        effort_rate_nm_s: Array,
+        sudden_nm: Array | float,
     ) -> None:
         """Move on from the middle of the last interval to that of this one, around the last reading."""
         model, data, rates = self.model, self.data, self.rates
@@ -126,13 +169,16 @@ class MomentumObserver:
         value = self._value
         value[0] = inertial + bias - effort_nm
         value[1] = np.abs(inertial) + np.abs(bias)
-        value[2] = np.abs(effort_rate_nm_s)
+        value[2] = np.abs(effort_nm - bias) + np.abs(bias)
+        value[3] = np.maximum(effort_rate_nm_s, 0.0)
+        value[4] = value[3] - effort_rate_nm_s
+        value[5] = sudden_nm
         unheard = math.isnan(value.sum())
         if unheard or self._unheard:
             # a joint that is heard again begins anew
             np.copyto(self._poles, 0.0, where=np.isnan(self._poles) & ~np.isnan(value))
         self._unheard = unheard
-        share = -math.expm1(-elapsed_s / self._time_constant_s)
+        share = -np.expm1(-elapsed_s / self._by_constant)
         for pole in self._poles:
             pole += share * (value - pole)
             value = pole
@@ -140,11 +186,13 @@ class MomentumObserver:
 
     def _doubt_stamp(self, step_s: float, error_s: float) -> None:
         """Note how wrong the newest stamp may be, beside the momentum that `_advance` has just worked out."""
-        if self._stamps is None:
+        if not self._stamps:
             if not error_s:
                 return
-            self._stamps = StampNoise(len(self.rates), self._time_constant_s)
+            self._stamps = [StampNoise(len(self.rates), each) for each in self._time_constants_s]
         model, data = self.model, self.data
         mujoco.mj_fullM(model, data, self._inertia)
         turning = np.abs(self._inertia) @ np.abs(self._hinge_rad_s)
-        self._stamps.add(step_s, error_s, self._joint_rates @ turning)
+        momentum = self._joint_rates @ turning
+        for stamps in self._stamps:
+            stamps.add(step_s, error_s, momentum)

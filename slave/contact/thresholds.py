@@ -17,6 +17,8 @@ from slave.model.own import leader
 
 DRIVE_STEP_RAD = 2.0 * np.pi / (1 << 16)
 """At the joint's output, of a drive's own encoder: 13 bits behind a gear of 8; most are finer."""
+BY_OUTPUTS_S, BY_DRIVES_S = (0.01, 0.02), (0.004, 0.01)
+"""Time constants by the 12-bit output encoders, and by drives' own angles."""
 COUNTS = 2.25
 """So many counts of every encoder may change at once. Seen in an hour of motions: see README.md."""
 TORQUE_NOISE = 0.02
@@ -31,21 +33,23 @@ _STEP_RESPONSE = 0.2306
 
 @dataclass(frozen=True, slots=True)
 class Angles:
-    """Whose angles the observer takes: their steps, and the time constant that suits them."""
+    """Whose angles the observer takes: their steps, and the time constants that suit them."""
 
     step_rad: float
-    time_constant_s: float
+    time_constants_s: tuple[float, ...]
+    """Ascending. The shortest notices what grows fast, the others what is weak."""
 
 
 def angles_of(config: ContactConfig, *, drives: bool) -> Angles:
     """The drives' own where they tell them, else the output encoders'."""
-    usual_s, step_rad = (0.004, DRIVE_STEP_RAD) if drives else (0.01, RAD_PER_COUNT)
-    return Angles(step_rad, config.time_constant_s or usual_s)
+    usual_s, step_rad = (BY_DRIVES_S, DRIVE_STEP_RAD) if drives else (BY_OUTPUTS_S, RAD_PER_COUNT)
+    shortest_s = config.time_constant_s or usual_s[0]
+    return Angles(step_rad, (shortest_s, *(each for each in usual_s if each > shortest_s)))
 
 
 @cache
 def noise_nm(skeleton: Skeleton, model: mujoco.MjModel, angles: Angles) -> Array:
-    """(J,) torque that the steps of quantised angles alone can feign, N m.
+    """(T, J) torque that the steps of quantised angles alone can feign, N m.
 
     A count that changes is a momentum M Δq̇ that comes and goes. The worst of four postures, the joints'
     couplings included.
@@ -61,19 +65,20 @@ def noise_nm(skeleton: Skeleton, model: mujoco.MjModel, angles: Angles) -> Array
             mujoco.mj_mulM(model, data, product, rate)
             feigned += np.abs(rates @ product)
         most = np.maximum(most, feigned)
-    out: Array = most * (COUNTS * _STEP_RESPONSE * angles.step_rad / angles.time_constant_s**2)
+    constants_s = np.array(angles.time_constants_s)[:, None]
+    out: Array = most * (COUNTS * _STEP_RESPONSE * angles.step_rad / constants_s**2)
     return out
 
 
 def thresholds_nm(skeleton: Skeleton, model: mujoco.MjModel, config: ContactConfig, angles: Angles) -> Array:
-    """(J,) thresholds at rest, N m; infinite for joints that are not watched: fingers that are not named."""
+    """(T, J) thresholds at rest, N m; infinite for joints that are not watched: unnamed fingers."""
     out = noise_nm(skeleton, model, angles).copy()
     for j, joint in enumerate(skeleton.joints):
         angle, ratio = leader(joint)
         limit_nm = model.jnt_actfrcrange[model.joint(angle).id, 1] * abs(ratio)
-        out[j] = max(LEAST_NM, out[j] + TORQUE_NOISE * limit_nm)
+        out[:, j] = np.maximum(LEAST_NM, out[:, j] + TORQUE_NOISE * limit_nm)
         if joint.name in config.joints:
-            out[j] = config.joints[joint.name].threshold_nm
+            out[:, j] = config.joints[joint.name].threshold_nm
         elif limit_nm < FEEBLE_NM:
-            out[j] = np.inf
+            out[:, j] = np.inf
     return out

@@ -13,6 +13,7 @@ from common.quaternion import Array
 from common.skeleton import Skeleton
 from common.wire.messages import Mask
 from slave.contact.config import ContactConfig
+from slave.contact.foretold import ForetoldTorque
 from slave.contact.least_push import least_push_n, push_words
 from slave.contact.observer import MomentumObserver
 from slave.contact.payload import loaded_model
@@ -48,7 +49,11 @@ class ContactWatch:
         self._model = model = loaded_model(skeleton, payload) if payload else _model(skeleton)
         self._config = config
         self._skeleton = skeleton
+        self._foretold = ForetoldTorque(skeleton, config.drive_hz, model)
         self._tune(drives=False)
+        self.limit_floor_nm: Array = self._floors_nm[0]
+        """(J,) what `TorqueLimit` stands on: the output encoders' thresholds of what is sudden, even where
+        drives tell finer angles. With less, drives reach their limits where nobody is touched (README.md)."""
         self.finding: str | None = None
         """Who is pushed and how hard, in words, for as long as it lasts; None: nobody."""
         self._also: str | None = None
@@ -70,9 +75,13 @@ class ContactWatch:
         """To the drives' own angles, or to the output encoders'."""
         angles = angles_of(self._config, drives=drives)
         self._by_drives = drives
-        self.observer = MomentumObserver(self._skeleton, angles.time_constant_s, self._model)
-        self.floor_nm = thresholds_nm(self._skeleton, self._model, self._config, angles)
-        """(J,) thresholds of a robot whose motors do nothing."""
+        self.observer = MomentumObserver(
+            self._skeleton, angles.time_constants_s, self._model, self._config.effort_late_s
+        )
+        self._floors_nm = thresholds_nm(self._skeleton, self._model, self._config, angles)
+        """(T, J) by time constant."""
+        self.floor_nm: Array = self._floors_nm.min(axis=0)
+        """(J,) thresholds of a robot whose motors do nothing, for what lasts."""
         self.dull = push_words(least_push_n(self._skeleton, self.floor_nm), drives)
         """Below which force no push is noticed, in words."""
 
@@ -84,16 +93,27 @@ class ContactWatch:
         return self.observer.external_nm.copy()
 
     @property
-    def threshold_nm(self) -> Array:
-        """(J,) thresholds now: the more torque motion takes and the faster it changes, the higher."""
-        seen, config = self.observer, self._config
-        out: Array = (
-            self.floor_nm
-            + config.model_error * seen.model_nm
-            + config.effort_late_s * seen.effort_rate_nm_s
-            + seen.stamp_nm
-        )
+    def least_threshold_nm(self) -> Array:
+        """(J,) thresholds now of what lasts."""
+        out: Array = self._thresholds_nm.min(axis=0)
         return out
+
+    @property
+    def _thresholds_nm(self) -> Array:
+        """(T, J) by time constant."""
+        seen, config = self.observer, self._config
+        out: Array = self._floors_nm + config.model_error * seen.model_nm + seen.late_nm + seen.stamp_nm
+        return out
+
+    @property
+    def threshold_nm(self) -> Array:
+        """(J,) thresholds of `external_nm` now: the more torque motion takes and changes, the higher."""
+        out: Array = self._thresholds_nm[0]
+        return out
+
+    def moved(self) -> None:
+        """The robot has been seated somewhere else: what was foretold is over."""
+        self._foretold.forget()
 
     def missing(self, now_ns: int) -> str:
         """Which joints' contact is not noticed now, and why; empty where all that matter are watched."""
@@ -127,18 +147,28 @@ class ContactWatch:
         if by_drives != self._by_drives:
             self._tune(drives=by_drives)
         angle_rad = reading.drive_rad if by_drives and reading.drive_rad is not None else position_rad
-        self.observer.update(reading.read_ns, angle_rad, effort, to_s(reading.stamp_error_ns))
+        self.observer.update(
+            reading.read_ns, angle_rad, effort, to_s(reading.stamp_error_ns), self._foretold.sudden_nm
+        )
         if not self.observer.ready:
             return
         self._ready_ns = now_ns
-        share = np.where(self._told, np.abs(self.observer.external_nm) / self.threshold_nm, 0.0)
-        self.share = share
+        shares = np.abs(self.observer.residuals_nm) / self._thresholds_nm
+        self.share = share = np.where(self._told, shares.max(axis=0), 0.0)
         pushed = share > 1.0
         if pushed.any():
             self.count += self.finding is None
             self.finding = self._describe(pushed)
         elif self.finding is not None and (share < RELEASE).all():
             self.finding = None
+
+    def wrote(self, dt_s: float, stand_rad: Array, setpoint_rad: Array) -> tuple[Array, Array]:
+        """Note the setpoints (J,) that are written now: the drives will give torques for them.
+
+        Returns M q'' and C q' + g (J,), N m at the joint, as they are foretold. `stand_rad` (J,): where the
+        joints are, when it begins.
+        """
+        return self._foretold.step(dt_s, stand_rad, setpoint_rad)
 
     def also(self, finding: str | None) -> None:
         """Something else says that the robot is pushed, after a look: a zone's force limit."""
@@ -159,7 +189,7 @@ class ContactWatch:
         """The outermost joint that is pushed, its torque, and the least force that makes it."""
         j = max(np.flatnonzero(pushed).tolist(), key=lambda joint: self._depth[joint])
         joint = self._skeleton.joints[j]
-        torque_nm = abs(float(self.observer.external_nm[j]))
+        torque_nm = float(np.abs(self.observer.residuals_nm[:, j]).max())
         model = self.observer.model
         segment = model.body(model.jnt_bodyid[self._hinge_ids[j]]).name
         force_n = torque_nm / self._lever_m(int(self._hinge_ids[j]))

@@ -119,7 +119,7 @@ def _watch(run: OperatedRobot, speed_m_s: float, towards: Array) -> Impact:
     ahead: list[float] = []
     stopped_s: float | None = None
     reach_nm_n = np.abs(robot.torques_of(towards))
-    threshold_nm = run.pipeline.contact.threshold_nm.copy()
+    threshold_nm = run.pipeline.contact.least_threshold_nm.copy()
     begin_ns = run.now_ns
     while run.now_ns - begin_ns < WATCHES_S * 1e9:
         run.tick()

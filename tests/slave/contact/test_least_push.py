@@ -65,10 +65,10 @@ def test_finer_angles_notice_less_and_the_words_say_whose() -> None:
     watch = ContactWatch(NURSING, ContactConfig())
     coarse = watch.dull
     watch._tune(drives=True)
-    assert "by the output encoders no push is noticed below 6 N at left_hand, right_hand" in coarse
-    assert "30 N at left_upper_arm, right_upper_arm" in coarse
-    assert "by the drives' angles no push is noticed below 4 N at left_hand, right_hand" in watch.dull
-    assert "15 N at left_upper_arm, right_upper_arm" in watch.dull
+    assert "by the output encoders no push is noticed below 3 N at left_hand, right_hand" in coarse
+    assert "11 N at left_upper_arm, right_upper_arm" in coarse
+    assert "by the drives' angles no push is noticed below 2 N at left_forearm, left_hand," in watch.dull
+    assert "6 N at left_upper_arm, right_upper_arm" in watch.dull
     assert push_words({}, drives=True) == ""
 
 

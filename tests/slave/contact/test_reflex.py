@@ -133,11 +133,11 @@ def test_an_estop_ends_it() -> None:
 def test_floating_gives_way_to_a_push_and_stands_without_one() -> None:
     robot = Raised(ContactConfig(reflex=Reflex.FLOAT))
     pushed = robot.watch.observer._poles
-    pushed[2, 0, SHOULDER] = -1.2 * robot.watch.threshold_nm[SHOULDER]
+    pushed[2, :, 0, SHOULDER] = -1.2 * robot.watch.threshold_nm[SHOULDER]
     course = robot.step(100)
     assert course[-1] < course[0] - 0.05
     assert np.abs(np.diff(course)).max() <= SLOW_RAD_S * 0.005 + 1e-9
-    pushed[2, 0, SHOULDER] = -0.4 * robot.watch.threshold_nm[SHOULDER]
+    pushed[2, :, 0, SHOULDER] = -0.4 * robot.watch.threshold_nm[SHOULDER]
     rest = robot.step(200)
     assert rest[-1] == rest[-50]
 

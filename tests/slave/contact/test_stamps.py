@@ -38,7 +38,7 @@ def turning(
         position[YAW] = RATE_RAD_S * (step_s * k + ERROR_S * error)
         observer.update(round(1e9 * step_s * (k + 1)), position, np.zeros(25), told[k])
         residual.append(observer.external_nm[YAW])
-        feigned.append(observer.stamp_nm[YAW] if isinstance(observer.stamp_nm, np.ndarray) else 0.0)
+        feigned.append(observer.stamp_nm[0, YAW] if isinstance(observer.stamp_nm, np.ndarray) else 0.0)
     return np.array(residual), np.array(feigned)
 
 
@@ -49,12 +49,14 @@ def test_the_worst_signs_feign_what_is_said(step_s: float, time_constant_s: floa
     # the impulse response, and with it the signs that add up
     impulse = np.zeros(4 * count)
     impulse[count:] = 1.0
-    residual, _ = turning(MomentumObserver(SKELETON, time_constant_s, MODEL), step_s, impulse, 0.0)
+    residual, _ = turning(MomentumObserver(SKELETON, (time_constant_s,), MODEL), step_s, impulse, 0.0)
     answer = np.diff(residual[count - 1 :])
     assert len(weights(share, count)) == count
     signs = np.sign(answer[:count])[::-1]
     errors = np.concatenate([np.zeros(2 * count), np.where(signs == 0.0, 1.0, signs)])
-    residual, feigned = turning(MomentumObserver(SKELETON, time_constant_s, MODEL), step_s, errors, ERROR_S)
+    residual, feigned = turning(
+        MomentumObserver(SKELETON, (time_constant_s,), MODEL), step_s, errors, ERROR_S
+    )
     assert abs(residual[-1]) <= 1.02 * feigned[-1]
     assert abs(residual[-1]) > 0.85 * feigned[-1]
 
@@ -62,7 +64,7 @@ def test_the_worst_signs_feign_what_is_said(step_s: float, time_constant_s: floa
 @given(st.lists(st.floats(-1.0, 1.0), min_size=20, max_size=40), st.sampled_from([0.004, 0.005, 0.02]))
 def test_no_signs_feign_more(signs: list[float], step_s: float) -> None:
     errors = np.array([0.0, 0.0, *signs])
-    residual, feigned = turning(MomentumObserver(SKELETON, 0.01, MODEL), step_s, errors, ERROR_S)
+    residual, feigned = turning(MomentumObserver(SKELETON, (0.01,), MODEL), step_s, errors, ERROR_S)
     assert (np.abs(residual[2:]) <= 1.02 * feigned[2:] + 1e-9).all()
 
 
@@ -70,14 +72,14 @@ def test_no_signs_feign_more(signs: list[float], step_s: float) -> None:
 def test_one_wrong_stamp_also_spoils_the_velocity_it_is_judged_by(sign: float) -> None:
     errors = np.zeros(60)
     errors[20] = sign
-    observer = MomentumObserver(SKELETON, 0.01, MODEL)
+    observer = MomentumObserver(SKELETON, (0.01,), MODEL)
     residual, feigned = turning(observer, 0.004, errors, ERROR_S * np.abs(errors))
     # what is forgotten after twelve time constants is less than a thousandth
     assert (np.abs(residual) <= feigned + 1e-4).all()
 
 
 def test_exact_stamps_cost_nothing() -> None:
-    _, feigned = turning(MomentumObserver(SKELETON, 0.004, MODEL), 0.005, np.zeros(30), 0.0)
+    _, feigned = turning(MomentumObserver(SKELETON, (0.004,), MODEL), 0.005, np.zeros(30), 0.0)
     assert (feigned == 0.0).all()
 
 

@@ -8,7 +8,8 @@ import pytest
 from common.quaternion import Array
 from common.skeleton import load_skeleton
 from slave.contact.config import ContactConfig
-from slave.contact.torque_limit import KEPT_S, LONGEST_S, MARGIN, TorqueLimit
+from slave.contact.foretold import KEPT_S, LONGEST_S, ForetoldTorque
+from slave.contact.torque_limit import MARGIN, TorqueLimit
 from slave.contact.watch import ContactWatch
 from slave.model.build import build_model
 from slave.servos.mujoco.simulated import CYCLE_NS, SimulatedRobot
@@ -17,14 +18,30 @@ SKELETON = load_skeleton("nursing")
 J = len(SKELETON.joints)
 SHOULDER = SKELETON.joint_names.index("right_shoulder_pitch")
 FINGERS = np.isinf(ContactWatch(SKELETON, ContactConfig()).floor_nm)
-FLOOR_NM = ContactWatch(SKELETON, ContactConfig()).floor_nm
+FLOOR_NM = ContactWatch(SKELETON, ContactConfig()).limit_floor_nm
 REST = np.clip(np.zeros(J), SKELETON.lower_rad, SKELETON.upper_rad)
 DT_S = 1e-9 * CYCLE_NS
 
 
-def limit(drive_hz: float = 8.0, model_error: float = 0.15) -> TorqueLimit:
-    config = ContactConfig(drive_hz=drive_hz, model_error=model_error)
-    return TorqueLimit(SKELETON, config, build_model(SKELETON))
+class Limit:
+    """Limits by what is foretold."""
+
+    def __init__(self, config: ContactConfig) -> None:
+        self._foretold = ForetoldTorque(SKELETON, config.drive_hz, build_model(SKELETON))
+        self._limit = TorqueLimit(config)
+
+    def step(self, dt_s: float, stand_rad: Array, setpoint_rad: Array, floor_nm: Array) -> Array | None:
+        if not 0.0 < dt_s <= LONGEST_S:
+            self._limit.forget()
+        return self._limit.step(dt_s, *self._foretold.step(dt_s, stand_rad, setpoint_rad), floor_nm)
+
+    def forget(self) -> None:
+        self._foretold.forget()
+        self._limit.forget()
+
+
+def limit(drive_hz: float = 8.0, model_error: float = 0.15) -> Limit:
+    return Limit(ContactConfig(drive_hz=drive_hz, model_error=model_error))
 
 
 def raised(angle_rad: float) -> Array:
@@ -94,7 +111,7 @@ def test_a_drive_that_is_held_up_pushes_no_harder_than_the_margin() -> None:
     assert np.array(free.given)[61:, SHOULDER].max() > np.array(limited.given)[61:, SHOULDER].max() + 15.0
 
 
-def still(one: TorqueLimit, seconds: float = 1.0) -> Array:
+def still(one: Limit, seconds: float = 1.0) -> Array:
     """The limits of a robot that has stood in `raised(1.0)` for long."""
     torque = None
     for _ in range(round(seconds / 0.005)):
@@ -148,7 +165,7 @@ def test_fingers_are_not_limited() -> None:
 
 
 def test_switched_off_it_limits_nothing() -> None:
-    off = TorqueLimit(SKELETON, ContactConfig(torque_limit=False), build_model(SKELETON))
+    off = Limit(ContactConfig(torque_limit=False))
     assert off.step(0.005, REST, raised(1.0), FLOOR_NM) is None
 
 

@@ -47,13 +47,13 @@ class Standing:
 
 def push(share: float, watch: ContactWatch) -> Array:
     out = np.zeros(25)
-    out[ELBOW] = share * watch.threshold_nm[ELBOW]
+    out[ELBOW] = share * watch.least_threshold_nm[ELBOW]
     return out
 
 
 def test_at_the_threshold() -> None:
     robot = Standing()
-    robot.run(200, push(0.97, robot.watch))
+    robot.run(200, push(0.95, robot.watch))
     assert robot.watch.finding is None
     robot.run(200, push(1.1, robot.watch))
     assert robot.watch.finding is not None

@@ -52,7 +52,14 @@ def test_finer_angles_notice_sooner(place: str) -> None:
     assert coarse.noticed_s is not None
     assert fine.noticed_s is not None
     assert fine.noticed_s < 0.02 < coarse.noticed_s < 0.05
-    assert fine.peak_n < 0.9 * coarse.peak_n
+    assert fine.peak_n < 0.96 * coarse.peak_n
+
+
+def test_a_free_patient_is_noticed_by_coarse_encoders_too() -> None:
+    """He is touched by the elbow for 60 ms; the allowances must not rise by the push itself."""
+    seen = meet(PLACES["elbow"], 0.5, clamped=False, reflex=Reflex.RETREAT, imperfect=Imperfect())
+    assert seen.noticed_s is not None
+    assert seen.noticed_s < 0.05
 
 
 def test_the_torque_limit_lowers_the_peak_before_anything_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
