@@ -67,7 +67,7 @@ def test_the_torque_limit_lowers_the_peak_before_anything_is_noticed(monkeypatch
     off = ContactConfig(torque_limit=False)
     monkeypatch.setattr(impact, "contact_config", lambda *_: off)
     as_hard_as_it_can = clamped("elbow", Reflex.RETREAT)
-    assert limited.peak_n < 0.75 * as_hard_as_it_can.peak_n
+    assert limited.peak_n < 0.8 * as_hard_as_it_can.peak_n
 
 
 def test_drives_are_limited_while_the_robot_follows_and_only_then() -> None:
