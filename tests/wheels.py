@@ -22,7 +22,7 @@ GLIBC = (28, 27, 26, 24, 17)
 """manylinux_2_N: Debian 12, Ubuntu 22.04 and the Jetson's have at least 2.35."""
 EXTRAS = (
     "simulation", "dynamixel", "gpio", "ros", "sound", "v4l2", "h264", "console", "metrics", "viewer",
-    "export", "lsl",
+    "export", "lsl", "voice",
 )  # fmt: skip
 """What is installed beside the core. `input` and `vqf` are built on the host, and the page says so."""
 

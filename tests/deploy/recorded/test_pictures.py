@@ -10,6 +10,7 @@ import simplejpeg
 
 from common.picture_code import count_of, paste_code, read_codes
 from common.wire.video import VideoFrame
+from deploy.recorded.held import _Newest
 from deploy.recorded.pictures import PictureDecoder, as_jpeg
 from slave.camera.h264 import H264Fitter
 from slave.camera.jpeg import Pixels
@@ -71,3 +72,27 @@ def test_a_picture_of_h264_becomes_a_jpeg_and_a_jpeg_stays_as_it_is() -> None:
     assert [code.count for code in read_codes(again)] == [count_of(10**9)]
     jpeg = replace(frame, body=simplejpeg.encode_jpeg(picture(1)), codec="jpeg")
     assert as_jpeg(jpeg, pixels) is jpeg.body
+
+
+def test_an_export_holds_h264_as_jpeg_and_skips_what_cannot_be_shown() -> None:
+    newest = _Newest(25)
+    frames = stream(6, frozenset({5}))
+    shown_numbers = []
+    for frame in frames[:2] + frames[3:]:
+        newest._picture("head", frame)
+        held = newest.pictures["head"]
+        assert held.codec == "jpeg"
+        codes = read_codes(simplejpeg.decode_jpeg(held.body))
+        shown_numbers.append((held.number, codes[0].count * 100_000 // 10**9))
+    assert shown_numbers == [(1, 1), (2, 2), (2, 2), (5, 5), (6, 6)]
+
+
+def test_a_viewer_s_copy_has_h264_in_the_schema_for_video() -> None:
+    protobuf = pytest.importorskip("deploy.viewer.protobuf")
+    pytest.importorskip("foxglove_schemas_protobuf", reason="the extra `viewer` is not installed")
+    frame = stream(1)[0]
+    message = protobuf.picture(frame, "camera_head", 1_700_000_000_000_000_000)
+    assert (message.DESCRIPTOR.full_name, message.format) == ("foxglove.CompressedVideo", "h264")
+    assert message.data == frame.body
+    jpeg = replace(frame, body=simplejpeg.encode_jpeg(picture(1)), codec="jpeg")
+    assert protobuf.picture(jpeg, "camera_head", 1).DESCRIPTOR.full_name == "foxglove.CompressedImage"
