@@ -341,3 +341,10 @@ _FACTS: dict[str, Any] = {
     "viewers": [{"person": "nurse-1", "robot": "robot-1", "this": True}],
     "console": {"cpu_percent": 1.4, "rss_mb": 57, "skipped": 0},
 }  # fmt: skip
+STUDY: dict[str, Any] = {
+    "subject": "k7pd", "session": "01", "protocol": "cup", "done": 1, "steps": 2, "since_s": 12.0,
+    "step": {"name": "questions", "text": {"en": "Answer.", "zh": "请填写。"}, "seconds": 60.0,
+             "questionnaire": "nasa-tlx"},
+    "next": {"name": "rest", "text": {"en": "Stand."}, "seconds": None, "questionnaire": None},
+    "answered": [],
+}  # fmt: skip

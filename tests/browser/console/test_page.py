@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.browser.console.browser import CHROMIUM
-from tests.browser.console.fake import FakeConsole
+from tests.browser.console.fake import STUDY, FakeConsole
 from tests.browser.console.steps import state, until
 
 pytestmark = [
@@ -321,15 +321,6 @@ def test_a_frozen_page_shows_the_present_when_it_goes_on(page: Any, fake: FakeCo
     devtools.send("Page.setWebLifecycleState", {"state": "active"})
     until(page, lambda: state(page) == "holds")
     assert fake.most_unacknowledged <= 10
-
-
-STUDY = {
-    "subject": "k7pd", "session": "01", "protocol": "cup", "done": 1, "steps": 2, "since_s": 12.0,
-    "step": {"name": "questions", "text": {"en": "Answer.", "zh": "请填写。"}, "seconds": 60.0,
-             "questionnaire": "nasa-tlx"},
-    "next": {"name": "rest", "text": {"en": "Stand."}, "seconds": None, "questionnaire": None},
-    "answered": [],
-}  # fmt: skip
 
 
 def test_the_study_page_leads_through_steps_and_sends_answers_to_each_question(
