@@ -74,6 +74,13 @@ def test_a_frame_like_one_before_is_read_as_it_would_be_unpacked(
         assert taken == data_frame(bytes(changed))
 
 
+def test_an_identifier_of_more_than_11_bits_is_like_nothing() -> None:
+    sound = pack_message(NODE)
+    like = Likeness(sound, bytes(NODE.data), True)
+    assert like.frame(sound) == (0x6A5, bytes(NODE.data), True)
+    assert like.frame(sound.replace(b"\xcd\x06\xa5", b"\xcd\x08\x00")) is None
+
+
 def test_what_is_laid_out_otherwise_is_like_nothing() -> None:
     fields = msgpack.unpackb(pack_message(NODE))
     turned = msgpack.packb(dict(reversed(fields.items())))
