@@ -59,6 +59,10 @@ ServoBackend = Annotated[
         "simulates drives on CAN buses, makers builds these as five makers do."
     ),
 ]
+Slower = Annotated[
+    float,
+    typer.Option(help="With `--motion capture`: how many times slower than recorded.", min=0.5, max=10.0),
+]
 Camera = Annotated[bool, typer.Option(help="Send video from the robot's camera.")]
 WithConsole = Annotated[
     bool, typer.Option("--console/--no-console", help="Serve the web page too; needs the extra `console`.")
@@ -87,6 +91,7 @@ def demo(
     replay: ReplayFile = None,
     profile: RobotProfile = "nursing",
     motion: Motion = None,
+    slower: Slower = 1.0,
     strategy: Strategy = "predict",
     filter_: Filter = "vqf",
     seed: Seed = 1,
@@ -111,7 +116,7 @@ def demo(
 
     console = Console()
     options = DemoOptions(
-        profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion,
+        profile=profile, seconds=seconds, transport=transport, replay=replay, motion=motion, slower=slower,
         strategy=strategy, filter=filter_, seed=seed, robots=robots, servos=servos, camera=camera,
         console=console_ and find_spec("aiohttp") is not None, listen=listen, keep=keep,
         record=record,

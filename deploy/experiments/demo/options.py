@@ -32,6 +32,8 @@ class DemoOptions:
     replay: Path | None = None
     motion: str | None = None
     """None: the one in the profile's example file."""
+    slower: float = 1.0
+    """How many times slower than recorded the motion `capture` is played."""
     strategy: str = "predict"
     filter: str = "vqf"
     seed: int = 1
@@ -55,6 +57,8 @@ class DemoOptions:
         suit = [f"seed={self.seed}"]
         if self.motion is not None:
             suit.append(f'motion="{self.motion}"')
+        if self.slower != 1.0:
+            suit.append(f"people.slower={self.slower}")
         master = [f'estimation.filter="{self.filter}"']
         if self.replay is not None or self._begins_in_the_zero_pose():
             # zeroed there, as the paper's reference was

@@ -45,7 +45,24 @@ OutageSeconds = Annotated[
 Motion = Annotated[
     str | None,
     typer.Option(
-        help="Motion of the simulated operator, such as sweep; by default the robot profile's own (bottle).",
+        help="Motion of the simulated operator, such as sweep; by default the robot profile's own (bottle). "
+        "`capture`: real people, on a virtual clock and over lines of 25 to 300 ms, with no hosts.",
+        show_default=False,
+    ),
+]
+Slower = Annotated[
+    float | None,
+    typer.Option(
+        help="With `--motion capture`: how many times slower than recorded; else 1 and 1.5.",
+        show_default=False, min=0.5, max=10.0,
+    ),
+]  # fmt: skip
+PeopleFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--people",
+        help="With `--motion capture`: recording of people's joint angles (npz); else motion_cmu.npz in the "
+        "folder that TANDEM_DATA names.",
         show_default=False,
     ),
 ]
@@ -96,6 +113,8 @@ def trial(
     seconds: Seconds = 20.0,
     outage: OutageSeconds = 2.0,
     motion: Motion = None,
+    slower: Slower = None,
+    people: PeopleFile = None,
     robot_profile: WhichRobot = "nursing",
     seed: Seed = 1,
     router: Router = False,
@@ -118,6 +137,11 @@ def trial(
     from deploy.experiments.trial.cell.choice import choose
     from deploy.experiments.trial.cell.plan import TrialPlan
 
+    if motion == "capture":
+        _follow_people(robot_profile, choose("--strategies", strategies), (people, slower, seed, report))
+        return
+    if people is not None or slower is not None:
+        raise TandemError("--people and --slower are for --motion capture: add it, or leave them out")
     if 0.0 < outage < SHORTEST_OUTAGE_S:
         raise TandemError(f"--outage {outage:g}: expected 0, or {SHORTEST_OUTAGE_S:g} s or longer")
     networks = (profiles,) if remote else choose("--profiles", profiles)
@@ -132,6 +156,20 @@ def trial(
         _run_here(plan, report, tasks)
     else:
         _run_remote(plan, report, tasks, link)
+
+
+def _follow_people(
+    robot_profile: str, strategies: tuple[str, ...], chosen: tuple[Path | None, float | None, int, Path]
+) -> None:
+    from common.skeleton import load_skeleton
+    from deploy.experiments.trial.people.view import run_people_trial
+    from deploy.sim.suit.people import PeopleConfig
+
+    if robot_profile != "nursing":
+        raise TandemError(f"--robot-profile {robot_profile}: --motion capture is of the profile nursing")
+    people, slower, seed, folder = chosen
+    skeleton = load_skeleton(robot_profile)
+    run_people_trial(PeopleConfig(file=people), skeleton, strategies, slower, seed, folder, Console())
 
 
 def _own_motion(robot_profile: str) -> str:

@@ -18,6 +18,7 @@ from deploy.sim.suit.disturbance import DisturbanceConfig
 from deploy.sim.suit.faults import FaultsConfig
 from deploy.sim.suit.imperfections import GradeName
 from deploy.sim.suit.motion import motion_mistakes
+from deploy.sim.suit.people import PeopleConfig
 from deploy.sim.suit.tray import TrayConfig
 from master.suit.nodes import NodeConfig, wiring_mistakes
 from master.suit.protocol import SHIPPED_DBC
@@ -50,7 +51,9 @@ class SuitConfig(Section):
     """What the operator does: `bottle`, `grasp`, `walk` (each of one profile), `calibration_pose`, `sweep`,
     `postures` (a person's, from one to the next);
     to calibrate: `tray` (all units in it are turned about), `move_joints` (the zero pose, then every joint
-    moves), `calibration` (the tray once, then move_joints). Not used with `replay`."""
+    moves), `calibration` (the tray once, then move_joints); `capture` (real people, `[people]`). Not used
+    with `replay`."""
+    people: PeopleConfig = PeopleConfig()
     tray: TrayConfig = TrayConfig()
     seed: int = Field(default=0, ge=0)
     """Decides the units' errors, their noise and the faults."""

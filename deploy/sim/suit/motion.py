@@ -16,6 +16,7 @@ from common.skeleton import Skeleton
 from deploy.sim.suit.gait import Curve, Gait, GaitError, Strides
 from deploy.sim.suit.joint_moves import JointMoves
 from deploy.sim.suit.minimum_jerk import MinimumJerkMotion, MotionError, Move
+from deploy.sim.suit.people import PeopleConfig, load_people
 from deploy.sim.suit.postures import posture_motion
 
 MOTIONS = {
@@ -29,6 +30,7 @@ MOTIONS = {
     "move_joints": None,
     "tray": None,
     "calibration": None,
+    "capture": "nursing",
 }
 """Each motion, and the one profile that can make it; None: any can."""
 
@@ -91,8 +93,8 @@ def motion_mistakes(name: str, profile: str) -> list[ConfigMistake]:
     return [ConfigMistake("motion", name, f"one of {', '.join(able)} for the profile {profile}")]
 
 
-def load_motion(name: str, skeleton: Skeleton) -> OperatorMotion:
-    """The named one of `MOTIONS` for a skeleton.
+def load_motion(name: str, skeleton: Skeleton, people: PeopleConfig | None = None) -> OperatorMotion:
+    """The named one of `MOTIONS` for a skeleton; `people` says what `capture` plays.
 
     Raises ConfigError for another name, for a motion of another profile, and for one whose joints the
     skeleton does not have or whose angles are beyond their limits.
@@ -104,6 +106,8 @@ def load_motion(name: str, skeleton: Skeleton) -> OperatorMotion:
         return sweep(skeleton)
     if name in ("move_joints", "tray", "calibration"):  # off the tray the operator always does this
         return JointMoves(skeleton)
+    if name == "capture":
+        return load_people(people or PeopleConfig(), skeleton)
     if name == "postures":
         return posture_motion(skeleton)
     if name == "calibration_pose":

@@ -236,7 +236,7 @@ def _wearer(config: SuitConfig, skeleton: Skeleton, motion: OperatorMotion | Non
         disturbance = Disturbance(config.disturbance, skeleton.segment_names, field_ut)
     imperfections = Imperfections(config.grade, len(skeleton.segments), config.seed)
     worn = SimulatedOperator(
-        motion or load_motion(config.motion, skeleton),
+        motion or load_motion(config.motion, skeleton, config.people),
         IdealSensors(skeleton, field_ut, alignment, disturbance),
         imperfections,
     )
