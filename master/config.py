@@ -47,7 +47,7 @@ class CaptureConfig(Section):
     rate_hz: int = Field(200, ge=10, le=1000)
     """SYNC frames a second."""
     decimation: int = Field(16, ge=1, le=1000)
-    """One tick in this many yields a command: 200 / 16 = 12.5 Hz."""
+    """One tick in this many yields a command: 200 / 16 = 12.5 Hz. 8: 25 Hz, for a line that carries it."""
     lost_after: int = Field(20, ge=1, le=10_000)
     """Missed ticks in a row after which a node counts as lost."""
     dbc: RelativePath = SHIPPED_DBC

@@ -140,7 +140,7 @@ def load_people(config: PeopleConfig, skeleton: Skeleton) -> PeopleMotion:
     return PeopleMotion(load_clips(config, skeleton), skeleton, config.slower)
 
 
-class Course:
+class ClipSpline:
     """A cubic spline: position or a derivative of it, (..., J), at times (...)."""
 
     def __init__(self, position_rad: Array, rate_hz: float, periodic: bool) -> None:
@@ -156,9 +156,9 @@ class Course:
         return out
 
 
-def spline(position_rad: Array, rate_hz: float, *, periodic: bool = False) -> Course:
+def spline(position_rad: Array, rate_hz: float, *, periodic: bool = False) -> ClipSpline:
     """A smooth course through rows (T, J)."""
-    return Course(position_rad, rate_hz, periodic)
+    return ClipSpline(position_rad, rate_hz, periodic)
 
 
 def _eased(position_rad: Array, rate_hz: float, slower: float) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from common.clock import to_ns
 from common.quaternion import Array
 from common.skeleton import Skeleton
-from deploy.sim.suit.people import Course
+from deploy.sim.suit.people import ClipSpline
 from slave.guard.limits import MotionLimits
 from slave.limit.limit import SetpointLimiter
 from slave.track.config import TrackConfig, make_tracker
@@ -53,7 +53,7 @@ class Followed:
 
 
 def follow(
-    course: Course, slower: float, skeleton: Skeleton, strategy: str, line: Line, seed: int
+    course: ClipSpline, slower: float, skeleton: Skeleton, strategy: str, line: Line, seed: int
 ) -> Followed:
     """Play a clip so much slower, then let the operator stand still."""
     lasts_s = course.lasts_s * slower
@@ -84,7 +84,7 @@ def follow(
 
 
 def _samples(
-    course: Course, slower: float, line: Line, end_s: float, seed: int
+    course: ClipSpline, slower: float, line: Line, end_s: float, seed: int
 ) -> Iterator[tuple[float, float, Array, Array]]:
     """Arrival and capture, s, position and velocity of each sample that comes, by arrival."""
     lasts_s = course.lasts_s * slower
