@@ -128,7 +128,7 @@ def test_a_motion_the_skeleton_cannot_make_is_refused(skeleton: Skeleton, text: 
         (
             "grasp",
             "nursing",
-            "bottle, crossed, calibration_pose, sweep, postures, move_joints, tray, calibration",
+            "bottle, crossed, calibration_pose, sweep, postures, move_joints, tray, calibration, capture",
         ),
         ("dance", "lower_limb", "walk, calibration_pose, sweep, postures, move_joints, tray, calibration"),
     ],
