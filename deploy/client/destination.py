@@ -78,5 +78,8 @@ def _link_of(file: MasterConfig | None, endpoints: list[str], certificate: Path 
     asked: dict[str, object] = {"connect": endpoints, **tls_beside(certificate)}
     if file is not None:
         # who only asks stands behind no door, and lets nobody in: the rules are for the others' doors
-        asked = {**file.link.model_dump(exclude={"listen", "access", "revoked"}), **asked}
+        asked = {**file.link.model_dump(exclude={"listen", "access", "revoked", "twin"}), **asked}
+        # a stop goes over both paths too; another endpoint than the file's is another robot's, perhaps
+        if file.link.twin is not None and file.link.twin.connect and endpoints == file.link.connect:
+            asked["twin"] = {"connect": file.link.twin.connect}
     return check_config(Path("command line"), asked, LinkConfig)
