@@ -126,7 +126,7 @@ async def served(
     runner = web.AppRunner(console.app.make(), shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", port).start()
-    async with aiohttp.ClientSession(cookie_jar=jar or cookie_jar()) as http:
+    async with aiohttp.ClientSession(cookie_jar=cookie_jar() if jar is None else jar) as http:
         console.http = http
         try:
             yield console
