@@ -25,6 +25,17 @@ def test_it_is_alike_at_every_rate_of_commands(swing_hz: float) -> None:
     assert found[0] == pytest.approx(2.0 * np.pi * swing_hz * np.sin(x) / x, rel=0.08)
 
 
+def test_noise_counts_alike_at_every_rate() -> None:
+    found = []
+    for rate_hz in (12.5, 25.0, 50.0):
+        persistence, random = Persistence(), np.random.default_rng(2)
+        for k in range(round(20.0 * rate_hz)):
+            swing = np.cos(2.0 * np.pi * 0.5 * k / rate_hz)
+            persistence.note(round(k / rate_hz * 1e9), np.array([swing + 0.2 * random.standard_normal()]))
+        found.append(float(persistence.omega_per_s[0]))
+    assert max(found) < 1.1 * min(found)
+
+
 def test_a_joint_that_stands_is_neither_restless_nor_more_than_even() -> None:
     still = Persistence()
     random = np.random.default_rng(1)

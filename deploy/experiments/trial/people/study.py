@@ -110,7 +110,7 @@ def _of_line(row: Row) -> list[Verdict]:
     ms = round(1e3 * row.line.one_way_s)
     k, group = ONE_WAY_MS.index(ms), f"{_speed(row.slower)}, {ms} ms"
     one: Callable[[str, float, float, str], Verdict] = lambda name, value, limit, unit: at_most(  # noqa: E731
-        f"{group}: {name}", value, limit, unit, group=group
+        f"{group}: {name}", value, limit, unit
     )
     found = (
         [one("RMSE / latest", row.over_latest, LEAST_RMSE[row.slower][k], "")]
