@@ -10,16 +10,15 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 
-from common.clock import monotonic_ns, to_ms
-from common.clock_sync import SlaveExchange
+from common.clock import monotonic_ns
 from common.clock_sync.services import keep_reference
 from common.link import Link, open_session
 from common.link.audit import Audit
 from common.link.place import own_endpoints
 from common.metrics.parts import Ticks
-from common.metrics.slave import OffsetMetrics, ServoMetrics, SlaveMetrics
+from common.metrics.slave import SlaveMetrics
 from common.metrics.tree import WriteMetrics
-from common.process.heap import freeze_heap, heap_in_use, reserve_heap
+from common.process.heap import freeze_heap, reserve_heap
 from common.process.notify import Notifier, open_notifier
 from common.process.pacing import TickGrid
 from common.process.realtime import enter_real_time
@@ -44,7 +43,6 @@ from common.wire.topics import (
     keyframe,
     video,
 )  # fmt: skip
-from common.wire.version import software
 from slave.attitude.open import open_base
 from slave.attitude.sensor import BaseSensor
 from slave.call_button import CallButton
@@ -56,6 +54,7 @@ from slave.guard.states import State
 from slave.guard.tilt import base_loss
 from slave.last_known import EVERY_S, LastKnown, state_file
 from slave.limit.limit import Setpoint
+from slave.metrics import servo_metrics, slave_metrics
 from slave.pipeline import SlavePipeline
 from slave.servos import LimitsTorque, Servos
 from slave.servos.servos import EncoderReading
@@ -255,62 +254,21 @@ class Slave:
 
     def metrics(self) -> SlaveMetrics:
         """Counters and percentiles for tables and reports."""
-        pipeline = self._pipeline
-        guard = pipeline.guard
-        return SlaveMetrics(
-            software=software(),
-            heap=heap_in_use(),
-            instance=pipeline.instance,
+        return slave_metrics(
+            self._pipeline,
+            monotonic_ns(),
             ticks=Ticks(self._ticks_expected, self._ticks_missed),
-            guard=guard.counters.metrics(str(guard.state), guard.reason),
-            lease=guard.lease.metrics(monotonic_ns()),
-            stages_ms=pipeline.traffic.journeys.budget.summary(),
-            end_to_end_ms=pipeline.traffic.journeys.budget.total(),
-            one_way_ms=pipeline.traffic.one_way.summary(),
-            one_way_corrected_ms=pipeline.traffic.due.corrected.summary(),
-            commands=pipeline.traffic.arrivals.metrics(),
-            due=pipeline.traffic.due.metrics(),
-            early=pipeline.traffic.one_way.clamped,
-            unmoved=pipeline.traffic.journeys.unmoved,
-            offset=_offset(pipeline.clock, monotonic_ns()),
-            undecodable=dict(pipeline.unread.counts),
             base=self._base.counters() if self._base else {},
-            servos=self._servo_metrics(),
+            servos=servo_metrics(self._servos, self._config),
             video=self._camera.metrics() if self._camera else None,
             link=self._link.counters(),
-            contact_from="" if pipeline.contact.missing(monotonic_ns()) else pipeline.contact.dull,
-            times=guard.times.metrics(),
         )
-
-    def _servo_metrics(self) -> ServoMetrics:
-        """The backend's, and which drives may push harder than moving needs."""
-        metrics = self._servos.metrics()
-        if not self._config.contact.torque_limit:
-            return replace(metrics, unlimited="contact.torque_limit is switched off")
-        if self._limiting is None:
-            backend = ", ".join(self._config.servos.names)
-            return replace(metrics, unlimited=f"tandem cannot limit the torque of {backend} servos")
-        return replace(metrics, no_torque_limit=dict(self._limiting.no_torque_limit))
 
 
 async def run(config: SlaveConfig, stop: asyncio.Event, write_metrics: WriteMetrics) -> None:
     """Run a slave until `stop` is set; the servos are left holding. Raises LinkError or RobotError."""
     await until_stopped(stop, _run(config, write_metrics))
     log.info("slave stopped; the servos hold their position")
-
-
-def _offset(clock: SlaveExchange, now_ns: int) -> OffsetMetrics:
-    best, round_trip = clock.estimate(now_ns), clock.estimator.estimate(now_ns)
-    return OffsetMetrics(
-        to_ms(best.offset_ns),
-        to_ms(best.bound_ns),
-        best.trusted,
-        source=clock.best.source,
-        words=clock.best.words,
-        round_trip_bound_ms=to_ms(round_trip.bound_ns),
-        contradictions=clock.best.contradictions,
-        clock_steps=clock.own_steps,
-    )
 
 
 async def _run(config: SlaveConfig, write_metrics: WriteMetrics) -> None:
