@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from common.clock import monotonic_ns, to_ns
 from common.errors import CodecError, LinkError, TandemError
-from common.link import LinkSession, open_session
+from common.link import Link, LinkSession, open_session
 from common.link.config import LinkConfig
 from common.log.throttle import LogThrottle
 from common.metrics.slave import SlaveMetrics
@@ -17,7 +17,7 @@ from common.tap.message import TapMessage
 from common.tap.reader import TapReader
 from common.wire.codec import decode
 from common.wire.messages import Command, RobotState, Statistics
-from common.wire.topics import IN_ORDER, STATE, STATISTICS, VIDEO
+from common.wire.topics import IN_ORDER, STATE, STATISTICS, VIDEO, Topic
 from common.wire.video import decode_frame
 from deploy.console.model.robot import LINK, TAP, RobotModel
 
@@ -69,20 +69,20 @@ class Hearing:
         """Hear the robots' figures over the link; their states and pictures too where there is no tap."""
         for robot in self.models:
             link = session.link(robot)
-            topics = (STATISTICS, STATE, VIDEO) if states else (STATISTICS,)
-            for topic in topics:
-                link.subscribe_keys(
-                    topic,
-                    lambda key, payload, at_ns: self._take(key, payload, at_ns, LINK),
-                    in_order=IN_ORDER if topic is VIDEO else 0,
-                )
+            self._subscribe(link, (STATISTICS, STATE, VIDEO) if states else (STATISTICS,))
 
     def open(self, session: LinkSession, model: RobotModel) -> None:
         """Hear one more robot over the link, in full."""
         self.models[model.robot] = model
-        link = session.link(model.robot)
-        for topic in (STATISTICS, STATE, VIDEO):
-            link.subscribe_keys(topic, lambda key, payload, at_ns: self._take(key, payload, at_ns, LINK))
+        self._subscribe(session.link(model.robot), (STATISTICS, STATE, VIDEO))
+
+    def _subscribe(self, link: Link, topics: Sequence[Topic]) -> None:
+        for topic in topics:
+            link.subscribe_keys(
+                topic,
+                lambda key, payload, at_ns: self._take(key, payload, at_ns, LINK),
+                in_order=IN_ORDER if topic is VIDEO else 0,
+            )
 
     def close(self, robot: str) -> None:
         """Hear it no more; the caller withdraws its link."""

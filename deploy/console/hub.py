@@ -72,15 +72,25 @@ class Hub:
 
     def turn(self, page: OpenPage, robot: str) -> str:
         """Let a page show another robot, opened if need be; why not, else empty."""
-        if robot not in self.models and self.opened is not None and page.person.role.sees:
-            why = self.opened.open(robot)
-            if why:
-                return why
-        if robot not in self.models:
-            return f"no such robot here: expected one of {', '.join(self.robots)}"
-        page.turn_to(self.models[robot])
-        self.greet(page)
-        return ""
+        why = self.find(robot, page.person)
+        if not why:
+            page.turn_to(self.models[robot])
+            self.greet(page)
+        return why
+
+    def find(self, robot: str, person: Person) -> str:
+        """Why this person cannot be shown a robot; empty: it is open, opened if need be."""
+        if robot in self.models:
+            return ""
+        if self.opened is not None and person.role.sees:
+            return self.opened.open(robot)
+        return f"no such robot here: expected one of {', '.join(self.robots)}"
+
+    def stopper(self, robot: str) -> RobotStopper | None:
+        """Of a robot that is open or listed: one that was closed while a page was away is opened anew."""
+        if robot not in self.stoppers and self.opened is not None:
+            self.opened.open(robot, to_stop=True)
+        return self.stoppers.get(robot)
 
     def full(self, person: Person) -> bool:
         """Whether one more page, of this person, would be too many."""

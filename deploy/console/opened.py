@@ -58,14 +58,14 @@ class OpenedRobots:
         """Whether a robot of that name is there."""
         return robot in self._roster
 
-    def open(self, robot: str) -> str:
-        """Why a robot cannot be opened; empty: it is open."""
+    def open(self, robot: str, to_stop: bool = False) -> str:
+        """Why a robot cannot be opened; empty: it is open. `to_stop`: however many are open already."""
         if robot in self._hearing.models:
             return ""
         listed = self._roster.get(robot)
         if listed is None:
             return f"no robot {robot} is there"
-        if len(self._unseen_ns) >= MOST_OPEN:
+        if len(self._unseen_ns) >= MOST_OPEN and not to_stop:
             return f"{MOST_OPEN} robots are open already"
         profiles = {each.profile for each in listed.processes.values()} - {"", self._profile}
         if profiles:

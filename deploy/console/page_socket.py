@@ -40,10 +40,14 @@ class PageSockets:
             await socket.send_str(pack({"kind": "bye", "why": why}))
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER)
             return socket
-        robot = request.query.get("robot", "")
-        model = self._hub.models.get(robot, self._hub.models[self._hub.robots[0]])
+        robot = request.query.get("robot") or self._hub.robots[0]
+        why = self._hub.find(robot, person)
+        model = self._hub.models[self._hub.robots[0] if why else robot]
         page = OpenPage(socket, model, secret, person)
         self._hub.enter(page)
+        if why:  # it was on this page before it was away: another one must not take its place unsaid
+            text = f"{robot}: {why}; this page shows {model.robot}"
+            page.say({"kind": "answer", "to": "robot", "done": False, "text": text})
         writing = asyncio.create_task(page.write())
         try:
             why = await self._listen(socket, page)
@@ -94,7 +98,8 @@ class PageSockets:
         return ""
 
     def _request(self, page: OpenPage, kind: object, robot: object) -> None:
-        known = isinstance(robot, str) and robot in self._hub.models
+        stopper = self._hub.stopper(robot) if kind == "stop" and isinstance(robot, str) else None
+        known = stopper is not None or (isinstance(robot, str) and robot in self._hub.models)
         if kind == "robot" and isinstance(robot, str):
             why = self._hub.turn(page, robot)
             if why:
@@ -102,9 +107,9 @@ class PageSockets:
         elif not known:
             text = f"no such robot here: expected one of {', '.join(self._hub.robots)}"
             page.say({"kind": "answer", "to": str(kind)[:20], "done": False, "text": text})
-        elif kind == "stop":
+        elif stopper is not None:
             page.asked_stop |= robot == page.model.robot
-            shown = self._hub.stoppers[str(robot)].stop(f"console: {page.name}")
+            shown = stopper.stop(f"console: {page.name}")
             sure = shown.kept or shown.robot_ns is not None
             text = "asked" if sure else NOT_KEPT
             page.say({"kind": "answer", "to": "stop", "done": sure, "text": text, "id": shown.number})

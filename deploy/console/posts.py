@@ -122,10 +122,11 @@ class PostHandlers:
 
     def _stopped(self, request: web.Request, body: Mapping[str, object]) -> web.StreamResponse:
         robot = body.get("robot") or self._hub.robots[0]
-        if not isinstance(robot, str) or robot not in self._hub.stoppers:
+        stopper = self._hub.stopper(robot) if isinstance(robot, str) else None
+        if stopper is None:
             return error_answer(400, f"no such robot here: expected one of {', '.join(self._hub.robots)}")
         _, person = self._visitors.of(request)
-        shown = self._hub.stoppers[robot].stop(f"console: {person.name or person.role}")
+        shown = stopper.stop(f"console: {person.name or person.role}")
         if not shown.kept and shown.robot_ns is None:
             # it is asked all the same; the page asks again until the robot has acknowledged it
             return error_answer(503, f"{NOT_KEPT}: use the switch at the robot")

@@ -15,7 +15,8 @@ const engineer = document.body.dataset.page === "engineer";
 const MORE = { engineer: "./engineer.js", study: "./study.js" };
 const seen = { hello: null, view: null, facts: null, setup: null, opened_ms: performance.now(), stopAsked: null, holdKey: "F9" };
 const parts = {};
-const robotOf = () => seen.view?.robot ?? seen.hello?.robot ?? seen.setup?.robot ?? link.robot ?? undefined;
+// the one that is on the screen; before there is any, the one that was asked for and not one in its place
+const robotOf = () => seen.view?.robot ?? link.robot ?? seen.hello?.robot ?? seen.setup?.robot ?? undefined;
 
 // ---- stop: first, so that nothing that fails below can take it away
 
@@ -166,7 +167,13 @@ async function hello(message) {
   parts.session = message.session;
   seen.hello = message;
   seen.stop = null;
-  if (message.role === "nobody") seen.view = seen.facts = null;
+  const turned = parts.shows !== undefined && parts.shows !== message.robot;
+  parts.shows = message.robot;
+  if (turned) {
+    link.pictures.clear();
+    parts.cameras?.clear(); // the home of one patient must not stand under the name of another
+  }
+  if (turned || message.role === "nobody") seen.view = seen.facts = null;
   link.quiet = message.role === "nobody";
   $("hold").classList.remove("down");
   if (message.may?.hold) link.letGo();

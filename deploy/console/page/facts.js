@@ -285,6 +285,17 @@ export class Cameras {
     return [...this.cameras.keys()].filter(Boolean);
   }
 
+  /** Another robot is shown: none of its pictures came yet. */
+  clear() {
+    for (const camera of this.cameras.values()) {
+      camera.header = null;
+      camera.box.classList.add("none");
+      camera.box.classList.remove("stale");
+      camera.canvas.width = camera.canvas.height = 1;
+    }
+    this.speak();
+  }
+
   /** Draw a picture; the canvas that shows it now. */
   take(header) {
     const camera = this.cameras.get(header.camera);

@@ -11,12 +11,15 @@ export class Pictures {
     this.ask = ask;
     this.missing = missing;
     this.streams = new Map();
+    this.era = 0;
   }
 
   /** Hands `show({...header, bitmap})` the picture once it is decoded; resolves when it was, or cannot be. */
   async take(header, bytes, show) {
     if (header.codec === "h264") return this.stream(header.camera).take(header, bytes, show);
+    const era = this.era;
     const bitmap = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
+    if (era !== this.era) return bitmap.close();
     return show({ ...header, bitmap });
   }
 
@@ -25,8 +28,9 @@ export class Pictures {
     return this.streams.get(camera);
   }
 
-  /** Another robot, or another socket: what is decoded builds on nothing that came before. */
+  /** Another robot, or another socket: what is decoded builds on nothing that came before, and that is not shown. */
   clear() {
+    this.era++;
     for (const stream of this.streams.values()) stream.reset();
     this.streams.clear();
   }

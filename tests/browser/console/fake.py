@@ -48,6 +48,8 @@ class FakeConsole:
         """Frames are no longer sent, and stops are not answered."""
         self.mute = False
         """No socket is told anything, as where too many pages are open; posts are answered."""
+        self.robot = "robot-1"
+        """The one that pages are shown; a page may turn to another."""
         self.told_stop: dict[str, Any] | None = None
         """What a page that may not look is told of its stop."""
         self.pictures = True
@@ -138,9 +140,10 @@ class FakeConsole:
     async def _reports(self, _: web.Request) -> web.Response:
         return web.json_response({"reports": self.reports})
 
-    async def _setup(self, _: web.Request) -> web.Response:
+    async def _setup(self, request: web.Request) -> web.Response:
         return web.json_response({
-            "version": 1, "tandem": "0", "robots": ["robot-1", "robot-2"], "robot": "robot-1",
+            "version": 1, "tandem": "0", "robots": ["robot-1", "robot-2"],
+            "robot": request.query.get("robot", self.robot),
             "operator": "nurse-1", "side": "operator", "language": "en", "hardware_estop": False,
             "deadman": "console",
             "guard_states": [str(state) for state in State],
@@ -192,6 +195,8 @@ class FakeConsole:
             acknowledged["n"] = message["n"]
             return
         self.received.append(message)
+        if message["kind"] == "robot":
+            self.robot = message["robot"]
         self._wants_key |= message["kind"] == "keyframe"
         if message["kind"] == "stop" and not self.silent:
             self._stop()
@@ -200,9 +205,12 @@ class FakeConsole:
         while self.silent or self.mute:  # noqa: ASYNC110 - a test sets it from another thread
             await asyncio.sleep(0.04)
         who = {"role": self.role, "person": "nurse-1", "may": self.may, "session": "0badcafe"}
-        await socket.send_json({"kind": "hello", "robot": "robot-1", "viewers": len(self._sockets), **who})
-        n, turn, facts_turn = 0, 0, 0
+        n, turn, facts_turn, told = 0, 0, 0, ""
         while True:
+            if told != self.robot:
+                told = self.robot
+                hello = {"kind": "hello", "robot": told, "viewers": len(self._sockets), **who}
+                await socket.send_json(hello)
             await asyncio.sleep(0.04)
             turn += 1
             self.most_unacknowledged = max(self.most_unacknowledged, n - acknowledged["n"])
@@ -228,7 +236,7 @@ class FakeConsole:
             since_s = time.monotonic() - self._stopped_s
             stop = {**stop, "since_s": since_s, "stands_s": 0.31 if since_s > 0.3 else None}
         return {
-            "kind": "view", "n": n, "robot": "robot-1", "heard": "tap", "silent_s": 0.02, "state_n": n,
+            "kind": "view", "n": n, "robot": self.robot, "heard": "tap", "silent_s": 0.02, "state_n": n,
             "guard": self.guard, "reason": self.reason, "operator": "nurse-1", "lease": "ours",
             "situation": SITUATIONS.get(self.guard, "holds"), "master": True, "deadman": True,
             "clutch_out": False, "resting": [], "encoder": encoder, "setpoint": target, "target": target,
@@ -252,7 +260,7 @@ class FakeConsole:
         return angles
 
     def _facts(self, n: int) -> dict[str, Any]:
-        return {"kind": "facts", "n": n, "robot": "robot-1", **_FACTS, **self._levels(), **self.facts}
+        return {"kind": "facts", "n": n, "robot": self.robot, **_FACTS, **self._levels(), **self.facts}
 
     def _levels(self) -> dict[str, Any]:
         level = {"left_forearm": ("silent", "silent for 3 s; check its cable")}

@@ -367,3 +367,41 @@ def test_every_page_has_the_banner_the_stop_and_the_keys(page: Any, fake: FakeCo
     assert page.locator("#pages a:visible").count() == 2
     page.keyboard.press("Escape")
     until(page, lambda: ("stop", {"robot": "robot-1"}) in fake.posted)
+
+
+def test_the_picture_of_one_robot_never_stands_under_the_name_of_another(
+    page: Any, fake: FakeConsole
+) -> None:
+    until(page, lambda: page.locator(".camera:not(.none)").count() == 1)
+    fake.pictures = False
+    page.route("**/api/setup*", lambda route: None)  # the line is slow: what follows is not known yet
+    page.select_option("#robot", "robot-2")
+    until(page, lambda: "robot-2" in page.title())
+    assert page.locator(".camera:not(.none)").count() == 0
+
+
+def test_what_is_still_being_decoded_is_not_shown_after_another_robot_was_opened(page: Any) -> None:
+    shown = page.evaluate("""async () => {
+      const { Pictures } = await import("/page/video.js");
+      const canvas = new OffscreenCanvas(8, 8);
+      canvas.getContext("2d");
+      const bytes = new Uint8Array(await (await canvas.convertToBlob({ type: "image/jpeg" })).arrayBuffer());
+      const [pictures, shown] = [new Pictures(() => {}, () => {}), []];
+      const before = pictures.take({ camera: "head", number: 1 }, bytes, ({ number }) => shown.push(number));
+      pictures.clear();
+      await pictures.take({ camera: "head", number: 2 }, bytes, ({ number }) => shown.push(number));
+      await before;
+      return shown;
+    }""")
+    assert shown == [2]
+
+
+def test_before_anything_is_shown_the_stop_is_for_the_robot_that_was_asked_for(
+    page: Any, fake: FakeConsole
+) -> None:
+    """A log-in that has ended: the console greets with its first robot, and shows nothing."""
+    fake.role, fake.may = "nobody", {"stop": True, "act": False, "reset": False, "hold": False}
+    page.goto(f"{fake.address}/?robot=ward-3")
+    until(page, lambda: state(page) == "locked")
+    page.keyboard.press("Escape")
+    until(page, lambda: ("stop", {"robot": "ward-3"}) in fake.posted)

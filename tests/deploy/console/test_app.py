@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import aiohttp
 import pytest
@@ -22,8 +23,8 @@ from deploy.examples import profiles
 from deploy.study.marks import read_marks
 from deploy.study.session import begin
 from deploy.study.under_way import say_under_way
-from tests.deploy.console.robots import ROBOT, frame, state
-from tests.deploy.console.served import Served, cookie_jar, served
+from tests.deploy.console.robots import ROBOT, frame, model, state
+from tests.deploy.console.served import HeardStops, Served, cookie_jar, served
 
 CUP = Path(profiles.__file__).parent / "study" / "cup.toml"
 TLX = ("mental", "physical", "temporal", "performance", "effort", "frustration")
@@ -408,6 +409,59 @@ def test_a_stop_without_a_robots_name_is_for_the_robot_that_is_shown() -> None:
         await page.hear("answer")
         assert [len(each.by) for each in console.stops.values()] == [1, 1]
         assert (await console.post("/api/stop", {"robot": "robot-9"}))[0] == 400
+
+    run(story)
+
+
+class Listed:
+    """Stands for the list, with one robot in it that is not open."""
+
+    def __init__(self, console: Served) -> None:
+        self._console = console
+
+    def open(self, robot: str, to_stop: bool = False) -> str:
+        if robot != "ward-3":
+            return f"no robot {robot} is there"
+        made = self._console.models[robot] = model(robot=robot)
+        self._console.stops[robot] = HeardStops(made)
+        return ""
+
+    async def close_unseen(self, shown: object, now_ns: int) -> None:
+        pass
+
+
+@pytest.mark.parametrize("way", ["post", "socket"])
+def test_a_stop_of_a_robot_of_the_list_opens_it(way: str) -> None:
+    """It was closed while the page that shows it was away."""
+
+    async def story(console: Served) -> None:
+        listed: Any = Listed(console)
+        console.hub.opened = listed
+        if way == "post":
+            assert (await console.post("/api/stop", {"robot": "ward-9"}))[0] == 400
+            assert (await console.post("/api/stop", {"robot": "ward-3"}))[0] == 202
+        else:
+            page = await console.page()
+            await page.say(kind="stop", robot="ward-3")
+            assert (await page.hear("answer"))["done"]
+        assert {robot: len(each.by) for robot, each in console.stops.items()} == {
+            ROBOT: 0, "robot-2": 0, "ward-3": 1,
+        }  # fmt: skip
+
+    run(story)
+
+
+def test_a_page_that_comes_back_shows_its_robot_or_says_that_it_shows_another() -> None:
+    async def story(console: Served) -> None:
+        listed: Any = Listed(console)
+        console.hub.opened = listed
+        assert (await (await console.page("ward-3")).hear("hello"))["robot"] == "ward-3"
+        page = await console.page("ward-9")
+        assert (await page.hear("hello"))["robot"] == ROBOT
+        said = await page.hear("answer")
+        assert (said["done"], said["text"]) == (
+            False, f"ward-9: no robot ward-9 is there; this page shows {ROBOT}",
+        )  # fmt: skip
 
     run(story)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -17,16 +18,18 @@ from common.wire.messages import Action
 from common.wire.presence import ProcessPresence
 from common.wire.summary import HomeCall, RobotSummary, encode_summary
 from common.wire.together import TOGETHER
-from common.wire.topics import STATE, SUMMARY
+from common.wire.topics import STATE, SUMMARY, VIDEO
+from common.wire.video import encode_frame
 from deploy.client.roster_view import roster_rows
 from deploy.console.acts import ActRefusedError, read_act
 from deploy.console.hearing import Hearing
+from deploy.console.hub import Hub
 from deploy.console.model.robot import RobotModel, Side, Whose
 from deploy.console.opened import KEPT_S, MOST_OPEN, OpenedRobots
-from deploy.console.session import PageRole, Person
+from deploy.console.session import Access, PageRole, Person
 from deploy.console.stopping import RobotStopper
 from tests.common.link.test_link import free_endpoint, until
-from tests.deploy.console.robots import SKELETON
+from tests.deploy.console.robots import SKELETON, frame
 
 NURSE = Person(PageRole.OPERATOR, "nurse-1")
 S = 1_000_000_000
@@ -37,6 +40,8 @@ class Desk:
     opened: OpenedRobots
     hearing: Hearing
     stoppers: dict[str, RobotStopper]
+    home: LinkSession
+    """Of the robots."""
     wanted: list[bool]
     """Whether the home's robot had somebody who heard its states, each time that changed."""
 
@@ -59,7 +64,7 @@ async def desk(profile: str = "nursing", robots: int = 1) -> AsyncIterator[Desk]
         wanted: list[bool] = []
         announce(home, robots, profile, wanted)
         await until(lambda: len(opened.rows(monotonic_ns()).robots) == robots)
-        yield Desk(opened, hearing, stoppers, wanted)
+        yield Desk(opened, hearing, stoppers, home, wanted)
 
 
 def announce(home: LinkSession, robots: int, profile: str, wanted: list[bool]) -> None:
@@ -144,3 +149,51 @@ def test_a_listed_robot_may_be_taken_and_given_back_and_nothing_else() -> None:
 def test_only_a_held_modifier_moves_several(together: object, key: str) -> None:
     body = {"act": "engage", "robot": "here", "together": together, "key": TOGETHER}
     assert read_act(body, ("here",), NURSE).key == key
+
+
+def test_a_stop_opens_a_robot_that_was_closed_while_its_page_was_away() -> None:
+    async def story() -> None:
+        async with desk() as one:
+            access = Access(["here"], secure=False, stranger=PageRole.NOBODY)
+            hub = Hub(one.hearing.models, access, one.stoppers, opened=one.opened)
+            assert hub.stopper("nobody") is None
+            stopper = hub.stopper("ward-0")
+            assert stopper is not None
+            assert stopper.stop("a test").kept
+            await one.opened.close_unseen((), S)
+            assert one.stoppers == {"ward-0": stopper}, "it is asked, whoever looks"
+            await stopper.close()
+
+    asyncio.run(story())
+
+
+def test_a_stop_opens_a_robot_however_many_are_open() -> None:
+    async def story() -> None:
+        async with desk(robots=MOST_OPEN + 1) as one:
+            for number in range(MOST_OPEN):
+                assert one.opened.open(f"ward-{number}") == ""
+            assert one.opened.open(f"ward-{MOST_OPEN}", to_stop=True) == ""
+
+    asyncio.run(story())
+
+
+def test_each_picture_of_an_opened_robot_is_heard() -> None:
+    """One of H.264 cannot be shown without the one before it: the newest alone would not do."""
+
+    async def story() -> None:
+        async with desk() as one:
+            assert one.opened.open("ward-0") == ""
+            numbers: list[int] = []
+            one.hearing.on_picture = lambda model, camera: numbers.append(
+                model.pictures.newest[camera].frame.number
+            )
+            put = one.home.link("ward-0").publish(VIDEO)
+            await until(lambda: one.wanted[-1])
+            await asyncio.sleep(0.2)
+            for number in range(1, 6):
+                put(encode_frame(frame(number, 1.0)))
+            time.sleep(0.3)  # noqa: ASYNC251  # this loop is late, and all of them wait for it
+            await until(lambda: bool(numbers) and numbers[-1] == 5)
+            assert numbers == [1, 2, 3, 4, 5]
+
+    asyncio.run(story())
