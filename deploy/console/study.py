@@ -63,11 +63,9 @@ class StudyDesk:
 
     def shown(self, now_ns: int) -> dict[str, object] | None:
         """As the page has it; None without a session."""
-        session = self._session()
-        if session is None:
-            return None
         try:
-            return _shown(session, now_ns)
+            session = self._session()
+            return None if session is None else _shown(session, now_ns)
         except TandemError:
             return None
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import logging
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -18,6 +20,8 @@ MARK_TOPIC = "session/mark"
 """Under which a recording holds the marks, each a line of JSON."""
 NOW_TOPIC = "session/now"
 """Once a second: subject, session and step, so that any part of a recording says of what it is."""
+
+log = logging.getLogger(__name__)
 
 
 class MarkKind(StrEnum):
@@ -50,12 +54,16 @@ class Mark:
 def write_mark(
     folder: Path, kind: MarkKind, text: str, wall: Clock = wall_ns, clock: Clock = monotonic_ns
 ) -> Mark:
-    """Write a mark down. Raises OSError."""
+    """Write a mark down. Raises OSError, also where the disk took a part of it alone."""
     mark = Mark(wall(), clock(), kind, text)
     # one write, so that two who mark at once never mix their lines
-    descriptor = os.open(folder / MARKS, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o640)
+    descriptor = os.open(folder / MARKS, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o640)
     try:
-        os.write(descriptor, f"{mark.line()}\n".encode())
+        size = os.fstat(descriptor).st_size
+        torn = size > 0 and os.pread(descriptor, 1, size - 1) != b"\n"
+        line = f"{chr(10) * torn}{mark.line()}\n".encode()
+        if os.write(descriptor, line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     finally:
         os.close(descriptor)
     return mark
@@ -63,18 +71,32 @@ def write_mark(
 
 def read_marks(folder: Path) -> list[Mark]:
     """All, in order. Raises TandemError where a line is none."""
-    path = folder / MARKS
-    if not path.exists():
-        return []
-    found, text = [], path.read_text("utf-8").removesuffix("\n")
+    marks, wrong = look_at_marks(folder)
+    if wrong:
+        raise TandemError(f"{folder / MARKS}: line {wrong[0]} is no mark")
+    return marks
+
+
+def look_at_marks(folder: Path) -> tuple[list[Mark], list[int]]:
+    """All that can be read, and the numbers of the lines that cannot, such as one that a full disk cut off.
+
+    Raises TandemError where the file itself cannot be read.
+    """
+    found, wrong = list[Mark](), list[int]()
+    try:
+        content = (folder / MARKS).read_bytes().removesuffix(b"\n")
+    except FileNotFoundError:
+        return found, wrong
+    except OSError as error:
+        raise TandemError(f"{folder / MARKS}: cannot be read ({error.strerror})") from None
     # not splitlines: a mark's text may hold what Unicode counts as the end of a line
-    for number, line in enumerate(text.split("\n") if text else (), start=1):
+    for number, line in enumerate(content.split(b"\n") if content else (), start=1):
         try:
             tree = json.loads(line)
             found.append(Mark(tree["wall_ns"], tree["monotonic_ns"], MarkKind(tree["kind"]), tree["text"]))
         except (ValueError, KeyError, TypeError):
-            raise TandemError(f"{path}: line {number} is no mark") from None
-    return found
+            wrong.append(number)
+    return found, wrong
 
 
 class NewMarks:
@@ -84,16 +106,23 @@ class NewMarks:
         """`all_of_them`: also those that are there already."""
         self.folder = folder
         self._size = 0
-        self._taken = 0 if all_of_them else len(read_marks(folder))
+        self._taken = 0 if all_of_them else len(look_at_marks(folder)[0])
 
     def take(self) -> Sequence[Mark]:
-        """Each once. Raises TandemError where a line is none."""
+        """Each once; a line that is none is passed over, for a recording goes on without it."""
         try:
             size = (self.folder / MARKS).stat().st_size
         except OSError:
             return ()
         if size == self._size:
             return ()
-        new = read_marks(self.folder)[self._taken :]
+        try:
+            marks, wrong = look_at_marks(self.folder)
+        except TandemError as error:
+            log.warning("%s", error)
+            return ()
+        if wrong:
+            log.warning("%s: line %d is no mark, and is passed over", self.folder / MARKS, wrong[0])
+        new = marks[self._taken :]
         self._size, self._taken = size, self._taken + len(new)
         return new

@@ -15,7 +15,7 @@ from pathlib import Path
 from common.clock import NS_PER_S, Clock, monotonic_ns, wall_ns
 from common.errors import TandemError
 from common.wire.version import software
-from deploy.study.marks import Mark, MarkKind, read_marks, write_mark
+from deploy.study.marks import Mark, MarkKind, look_at_marks, read_marks, write_mark
 from deploy.study.protocol import ProtocolStep, StudyProtocol, check_code, load_protocol
 
 SESSION, PROTOCOL = "session.json", "protocol.toml"
@@ -76,7 +76,7 @@ class Session:
     @property
     def ended(self) -> bool:
         """Whether its end is marked."""
-        return any(mark.kind is MarkKind.END for mark in self.marks())
+        return any(mark.kind is MarkKind.END for mark in look_at_marks(self.path)[0])
 
     @property
     def step(self) -> str:
@@ -98,7 +98,7 @@ class Session:
         return left[0].name
 
     def _begun(self) -> list[str]:
-        return [mark.text for mark in self.marks() if mark.kind is MarkKind.STEP]
+        return [mark.text for mark in look_at_marks(self.path)[0] if mark.kind is MarkKind.STEP]
 
 
 def expects_signature(folder: Path) -> bool:

@@ -29,13 +29,18 @@ def say_over(session: Session) -> None:
 
 
 def session_under_way(root: Path) -> Session | None:
-    """The session; None where there is none, or it has ended."""
+    """The session; None where there is none, or it has ended.
+
+    Raises TandemError where one is named that cannot be read: what its subject has consented to is not known.
+    """
     try:
         named = (root / UNDER_WAY).read_text("utf-8").strip()
-        path = (root / named).resolve()
-        if not path.is_relative_to(root.resolve()):
-            return None
-        session = Session(path)
-        return None if session.ended else session
-    except (OSError, TandemError):
+    except FileNotFoundError:
         return None
+    except (OSError, ValueError) as error:
+        raise TandemError(f"{root / UNDER_WAY}: cannot be read ({error})") from None
+    path = (root / named).resolve()
+    if not path.is_relative_to(root.resolve()) or not path.exists():
+        return None
+    session = Session(path)
+    return None if session.ended else session

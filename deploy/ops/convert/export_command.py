@@ -106,6 +106,8 @@ def export_joints(
 
         if key is None:
             raise TandemError("export --to share: name the secret's file by --key, outside of what you share")
+        if out is None:  # a recording's name holds its date
+            raise TandemError("export --to share: name the copy by --out, without date and name")
         said = write_share(file, path, skeleton, ShareKey(key))
         Console().print(f"{path}: {said}", highlight=False, markup=False, soft_wrap=True)
         return

@@ -73,10 +73,9 @@ class ShareKey:
 class _Copier:
     """Makes each message anew; None for one that is left out."""
 
-    def __init__(self, key: ShareKey, skeleton: Skeleton, subject: str) -> None:
+    def __init__(self, key: ShareKey, skeleton: Skeleton) -> None:
         self._key = key
         self._joints = len(skeleton.joints)
-        self._subject = subject
         self.names: set[str] = set()
         """Names that were replaced."""
         self.kept: Counter[str] = Counter()
@@ -93,7 +92,8 @@ class _Copier:
             return entry.topic, entry.payload
         if entry.topic == NOW_TOPIC:
             told = json.loads(entry.payload)
-            now = {"subject": self._subject, "session": told["session"], "step": told["step"]}
+            subject = self._key.code("subject", told["subject"])
+            now = {"subject": subject, "session": told["session"], "step": told["step"]}
             return NOW_TOPIC, json.dumps(now).encode()
         if entry.topic == MARK_TOPIC:
             told = json.loads(entry.payload)
@@ -131,24 +131,24 @@ def write_share(source: Path, out: Path, skeleton: Skeleton, key: ShareKey) -> s
 
     Raises TandemError where the subject has not consented to sharing, or a name got into the copy.
     """
-    head = _head(source)
-    if "study_scope" in head and SHARING not in head["study_scope"].split():
-        raise TandemError(
-            f"{source}: its subject has not consented to sharing (`tandem session start --scope {SHARING}`)"
-        )
+    head = _consented(source)
     person = head.get("study_subject", source.stem)
     subject, shift_ns = key.code("subject", person), key.shift_ns(person)
     metadata = {name: head[name] for name in KEPT_METADATA if name in head}
     derived = hashlib.sha256(source.read_bytes()).hexdigest()
     metadata |= {"shared_subject": subject, "derived_from_sha256": derived}
-    copier = _Copier(key, skeleton, subject)
+    copier = _Copier(key, skeleton)
     wall = _WallClock()
     with McapRecorder(out, metadata, wall=wall.read) as recorder:
-        for entry in RecordingStream(source):
-            made = copier.copy(entry)
-            if made is not None:
-                wall.now_ns = entry.wall_ns - shift_ns
-                _put(recorder, made, entry.monotonic_ns)
+        try:
+            for entry in RecordingStream(source):
+                made = copier.copy(entry)
+                if made is not None:
+                    wall.now_ns = entry.wall_ns - shift_ns
+                    _put(recorder, made, entry.monotonic_ns)
+        except BaseException:  # a part of a copy, in which nobody looked for names
+            out.unlink(missing_ok=True)
+            raise
     if recorder.counters.failed:
         raise TandemError(f"{out}: cannot be written: {recorder.counters.failed}")
     _check(out, copier.names)
@@ -174,13 +174,24 @@ def _put(recorder: McapRecorder, made: tuple[str, bytes], monotonic_ns: int) -> 
         time.sleep(WAIT_S)
 
 
-def _head(source: Path) -> Mapping[str, str]:
+def _consented(source: Path) -> Mapping[str, str]:
+    """The head of a recording that may be shared.
+
+    Raises TandemError where a subject has not consented: of the session that it was made for, or of one that
+    was under way while a recorder ran for good.
+    """
     stream = RecordingStream(source)
-    for _ in stream:
-        break
-    if stream.metadata is None:
+    scopes = [json.loads(entry.payload).get("scope") for entry in stream if entry.topic == NOW_TOPIC]
+    head = stream.metadata
+    if head is None:
         raise RecordingError(f"{source}: not a recording of tandem")
-    return stream.metadata
+    if "study_scope" in head:
+        scopes = [head["study_scope"].split()]
+    if not all(isinstance(scope, list) and SHARING in scope for scope in scopes):
+        raise TandemError(
+            f"{source}: its subject has not consented to sharing (`tandem session start --scope {SHARING}`)"
+        )
+    return head
 
 
 def _check(out: Path, names: set[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from master.journal.calls import MISSING
 
 GREETED_S = 5.0
 PROGRESS_S = 0.5
+
+log = logging.getLogger(__name__)
 
 
 async def record_tap(
@@ -78,15 +81,19 @@ class _Marking:
         self._marks = NewMarks(folder if session is None else session.path, session is not None)
         self._of_session: NewMarks | None = None
         self._now_ns = -NS_PER_S
+        self._doubt = ""
+        """Why it is not known whether a session is under way; empty where it is."""
 
     def may_record(self, topic: str) -> bool:
         """Whether the subject has consented to what a topic holds; True without a session."""
+        if self._doubt:
+            return "/video/" not in topic
         return self._session is None or self._session.may_record(topic)
 
     def take(self, now_ns: int) -> list[tuple[str, bytes, int]]:
         """Topic, content and time of what is new."""
         if self._named is None and self._study is not None:
-            self._turn_to(session_under_way(self._study))
+            self._look_for_session(self._study)
         out = [
             (MARK_TOPIC, mark.line().encode(), mark.monotonic_ns)
             for source in (self._marks, self._of_session)
@@ -96,9 +103,19 @@ class _Marking:
         if self._session is not None and now_ns - self._now_ns >= NS_PER_S:
             self._now_ns = now_ns
             head = self._session.head
-            now = {"subject": head.subject, "session": head.session, "step": self._session.step}
+            who = {"subject": head.subject, "session": head.session, "scope": list(head.scope)}
+            now = {**who, "step": self._session.step}
             out.append((NOW_TOPIC, json.dumps(now).encode(), now_ns))
         return out
+
+    def _look_for_session(self, study: Path) -> None:
+        try:
+            self._turn_to(session_under_way(study))
+            self._doubt = ""
+        except TandemError as error:
+            if str(error) != self._doubt:
+                log.warning("%s; no pictures are recorded until it can be read", error)
+            self._doubt = str(error)
 
     def _turn_to(self, session: Session | None) -> None:
         if (session and session.path) != (self._session and self._session.path):

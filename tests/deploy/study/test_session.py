@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -198,3 +200,38 @@ def test_one_subject_is_handed_out_and_deleted_and_the_others_stay(tmp_path: Pat
     assert json.loads((root / RECEIPTS).read_text())["subject"] == "k7pd"
     with pytest.raises(TandemError, match="no such subject"):
         delete_subject(root, "k7pd")
+
+
+def test_a_line_that_a_full_disk_cut_off_costs_itself_alone(tmp_path: Path) -> None:
+    session = begin(tmp_path, CUP, "k7pd")
+    say_under_way(session)
+    session.next_step()
+    new = NewMarks(session.path, all_of_them=True)
+    with (session.path / MARKS).open("ab") as stream:
+        stream.write('{"wall_ns": 1, "text": "落'.encode()[:-1])
+    session.mark(MarkKind.EVENT, "after")
+    assert [mark.text for mark in new.take()] == ["rest", "after"]
+    found = session_under_way(tmp_path)
+    assert found is not None, "what its subject has consented to still counts"
+    assert found.step == "rest"
+    with pytest.raises(TandemError, match="line 2 is no mark"):
+        session.marks()
+    session.mark(MarkKind.END, "done")
+    assert session_under_way(tmp_path) is None
+
+
+def test_a_mark_that_the_disk_took_in_part_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = os.write
+    monkeypatch.setattr(os, "write", lambda at, data: whole(at, data[:5]))
+    with pytest.raises(OSError, match="No space left"):
+        write_mark(tmp_path, MarkKind.EVENT, "x")
+
+
+def test_a_session_that_is_named_and_cannot_be_read_is_not_taken_for_none(tmp_path: Path) -> None:
+    session = begin(tmp_path, CUP, "k7pd")
+    say_under_way(session)
+    (session.path / "session.json").write_text("{")
+    with pytest.raises(TandemError, match="there is no session"):
+        session_under_way(tmp_path)
+    shutil.rmtree(session.path)
+    assert session_under_way(tmp_path) is None, "it was deleted"

@@ -100,3 +100,47 @@ def test_without_consent_to_sharing_nothing_is_written(source: Path, tmp_path: P
     assert not out.exists()
     assert CliRunner().invoke(cli.app, [*arguments, "--key", str(tmp_path / "key")]).exit_code == 0
     assert out.exists()
+
+
+@pytest.mark.parametrize("scopes", [[["motion"]], [["motion", "sharing"], ["motion"]], [None]])
+def test_a_session_that_was_under_way_without_consent_to_sharing_keeps_the_recording_here(
+    tmp_path: Path, scopes: list[list[str] | None]
+) -> None:
+    """A recorder that runs for good has no subject in its head."""
+    steady, out = tmp_path / "steady.mcap", tmp_path / "out.mcap"
+    with McapRecorder(steady, {"role": "master"}) as recorder:
+        for scope in scopes:
+            now = {"subject": "k7pd", "session": "01", "step": "reach"} | ({"scope": scope} if scope else {})
+            recorder.put(NOW_TOPIC, json.dumps(now).encode(), 1)
+    with pytest.raises(TandemError, match="has not consented to sharing"):
+        write_share(steady, out, SKELETON, ShareKey(tmp_path / "key"))
+    assert not out.exists()
+
+
+def test_each_subject_of_a_recording_has_a_code(tmp_path: Path) -> None:
+    steady, out, key = tmp_path / "steady.mcap", tmp_path / "out.mcap", ShareKey(tmp_path / "key")
+    with McapRecorder(steady, {"role": "master"}) as recorder:
+        for subject in ("k7pd", "m2xa"):
+            now = {"subject": subject, "session": "01", "step": "reach", "scope": ["motion", "sharing"]}
+            recorder.put(NOW_TOPIC, json.dumps(now).encode(), 1)
+    write_share(steady, out, SKELETON, key)
+    shared = [json.loads(entry.payload)["subject"] for entry in read_recording(out).entries]
+    assert shared == [key.code("subject", subject) for subject in ("k7pd", "m2xa")]
+
+
+def test_a_copy_that_could_not_be_finished_is_removed(tmp_path: Path) -> None:
+    damaged, out = tmp_path / "damaged.mcap", tmp_path / "out.mcap"
+    with McapRecorder(damaged, {"role": "master"}) as recorder:
+        recorder.put(MARK_TOPIC, b"not a mark", 1)
+    with pytest.raises(ValueError, match="Expecting value"):
+        write_share(damaged, out, SKELETON, ShareKey(tmp_path / "key"))
+    assert not out.exists()
+
+
+def test_the_copys_name_is_not_made_of_the_recordings(source: Path, tmp_path: Path) -> None:
+    """A recording's name holds the day that the copy must not tell."""
+    result = CliRunner().invoke(
+        cli.app, ["export", str(source), "--to", "share", "--key", str(tmp_path / "k")]
+    )
+    assert result.exit_code
+    assert not list(source.parent.glob("*_shared.mcap"))

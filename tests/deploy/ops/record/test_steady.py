@@ -17,10 +17,11 @@ from common.errors import ConfigError, TandemError
 from common.recording import read_recording
 from common.recording.config import RecordingConfig
 from common.tap.sender import TapSender
+from deploy.ops.record.from_tap import _Marking
 from deploy.ops.record.retention import SEAL, WRITTEN, KeptFile, remove, to_remove
 from deploy.ops.record.steady import ROOM_BYTES, SteadyOptions, _name, record_steadily, steady_options
 from deploy.study.marks import MARK_TOPIC, NOW_TOPIC, MarkKind, write_mark
-from deploy.study.session import begin
+from deploy.study.session import SESSION, begin
 from deploy.study.under_way import say_under_way
 from master.config import MasterConfig
 
@@ -245,7 +246,21 @@ def test_marks_in_the_folder_and_of_the_session_under_way_are_recorded_within_it
     marks = [json.loads(entry.payload) for entry in entries if entry.topic == MARK_TOPIC]
     assert {(mark["kind"], mark["text"]) for mark in marks} == {("event", "page"), ("step", "rest")}
     now = [json.loads(entry.payload) for entry in entries if entry.topic == NOW_TOPIC]
-    assert now[-1] == {"subject": "k7pd", "session": "01", "step": "rest"}
+    assert now[-1] == {"subject": "k7pd", "session": "01", "scope": ["motion"], "step": "rest"}
     topics = [entry.topic for entry in entries]
     last = len(topics) - 1 - topics[::-1].index("suit/frames")
     assert "tandem/robot-1/video/head" not in topics[topics.index(NOW_TOPIC) : last]
+
+
+def test_while_it_is_not_known_who_is_recorded_no_picture_is(tmp_path: Path) -> None:
+    """Consent cannot be looked up: the file of the session that is under way is damaged."""
+    study = tmp_path / "study"
+    session = begin(study, CUP, "k7pd", scope=("motion", "video"))
+    say_under_way(session)
+    marking = _Marking(tmp_path, None, study)
+    head = (session.path / SESSION).read_text()
+    for written, video in ((head, True), ("{", False), (head, True)):
+        (session.path / SESSION).write_text(written)
+        marking.take(0)
+        assert marking.may_record("tandem/robot-1/video/head") is video
+        assert marking.may_record("suit/frames")
