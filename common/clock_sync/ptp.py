@@ -2,6 +2,7 @@
 
 PTP measures the mean delay of the path and takes both ways as equally long. A way may be anything between 0
 and twice the mean, so the offset is certain only within ± the mean path delay: on a wire some microseconds.
+Stamps that are wrong can make that mean negative; by as much they are wrong at least.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def read_state(printed: str) -> PtpState | str:
         return _state(values)
     except KeyError as error:
         return f"ptp4l does not tell {error.args[0]}"
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         return f"ptp4l tells what is no number: {error}"
 
 
@@ -60,7 +61,7 @@ def _state(values: dict[str, str]) -> PtpState | str:
     if port not in (_STEERED if present else _GRANDMASTER):
         return f"ptp4l's port is {port}"
     offset_ns = round(float(values["master_offset"])) if present else 0
-    path_ns = round(float(values["meanPathDelay"])) if present else 0
+    path_ns = abs(round(float(values["meanPathDelay"]))) if present else 0
     traceable = values["timeTraceable"] == values["ptpTimescale"] == values["currentUtcOffsetValid"] == "1"
     accuracy_s = _accuracy_s(int(values["gm.ClockAccuracy"], 16))
     by_utc = traceable and accuracy_s is not None

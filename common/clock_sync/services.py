@@ -14,7 +14,6 @@ import socket
 import subprocess
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from common.clock import NS_PER_S, Clock, monotonic_ns, wall_ns
@@ -147,8 +146,10 @@ async def keep_reference(config: ClockConfig, tell: Callable[[ClockReference | N
     async for due in ticks(TickGrid(monotonic_ns(), EVERY_NS)):
         if due.tick % SELDOM and services.track.reference(monotonic_ns()) is None and due.tick > SELDOM:
             continue
-        with suppress(OSError):
+        try:
             await asyncio.to_thread(services.read)
+        except Exception as error:  # whatever goes wrong: the round trip is enough, and the session goes on
+            services.words = f"the time service cannot be asked: {type(error).__name__}: {error}"
         tell(services.track.reference(monotonic_ns()), services.track.steps)
         source = services.words.partition(" states")[0]
         if source != said:

@@ -16,6 +16,9 @@ from common.link.twin import FirstArrivals
 from common.log.throttle import LogThrottle
 from common.metrics.link import TopicCounters
 
+OVERTAKEN = 16
+"""Messages by which the slower of two paths may lag and still fill a gap, where all are taken in turn."""
+
 log = logging.getLogger(__name__)
 
 
@@ -29,14 +32,18 @@ class Inbox:
         loop: asyncio.AbstractEventLoop,
         counters: TopicCounters,
         most_keys: int = MOST_KEYS,
+        behind: int = 0,
     ) -> None:
-        """`most_keys`: senders whose newest values are kept apart until the loop takes them."""
+        """`most_keys`: senders whose newest values are kept apart until the loop takes them.
+
+        `behind`: as `FirstArrivals` has it.
+        """
         self._key = key
         self._on_payload = on_payload
         self._loop = loop
         self._counters = counters
         self._mailbox: Mailbox[tuple[bytes, int]] = Mailbox(most_keys)
-        self._firsts = FirstArrivals()
+        self._firsts = FirstArrivals(behind)
         self._throttle = LogThrottle()
         self._closed = False
 
@@ -45,15 +52,19 @@ class Inbox:
         arrived_ns = monotonic_ns()
         if self._closed:
             return
-        attachment = sample.attachment
-        if not self._firsts.is_first(
-            str(sample.key_expr), None if attachment is None else attachment.to_bytes()
-        ):
-            self._counters.duplicates = self._firsts.dropped
+        if not self._is_first(sample):
             return
         if self._mailbox.put(str(sample.key_expr), (sample.payload.to_bytes(), arrived_ns)):
             wake(self._loop, self._deliver)
         self._counters.received += 1
+
+    def _is_first(self, sample: zenoh.Sample) -> bool:
+        attachment = sample.attachment
+        number = None if attachment is None else attachment.to_bytes()
+        if self._firsts.is_first(str(sample.key_expr), number):
+            return True
+        self._counters.duplicates = self._firsts.dropped
+        return False
 
     def close(self) -> None:
         """Deliver nothing from now on."""
@@ -92,13 +103,13 @@ class OrderedInbox(Inbox):
         most: int,
     ) -> None:
         """`most`: payloads that wait for the loop; the oldest one goes where another comes."""
-        super().__init__(key, on_payload, loop, counters)
+        super().__init__(key, on_payload, loop, counters, behind=OVERTAKEN)
         self._waiting: deque[tuple[str, bytes, int]] = deque(maxlen=most)
 
     def on_sample(self, sample: zenoh.Sample) -> None:
         """Called in Zenoh's thread."""
         arrived_ns = monotonic_ns()
-        if self._closed:
+        if self._closed or not self._is_first(sample):
             return
         self._counters.overwritten += len(self._waiting) == self._waiting.maxlen
         self._waiting.append((str(sample.key_expr), sample.payload.to_bytes(), arrived_ns))

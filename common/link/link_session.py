@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import re
 import threading
 from collections.abc import Awaitable, Callable, Sequence
 
@@ -21,7 +20,7 @@ from common.link.roster import MOST_ROBOTS, Roster
 from common.link.waiting import count_peers
 from common.metrics.link import TopicCounters
 from common.wire.instance import draw_instance
-from common.wire.presence import OperatorPresence, ProcessPresence, place
+from common.wire.presence import ROBOT_NAME, OperatorPresence, ProcessPresence, place
 from common.wire.topics import SUMMARY, Topic
 from common.wire.version import installed
 
@@ -30,14 +29,13 @@ REOPEN_S = 0.5
 """Between two attempts to open the session anew."""
 OpenAgain = Callable[[frozenset[str]], Awaitable[zenoh.Session]]
 """Opens a session as the first one, whose rules refuse these common names."""
-_ROBOT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 log = logging.getLogger(__name__)
 
 
 def check_robot_name(robot: str) -> None:
     """Raises LinkError for a name that is no part of a key."""
-    if not _ROBOT_NAME.fullmatch(robot):
+    if not ROBOT_NAME.fullmatch(robot):
         raise LinkError(f"robot {robot!r}: expected a name of at most 64 letters, digits, '_', '.' and '-'")
 
 

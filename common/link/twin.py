@@ -1,9 +1,9 @@
 """Two Zenoh sessions over two paths that stand as one: everything is sent on both, what comes first counts.
 
 Each message carries a number of its sender in the attachment. The receiver takes a number once; what is not
-newer is a duplicate, or late, and is dropped and counted. A question goes out on both paths under one number
-too: it is handled once, and its answer goes back on both. So a path that is cut costs nothing, not even the
-time to notice.
+newer is a duplicate, or late, and is dropped and counted. Where all are taken in turn (voice, video), one
+that was overtaken may still fill a gap. A question goes out on both paths under one number too: it is handled
+once, and its answer goes back on both. So a path that is cut costs nothing, not even the time to notice.
 
 Zenoh's own `max_links` was not taken: it sends each message on one of the links.
 """
@@ -29,8 +29,11 @@ MOST_QUESTIONS = 256
 class FirstArrivals:
     """Which messages of numbered senders are new. Thread-safe: two sessions call it."""
 
-    def __init__(self) -> None:
-        self._newest: OrderedDict[tuple[str, int], int] = OrderedDict()
+    def __init__(self, behind: int = 0) -> None:
+        """`behind`: by how much a number that did not come yet may be overtaken; 0: only newer ones count."""
+        self._behind = behind
+        self._newest: OrderedDict[tuple[str, int], tuple[int, frozenset[int]]] = OrderedDict()
+        """By key and sender: the newest number, and which of those `behind` it came."""
         self._lock = threading.Lock()
         self.dropped = 0
         """Second copies, and messages that a newer one overtook."""
@@ -41,12 +44,16 @@ class FirstArrivals:
             return True
         sender, number = NUMBER.unpack(attachment)
         with self._lock:
-            newest = self._newest.pop((key, sender), -1)
-            self._newest[key, sender] = max(newest, number)
+            newest, came = self._newest.pop((key, sender), (-1, frozenset()))
+            first = bool(number > newest or (number > newest - self._behind and number not in came))
+            newest = max(newest, number)
+            if self._behind:
+                came = frozenset(each for each in (*came, number) if each > newest - self._behind)
+            self._newest[key, sender] = newest, came
             while len(self._newest) > MOST_SENDERS:
                 self._newest.popitem(last=False)
-            self.dropped += number <= newest
-            return bool(number > newest)
+            self.dropped += not first
+            return first
 
 
 class TwinPublisher:
@@ -111,6 +118,7 @@ class TwinQuery:
     def __init__(self, first: zenoh.Query) -> None:
         self._copies = [first]
         self._answer: Callable[[zenoh.Query], None] | None = None
+        self._dropped = False
         self._lock = threading.Lock()
         self.payload, self.key_expr = first.payload, first.key_expr
 
@@ -123,12 +131,13 @@ class TwinQuery:
     def also(self, query: zenoh.Query) -> None:
         """Another copy came: it waits for the answer, or gets it."""
         with self._lock:
-            if self._answer is None:
+            answer = self._answer
+            if answer is None and not self._dropped:
                 self._copies.append(query)
                 return
-            answer = self._answer
         with query:
-            answer(query)
+            if answer is not None:
+                answer(query)
 
     def reply(self, key: str, payload: bytes, *, express: bool) -> None:
         """Answer every copy, also one that is still to come."""
@@ -150,17 +159,20 @@ class TwinQuery:
     def drop(self) -> None:
         """No more answers: the askers need not wait."""
         with self._lock:
-            copies, self._copies = tuple(self._copies), []
+            copies, self._copies, self._dropped = tuple(self._copies), [], True
         for query in copies:
             query.drop()
 
 
 class TwinQuestions:
-    """Brings together the copies of each question."""
+    """Brings together the copies of each question: same number, same key, same bytes.
+
+    The number alone would let anybody who saw one choose what the asker's next question counts as a copy of.
+    """
 
     def __init__(self, handle: Callable[..., object]) -> None:
         self._handle = handle
-        self._known: OrderedDict[bytes, TwinQuery] = OrderedDict()
+        self._known: OrderedDict[tuple[bytes, str, bytes], TwinQuery] = OrderedDict()
         self._lock = threading.Lock()
 
     def on_query(self, query: zenoh.Query) -> None:
@@ -169,10 +181,12 @@ class TwinQuestions:
         if number is None or len(number) != NUMBER.size:
             self._handle(query)
             return
+        payload = b"" if query.payload is None else query.payload.to_bytes()
+        copy_of = number, str(query.key_expr), payload
         with self._lock:
-            known = self._known.get(number)
+            known = self._known.get(copy_of)
             if known is None:
-                self._known[number] = twin = TwinQuery(query)
+                self._known[copy_of] = twin = TwinQuery(query)
             while len(self._known) > MOST_QUESTIONS:
                 self._known.popitem(last=False)
         if known is not None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import secrets
 import threading
-from collections import Counter
 from collections.abc import Callable
+from functools import partial
 
 import zenoh
 from zenoh.handlers import Callback
@@ -152,27 +152,36 @@ class TwinLiveliness:
 
     def declare_subscriber(self, key: str, handler: Callback[zenoh.Sample], *, history: bool) -> TwinHeld:
         """Tell of the first copy that comes and of the last that goes."""
-        once = _once(handler.callback)
+        tokens = TwinTokens(handler.callback)
         return TwinHeld(
             [
-                each.liveliness().declare_subscriber(key, Callback(once, indirect=False), history=history)
-                for each in self._both
+                each.liveliness().declare_subscriber(
+                    key, Callback(partial(tokens.on_sample, path), indirect=False), history=history
+                )
+                for path, each in enumerate(self._both)
             ]
         )
 
 
-def _once(callback: Callable[[zenoh.Sample], object]) -> Callable[[zenoh.Sample], None]:
-    here: Counter[str] = Counter()
-    lock = threading.Lock()
+class TwinTokens:
+    """Which paths show each token. Zenoh may tell of one twice on a path: it counts once there."""
 
-    def on_sample(sample: zenoh.Sample) -> None:
+    def __init__(self, callback: Callable[[zenoh.Sample], object]) -> None:
+        self._callback = callback
+        self._paths: dict[str, set[int]] = {}
+        self._lock = threading.Lock()
+
+    def on_sample(self, path: int, sample: zenoh.Sample) -> None:
+        """Called in Zenoh's threads."""
         key, alive = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-        with lock:
-            here[key] += 1 if alive else -1
-            tell = here[key] == (1 if alive else 0)
-            if here[key] <= 0:
-                del here[key]
-        if tell:
-            callback(sample)
-
-    return on_sample
+        # told under the lock: else "gone" on one path could be told after "here" on the other
+        with self._lock:
+            paths = self._paths.get(key, set())
+            before = bool(paths)
+            (paths.add if alive else paths.discard)(path)
+            if paths:
+                self._paths[key] = paths
+            else:
+                self._paths.pop(key, None)
+            if bool(paths) != before:
+                self._callback(sample)

@@ -13,6 +13,7 @@ robot can bear it.
 from __future__ import annotations
 
 import platform
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from urllib.parse import quote, unquote
@@ -22,6 +23,8 @@ from common.wire.sender import operator_chunk, operator_of
 from common.wire.topics import ALIVE
 from common.wire.version import installed
 
+ROBOT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+"""Of a robot: what else stands in a key is no robot of tandem's, and no process may act on it."""
 _MOST_PLACE = 160
 _MOST_PROFILE = 64
 
@@ -79,6 +82,8 @@ def read_presence(key: str) -> ProcessPresence | None:
     if len(parts) < 4 or parts[0] != "tandem" or parts[2] != "alive":
         return None
     robot, role, more = parts[1], parts[3], parts[4:]
+    if not ROBOT_NAME.fullmatch(robot):
+        return None
     if not more:
         return ProcessPresence(robot, role)
     try:

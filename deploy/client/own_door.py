@@ -13,7 +13,7 @@ _EVERYWHERE = {"0.0.0.0": "127.0.0.1", "[::]": "[::1]", "*": "127.0.0.1"}
 
 def own_doors(file: Path, link: LinkConfig, robot: str, operator: str = "") -> Destination:
     """The slave of a file, as a process beside it reaches it: at its own endpoints or through its router."""
-    kept = link.model_dump(exclude={"listen", "access", "revoked"})
+    kept = link.model_dump(exclude={"listen", "access", "revoked", "twin"})
     doors = link.connect if link.mode == "client" else map(own_door, link.listen)
     link = check_config(file, {**kept, "connect": list(doors)}, LinkConfig)
     return Destination(link, (robot,), operator, operator)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import socket
 import struct
 import threading
@@ -15,7 +17,7 @@ from common.clock import monotonic_ns, wall_ns
 from common.clock_sync.chrony import ANSWER_BYTES, read_tracking, tracking_request
 from common.clock_sync.config import ClockConfig
 from common.clock_sync.ptp import PtpState, read_state
-from common.clock_sync.services import TimeServices, read_beside
+from common.clock_sync.services import TimeServices, keep_reference, read_beside
 
 PMC = """sending: GET TIME_STATUS_NP
 	0a56c0.fffe.d7f247-0 seq 0 RESPONSE MANAGEMENT TIME_STATUS_NP
@@ -164,3 +166,39 @@ def test_no_service_is_said_and_the_round_trip_remains(tmp_path: Path) -> None:
     services.read()
     assert services.track.reference(monotonic_ns()) is None
     assert services.words == f"chronyd at UDP port {port}: Connection refused"
+
+
+def test_a_path_delay_below_nothing_is_an_error_as_large_and_never_a_negative_one() -> None:
+    state = read_state(PMC.replace("1806.0", "-5000.0"))
+    assert isinstance(state, PtpState)
+    assert state.error_ns == 244 + 5000 + 100
+
+
+@pytest.mark.parametrize("delay", ["inf", "nan"])
+def test_what_is_no_finite_number_states_nothing(delay: str) -> None:
+    assert str(read_state(PMC.replace("1806.0", delay))).startswith("ptp4l tells what is no number")
+
+
+def test_a_service_that_cannot_be_asked_ends_no_session(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Whatever goes wrong with it: robot and master do without."""
+    caplog.set_level(logging.INFO)
+
+    def fails(_: TimeServices) -> None:
+        b"\xff".decode()
+
+    monkeypatch.setattr(TimeServices, "read", fails)
+    told: list[object] = []
+
+    async def story() -> None:
+        async with asyncio.timeout(5.0):
+            keeping = asyncio.create_task(keep_reference(ClockConfig(), lambda one, _: told.append(one)))
+            while not told and not keeping.done():  # noqa: ASYNC110  # asked in a thread
+                await asyncio.sleep(0.01)
+            assert not keeping.done()
+            keeping.cancel()
+
+    asyncio.run(story())
+    assert told[0] is None
+    assert "the time service cannot be asked" in caplog.text

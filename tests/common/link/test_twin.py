@@ -6,15 +6,18 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
+from itertools import pairwise
 
 import pytest
+import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
 from common.link import Link, open_session
 from common.link.config import LinkConfig, TwinConfig
-from common.link.twin import NUMBER, FirstArrivals
-from common.wire.topics import COMMAND, CONTROL, STATE
+from common.link.twin import NUMBER, FirstArrivals, TwinQuestions
+from common.link.twin_session import TwinTokens
+from common.wire.topics import COMMAND, CONTROL, IN_ORDER, STATE, VIDEO
 from deploy.harness.endpoints import free_port
 from tests.tcp_path import TcpPath
 
@@ -173,3 +176,93 @@ def test_both_paths_are_named() -> None:
     config = LinkConfig(listen=["tcp/1.2.3.5:1"], twin=twin)
     assert config.all_listen == ["tcp/1.2.3.5:1", "tcp/1.2.3.4:1"]
     assert config.all_connect == ["tcp/1.2.3.4:2"]
+
+
+def test_where_all_are_taken_in_turn_an_overtaken_one_fills_its_gap_once() -> None:
+    arrivals = FirstArrivals(behind=4)
+    taken = [n for n in (1, 2, 4, 2, 3, 3, 4, 9, 5, 6, 6, 8) if arrivals.is_first("key", NUMBER.pack(7, n))]
+    assert taken == [1, 2, 4, 3, 9, 6, 8]
+
+
+def test_voice_and_video_come_once_too() -> None:
+    async def story() -> None:
+        async with two_hosts() as (operator, robot, _, __):
+            heard: list[bytes] = []
+            operator.subscribe(VIDEO, lambda payload, _: heard.append(payload), in_order=IN_ORDER)
+            put = robot.publish(VIDEO)
+            await until(lambda: put(b"?") or heard)
+            for number in range(20):
+                put(str(number).encode())
+                await until(partial(ends_with, heard, number))
+            await until(lambda: operator.counters()[VIDEO.name].duplicates >= 20)
+            assert [each for each in heard if each != b"?"] == [str(n).encode() for n in range(20)]
+
+    asyncio.run(story())
+
+
+class Said:
+    """Stands for a zenoh.ZBytes."""
+
+    def __init__(self, payload: bytes) -> None:
+        self.payload = payload
+
+    def to_bytes(self) -> bytes:
+        return self.payload
+
+
+class Asked:
+    """Stands for a zenoh.Query."""
+
+    def __init__(self, payload: bytes, number: int, key: str = "tandem/robot-1/stop") -> None:
+        self.payload, self.key_expr, self.attachment = Said(payload), key, Said(NUMBER.pack(7, number))
+        self.answers: list[bytes] = []
+        self.dropped = False
+
+    def __enter__(self) -> Asked:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.drop()
+
+    def drop(self) -> None:
+        self.dropped = True
+
+    def reply(self, key: str, payload: bytes, *, express: bool) -> None:
+        self.answers.append(payload)
+
+
+def test_nobody_can_make_a_stop_count_as_the_copy_of_another_question() -> None:
+    handled: list[bytes] = []
+    questions = TwinQuestions(lambda query: handled.append(query.payload.to_bytes()))
+    questions.on_query(Asked(b"status", 5))  # type: ignore[arg-type]  # who saw the asker's last number
+    questions.on_query(Asked(b"stop", 5))  # type: ignore[arg-type]
+    questions.on_query(Asked(b"stop", 5, "tandem/robot-1/operator/anna/control"))  # type: ignore[arg-type]
+    questions.on_query(Asked(b"stop", 5))  # type: ignore[arg-type]
+    assert handled == [b"status", b"stop", b"stop"]
+
+
+def test_a_copy_of_a_question_that_was_turned_away_does_not_wait() -> None:
+    questions, late = TwinQuestions(lambda query: query.drop()), Asked(b"a", 1)
+    questions.on_query(Asked(b"a", 1))  # type: ignore[arg-type]
+    questions.on_query(late)  # type: ignore[arg-type]
+    assert late.dropped
+
+
+@given(st.lists(st.tuples(st.integers(0, 1), st.booleans())))
+def test_a_token_is_there_while_a_path_shows_it_however_often_each_tells(
+    told: list[tuple[int, bool]],
+) -> None:
+    class Sample:
+        key_expr = "tandem/robot-1/alive/slave"
+
+        def __init__(self, alive: bool) -> None:
+            self.kind = zenoh.SampleKind.PUT if alive else zenoh.SampleKind.DELETE
+
+    said: list[bool] = []
+    tokens = TwinTokens(lambda sample: said.append(sample.kind == zenoh.SampleKind.PUT))
+    shown = [False, False]
+    for path, alive in told:
+        shown[path] = alive
+        tokens.on_sample(path, Sample(alive))  # type: ignore[arg-type]
+        assert (said[-1] if said else False) == any(shown)
+    assert all(one != next_one for one, next_one in pairwise(said))

@@ -24,7 +24,10 @@ def test_a_later_version_may_add_to_it() -> None:
 
 @pytest.mark.parametrize(
     "key", ["", "tandem", "other/r/alive/slave", "tandem/r/state", f"{KEY}".replace("0abc", "xyz"),
-            "tandem/r/alive/slave/0abcdef1", "tandem/r/alive/slave/0abcdef1/v/p"],
+            "tandem/r/alive/slave/0abcdef1", "tandem/r/alive/slave/0abcdef1/v/p",
+            # a stranger's: no link has such a robot, so whoever acted on it would fail
+            "tandem/a b/alive/slave", "tandem/-/alive/slave/0abcdef1/5-1/p",
+            f"tandem/{65 * 'r'}/alive/slave"],
 )  # fmt: skip
 def test_what_is_no_token_is_none(key: str) -> None:
     assert read_presence(key) is None
